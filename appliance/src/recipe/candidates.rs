@@ -6,6 +6,7 @@ use super::golden::{GoldenPart, SMOOTHING_PX};
 use super::{SequenceFile, SequenceKind, UnseenFile};
 use algo::inspect::ripple;
 use algo::pattern::{Sequence, Shot, Slips, Waveform, Waveforms};
+use algo::phase::Trust;
 use algo::units::PhaseDelta;
 
 /// A sequence that a part may be measured with: what it can unwrap, and what each frame shows.
@@ -108,6 +109,20 @@ impl GoldenPart<'_> {
             ripple_mm: None,
             unseen_orders,
         }
+    }
+
+    /// The share of the frame that one measurement with these frames is expected to resolve of a part that lies as taught. Golden, the mean of
+    /// several, also has pixels that the noise of one measurement takes below the least modulation.
+    pub(super) fn expected_coverage(&self, frames: &[Shot]) -> Option<f64> {
+        let sequence = Sequence::from_frames(frames).ok()?;
+        let (least, full_scale) = (self.decoder.least_modulation(), self.decoder.full_scale());
+        let taught = finest_waveform(self.full).fundamental();
+        let chance = least.chance(&sequence, (self.calibration.noise_counts, full_scale));
+        let pixels = self.phases.trust.iter().zip(&self.phases.modulation);
+        let resolved = pixels.filter(|(trust, _)| **trust == Trust::Resolved);
+        let chances =
+            resolved.map(|(_, modulation)| chance(modulation.counts(full_scale) / taught));
+        Some(chances.sum::<f64>() / self.phases.trust.len().max(1) as f64)
     }
 
     /// How often these frames give one of some pixels a wrong order unseen, if they can be unwrapped.

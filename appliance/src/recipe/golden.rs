@@ -27,7 +27,7 @@ pub(super) const SMOOTHING_PX: usize = 9;
 /// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be measured that well, else the limit is
 /// wider: see [`super::good_parts`].
 const DEVIATION_MM: f64 = 0.15;
-/// The coverage of a good part may be lower than golden's by this share of the frame. Noise alone causes less: of 200,000 pixels
+/// The coverage of a good part may be lower than expected by this share of the frame. Noise alone causes less: of 200,000 pixels
 /// that are all just at the least trusted modulation, the number of resolved ones has σ = √200,000 / 2, and 6 σ of the difference
 /// of two such numbers is 1,900, or 0.7 % of a frame of only 512 × 512 pixels.
 const COVERAGE_CHANGE: f64 = 0.01;
@@ -167,9 +167,18 @@ impl GoldenPart<'_> {
         let mut choice = planner::choose(&sequences, &gauges);
         let good_parts = self.weigh(surface, &mut arrays, &sequences, choice.production);
         choice.reasons.extend(good_parts.words());
+        let expected = sequences[choice.production..].iter();
+        let expected = expected.filter_map(|sequence| self.expected_coverage(&sequence.frames));
+        let coverage = expected.fold(f64::INFINITY, f64::min) - COVERAGE_CHANGE;
         for gauge in &mut gauges {
-            if matches!(gauge.measures, GaugeKind::Deviation { .. }) {
-                (gauge.low, gauge.high) = (Some(-good_parts.limit_mm), Some(good_parts.limit_mm));
+            match gauge.measures {
+                GaugeKind::Deviation { .. } => {
+                    let limit = good_parts.limit_mm;
+                    (gauge.low, gauge.high) = (Some(-limit), Some(limit));
+                }
+                // Of the whole frame; openings have an upper limit.
+                GaugeKind::Coverage => gauge.low = gauge.low.map(|_| coverage.max(0.0)),
+                _ => {}
             }
         }
         let range = self.triangulator.range();
@@ -329,7 +338,6 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
         name: "frame".into(),
         polygon: vec![[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]],
     }];
-    let coverage = resolved.iter().filter(|on| **on).count() as f64 / resolved.len().max(1) as f64;
     let mut gauges = vec![
         GaugeFile {
             name: "deviation".into(),
@@ -344,7 +352,7 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
             name: "coverage".into(),
             region: "frame".into(),
             measures: GaugeKind::Coverage,
-            low: Some((coverage - COVERAGE_CHANGE).max(0.0)),
+            low: Some(0.0),
             high: None,
         },
     ];
