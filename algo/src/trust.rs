@@ -1,8 +1,5 @@
 //! Whether a pixel is resolved, and if not, the first reason.
 
-use crate::pattern::Sequence;
-use alloc::vec::Vec;
-
 /// σ of a sample over the least modulation that is trusted. It decides how rare wrong fringe orders are: uniform noise of ±2.5 % of full
 /// scale (Peng & Gupta 2008), σ = 3.68 of 255 counts, gives 16 counts.
 pub const NOISE_OVER_LEAST: f64 = 0.23;
@@ -34,27 +31,6 @@ impl LeastModulation {
     /// In counts of an 8-bit sample.
     pub fn eight_bit(self) -> f64 {
         self.0
-    }
-
-    /// How likely all levels of a sequence are trusted in one measurement of a pixel, by the modulation that a sine has there. It is in
-    /// counts of samples with this full scale, and so is `noise`, σ of a sample. A level's modulation has σ_B = σ √(2 / N).
-    pub fn chance(
-        self,
-        sequence: &Sequence,
-        (noise, full_scale): (f64, u16),
-    ) -> impl Fn(f64) -> f64 {
-        let least = self.counts(full_scale);
-        let levels = sequence.levels().iter().map(|level| {
-            let sharpness = libm::sqrt(level.shifts() as f64) / 2.0 / noise;
-            (level.waveform.fundamental(), sharpness)
-        });
-        let levels: Vec<_> = levels.collect();
-        move |modulation| {
-            let trusted = |&(fundamental, sharpness): &(f64, f64)| {
-                0.5 * libm::erfc((least - modulation * fundamental) * sharpness)
-            };
-            levels.iter().map(trusted).product()
-        }
     }
 
     /// In counts of samples with this full scale.
@@ -127,22 +103,6 @@ impl Trust {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pattern::Shot;
-
-    #[test]
-    fn a_pixel_at_the_least_modulation_is_trusted_by_half_of_the_measurements_of_each_level() {
-        let least = LeastModulation::default();
-        let chance = |levels: &[f64], modulation| {
-            let shots: Vec<_> = levels.iter().flat_map(|&r| Shot::level(r, 8)).collect();
-            let sequence = Sequence::from_frames(&shots).unwrap();
-            least.chance(&sequence, (2.0, 255))(modulation)
-        };
-        assert!((chance(&[1.0], 16.0) - 0.5).abs() < 1e-12);
-        assert!((chance(&[0.75, 0.9375, 1.0], 16.0) - 0.125).abs() < 1e-12);
-        // σ_B of eight shifts is half of a sample's.
-        assert!((chance(&[1.0], 17.0) - 0.8413).abs() < 1e-4);
-        assert!(chance(&[1.0], 40.0) > 1.0 - 1e-12);
-    }
 
     #[test]
     fn the_least_modulation_is_four_sigma_and_a_third_and_never_below_four_counts() {

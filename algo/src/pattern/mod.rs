@@ -1,5 +1,6 @@
 //! What is projected: phase functions, their grey rasters, and sequences of levels and shifts.
 
+mod chance;
 mod encode;
 mod function;
 mod interpolate;

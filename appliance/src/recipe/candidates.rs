@@ -117,7 +117,7 @@ impl GoldenPart<'_> {
         let sequence = Sequence::from_frames(frames).ok()?;
         let (least, full_scale) = (self.decoder.least_modulation(), self.decoder.full_scale());
         let taught = finest_waveform(self.full).fundamental();
-        let chance = least.chance(&sequence, (self.calibration.noise_counts, full_scale));
+        let chance = sequence.chance_of_trust(least, (self.calibration.noise_counts, full_scale));
         let pixels = self.phases.trust.iter().zip(&self.phases.modulation);
         let resolved = pixels.filter(|(trust, _)| **trust == Trust::Resolved);
         let chances =

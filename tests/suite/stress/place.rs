@@ -37,6 +37,7 @@ fn embedded(random: &mut Random, inner: &Stack, (left, top): (usize, usize)) -> 
     let mut outer = Stack::dark(size, inner.bit_depth, inner.frames.clone(), range);
     let stride = outer.width + random.below(70);
     outer = outer.with_stride(stride);
+    outer.least = inner.least;
     // Random light, or none, around it.
     let full = usize::from(inner.full_scale());
     let dark = random.below(2) == 0;
