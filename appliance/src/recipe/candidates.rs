@@ -98,7 +98,7 @@ impl GoldenPart<'_> {
         };
         let valid = || (0..arrays.valid.len()).filter(|&at| arrays.valid[at] == 1);
         let variance = self.variance(kind, &frames, arrays);
-        let unseen_orders = self.unseen_orders(&frames, arrays, || valid().filter(safe));
+        let unseen_orders = self.unseen_orders((kind, &frames), arrays, || valid().filter(safe));
         let count = valid().count().max(1) as f64;
         let sigma_mm = (valid().map(variance).sum::<f64>() / count).sqrt();
         SequenceFile {
@@ -125,10 +125,11 @@ impl GoldenPart<'_> {
         Some(chances.sum::<f64>() / self.phases.trust.len().max(1) as f64)
     }
 
-    /// How often these frames give one of some pixels a wrong order unseen, if they can be unwrapped.
+    /// How often these frames give one of some pixels a wrong order unseen, if they can be unwrapped; of a sequence that counts as safe for
+    /// every placement, at the map.
     fn unseen_orders<P: Iterator<Item = usize>>(
         &self,
-        frames: &[Shot],
+        (kind, frames): (SequenceKind, &[Shot]),
         arrays: &Arrays,
         pixels: impl Fn() -> P,
     ) -> Option<UnseenFile> {
@@ -136,7 +137,10 @@ impl GoldenPart<'_> {
         let slips = Slips::of(&sequence, self.triangulator.function().range()).ok()?;
         let taught = finest_waveform(self.full).fundamental();
         let noise = self.calibration.noise_counts * taught;
-        let reach = |at: usize| f64::from(arrays.phase_reach[at]);
+        let reach = |at: usize| {
+            kind.reach()
+                .map_or(0.0, |_| f64::from(arrays.phase_reach[at]))
+        };
         let rates =
             pixels().map(|at| slips.rate(noise / f64::from(arrays.modulation[at]), reach(at)));
         let farthest = pixels().map(reach).fold(0.0, f64::max);

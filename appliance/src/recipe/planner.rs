@@ -9,6 +9,9 @@ pub(super) const SIGMAS: f64 = 6.0;
 /// Share of the golden surface that must be safe for a sequence that is not full.
 const SAFE_SHARE: f64 = 0.98;
 
+/// Rates below this are as good as none.
+const LEAST_RATE: f64 = 1e-12;
+
 /// The chosen sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
@@ -65,7 +68,8 @@ pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile]) -> Choice {
             std::cmp::Ordering::Greater => "better, not needed",
         };
         let unseen = sequence.unseen_orders.map(|UnseenFile { part, darkest }| {
-            format!(", wrong fringe orders unseen at {part:.0e} of its pixels ({darkest:.0e} where it is darkest)")
+            let [part, darkest] = [part, darkest].map(rate);
+            format!(", wrong fringe orders unseen at {part} of its pixels ({darkest} where it is darkest)")
         });
         format!(
             "{} frames: predicted σ {:.1} µm of {:.1} µm allowed, safe on {:.1} % of the part{}: {word}",
@@ -79,6 +83,14 @@ pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile]) -> Choice {
     Choice {
         production: taken,
         reasons: sequences.iter().enumerate().map(reason).collect(),
+    }
+}
+
+/// A rate in words.
+fn rate(of: f64) -> String {
+    match of < LEAST_RATE {
+        true => format!("less than {LEAST_RATE:.0e}"),
+        false => format!("{of:.0e}"),
     }
 }
 
