@@ -170,6 +170,7 @@ mod tests {
         assert!(choice.reasons[0].contains("4 frames") && choice.reasons[0].contains("not safe"));
         let unseen = "unseen at 2e-9 of its pixels (2e-3 where it is darkest)";
         assert!(choice.reasons[0].contains(unseen), "{}", choice.reasons[0]);
+        assert_eq!(rate(1e-148), "less than 1e-12");
         assert!(choice.reasons[1].ends_with("taken"));
         assert!(choice.reasons[2].ends_with("better, not needed"));
     }

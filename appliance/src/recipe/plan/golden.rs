@@ -60,8 +60,8 @@ fn delta(offset: &[i16], at: usize) -> PhaseDelta {
     PhaseDelta::from_bits(offset.get(at).copied().map_or(0, i32::from))
 }
 
-/// The surface that deviations refer to, as the sequence with this offset measured it. Where golden has none, such as in an opening, it is interpolated from the surface
-/// around: material that should not be there must be found, by the full sequence at least.
+/// The surface that deviations refer to, as the sequence with this offset measured it. Where golden has none, such as in an opening, it is
+/// interpolated from the surface around: material that should not be there must be found, by the full sequence at least.
 pub(super) fn surface(width: usize, arrays: &Arrays, offset: &[i16]) -> KnownSurface {
     let mut height = vec![Height::UNKNOWN; arrays.golden_height.len()];
     pipeline::for_each_row(&mut height, width, |v, row| {

@@ -39,6 +39,8 @@ pub(super) const REACH: usize = SIDE / 2;
 pub const PIXELS: f64 = (SIDE * SIDE) as f64;
 /// Bits of the samples that are used.
 const BITS: u8 = 12;
+/// Rows of a band.
+pub(super) const BAND_ROWS: usize = 64;
 /// Steps of a turn in the table of sines.
 const TURN: usize = 4096;
 
@@ -174,7 +176,7 @@ impl Windows {
         terms: &mut Terms,
         sines: &mut [[i16; 2]],
     ) {
-        // Always.
+        // The table always has this length; as an array it needs no checks of bounds.
         if let Some(table) = self.sines.first_chunk::<TURN>() {
             for (sine, phase) in sines.iter_mut().zip(&terms.phase) {
                 *sine = table[(phase.to_bits() & 0xffff) as usize / (65_536 / TURN)];
@@ -332,6 +334,3 @@ fn full_scale(bit_depth: u8) -> f64 {
 fn unit(bit_depth: u8) -> f64 {
     libm::exp2(f64::from(BITS) - f64::from(bit_depth))
 }
-
-/// Rows of a band.
-pub(super) const BAND_ROWS: usize = 64;
