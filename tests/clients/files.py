@@ -59,10 +59,17 @@ def recipe(program, folder):
         expect(archive.testzip() is None, "the recipe's checksums hold")
         manifest = json.loads(archive.read("recipe.json"))
         rows_and_columns = {key: (manifest[key]["height"], manifest[key]["width"]) for key in ("camera", "projector")}
+        rows, columns = rows_and_columns["camera"]
+        others = {
+            "phase_function.npy": rows_and_columns["projector"],
+            "sequence_offset.npy": ((len(manifest["sequences"]) - 1) * rows, columns),
+        }
         arrays = [name for name in archive.namelist() if name.endswith(".npy")]
+        expect(set(others) <= set(arrays), f"the recipe holds {', '.join(others)}")
         for name in arrays:
-            size = rows_and_columns["projector" if name == "phase_function.npy" else "camera"]
-            expect(numpy.load(io.BytesIO(archive.read(name))).shape == size, f"{name} is [rows, columns]")
+            size = others.get(name, (rows, columns))
+            shape = numpy.load(io.BytesIO(archive.read(name))).shape
+            expect(shape == size, f"{name} is {size}, not {shape}")
     return len(arrays)
 
 
