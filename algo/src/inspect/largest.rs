@@ -3,11 +3,12 @@
 //! # Idea
 //! The largest of many noisy means is not 0 on a good part, and scatters much less than one of them: over 10³ independent squares of
 //! error σ it reads 3.5 σ with a scatter of 0.3 σ. On a part with a defect that is far larger than that, it is the mean over one
-//! square and has its error. In between, the largest deviation is the greater of two: that of noise alone, M, and that of one
-//! place that does deviate, X.
+//! square and has its error. In between, the largest deviation is the greater of two: that of noise alone, M, and that of what
+//! does deviate, X. Where several places deviate by nearly as much, as edges of a displaced part do, X is the greatest of
+//! them, which scatters less than each.
 //!
 //! # Equations
-//! M has the mean e and the scatter s of [`LargestDeviation`]. X is normal with a mean m and the error σ of the square. Moments of their
+//! M has the mean e and the scatter s of [`LargestDeviation`]. X is normal with a mean m and a scatter σ. Moments of their
 //! maximum (C. E. Clark, *The greatest of a finite set of random variables*, Oper. Res. 9, 1961, eqs. 2 and 3), a² = σ² + s²,
 //! α = (m − e)/a:
 //!
@@ -16,7 +17,8 @@
 //! E₂ = (m² + σ²) Φ(α) + (e² + s²) Φ(−α) + (m + e) a φ(α)
 //! ```
 //!
-//! m is the one for which E is the measured value less 2 s: what noise alone reaches says nothing about a defect.
+//! m is the one for which E is the measured value less 2 s: what noise alone reaches says nothing about a defect. σ is the scatter of the
+//! greatest of the squares that were found, from the same equations, one square after the other, with their measured values as means.
 //!
 //! # Shapes and units
 //! Lengths in mm.
@@ -94,42 +96,47 @@ impl Largest {
         }
     }
 
-    /// The error of a largest deviation of magnitude `value` that was found in a square of error `sigma`.
-    pub(super) fn uncertain(self, value: f64, sigma: f64) -> Uncertain {
-        let spread = libm::sqrt(sigma * sigma + self.scatter * self.scatter);
-        let beyond = value - NOISE * self.scatter;
-        if !(beyond > self.mean && spread > 0.0) {
-            let variance = self.scatter * self.scatter;
+    /// The error of the largest of deviations that were found in squares that share no pixel: their magnitudes and variances.
+    pub(super) fn uncertain(
+        self,
+        largest: [f64; 2],
+        others: impl IntoIterator<Item = [f64; 2]>,
+    ) -> Uncertain {
+        let noise = [self.mean, self.scatter * self.scatter];
+        let beyond = largest[0] - NOISE * self.scatter;
+        if !(beyond > self.mean && largest[1] > 0.0) {
             return Uncertain {
-                variance,
+                variance: noise[1],
                 defect: 0.0,
             };
         }
+        let greatest = |greatest, next| greater(greatest, next).0;
+        let [_, variance] = others.into_iter().fold(largest, greatest);
+        let spread = libm::sqrt(variance + self.scatter * self.scatter);
         let (mut low, mut high) = (self.mean - FAR * spread, beyond);
         for _ in 0..HALVINGS {
             let middle = (low + high) / 2.0;
-            match self.greater(middle, sigma, spread).0 > beyond {
+            match greater([middle, variance], noise).0[0] > beyond {
                 true => high = middle,
                 false => low = middle,
             }
         }
-        let (_, variance, defect) = self.greater(high, sigma, spread);
+        let ([_, variance], defect) = greater([high, variance], noise);
         Uncertain { variance, defect }
     }
+}
 
-    /// Mean and variance of the greater of noise and a defect of mean `m`, and how often it is the defect.
-    fn greater(self, m: f64, sigma: f64, spread: f64) -> (f64, f64, f64) {
-        let Self { mean: e, scatter } = self;
-        let alpha = (m - e) / spread;
-        let defect = 0.5 * libm::erfc(-alpha / SQRT_2);
-        let both = spread * libm::exp(-alpha * alpha / 2.0) / libm::sqrt(2.0 * PI);
-        // About e, so that little is lost in the difference.
-        let first = (m - e) * defect + both;
-        let second = ((m - e) * (m - e) + sigma * sigma) * defect
-            + scatter * scatter * (1.0 - defect)
-            + (m - e) * both;
-        (e + first, (second - first * first).max(0.0), defect)
-    }
+/// Mean and variance of the greater of two normal numbers with these means and variances, and how often it is the first. At least one
+/// variance is not 0.
+fn greater([m, u]: [f64; 2], [e, v]: [f64; 2]) -> ([f64; 2], f64) {
+    let spread = libm::sqrt(u + v);
+    let alpha = (m - e) / spread;
+    let chance = 0.5 * libm::erfc(-alpha / SQRT_2);
+    let both = spread * libm::exp(-alpha * alpha / 2.0) / libm::sqrt(2.0 * PI);
+    // About e, so that little is lost in the difference.
+    let first = (m - e) * chance + both;
+    let second = ((m - e) * (m - e) + u) * chance + v * (1.0 - chance) + (m - e) * both;
+    ([e + first, (second - first * first).max(0.0)], chance)
 }
 
 #[cfg(test)]
@@ -169,20 +176,56 @@ mod tests {
         let noise = Largest { mean, scatter };
         // Noise alone, as far as it reaches, has its own scatter.
         for value in [0.9 * mean, mean, mean + 2.0 * scatter] {
-            let found = noise.uncertain(value, 1.0);
+            let found = noise.uncertain([value, 1.0], []);
             assert_eq!((found.variance, found.defect), (scatter * scatter, 0.0));
         }
         // A defect that noise does not reach has the error of its square, and one in between is in between.
         for (defect, within) in [(4.5, 0.35), (6.0, 0.1), (9.0, 0.05)] {
             let (value, spread) = drawn(defect, &mut random);
-            let found = noise.uncertain(value, 1.0);
+            let found = noise.uncertain([value, 1.0], []);
             let ratio = spread / libm::sqrt(found.variance);
             assert!((ratio - 1.0).abs() < within, "{defect}: {ratio}");
         }
-        assert!(noise.uncertain(9.0, 1.0).defect > 0.99);
-        assert_eq!(Largest::default().uncertain(0.0, 0.0).variance, 0.0);
-        let twice = noise.times(2.0).uncertain(18.0, 2.0);
-        let once = noise.uncertain(9.0, 1.0);
+        assert!(noise.uncertain([9.0, 1.0], []).defect > 0.99);
+        assert_eq!(Largest::default().uncertain([0.0, 0.0], []).variance, 0.0);
+        let twice = noise.times(2.0).uncertain([18.0, 4.0], []);
+        let once = noise.uncertain([9.0, 1.0], []);
         assert!((twice.variance / once.variance - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn places_that_deviate_alike_scatter_less_than_each_of_them() {
+        let mut random = SplitMix64::seed_from_u64(4);
+        let noise = Largest {
+            mean: 3.5,
+            scatter: 0.3,
+        };
+        // Means and errors of places: alike, a noisy one among quiet ones, and one that is far above the others.
+        for (places, alone) in [
+            (&[[12.0, 1.0]; 4][..], false),
+            (&[[12.0, 2.0], [12.0, 0.5], [11.5, 0.5]], false),
+            (&[[18.0, 1.0], [12.0, 1.0], [12.0, 1.0]], true),
+        ] {
+            let mut draw = || {
+                let draws = places
+                    .iter()
+                    .map(|[m, sigma]| [m + sigma * normal(&mut random), sigma * sigma]);
+                let mut found: Vec<_> = draws.collect();
+                found.sort_by(|a, b| b[0].total_cmp(&a[0]));
+                let uncertain = noise.uncertain(found[0], found[1..].iter().copied());
+                (found[0][0], uncertain.variance, found[0][1])
+            };
+            let draws: Vec<_> = (0..DRAWS).map(|_| draw()).collect();
+            let mean = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
+                draws.iter().map(of).sum::<f64>() / DRAWS as f64
+            };
+            let average = mean(&|draw| draw.0);
+            let scatter = libm::sqrt(mean(&|draw| (draw.0 - average) * (draw.0 - average)));
+            let ratio = scatter / libm::sqrt(mean(&|draw| draw.1));
+            let without = scatter / libm::sqrt(mean(&|draw| draw.2));
+            std::println!("{scatter:.3}: {ratio:.3}, without the others {without:.3}");
+            assert!((0.85..1.15).contains(&ratio), "{places:?}: {ratio}");
+            assert_eq!((0.85..1.15).contains(&without), alone, "{without}");
+        }
     }
 }

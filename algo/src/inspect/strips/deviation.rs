@@ -7,7 +7,9 @@
 //! σ² = Σ w² σ_p² / n² + gᵀ C g        g = Σ w j / n
 //! ```
 //!
-//! The deviation is the largest of many such means, so its own error is that of an extreme ([`largest`](crate::inspect::largest)).
+//! The deviation is the largest of many such means, so its own error is that of an extreme ([`largest`](crate::inspect::largest)): of
+//! noise, and of all squares that come near the one that was found. The motion's error differs from place to place, so each of these has its
+//! own.
 //! j is the Jacobian of a pixel's height over the motion ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)); it changes
 //! little over a square, so its mean over some pixels is taken.
 
@@ -79,40 +81,34 @@ impl SquareNoise {
 }
 
 impl Production {
-    /// The reading of the square of `side` pixels that was found. σ_z is `noisier` times the taught σ.
-    /// The error of the square itself is worked out here, for this one square alone.
+    /// The reading of the first of the squares of `side` pixels that were found, in falling order; none if there is none. σ_z is `noisier`
+    /// times the taught σ. The errors of the squares are worked out here, for these few alone.
     pub(super) fn deviation(
         &self,
-        (best, side): (Extreme, usize),
+        (found, side): (&[Extreme], usize),
         input: Input<'_>,
         pose: &PoseField,
         strip: &mut Strip,
         (gauge, noisier): (usize, f64),
-    ) -> Reading {
-        let half = side / 2;
-        let bottom = (best.row + half + 1).min(self.window.len());
-        let mut noise = SquareNoise::new(side);
-        for v in best.row.saturating_sub(half)..bottom {
-            let window = &self.window[v];
-            let left = best.column.saturating_sub(half).max(window.start);
-            let right = (best.column + half + 1).min(window.end);
-            if left < right {
-                strip.add_noise(self, pose, input, v, left..right, &mut noise);
-            }
-        }
-        let count = best.count as f64;
-        let (pixels, motion) = noise.variances(count, pose.placed.as_ref());
+    ) -> Option<Reading> {
+        let best = found.first()?;
         let smoothed = self.square_variance(side);
-        let pixels = pixels * smoothed;
-        let value = best.sum as f64 / count / 1e6;
+        let mut variances = found.iter().map(|square| {
+            let noise = self.noise_of(square, side, input, pose, strip);
+            let (pixels, motion) = noise.variances(square.count as f64, pose.placed.as_ref());
+            (pixels * smoothed, motion)
+        });
+        let (pixels, motion) = variances.next()?;
+        let others = found[1..].iter().zip(variances);
+        let others = others.map(|(square, (pixels, motion))| [magnitude(square), pixels + motion]);
         // What good parts read: golden's noise and that of this measurement.
         let golden = self.golden_variance(noisier) / smoothed;
         let largest = self.largest.get(gauge).copied().unwrap_or_default();
         let largest = largest.times(libm::sqrt(1.0 + 1.0 / golden));
-        let extreme = largest.uncertain(libm::fabs(value), libm::sqrt(pixels));
-        let sigma = libm::sqrt(extreme.variance + motion);
-        Reading {
-            value,
+        let extreme = largest.uncertain([magnitude(best), pixels + motion], others);
+        let sigma = libm::sqrt(extreme.variance + (1.0 - extreme.defect) * motion);
+        Some(Reading {
+            value: best.sum as f64 / best.count as f64 / 1e6,
             sigma: (sigma > 0.0).then_some(sigma),
             expected: Some(largest.mean).filter(|mean| *mean > 0.0),
             // The extreme of noise scatters with golden's noise, too; that of a defect is shifted by it.
@@ -122,7 +118,30 @@ impl Production {
                 ),
                 libm::hypot(self.displaced(pose.placed.as_ref()), self.rippled()),
             ),
+        })
+    }
+
+    /// The noise of the pixels of a square.
+    fn noise_of(
+        &self,
+        square: &Extreme,
+        side: usize,
+        input: Input<'_>,
+        pose: &PoseField,
+        strip: &mut Strip,
+    ) -> SquareNoise {
+        let half = side / 2;
+        let bottom = (square.row + half + 1).min(self.window.len());
+        let mut noise = SquareNoise::new(side);
+        for v in square.row.saturating_sub(half)..bottom {
+            let window = &self.window[v];
+            let left = square.column.saturating_sub(half).max(window.start);
+            let right = (square.column + half + 1).min(window.end);
+            if left < right {
+                strip.add_noise(self, pose, input, v, left..right, &mut noise);
+            }
         }
+        noise
     }
 
     /// The Jacobian, over the motion, of the height of what a pixel sees `offset_nm` above golden; none where the surface there has
@@ -141,6 +160,11 @@ impl Production {
         let facet = self.golden().facet(point, seen)?;
         Some(facet.jacobian(point, (alignment.centre, alignment.radius)))
     }
+}
+
+/// |mean| of a square, mm.
+fn magnitude(square: &Extreme) -> f64 {
+    square.sum.abs() as f64 / square.count as f64 / 1e6
 }
 
 #[cfg(test)]

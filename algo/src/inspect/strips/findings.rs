@@ -3,6 +3,7 @@
 use super::counts::TRUSTS;
 use super::coverage;
 use super::pose::PoseField;
+use super::squares::rivals::rivals;
 use super::uncertainty::Made;
 use super::{CellBuffers, Input, MAX_GAUGES, Measure, Production, Strip, Strips};
 use crate::inspect::Reading;
@@ -126,13 +127,14 @@ impl Production {
                 })
             }
             Measure::Deviation { side } => {
-                let extremes = strips
-                    .iter()
-                    .filter_map(|strip| strip.squares.extremes[gauge]);
-                let best =
-                    extremes.reduce(|best, next| if next.reaches(&best) { next } else { best })?;
+                for below in 1..strips.len() {
+                    if let [above, below] = &mut strips[below - 1..=below] {
+                        below.squares.extremes[gauge].join(&mut above.squares.extremes[gauge]);
+                    }
+                }
+                let found = rivals(strips.iter().map(|strip| &strip.squares.extremes[gauge]));
                 let strip = strips.first_mut()?;
-                Some(self.deviation((best, side), input, pose, strip, (gauge, noisier)))
+                self.deviation((&found, side), input, pose, strip, (gauge, noisier))
             }
             Measure::Placement(component) => {
                 let (value, sigma) = pose.placed.as_ref()?.component(component)?;

@@ -33,14 +33,14 @@ impl Strip {
     pub fn new(plan: &Production, rows: Range<usize>) -> Self {
         let width = plan.size().0;
         Self {
-            rows,
             decoded: PhaseMap::new(width, 1),
             heights: HeightRow::new(width),
             coordinates: TaughtCoordinates::new(width),
             recent: RecentRows::new(width, plan.gauges.largest_side()),
             counts: Counts::new(plan),
-            squares: Squares::new(plan),
+            squares: Squares::new(plan, &rows),
             samples: Vec::new(),
+            rows,
         }
     }
 

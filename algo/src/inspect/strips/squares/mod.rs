@@ -2,10 +2,11 @@
 //!
 //! Sums down the columns slide from row to row: the row that enters the squares is added, the one that leaves them is taken out.
 //! Sums over squares follow from these along the row: in 32 bits where all deviations are small ([`narrow`]), to find the few
-//! places where the largest may be, and exactly there ([`extreme`]).
+//! places where the largest may be, and exactly there ([`extreme`]). What comes near the largest elsewhere is kept, too ([`rivals`]).
 
 pub(super) mod extreme;
 pub(super) mod narrow;
+pub(super) mod rivals;
 
 use super::pose::PoseField;
 use super::recent::RecentRows;
@@ -15,8 +16,9 @@ use crate::simd::{Lanes, back_end_entry};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
-use extreme::{Extreme, SquareRow};
+use extreme::SquareRow;
 use narrow::NarrowSums;
+use rivals::Extremes;
 
 /// A packed sum holds the number of its terms above this bit, and their sum below it.
 const COUNT_BIT: u32 = 44;
@@ -27,19 +29,24 @@ pub(super) struct Squares {
     /// For each side the packed sums down the columns, with half a side of padding at both ends.
     columns: Vec<Vec<i64>>,
     narrow: NarrowSums,
-    /// Per gauge: the square of largest deviation.
-    pub extremes: Vec<Option<Extreme>>,
+    /// Per gauge: the squares of largest deviation.
+    pub extremes: Vec<Extremes>,
 }
 
 impl Squares {
-    pub fn new(plan: &Production) -> Self {
+    /// Of a strip's own rows.
+    pub fn new(plan: &Production, rows: &Range<usize>) -> Self {
         let (width, sides) = (plan.size().0, &plan.gauges.sides);
         let padding = sides.iter().max().map_or(0, |side| side / 2 * 2);
         let padded = sides.iter().map(|side| vec![0; width + side / 2 * 2]);
+        let extremes = plan.gauges.list.iter().map(|gauge| match gauge.measure {
+            Measure::Deviation { side } => Extremes::new(side, rows, width),
+            _ => Extremes::default(),
+        });
         Self {
             columns: padded.collect(),
             narrow: NarrowSums::new(width + padding),
-            extremes: vec![None; plan.gauges.list.len()],
+            extremes: extremes.collect(),
         }
     }
 
@@ -47,7 +54,7 @@ impl Squares {
         for sums in &mut self.columns {
             sums.fill(0);
         }
-        self.extremes.fill(None);
+        self.extremes.iter_mut().for_each(Extremes::clear);
     }
 
     /// Slides the sums of each side down to row `v`, and looks at the squares that are complete with it and whose middle is one
@@ -87,15 +94,14 @@ impl Squares {
                 row: middle,
             };
             let gauges = plan.gauges.list.iter().zip(&mut self.extremes);
-            for (at, (gauge, best)) in gauges.enumerate() {
+            for (at, (gauge, extremes)) in gauges.enumerate() {
                 if gauge.measure == (Measure::Deviation { side }) {
                     for (_, span) in pose.region(plan, at).row(middle) {
                         let span = common(span, &seen);
-                        if narrow {
-                            self.narrow.search(backend, best, &row, span);
-                        } else {
-                            row.search(best, span);
-                        }
+                        extremes.update(middle, &span, |best, span| match narrow {
+                            true => self.narrow.search(backend, best, &row, span),
+                            false => row.search(best, span),
+                        });
                     }
                 }
             }
