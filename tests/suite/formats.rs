@@ -26,7 +26,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 66] = [
+const KEYS: [&str; 68] = [
     "alignment",
     "calibration",
     "camera",
@@ -78,6 +78,7 @@ const KEYS: [&str; 66] = [
     "projector.height",
     "projector.width",
     "range_mm",
+    "read_noise_counts",
     "regions",
     "regions.name",
     "regions.polygon",
@@ -90,6 +91,7 @@ const KEYS: [&str; 66] = [
     "sequences.unseen_orders",
     "sequences.unseen_orders.darkest",
     "sequences.unseen_orders.part",
+    "shot_noise",
     "taught_at_unix_s",
     "taught_by",
     "version",

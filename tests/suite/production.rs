@@ -2,13 +2,14 @@
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::whole_maps::{Comparison, Golden};
+use algo::frame::SampleNoise;
 use algo::inspect::{Findings, Measure, Production, Region, Weight};
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, decode};
 use algo::simd::Backend;
 use algo::units::{AbsolutePhase, Height, PhaseDelta};
 use appliance::head::seam;
-use appliance::recipe::archive::pack;
+use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
 use appliance::recipe::{AlignmentKind, Recipe};
@@ -157,6 +158,7 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
     let mut strips = production.strips(37);
     let found = production.inspect(&views, &mut strips, None).unwrap();
     let heights = plan.heights(0, frames).unwrap();
+    let even = even_noise(recipe);
     let (decoder, window) = (production.decoder(), Some(production.window()));
     let map = decoder.unwrapping().needs_map().then(|| production.map());
     let phases = decode(decoder, &views, map, window).unwrap();
@@ -174,7 +176,7 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
             .unwrap();
         compared += 1;
         gross += u32::from((exact.point.z - f64::from(mm)).abs() > MAX_ERROR_MM + SINGLE_MM);
-        let turns = decoder.phase_noise(phases.modulation[at], recipe.conditions.noise_counts);
+        let turns = decoder.phase_noise(phases.modulation[at], even);
         sigma[at] = (turns / exact.slope.abs()) as f32;
     }
     assert_eq!(
@@ -267,6 +269,24 @@ pub(crate) fn expected(
     }
 }
 
+/// The noise of all pixels alike with which σ_z of the compared part has the RMS that it has by the light of each.
+fn even_noise(recipe: &Recipe) -> SampleNoise {
+    let Arrays {
+        valid,
+        modulation,
+        height_slope,
+        ..
+    } = &recipe.arrays;
+    let compared = (0..valid.len()).filter(|&at| valid[at] != 0);
+    let weighted = compared.map(|at| {
+        let counts = f64::from(modulation[at]);
+        let weight = (f64::from(height_slope[at]) / counts).powi(2);
+        (weight, weight * recipe.conditions.noise.at(counts).powi(2))
+    });
+    let sums = weighted.fold((0.0, 0.0), |sum, next| (sum.0 + next.0, sum.1 + next.1));
+    SampleNoise::constant((sums.1 / sums.0).sqrt())
+}
+
 /// σ of golden's heights with the plan's sequence, mm.
 fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
     let arrays = &recipe.arrays;
@@ -275,13 +295,12 @@ fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
     // The modulation as taught is that of the last sequence's waveform.
     let fundamental = |at: usize| recipe.sequences[at].fundamental();
     let brighter = fundamental(0) / fundamental(recipe.sequences.len() - 1);
-    let noise = recipe.conditions.noise_counts / brighter;
     let sigma = arrays.modulation.iter().zip(&arrays.height_slope);
     sigma
         .map(|(&counts, &slope)| {
             let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
             let modulation = algo::units::Modulation::from_bits(share);
-            let turns = decoder.phase_noise(modulation, noise);
+            let turns = decoder.phase_noise(modulation, recipe.conditions.noise) / brighter;
             (turns * f64::from(slope).abs()) as f32
         })
         .collect()

@@ -3,7 +3,7 @@
 use super::arrived::Arrived;
 use super::level::Level;
 use super::unwrap::{Unwrapper, information};
-use crate::frame::{FrameView, Samples};
+use crate::frame::{FrameView, SampleNoise, Samples};
 use crate::pattern::{PhaseRange, Sequence, SequenceError, Unwrapping};
 use crate::simd::Backend;
 use crate::trust::{LeastModulation, Trust};
@@ -186,11 +186,11 @@ impl Decoder {
     /// σ_Φ of a resolved pixel in turns: σ_I / 2π · √(2 / Σ N_i r_i² B²). B is the finest level's, the smallest of all, so that σ
     /// is not too small.
     ///
-    /// `noise` is σ_I, the noise of one sample in counts.
-    pub fn phase_noise(&self, modulation: Modulation, noise: f64) -> f64 {
+    /// `noise` is σ_I, the noise of one sample.
+    pub fn phase_noise(&self, modulation: Modulation, noise: SampleNoise) -> f64 {
         let counts = modulation.counts(self.full_scale());
         let information = self.information * counts * counts;
-        noise / core::f64::consts::TAU * libm::sqrt(2.0 / information)
+        noise.at(counts) / core::f64::consts::TAU * libm::sqrt(2.0 / information)
     }
 
     /// The smallest modulation that is trusted.

@@ -1,7 +1,7 @@
 //! Whole frames: frames → phase map → height map.
 
 use super::{for_each, for_each_row, for_each_row_of_two};
-use crate::frame::FrameView;
+use crate::frame::{FrameView, SampleNoise};
 use crate::geometry::Triangulator;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow, Trust};
 use crate::units::{AbsolutePhase, Height, Modulation};
@@ -146,12 +146,12 @@ fn each_row(
     phases
 }
 
-/// Triangulates every resolved pixel, and marks those without a height in the working range as [`Trust::OutOfRange`]. `noise` is σ of
-/// one sample in counts, for σ_z.
+/// Triangulates every resolved pixel, and marks those without a height in the working range as [`Trust::OutOfRange`]. `noise` is that of
+/// one sample, for σ_z.
 pub fn triangulate(
     triangulator: &Triangulator,
     decoder: &Decoder,
-    noise: Option<f64>,
+    noise: Option<SampleNoise>,
     phases: &mut PhaseMap,
 ) -> HeightMap {
     let width = phases.width;

@@ -1,6 +1,6 @@
 //! The noise of one sample, estimated from the redundancy of levels with 4 or more shifts.
 
-use super::map_rows;
+use super::{PhaseMap, map_rows};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{Level, Sequence};
 use crate::phase::Trust;
@@ -35,6 +35,46 @@ pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trus
         .into_iter()
         .fold((0.0, 0.0), |sum, row| (sum.0 + row.0, sum.1 + row.1));
     (freedom > 0.0).then(|| libm::sqrt(squares / freedom))
+}
+
+/// The mean signal of the resolved pixels over their modulation, both of the finest level; with it σ of a sample follows from the modulation.
+/// 1 if there is none. Samples have `full_scale` counts at most.
+pub fn signal_per_modulation(
+    sequence: &Sequence,
+    (frames, full_scale): (&[FrameView<'_>], u16),
+    phases: &PhaseMap,
+) -> f64 {
+    let (Some(finest), Some(first)) = (sequence.levels().last(), frames.first()) else {
+        return 1.0;
+    };
+    let width = first.width();
+    let finest = finest.frames.iter().map(|&at| frames[usize::from(at)]);
+    let finest: Vec<FrameView<'_>> = finest.collect();
+    let rows = map_rows(first.height(), |v| {
+        let rows: Vec<Samples<'_>> = finest.iter().map(|frame| frame.row(v)).collect();
+        let (mut signal, mut modulation) = (0_u64, 0_u64);
+        for u in (0..width).filter(|u| phases.trust[v * width + u] == Trust::Resolved) {
+            signal += rows.iter().map(|row| u64::from(count(row, u))).sum::<u64>();
+            modulation += u64::from(phases.modulation[v * width + u].to_bits());
+        }
+        (signal, modulation)
+    });
+    let (signal, modulation) = rows
+        .into_iter()
+        .fold((0, 0), |sum, row| (sum.0 + row.0, sum.1 + row.1));
+    let counts = f64::from(full_scale) / f64::from(u16::MAX) * modulation as f64;
+    match counts > 0.0 {
+        true => signal as f64 / finest.len() as f64 / counts,
+        false => 1.0,
+    }
+}
+
+/// A sample in counts.
+fn count(row: &Samples<'_>, u: usize) -> u16 {
+    match row {
+        Samples::Eight(row) => row[u].into(),
+        Samples::Sixteen(row) => row[u],
+    }
 }
 
 /// What a level's samples are fitted by: offset, fundamental, and the places of the waveform's harmonics.
@@ -81,10 +121,7 @@ impl Fit {
 
     /// Σ of the squared deviations of pixel `u` from its fitted waveform, in counts².
     fn residual_square(&self, rows: &[Samples<'_>], u: usize) -> f64 {
-        let count = |frame: usize| match rows[frame] {
-            Samples::Eight(row) => f64::from(row[u]),
-            Samples::Sixteen(row) => f64::from(row[u]),
-        };
+        let count = |frame: usize| f64::from(count(&rows[frame], u));
         let (mut sum, mut squares) = (0.0, 0.0);
         for &frame in &self.frames {
             sum += count(frame);

@@ -18,6 +18,7 @@ use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
 use algo::adaptive::ProjectorMap;
+use algo::frame::SampleNoise;
 use hal::bounds::text;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
@@ -276,6 +277,7 @@ impl Teach {
             phases,
             heights: &surface.map,
             offsets: &[],
+            noise: SampleNoise::constant(noise),
             captures: 1,
             comparison: None,
         };

@@ -80,8 +80,8 @@ impl CalibratedHead<'_> {
             map => map.filter(|_| scan.needs_map()),
         };
         let mut phases = scan.phases(map).map_err(impossible)?;
-        let noise = Some(calibration.noise_counts);
-        let heights = scan.heights(&triangulator, noise, &mut phases);
+        let noise = scan.noise(calibration, &phases);
+        let heights = scan.heights(&triangulator, Some(noise), &mut phases);
         Ok(Measured {
             phases,
             heights,

@@ -4,7 +4,7 @@
 use super::calibration::Calibration;
 use super::rasters::rasters;
 use super::seam;
-use algo::frame::FrameView;
+use algo::frame::{FrameView, SampleNoise};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::{Decoder, LeastModulation};
@@ -117,15 +117,22 @@ impl<'a> Scan<'a> {
         pipeline::decode(&self.decoder, &self.frames, map, None).map_err(words)
     }
 
+    /// The noise of a sample by the modulation of its pixel.
+    pub fn noise(&self, calibration: &Calibration, phases: &PhaseMap) -> SampleNoise {
+        let frames = (&self.frames[..], self.decoder.full_scale());
+        let signal = pipeline::signal_per_modulation(&self.sequence, frames, phases);
+        calibration.noise.by(signal)
+    }
+
     /// The heights of its phases, and their σ where the noise of a sample is known; phases outside of the working range lose
     /// their trust.
     pub fn heights(
         &self,
         triangulator: &Triangulator,
-        noise_counts: Option<f64>,
+        noise: Option<SampleNoise>,
         phases: &mut PhaseMap,
     ) -> HeightMap {
-        pipeline::triangulate(triangulator, &self.decoder, noise_counts, phases)
+        pipeline::triangulate(triangulator, &self.decoder, noise, phases)
     }
 }
 

@@ -19,6 +19,7 @@ use crate::head::seam;
 use crate::output::cloud::Surface;
 use crate::recipe::Recipe;
 use algo::adaptive::ProjectorMap;
+use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
 use algo::pattern::PhaseFunction;
 use algo::phase::{Decoder, LeastModulation};
@@ -160,6 +161,10 @@ fn measure_about(
         } = &channel.scan;
         pipeline::sample_noise(sequence, frames, &phases[primary].trust)
     });
+    let by_light = match (recording.noise_counts, recipe) {
+        (None, Some(recipe)) => Some(recipe.conditions.noise),
+        _ => noise.map(SampleNoise::constant),
+    };
     stage_ended("noise", started);
     let started = Instant::now();
     let no_phase = wrapped_only[primary].as_ref();
@@ -170,7 +175,7 @@ fn measure_about(
     let heights = geometry.map(|triangulator| Surface {
         map: channel
             .scan
-            .heights(&triangulator, noise, &mut phases[primary]),
+            .heights(&triangulator, by_light, &mut phases[primary]),
         triangulator,
     });
     stage_ended("height", started);

@@ -80,6 +80,12 @@ impl RecipeFile {
         }
         let (least, most) = (MIN_NOISE_COUNTS, MAX_NOISE_COUNTS);
         within("noise_counts", self.noise_counts, least, most)?;
+        if let Some(counts) = self.read_noise_counts {
+            within("read_noise_counts", counts, 0.0, most)?;
+        }
+        if let Some(shot) = self.shot_noise {
+            within("shot_noise", shot, 0.0, most)?;
+        }
         within("golden_captures", self.golden_captures, 1, MAX_CAPTURES)?;
         if let Some(counts) = self.least_modulation {
             let [least, most] = LeastModulation::BOUNDS;

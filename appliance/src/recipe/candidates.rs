@@ -81,11 +81,11 @@ impl GoldenPart<'_> {
             .filter(|shot| carries(shot.ratio))
             .map(|shot| (shot.ratio * shot.waveform.fundamental() / taught).powi(2));
         let information: f64 = squares.sum();
-        let noise = self.calibration.noise_counts;
+        let noise = self.noise;
         move |at| {
             let counts = f64::from(arrays.modulation[at]);
-            let turns =
-                noise / std::f64::consts::TAU * (2.0 / (information * counts * counts)).sqrt();
+            let turns = noise.at(counts) / std::f64::consts::TAU
+                * (2.0 / (information * counts * counts)).sqrt();
             (turns * f64::from(arrays.height_slope[at])).powi(2)
         }
     }

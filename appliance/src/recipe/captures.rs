@@ -11,6 +11,7 @@ use crate::head::calibrated::CalibratedHead;
 use crate::head::means;
 use crate::head::rasters::rasters;
 use crate::head::scan::Scan;
+use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::{Decoder, Trust};
@@ -39,6 +40,8 @@ pub struct Captured {
     pub triangulator: Triangulator,
     /// Of all sequences but the full one.
     pub offsets: Vec<Offsets>,
+    /// The noise of a sample by the modulation of its pixel, by the full sequence.
+    pub noise: SampleNoise,
 }
 
 impl Captured {
@@ -68,17 +71,21 @@ impl Captured {
             let frame = |shot| shots.iter().position(|other| other == shot);
             let frames = shown.iter().filter_map(frame).map(|at| &means[at]);
             let scan = Scan::new(function.range(), shown, frames)?.trusting(least);
-            scan.phases(scan.needs_map().then_some(map))
+            let phases = scan.phases(scan.needs_map().then_some(map))?;
+            Ok::<_, String>((scan.noise(calibration, &phases), phases))
         };
         head.load(rasters(function, &shots, calibration)?)?;
         let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
+        let mut noise = calibration.noise;
         for mean in 0..MEANS {
             let share = |share: f64| progress((mean as f64 + share) / MEANS as f64);
             let means = means::take(head, shots.len(), *timeout, &share)?;
             let means = means.ok_or(TeachError::Ended)?;
-            let phases = decode(full, &means, expected).map_err(|error| rig(&error))?;
+            let (by_modulation, phases) =
+                decode(full, &means, expected).map_err(|error| rig(&error))?;
+            noise = by_modulation;
             let offsets = short.iter().map(|shown| {
-                let by = decode(shown, &means, &phases.phase)?;
+                let (_, by) = decode(shown, &means, &phases.phase)?;
                 Ok(offsets(&by, &phases))
             });
             let offsets: Result<_, String> = offsets.collect();
@@ -96,8 +103,7 @@ impl Captured {
             return Err(TeachError::Ended);
         };
         average(&mut phases, &other);
-        let noise = Some(calibration.noise_counts);
-        let heights = pipeline::triangulate(&triangulator, &decoder, noise, &mut phases);
+        let heights = pipeline::triangulate(&triangulator, &decoder, Some(noise), &mut phases);
         Ok(Self {
             phases,
             heights,
@@ -108,6 +114,7 @@ impl Captured {
                 .zip(second)
                 .map(<[_; MEANS]>::from)
                 .collect(),
+            noise,
         })
     }
 }

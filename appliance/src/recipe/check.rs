@@ -5,6 +5,7 @@ use super::demands::Demands;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::{check_limits, gauges};
 use algo::calibration::LENGTH;
+use algo::frame::SampleNoise;
 use algo::inspect::{CalibrationError, Gauge};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
@@ -58,8 +59,10 @@ pub struct Conditions {
     pub range_mm: [f64; 2],
     /// Exposure in µs; none where the head has no such setting.
     pub exposure_us: Option<f64>,
-    /// σ of one sample in counts.
+    /// σ of one sample in counts, at half the light of white.
     pub noise_counts: f64,
+    /// The noise of one sample by golden's modulation of its pixel.
+    pub noise: SampleNoise,
     /// Captures that golden is the mean of.
     pub golden_captures: usize,
     /// The least modulation that is trusted.
@@ -248,6 +251,10 @@ impl From<&RecipeFile> for Conditions {
             range_mm: file.range_mm,
             exposure_us: file.exposure_us,
             noise_counts: file.noise_counts,
+            noise: SampleNoise::new(
+                file.read_noise_counts.unwrap_or(file.noise_counts),
+                file.shot_noise.unwrap_or(0.0),
+            ),
             golden_captures: file.golden_captures,
             least_modulation: file
                 .least_modulation

@@ -57,8 +57,14 @@ pub struct RecipeFile {
     /// Exposure in µs; `None` if the head has no such setting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_us: Option<f64>,
-    /// σ of one sample in counts.
+    /// σ of one sample in counts, at half the light of white.
     pub noise_counts: f64,
+    /// σ of one sample without light, counts; `None` in recipes of older programs: σ is `noise_counts` whatever the light.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub read_noise_counts: Option<f64>,
+    /// Variance of a sample in counts² that a count of golden's modulation adds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shot_noise: Option<f64>,
     /// Captures that golden is the mean of; 1, which is left out, where it was taught from a recording and in recipes of older programs.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub golden_captures: usize,

@@ -11,6 +11,7 @@ use super::{
 };
 use crate::head::calibration::Calibration;
 use algo::adaptive::phase_reach;
+use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{eroded, openings};
 use algo::pattern::Shot;
@@ -80,6 +81,8 @@ pub struct GoldenPart<'a> {
     pub heights: &'a HeightMap,
     /// The difference from this phase by each of the other sequences, in their order; none if they were not measured.
     pub offsets: &'a [Offsets],
+    /// The noise of a sample by the modulation of its pixel in one capture.
+    pub noise: SampleNoise,
     /// Captures that all of this is the mean of; σ is that of one.
     pub captures: usize,
     /// Fixed against adaptive pattern, if a fixed one was measured as well.
@@ -214,6 +217,8 @@ impl GoldenPart<'_> {
             // Heads take their exposure from the configuration.
             exposure_us: None,
             noise_counts: calibration.noise_counts,
+            read_noise_counts: Some(self.noise.read_counts()),
+            shot_noise: Some(self.noise.shot()),
             golden_captures: self.captures,
             least_modulation: Some(self.decoder.least_modulation().eight_bit()),
             calibration_sigma: calibration.sigma,

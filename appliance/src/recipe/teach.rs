@@ -159,6 +159,7 @@ pub fn teach_while(
         phases: &golden.phases,
         heights: &golden.heights,
         offsets: &golden.offsets,
+        noise: golden.noise,
         captures: CAPTURES,
         comparison: Some(comparison),
     };

@@ -353,15 +353,19 @@ impl Scenario {
     /// Standard deviation of one sample in counts of this camera at half of full scale, with rounding.
     #[must_use]
     pub fn noise_sigma_counts(&self) -> f64 {
+        let [read, shot] = self.noise_variance();
+        (read + shot * self.full_scale() / 2.0).sqrt()
+    }
+
+    /// Variance of one sample in counts² of this camera: without light, with rounding, and what a count of signal adds.
+    #[must_use]
+    pub fn noise_variance(&self) -> [f64; 2] {
         let full_scale = self.full_scale();
-        let variance = match self.noise.noise_counts {
-            Some(counts) => (counts * full_scale / 255.0).powi(2) / 3.0,
-            None => {
-                let [read, shot] = self.noise.variance(self.optics.gain * full_scale);
-                read + shot * full_scale / 2.0
-            }
+        let [read, shot] = match self.noise.noise_counts {
+            Some(counts) => [(counts * full_scale / 255.0).powi(2) / 3.0, 0.0],
+            None => self.noise.variance(self.optics.gain * full_scale),
         };
-        (variance + 1.0 / 12.0).sqrt()
+        [read + 1.0 / 12.0, shot]
     }
 
     /// The largest sample.

@@ -4,6 +4,7 @@ use super::bounds::Tally;
 use super::random::{Draw, KINDS};
 use super::rig;
 use super::stack::{Stack, pool, shots};
+use algo::frame::SampleNoise;
 use algo::phase::{FULL_TRUST_SHIFTS, LeastModulation, Trust};
 use algo::pipeline::triangulate;
 use algo::units::AbsolutePhase;
@@ -220,9 +221,10 @@ fn what_has_no_phase_has_no_height_whatever_the_frames_hold() {
                 false => random.below(256) as u16,
             });
             let decoder = stack.decoder();
+            let noise = SampleNoise::new(1.5, 0.04);
             let run = || {
                 let mut phases = stack.decode();
-                let heights = triangulate(&solver, &decoder, Some(2.5), &mut phases);
+                let heights = triangulate(&solver, &decoder, Some(noise), &mut phases);
                 (phases, heights)
             };
             let (phases, heights) = run();

@@ -16,6 +16,7 @@
 //!
 //! The error of the part's motion, which moves the region by some hundredths of a pixel, is left out.
 
+use crate::frame::SampleNoise;
 use crate::pattern::Unwrapping;
 use crate::phase::Decoder;
 use crate::pipeline::NO_OFFSET;
@@ -44,11 +45,12 @@ const THREE_LEVELS: f64 = 3.0 * (1.2672 - 0.8463);
 const ONE: f64 = 1_048_576.0;
 
 impl Threshold {
-    /// Of samples with this noise, in counts.
-    pub fn new(decoder: &Decoder, noise_counts: f64) -> Self {
+    /// Of samples with this noise.
+    pub fn new(decoder: &Decoder, noise: SampleNoise) -> Self {
         let unit = f64::from(u16::MAX) / f64::from(decoder.full_scale());
-        let least = decoder.least_modulation().counts(decoder.full_scale()) * unit;
-        let sigma = decoder.modulation_noise(noise_counts) * unit;
+        let least = decoder.least_modulation().counts(decoder.full_scale());
+        let sigma = decoder.modulation_noise(noise.at(least)) * unit;
+        let least = least * unit;
         Self {
             least,
             sigma,

@@ -6,6 +6,7 @@
 use super::Production;
 use super::recent::RecentRows;
 use super::squares::narrow::MAX_NARROW_NM;
+use crate::frame::SampleNoise;
 use crate::geometry::Solution;
 use crate::phase::Trust;
 use crate::pipeline::{
@@ -148,8 +149,9 @@ impl HeightRow {
             }
             if sums_variances(v) && compared {
                 tally.summed += 1;
-                let sigma = plan.sigma_nm(decoded.modulation[u], 1.0 / solution.slope);
-                let units = sigma / VARIANCE_UNIT_NM;
+                let noise = SampleNoise::constant(plan.noise_counts);
+                let turns = plan.decoder.phase_noise(decoded.modulation[u], noise);
+                let units = turns / solution.slope * 1e6 / VARIANCE_UNIT_NM;
                 tally.variance += libm::rint((units * units).min(MAX_VARIANCE)) as u64;
             }
         }
@@ -202,7 +204,7 @@ impl Production {
 
     /// σ_z in nm of a pixel with this modulation and ∂z/∂Φ; of a pair that of the pixel's own samples, without its window.
     pub(super) fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
-        let turns = self.decoder.phase_noise(modulation, self.noise_counts);
+        let turns = self.decoder.phase_noise(modulation, self.noise);
         libm::fabs(turns * slope) * 1e6
     }
 }

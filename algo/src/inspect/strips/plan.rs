@@ -5,6 +5,7 @@ use super::gauges::{Gauge, Gauges, Unmeasurable};
 use super::taught::Taught;
 use super::uncertainty::CalibrationError;
 use super::weighted::WeightedTiles;
+use crate::frame::SampleNoise;
 use crate::geometry::Triangulator;
 use crate::inspect::Largest;
 use crate::inspect::align::{Alignment, GoldenSurface, levels};
@@ -34,7 +35,9 @@ pub struct Parts {
     pub gauges: Vec<Gauge>,
     /// The columns of each row that are looked at: every gauge's region with half its smoothing and the part's motion around.
     pub window: Vec<Range<usize>>,
-    /// σ of one sample.
+    /// The noise of one sample by this sequence.
+    pub noise: SampleNoise,
+    /// σ of a sample in counts, the same at all pixels, with which σ_z of the compared part as taught has the RMS that it has by `noise`.
     pub noise_counts: f64,
     /// Whether the part's motion is found and taken back.
     pub aligned: bool,
@@ -63,7 +66,8 @@ pub struct Production {
     pub(super) window: Vec<Range<usize>>,
     /// Pixels inside the window that are compared.
     pub(super) compared: u64,
-    /// σ of one sample.
+    /// See [`Parts`].
+    pub(super) noise: SampleNoise,
     pub(super) noise_counts: f64,
     /// The same as [`crate::pipeline::CubicInput::noise`].
     pub(super) variance_scale: f32,
@@ -94,6 +98,7 @@ impl Production {
             mut taught,
             gauges,
             window,
+            noise,
             noise_counts,
             aligned,
             golden_noise,
@@ -108,7 +113,10 @@ impl Production {
             row.filter(|&place| taught.compared(place)).count() as u64
         });
         let compared = compared.sum();
-        let turns = decoder.phase_noise(Modulation::from_bits(1), noise_counts) / cubics.range();
+        let turns = decoder.phase_noise(
+            Modulation::from_bits(1),
+            SampleNoise::constant(noise_counts),
+        ) / cubics.range();
         let golden = GoldenSurface {
             triangulator: &triangulator,
             surface: cubics.surface(),
@@ -120,7 +128,7 @@ impl Production {
         };
         let range = triangulator.range();
         let span_nm = (range.high - range.low) * 1e6;
-        let threshold = Threshold::new(&decoder, noise_counts);
+        let threshold = Threshold::new(&decoder, noise);
         let gauges = Gauges::new(gauges, golden, alignment.as_ref(), span_nm, threshold)?;
         Ok(Self {
             levels: levels(&cubics.surface().height, width, &window),
@@ -133,6 +141,7 @@ impl Production {
             taught,
             window,
             compared,
+            noise,
             noise_counts,
             alignment,
             gauges,

@@ -9,6 +9,7 @@ use crate::head::examine::{
     Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_BY_CONTENT, MOST_SATURATED, SETTLE, Spaced, Stamps,
     by_content, contrast, noise, pace, response,
 };
+use algo::frame::SampleNoise;
 use hal::head::{Head, Timing};
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
@@ -54,6 +55,7 @@ impl Characteristics {
     pub fn adopt(&self, calibration: &mut Calibration) -> Result<(), String> {
         calibration.response = inverted(&self.response)?;
         calibration.noise_counts = self.noise.counts;
+        calibration.noise = self.noise.by_signal();
         calibration.contrast = Some(self.contrast.clone());
         Ok(())
     }
@@ -120,6 +122,7 @@ pub fn characterise(
     progress(0.8, "noise");
     let noise = noise(head, settle, &lit)?;
     calibration.noise_counts = noise.counts;
+    calibration.noise = SampleNoise::new(noise.read_counts, noise.shot);
     progress(0.9, "contrast");
     let contrast = contrast(head, calibration, settle, &lit)?;
     Ok(Characteristics {

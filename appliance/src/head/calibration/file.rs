@@ -6,6 +6,7 @@ use super::{Calibration, HeightsBy, size};
 use crate::head::seam;
 use crate::storage::hex;
 use crate::system::clock;
+use algo::frame::SampleNoise;
 use algo::geometry::Pinhole;
 use algo::pattern::GreyResponse;
 use hal::bounds::{clipped, shortened};
@@ -144,6 +145,13 @@ pub struct NoiseFile {
     pub shot: f64,
     /// The measured levels.
     pub levels: Vec<LevelFile>,
+}
+
+impl NoiseFile {
+    /// The noise by the mean signal.
+    pub fn by_signal(&self) -> SampleNoise {
+        SampleNoise::new(self.read_counts, self.shot)
+    }
 }
 
 /// Noise at one level.
@@ -318,7 +326,9 @@ impl CalibrationFile {
         self.check_bounds()
             .map_err(|error| format!("{error}: calibrate anew"))?;
         let (camera, projector) = (&self.camera, &self.projector);
+        let nominal = SampleNoise::constant(NOMINAL_NOISE);
         Ok(Calibration {
+            noise: self.noise.as_ref().map_or(nominal, NoiseFile::by_signal),
             contrast: self.contrast.clone(),
             plane: self.plane(),
             heights_by: self.heights_by,

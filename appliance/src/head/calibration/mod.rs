@@ -13,6 +13,7 @@ use file::ContrastFile;
 
 use crate::head::seam;
 use crate::storage::hex;
+use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
 use algo::pattern::{GreyResponse, PhaseFunction, Waveform, Waveforms};
 use algo::phase::LeastModulation;
@@ -54,8 +55,10 @@ pub struct Calibration {
     pub plane: Option<PlaneModel>,
     /// What heights go by.
     pub heights_by: HeightsBy,
-    /// σ of one sample in counts.
+    /// σ of one sample in counts, at half the light of white.
     pub noise_counts: f64,
+    /// The noise of one sample by its mean signal.
+    pub noise: SampleNoise,
     /// Contrast of fringes against their pitch, if it was measured.
     pub contrast: Option<ContrastFile>,
     /// The projector's measured grey response, where it is not linear.
@@ -96,6 +99,7 @@ impl Calibration {
             plane: None,
             heights_by: HeightsBy::Models,
             noise_counts,
+            noise: SampleNoise::constant(noise_counts),
             contrast: None,
             response: None,
             linear: false,
@@ -115,7 +119,9 @@ impl Calibration {
             (&scenario.camera_model(), &projector.model()),
             scenario.noise_sigma_counts(),
         )?;
+        let [read, shot] = scenario.noise_variance();
         Ok(Self {
+            noise: SampleNoise::new(read.sqrt(), shot),
             linear: scenario.optics.gamma == 1.0,
             ..head
         })

@@ -3,19 +3,25 @@
 use crate::recipe::archive::Arrays;
 use crate::recipe::{SequenceKind, safe};
 use algo::adaptive::Field;
+use algo::frame::SampleNoise;
 use algo::inspect::{Taught, Weight};
 use algo::phase::Decoder;
 use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation, PhaseDelta};
 use rayon::prelude::*;
 
-/// The weight of each pixel's deviation, and the uncertainty of its taught height.
-pub(super) fn taught(noise_counts: f64, arrays: &Arrays, decoder: &Decoder) -> Taught {
+/// The weight of each pixel's deviation, and the uncertainty of its taught height. The sequence has `brighter` times the modulation of
+/// golden, by which `noise` goes.
+pub(super) fn taught(
+    (noise, brighter): (SampleNoise, f64),
+    arrays: &Arrays,
+    decoder: &Decoder,
+) -> Taught {
     let full_scale = f64::from(decoder.full_scale());
     let noises = arrays.modulation.iter().zip(&arrays.height_slope);
     let sigmas = noises.map(|(&counts, &slope)| {
         let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
-        let turns = decoder.phase_noise(Modulation::from_bits(share), noise_counts);
+        let turns = decoder.phase_noise(Modulation::from_bits(share), noise) / brighter;
         turns * f64::from(slope).abs()
     });
     let valid = arrays.valid.iter().zip(&arrays.golden_height);
@@ -24,6 +30,24 @@ pub(super) fn taught(noise_counts: f64, arrays: &Arrays, decoder: &Decoder) -> T
         false => Weight::NONE,
     });
     Taught::new(weights.zip(sigmas))
+}
+
+/// σ of a sample, the same at all pixels, with which σ_z of the compared part has the RMS that it has by `noise`; counts.
+pub(super) fn even_noise(noise: SampleNoise, arrays: &Arrays) -> f64 {
+    let compared = (0..arrays.valid.len()).filter(|&at| arrays.valid[at] != 0);
+    let (mut sum, mut weights) = (0.0, 0.0);
+    for at in compared {
+        let counts = f64::from(arrays.modulation[at]);
+        let weight = (f64::from(arrays.height_slope[at]) / counts).powi(2);
+        if weight.is_finite() {
+            sum += weight * noise.at(counts).powi(2);
+            weights += weight;
+        }
+    }
+    match weights > 0.0 {
+        true => (sum / weights).sqrt(),
+        false => noise.at(0.0),
+    }
 }
 
 /// The phase that a sequence is unwrapped about and compared with: golden's by this sequence, which is `offset` from that by the full

@@ -19,12 +19,11 @@ use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
-use algo::geometry::{HeightRange, Triangulator};
+use algo::geometry::HeightRange;
 use algo::inspect::{Findings, Input, PairPlaced, Production, Strips};
 use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
-use algo::units::Height;
 use hal::frame::Frame;
 use hal::projector::Raster;
 use run::{Pair, Prepared, Run, Shared};
@@ -168,7 +167,7 @@ impl Plan {
         let triangulator = triangulator.map_err(|error| error.to_string())?;
         let aligned = demands.aligned;
         let away = match aligned {
-            true => pixels(&triangulator, demands.tolerance_mm),
+            true => window::pixels(&triangulator, demands.tolerance_mm),
             false => 0,
         };
         let mut window = window::of(&gauges, size, away);
@@ -181,7 +180,7 @@ impl Plan {
         let base = base.filter(|_| !arrays.sequence_offset.is_empty());
         let mut shots = Vec::new();
         let prepared = || {
-            let noise = conditions.noise_counts;
+            let noise = conditions.noise;
             let range = (range, camera.2, conditions.least_modulation);
             // Golden was measured with the full sequence, the last.
             let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
@@ -202,6 +201,7 @@ impl Plan {
                 MAX_PATTERN_BYTES >> 20
             ));
         }
+        let noise_counts = golden::even_noise(conditions.noise, &arrays);
         let modulation = match two_frames {
             true => std::mem::take(&mut arrays.modulation),
             false => Vec::new(),
@@ -220,7 +220,8 @@ impl Plan {
             cubics: Arc::new(cubics),
             gauges,
             window,
-            noise_counts: conditions.noise_counts,
+            noise: conditions.noise,
+            noise_counts,
             calibration: conditions.calibration,
             golden,
             picture: (modulation, away as f64),
@@ -428,16 +429,6 @@ impl Laps {
             .add(stage, u32::try_from(us).unwrap_or(u32::MAX));
         self.since = now;
     }
-}
-
-/// About how many pixels the image of a part that is displaced by `mm` moves at most.
-fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
-    let camera = triangulator.camera();
-    let (u, v) = (camera.width() as f64 / 2.0, camera.height() as f64 / 2.0);
-    let at = |u: f64, v: f64| triangulator.point(u as usize, v as usize, Height::from_nm(0));
-    let pitch = at(u, v).zip(at(u + 1.0, v)).map(|(a, b)| (b - a).length());
-    // One pixel more for rounding.
-    pitch.map_or(0, |pitch| (mm / pitch).ceil().min(u) as usize + 1)
 }
 
 /// The flag of a result that says which kind of sequence was used.

@@ -3,6 +3,7 @@
 use super::golden;
 use crate::recipe::archive::Arrays;
 use crate::recipe::{RecipeSequence, SequenceKind};
+use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
     CalibrationError, Gauge, Largest, Measure, PairBuffers, Parts, Picture, Production, Taught,
@@ -44,6 +45,7 @@ pub(super) struct Shared {
     pub cubics: Arc<HeightCubics>,
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
+    pub noise: SampleNoise,
     pub noise_counts: f64,
     pub calibration: CalibrationError,
     pub golden: GoldenNoise,
@@ -84,7 +86,7 @@ impl Prepared {
     /// with; `base` is the offset of the sequence that the golden surface is by.
     pub fn of(
         sequence: RecipeSequence,
-        (noise_counts, fundamental): (f64, f64),
+        (noise, fundamental): (SampleNoise, f64),
         (arrays, base): (&Arrays, Option<usize>),
         (range, bit_depth, least): (PhaseRange, u8, LeastModulation),
         rasters: &mut Vec<Shot>,
@@ -111,7 +113,7 @@ impl Prepared {
         Ok(Self {
             kind,
             indices: indices.collect(),
-            taught: golden::taught(noise_counts / brighter, arrays, &decoder),
+            taught: golden::taught((noise, brighter), arrays, &decoder),
             map: golden::map(arrays, kind, offsets),
             decoder,
             brighter,
@@ -143,7 +145,8 @@ impl Prepared {
     /// σ of the phase of a pixel of full modulation in golden, turns per count of noise.
     fn phase_noise(&self) -> f64 {
         let full = Modulation::from_bits(u16::MAX);
-        self.decoder.phase_noise(full, 1.0 / self.brighter)
+        let noise = SampleNoise::constant(1.0 / self.brighter);
+        self.decoder.phase_noise(full, noise)
     }
 
     /// σ of golden's heights that deviations by this sequence have, over that of one measurement by it.
@@ -172,6 +175,7 @@ impl Prepared {
             decoder,
             taught,
             map,
+            brighter,
             ripple_mm,
             ..
         } = self;
@@ -184,6 +188,7 @@ impl Prepared {
             taught,
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
+            noise: shared.noise.by(1.0 / brighter),
             noise_counts: shared.noise_counts,
             aligned: shared.aligned,
             golden_noise,

@@ -1,6 +1,8 @@
 //! The part of the frame that the gauges need.
 
+use algo::geometry::Triangulator;
 use algo::inspect::{Gauge, Measure};
+use algo::units::Height;
 use std::ops::Range;
 
 /// The columns of each row of a frame of (width, height) that some gauge needs: its region, half of its smoothing square and
@@ -49,4 +51,14 @@ fn widen(columns: &mut Range<usize>, by: Range<usize>) {
         true => by,
         false => columns.start.min(by.start)..columns.end.max(by.end),
     };
+}
+
+/// About how many pixels the image of a part that is displaced by `mm` moves at most.
+pub(super) fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
+    let camera = triangulator.camera();
+    let (u, v) = (camera.width() as f64 / 2.0, camera.height() as f64 / 2.0);
+    let at = |u: f64, v: f64| triangulator.point(u as usize, v as usize, Height::from_nm(0));
+    let pitch = at(u, v).zip(at(u + 1.0, v)).map(|(a, b)| (b - a).length());
+    // One pixel more for rounding.
+    pitch.map_or(0, |pitch| (mm / pitch).ceil().min(u) as usize + 1)
 }
