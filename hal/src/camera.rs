@@ -17,7 +17,7 @@ pub enum Starts {
     ByItself,
 }
 
-/// How a running camera takes its frames. Nothing changes between start and stop.
+/// How a running camera takes its frames. Nothing changes while it takes some.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraTiming {
     /// Who starts an exposure.
@@ -28,6 +28,19 @@ pub struct CameraTiming {
     pub period: Duration,
     /// From the end of an exposure until its frame can be fetched, without any delay.
     pub delivery: Duration,
+}
+
+impl CameraTiming {
+    /// The same with exposures `times` as long; the time between two of them stays as it is.
+    #[must_use]
+    pub fn exposed(self, times: u32) -> Self {
+        let exposure = self.exposure.saturating_mul(times);
+        Self {
+            exposure,
+            period: exposure + self.period.saturating_sub(self.exposure),
+            ..self
+        }
+    }
 }
 
 /// How samples are encoded on their way from the sensor.
@@ -53,6 +66,21 @@ pub trait Camera: Send {
 
     /// How the camera takes its frames.
     fn timing(&self) -> CameraTiming;
+
+    /// Makes each exposure `times` as long as it is set to, from the camera's next start on; [`Camera::timing`] says so at once. The
+    /// device is not asked: what it makes of that, its start or its frames say.
+    ///
+    /// # Errors
+    /// `Unsupported` if this back-end can only expose as it is set to.
+    fn expose(&mut self, times: u32) -> Result<(), Error> {
+        match times {
+            1 => Ok(()),
+            _ => Err(Error::unsupported(
+                format!("exposing {times} times as long as this camera is set to"),
+                "use a recipe that was taught with --exposures 1",
+            )),
+        }
+    }
 
     /// How long it may stay on without an exposure; zero if it is to be stopped after each sequence. A triggered camera that stays on
     /// is ready for the next sequence at once.

@@ -361,7 +361,26 @@ pub fn check_head(head: &mut Head, patterns: usize) -> Result<(), Violation> {
     must(
         "a head works after errors",
         head.acquire(&indices, PATIENT, &mut |_, _| ()).map(|_| ()),
-    )
+    )?;
+
+    let set = head.camera_timing();
+    for times in [2, 1] {
+        match head.expose(times) {
+            Err(Error::Unsupported { .. }) => return Ok(()),
+            exposed => must("a head exposes longer, and as it is set again", exposed)?,
+        }
+        let timing = head.camera_timing();
+        ensure(
+            "a head says how long it exposes",
+            timing == set.exposed(times) && head.exposures() == times,
+            || format!("{timing:?} at {times} times {set:?}"),
+        )?;
+        must(
+            "sequences are acquired with exposures of any length",
+            head.acquire(&indices, PATIENT, &mut |_, _| ()),
+        )?;
+    }
+    Ok(())
 }
 
 /// A checksum of a frame's samples.

@@ -16,7 +16,7 @@ use crate::clock::monotonic;
 use crate::error::Error;
 use crate::latest;
 use crate::setup::TriggerSetup;
-use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger};
+use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger, decides};
 use crate::units::Timestamp;
 
 /// How long before the end of a pulse the thread wakes: longer than waking usually takes, short enough to poll the clock meanwhile.
@@ -34,6 +34,7 @@ type Put = dyn Fn(bool) -> Result<(), LineError> + Send + Sync;
 /// The line and the state that both threads share.
 struct Pulsed {
     put: Box<Put>,
+    /// Of a pulse for one exposure as the camera is set.
     width: Duration,
     /// Locked from before an edge until its times are stored, so that a thread that locks it later knows them.
     state: Mutex<State>,
@@ -41,6 +42,8 @@ struct Pulsed {
 }
 
 struct State {
+    /// Of the pulses that it makes now.
+    width: Duration,
     /// Times before and after the rising edge of the pulse that is on.
     rise: Option<(Timestamp, Timestamp)>,
     /// Spoiled pulses that were not fetched yet.
@@ -81,6 +84,7 @@ impl Pulse {
             put,
             width,
             state: Mutex::new(State {
+                width,
                 rise: None,
                 spoiled: SpoiledPulses::new(),
                 failed: None,
@@ -120,6 +124,15 @@ impl Trigger for Pulse {
         Ok(after)
     }
 
+    fn expose(&mut self, exposure: Duration, times: u32) {
+        let width = self.line.width;
+        let longer = match decides(width, exposure) {
+            true => exposure.saturating_mul(times.saturating_sub(1)),
+            false => Duration::ZERO,
+        };
+        self.line.lock().width = width + longer;
+    }
+
     fn poll_spoiled(&mut self) -> Option<Spoiled> {
         self.line.lock().spoiled.pop_front()
     }
@@ -152,7 +165,7 @@ impl Pulsed {
                 continue;
             };
             // From the reading before the rise to the reading before the fall: both edges are delayed alike by their system calls.
-            let ends = rise.0 + self.width;
+            let ends = rise.0 + state.width;
             let left = ends.since(monotonic());
             if left > EARLY {
                 state = self.wait(state, left - EARLY);
@@ -166,7 +179,7 @@ impl Pulsed {
             state.failed = (self.put)(false).err();
             let fall = (before, monotonic());
             state.rise = None;
-            if let Some(spoiled) = Spoiled::by(&Edges { rise, fall }, self.width) {
+            if let Some(spoiled) = Spoiled::by(&Edges { rise, fall }, state.width) {
                 latest::keep(&mut state.spoiled, spoiled);
             }
         }
@@ -218,6 +231,18 @@ mod tests {
         let told = told.expect("an interrupted fall");
         assert_eq!((told.fired, told.width), (fired, WIDTH));
         assert!(told.longer >= STALL, "{told:?}");
+    }
+
+    #[test]
+    fn a_pulse_that_sets_the_exposure_lasts_as_much_longer_and_one_that_starts_it_does_not() {
+        let us = Duration::from_micros;
+        for (width, twice) in [(us(16_653), us(33_320)), (us(100), us(100))] {
+            let mut pulse = Pulse::of(Box::new(|_| Ok(())), width, || ()).unwrap();
+            for (times, wanted) in [(2, twice), (1, width)] {
+                pulse.expose(us(16_667), times);
+                assert_eq!(pulse.line.lock().width, wanted);
+            }
+        }
     }
 
     #[test]

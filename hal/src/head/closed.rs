@@ -32,13 +32,16 @@ impl Head {
             size: self.projector_size(),
             refresh: self.refresh(),
         };
-        Self::new(
+        let mut closed = Self::new(
             Box::new(like.clone()),
             Box::new(like),
             Box::new(NoTrigger),
             Box::new(Monotonic::default()),
             self.timing(),
-        )
+        );
+        // Its timing is that of so many.
+        closed.devices.exposures = self.devices.exposures;
+        closed
     }
 }
 

@@ -5,6 +5,7 @@
 mod aside;
 mod closed;
 mod count;
+mod exposures;
 mod failure;
 mod identity;
 mod pacing;
@@ -50,6 +51,8 @@ pub(crate) struct Devices {
     pub clock: Box<dyn Clock>,
     /// Whether the camera stayed on after a sequence, and which frames it had given.
     streaming: Streaming,
+    /// Each exposure lasts so many times as long as the camera is set to.
+    exposures: u32,
     /// The first patterns, which stay loaded; indices of the others count from behind them.
     kept: usize,
 }
@@ -114,6 +117,7 @@ impl Head {
                 trigger,
                 clock,
                 streaming: Streaming::default(),
+                exposures: 1,
                 kept: 0,
             },
             timing,
@@ -308,6 +312,7 @@ fn carry_out(
         clock,
         streaming,
         kept,
+        ..
     } = devices;
     let refresh = projector.refresh();
     let timing = camera.timing();

@@ -16,6 +16,8 @@ use crate::units::Timestamp;
 pub(super) struct Streaming {
     /// Since when it has been waiting; none if it is stopped, or a sequence runs.
     since: Option<Timestamp>,
+    /// How it was started ([`Head::expose`]).
+    exposures: u32,
     /// Counts of frames are at least this since the sequence began.
     first: u64,
     /// One more than the largest count of a frame.
@@ -92,14 +94,17 @@ impl Devices {
 
     /// Starts the camera, unless it is on, and returns how long that took.
     fn start(&mut self) -> Result<Duration, Error> {
-        if self.streaming.since.take().is_some() {
+        let waiting = self.streaming.since.take().is_some();
+        if waiting && self.streaming.exposures != self.exposures {
+            self.camera.stop()?;
+        } else if waiting {
             while let Some(frame) = self.camera.poll_frame()? {
                 self.streaming.is_new(&frame);
             }
             self.streaming.first = self.streaming.next;
             return Ok(Duration::ZERO);
         }
-        self.streaming.first = 0;
+        (self.streaming.first, self.streaming.exposures) = (0, self.exposures);
         let begun = self.clock.now();
         self.camera.start()?;
         Ok(self.clock.now().since(begun))

@@ -13,7 +13,7 @@ use rustix::event::{EventfdFlags, eventfd};
 use super::open::Configured;
 use super::owner::{Event, Order, Wires, own, with_manager};
 use super::report::ContinuedCount;
-use super::{Reading, Settings};
+use super::{Exposing, Reading, Settings};
 use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};
@@ -45,6 +45,8 @@ pub struct LibCamera {
     ended: Receiver<()>,
     count: ContinuedCount,
     running: bool,
+    /// How it is started: each exposure so many times as long as set.
+    times: u32,
 }
 
 impl LibCamera {
@@ -127,6 +129,7 @@ impl LibCamera {
             ended,
             count: ContinuedCount::default(),
             running: false,
+            times: 1,
         })
     }
 
@@ -224,12 +227,27 @@ impl Camera for LibCamera {
     }
 
     fn timing(&self) -> CameraTiming {
-        CameraTiming {
+        let Exposing {
+            exposure, period, ..
+        } = self.settings.exposing;
+        let set = CameraTiming {
             starts: self.settings.starts,
-            exposure: self.settings.exposing.exposure,
-            period: self.settings.exposing.period,
+            exposure,
+            period,
             delivery: self.settings.delivery,
+        };
+        set.exposed(self.times)
+    }
+
+    fn expose(&mut self, times: u32) -> Result<(), Error> {
+        if times != 1 && !self.settings.controlled {
+            return Err(Error::unsupported(
+                format!("setting the exposure of the camera `{}`", self.id),
+                "use a camera that has this control, or a recipe that was taught with --exposures 1",
+            ));
         }
+        self.times = times;
+        Ok(())
     }
 
     fn stays_on(&self) -> Duration {
@@ -260,7 +278,14 @@ impl Camera for LibCamera {
             ));
         }
         self.count.restart();
-        self.ask("starting", Order::Start).inspect_err(|_| {
+        let timing = self.timing();
+        let exposing = Exposing {
+            exposure: timing.exposure,
+            period: timing.period,
+            ..self.settings.exposing
+        };
+        let start = |answer| Order::Start(exposing, answer);
+        self.ask("starting", start).inspect_err(|_| {
             // The camera may be running, and queueing its requests may have failed.
             let _ = self.ask("stopping", Order::Stop);
         })?;

@@ -18,7 +18,7 @@ use rustix::time::ClockId;
 
 use super::Settings;
 use super::open::{Configured, Opened, open, refused};
-use super::report::{Clocks, Reported, on_the_heads_clock};
+use super::report::{Clocks, Exposing, Reported, on_the_heads_clock};
 use crate::clock::{monotonic, read};
 use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, Pixels, Pool};
@@ -34,7 +34,8 @@ static ONE_MANAGER: Mutex<()> = Mutex::new(());
 
 /// A message to the thread.
 pub(super) enum Order {
-    Start(Sender<Result<(), Error>>),
+    /// Start the camera with these settings.
+    Start(Exposing, Sender<Result<(), Error>>),
     Stop(Sender<Result<(), Error>>),
     /// The library has completed a request.
     Done(Request),
@@ -119,6 +120,7 @@ pub(super) fn own(wires: Wires, answer: &Sender<Result<(String, Configured), Err
         let mut owner = Owner {
             copies: Pool::new(opened.configured.format, COPIES),
             opened,
+            exposing: wires.settings.exposing,
             wires: &wires,
             running: false,
             closing: false,
@@ -139,6 +141,8 @@ fn ring(ready: &OwnedFd) {
 struct Owner<'a> {
     opened: Opened,
     copies: Pool,
+    /// As it was started.
+    exposing: Exposing,
     wires: &'a Wires,
     running: bool,
     closing: bool,
@@ -150,7 +154,8 @@ impl Owner<'_> {
             && let Ok(order) = self.wires.orders.recv()
         {
             match order {
-                Order::Start(answer) => {
+                Order::Start(exposing, answer) => {
+                    self.exposing = exposing;
                     let started = self.start();
                     let _ = answer.send(started);
                 }
@@ -182,7 +187,7 @@ impl Owner<'_> {
 
     /// Controls that switch everything automatic off and set the values from the first frame on.
     fn controls(&self) -> ::libcamera::utils::UniquePtr<ControlList> {
-        let exposing = &self.wires.settings.exposing;
+        let exposing = &self.exposing;
         let microseconds = |time: Duration| i64::try_from(time.as_micros()).unwrap_or(i64::MAX);
         let period = microseconds(exposing.period);
         let exposure = i32::try_from(exposing.exposure.as_micros()).unwrap_or(i32::MAX);
@@ -212,7 +217,7 @@ impl Owner<'_> {
                 }
                 // `LibCamera` was dropped without waiting for an answer.
                 Ok(Order::Close) => self.closing = true,
-                Ok(Order::Start(_) | Order::Stop(_) | Order::Fetched(_)) => {}
+                Ok(Order::Start(..) | Order::Stop(_) | Order::Fetched(_)) => {}
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
                     return Err(Error::timeout(
                         format!(
@@ -321,7 +326,7 @@ impl Owner<'_> {
                 period: metadata.get::<controls::FrameDuration>().ok().map(|v| v.0),
             };
             let rows = self.opened.configured.rows;
-            self.wires.settings.exposing.verify(rows, &reported)
+            self.exposing.verify(rows, &reported)
         } else {
             Ok(())
         };

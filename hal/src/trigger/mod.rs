@@ -2,8 +2,12 @@
 
 mod spoiled;
 
+use std::time::Duration;
+
 use crate::error::Error;
 use crate::units::Timestamp;
+#[cfg(feature = "gpio")]
+pub(crate) use spoiled::decides;
 pub use spoiled::{Edges, Spoiled};
 
 /// How many triggers back a frame may belong to: so many pulses are remembered, and so many spoiled ones are kept until fetched.
@@ -22,6 +26,9 @@ pub trait Trigger: Send {
     /// # Errors
     /// The device's error.
     fn fire(&mut self) -> Result<Timestamp, Error>;
+
+    /// From now on the camera exposes `times` as long as its own `exposure`: so do pulses that set the exposure.
+    fn expose(&mut self, _exposure: Duration, _times: u32) {}
 
     /// The next spoiled pulse that was not fetched yet; at most the latest [`REMEMBERED`] are kept.
     ///

@@ -51,6 +51,11 @@ pub struct Spoiled {
     pub longer: Duration,
 }
 
+/// Whether a pulse of this width determines the length of an exposure.
+pub(crate) fn decides(width: Duration, exposure: Duration) -> bool {
+    width * 2 >= exposure
+}
+
 impl Spoiled {
     /// Judges a pulse with these edges that should have lasted `width`; `None` if it was good.
     #[must_use]
@@ -69,7 +74,7 @@ impl Spoiled {
     /// Whether it determined the length of an exposure. A pulse shorter than half the exposure only starts it.
     #[must_use]
     pub fn decides(&self, exposure: Duration) -> bool {
-        self.width * 2 >= exposure
+        decides(self.width, exposure)
     }
 
     /// By how much it may have been off.

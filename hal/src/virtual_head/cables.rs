@@ -51,6 +51,7 @@ impl<S: Scene> Bench<S> {
             }
         }
         self.sensor.stop();
+        self.expose(1);
         self.blank();
         self.first_light = self.now + self.mechanics.first_light;
         Ok(())

@@ -157,6 +157,21 @@ impl Sensor {
 }
 
 impl<S: Scene> Bench<S> {
+    /// The exposure that the camera is set to.
+    pub fn own_exposure(&self) -> Duration {
+        self.mechanics.exposure / self.exposures
+    }
+
+    /// Makes each exposure so many times as long as set.
+    pub fn expose(&mut self, times: u32) {
+        let own = self.own_exposure();
+        let before = std::mem::replace(&mut self.mechanics.exposure, own * times);
+        if let Some((period, _)) = &mut self.mechanics.free_running {
+            *period = *period + own * times - before;
+        }
+        self.exposures = times;
+    }
+
     fn frame(&mut self) -> Result<Option<Frame>, Error> {
         self.sensor.run(self.now, &self.mechanics, self.dice);
         if let Some(frame) = self.sensor.again.take() {
@@ -169,7 +184,9 @@ impl<S: Scene> Bench<S> {
         let mechanics = &self.mechanics;
         let (start, length) = (exposure.start, exposure.length);
         let end = start + length;
-        let seen = self.light.seen(start, length, mechanics.exposure);
+        let seen = self
+            .light
+            .seen(start, length, mechanics.exposure / self.exposures);
         let marked = match mechanics.stamp {
             Stamp::ExposureStart => start,
             Stamp::ExposureEnd => end,
@@ -203,6 +220,11 @@ impl<S: Scene> Camera for VirtualDevice<S> {
 
     fn timing(&self) -> CameraTiming {
         lock(&self.bench).mechanics.camera()
+    }
+
+    fn expose(&mut self, times: u32) -> Result<(), Error> {
+        lock(&self.bench).expose(times);
+        Ok(())
     }
 
     fn stays_on(&self) -> Duration {

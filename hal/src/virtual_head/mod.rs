@@ -55,8 +55,8 @@ pub trait Scene: Send {
     /// Patterns loaded.
     fn loaded(&self) -> usize;
 
-    /// The frame of an exposure. `seen` lists the patterns (or none) that were in view, in order, each with its share of the planned
-    /// exposure; it is not empty, and its shares sum to 1, or to more if the exposure lasted longer. `timestamp` and
+    /// The frame of an exposure. `seen` lists the patterns (or none) that were in view, in order, each with its share of the exposure that
+    /// the camera is set to; it is not empty, and its shares sum to 1, or to more if the exposure lasted longer. `timestamp` and
     /// `count` are the frame's.
     ///
     /// # Errors
@@ -72,7 +72,9 @@ pub trait Scene: Send {
 /// The scene and the state of the devices in front of it.
 struct Bench<S> {
     scene: S,
+    /// With the exposure and the period of so many [`Bench::exposures`].
     mechanics: Mechanics,
+    exposures: u32,
     dice: Dice,
     now: Timestamp,
     screen: Screen,
@@ -107,15 +109,16 @@ impl<S: Scene + 'static> Control<S> {
         act(&mut lock(&self.bench).scene)
     }
 
-    /// The planned exposure.
+    /// The exposure that the camera is set to.
     #[must_use]
     pub fn exposure(&self) -> Duration {
-        lock(&self.bench).mechanics.exposure
+        lock(&self.bench).own_exposure()
     }
 
-    /// Replaces the planned exposure; the scene is told by its owner how much brighter that is.
+    /// Replaces it; the scene is told by its owner how much brighter that is.
     pub fn set_exposure(&self, exposure: Duration) {
-        lock(&self.bench).mechanics.exposure = exposure;
+        let mut bench = lock(&self.bench);
+        bench.mechanics.exposure = exposure * bench.exposures;
     }
 
     /// Opens the devices again: a stopped camera and a blank projector.
@@ -141,6 +144,7 @@ pub fn head<S: Scene + 'static>(scene: S, mechanics: Mechanics) -> (Head, Contro
         pulses: Pulses::default(),
         waits: 0,
         cables: Cables::default(),
+        exposures: 1,
         mechanics,
     }));
     let head = devices(&bench);

@@ -1,6 +1,7 @@
 //! Promises of the head: each frame that it returns shows the pattern that the frame names, whatever the devices do.
 
 mod aside;
+mod exposures;
 mod schedules;
 mod sequences;
 mod streaming;
