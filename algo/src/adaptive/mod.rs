@@ -6,6 +6,7 @@
 //! projector's raster ([`Field`]) from the projector point of each camera pixel ([`ProjectorMap`])
 //! and integrate it to a phase function.
 
+pub mod amplitude;
 mod blur;
 mod contrast;
 mod field;
