@@ -254,6 +254,7 @@ fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe
         name: "sphere".into(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
+        exposures: 1,
     };
     let taught = teach(head, calibration, &naming, TIMEOUT, &|_, _| ()).expect("a sphere");
     (taught.bytes, taught.recipe)

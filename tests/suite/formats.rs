@@ -96,12 +96,14 @@ const KEYS: [&str; 68] = [
     "taught_by",
     "version",
 ];
-/// Keys that `recipe.json` may have in addition.
-const OPTIONAL: [&str; 10] = [
+/// Keys that `recipe.json` may have in addition, and a member of the recipe.
+const OPTIONAL: [&str; 12] = [
     "calibration_sigma",
     "height_mm",
     "length_mm",
     "exposure_us",
+    "exposures",
+    "amplitude.npy",
     "fringes",
     "from",
     "tolerance_mm",

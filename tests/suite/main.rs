@@ -14,6 +14,7 @@ mod commissioning;
 mod doctor;
 mod drift;
 mod experiment;
+mod exposures;
 mod faint;
 mod foreign;
 mod formats;

@@ -55,12 +55,22 @@ pub(crate) fn taught_within(
     bed: &mut Bed,
     placement_tolerance_mm: f64,
 ) -> Result<TaughtRecipe, String> {
+    taught_exposed(bed, placement_tolerance_mm, 1)
+}
+
+/// As [`taught_within`], with frames that are exposed so many times as long as the head is set to.
+pub(crate) fn taught_exposed(
+    bed: &mut Bed,
+    placement_tolerance_mm: f64,
+    exposures: u32,
+) -> Result<TaughtRecipe, String> {
     let naming = Naming {
         number: 1,
         part_number: "P".into(),
         name: "part".into(),
         taught_at_unix_s: 0,
         placement_tolerance_mm,
+        exposures,
     };
     teach(
         &mut bed.head,

@@ -45,6 +45,7 @@ impl Bed {
             name: "part".into(),
             taught_at_unix_s: 0,
             placement_tolerance_mm: 1.0,
+            exposures: 1,
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
         let plan = Plan::new(taught.recipe.clone(), &calibration, true).unwrap();

@@ -6,10 +6,11 @@ use super::options::Measuring;
 use crate::config::Config;
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
+use crate::head::rasters::Illumination;
 use crate::head::seam;
 use crate::measure::{measure, measure_after, primary_of};
 use crate::production::backend::{self, Opened};
-use crate::recipe::bounds::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_TOLERANCE_MM};
+use crate::recipe::bounds::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
 use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe};
 use crate::recipe::replace;
 use crate::recipe::teach::{TeachError, teach};
@@ -47,6 +48,10 @@ pub struct Teach {
     /// or 1.
     #[arg(long, value_name = "MM", value_parser = number(0.0, MAX_TOLERANCE_MM))]
     tolerance: Option<f64>,
+    /// Expose each frame so many times as long as the head is set to, with less light where the part is bright: dark places have less
+    /// noise; without it as in the recipe that is replaced, or 1.
+    #[arg(long, value_name = "N", conflicts_with = "golden", value_parser = number(1, MAX_EXPOSURES))]
+    exposures: Option<u32>,
     /// Let cycles begin with two frames, the fringe and its complement; where they do not hold, the sequence that the limits ask
     /// for follows in the same cycle.
     #[arg(long, value_name = "2", value_parser = number(2_u16, 2))]
@@ -194,6 +199,7 @@ impl Teach {
             part_number: self.part_number.clone().unwrap_or(kept.part_number),
             name: self.name.clone().unwrap_or(kept.name),
             placement_tolerance_mm: self.tolerance.unwrap_or(kept.placement_tolerance_mm),
+            exposures: self.exposures.unwrap_or(kept.exposures),
             ..kept
         }
     }
@@ -271,6 +277,8 @@ impl Teach {
                 PatternSpec::Horizontal { fringes } => PatternFile::Horizontal { fringes },
                 PatternSpec::File { .. } => PatternFile::File,
             },
+            // Recordings cannot be exposed anew.
+            illumination: Illumination::default(),
             full: &full,
             decoder: &measured.decoder,
             triangulator: &surface.triangulator,

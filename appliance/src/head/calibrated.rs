@@ -1,6 +1,7 @@
 //! Measures a part with a pattern of the caller's choice, where no recipe describes the measurement: for teaching and experiments.
 
 use crate::head::calibration::Calibration;
+use crate::head::rasters::Illumination;
 use crate::head::scan::{self, Scan};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Shot};
@@ -65,10 +66,26 @@ impl CalibratedHead<'_> {
         map: Option<&[AbsolutePhase]>,
         progress: &dyn Fn(f64),
     ) -> Result<Measured, MeasureError> {
+        self.measure_lit(&Illumination::default(), function, shots, map, progress)
+    }
+
+    /// As [`Self::measure`], with patterns that are illuminated and exposed in this way.
+    ///
+    /// # Errors
+    /// As [`Self::measure`]; if the head cannot expose for so long.
+    pub fn measure_lit(
+        &mut self,
+        illumination: &Illumination,
+        function: &PhaseFunction,
+        shots: &[Shot],
+        map: Option<&[AbsolutePhase]>,
+        progress: &dyn Fn(f64),
+    ) -> Result<Measured, MeasureError> {
         let (calibration, timeout) = (self.calibration, self.timeout);
         let triangulator = calibration.triangulator(function.clone(), None);
         let triangulator = triangulator.map_err(impossible)?;
-        let frames = scan::take(self.head, calibration, function, shots, timeout, progress)?;
+        illumination.load(self.head, function, shots, calibration)?;
+        let frames = scan::take_loaded(self.head, shots.len(), timeout, progress)?;
         let scan = Scan::new(function.range(), shots, &frames).map_err(impossible)?;
         let scan = scan.trusting(calibration.least_modulation());
         let reference;

@@ -27,11 +27,24 @@ pub fn take(
     progress: &dyn Fn(f64),
 ) -> Result<Vec<Frame>, hal::error::Error> {
     head.load(rasters(function, shots, calibration)?)?;
-    let mut taken = Vec::with_capacity(shots.len());
-    let indices: Vec<usize> = (0..shots.len()).collect();
+    take_loaded(head, shots.len(), timeout, progress)
+}
+
+/// Takes a frame of each of so many patterns, which are loaded. `progress` gets the share of the frames taken.
+///
+/// # Errors
+/// Of the device that failed.
+pub fn take_loaded(
+    head: &mut Head,
+    patterns: usize,
+    timeout: Duration,
+    progress: &dyn Fn(f64),
+) -> Result<Vec<Frame>, hal::error::Error> {
+    let mut taken = Vec::with_capacity(patterns);
+    let indices: Vec<usize> = (0..patterns).collect();
     head.acquire(&indices, timeout, &mut |_, frame| {
         taken.push(frame);
-        progress(taken.len() as f64 / shots.len() as f64);
+        progress(taken.len() as f64 / patterns as f64);
     })?;
     Ok(taken)
 }

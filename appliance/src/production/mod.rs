@@ -276,10 +276,8 @@ impl Worker {
     /// fails, there is no plan any more, and each trigger ends INVALID.
     fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
         let Some(before) = plan else { return };
-        let shown = self
-            .pool
-            .install(|| before.rasters(&self.opened.calibration));
-        match shown.and_then(|rasters| self.opened.head.load(rasters)) {
+        let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
+        match self.pool.install(|| before.load(head, calibration)) {
             Ok(()) => {}
             Err(error) if recovery::is_lost(&error) => self.lost = Some(error),
             Err(error) => {
@@ -338,8 +336,8 @@ impl Worker {
         if shown.is_some_and(|shown| Arc::ptr_eq(shown, &plan)) {
             return Ok((plan, fallback));
         }
-        pool.install(|| plan.rasters(calibration))
-            .and_then(|rasters| self.opened.head.load(rasters))
+        let head = &mut self.opened.head;
+        pool.install(|| plan.load(head, calibration))
             .map_err(|error| {
                 let message = error.to_string();
                 self.lost = Some(error).filter(recovery::is_lost);

@@ -17,7 +17,7 @@ const PRELIMINARY_PITCH_PX: f64 = 20.0;
 /// Levels of the preliminary sequence.
 const LEVELS: usize = 3;
 /// Shifts of each.
-const SHIFTS: usize = 4;
+pub(super) const SHIFTS: usize = 4;
 
 /// What is projected first, on a part of which nothing is known.
 #[derive(Clone, Debug)]

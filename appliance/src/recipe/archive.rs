@@ -13,8 +13,8 @@ use zip::{CompressionMethod, ZipWriter};
 
 /// The manifest's name in the archive.
 const MANIFEST: &str = "recipe.json";
-/// The manifest and nine arrays.
-const MAX_MEMBERS: usize = 10;
+/// The manifest and ten arrays.
+const MAX_MEMBERS: usize = 11;
 /// The largest manifest that is read, in bytes.
 const MAX_MANIFEST: u64 = 1 << 20;
 /// The fingerprint in the manifest while the fingerprint is computed.
@@ -23,7 +23,7 @@ const NO_FINGERPRINT: &str = "00000000000000000000000000000000000000000000000000
 /// Defines [`Arrays`] with what is done to each of them by its name, which is also that of its member.
 macro_rules! arrays {
     ($($(#[$doc:meta])* $name:ident: $element:ty,)*) => {
-        /// The arrays of a recipe, row-major over the camera's frame except the phase function.
+        /// The arrays of a recipe, row-major over the camera's frame except the phase function and the amplitude.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Arrays {
             $($(#[$doc])* pub $name: Vec<$element>,)*
@@ -75,6 +75,8 @@ arrays! {
     /// For all sequences but the full one, behind each other: Φ as taught by this sequence less `golden_phase`, 1/65536 turn. Empty
     /// where golden was not measured with them.
     sequence_offset: i16,
+    /// The light of each pixel of the projector's raster, in 1/255 of what its pattern asks for; empty where that is all of it.
+    amplitude: u8,
 }
 
 /// What is wrong with a file that is not a ZIP, lacks a member, or has one that cannot be read; with the remedy.
@@ -99,7 +101,7 @@ pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Str
 /// The arrays by their members' names; one that is empty has no member.
 pub(crate) fn members(file: &RecipeFile, arrays: &Arrays) -> Vec<(&'static str, Vec<u8>)> {
     let mut members = arrays.members(|name| match name {
-        "phase_function" => file.projector.width,
+        "phase_function" | "amplitude" => file.projector.width,
         _ => file.camera.width,
     });
     let mut lengths = arrays.lengths().into_iter();

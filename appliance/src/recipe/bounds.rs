@@ -26,6 +26,8 @@ const MAX_SEQUENCES: usize = 8;
 const MAX_CORNERS: usize = 256;
 /// Farthest that a part may lie from where it was taught, mm.
 pub const MAX_TOLERANCE_MM: f64 = 20.0;
+/// Most exposures of a frame: with more, the amplitude of bright places has too few grey levels.
+pub const MAX_EXPOSURES: u32 = 4;
 /// Widest guard band, in multiples of u.
 pub const MAX_GUARD_K: f64 = 10.0;
 /// The last second of the year 9999.
@@ -78,6 +80,7 @@ impl RecipeFile {
         if let Some(exposure) = self.exposure_us {
             within("exposure_us", exposure, 1.0, MAX_EXPOSURE_US)?;
         }
+        within("exposures", self.exposures, 1, MAX_EXPOSURES)?;
         let (least, most) = (MIN_NOISE_COUNTS, MAX_NOISE_COUNTS);
         within("noise_counts", self.noise_counts, least, most)?;
         if let Some(counts) = self.read_noise_counts {

@@ -9,7 +9,7 @@
 use super::teach::TeachError;
 use crate::head::calibrated::CalibratedHead;
 use crate::head::means;
-use crate::head::rasters::rasters;
+use crate::head::rasters::Illumination;
 use crate::head::scan::Scan;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
@@ -45,7 +45,7 @@ pub struct Captured {
 }
 
 impl Captured {
-    /// Measures the part with sequences of a phase function; the last is the full one, which is unwrapped about `expected`, the others
+    /// Measures the part in this light with sequences of a phase function; the last is the full one, which is unwrapped about `expected`, the others
     /// are about that. `progress` gets the share of the frames taken and may end it by `false`.
     ///
     /// # Errors
@@ -56,6 +56,7 @@ impl Captured {
             calibration,
             timeout,
         }: &mut CalibratedHead<'_>,
+        illumination: &Illumination,
         function: &PhaseFunction,
         sequences: &[&[Shot]],
         expected: &[AbsolutePhase],
@@ -74,7 +75,7 @@ impl Captured {
             let phases = scan.phases(scan.needs_map().then_some(map))?;
             Ok::<_, String>((scan.noise(calibration, &phases), phases))
         };
-        head.load(rasters(function, &shots, calibration)?)?;
+        illumination.load(head, function, &shots, calibration)?;
         let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
         let mut noise = calibration.noise;
         for mean in 0..MEANS {

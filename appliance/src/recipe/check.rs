@@ -59,6 +59,8 @@ pub struct Conditions {
     pub range_mm: [f64; 2],
     /// Exposure in µs; none where the head has no such setting.
     pub exposure_us: Option<f64>,
+    /// Each frame is exposed so many times as long as the head is set to.
+    pub exposures: u32,
     /// σ of one sample in counts, at half the light of white.
     pub noise_counts: f64,
     /// The noise of one sample by golden's modulation of its pixel.
@@ -145,8 +147,10 @@ impl Recipe {
         file.check_bounds()?;
         let (width, height) = (file.camera.width as usize, file.camera.height as usize);
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
-        // A phase function has the size of the projector, which is checked below.
-        for (name, length) in arrays.lengths().into_iter().skip(1) {
+        // Those of the projector's size are checked below.
+        let of_projector = ["phase_function", "amplitude"];
+        let lengths = arrays.lengths().into_iter();
+        for (name, length) in lengths.filter(|(name, _)| !of_projector.contains(name)) {
             let of_short = name == "sequence_offset";
             let maps = if of_short {
                 file.sequences.len() - 1
@@ -165,6 +169,19 @@ impl Recipe {
             file.projector.width as usize,
             file.projector.height as usize,
         );
+        let amplitude = &arrays.amplitude;
+        let expected = match file.exposures {
+            1 => 0,
+            _ => columns * rows,
+        };
+        if amplitude.len() != expected || amplitude.contains(&0) {
+            return Err(format!(
+                "amplitude has {} values, {} of them 0, for a projector of {columns}x{rows} and {} exposures: it has one of 1 to 255 for each pixel where there are several, else none",
+                amplitude.len(),
+                amplitude.iter().filter(|share| **share == 0).count(),
+                file.exposures
+            ));
+        }
         let function = match file.pattern {
             PatternFile::Vertical { fringes } => PhaseFunction::vertical(columns, rows, fringes),
             PatternFile::Horizontal { fringes } => {
@@ -250,6 +267,7 @@ impl From<&RecipeFile> for Conditions {
             pattern: file.pattern.clone(),
             range_mm: file.range_mm,
             exposure_us: file.exposure_us,
+            exposures: file.exposures,
             noise_counts: file.noise_counts,
             noise: SampleNoise::new(
                 file.read_noise_counts.unwrap_or(file.noise_counts),

@@ -57,6 +57,9 @@ pub struct RecipeFile {
     /// Exposure in µs; `None` if the head has no such setting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_us: Option<f64>,
+    /// Each frame is exposed so many times as long as the head is set to, 1 to 4; 1, which is left out, in recipes of older programs.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub exposures: u32,
     /// σ of one sample in counts, at half the light of white.
     pub noise_counts: f64,
     /// σ of one sample without light, counts; `None` in recipes of older programs: σ is `noise_counts` whatever the light.
@@ -102,16 +105,12 @@ fn is_zero(number: &f64) -> bool {
     *number == 0.0
 }
 
-const fn one() -> usize {
-    1
+fn one<T: From<u8>>() -> T {
+    1.into()
 }
 
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde passes a reference"
-)]
-fn is_one(number: &usize) -> bool {
-    *number == 1
+fn is_one<T: From<u8> + PartialEq>(number: &T) -> bool {
+    *number == one()
 }
 
 /// A camera's frames.

@@ -10,6 +10,7 @@ use super::{
     AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
 };
 use crate::head::calibration::Calibration;
+use crate::head::rasters::Illumination;
 use algo::adaptive::phase_reach;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
@@ -48,7 +49,7 @@ const OPENING_REACH: usize = 4;
 /// |ΔΦ| up to which the expansion of the height is used, turns.
 const EXPANSION_TURNS: f64 = 0.5;
 
-/// Names of a recipe, and its placement tolerance.
+/// Names of a recipe, its placement tolerance and its exposures.
 #[derive(Clone, Debug)]
 pub struct Naming {
     /// 1–9999.
@@ -61,6 +62,8 @@ pub struct Naming {
     pub taught_at_unix_s: u64,
     /// How far any corner of a part may lie from where it was taught, mm.
     pub placement_tolerance_mm: f64,
+    /// Each frame is exposed so many times as long as the head is set to, 1 to 4.
+    pub exposures: u32,
 }
 
 /// A measured golden part.
@@ -69,6 +72,8 @@ pub struct GoldenPart<'a> {
     pub calibration: &'a Calibration,
     /// The pattern's file form; the function itself is the triangulator's.
     pub pattern: PatternFile,
+    /// The light with which it was measured.
+    pub illumination: Illumination,
     /// What each frame of the full sequence shows.
     pub full: &'a [Shot],
     /// How these frames were decoded.
@@ -216,6 +221,7 @@ impl GoldenPart<'_> {
             range_mm: [range.low, range.high],
             // Heads take their exposure from the configuration.
             exposure_us: None,
+            exposures: self.illumination.exposures,
             noise_counts: calibration.noise_counts,
             read_noise_counts: Some(self.noise.read_counts()),
             shot_noise: Some(self.noise.shot()),
@@ -295,6 +301,7 @@ impl GoldenPart<'_> {
                 .collect(),
             phase_reach: phase_reach(self.triangulator, surface, placement_tolerance_mm),
             sequence_offset: self.offsets.iter().flat_map(mean).collect(),
+            amplitude: self.illumination.amplitude.clone(),
         }
     }
 

@@ -7,9 +7,10 @@ use super::{RecipeFile, Store};
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 
-/// Names and placement tolerance of a recipe that is taught under a number: those of the recipe that it replaces, if any.
+/// Names, placement tolerance and exposures of a recipe that is taught under a number: those of the recipe that it replaces, if any.
 pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
     let kept = replaced.cloned();
+    let exposures = replaced.map_or(1, |file| file.exposures);
     let (part_number, name, placement_tolerance_mm) = match kept {
         Some(file) => (file.part_number, file.name, file.placement_tolerance_mm),
         None => (
@@ -24,6 +25,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
         name,
         taught_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
         placement_tolerance_mm,
+        exposures,
     }
 }
 

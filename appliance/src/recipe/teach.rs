@@ -11,6 +11,7 @@ use super::golden::GoldenPart;
 use crate::error::code_of;
 use crate::head::calibrated::{CalibratedHead, MeasureError};
 use crate::head::calibration::Calibration;
+use crate::head::rasters::Illumination;
 use crate::station::error_code;
 use crate::system::computing::Computing;
 use algo::adaptive::AdaptError;
@@ -126,10 +127,18 @@ pub fn teach_while(
     };
     let raster = &calibration.projector;
     let preliminary = Preliminary::new((raster.width(), raster.height()))?;
-    let first = head.measure(&preliminary.function, &preliminary.shots, None, &|share| {
-        // Checked before the next stage: a sequence is not interrupted.
+    // Checked before the next stage: a sequence is not interrupted.
+    let measuring = |share: f64| {
         progress(0.3 * share, "measuring the part");
-    })?;
+    };
+    let Preliminary { function, shots } = &preliminary;
+    let mut first = head.measure(function, shots, None, &measuring)?;
+    let mut illumination = Illumination::default();
+    if naming.exposures > 1 {
+        stage(0.3, "measuring the part with longer exposures")?;
+        illumination = computing.on(|| preliminary.illumination(&first, calibration, naming));
+        first = head.measure_lit(&illumination, function, shots, None, &|_| ())?;
+    }
     refuse_empty(&first.phases)?;
     stage(0.35, "making the part's own pattern")?;
     let AdaptivePattern { function, expected } =
@@ -137,12 +146,19 @@ pub fn teach_while(
     let full = Sequence::dense(DENSE_N, SHIFTS);
     let candidates = candidates(calibration.waveforms(), &full);
     let sequences: Vec<&[Shot]> = candidates.iter().map(|(_, frames)| &frames[..]).collect();
-    let golden = Captured::take(&mut head, &function, &sequences, &expected, &|share| {
-        progress(
-            0.4 + 0.35 * share,
-            "measuring the part with its own pattern",
-        )
-    })?;
+    let golden = Captured::take(
+        &mut head,
+        &illumination,
+        &function,
+        &sequences,
+        &expected,
+        &|share| {
+            progress(
+                0.4 + 0.35 * share,
+                "measuring the part with its own pattern",
+            )
+        },
+    )?;
     refuse_empty(&golden.phases)?;
     stage(0.75, "working out the expansion and the safe mask")?;
     let adaptive = (full.len(), &golden.phases, &golden.heights);
@@ -153,6 +169,7 @@ pub fn teach_while(
     let part = GoldenPart {
         calibration,
         pattern: PatternFile::File,
+        illumination,
         full: &full,
         decoder: &golden.decoder,
         triangulator: &golden.triangulator,
@@ -164,7 +181,8 @@ pub fn teach_while(
         comparison: Some(comparison),
     };
     let taught = computing.on(|| part.recipe(naming));
-    let taught = taught.map_err(TeachError::Rig)?;
+    let mut taught = taught.map_err(TeachError::Rig)?;
+    taught.choice.reasons.extend(part.illumination.words());
     stage(1.0, "taught")?;
     Ok(taught)
 }

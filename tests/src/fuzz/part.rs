@@ -43,6 +43,7 @@ impl Part {
             name: "plane".into(),
             taught_at_unix_s: 0,
             placement_tolerance_mm: 0.5,
+            exposures: 1,
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ());
         let taught = taught.expect("a plane can be taught");

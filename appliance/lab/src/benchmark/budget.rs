@@ -117,6 +117,7 @@ pub fn budgets(
         name: "bench".into(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: PLACEMENT_MM,
+        exposures: 1,
     };
     let on_progress =
         |share: f64, words: &str| progress(0.3 + 0.4 * share, &format!("{about}: {words}"));
@@ -162,8 +163,7 @@ fn budget(
     refresh: Duration,
     effort: &Effort,
 ) -> Result<Budget, String> {
-    head.load(plan.rasters(calibration).map_err(words)?)
-        .map_err(words)?;
+    plan.load(head, calibration).map_err(words)?;
     let indices = plan.indices(0);
     let mut frames = Vec::new();
     // The first cycle after a pause starts the camera; all others find it on.

@@ -163,7 +163,8 @@ impl Opened {
             Some(stage) => stage.exposing().1,
             None => config.camera.gain,
         };
-        let exposure = self.head.camera_timing().exposure;
+        // A loaded recipe may ask for several.
+        let exposure = self.head.camera_timing().exposure / self.head.exposures();
         Exposing {
             exposure_us: u32::try_from(exposure.as_micros()).unwrap_or(u32::MAX),
             gain,

@@ -4,6 +4,7 @@ mod arriving;
 mod golden;
 mod judge;
 mod layers;
+mod patterns;
 mod run;
 mod trial;
 mod window;
@@ -12,7 +13,7 @@ pub use arriving::Arriving;
 pub use layers::Layers;
 
 use crate::head::calibration::Calibration;
-use crate::head::rasters::rasters;
+use crate::head::rasters::Illumination;
 use crate::head::seam;
 use crate::recipe::{Conditions, Demands, Recipe, RecipeId, RecipeSequence, SequenceKind};
 use crate::station::error_code::WRONG_FRAMES;
@@ -25,7 +26,6 @@ use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
 use hal::frame::Frame;
-use hal::projector::Raster;
 use run::{Pair, Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
@@ -37,6 +37,8 @@ pub struct Plan {
     conditions: Conditions,
     /// What it demands of a part.
     demands: Demands,
+    /// The light of its patterns.
+    illumination: Illumination,
     /// What the rasters show, each once; those of the first run come first.
     shots: Vec<Shot>,
     /// The sequences in the order in which they are tried; each unwraps further than the one before. Methods take the index of
@@ -146,6 +148,10 @@ impl Plan {
             .any(|sequence| sequence.kind == SequenceKind::TwoFrames);
         // Large arrays that production does not read.
         arrays.phase_function = Vec::new();
+        let illumination = Illumination {
+            exposures: conditions.exposures,
+            amplitude: std::mem::take(&mut arrays.amplitude),
+        };
         arrays.height_curvature = Vec::new();
         let camera = conditions.camera;
         if camera != calibration.frames() {
@@ -237,6 +243,7 @@ impl Plan {
             id,
             conditions,
             demands,
+            illumination,
             shots,
             runs,
             simulated,
@@ -262,7 +269,8 @@ impl Plan {
             false => 0,
         };
         let runs: usize = self.runs.iter().map(|run| run.bytes).sum();
-        production.cubics().bytes() + samples * size_of::<f64>() + runs
+        let amplitude = self.illumination.amplitude.len();
+        production.cubics().bytes() + samples * size_of::<f64>() + runs + amplitude
     }
 
     /// Number of sequences; they are tried one after the other until one is good enough.
@@ -294,17 +302,6 @@ impl Plan {
     /// The same by value.
     pub fn into_production(mut self) -> Production {
         self.runs.swap_remove(0).production
-    }
-
-    /// The rasters of all sequences; those of the first come first, in the order of its frames.
-    pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
-        let function = self.production().triangulator().function();
-        rasters(function, &self.shots, calibration)
-    }
-
-    /// How many rasters [`Self::rasters`] makes.
-    pub fn patterns(&self) -> usize {
-        self.shots.len()
     }
 
     /// Judges a part from the frames of a sequence; the times of its stages begin at `exposed`. A part that cannot be measured
