@@ -2,8 +2,8 @@
 
 /// σ of a sample by the light of its pixel, read noise and shot noise: σ² = read² + shot · I (photon transfer: Janesick 1987).
 ///
-/// The light is given by the mean signal I, or by the modulation B. Both are the light that the part returns, so on one part I is about
-/// proportional to B ([`signal_per_modulation`](crate::pipeline::signal_per_modulation)).
+/// The light is given by the mean signal I, or by the modulation B: both grow with the light that the part returns
+/// ([`signal_by_modulation`](crate::pipeline::signal_by_modulation)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleNoise {
     /// Variance without light, counts².
@@ -40,11 +40,13 @@ impl SampleNoise {
         libm::sqrt(self.read + self.shot * light)
     }
 
-    /// The same by another measure of the light, of which one count is `counts` of this one.
+    /// The same by another measure of the light: nothing of that is `offset` counts of this one, and a count more is `slope` more.
     #[must_use]
-    pub fn by(self, counts: f64) -> Self {
-        let shot = self.shot * counts;
-        Self { shot, ..self }
+    pub fn by(self, [offset, slope]: [f64; 2]) -> Self {
+        Self {
+            read: self.read + self.shot * offset,
+            shot: self.shot * slope,
+        }
     }
 }
 
@@ -57,7 +59,8 @@ mod tests {
         let noise = SampleNoise::new(0.5, 0.04);
         assert_eq!(noise.at(0.0), 0.5);
         assert!((noise.at(100.0) - libm::sqrt(4.25)).abs() < 1e-12);
-        assert_eq!(noise.by(0.5).at(200.0), noise.at(100.0));
+        assert_eq!(noise.by([0.0, 0.5]).at(200.0), noise.at(100.0));
+        assert_eq!(noise.by([20.0, 2.0]).at(40.0), noise.at(100.0));
         assert_eq!(SampleNoise::constant(2.0).at(77.0), 2.0);
     }
 }

@@ -15,7 +15,7 @@ pub(crate) use cubic::{
 pub use cubic::{HeightCubics, KnownSurface};
 pub use epipolar::Epipolar;
 pub use measure::{HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
-pub use noise::{sample_noise, signal_per_modulation};
+pub use noise::{sample_noise, signal_by_modulation};
 pub use plate::{Plate, PlateError};
 pub use rows::for_each_row;
 pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};

@@ -37,36 +37,51 @@ pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trus
     (freedom > 0.0).then(|| libm::sqrt(squares / freedom))
 }
 
-/// The mean signal of the resolved pixels over their modulation, both of the finest level; with it σ of a sample follows from the modulation.
-/// 1 if there is none. Samples have `full_scale` counts at most.
-pub fn signal_per_modulation(
+/// The mean signal of a resolved pixel by its modulation, both of the finest level: offset in counts, and counts per count, neither below 0.
+/// It is the least-squares line, because not all light is modulated: light from elsewhere is not, nor what blur takes. Samples have
+/// `full_scale` counts at most.
+pub fn signal_by_modulation(
     sequence: &Sequence,
     (frames, full_scale): (&[FrameView<'_>], u16),
     phases: &PhaseMap,
-) -> f64 {
+) -> [f64; 2] {
     let (Some(finest), Some(first)) = (sequence.levels().last(), frames.first()) else {
-        return 1.0;
+        return [0.0, 1.0];
     };
     let width = first.width();
     let finest = finest.frames.iter().map(|&at| frames[usize::from(at)]);
     let finest: Vec<FrameView<'_>> = finest.collect();
     let rows = map_rows(first.height(), |v| {
         let rows: Vec<Samples<'_>> = finest.iter().map(|frame| frame.row(v)).collect();
-        let (mut signal, mut modulation) = (0_u64, 0_u64);
+        // Whole numbers below 2⁶⁴: x is the modulation, y the sum of all samples.
+        let mut sums = [0_u64; 5];
         for u in (0..width).filter(|u| phases.trust[v * width + u] == Trust::Resolved) {
-            signal += rows.iter().map(|row| u64::from(count(row, u))).sum::<u64>();
-            modulation += u64::from(phases.modulation[v * width + u].to_bits());
+            let x = u64::from(phases.modulation[v * width + u].to_bits());
+            let y: u64 = rows.iter().map(|row| u64::from(count(row, u))).sum();
+            for (sum, term) in sums.iter_mut().zip([1, x, y, x * x, x * y]) {
+                *sum += term;
+            }
         }
-        (signal, modulation)
+        sums
     });
-    let (signal, modulation) = rows
-        .into_iter()
-        .fold((0, 0), |sum, row| (sum.0 + row.0, sum.1 + row.1));
-    let counts = f64::from(full_scale) / f64::from(u16::MAX) * modulation as f64;
-    match counts > 0.0 {
-        true => signal as f64 / finest.len() as f64 / counts,
-        false => 1.0,
+    let mut sums = [0_u64; 5];
+    for row in rows {
+        sums.iter_mut()
+            .zip(row)
+            .for_each(|(sum, here)| *sum += here);
     }
+    let [n, x, y, xx, xy] = sums.map(|sum| sum as f64);
+    let slope = ((n * xy - x * y) / (n * xx - x * x)).max(0.0);
+    let (offset, slope) = match (y - slope * x) / n {
+        offset if offset > 0.0 => (offset, slope),
+        _ if xx > 0.0 => (0.0, xy / xx),
+        _ => return [0.0, 1.0],
+    };
+    let samples = finest.len() as f64;
+    [
+        offset / samples,
+        slope / samples * f64::from(u16::MAX) / f64::from(full_scale),
+    ]
 }
 
 /// A sample in counts.
@@ -144,6 +159,7 @@ impl Fit {
 mod tests {
     use super::*;
     use crate::pattern::{Shot, Waveform};
+    use crate::units::Modulation;
 
     /// σ of uniform noise of ±6 counts, from samples of a waveform with half of the harmonics' contrast.
     #[test]
@@ -187,5 +203,57 @@ mod tests {
                 assert!((found / expected - 1.0).abs() < 0.03, "{shifts}: {found}");
             }
         }
+    }
+
+    /// A part of several shades in light from elsewhere: frames of two levels, and what is found in them.
+    #[test]
+    fn the_signal_follows_from_the_modulation_with_light_from_elsewhere() {
+        const SIDE: usize = 64;
+        let shots: Vec<Shot> = [0.25, 1.0]
+            .iter()
+            .flat_map(|&r| Shot::level(r, 4))
+            .collect();
+        let sequence = Sequence::from_frames(&shots).unwrap();
+        for (elsewhere, shades) in [(12.0, 40), (0.0, 40), (30.0, 1)] {
+            let modulation = |at: usize| 50.0 + (at % shades) as f64;
+            let frames: Vec<Vec<u8>> = shots
+                .iter()
+                .map(|shot| {
+                    // Blur takes a tenth of the modulation.
+                    let light = |at: usize| {
+                        let turns = shot.ratio * at as f64 / 37.3 + shot.shift;
+                        let wave = 1.0 + 0.9 * libm::sin(TAU * turns);
+                        libm::rint(elsewhere + modulation(at) / 0.9 * wave) as u8
+                    };
+                    (0..SIDE * SIDE).map(light).collect()
+                })
+                .collect();
+            let views: Vec<_> = frames
+                .iter()
+                .map(|frame| FrameView::new(Samples::Eight(frame), SIDE, SIDE, SIDE).unwrap())
+                .collect();
+            let mut phases = PhaseMap::new(SIDE, SIDE);
+            phases.trust.fill(Trust::Resolved);
+            for (at, here) in phases.modulation.iter_mut().enumerate() {
+                *here = Modulation::from_bits((modulation(at) * 257.0) as u16);
+            }
+            let [offset, slope] = signal_by_modulation(&sequence, (&views, 255), &phases);
+            let signal = |b: f64| offset + slope * b;
+            for b in [50.0, 50.0 + (shades - 1) as f64] {
+                let found = signal(b) - (elsewhere + b / 0.9);
+                assert!(
+                    found.abs() < 0.1,
+                    "{elsewhere}, {shades} shades, {b}: {found}"
+                );
+            }
+            // Beyond the shades only where there are several.
+            let dark = signal(0.0) - elsewhere;
+            assert_eq!(dark.abs() < 0.3, shades > 1, "{dark}");
+        }
+        let nothing = PhaseMap::new(SIDE, SIDE);
+        assert_eq!(
+            signal_by_modulation(&sequence, (&[], 255), &nothing),
+            [0.0, 1.0]
+        );
     }
 }

@@ -133,7 +133,7 @@ impl<'a> Scan<'a> {
     /// The noise of a sample by the modulation of its pixel.
     pub fn noise(&self, calibration: &Calibration, phases: &PhaseMap) -> SampleNoise {
         let frames = (&self.frames[..], self.decoder.full_scale());
-        let signal = pipeline::signal_per_modulation(&self.sequence, frames, phases);
+        let signal = pipeline::signal_by_modulation(&self.sequence, frames, phases);
         calibration.noise.by(signal)
     }
 

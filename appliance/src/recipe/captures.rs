@@ -45,8 +45,8 @@ pub struct Captured {
 }
 
 impl Captured {
-    /// Measures the part in this light with sequences of a phase function; the last is the full one, which is unwrapped about `expected`, the others
-    /// are about that. `progress` gets the share of the frames taken and may end it by `false`.
+    /// Measures the part in this light with sequences of a phase function; the last is the full one, which is unwrapped about `expected`,
+    /// the others are about that. `progress` gets the share of the frames taken and may end it by `false`.
     ///
     /// # Errors
     /// As of [`super::teach::teach`].

@@ -4,9 +4,9 @@
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], [`plan`] joins that with the head's calibration.
 //! - Stored: [`store`] keeps the files of a station, [`generations`] previous generations and deleted recipes, [`incoming`]
 //!   files that are being uploaded; [`exchange`] lists, exports and imports, [`edit`] changes.
-//! - Made: [`teach`] measures the part, `illumination` chooses its light, [`adaptive`] makes its pattern, [`captures`] measures the part with this pattern by every sequence
-//!   that production may use (`candidates`), [`golden`] makes the recipe, [`planner`] chooses the sequence, [`good_parts`] the limit of the
-//!   deviation; [`replace`] keeps names and gauges of a recipe that is taught again.
+//! - Made: [`teach`] measures the part, `illumination` chooses its light, [`adaptive`] makes its pattern, [`captures`] measures the part
+//!   with this pattern by every sequence that production may use (`candidates`), [`golden`] makes the recipe, [`planner`] chooses the
+//!   sequence, [`good_parts`] the limit of the deviation; [`replace`] keeps names and gauges of a recipe that is taught again.
 
 pub mod adaptive;
 pub mod archive;

@@ -188,7 +188,7 @@ impl Prepared {
             taught,
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
-            noise: shared.noise.by(1.0 / brighter),
+            noise: shared.noise.by([0.0, 1.0 / brighter]),
             noise_counts: shared.noise_counts,
             aligned: shared.aligned,
             golden_noise,
