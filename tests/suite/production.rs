@@ -9,7 +9,7 @@ use algo::pipeline::{HeightMap, decode};
 use algo::simd::Backend;
 use algo::units::{AbsolutePhase, Height, PhaseDelta};
 use appliance::head::seam;
-use appliance::recipe::archive::{Arrays, pack};
+use appliance::recipe::archive::pack;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
 use appliance::recipe::{AlignmentKind, Recipe};
@@ -271,16 +271,11 @@ pub(crate) fn expected(
 
 /// The noise of all pixels alike with which σ_z of the compared part has the RMS that it has by the light of each.
 fn even_noise(recipe: &Recipe) -> SampleNoise {
-    let Arrays {
-        valid,
-        modulation,
-        height_slope,
-        ..
-    } = &recipe.arrays;
-    let compared = (0..valid.len()).filter(|&at| valid[at] != 0);
+    let arrays = &recipe.arrays;
+    let compared = (0..arrays.valid.len()).filter(|&at| arrays.valid[at] != 0);
     let weighted = compared.map(|at| {
-        let counts = f64::from(modulation[at]);
-        let weight = (f64::from(height_slope[at]) / counts).powi(2);
+        let counts = f64::from(arrays.modulation[at]);
+        let weight = (f64::from(arrays.height_slope[at]) / counts).powi(2);
         (weight, weight * recipe.conditions.noise.at(counts).powi(2))
     });
     let sums = weighted.fold((0.0, 0.0), |sum, next| (sum.0 + next.0, sum.1 + next.1));
