@@ -29,6 +29,11 @@ fn the_kernel_table_has_its_keys_and_every_variant_decodes_rightly() {
     positive(&all["kernel"], "floor_ns_per_px");
     let workloads = [
         "geometric_12",
+        "geometric_12_quiet",
+        "dense_12_quiet",
+        "golden_4_quiet",
+        "golden_3_quiet",
+        "geometric_9_quiet",
         "background_25",
         "background_50",
         "background_75",

@@ -9,7 +9,7 @@
 //!
 //! CASE is the name of a case, one of `cases.rs` or another of that form; with `/background` appended three quarters of the
 //! frames are dark, with `/arrival` the coarser levels are decoded on arrival, with `/aligned` every frame begins at a page of
-//! 16 KiB, as a camera's buffers do. At the end may stand a back-end, as in `single-4-8@ssse3`; without it the fastest is used.
+//! 16 KiB, as a camera's buffers do, with `/quiet` a quiet head's modulations are trusted. At the end may stand a back-end, as in `single-4-8@ssse3`; without it the fastest is used.
 //!
 //! The hashes must be those of `frozen.txt` on every machine and with every back-end; a test here checks it. After a
 //! change that is meant to change bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
@@ -20,7 +20,7 @@ mod rig;
 mod scene;
 
 use algo::frame::FrameView;
-use algo::phase::Decoder;
+use algo::phase::{Decoder, LeastModulation};
 use algo::pipeline::{PhaseMap, arrive, decode, decode_last, triangulate};
 use algo::simd::Backend;
 use algo::units::AbsolutePhase;
@@ -38,6 +38,9 @@ type Outcome<T> = Result<T, Box<dyn Error>>;
 const SIZES: [(usize, usize); 2] = [(67, 48), (13, 9)];
 /// Size of the frames for counting: as wide as the camera's.
 const COUNTED: (usize, usize) = (1456, 48);
+
+/// The least modulation that a quiet head trusts, counts of 8 bits.
+const QUIET_COUNTS: f64 = 5.0;
 
 /// The decoder with each back-end of this machine.
 fn backends(decoder: &Decoder) -> Vec<(&'static str, Decoder)> {
@@ -124,6 +127,10 @@ fn main() -> Outcome<()> {
             };
             let frames = image.frames(rows.parse::<usize>()?.min(height))?;
             let decoder = case.decoder()?.with_backend(backend);
+            let decoder = match (way, LeastModulation::new(QUIET_COUNTS)) {
+                ("quiet", Some(least)) => decoder.with_least_modulation(least),
+                _ => decoder,
+            };
             let map = match way {
                 "arrival" => arrival(&decoder, &frames, image.map(&case))?,
                 _ => decode(&decoder, &frames, image.map(&case), None)?,

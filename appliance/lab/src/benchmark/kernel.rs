@@ -54,6 +54,9 @@ fn by_name<S: Serializer>(rows: &[Timing], out: S) -> Result<S::Ok, S::Error> {
     out.collect_map(rows.iter().map(|row| (&row.name, row)))
 }
 
+/// Makes variants of a workload for so many frame sets.
+type Variants = fn(&Workload, usize) -> Result<Vec<variants::Named<String>>, String>;
+
 /// A phase is right within this many turns: seven σ of the noise that the frames have.
 const RIGHT: f64 = 0.05;
 /// A kernel is bound by memory if frames that are in no cache take it at least this many times as long as those that are.
@@ -106,23 +109,30 @@ pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<Ker
     })
 }
 
-/// Every variant of a workload: the decoders on each rotation, the first of which is packed and the second aligned, and the
-/// references on the first.
+/// Every variant of a workload: the decoders on each rotation, the first of which is packed and the second aligned, and that of a quiet
+/// head and the references on the first.
 fn contenders(
     workload: &Workload,
     effort: &Effort,
     rotations: &[Rotation],
 ) -> Result<(Vec<String>, Vec<Contender>), String> {
+    let mut kinds: Vec<(usize, &str, Variants)> = vec![(0, "", variants::decoding)];
+    if workload.has_quiet {
+        kinds.push((0, "", variants::quiet));
+    }
+    if rotations.len() > 1 {
+        kinds.push((1, "_aligned", variants::decoding));
+    }
     let mut all = Vec::new();
-    for (rotation, (sets, suffix)) in rotations.iter().zip(["", "_aligned"]).enumerate() {
+    for (rotation, suffix, variants) in kinds {
         let hot = |size| {
             let set = workload.render(size);
             let set = if rotation > 0 { set.aligned() } else { set };
-            let kernels = variants::decoding(workload, 1)?.into_iter();
+            let kernels = variants(workload, 1)?.into_iter();
             Ok::<_, String>(kernels.map(move |(_, kernel)| (kernel, set.clone())))
         };
         let [wide, narrow] = effort.hot_sizes().map(hot);
-        let cold = variants::decoding(workload, sets.copies())?.into_iter();
+        let cold = variants(workload, rotations[rotation].copies())?.into_iter();
         for (((name, kernel), wide), narrow) in cold.zip(wide?).zip(narrow?) {
             let contender = Contender {
                 kernel,

@@ -6,8 +6,11 @@ use super::timing::Kernel;
 use super::words;
 use super::workload::{RANGE, Workload};
 use algo::pattern::{PhaseRange, Sequence};
-use algo::phase::Decoder;
+use algo::phase::{Decoder, LeastModulation};
 use algo::simd::Backend;
+
+/// The least modulation that a quiet head trusts, counts of 8 bits: 4.3 σ of a noise of 1.2 counts.
+const QUIET_COUNTS: f64 = 5.0;
 
 /// An implementation by its name.
 pub type Named<N> = (N, Box<dyn Kernel>);
@@ -49,17 +52,38 @@ pub fn references(
 /// If its sequence cannot be decoded.
 pub fn decoding(workload: &Workload, copies: usize) -> Result<Vec<Named<String>>, String> {
     let sequence = Sequence::from_frames(&workload.frames).map_err(words)?;
-    let mut variants: Vec<Named<String>> = Vec::new();
-    for (name, decoder) in decoders(&sequence, RANGE, workload.bit_depth)? {
-        if decoder.levels().len() > 1 && workload.has_references {
-            let last = Decoding::after_the_last(decoder.clone(), copies);
-            let name = format!("{name}_last_frames_of_{}", workload.name);
-            variants.push((name, Box::new(last)));
-        }
-        let name = format!("{name}_{}", workload.name);
-        variants.push((name, Box::new(Decoding::new(decoder, None))));
+    let decoders = decoders(&sequence, RANGE, workload.bit_depth)?.into_iter();
+    let named = decoders.flat_map(|(name, decoder)| of(workload, name, &decoder, copies));
+    Ok(named.collect())
+}
+
+/// The fastest of them with the least modulation of a quiet head: `avx2_geometric_12_quiet`.
+///
+/// # Errors
+/// If its sequence cannot be decoded.
+pub fn quiet(workload: &Workload, copies: usize) -> Result<Vec<Named<String>>, String> {
+    let sequence = Sequence::from_frames(&workload.frames).map_err(words)?;
+    let decoder = Decoder::new(&sequence, RANGE, workload.bit_depth).map_err(words)?;
+    let least = LeastModulation::new(QUIET_COUNTS).ok_or("no least modulation of a quiet head")?;
+    let decoder = decoder.with_least_modulation(least);
+    let mut variants = of(workload, decoder.backend().name(), &decoder, copies);
+    for (name, _) in &mut variants {
+        name.push_str("_quiet");
     }
     Ok(variants)
+}
+
+/// A decoder of all levels at once, and of the last alone.
+fn of(workload: &Workload, name: &str, decoder: &Decoder, copies: usize) -> Vec<Named<String>> {
+    let mut variants: Vec<Named<String>> = Vec::new();
+    if decoder.levels().len() > 1 && workload.has_references {
+        let last = Decoding::after_the_last(decoder.clone(), copies);
+        let name = format!("{name}_last_frames_of_{}", workload.name);
+        variants.push((name, Box::new(last)));
+    }
+    let name = format!("{name}_{}", workload.name);
+    variants.push((name, Box::new(Decoding::new(decoder.clone(), None))));
+    variants
 }
 
 /// The references of a workload that has them, by implementation and workload: `f32_geometric_12`.
