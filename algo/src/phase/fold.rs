@@ -11,9 +11,8 @@
 //! S = Σ I_k cos 2πs_k      C = Σ I_k sin 2πs_k      φ = atan2(S, C) / 2π      B = (2/N) √(S² + C²)
 //! ```
 //!
-//! Four shifts of 8 bits are folded in bytes, exactly, where the least modulation is the one of unknown noise, all others in words from S
-//! and C of [`super::terms`]. Where less modulation is trusted, pointers may be too short to be normalised at once: they are lifted
-//! by two bits in blocks that have such pixels.
+//! Four shifts of 8 bits are folded in bytes, exactly, all others in words from S and C of [`super::terms`]. Where little modulation is
+//! trusted, pointers in words may be too short to be normalised at once: they are lifted by two bits in blocks that have such pixels.
 //!
 //! **Shapes and units.** Samples in counts of the bit depth, one block of each of the N rows; components in words, scaled by a
 //! power of two so that the longer one uses 15 bits.
@@ -44,6 +43,8 @@ pub(super) struct Folded<V: Lanes> {
     pub base: Option<[V::W; 2]>,
     /// Mask: the modulation is at least the trusted minimum.
     pub strong: V::B,
+    /// Whether that is set nowhere.
+    pub dark: bool,
     /// 255 where a sample is at full scale and the level does not tolerate that.
     pub brightest: V::B,
 }
@@ -60,15 +61,17 @@ impl<V: Lanes> Folded<V> {
     }
 }
 
-/// At 8 bits, N = 4 and the least modulation of unknown noise, B = √(S² + C²)/2 reaches 16 counts where S² + C² ≥ 32²: for each longer component from 16 to 31 the
-/// least shorter one that is enough; 255 where none is.
-const LEAST_SHORT: [u8; 16] = [
-    255, 255, 255, 255, 255, 255, 255, 23, 22, 20, 19, 18, 16, 14, 12, 8,
-];
+/// Tells the compiler that a branch is seldom taken: then registers are saved there and not before it.
+#[cold]
+fn seldom() {}
 
 /// Folds a block of four shifts of 8 bits, S = I₀ − I₂ and C = I₁ − I₃, in bytes with the signs apart.
 #[inline(always)]
-pub(super) fn fold_four<V: Lanes>(v: V, [i0, i1, i2, i3]: [V::B; 4]) -> Folded<V> {
+pub(super) fn fold_four<V: Lanes>(
+    v: V,
+    level: &LevelLanes<'_, V>,
+    [i0, i1, i2, i3]: [V::B; 4],
+) -> Folded<V> {
     let (even, odd) = (v.max8(i0, i2), v.max8(i1, i3));
     let s = v.sub8(even, v.min8(i0, i2));
     let c = v.sub8(odd, v.min8(i1, i3));
@@ -76,10 +79,11 @@ pub(super) fn fold_four<V: Lanes>(v: V, [i0, i1, i2, i3]: [V::B; 4]) -> Folded<V
     let (s_down, c_down) = (v.eq8(even, i2), v.eq8(odd, i3));
     let (long, short) = (v.max8(s, c), v.min8(s, c));
     let steep = v.eq8(long, s);
+    // Before what is not needed of the background.
+    let (strong, dark) = strong_four(v, level, long, short);
     let backwards = v.xor8(v.xor8(s_down, c_down), steep);
     let axis = v.quarters8(steep, s_down, c_down);
     let scaled = v.scaled(long, short);
-    let least = v.by_excess(&LEAST_SHORT, long);
     Folded {
         long: scaled.long,
         short: scaled.short,
@@ -88,43 +92,71 @@ pub(super) fn fold_four<V: Lanes>(v: V, [i0, i1, i2, i3]: [V::B; 4]) -> Folded<V
         sign: v.signs(backwards),
         axis: v.widen_256(axis),
         base: None,
-        strong: v.eq8(v.max8(short, least), short),
+        strong,
+        dark,
         brightest: v.max8(even, odd),
     }
 }
 
-/// Folds the pointers of a block of any other level, in words; `LIFTED` where some may be [`FAINT`].
+/// Mask: the sum of both squares is at least the level's least power; and whether it is set nowhere.
 #[inline(always)]
-pub(super) fn fold<V: Lanes, const LIFTED: bool>(
+fn strong_four<V: Lanes>(v: V, level: &LevelLanes<'_, V>, long: V::B, short: V::B) -> (V::B, bool) {
+    // On most of a part the longer component is enough by itself, and in the background no shorter one makes up for it.
+    if v.all_at_least(long, level.four.long_enough) {
+        return (v.splat8(u8::MAX), false);
+    }
+    if v.all_at_most(long, level.four.too_short) {
+        return (v.splat8(0), true);
+    }
+    seldom();
+    let zero = v.splat8(0);
+    let (long, short) = (v.widen(long, zero), v.widen(short, zero));
+    let mut strong = long;
+    let mut half = 0;
+    while half < 2 {
+        let missing = v.excess(level.four.power, v.mul_low(long[half], long[half]));
+        let missing = v.excess(missing, v.mul_low(short[half], short[half]));
+        strong[half] = v.eq(missing, v.splat16(0));
+        half += 1;
+    }
+    let strong = v.narrow_mask(strong);
+    (strong, v.none8(strong))
+}
+
+/// Folds the pointers of a block of any other level, in words.
+#[inline(always)]
+pub(super) fn fold<V: Lanes>(
     v: V,
     level: &LevelLanes<'_, V>,
     Pointers { s, c, brightest }: Pointers<V>,
 ) -> Folded<V> {
     let (along, across) = ([v.abs(s[0]), v.abs(s[1])], [v.abs(c[0]), v.abs(c[1])]);
     let length = [v.max(along[0], across[0]), v.max(along[1], across[1])];
-    // What is normalised: a copy, because the modulation follows from the length itself.
-    let (mut along, mut across, mut long) = (along, across, length);
+    let short = [v.min(along[0], across[0]), v.min(along[1], across[1])];
+    // Where the longer component is C.
+    let mut flat = [v.gt(across[0], along[0]), v.gt(across[1], along[1])];
     // On most of a part the longer component is enough by itself.
-    let enough = v.gt(v.min(length[0], length[1]), level.below_long_enough);
-    let strong = if v.all8(v.bytes_of(enough)) {
-        v.splat8(u8::MAX)
+    let (strong, dark, low, high);
+    if v.none_below(v.min(length[0], length[1]), level.long_enough) {
+        (strong, dark) = (v.splat8(u8::MAX), false);
+        low = v.normalised(length[0], short[0]);
+        high = v.normalised(length[1], short[1]);
     } else {
-        let low = strong(v, level, along[0], across[0]);
-        let strong = v.narrow_mask([low, strong(v, level, along[1], across[1])]);
-        if LIFTED && level.plan.faint {
-            let mut half = 0;
-            while half < 2 {
-                let faint = v.gt(v.splat16(FAINT), length[half]);
-                for component in [&mut along[half], &mut across[half], &mut long[half]] {
-                    *component = v.pick(faint, v.shl::<2>(*component), *component);
-                }
-                half += 1;
-            }
-        }
-        strong
-    };
-    let low = octant(v, [s[0], c[0]], [along[0], across[0]], long[0]);
-    let high = octant(v, [s[1], c[1]], [along[1], across[1]], long[1]);
+        seldom();
+        strong = v.narrow_mask([
+            strong_words(v, level, length[0], short[0]),
+            strong_words(v, level, length[1], short[1]),
+        ]);
+        dark = v.none8(strong);
+        low = lifted(v, level, length[0], short[0]);
+        high = lifted(v, level, length[1], short[1]);
+    }
+    if !V::FEW_REGISTERS {
+        // The same, but compared here, where one instruction can take the bits of its inverse.
+        flat = [v.gt(length[0], along[0]), v.gt(length[1], along[1])];
+    }
+    let low = octant(v, [s[0], c[0]], flat[0], low);
+    let high = octant(v, [s[1], c[1]], flat[1], high);
     Folded {
         long: [low.long, high.long],
         short: [low.short, high.short],
@@ -134,14 +166,26 @@ pub(super) fn fold<V: Lanes, const LIFTED: bool>(
         axis: [low.axis, high.axis],
         base: Some([low.base, high.base]),
         strong,
+        dark,
         brightest,
     }
+}
+
+/// Both components normalised, [`FAINT`] ones too where these can be trusted.
+#[inline(always)]
+fn lifted<V: Lanes>(v: V, level: &LevelLanes<'_, V>, mut long: V::W, mut short: V::W) -> [V::W; 2] {
+    if V::LIFTS_FAINT && level.plan.faint {
+        let faint = v.gt(v.splat16(FAINT), long);
+        long = v.pick(faint, v.shl::<2>(long), long);
+        short = v.pick(faint, v.shl::<2>(short), short);
+    }
+    v.normalised(long, short)
 }
 
 /// Mask: the sum of both squares is at least the level's least power. Takes the magnitudes: of S and C the compiler for NEON would
 /// narrow one half twice.
 #[inline(always)]
-fn strong<V: Lanes>(v: V, level: &LevelLanes<'_, V>, a: V::W, b: V::W) -> V::W {
+fn strong_words<V: Lanes>(v: V, level: &LevelLanes<'_, V>, a: V::W, b: V::W) -> V::W {
     let power = v.dot(a, a, b, b);
     // Not kept in all lanes: it is needed too seldom.
     let below = v.splat32(level.plan.below_least_power);
@@ -159,17 +203,9 @@ struct Octant<W> {
 }
 
 #[inline(always)]
-fn octant<V: Lanes>(
-    v: V,
-    [s, c]: [V::W; 2],
-    [along, across]: [V::W; 2],
-    length: V::W,
-) -> Octant<V::W> {
-    let short = v.min(along, across);
-    let flat = v.gt(across, along);
+fn octant<V: Lanes>(v: V, [s, c]: [V::W; 2], flat: V::W, [long, short]: [V::W; 2]) -> Octant<V::W> {
     let backwards = v.xor(v.xor(s, c), flat);
     let quarter = v.splat16(1 << 14);
-    let [long, short] = v.normalised(length, short);
     Octant {
         long,
         short,

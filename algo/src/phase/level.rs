@@ -52,18 +52,29 @@ pub(crate) struct Level {
     per_count: f64,
     /// S² + C² must be above this.
     pub below_least_power: i32,
-    /// Where |S| or |C| is above this, S² + C² is above `below_least_power`, and the pointer is not [`FAINT`].
-    below_long_enough: i16,
+    /// Where |S| or |C| is at least this, S² + C² is above `below_least_power`, and the pointer is not [`FAINT`].
+    long_enough: i16,
     /// Whether a pixel whose pointer is [`FAINT`] can be trusted.
     pub faint: bool,
-    /// Whether the least modulation is the one that [`super::fold::fold_four`] knows.
-    pub usual: bool,
+    /// The same for four shifts of 8 bits, folded in bytes.
+    four: LeastOfFour,
     /// Coefficients of √(1 + t²), scaled so that the product with a length is a modulation.
     hypotenuse: [i16; 3],
     /// Whether that product is half of the modulation, because the coefficients would not fit Q15.
     doubled: bool,
     /// Whether a sample at full scale rejects its pixel.
     pub saturates: bool,
+}
+
+/// The least modulation of four shifts of 8 bits, with S and C in counts.
+#[derive(Clone, Copy, Debug, Default)]
+struct LeastOfFour {
+    /// The least S² + C², at most 255².
+    power: u16,
+    /// The least |S| or |C| that is enough by itself.
+    long_enough: u8,
+    /// The largest that is too short even where both are so long.
+    too_short: u8,
 }
 
 /// How S and C come from the samples of a level ([`super::terms`]).
@@ -151,9 +162,9 @@ impl Level {
             below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
             per_count: shifts as f64 / 2.0 * unit,
             below_least_power: 0,
-            below_long_enough: 0,
+            long_enough: 0,
             faint: false,
-            usual: true,
+            four: LeastOfFour::default(),
             hypotenuse: LENGTH.map(|c| libm::rint(c * factor * 32_768.0) as i16),
             doubled,
             saturates: shifts < FULL_TRUST_SHIFTS || level.waveform != Waveform::SINE,
@@ -168,13 +179,19 @@ impl Level {
         self.below_least_power = libm::ceil(length * length) as i32 - 1;
         // The longer of two components is at least 1/√2 of the length.
         self.faint = length < f64::from(FAINT) * core::f64::consts::SQRT_2;
-        let enough = libm::ceil(length) as i16 - 1;
-        self.below_long_enough = if self.faint {
-            enough.max(FAINT - 1)
+        let enough = libm::ceil(length) as i16;
+        self.long_enough = if self.faint {
+            enough.max(FAINT)
         } else {
             enough
         };
-        self.usual = least == LeastModulation::default();
+        // The words of four shifts of 8 bits are differences shifted left by 7 bits; other levels do not use this.
+        let below = (self.below_least_power >> (2 * lift_of(8, 4))).min(255 * 255 - 1);
+        self.four = LeastOfFour {
+            power: below as u16 + 1,
+            long_enough: below.isqrt() as u8 + 1,
+            too_short: (below / 2).isqrt() as u8,
+        };
     }
 }
 
@@ -187,13 +204,22 @@ pub(super) struct LevelLanes<'a, V: Lanes> {
     /// `lift` less one bit.
     pub half_lift: V::Count,
     pub to_16_bits: V::Count,
-    pub below_long_enough: V::W,
+    pub long_enough: V::W,
     /// Full scale, all bits of a sample.
     pub full_scale: V::W,
     /// Full scale less one count, with its sign bit inverted.
     pub below_full_scale: V::W,
     hypotenuse: [V::W; 3],
     doubled: V::Count,
+    pub four: LeastOfFourLanes<V>,
+}
+
+/// [`LeastOfFour`] in all lanes.
+#[derive(Clone, Copy)]
+pub(super) struct LeastOfFourLanes<V: Lanes> {
+    pub power: V::W,
+    pub long_enough: V::Bound,
+    pub too_short: V::Bound,
 }
 
 impl<'a, V: Lanes> LevelLanes<'a, V> {
@@ -209,7 +235,7 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
             lift: v.left(plan.lift),
             half_lift: v.left(plan.lift.saturating_sub(1)),
             to_16_bits: v.left(plan.to_16_bits),
-            below_long_enough: v.splat16(plan.below_long_enough),
+            long_enough: v.splat16(plan.long_enough),
             full_scale: v.splat16(plan.below_full_scale | 1),
             below_full_scale: v.xor(v.splat16(plan.below_full_scale), v.splat16(i16::MIN)),
             hypotenuse: [
@@ -218,6 +244,11 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
                 v.splat16(plan.hypotenuse[2]),
             ],
             doubled: v.left(u8::from(plan.doubled)),
+            four: LeastOfFourLanes {
+                power: v.splat16(plan.four.power.cast_signed()),
+                long_enough: v.bound(plan.four.long_enough),
+                too_short: v.bound(plan.four.too_short),
+            },
         }
     }
 

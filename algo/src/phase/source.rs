@@ -151,9 +151,9 @@ fn fold_bytes<V: Lanes, const N: usize>(
     blocks: [V::B; N],
 ) -> Folded<V> {
     if N == 4 {
-        return fold_four(v, [blocks[0], blocks[1], blocks[2], blocks[N - 1]]);
+        return fold_four(v, level, [blocks[0], blocks[1], blocks[2], blocks[N - 1]]);
     }
-    fold::<V, false>(v, level, of_shifts::<V, u8, N>(v, level, &blocks))
+    fold(v, level, of_shifts::<V, u8, N>(v, level, &blocks))
 }
 
 impl<T: BlockSample> Frames for Rows<'_, T> {
@@ -182,7 +182,7 @@ impl<T: BlockSample> Frames for Rows<'_, T> {
         at: usize,
         after: usize,
     ) -> Folded<V> {
-        fold::<V, true>(v, level, pointers(v, level, self, at, after))
+        fold(v, level, pointers(v, level, self, at, after))
     }
 
     #[inline(always)]

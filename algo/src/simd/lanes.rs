@@ -32,10 +32,14 @@ pub(crate) trait Lanes: Copy + Debug {
     const PIXELS: usize;
     /// Whether there are too few registers for the constants of a kernel.
     const FEW_REGISTERS: bool = true;
+    /// Whether [`Self::normalised`] needs components of at least 2¹⁰; else it takes shorter ones, too.
+    const LIFTS_FAINT: bool = true;
     /// How many samples ahead of their use rows are prefetched.
     const AHEAD: usize;
     /// A byte per pixel of a block.
     type B: Copy;
+    /// A number that bytes are compared with.
+    type Bound: Copy;
     /// A word per pixel of half a block.
     type W: Copy;
     /// A double word per pixel of a quarter of a block.
@@ -101,8 +105,12 @@ pub(crate) trait Lanes: Copy + Debug {
         let half = self.and8(self.pick8(mask, s, c), self.splat8(128));
         self.or8(half, self.and8(mask, self.splat8(64)))
     }
-    /// table\[x − 16\] for 16 ≤ x < 32, table\[0\] below, 0 above.
-    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B;
+    /// Prepares comparisons with x.
+    fn bound(self, x: u8) -> Self::Bound;
+    /// Whether every byte is at least the bound.
+    fn all_at_least(self, x: Self::B, bound: Self::Bound) -> bool;
+    /// Whether every byte is at most the bound.
+    fn all_at_most(self, x: Self::B, bound: Self::Bound) -> bool;
     /// Whether every byte of a mask is set.
     fn all8(self, mask: Self::B) -> bool;
     /// Whether every byte is 0, of a mask or of any other bytes.
@@ -132,7 +140,7 @@ pub(crate) trait Lanes: Copy + Debug {
         let [low, high] = self.widen(x, self.splat8(0));
         [self.shl::<7>(low), self.shl::<7>(high)]
     }
-    /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 16 or short > long.
+    /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 4 or short > long.
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W>;
     /// The bytes of words, two per pixel, in any order.
     fn bytes_of(self, x: Self::W) -> Self::B;
@@ -192,6 +200,11 @@ pub(crate) trait Lanes: Copy + Debug {
     #[inline(always)]
     fn excess(self, a: Self::W, b: Self::W) -> Self::W {
         self.sub(self.max_unsigned(a, b), b)
+    }
+    /// Whether no a < b, signed.
+    #[inline(always)]
+    fn none_below(self, a: Self::W, b: Self::W) -> bool {
+        self.none8(self.bytes_of(self.gt(b, a)))
     }
     /// The smaller, signed.
     fn min(self, a: Self::W, b: Self::W) -> Self::W;

@@ -47,9 +47,11 @@ type Count = int16x8_t;
 impl Lanes for Neon {
     const PIXELS: usize = BYTES;
     const FEW_REGISTERS: bool = false;
+    const LIFTS_FAINT: bool = false;
     /// Nothing is prefetched.
     const AHEAD: usize = 0;
     type B = B;
+    type Bound = u8;
     type W = W;
     type D = D;
     type F = F;
@@ -137,17 +139,33 @@ impl Lanes for Neon {
     }
     #[inline(always)]
     fn quarters8(self, mask: Self::B, s: Self::B, c: Self::B) -> Self::B {
-        let half = in_place!("bit", "16b", c, s, mask);
+        let mut half = c;
+        // SAFETY: an instruction of NEON that reads and writes registers only. It names what kernels compute of the same masks, so that
+        // this is done before and no copy of the one that changes is needed.
+        unsafe {
+            asm!(
+                "bit {0:v}.16b, {1:v}.16b, {2:v}.16b // {3:v}",
+                inout(vreg) half,
+                in(vreg) s,
+                in(vreg) mask,
+                in(vreg) self.xor8(s, c),
+                options(pure, nomem, nostack, preserves_flags),
+            );
+        }
         // Shifts to the right that round make 128 and 64 of 255.
         neon!(vrsraq_n_u8::<2>(vrshrq_n_u8::<1>(half), mask))
     }
     #[inline(always)]
-    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
-        let below = self.splat8(table[0]);
-        // SAFETY: the table holds the 16 bytes that are read.
-        let table = unsafe { vld1q_u8(table.as_ptr()) };
-        // An index outside of both tables reads 0.
-        neon!(vqtbl2q_u8(uint8x16x2_t(below, table), x))
+    fn bound(self, x: u8) -> Self::Bound {
+        x
+    }
+    #[inline(always)]
+    fn all_at_least(self, x: Self::B, bound: Self::Bound) -> bool {
+        neon!(vminvq_u8(x)) >= bound
+    }
+    #[inline(always)]
+    fn all_at_most(self, x: Self::B, bound: Self::Bound) -> bool {
+        neon!(vmaxvq_u8(x)) <= bound
     }
     #[inline(always)]
     fn all8(self, mask: Self::B) -> bool {

@@ -83,6 +83,7 @@ impl Lanes for Portable {
     /// Nothing is prefetched.
     const AHEAD: usize = 0;
     type B = B;
+    type Bound = u8;
     type W = W;
     type D = D;
     type F = F;
@@ -98,6 +99,9 @@ impl Lanes for Portable {
         and8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a & b);
         or8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a | b);
         xor8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a ^ b);
+        bound(self, x: u8) -> u8 = x;
+        all_at_least(self, x: B, bound: u8) -> bool = x.iter().all(|&x| x >= bound);
+        all_at_most(self, x: B, bound: u8) -> bool = x.iter().all(|&x| x <= bound);
         all8(self, mask: B) -> bool = mask == [u8::MAX; BYTES];
         none8(self, bytes: B) -> bool = bytes == [0; BYTES];
         sum(self, a: B, b: B) -> [W; 2] = halves(pairs(a, b, |a, b| i16::from(a) + i16::from(b)), |half| half);
@@ -155,14 +159,6 @@ impl Lanes for Portable {
         self.or8(self.and8(mask, a), b)
     }
     #[inline(never)]
-    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
-        lanes(x, |x| match x {
-            0..16 => table[0],
-            16..32 => table[usize::from(x - 16)],
-            _ => 0,
-        })
-    }
-    #[inline(never)]
     fn widen(self, low: Self::B, high: Self::B) -> [Self::W; 2] {
         let words: [i16; BYTES] = pairs(low, high, |low, high| i16::from_le_bytes([low, high]));
         halves(words, |half| half)
@@ -171,7 +167,7 @@ impl Lanes for Portable {
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
         let mut scaled = [[0; BYTES]; 3];
         for lane in 0..BYTES {
-            let n = 7 + long[lane].leading_zeros().min(3);
+            let n = 7 + long[lane].leading_zeros();
             let long = i16::from(long[lane]) << n;
             scaled[0][lane] = long;
             scaled[1][lane] = i16::from(short[lane]) << n;

@@ -44,6 +44,7 @@ impl Lanes for Ssse3 {
     const PIXELS: usize = BYTES;
     const AHEAD: usize = AHEAD;
     type B = B;
+    type Bound = B;
     type W = W;
     type D = D;
     type F = F;
@@ -123,15 +124,23 @@ impl Lanes for Ssse3 {
         unsafe { _mm_storeu_si128(block.as_mut_ptr().cast(), x) }
     }
     #[inline(always)]
-    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
-        // SAFETY: the table holds the 16 bytes that are read; the load needs no alignment; `self` proves SSSE3.
-        let table = unsafe { _mm_loadu_si128(table.as_ptr().cast()) };
-        ssse3!({
-            // A set high bit reads 0: from 32 on, with 112 more than the excess.
-            let excess = _mm_subs_epu8(x, _mm_set1_epi8(16));
-            let index = _mm_adds_epu8(excess, _mm_set1_epi8(112));
-            _mm_shuffle_epi8(table, index)
-        })
+    fn quarters8(self, mask: Self::B, s: Self::B, c: Self::B) -> Self::B {
+        // Picked by exclusive or, because kernels need that of both masks, too.
+        let picked = self.xor8(c, self.and8(mask, self.xor8(s, c)));
+        let half = self.and8(picked, self.splat8(128));
+        self.or8(half, self.and8(mask, self.splat8(64)))
+    }
+    #[inline(always)]
+    fn bound(self, x: u8) -> Self::Bound {
+        self.splat8(x)
+    }
+    #[inline(always)]
+    fn all_at_least(self, x: Self::B, bound: Self::Bound) -> bool {
+        self.none8(self.excess8(bound, x))
+    }
+    #[inline(always)]
+    fn all_at_most(self, x: Self::B, bound: Self::Bound) -> bool {
+        self.none8(self.excess8(x, bound))
     }
     #[inline(always)]
     fn all8(self, mask: Self::B) -> bool {
@@ -141,6 +150,10 @@ impl Lanes for Ssse3 {
     fn none8(self, bytes: Self::B) -> bool {
         let zero = self.splat8(0);
         self.all8(self.eq8(bytes, zero))
+    }
+    #[inline(always)]
+    fn none_below(self, a: Self::W, b: Self::W) -> bool {
+        self.all8(self.gt(a, self.sub(b, self.splat16(1))))
     }
     #[inline(always)]
     fn bytes_of(self, mask: Self::W) -> Self::B {
@@ -168,17 +181,14 @@ impl Lanes for Ssse3 {
     }
     #[inline(always)]
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
-        // The first nibble of the longer decides the scale: 128 is a low byte, 256 to 1024 are high bytes.
+        // The five leading bits of the longer decide the scale: with the first of them it is 128, a low byte, else 256 to 4096, a high
+        // byte by the others. A set high bit reads 0.
         let scale = ssse3!({
-            let low = _mm_setr_epi8(
-                0, 0, 0, 0, 0, 0, 0, 0, -128, -128, -128, -128, -128, -128, -128, -128,
-            );
-            let high = _mm_setr_epi8(8, 4, 2, 2, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0);
-            let nibble = _mm_and_si128(_mm_srli_epi16::<4>(long), _mm_set1_epi8(15));
-            self.widen(
-                _mm_shuffle_epi8(low, nibble),
-                _mm_shuffle_epi8(high, nibble),
-            )
+            let table = _mm_setr_epi8(16, 8, 4, 4, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1);
+            let first = _mm_and_si128(long, _mm_set1_epi8(-128));
+            let others = _mm_and_si128(_mm_srli_epi16::<3>(long), _mm_set1_epi8(15));
+            let index = _mm_or_si128(first, others);
+            self.widen(first, _mm_shuffle_epi8(table, index))
         });
         scaled_by(self, long, short, scale)
     }

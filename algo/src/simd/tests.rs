@@ -12,7 +12,7 @@ const WIDTH: usize = 64;
 
 /// Rows of lanes, made anew for every round.
 pub(super) struct Inputs {
-    /// Two rows of any bytes, two of masks, and a pointer's components of 8 bits: 16 ≤ long, short ≤ long.
+    /// Two rows of any bytes, two of masks, and a pointer's components of 8 bits: 4 ≤ long, short ≤ long.
     bytes: [[u8; WIDTH]; 6],
     /// Four rows of any words, and a pointer's components: 2¹⁰ ≤ long < 2¹⁵, short ≤ long.
     words: [[u16; WIDTH]; 6],
@@ -38,7 +38,10 @@ impl Inputs {
             7 => i64::from(i32::MAX),
             _ => x >> 24 >> (x >> 4 & 15),
         };
-        let (long8, long16) = (row(|x| 16 + (x & 127)), row(|x| 1024 + (x & 0x3FFF)));
+        let (long8, long16) = (
+            row(|x| 4 + (((x & 0xFF) % 252) >> ((x >> 8) & 7))),
+            row(|x| 1024 + (x & 0x3FFF)),
+        );
         let up_to = |long: [i64; WIDTH], x: [i64; WIDTH]| {
             core::array::from_fn(|at| x[at].rem_euclid(long[at] + 1))
         };
@@ -119,6 +122,21 @@ fn operations<V: Lanes>(v: V, inputs: &Inputs, out: &mut Outputs) {
         assert!(v.all8(v.load8(&row, 0)));
         row[place] = 0;
         assert!(!v.all8(v.load8(&row, 0)), "pixel {place}");
+        let mut row = [130; WIDTH];
+        row[place] = 129;
+        let x = v.load8(&row, 0);
+        let at_least = |bound| v.all_at_least(x, v.bound(bound));
+        assert!(
+            at_least(0) && at_least(129) && !at_least(130),
+            "pixel {place}"
+        );
+        row[place] = 131;
+        let x = v.load8(&row, 0);
+        let at_most = |bound| v.all_at_most(x, v.bound(bound));
+        assert!(
+            at_most(255) && at_most(131) && !at_most(130),
+            "pixel {place}"
+        );
     }
 }
 
@@ -127,7 +145,6 @@ fn operations_of_bytes<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut Out
     let [a, b, mask, other, long, short] = &inputs.bytes;
     let (a, b) = (v.load8(a, at), v.load8(b, at));
     let (mask, other) = (v.load8(mask, at), v.load8(other, at));
-    let table = core::array::from_fn(|at| (at * 7 + 3) as u8);
     results! { v, out;
         bytes splat8(inputs.shift);
         bytes min8(a, b);
@@ -140,7 +157,6 @@ fn operations_of_bytes<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut Out
         bytes pick8(mask, a, b);
         bytes excess8(a, b);
         bytes quarters8(mask, other, v.xor8(mask, other));
-        bytes by_excess(&table, a);
         words widen(a, b);
         words sum(a, b);
         words difference(a, b);

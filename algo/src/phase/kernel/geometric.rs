@@ -288,7 +288,7 @@ impl<V: Lanes, S: Frames, const BETWEEN: usize> OnePass<'_, V, S, BETWEEN> {
         // The line of a lit block is lit nearly everywhere. With few registers the question costs less than a longer stretch without
         // a branch, whose instructions the compiler mixes.
         let asked = V::FEW_REGISTERS || !matches!(place, Place::Other(_));
-        if asked && v.none8(lit) {
+        if asked && folded.dark {
             out.store_unknown(v, at, v.splat8(Trust::Dark as u8));
             return false;
         }

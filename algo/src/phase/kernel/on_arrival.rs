@@ -136,7 +136,7 @@ fn coarsest_columns<V: Lanes, S: Frames>(
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
         let folded = frames.fold(v, &level, at, V::AHEAD);
-        if v.none8(folded.strong) {
+        if folded.dark {
             // Later levels skip this block and do not read its prediction.
             v.store8(out.reason, at, v.splat8(Trust::Dark as u8));
             continue;

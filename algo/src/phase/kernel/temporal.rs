@@ -268,14 +268,13 @@ pub(super) fn rows_of_bytes<'r, 'a, T: BlockSample, const N: usize>(
     bytes
 }
 
-/// The rows of a level of N shifts of 8 bits that start at 0, without pointers that must be lifted; of four only with the least
-/// modulation that is known in bytes.
+/// The rows of a level of N shifts of 8 bits that start at 0.
 pub(super) fn of_bytes<'r, 'a, T: BlockSample, const N: usize>(
     level: &Level,
     rows: &'r [&'a [T]],
 ) -> Option<&'r [&'a [u8]; N]> {
     let rows: &[&[T]; N] = rows.try_into().ok()?;
-    if level.samples == Samples::Weighted || level.faint || N == 4 && !level.usual {
+    if level.samples == Samples::Weighted {
         return None;
     }
     T::bytes(rows)

@@ -47,6 +47,7 @@ impl Lanes for Avx2 {
     const PIXELS: usize = BYTES;
     const AHEAD: usize = AHEAD;
     type B = B;
+    type Bound = B;
     type W = W;
     type D = D;
     type F = F;
@@ -127,15 +128,16 @@ impl Lanes for Avx2 {
         unsafe { _mm256_storeu_si256(block.as_mut_ptr().cast(), x) }
     }
     #[inline(always)]
-    fn by_excess(self, table: &[u8; 16], x: Self::B) -> Self::B {
-        // SAFETY: the table holds the 16 bytes that are read; the load needs no alignment; `self` proves AVX2.
-        let table = unsafe { _mm256_broadcastsi128_si256(_mm_loadu_si128(table.as_ptr().cast())) };
-        avx2!({
-            // A set high bit reads 0: from 32 on, with 112 more than the excess.
-            let excess = _mm256_subs_epu8(x, _mm256_set1_epi8(16));
-            let index = _mm256_adds_epu8(excess, _mm256_set1_epi8(112));
-            _mm256_shuffle_epi8(table, index)
-        })
+    fn bound(self, x: u8) -> Self::Bound {
+        self.splat8(x)
+    }
+    #[inline(always)]
+    fn all_at_least(self, x: Self::B, bound: Self::Bound) -> bool {
+        self.none8(self.excess8(bound, x))
+    }
+    #[inline(always)]
+    fn all_at_most(self, x: Self::B, bound: Self::Bound) -> bool {
+        self.none8(self.excess8(x, bound))
     }
     #[inline(always)]
     fn all8(self, mask: Self::B) -> bool {
@@ -176,21 +178,17 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
-        // The first nibble of the longer decides the scale: 128 is a low byte, 256 to 1024 are high bytes.
+        // The five leading bits of the longer decide the scale: with the first of them it is 128, a low byte, else 256 to 4096, a high
+        // byte by the others. A set high bit reads 0.
         let scale = avx2!({
-            let low = _mm256_setr_epi8(
-                0, 0, 0, 0, 0, 0, 0, 0, -128, -128, -128, -128, -128, -128, -128, -128, //
-                0, 0, 0, 0, 0, 0, 0, 0, -128, -128, -128, -128, -128, -128, -128, -128,
+            let table = _mm256_setr_epi8(
+                16, 8, 4, 4, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, //
+                16, 8, 4, 4, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1,
             );
-            let high = _mm256_setr_epi8(
-                8, 4, 2, 2, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0, //
-                8, 4, 2, 2, 1, 1, 1, 1, 0, 0, 0, 0, 0, 0, 0, 0,
-            );
-            let nibble = _mm256_and_si256(_mm256_srli_epi16::<4>(long), _mm256_set1_epi8(15));
-            self.widen(
-                _mm256_shuffle_epi8(low, nibble),
-                _mm256_shuffle_epi8(high, nibble),
-            )
+            let first = _mm256_and_si256(long, _mm256_set1_epi8(-128));
+            let others = _mm256_and_si256(_mm256_srli_epi16::<3>(long), _mm256_set1_epi8(15));
+            let index = _mm256_or_si256(first, others);
+            self.widen(first, _mm256_shuffle_epi8(table, index))
         });
         scaled_by(self, long, short, scale)
     }
