@@ -3,6 +3,7 @@
 use super::gauges::frames;
 use super::placement::{Bed, bed, scenario, taught_exposed};
 use super::station_plc::{Daemon, Place, Plc, command, long};
+use super::two_frames::MIDDLE;
 use super::written::program;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::{Recipe, RecipeFile, SequenceKind, archive, replace};
@@ -212,15 +213,6 @@ fn good_parts_pass_and_dented_ones_fail_with_longer_exposures_also_where_they_li
         }
     }
 }
-
-/// A head that sees the middle of the bracket.
-const MIDDLE: &str = "sub_rays = 2
-part = { kind = \"sheet_metal\" }
-[rig.camera]
-width = 256
-height = 192
-fov_deg = [10.0, 7.5]
-";
 
 #[test]
 fn a_station_measures_by_a_recipe_that_teach_makes_with_longer_exposures() {

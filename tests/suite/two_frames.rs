@@ -281,7 +281,7 @@ fn teach_asks_for_two_frames_only_when_it_is_told_to() {
 }
 
 /// A head that sees the middle of the bracket, with the large hole and half of bead and slot.
-const MIDDLE: &str = "sub_rays = 2
+pub(crate) const MIDDLE: &str = "sub_rays = 2
 part = { kind = \"sheet_metal\" }
 [rig.camera]
 width = 256

@@ -161,6 +161,24 @@ mod tests {
     use crate::pattern::{Shot, Waveform};
     use crate::units::Modulation;
 
+    /// Frames of a scene with a side of so many pixels, from the sample of each pixel under each shot.
+    fn frames(
+        side: usize,
+        shots: &[Shot],
+        mut light: impl FnMut(&Shot, usize) -> f64,
+    ) -> Vec<Vec<u8>> {
+        let mut sample = |shot, at| libm::rint(light(shot, at)) as u8;
+        let frame = |shot| (0..side * side).map(|at| sample(shot, at)).collect();
+        shots.iter().map(frame).collect()
+    }
+
+    fn views(side: usize, frames: &[Vec<u8>]) -> Vec<FrameView<'_>> {
+        let frames = frames.iter();
+        frames
+            .map(|frame| FrameView::new(Samples::Eight(frame), side, side, side).unwrap())
+            .collect()
+    }
+
     /// σ of uniform noise of ±6 counts, from samples of a waveform with half of the harmonics' contrast.
     #[test]
     fn harmonics_of_a_waveform_are_not_taken_for_noise() {
@@ -180,20 +198,10 @@ mod tests {
             let blurred = shots[0].waveform.harmonics();
             let blurred: Vec<_> = blurred.map(|(order, share)| (order, share / 2.0)).collect();
             let blurred = Waveform::of(&blurred);
-            let frames: Vec<Vec<u8>> = shots
-                .iter()
-                .map(|shot| {
-                    let light = |at: usize| {
-                        let turns = at as f64 / 37.3 + shot.shift;
-                        libm::rint(120.0 + 80.0 * blurred.unscaled(turns) + noise()) as u8
-                    };
-                    (0..SIDE * SIDE).map(light).collect()
-                })
-                .collect();
-            let views: Vec<_> = frames
-                .iter()
-                .map(|frame| FrameView::new(Samples::Eight(frame), SIDE, SIDE, SIDE).unwrap())
-                .collect();
+            let frames = frames(SIDE, &shots, |shot, at| {
+                120.0 + 80.0 * blurred.unscaled(at as f64 / 37.3 + shot.shift) + noise()
+            });
+            let views = views(SIDE, &frames);
             let trust = [Trust::Resolved; SIDE * SIDE];
             let found = sample_noise(&sequence, &views, &trust);
             assert_eq!(found.is_some(), freedom > 0, "{shifts} shifts");
@@ -216,22 +224,12 @@ mod tests {
         let sequence = Sequence::from_frames(&shots).unwrap();
         for (elsewhere, shades) in [(12.0, 40), (0.0, 40), (30.0, 1)] {
             let modulation = |at: usize| 50.0 + (at % shades) as f64;
-            let frames: Vec<Vec<u8>> = shots
-                .iter()
-                .map(|shot| {
-                    // Blur takes a tenth of the modulation.
-                    let light = |at: usize| {
-                        let turns = shot.ratio * at as f64 / 37.3 + shot.shift;
-                        let wave = 1.0 + 0.9 * libm::sin(TAU * turns);
-                        libm::rint(elsewhere + modulation(at) / 0.9 * wave) as u8
-                    };
-                    (0..SIDE * SIDE).map(light).collect()
-                })
-                .collect();
-            let views: Vec<_> = frames
-                .iter()
-                .map(|frame| FrameView::new(Samples::Eight(frame), SIDE, SIDE, SIDE).unwrap())
-                .collect();
+            // Blur takes a tenth of the modulation.
+            let frames = frames(SIDE, &shots, |shot, at| {
+                let turns = shot.ratio * at as f64 / 37.3 + shot.shift;
+                elsewhere + modulation(at) / 0.9 * (1.0 + 0.9 * libm::sin(TAU * turns))
+            });
+            let views = views(SIDE, &frames);
             let mut phases = PhaseMap::new(SIDE, SIDE);
             phases.trust.fill(Trust::Resolved);
             for (at, here) in phases.modulation.iter_mut().enumerate() {
