@@ -51,36 +51,90 @@ pub(in super::super) struct SquareRow<'a> {
 }
 
 impl SquareRow<'_> {
-    /// Searches the squares around the compared pixels of a span. Of equal ones the last counts.
-    pub fn search(&self, best: &mut Option<Extreme>, span: Range<usize>) {
-        let reach = self.side / 2 * 2;
+    /// Searches the squares around the compared pixels of a span for the largest mean. Of equal ones the last counts.
+    pub fn search(&self, largest: &mut Option<Extreme>, span: Range<usize>) {
         let least = least_support(self.side);
-        let mut floor = floor_of(*best, least);
+        let mut floor = floor_of(*largest, least);
+        for square in self.squares(span) {
+            if square.sum.abs() >= floor && self.is_compared(&square) {
+                Self::raise(largest, square, least);
+                floor = floor_of(*largest, least);
+            }
+        }
+    }
+
+    /// As [`Self::search`], and for the largest sum.
+    pub fn search_both(&self, [largest, strongest]: [&mut Option<Extreme>; 2], span: Range<usize>) {
+        let least = least_support(self.side);
+        let mut floor = floor_of(*largest, least);
+        let mut most = strength(*strongest) + 1;
+        let mut column = None;
+        for square in self.squares(span) {
+            let sum = square.sum.abs();
+            if sum >= floor.min(most) && self.is_compared(&square) {
+                Self::raise(largest, square, least);
+                floor = floor_of(*largest, least);
+                if sum >= most {
+                    most = sum;
+                    column = Some(square.column);
+                }
+            }
+        }
+        column
+            .iter()
+            .for_each(|column| self.strengthen(strongest, *column));
+    }
+
+    /// Takes the square around a column as the strongest, if it has enough deviations.
+    pub fn strengthen(&self, strongest: &mut Option<Extreme>, column: usize) {
+        let columns = &self.sums[column..=column + self.side / 2 * 2];
+        let square = self.unpack(columns.iter().sum(), column);
+        if square.count >= least_support(self.side) {
+            *strongest = Some(square);
+        }
+    }
+
+    /// The squares around the pixels of a span.
+    fn squares(&self, span: Range<usize>) -> impl Iterator<Item = Extreme> {
+        let reach = self.side / 2 * 2;
         let mut packed = self.sums[span.start..span.start + reach]
             .iter()
             .sum::<i64>();
         let entering = &self.sums[span.start + reach..span.end + reach];
         let leaving = &self.sums[span.clone()];
-        for (offset, (enters, leaves)) in entering.iter().zip(leaving).enumerate() {
-            packed += enters;
-            let sum = (packed << (64 - COUNT_BIT)) >> (64 - COUNT_BIT);
-            if sum.abs() >= floor {
-                let column = span.start + offset;
-                let found = Extreme {
-                    sum,
-                    count: (packed - sum) >> COUNT_BIT,
-                    row: self.row,
-                    column,
-                };
-                let counts = found.count >= least && self.centres[column] != NO_OFFSET;
-                if counts && best.is_none_or(|best| found.reaches(&best)) {
-                    *best = Some(found);
-                    floor = floor_of(*best, least);
-                }
-            }
-            packed -= leaves;
+        let columns = span.zip(entering.iter().zip(leaving));
+        columns.map(move |(column, (enters, leaves))| {
+            let square = self.unpack(packed + enters, column);
+            packed += enters - leaves;
+            square
+        })
+    }
+
+    fn is_compared(&self, square: &Extreme) -> bool {
+        self.centres[square.column] != NO_OFFSET
+    }
+
+    /// Takes a square as the largest if it is, and has enough deviations.
+    fn raise(largest: &mut Option<Extreme>, square: Extreme, least: i64) {
+        if square.count >= least && largest.is_none_or(|largest| square.reaches(&largest)) {
+            *largest = Some(square);
         }
     }
+
+    fn unpack(&self, packed: i64, column: usize) -> Extreme {
+        let sum = (packed << (64 - COUNT_BIT)) >> (64 - COUNT_BIT);
+        Extreme {
+            sum,
+            count: (packed - sum) >> COUNT_BIT,
+            row: self.row,
+            column,
+        }
+    }
+}
+
+/// |sum| of a square; 0 without one.
+pub(in super::super) fn strength(square: Option<Extreme>) -> i64 {
+    square.map_or(0, |square| square.sum.abs())
 }
 
 /// A sum of at least `least` deviations whose magnitude is below this does not reach the best mean.

@@ -2,7 +2,7 @@
 //!
 //! Sums down the columns slide from row to row: the row that enters the squares is added, the one that leaves them is taken out.
 //! Sums over squares follow from these along the row: in 32 bits where all deviations are small ([`narrow`]), to find the few
-//! places where the largest may be, and exactly there ([`extreme`]). What comes near the largest elsewhere is kept, too ([`rivals`]).
+//! places where the largest may be, and exactly there ([`extreme`]). What deviates elsewhere is kept, too ([`rivals`]).
 
 pub(super) mod extreme;
 pub(super) mod narrow;
@@ -98,9 +98,9 @@ impl Squares {
                 if gauge.measure == (Measure::Deviation { side }) {
                     for (_, span) in pose.region(plan, at).row(middle) {
                         let span = common(span, &seen);
-                        extremes.update(middle, &span, |best, span| match narrow {
-                            true => self.narrow.search(backend, best, &row, span),
-                            false => row.search(best, span),
+                        extremes.update(middle, &span, |found, span| match narrow {
+                            true => self.narrow.search(backend, &row, span, found),
+                            false => row.search_both(found, span),
                         });
                     }
                 }

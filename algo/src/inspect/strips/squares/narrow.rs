@@ -1,7 +1,7 @@
 //! Sums over squares in 32 bits, many pixels at a time: they tell where in a row the largest deviation may be.
 
 use super::COUNT_BIT;
-use super::extreme::{Extreme, SquareRow, floor_of, least_support};
+use super::extreme::{Extreme, SquareRow, floor_of, least_support, strength};
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec;
@@ -12,8 +12,6 @@ use core::ops::Range;
 pub(in super::super) const MAX_NARROW_NM: u32 = 1 << 22;
 /// Sums over squares of up to so many such deviations do not overflow.
 const MAX_PIXELS: usize = (i32::MAX as u32 / MAX_NARROW_NM) as usize;
-/// Squares that are tested together.
-const BLOCK: usize = 64;
 
 /// Sums over the squares around the pixels of a row.
 #[derive(Debug)]
@@ -75,45 +73,46 @@ impl NarrowSums {
         }
     }
 
-    /// Searches a span for the largest deviation: exactly, in the blocks in which a sum is large enough.
+    /// Searches some squares for the largest deviation and for the largest sum: exactly, where the sums are large enough.
     pub fn search(
         &self,
         backend: Backend,
-        best: &mut Option<Extreme>,
         row: &SquareRow<'_>,
         span: Range<usize>,
+        [largest, strongest]: [&mut Option<Extreme>; 2],
     ) {
-        let reach = row.side / 2 * 2;
-        let mut start = span.start;
-        while start < span.end {
-            let block = start..(start + BLOCK).min(span.end);
-            start = block.end;
-            let sums = &self.all[block.start - self.first..block.end - self.first];
-            let centres = &row.centres[block.clone()];
-            let mut reached = false;
-            let floor = floor_of(*best, least_support(row.side));
-            sift(backend, sums, centres, floor, &mut reached);
-            if reached {
-                // A larger floor, as no square of the block has fewer deviations than the least count allows.
-                let mut least = i64::MAX;
-                least_count(
-                    backend,
-                    &row.sums[block.start..block.end + reach],
-                    &mut least,
-                );
-                let least = (least * (reach as i64 + 1)).max(least_support(row.side));
-                sift(backend, sums, centres, floor_of(*best, least), &mut reached);
+        let sums = &self.all[span.start - self.first..span.end - self.first];
+        let centres = &row.centres[span.clone()];
+        let mut greatest = 0;
+        greatest_sum(backend, sums, centres, &mut greatest);
+        let sum = i64::from(greatest);
+        if sum >= floor_of(*largest, least_support(row.side)) {
+            // A larger floor, as no square of the span has fewer deviations than the least count allows.
+            let reach = row.side / 2 * 2;
+            let columns = &row.sums[span.start..span.end + reach];
+            let mut least = i64::MAX;
+            least_count(backend, columns, &mut least);
+            let least = (least * (reach as i64 + 1)).max(least_support(row.side));
+            if sum >= floor_of(*largest, least) {
+                row.search(largest, span.clone());
             }
-            if reached {
-                row.search(best, block);
-            }
+        }
+        if sum > strength(*strongest) {
+            let mut last = 0;
+            last_with(backend, sums, centres, greatest, &mut last);
+            row.strengthen(strongest, span.start + last);
         }
     }
 }
 
 back_end_entry! {
-    /// Whether the sum of a square whose middle is compared reaches ± `floor`.
-    fn sift [] = sift_sums(sums: &[i32], centres: &[i32], floor: i64, reached: &mut bool)
+    /// The greatest |sum| of the squares whose middle is compared.
+    fn greatest_sum [] = greatest_of(sums: &[i32], centres: &[i32], greatest: &mut i32)
+}
+
+back_end_entry! {
+    /// The last of these squares that has this |sum|.
+    fn last_with [] = last_of(sums: &[i32], centres: &[i32], magnitude: i32, last: &mut usize)
 }
 
 back_end_entry! {
@@ -137,19 +136,32 @@ back_end_entry! {
 }
 
 #[inline(always)]
-fn sift_sums<V: Lanes>(_: V, sums: &[i32], centres: &[i32], floor: i64, reached: &mut bool) {
-    let floor = if floor > i64::from(i32::MAX) {
-        i32::MAX
-    } else {
-        floor as i32
-    };
+fn greatest_of<V: Lanes>(_: V, sums: &[i32], centres: &[i32], greatest: &mut i32) {
     let centres = &centres[..sums.len()];
-    let mut any = 0_u32;
+    let mut most = 0;
     for i in 0..sums.len() {
-        let far = (sums[i] >= floor) | (sums[i] <= -floor);
-        any |= u32::from(far & (centres[i] != NO_OFFSET));
+        let magnitude = magnitude(sums[i], centres[i]);
+        most = if magnitude > most { magnitude } else { most };
     }
-    *reached = any != 0;
+    *greatest = most;
+}
+
+#[inline(always)]
+fn last_of<V: Lanes>(_: V, sums: &[i32], centres: &[i32], magnitude: i32, last: &mut usize) {
+    let centres = &centres[..sums.len()];
+    let mut found = 0_u32;
+    for i in 0..sums.len() {
+        let here = self::magnitude(sums[i], centres[i]) == magnitude;
+        found = if here { i as u32 } else { found };
+    }
+    *last = found as usize;
+}
+
+/// |sum| of a square whose middle is compared, else 0.
+#[inline(always)]
+fn magnitude(sum: i32, centre: i32) -> i32 {
+    let magnitude = if sum < 0 { -sum } else { sum };
+    if centre == NO_OFFSET { 0 } else { magnitude }
 }
 
 #[inline(always)]
@@ -186,5 +198,62 @@ fn three<V: Lanes>(_: V, a: &[i32], b: &[i32], c: &[i32], out: &mut [i32]) {
     let (a, b, c) = (&a[..length], &b[..length], &c[..length]);
     for i in 0..length {
         out[i] = a[i].wrapping_add(b[i]).wrapping_add(c[i]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_xoshiro::SplitMix64;
+    use rand_xoshiro::rand_core::{Rng, SeedableRng};
+
+    const WIDTH: usize = 200;
+
+    /// Packed sums of the deviations down each column of squares of `side` pixels, with padding; and the deviations of a row.
+    fn columns(side: usize, random: &mut SplitMix64) -> (Vec<i64>, Vec<i32>) {
+        let mut draw = |below: usize| (random.next_u64() % below as u64) as i64;
+        let mut sums = vec![0; WIDTH + side / 2 * 2];
+        for sum in &mut sums[side / 2..side / 2 + WIDTH] {
+            // A few are missing.
+            for _ in 0..side as i64 - draw(side / 4 + 1) {
+                *sum += (1 << COUNT_BIT) + draw(8001) - 4000;
+            }
+        }
+        let centres = (0..WIDTH).map(|_| if draw(4) == 0 { NO_OFFSET } else { 0 });
+        (sums, centres.collect())
+    }
+
+    #[test]
+    fn lanes_and_single_squares_find_the_largest_mean_and_the_largest_sum() {
+        let mut random = SplitMix64::seed_from_u64(3);
+        let spans = [3..64, 64..128, 128..128, 130..131, 140..190];
+        for (backend, side) in
+            Backend::available().flat_map(|b| [1, 2, 9, 21].map(|side| (b, side)))
+        {
+            let (sums, centres) = columns(side, &mut random);
+            let row = SquareRow {
+                sums: &sums,
+                centres: &centres,
+                side,
+                row: 7,
+            };
+            let mut narrow = NarrowSums::new(sums.len());
+            narrow.add(backend, &sums, side, 3..190);
+            let (mut by_lanes, mut single) = ([None; 2], [None; 2]);
+            for span in spans.clone() {
+                narrow.search(backend, &row, span.clone(), by_lanes.each_mut());
+                row.search_both(single.each_mut(), span);
+                assert_eq!(by_lanes, single, "{side}");
+            }
+            let [largest, strongest] = by_lanes.map(Option::unwrap);
+            let columns = spans.iter().flat_map(Clone::clone);
+            for column in columns.filter(|column| centres[*column] != NO_OFFSET) {
+                let mut around = None;
+                row.strengthen(&mut around, column);
+                let around = around.unwrap();
+                assert!(largest.reaches(&around), "{side}: {column}");
+                assert!(strongest.sum.abs() >= around.sum.abs(), "{side}: {column}");
+            }
+        }
     }
 }

@@ -2,7 +2,7 @@
 //! scatters less than any of them.
 
 use super::common;
-use super::extreme::Extreme;
+use super::extreme::{Extreme, strength};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -14,7 +14,7 @@ const LEAST_ROWS: usize = 8;
 /// Columns of a tile.
 const COLUMNS: usize = 64;
 
-/// The square of largest deviation of each tile of the frame, as far as it has at least half of the largest of all.
+/// The square of largest mean deviation, and that of the largest sum in each tile of the frame.
 #[derive(Clone, Debug, Default)]
 pub(in super::super) struct Extremes {
     side: usize,
@@ -46,27 +46,18 @@ impl Extremes {
         self.largest = None;
     }
 
-    /// Looks for larger ones about the pixels of a span of a row, tile by tile: `search` gets what they have to reach.
+    /// Looks for larger ones about the pixels of a span of a row, tile by tile: `search` gets the largest and the tile's.
     pub fn update(
         &mut self,
         row: usize,
         span: &Range<usize>,
-        mut search: impl FnMut(&mut Option<Extreme>, Range<usize>),
+        mut search: impl FnMut([&mut Option<Extreme>; 2], Range<usize>),
     ) {
         let band = row / self.side.max(LEAST_ROWS) - self.bands.start;
         for column in span.start / COLUMNS..span.end.div_ceil(COLUMNS) {
             let tile = &mut self.tiles[band * self.columns + column];
-            let before = match (*tile, self.largest.map(half)) {
-                (Some(tile), Some(half)) if half.reaches(&tile) => Some(half),
-                (tile, half) => tile.or(half),
-            };
-            let mut best = before;
             let columns = column * COLUMNS..(column + 1) * COLUMNS;
-            search(&mut best, common(span, &columns));
-            if best != before {
-                *tile = best;
-                best.iter().for_each(|best| raise(&mut self.largest, *best));
-            }
+            search([&mut self.largest, tile], common(span, &columns));
         }
     }
 
@@ -75,10 +66,9 @@ impl Extremes {
         if self.bands.start < above.bands.end {
             let shared = above.tiles.len() - self.columns;
             for (tile, above) in self.tiles.iter_mut().zip(&mut above.tiles[shared..]) {
-                if let Some(above) = above.take()
-                    && !tile.is_some_and(|tile| tile.reaches(&above))
-                {
-                    *tile = Some(above);
+                let above = above.take();
+                if strength(above) >= strength(*tile) {
+                    *tile = above;
                 }
             }
         }
@@ -147,12 +137,14 @@ mod tests {
         for &bottom in cuts.iter().chain(&[90]) {
             let mut strip = Extremes::new(9, &(top..bottom), 200);
             for row in top..bottom {
-                strip.update(row, &(3..190), |best, span| {
+                strip.update(row, &(3..190), |[largest, strongest], span| {
                     let here = |found: &&Extreme| found.row == row && span.contains(&found.column);
-                    squares
-                        .iter()
-                        .filter(here)
-                        .for_each(|found| raise(best, *found));
+                    for found in squares.iter().filter(here) {
+                        raise(largest, *found);
+                        if strength(Some(*found)) > strength(*strongest) {
+                            *strongest = Some(*found);
+                        }
+                    }
                 });
             }
             strips.push(strip);
