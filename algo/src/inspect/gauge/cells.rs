@@ -81,6 +81,11 @@ impl Grid {
         self.side
     }
 
+    /// Cells of a row.
+    pub fn columns(&self) -> usize {
+        self.columns
+    }
+
     /// The least number of measured pixels of a cell.
     pub fn least(&self) -> i64 {
         let side = self.side as f64;
@@ -116,6 +121,8 @@ impl Sum {
 /// The means of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
+    /// Its number in the [`Grid`].
+    pub at: usize,
     /// Pixels whose noise makes its error.
     pub pixels: f64,
     /// Height, mm: as taught plus the mean deviation, so that it does not depend on which pixels of the cell were measured.
@@ -137,16 +144,18 @@ pub fn cells(sums: &[Sum], taught: &[TaughtCell], least: Option<i64>, out: &mut 
     }
     let all: i64 = sums.iter().map(|sum| sum.deviation).sum();
     let mean = all as f64 / has as f64;
-    let pairs = sums.iter().zip(taught);
-    let pairs = pairs
-        .filter(|(sum, taught)| taught.pixels > 0 && least.is_none_or(|least| sum.count >= least));
-    out.extend(pairs.map(|(sum, &taught)| {
+    let pairs = sums.iter().zip(taught).enumerate();
+    let pairs = pairs.filter(|(_, (sum, taught))| {
+        taught.pixels > 0 && least.is_none_or(|least| sum.count >= least)
+    });
+    out.extend(pairs.map(|(at, (sum, &taught))| {
         let (pixels, nm) = match sum.count {
             0 => (f64::from(taught.pixels), mean),
             count => (count as f64, sum.deviation as f64 / count as f64),
         };
         let deviation = nm * 1e-6;
         Cell {
+            at,
             pixels,
             height: taught.height + deviation,
             deviation,

@@ -101,12 +101,16 @@ impl Drawn {
         }
     }
 
-    /// The estimate for a measured value; more than `defect` times the scatter off the mean it belongs to a defect.
+    /// Whether a measured value lies more than `defect` times the scatter off the mean, and so belongs to a defect.
+    fn is_off(&self, measured: f64, defect: f64) -> bool {
+        libm::fabs(measured - self.mean) > defect * self.scatter
+    }
+
+    /// The estimate for a measured value.
     fn value(&self, measured: f64, defect: f64) -> f64 {
-        let off = measured - self.mean;
-        match libm::fabs(off) > defect * self.scatter {
+        match self.is_off(measured, defect) {
             true => measured,
-            false => self.mean + off * self.share,
+            false => self.mean + (measured - self.mean) * self.share,
         }
     }
 }
@@ -190,12 +194,14 @@ const SURE: f64 = 8.0;
 
 /// Share of the cells that deviate by more than `tolerance` mm. A cell of true deviation m lies outside with
 /// p = Q((T − m)/σ) + Q((T + m)/σ), Q the upper tail of the normal distribution, so σ² = Σ p(1 − p) / n² + gᵀ C g: the error of the motion
-/// moves all cells together, g = Σ p′ j / n. True deviations are drawn as [`Drawn`].
+/// moves all cells together, g = Σ p′ j / n. True deviations are drawn as [`Drawn`]; those of the rim of a defect, whose true ones
+/// scatter more than those of the rest, by themselves. `columns` are those of the grid; `room` is for a value per cell.
 pub fn share_outside(
-    cells: &[Cell],
+    (cells, columns): (&[Cell], usize),
     sigma: f64,
     tolerance: f64,
     placed: Option<&Placed>,
+    room: &mut Vec<f64>,
 ) -> Option<Found> {
     if cells.is_empty() {
         return None;
@@ -204,9 +210,20 @@ pub fn share_outside(
     let sizes = cells.iter().map(|cell| libm::fabs(cell.deviation));
     let outside = sizes.filter(|size| *size > tolerance).count() as f64;
     let drawn = Drawn::of(cells.iter().map(|cell| cell.deviation), sigma);
+    mark_beside(
+        (cells, columns),
+        |cell| drawn.is_off(cell.deviation, RIM),
+        room,
+    );
+    let rim = cells.iter().zip(&*room);
+    let rim = rim.filter(|(cell, mark)| **mark > 0.0 && !drawn.is_off(cell.deviation, RIM));
+    let rim = Drawn::of(rim.map(|(cell, _)| cell.deviation), sigma);
     let (mut variance, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
-    for cell in cells {
-        let m = drawn.value(cell.deviation, RIM);
+    for (cell, mark) in cells.iter().zip(&*room) {
+        let m = match drawn.is_off(cell.deviation, RIM) || *mark == 0.0 {
+            true => drawn.value(cell.deviation, RIM),
+            false => rim.value(cell.deviation, RIM),
+        };
         let [upper, lower] = [(tolerance - m) / sigma, (tolerance + m) / sigma];
         if libm::fabs(upper).min(libm::fabs(lower)) < SURE {
             let p = below(-upper) + below(-lower);
@@ -224,4 +241,53 @@ pub fn share_outside(
         motion: motion(&g, placed),
         lever,
     })
+}
+
+/// Marks by 1, of all others by 0, the cells that have one of a defect beside them, in a grid of so many columns.
+fn mark_beside(
+    (cells, columns): (&[Cell], usize),
+    is_defect: impl Fn(&Cell) -> bool,
+    marks: &mut Vec<f64>,
+) {
+    marks.clear();
+    marks.resize(cells.len(), 0.0);
+    let row = |at: usize| at / columns;
+    for defect in cells.iter().filter(|cell| is_defect(cell)) {
+        for middle in [
+            defect.at.wrapping_sub(columns),
+            defect.at,
+            defect.at + columns,
+        ] {
+            let first = cells.partition_point(|cell| cell.at + 1 < middle);
+            let near = cells[first..].iter().zip(&mut marks[first..]);
+            near.take_while(|(cell, _)| cell.at <= middle + 1)
+                .filter(|(cell, _)| row(cell.at) == row(middle))
+                .for_each(|(_, mark)| *mark = 1.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_lies_beside_a_defect_is_marked_and_rows_do_not_wrap() {
+        let deviating = [0, 14, 23];
+        // Six columns; cell 7 was not measured.
+        let cells = (0..24).filter(|at| *at != 7).map(|at| Cell {
+            at,
+            pixels: 25.0,
+            height: 0.0,
+            deviation: if deviating.contains(&at) { 1.0 } else { 0.0 },
+            taught: Default::default(),
+        });
+        let cells: Vec<Cell> = cells.collect();
+        let mut marks = Vec::new();
+        mark_beside((&cells, 6), |cell| cell.deviation > 0.5, &mut marks);
+        let marked = cells.iter().zip(&marks).filter(|(_, mark)| **mark == 1.0);
+        let marked: Vec<usize> = marked.map(|(cell, _)| cell.at).collect();
+        let expected = [0, 1, 6, 8, 9, 13, 14, 15, 16, 17, 19, 20, 21, 22, 23];
+        assert_eq!(marked, expected);
+    }
 }

@@ -124,14 +124,14 @@ fn deviations_have_a_root_mean_square_and_a_share_out_of_tolerance() {
     let cells = seen(&sums, &taught, None);
     let expected: f64 = (4.0 * 0.09 + 12.0 * 0.01) / 16.0;
     close(rms(&cells, 0.0, None).unwrap().value, expected.sqrt());
-    let share = share_outside(&cells, 0.001, 0.2, None).unwrap();
+    let share = share_outside((&cells, 4), 0.001, 0.2, None, &mut Vec::new()).unwrap();
     close(share.value, 0.25);
     // Nothing lies within 100 σ of the tolerance.
     close(sigma(share), 0.0);
     // One cell at the tolerance is a coin.
     let (sums, taught) = grid(1, |_, _| 0.2);
     let one = seen(&sums, &taught, None);
-    let coin = sigma(share_outside(&one, 0.01, 0.2, None).unwrap());
+    let coin = sigma(share_outside((&one, 1), 0.01, 0.2, None, &mut Vec::new()).unwrap());
     close(coin, 0.5);
 }
 

@@ -208,8 +208,10 @@ impl Production {
                 return Some(reading(found, Made::OfDeviations));
             }
             Measure::OutOfTolerance { tolerance, .. } => {
-                let found = together(share_outside(cells, cell, tolerance, placed)?);
-                return Some(reading(found, Made::OfDeviations));
+                let columns = self.gauges.patches[patches.start].grid.columns();
+                let cells = (&cells[..], columns);
+                let found = share_outside(cells, cell, tolerance, placed, weights)?;
+                return Some(reading(together(found), Made::OfDeviations));
             }
             Measure::MeanHeight => mean(cells, weights)?,
             Measure::Tilt(about) => tilt(cells, about, weights)?,
