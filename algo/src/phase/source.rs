@@ -254,7 +254,7 @@ impl<S: Frames> Source for S {
 
     #[inline(always)]
     fn block<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Block<V> {
-        Block::Folded(self.fold(v, level, at, V::AHEAD))
+        Block::Folded(self.fold(v, level, at, V::AHEAD_OF_MANY))
     }
 }
 

@@ -36,6 +36,8 @@ pub(crate) trait Lanes: Copy + Debug {
     const LIFTS_FAINT: bool = true;
     /// How many samples ahead of their use rows are prefetched.
     const AHEAD: usize;
+    /// The same where the rows of several levels are read: a sample then takes longer, and fewer lines wait that displace one another.
+    const AHEAD_OF_MANY: usize = Self::AHEAD / 2;
     /// A byte per pixel of a block.
     type B: Copy;
     /// A number that bytes are compared with.
@@ -66,9 +68,9 @@ pub(crate) trait Lanes: Copy + Debug {
         }
         blocks
     }
-    /// Prefetches what lies `after` samples behind the block at `at`. That is [`Self::AHEAD`] where whole rows are read, because
-    /// rows follow one another in memory; where only some columns of each row are read it is the length of a row, so that the
-    /// same columns of the next row are prefetched.
+    /// Prefetches what lies `after` samples behind the block at `at`. That is [`Self::AHEAD`] or [`Self::AHEAD_OF_MANY`] where whole
+    /// rows are read, because rows follow one another in memory; where only some columns of each row are read it is the length of a
+    /// row, so that the same columns of the next row are prefetched.
     fn fetch<T>(self, row: &[T], at: usize, after: usize);
     /// Prefetches the cache line of sample `at`, which may lie behind the row.
     #[inline(always)]

@@ -294,7 +294,7 @@ fn dense_columns<V: Lanes, S: Source, F: Frames, const OTHERS: usize>(
             block.middle = middle.fine(v, &angle, at);
             quality.add(v, block.middle.strong, block.middle.brightest);
         }
-        let folded = finest.fold(v, &level, at, V::AHEAD);
+        let folded = finest.fold(v, &level, at, V::AHEAD_OF_MANY);
         let modulation;
         (block.finest, modulation) = level.fine(v, &angle, &folded, F::DOUBLED);
         quality.add(v, block.finest.strong, block.finest.brightest);

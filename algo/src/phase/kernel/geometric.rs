@@ -224,7 +224,7 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
         // Behind a pointer of its own: a pair of registers cannot be stored far from the stack pointer.
         kept = black_box(kept);
     }
-    let mut after = V::AHEAD;
+    let mut after = V::AHEAD_OF_MANY;
     let mut start = columns.start;
     // Where the next line begins.
     let mut line = start + coarsest.to_line(start);
@@ -282,8 +282,14 @@ impl<V: Lanes, S: Frames, const BETWEEN: usize> OnePass<'_, V, S, BETWEEN> {
         out: &mut Results<'_>,
     ) -> bool {
         let (lanes, finest) = (&self.lanes, &self.finest);
-        let folded =
-            (self.coarsest).fold_in_line(v, &self.level, at, at + V::AHEAD, place, kept_coarsest);
+        let folded = (self.coarsest).fold_in_line(
+            v,
+            &self.level,
+            at,
+            at + V::AHEAD_OF_MANY,
+            place,
+            kept_coarsest,
+        );
         let lit = folded.strong;
         // The line of a lit block is lit nearly everywhere. With few registers the question costs less than a longer stretch without
         // a branch, whose instructions the compiler mixes.
