@@ -13,6 +13,7 @@ mod cli;
 mod commissioning;
 mod doctor;
 mod drift;
+mod every_part;
 mod experiment;
 mod exposures;
 mod faint;

@@ -3,9 +3,9 @@
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::whole_maps::{Comparison, Golden};
 use algo::frame::SampleNoise;
-use algo::inspect::{Findings, Measure, Production, Region, Weight};
+use algo::inspect::{Factor, Findings, Measure, Production, Region, Weight, normal_shares};
 use algo::phase::Trust;
-use algo::pipeline::{HeightMap, decode};
+use algo::pipeline::{HeightMap, KnownSurface, decode};
 use algo::simd::Backend;
 use algo::units::{AbsolutePhase, Height, PhaseDelta};
 use appliance::head::seam;
@@ -191,7 +191,7 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
             .collect(),
         sigma,
     };
-    let golden = golden(recipe);
+    let golden = golden(recipe, plan);
     let comparison = Comparison::new(&golden, &measured);
     let close = |a: f64, b: f64, share: f64| (a - b).abs() <= share * b.abs();
     for (planned, reading) in recipe.gauges.iter().zip(&found.readings) {
@@ -301,7 +301,23 @@ fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
         .collect()
 }
 
-fn golden(recipe: &Recipe) -> Golden {
+/// What height differences are multiplied by: the share along golden's normal times the weight.
+pub(crate) fn factors(recipe: &Recipe, plan: &Plan, height: &[Height]) -> Vec<f64> {
+    let valid = &recipe.arrays.valid;
+    let surface = KnownSurface {
+        width: recipe.conditions.camera.0 as usize,
+        phase: Vec::new(),
+        height: height.to_vec(),
+    };
+    let shares = normal_shares(plan.production().triangulator(), &surface);
+    let factors = valid.iter().zip(shares).map(|(&bits, share)| {
+        let weight = Weight::from_bits(bits).share();
+        Factor::of(weight * f64::from(share)).number()
+    });
+    factors.collect()
+}
+
+fn golden(recipe: &Recipe, plan: &Plan) -> Golden {
     let arrays = &recipe.arrays;
     // As the first sequence measured it.
     let pixels = arrays.valid.len();
@@ -313,20 +329,16 @@ fn golden(recipe: &Recipe) -> Golden {
         f64::from(arrays.golden_height[at]) + f64::from(arrays.height_slope[at]) * turns(at)
     };
     let heights = (0..pixels).map(by_first).zip(&arrays.valid);
+    let height: Vec<_> = heights
+        .map(|(mm, &valid)| match valid {
+            0 => Height::UNKNOWN,
+            _ => Height::from_mm(mm),
+        })
+        .collect();
     Golden {
         width: recipe.conditions.camera.0 as usize,
-        height: heights
-            .map(|(mm, &valid)| match valid {
-                0 => Height::UNKNOWN,
-                _ => Height::from_mm(mm),
-            })
-            .collect(),
-        weight: arrays
-            .valid
-            .iter()
-            .copied()
-            .map(Weight::from_bits)
-            .collect(),
+        factor: factors(recipe, plan, &height),
+        height,
     }
 }
 

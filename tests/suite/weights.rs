@@ -1,7 +1,7 @@
 //! Weighted deviations: measurement in strips compared with the comparison of whole maps, for parts in place and displaced parts.
 
 use super::placement::{bed, scenario, taught};
-use super::production::{compare, expected, frames, parts, plan, plan_with};
+use super::production::{compare, expected, factors, frames, parts, plan, plan_with};
 use super::whole_maps::{Comparison, Golden};
 use algo::inspect::Weight;
 use algo::pipeline::HeightMap;
@@ -71,8 +71,14 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     let width = recipe.conditions.camera.0 as usize;
     let triangulator = production.triangulator();
     let arrays = &recipe.arrays;
-    // Golden as the pixel `at` sees it after the part's motion: the measured z minus its deviation, and the weight there. It looks
-    // `aside` pixels beside its place.
+    let taught: Vec<_> = arrays
+        .golden_height
+        .iter()
+        .map(|mm| Height::from_mm(f64::from(*mm)))
+        .collect();
+    let factor = factors(recipe, plan, &taught);
+    // Golden as the pixel `at` sees it after the part's motion: the measured z minus its deviation, and the factor there, with and
+    // without the weight. It looks `aside` pixels beside its place.
     let moved_golden = |at: usize, z: f64, aside: f64| {
         let point = triangulator.point(at % width, at / width, Height::from_mm(z))?;
         let back = motion.undo(point);
@@ -89,9 +95,9 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
         let (along, down) = (u.fract() + aside, v.fract());
         let (upper, lower) = (a + (b - a) * along, c + (d - c) * along);
         let deviation = back.z - (upper + (lower - upper) * down);
-        let nearest = v.round() as usize * width + u.round() as usize;
-        let weight = Weight::from_bits(arrays.valid[nearest]);
-        Some((Height::from_mm(z - deviation), weight))
+        let weight = Weight::from_bits(arrays.valid[place]).share();
+        let factors = [factor[place], factor[place] / weight];
+        Some((Height::from_mm(z - deviation), factors))
     };
     let measured = HeightMap {
         width,
@@ -101,25 +107,22 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
             .collect(),
         sigma: vec![f32::NAN; heights.len()],
     };
-    let golden = |aside: f64| {
+    let golden = |aside: f64, weighed: bool| {
         let golden = heights.iter().enumerate().map(|(at, &mm)| {
             let z = f64::from(mm);
             let golden = z.is_finite().then(|| moved_golden(at, z, aside)).flatten();
-            golden.unwrap_or((Height::UNKNOWN, Weight::NONE))
+            let (height, factors) = golden.unwrap_or((Height::UNKNOWN, [1.0; 2]));
+            (height, factors[usize::from(!weighed)])
         });
-        let (height, weight) = golden.unzip();
+        let (height, factor) = golden.unzip();
         Golden {
             width,
             height,
-            weight,
+            factor,
         }
     };
-    let aside = [-BENT_PX, BENT_PX].map(golden);
-    let golden = golden(0.0);
-    let unweighed = Golden {
-        weight: vec![Weight::FULL; golden.weight.len()],
-        ..golden.clone()
-    };
+    let aside = [-BENT_PX, BENT_PX].map(|aside| golden(aside, true));
+    let (golden, unweighed) = (golden(0.0, true), golden(0.0, false));
     let gauge = &recipe.gauges[0];
     let reading = found.readings[0].unwrap().value;
     let value = |golden: &Golden| {

@@ -1,7 +1,7 @@
 //! A whole measured height map against the golden one, pixel by pixel: deviation and coverage of regions. Production by strips is
 //! compared with it.
 
-use algo::inspect::{Reading, Region, Weight};
+use algo::inspect::{Reading, Region};
 use algo::pipeline::{HeightMap, Window};
 use algo::units::Height;
 
@@ -12,8 +12,8 @@ pub(crate) struct Golden {
     pub width: usize,
     /// Height as taught, [`Height::UNKNOWN`] where the part is not to be compared.
     pub height: Vec<Height>,
-    /// How much the deviation there counts in the means over squares.
-    pub weight: Vec<Weight>,
+    /// What height differences there are multiplied by: their share along the normal times their weight.
+    pub factor: Vec<f64>,
 }
 
 /// A measured height map beside the golden one. Places that only one of them knows do not count.
@@ -21,7 +21,7 @@ pub(crate) struct Golden {
 pub(crate) struct Comparison<'a> {
     golden: &'a Golden,
     measured: &'a HeightMap,
-    /// Weighted deviation in nm and its variance in nm² of each pixel that both maps know.
+    /// Weighted deviation along the normal in nm and its variance in nm² of each pixel that both maps know.
     deviations: Vec<Option<(i64, f64)>>,
 }
 
@@ -120,15 +120,15 @@ fn at(golden: &Golden, measured: &HeightMap, place: usize) -> Option<(i64, f64)>
     if !(taught.is_known() && height.is_known()) {
         return None;
     }
-    let weight = golden.weight[place];
-    let sigma = f64::from(measured.sigma[place]) * 1e6 * weight.share();
+    let factor = golden.factor[place];
+    let sigma = f64::from(measured.sigma[place]) * 1e6 * factor;
     let variance = if sigma.is_finite() {
         sigma * sigma
     } else {
         0.0
     };
-    let deviation = i64::from(height.nm()) - i64::from(taught.nm());
-    Some((weight.apply(deviation), variance))
+    let deviation = f64::from(height.nm() - taught.nm()) * factor;
+    Some((deviation.round() as i64, variance))
 }
 
 #[cfg(test)]
@@ -141,7 +141,7 @@ mod tests {
         let golden = Golden {
             width: WIDTH,
             height: vec![Height::from_nm(0); WIDTH * WIDTH],
-            weight: vec![Weight::FULL; WIDTH * WIDTH],
+            factor: vec![1.0; WIDTH * WIDTH],
         };
         let measured = HeightMap {
             width: WIDTH,
@@ -181,7 +181,7 @@ mod tests {
         for row in 20..27 {
             for column in 20..27 {
                 measured.height[row * WIDTH + column] = Height::from_mm(-0.5);
-                golden.weight[row * WIDTH + column] = Weight::from_bits(64);
+                golden.factor[row * WIDTH + column] = 0.25;
             }
         }
         let dent = Comparison::new(&golden, &measured)

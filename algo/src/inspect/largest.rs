@@ -64,14 +64,12 @@ impl Largest {
     pub fn of(taught: &Taught, width: usize, region: &Region, side: usize) -> Self {
         let pixels = taught.pixels().len();
         let variance = |place| {
-            let sigma = taught.sigma_mm(place);
+            let sigma = taught.sigma_mm(place) * taught.factor(place);
             (sigma * sigma) as f32
         };
-        let weight = |place| match taught.compared(place) {
-            true => taught.weight(place),
-            false => Weight::NONE,
-        };
-        let weights: Vec<Weight> = (0..pixels).map(weight).collect();
+        let weights: Vec<Weight> = (0..pixels)
+            .map(|place| Weight::from(taught.compared(place)))
+            .collect();
         let pixel: Vec<f32> = (0..pixels).map(variance).collect();
         let noise = DeviationNoise {
             width,

@@ -5,6 +5,7 @@ mod gauge;
 pub mod good;
 mod largest;
 mod mask;
+mod normal_shares;
 mod openings;
 mod region;
 mod ripple;
@@ -17,6 +18,7 @@ pub use gauge::{Axis, Measure, Reading, TooFine};
 pub use largest::Largest;
 pub(crate) use mask::components;
 pub use mask::eroded;
+pub use normal_shares::normal_shares;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
@@ -24,4 +26,4 @@ pub use strips::{
     CalibrationError, Findings, Found, Gauge, Input, MAX_GAUGES, PairBuffers, PairPlaced, Parts,
     Picture, Production, Skipped, Strips, Taught, Unmeasurable,
 };
-pub use weight::Weight;
+pub use weight::{Factor, Weight};

@@ -1,12 +1,11 @@
-//! How much a pixel's deviation counts in the mean over a square.
+//! How much a pixel's deviation counts in the mean over a square: its weight, and the share of a height difference that lies along the
+//! surface's normal.
 
 /// The weight of a pixel as a byte: 0 if it is not compared, 1 if its deviation counts in full, n from 2 on if its deviation is
 /// multiplied by n/256.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Weight(u8);
 
-/// Binary digits of a weight.
-const BITS: u32 = 8;
 /// Weights are multiples of 1/256.
 const UNITS: f64 = 256.0;
 /// A weight of fewer units, below 1/16, is 0.
@@ -54,13 +53,31 @@ impl Weight {
             false => f64::from(self.0),
         }
     }
+}
 
-    /// A deviation of a compared pixel times the weight, rounded to nearest.
-    pub fn apply(self, nm: i64) -> i64 {
-        match self.partial() {
-            true => (nm * i64::from(self.0) + (1 << (BITS - 1))) >> BITS,
-            false => nm,
-        }
+/// What a height difference along a line of sight is multiplied by, as a byte: n stands for (n + 1)/192, so that factors reach 1.33. It is the
+/// share of the difference that lies along the surface's normal ([`normal_shares`](super::normal_shares)), times the pixel's [`Weight`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Factor(u8);
+
+impl Factor {
+    /// 1/192.
+    pub const UNIT: f64 = 1.0 / 192.0;
+
+    /// The factor nearest to a number.
+    pub fn of(number: f64) -> Self {
+        Self((libm::rint(number / Self::UNIT) - 1.0).clamp(0.0, f64::from(u8::MAX)) as u8)
+    }
+
+    /// As a number.
+    pub fn number(self) -> f64 {
+        f64::from(self.units()) * Self::UNIT
+    }
+
+    /// As a multiple of [`Self::UNIT`].
+    #[inline(always)]
+    pub fn units(self) -> i32 {
+        i32::from(self.0) + 1
     }
 }
 
@@ -79,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_weight_is_a_share_rounded_down_and_scales_to_nearest() {
+    fn a_weight_is_a_share_rounded_down_and_a_factor_the_nearest_one() {
         for (share, bits) in [(0.0, 0), (0.0624, 0), (0.0625, 16), (0.5, 128)] {
             assert_eq!(Weight::of_share(share).bits(), bits, "{share}");
         }
@@ -90,13 +107,12 @@ mod tests {
             let weight = Weight::from_bits(bits);
             assert_eq!(weight.compared(), bits > 0);
             assert_eq!(weight.partial(), bits > 1);
-            for nm in [-2_000_001, -513, -1, 0, 1, 300, 2_000_001]
-                .into_iter()
-                .filter(|_| bits > 0)
-            {
-                let exact = nm as f64 * weight.share();
-                assert!((weight.apply(nm) as f64 - exact).abs() <= 0.5);
-            }
         }
+        for number in [1.33, 1.0, 0.75, 0.26, 1.0 / 192.0] {
+            let factor = Factor::of(number).number();
+            assert!((factor - number).abs() <= 0.5 / 192.0, "{number}");
+        }
+        assert_eq!(Factor::of(1.0).number(), 1.0);
+        assert_eq!(Factor::of(0.0), Factor::of(1.0 / 192.0));
     }
 }

@@ -2,7 +2,8 @@
 
 use super::archive::Arrays;
 use super::captures::Offsets;
-use super::golden::{GoldenPart, SMOOTHING_PX};
+use super::golden::GoldenPart;
+use super::good_parts::SIDES;
 use super::{SequenceFile, SequenceKind, UnseenFile};
 use algo::inspect::ripple;
 use algo::pattern::{Sequence, Shot, Slips, Waveform, Waveforms};
@@ -60,7 +61,7 @@ impl GoldenPart<'_> {
             let valid = arrays.valid[at] != 0;
             valid.then(|| turns.map(|turns| turns * f64::from(arrays.height_slope[at])))
         };
-        ripple((width, pixels), SMOOTHING_PX, heights)
+        ripple((width, pixels), SIDES[SIDES.len() - 1], heights)
     }
 
     /// σ_z² in mm² of a pixel of golden, measured once with these frames.
@@ -112,16 +113,23 @@ impl GoldenPart<'_> {
     }
 
     /// The share of the frame that one measurement with these frames is expected to resolve of a part that lies as taught. Golden, the mean of
-    /// several, also has pixels that the noise of one measurement takes below the least modulation.
-    pub(super) fn expected_coverage(&self, frames: &[Shot]) -> Option<f64> {
-        let sequence = Sequence::from_frames(frames).ok()?;
+    /// several, also has pixels that the noise of one measurement takes below the least modulation; and a sequence of limited reach leaves
+    /// out what a placement could move further than that.
+    pub(super) fn expected_coverage(
+        &self,
+        sequence: &SequenceFile,
+        phase_reach: &[f32],
+    ) -> Option<f64> {
+        let reach = sequence.kind.reach();
+        let sequence = Sequence::from_frames(&sequence.frames).ok()?;
         let (least, full_scale) = (self.decoder.least_modulation(), self.decoder.full_scale());
         let taught = finest_waveform(self.full).fundamental();
         let chance = sequence.chance_of_trust(least, (self.calibration.noise_counts, full_scale));
-        let pixels = self.phases.trust.iter().zip(&self.phases.modulation);
-        let resolved = pixels.filter(|(trust, _)| **trust == Trust::Resolved);
-        let chances =
-            resolved.map(|(_, modulation)| chance(modulation.counts(full_scale) / taught));
+        let safe = |at: usize| reach.is_none_or(|reach| phase_reach[at] < reach);
+        let resolved = |at: &usize| self.phases.trust[*at] == Trust::Resolved && safe(*at);
+        let modulation = |at: usize| self.phases.modulation[at].counts(full_scale);
+        let pixels = (0..self.phases.trust.len()).filter(resolved);
+        let chances = pixels.map(|at| chance(modulation(at) / taught));
         Some(chances.sum::<f64>() / self.phases.trust.len().max(1) as f64)
     }
 

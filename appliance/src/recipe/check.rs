@@ -4,6 +4,7 @@ use super::archive::{Arrays, short, unpack};
 use super::demands::Demands;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::{check_limits, gauges};
+use super::good_parts::GoodPartsFile;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
 use algo::inspect::{CalibrationError, Gauge};
@@ -73,6 +74,8 @@ pub struct Conditions {
     pub calibration: CalibrationError,
     /// |ΔΦ| in turns up to which the expansion of the height holds.
     pub expansion_range_turns: f64,
+    /// What is known of good parts' deviations.
+    pub good_parts: Option<GoodPartsFile>,
 }
 
 /// A sequence that a part is measured with.
@@ -285,6 +288,7 @@ impl From<&RecipeFile> for Conditions {
                     length: sigma.length_mm / LENGTH,
                 }),
             expansion_range_turns: file.expansion_range_turns,
+            good_parts: file.good_parts,
         }
     }
 }

@@ -4,13 +4,15 @@ use super::archive::{self, Arrays};
 use super::captures::Offsets;
 use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
-use super::good_parts::{GoodPartsFile, Noise};
+use super::good_parts::{GoodPartsFile, Noise, ROOM, SIDES};
 use super::planner::{self, Choice};
+use super::proof;
 use super::{
     AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
 };
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
+use crate::station::{Inspection, MAX_GAUGES};
 use algo::adaptive::phase_reach;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
@@ -24,17 +26,17 @@ use std::io::Cursor;
 const EROSION_PX: usize = 2;
 /// Pixels whose taught height is less certain than this are not compared, mm (1 σ).
 const MAX_SIGMA_MM: f64 = 0.25;
-/// Deviations are averaged over squares with sides of this many camera pixels.
-pub(super) const SMOOTHING_PX: usize = 9;
 /// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be measured that well, else the limit is
 /// wider: see [`super::good_parts`].
 const DEVIATION_MM: f64 = 0.15;
 /// The coverage of a good part may be lower than expected by this share of the frame. Noise alone causes less: of 200,000 pixels
 /// that are all just at the least trusted modulation, the number of resolved ones has σ = √200,000 / 2, and 6 σ of the difference
 /// of two such numbers is 1,900, or 0.7 % of a frame of only 512 × 512 pixels.
-const COVERAGE_CHANGE: f64 = 0.01;
+pub(super) const COVERAGE_CHANGE: f64 = 0.01;
 /// Least share of the golden surface that must be resolved.
 const MIN_COVERAGE: f64 = 0.80;
+/// The deviation of a good part is taken to lie at most this many scatters above its mean: of placements that are worked out.
+const FARTHEST: f64 = 4.0;
 /// Guard bands of new recipes: with k = 1.65 one in 20 parts that lie just outside of a limit would pass (ISO 14253-1:2017), with 2
 /// one in 44.
 const GUARD_K: f64 = 2.0;
@@ -164,7 +166,7 @@ impl GoldenPart<'_> {
             .iter()
             .map(|trust| *trust == Trust::Resolved)
             .collect();
-        let (regions, mut gauges) = gauges(&resolved, self.phases.width);
+        let (regions, gauges) = gauges(&resolved, self.phases.width);
         let surface = KnownSurface {
             width: self.phases.width,
             phase: self.phases.phase.clone(),
@@ -172,28 +174,12 @@ impl GoldenPart<'_> {
         };
         let mut arrays = self.arrays(&surface, naming.placement_tolerance_mm);
         let sequences = self.sequences(&arrays);
-        let mut choice = planner::choose(&sequences, &gauges);
-        let good_parts = self.weigh(surface, &mut arrays, &sequences, choice.production);
-        choice.reasons.extend(good_parts.words());
-        let expected = sequences[choice.production..].iter();
-        let expected = expected.filter_map(|sequence| self.expected_coverage(&sequence.frames));
-        let coverage = expected.fold(f64::INFINITY, f64::min) - COVERAGE_CHANGE;
-        for gauge in &mut gauges {
-            match gauge.measures {
-                GaugeKind::Deviation { .. } => {
-                    let limit = good_parts.limit_mm;
-                    (gauge.low, gauge.high) = (Some(-limit), Some(limit));
-                }
-                // Of the whole frame; openings have an upper limit.
-                GaugeKind::Coverage => gauge.low = gauge.low.map(|_| coverage.max(0.0)),
-                _ => {}
-            }
-        }
+        let choice = planner::choose(&sequences, &gauges);
         let range = self.triangulator.range();
         let calibration = self.calibration;
         let (width, height, bit_depth) = calibration.frames();
         let (columns, rows) = calibration.raster();
-        let manifest = RecipeFile {
+        let mut manifest = RecipeFile {
             format: FORMAT.into(),
             version: VERSION,
             fingerprint: String::new(),
@@ -234,8 +220,13 @@ impl GoldenPart<'_> {
             regions,
             gauges,
             comparison: self.comparison.clone(),
-            good_parts: Some(good_parts),
+            good_parts: None,
         };
+        let mut words = self.set_limits(surface, &mut manifest, &mut arrays)?;
+        // The smaller the squares, the less noise is allowed.
+        let mut choice = planner::choose(&manifest.sequences, &manifest.gauges);
+        manifest.production = choice.production;
+        choice.reasons.append(&mut words);
         let (bytes, _) = archive::pack(&manifest, &arrays)?;
         drop(arrays);
         // Read back as after a restart, so that what was taught is known to load.
@@ -305,15 +296,84 @@ impl GoldenPart<'_> {
         }
     }
 
-    /// Sets the limit of the deviation, and overwrites `arrays.valid` (0 or 1) with the weights of the pixels: those that are too noisy
-    /// for the limit get less weight.
-    fn weigh(
+    /// Sets the squares and the limits of the gauges by what good parts are predicted to read, wherever they lie within the placement tolerance;
+    /// overwrites `arrays.valid` (0 or 1) with the weights of the pixels. Returns what to say of it.
+    fn set_limits(
         &self,
         surface: KnownSurface,
+        manifest: &mut RecipeFile,
         arrays: &mut Arrays,
+    ) -> Result<Vec<String>, String> {
+        let (sequences, production) = (&manifest.sequences, manifest.production);
+        let expected = sequences[production..].iter();
+        let expected = expected.filter_map(|of| self.expected_coverage(of, &arrays.phase_reach));
+        let coverage = expected.fold(f64::INFINITY, f64::min) - COVERAGE_CHANGE;
+        let noise = self.noise(surface, arrays, sequences, production);
+        let compared = arrays.valid.clone();
+        let mut good_parts = noise.weigh_smallest(&mut arrays.valid, DEVIATION_MM, &SIDES);
+        for gauge in &mut manifest.gauges {
+            match gauge.measures {
+                GaugeKind::Deviation { .. } => set_deviation(gauge, &good_parts),
+                // Of the whole frame; openings have an upper limit.
+                GaugeKind::Coverage => gauge.low = gauge.low.map(|_| coverage.max(0.0)),
+                _ => {}
+            }
+        }
+        // The same deviation in squares of all sides that may be taken.
+        let sides = SIDES
+            .into_iter()
+            .filter(|side| *side >= good_parts.smoothing_px);
+        let sides: Vec<usize> = sides.collect();
+        let mut tried = manifest.clone();
+        let room = MAX_GAUGES.saturating_sub(tried.gauges.len());
+        for side in sides.iter().skip(1).take(room) {
+            let mut gauge = tried.gauges[0].clone();
+            gauge.name = format!("{} in {side}", gauge.name);
+            gauge.measures = GaugeKind::Deviation {
+                smoothing_px: *side,
+            };
+            tried.gauges.push(gauge);
+        }
+        let judged = proof::displaced(&tried, arrays, self.calibration)?;
+        let others = manifest.gauges.len() - 1;
+        let found = |at: usize| proof::magnitudes(&judged, if at == 0 { 0 } else { at + others });
+        let fits = |(mean, scatter, most): (f64, f64, f64)| {
+            most.max(mean + FARTHEST * scatter) < ROOM * good_parts.limit_mm
+        };
+        let at = (0..sides.len()).find(|at| found(*at).is_none_or(fits));
+        let at = at.unwrap_or(sides.len() - 1);
+        if at > 0 {
+            arrays.valid = compared;
+            good_parts = noise.weigh_smallest(&mut arrays.valid, DEVIATION_MM, &sides[at..=at]);
+            set_deviation(&mut manifest.gauges[0], &good_parts);
+        }
+        if let Some((mean, scatter, _)) = found(at) {
+            (good_parts.displaced_mm, good_parts.displaced_scatter_mm) = (mean, scatter);
+        }
+        let mut words = good_parts.words();
+        manifest.good_parts = Some(good_parts);
+        // Values by the squares that were taken, in the order of the recipe's gauges.
+        let judged = judged.into_iter().map(|mut inspection| {
+            let taken = if at == 0 { 0 } else { at + others };
+            if let Some(value) = inspection.gauges.get(taken).cloned() {
+                inspection.gauges[0] = value;
+            }
+            inspection.gauges.truncate(others + 1);
+            inspection
+        });
+        let judged: Vec<Inspection> = judged.collect();
+        words.extend(proof::hold(manifest, &judged));
+        Ok(words)
+    }
+
+    /// The noise of the part by the sequence that it is measured with first.
+    fn noise<'a>(
+        &'a self,
+        surface: KnownSurface,
+        arrays: &Arrays,
         sequences: &[SequenceFile],
         production: usize,
-    ) -> GoodPartsFile {
+    ) -> Noise<'a> {
         let first = &sequences[production];
         let production = {
             let variance = self.variance(first.kind, &first.frames, arrays);
@@ -326,14 +386,22 @@ impl GoldenPart<'_> {
             Some(full) => (full.sigma_mm / first.sigma_mm.max(f64::MIN_POSITIVE)).powi(2),
             None => 1.0,
         };
-        let noise = Noise {
+        Noise {
             triangulator: self.triangulator,
             surface,
             production,
             golden: golden / self.captures as f64,
-        };
-        noise.weigh(&mut arrays.valid, DEVIATION_MM)
+        }
     }
+}
+
+/// Gives a deviation the squares and the limit of a prediction.
+fn set_deviation(gauge: &mut GaugeFile, good_parts: &GoodPartsFile) {
+    let limit = good_parts.limit_mm;
+    (gauge.low, gauge.high) = (Some(-limit), Some(limit));
+    gauge.measures = GaugeKind::Deviation {
+        smoothing_px: good_parts.smoothing_px,
+    };
 }
 
 /// The mean of both.
@@ -355,7 +423,7 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
             name: "deviation".into(),
             region: "frame".into(),
             measures: GaugeKind::Deviation {
-                smoothing_px: SMOOTHING_PX,
+                smoothing_px: SIDES[SIDES.len() - 1],
             },
             low: Some(-DEVIATION_MM),
             high: Some(DEVIATION_MM),

@@ -5,14 +5,17 @@
 //! found. If that concerned more than a small share of the pixels, the limit is wider instead, and teaching reports that the
 //! tolerance cannot be held.
 //!
+//! Squares are as small as noise allows: the smallest whose largest deviation on good parts stays below a third of the limit, so that small
+//! deep defects are seen at nearly their depth. Parts that lie elsewhere than golden deviate by more than noise, as golden is interpolated
+//! between pixels: teaching tries that with golden, displaced ([`super::proof`]).
+//!
 //! Leaving such pixels out instead misses nearly all dents among them
 //! (`dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_pixels`).
 
-use super::golden::SMOOTHING_PX;
 use crate::station::Unit;
 use algo::geometry::Triangulator;
 use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_variance};
-use algo::inspect::{GoldenSurface, Taught, Weight};
+use algo::inspect::{GoldenSurface, Largest, Taught, Weight, normal_shares};
 use algo::pipeline::KnownSurface;
 use hal::bounds::within;
 use serde::{Deserialize, Serialize};
@@ -23,6 +26,11 @@ const WEIGHED: f64 = 0.05;
 const SIGMAS: f64 = 6.5;
 /// At most this share of good parts is predicted to exceed the limit.
 const BEYOND: f64 = 1e-6;
+/// Sides of squares in camera pixels, the smallest first. A single pixel may be a wild one. In the largest a dent of 8 mm is still seen at
+/// half its depth by 0.4 mm per pixel.
+pub(super) const SIDES: [usize; 4] = [3, 5, 7, 9];
+/// The largest deviation of good parts is to stay below this share of the limit.
+pub(super) const ROOM: f64 = 1.0 / 3.0;
 /// Limits wider than the tolerance are rounded up to a multiple of this, mm; each is wider than the one before by this factor,
 /// and at most so many times the tolerance.
 const STEP_MM: f64 = 0.01;
@@ -51,10 +59,24 @@ pub struct GoodPartsFile {
     /// The least of these weights; 1 where there are none.
     #[serde(default = "full")]
     pub least_weight: f64,
+    /// The side of the squares that all of this is of, pixels.
+    #[serde(default = "largest_side")]
+    pub smoothing_px: usize,
+    /// The largest deviation of good parts that lie anywhere within the placement tolerance: mean and standard deviation, mm; 0 if it was not
+    /// tried.
+    #[serde(default)]
+    pub displaced_mm: f64,
+    /// See above.
+    #[serde(default)]
+    pub displaced_scatter_mm: f64,
 }
 
 const fn full() -> f64 {
     1.0
+}
+
+const fn largest_side() -> usize {
+    SIDES[SIDES.len() - 1]
 }
 
 /// What is known of the noise of a taught part.
@@ -70,13 +92,35 @@ pub(super) struct Noise<'a> {
 }
 
 impl Noise<'_> {
-    /// The limit of the deviation for a tolerance. `mask` is not 0 where the part can be compared; it is overwritten with the
-    /// weights of the pixels ([`Weight::bits`]) for this limit.
-    pub fn weigh(&self, mask: &mut [u8], tolerance_mm: f64) -> GoodPartsFile {
+    /// The limit of the deviation for a tolerance, in the smallest squares of the given sides that noise allows, else in the largest. `mask` is
+    /// not 0 where the part can be compared; it is overwritten with the weights of the pixels ([`Weight::bits`]) for this limit.
+    pub fn weigh_smallest(
+        &self,
+        mask: &mut Vec<u8>,
+        tolerance_mm: f64,
+        sides: &[usize],
+    ) -> GoodPartsFile {
+        let (last, smaller) = sides.split_last().unwrap_or((&SIDES[0], &[]));
+        for side in smaller {
+            let mut weighed = mask.clone();
+            let (found, extreme) = self.weigh(&mut weighed, tolerance_mm, *side);
+            if found.limit_mm <= tolerance_mm && extreme < ROOM * tolerance_mm {
+                *mask = weighed;
+                return found;
+            }
+        }
+        self.weigh(mask, tolerance_mm, *last).0
+    }
+
+    /// The same in squares of one side. The second value is what the deviation of hardly any good part exceeds, mm.
+    fn weigh(&self, mask: &mut [u8], tolerance_mm: f64, side: usize) -> (GoodPartsFile, f64) {
         let width = self.surface.width;
         let valid: Vec<bool> = mask.iter().map(|&valid| valid != 0).collect();
         let both = 1.0 + self.golden as f32;
-        let pixel: Vec<f32> = self.production.iter().map(|z| z * both).collect();
+        let shares = normal_shares(self.triangulator, &self.surface);
+        let along_normal = |(variance, share): (&f32, &f32)| variance * share * share * both;
+        let pixel = self.production.iter().zip(&shares).map(along_normal);
+        let pixel: Vec<f32> = pixel.collect();
         let still = vec![0.0; valid.len()];
         let mut noise = DeviationNoise {
             width,
@@ -87,15 +131,17 @@ impl Noise<'_> {
         let whole = self.taught(&full);
         let whole = self.golden_surface(&whole);
         // The motion is found from what counts in full, and what does depends on the motion: once each.
-        let (_, weights) = limited(&noise, &valid, tolerance_mm);
+        let (_, weights) = limited(&noise, &valid, tolerance_mm, side);
         let taught = self.taught(&weights);
         let window = vec![0..width; valid.len() / width.max(1)];
         let mut motion = motion_variance(self.golden_surface(&taught), whole, &window);
-        motion.iter_mut().for_each(|variance| *variance *= both);
+        for (variance, share) in motion.iter_mut().zip(&shares) {
+            *variance = along_normal((variance, share));
+        }
         noise.motion = &motion;
-        let (limit_mm, weights) = limited(&noise, &valid, tolerance_mm);
-        let squares = noise.of_squares(&weights, SMOOTHING_PX);
-        let largest = LargestDeviation::new(&squares, width, SMOOTHING_PX);
+        let (limit_mm, weights) = limited(&noise, &valid, tolerance_mm, side);
+        let squares = noise.of_squares(&weights, side);
+        let largest = LargestDeviation::new(&squares, width, side);
         let limit_mm = match largest.beyond(limit_mm) > BEYOND {
             true => rounded_up(largest.limit(BEYOND)),
             false => limit_mm,
@@ -115,7 +161,7 @@ impl Noise<'_> {
         for (mask, weight) in mask.iter_mut().zip(&weights) {
             *mask = weight.bits();
         }
-        GoodPartsFile {
+        let found = GoodPartsFile {
             tolerance_mm,
             limit_mm,
             largest_mm,
@@ -124,7 +170,11 @@ impl Noise<'_> {
             left_out: 1.0 - compared.count() as f64 / count(&valid).max(1.0),
             weighed: weighed / f64::max(all, f64::MIN_POSITIVE),
             least_weight,
-        }
+            smoothing_px: side,
+            displaced_mm: 0.0,
+            displaced_scatter_mm: 0.0,
+        };
+        (found, largest.limit(BEYOND))
     }
 
     /// Golden with these weights, and the noise with which production takes it ([`Taught`]).
@@ -133,7 +183,9 @@ impl Noise<'_> {
             .production
             .iter()
             .map(|variance| f64::from(*variance).sqrt());
-        Taught::new(weights.iter().copied().zip(sigmas))
+        // Only the motion is found from it, which goes by heights.
+        let pixels = weights.iter().copied().zip(sigmas);
+        Taught::new(pixels.map(|(weight, sigma)| (weight, 1.0, sigma)))
     }
 
     fn golden_surface<'a>(&'a self, taught: &'a Taught) -> GoldenSurface<'a> {
@@ -146,11 +198,16 @@ impl Noise<'_> {
 }
 
 /// The limit, at least the tolerance, that all but [`WEIGHED`] of the pixels can hold, and the weights with which the others can.
-fn limited(noise: &DeviationNoise<'_>, valid: &[bool], tolerance_mm: f64) -> (f64, Vec<Weight>) {
+fn limited(
+    noise: &DeviationNoise<'_>,
+    valid: &[bool],
+    tolerance_mm: f64,
+    side: usize,
+) -> (f64, Vec<Weight>) {
     let least = (1.0 - WEIGHED) * count(valid);
     let mut limit = tolerance_mm;
     loop {
-        let weights = noise.weights(valid, SMOOTHING_PX, limit / SIGMAS);
+        let weights = noise.weights(valid, side, limit / SIGMAS);
         let full = weights.iter().filter(|weight| **weight == Weight::FULL);
         if full.count() as f64 >= least || limit > WIDEST * tolerance_mm {
             return (limit, weights);
@@ -182,7 +239,20 @@ impl GoodPartsFile {
         within("beyond", self.beyond, 0.0, 1.0)?;
         within("left_out", self.left_out, 0.0, 1.0)?;
         within("weighed", self.weighed, 0.0, 1.0)?;
-        within("least_weight", self.least_weight, 1.0 / 256.0, 1.0)
+        within("least_weight", self.least_weight, 1.0 / 256.0, 1.0)?;
+        within("smoothing_px", self.smoothing_px, 1, usize::from(u16::MAX))?;
+        within("displaced_mm", self.displaced_mm, 0.0, longest)?;
+        let scatter = self.displaced_scatter_mm;
+        within("displaced_scatter_mm", scatter, 0.0, longest)
+    }
+
+    /// What displaced good parts deviate by in squares of `side` pixels; none if it is not known.
+    pub fn displaced(&self, side: usize) -> Option<Largest> {
+        let known = side == self.smoothing_px && self.displaced_mm > 0.0;
+        known.then_some(Largest {
+            mean: self.displaced_mm,
+            scatter: self.displaced_scatter_mm,
+        })
     }
 
     /// The prediction in words: one line, and further ones if the tolerance is not held everywhere.
@@ -196,6 +266,9 @@ impl GoodPartsFile {
             left_out,
             weighed,
             least_weight,
+            smoothing_px,
+            displaced_mm,
+            displaced_scatter_mm,
         } = *self;
         if largest_mm == 0.0 {
             return vec![
@@ -213,6 +286,14 @@ impl GoodPartsFile {
             ),
             false => format!("deviation: {expected}"),
         }];
+        lines.push(format!(
+            "deviations are means over {smoothing_px} × {smoothing_px} pixels: a defect that is narrower is seen at less than its depth"
+        ));
+        if displaced_mm > 0.0 {
+            lines.push(format!(
+                "parts that lie anywhere within the placement tolerance deviate by up to {displaced_mm:.3} ± {displaced_scatter_mm:.3} mm"
+            ));
+        }
         if weighed > 0.0 {
             lines.push(format!(
                 "{:.2} % of the surface is seen so faintly or flatly that a deviation there must be larger to be found, by a \

@@ -8,6 +8,8 @@ use super::candidates::candidates;
 use super::captures::{CAPTURES, Captured};
 use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
+use super::plan::Plan;
+use super::proof;
 use crate::error::code_of;
 use crate::head::calibrated::{CalibratedHead, MeasureError};
 use crate::head::calibration::Calibration;
@@ -83,7 +85,7 @@ impl From<AdaptError> for TeachError {
 }
 
 /// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern, measures it again and again with that one by
-/// every sequence that production may use, and makes the recipe; nothing is stored here. The part must not move meanwhile. `progress` gets the share done and the current stage in words.
+/// every sequence that production may use, makes the recipe, and tries it on the part; nothing is stored here. The part must not move meanwhile. `progress` gets the share done and the current stage in words.
 ///
 /// # Errors
 /// If a device fails or the scene cannot be taught.
@@ -183,6 +185,23 @@ pub fn teach_while(
     let taught = computing.on(|| part.recipe(naming));
     let mut taught = taught.map_err(TeachError::Rig)?;
     taught.choice.reasons.extend(part.illumination.words());
+    drop(golden);
+    stage(0.9, "trying the recipe on the part")?;
+    let plan = computing.on(|| Plan::new(taught.recipe.clone(), calibration, false));
+    let plan = plan.map_err(|error| TeachError::Rig(error.to_string()))?;
+    let trying = |share: f64| progress(0.9 + 0.1 * share, "trying the recipe on the part");
+    let judged = proof::as_it_lies(&plan, head.head, calibration, timeout, &trying)?;
+    drop(plan);
+    if let Some(words) = proof::not_judged(&judged) {
+        return Err(TeachError::Scene(words));
+    }
+    let words = proof::hold(&mut taught.manifest, &judged);
+    if !words.is_empty() {
+        let reasons = taught.choice.reasons;
+        let again = computing.on(|| TaughtRecipe::of(taught.manifest, taught.recipe.arrays));
+        taught = again.map_err(TeachError::Rig)?;
+        taught.choice.reasons = reasons.into_iter().chain(words).collect();
+    }
     stage(1.0, "taught")?;
     Ok(taught)
 }

@@ -61,6 +61,8 @@ pub fn form(u: &[f64; 6], matrix: &Matrix6, v: &[f64; 6]) -> f64 {
 pub struct Directions {
     /// Eigenvalue and unit vector of each that is determined.
     kept: heapless::Vec<(f64, [f64; 6]), 6>,
+    /// Unit vectors of the others.
+    free: heapless::Vec<[f64; 6], 6>,
     /// Components that the shape does not determine.
     pub left_out: [bool; 6],
 }
@@ -78,7 +80,7 @@ impl Directions {
     /// error of a residual, 1 σ.
     pub fn of(normal: &Matrix6, noise: &Matrix6, sigma_mm: f64) -> Self {
         let (values, vectors) = eigen(normal);
-        let mut kept = heapless::Vec::new();
+        let (mut kept, mut free) = (heapless::Vec::new(), heapless::Vec::new());
         let mut lost = [0.0; 6];
         let mut worst = None;
         for (value, vector) in values.into_iter().zip(vectors) {
@@ -89,6 +91,7 @@ impl Directions {
                 let _ = kept.push((value, vector));
                 continue;
             }
+            let _ = free.push(vector);
             for (lost, part) in lost.iter_mut().zip(vector) {
                 *lost += part * part;
             }
@@ -98,7 +101,16 @@ impl Directions {
         if let Some(worst) = worst {
             left_out[worst] = true;
         }
-        Self { kept, left_out }
+        Self {
+            kept,
+            free,
+            left_out,
+        }
+    }
+
+    /// Unit vectors of the directions that are not determined.
+    pub fn free(&self) -> &[[f64; 6]] {
+        &self.free
     }
 
     /// The x with A x = b along the directions that are determined, 0 along the others.

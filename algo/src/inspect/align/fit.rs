@@ -54,8 +54,11 @@ pub struct Placed {
     pub points: usize,
     /// Share of the points that do not.
     pub outliers: f64,
-    /// How far the motion takes the corner of the part's box that it takes farthest, mm.
+    /// How far the motion takes the corner of the part's box that it takes farthest, mm: of all motions that differ along directions that
+    /// the shape does not determine, the one that takes it least far.
     pub reach: f64,
+    /// The error of that way, mm (1 σ).
+    pub reach_sigma: f64,
 }
 
 impl Placed {
@@ -82,6 +85,9 @@ const SMALL_CHANGE_MM: f64 = 1e-4;
 /// 2 mm is 0.6 µm off its facet there.
 const ROUNDS: usize = 8;
 const NEAR_MM: f64 = 0.05;
+/// Corners of a box, and halvings until the least farthest way is known to a thousandth.
+const CORNERS: usize = 8;
+const HALVINGS: usize = 10;
 /// With a larger share of outliers a bent part may have been taken for a moved one.
 const SUSPICIOUS: f64 = 0.05;
 /// Buffers of a fit, which the next one uses again.
@@ -188,17 +194,64 @@ impl Fitting<'_> {
 
     fn placed(&self, motion: Motion, solved: &Solved, equations: &mut Equations) -> Placed {
         let spread = equations.covariance(self.backend, &solved.further, solved.normal.scale);
-        let farthest = |corner: &Vector| (motion.apply(*corner) - *corner).length();
         let inside = solved.normal.inside;
+        let covariance = solved.directions.covariance(&spread);
+        let (reach, reach_sigma) = self.reach(&motion, solved.directions.free(), &covariance);
         Placed {
             motion,
-            covariance: solved.directions.covariance(&spread),
+            covariance,
             radius: self.plan.radius,
             left_out: solved.directions.left_out,
             points: inside,
             outliers: 1.0 - inside as f64 / equations.len() as f64,
-            reach: self.plan.corners.iter().map(farthest).fold(0.0, f64::max),
+            reach,
+            reach_sigma,
         }
+    }
+
+    /// See [`Placed::reach`], and its σ; `free` are the directions that the shape does not determine.
+    fn reach(&self, motion: &Motion, free: &[[f64; 6]], covariance: &Matrix6) -> (f64, f64) {
+        let mut ways: heapless::Vec<Vector, CORNERS> = heapless::Vec::new();
+        let corners = self.plan.corners.iter();
+        ways.extend(corners.map(|corner| motion.apply(*corner) - *corner));
+        let farthest = |ways: &[Vector]| ways.iter().map(|way| way.length()).fold(0.0, f64::max);
+        let mut reach = farthest(&ways);
+        // The farthest way is a convex function of the share of each direction: the interval about its least value is halved, direction by
+        // direction.
+        let mut step = reach / 2.0;
+        for _ in 0..HALVINGS {
+            for direction in free {
+                for share in [-step, step] {
+                    let mut moved = ways.clone();
+                    for (way, corner) in moved.iter_mut().zip(&self.plan.corners) {
+                        *way = *way + self.way(direction, *corner) * share;
+                    }
+                    let found = farthest(&moved);
+                    if found < reach {
+                        (ways, reach) = (moved, found);
+                        break;
+                    }
+                }
+            }
+            step /= 2.0;
+        }
+        let far = ways.iter().zip(&self.plan.corners);
+        let Some((way, corner)) = far.max_by(|a, b| a.0.length().total_cmp(&b.0.length())) else {
+            return (reach, 0.0);
+        };
+        let towards = *way * (1.0 / reach.max(f64::MIN_POSITIVE));
+        let along = |axis: usize| {
+            let unit = core::array::from_fn(|i| if i == axis { 1.0 } else { 0.0 });
+            self.way(&unit, *corner).dot(towards)
+        };
+        let g = core::array::from_fn(along);
+        (reach, libm::sqrt(form(&g, covariance, &g).max(0.0)))
+    }
+
+    /// Where a small motion takes a point.
+    fn way(&self, &[x, y, z, a, b, c]: &[f64; 6], point: Vector) -> Vector {
+        let turn = Vector::new(a, b, c) * (1.0 / self.plan.radius);
+        Vector::new(x, y, z) + turn.cross(point - self.plan.centre)
     }
 
     /// Variance, mm², of how far the error of a motion lifts a facet at a point.

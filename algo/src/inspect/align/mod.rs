@@ -131,6 +131,11 @@ impl Alignment {
             .fit(&samples, &mut FitBuffers::default())
     }
 
+    /// Corners of a box around the part.
+    pub fn corners(&self) -> &[Vector] {
+        &self.corners
+    }
+
     /// About how many pixels there are to each spot.
     pub fn pixels_per_spot(&self) -> f64 {
         self.pixels_per_spot

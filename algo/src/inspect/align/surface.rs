@@ -40,6 +40,11 @@ impl Facet {
         let lift = self.lift;
         [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z]
     }
+
+    /// The share of a height difference that lies along the normal: n·d, as |m| = 1 / n·d.
+    pub fn normal_share(&self) -> f64 {
+        1.0 / self.lift.length()
+    }
 }
 
 /// The plane is fitted to the heights of a square of this many pixels to each side.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::geometry::{Pinhole, PinholeModel, Reference, Triangulator};
-use crate::inspect::{Taught, Weight};
+use crate::inspect::{Taught, Weight, normal_shares};
 use crate::pattern::PhaseFunction;
 use crate::pipeline::KnownSurface;
 use crate::units::AbsolutePhase;
@@ -56,7 +56,7 @@ fn made(f: impl Fn(f64, f64) -> f64) -> Made {
         phase: vec![AbsolutePhase::from_bits(0); SIDE * SIDE],
         height: height.collect(),
     };
-    let taught = Taught::new((0..SIDE * SIDE).map(|_| (Weight::FULL, SIGMA_MM)));
+    let taught = Taught::new((0..SIDE * SIDE).map(|_| (Weight::FULL, 1.0, SIGMA_MM)));
     Made {
         triangulator,
         surface,
@@ -221,7 +221,7 @@ fn a_wall_at_a_grazing_angle_is_not_lifted_by_the_noise_of_the_motion() {
     assert_eq!(even.alignment(), few);
     // The camera looks along a slope of 2.7.
     let mut steep = made(|x, y| hills(x, y) + 2.4 * (x - 40.0).max(0.0));
-    steep.taught = Taught::new((0..SIDE * SIDE).map(|_| (Weight::FULL, 4.0 * SIGMA_MM)));
+    steep.taught = Taught::new((0..SIDE * SIDE).map(|_| (Weight::FULL, 1.0, 4.0 * SIGMA_MM)));
     let golden = steep.golden();
     let (few, _) = Alignment::of_points(POINTS, golden, &window).unwrap();
     let (before, after) = (
@@ -230,4 +230,30 @@ fn a_wall_at_a_grazing_angle_is_not_lifted_by_the_noise_of_the_motion() {
     );
     assert!(before > MOST_LIFT_MM, "{before}");
     assert!(after < before / 1.7, "{before} {after}");
+}
+
+#[test]
+fn the_share_along_the_normal_of_a_plane_is_that_of_its_tilt_and_of_the_ray() {
+    for (along, down) in [(0.0, 0.0), (1.2, 0.0), (-1.5, 0.4), (0.0, 1.0)] {
+        let plane = made(|x, y| along * x + down * y);
+        let normal = Vector::new(-along, -down, 1.0);
+        let normal = normal * (1.0 / normal.length());
+        let shares = normal_shares(&plane.triangulator, &plane.surface);
+        // Where the plane is in the working range.
+        for (u, v) in [(70, 70), (100, 100), (130, 110)] {
+            let place = v * SIDE + u;
+            let height = plane.surface.height[place];
+            let point = plane.triangulator.point(u, v, height).unwrap();
+            let ray = point - plane.triangulator.camera().centre();
+            let exact = libm::fabs(normal.dot(ray) / ray.z);
+            let found = f64::from(shares[place]);
+            assert!(
+                (found - exact).abs() < 1e-3,
+                "{along} {down}: {found} {exact}"
+            );
+            let seen = plane.triangulator.camera().project(point).unwrap();
+            let facet = plane.golden().facet(point, seen).unwrap();
+            assert!((facet.normal_share() - exact).abs() < 1e-3);
+        }
+    }
 }

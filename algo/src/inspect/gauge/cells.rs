@@ -127,7 +127,7 @@ pub struct Cell {
     pub pixels: f64,
     /// Height, mm: as taught plus the mean deviation, so that it does not depend on which pixels of the cell were measured.
     pub height: f64,
-    /// Deviation from golden, mm.
+    /// Deviation from golden in height, mm.
     pub deviation: f64,
     /// The cell as taught.
     pub taught: TaughtCell,

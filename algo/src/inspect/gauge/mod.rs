@@ -59,18 +59,18 @@ pub enum Axis {
 /// are averaged over, in camera pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measure {
-    /// The mean weighted deviation from golden of largest magnitude, with its sign, of the squares of `side` pixels about every
-    /// pixel, mm: single noisy pixels do not decide. Squares of which less than half can be compared do not count.
+    /// The mean weighted deviation from golden along its normal of largest magnitude, positive outwards, of the squares of `side` pixels about
+    /// every pixel, mm (profile of a surface, ISO 1101:2017): single noisy pixels do not decide. Squares of which less than half can be compared do not count.
     Deviation {
         /// Odd; 1 = single pixels.
         side: usize,
     },
-    /// The root of the mean square of the cells' deviations from golden, mm.
+    /// The root of the mean square of the cells' deviations from golden along its normal, mm.
     RmsDeviation {
         /// Of the cells.
         side: usize,
     },
-    /// The share of the cells that deviate from golden by more than a tolerance.
+    /// The share of the cells that deviate from golden along its normal by more than a tolerance.
     OutOfTolerance {
         /// Of the cells.
         side: usize,

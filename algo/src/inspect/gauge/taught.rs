@@ -25,6 +25,18 @@ pub struct TaughtCell {
     pub jacobian: [f64; 6],
     /// Σ of the variances of its pixels' heights, mm².
     pub variance: f64,
+    /// The share of a height difference that lies along the normal ([`normal_shares`](crate::inspect::normal_shares)).
+    pub normal: f64,
+}
+
+impl TaughtCell {
+    /// The same cell, along the normal instead of in height.
+    #[must_use]
+    pub fn along_normal(mut self) -> Self {
+        self.jacobian = self.jacobian.map(|value| value * self.normal);
+        self.variance *= self.normal * self.normal;
+        self
+    }
 }
 
 /// Facets of a cell that are averaged, in each direction.
@@ -69,6 +81,7 @@ pub(in crate::inspect) fn taught_cells(
                     *sum += value;
                 }
                 cell.area += facet.area;
+                cell.normal += facet.normal_share();
                 facets[at] += 1.0;
             }
         }
@@ -84,9 +97,11 @@ pub(in crate::inspect) fn taught_cells(
         if facets > 0.0 {
             cell.jacobian = cell.jacobian.map(|sum| sum / facets);
             cell.area *= pixels / facets;
+            cell.normal /= facets;
         } else {
             cell.jacobian = flat;
             cell.area = pixels * mean;
+            cell.normal = 1.0;
         }
     }
     cells

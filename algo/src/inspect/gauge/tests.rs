@@ -16,6 +16,7 @@ fn grid(side: usize, height: impl Fn(f64, f64) -> f64) -> (Vec<Sum>, Vec<TaughtC
             deviation: 4 * (height(x, y) * 1e6).round() as i64,
         };
         let taught = TaughtCell {
+            normal: 1.0,
             pixels: 4,
             height: 0.0,
             x,
@@ -167,6 +168,7 @@ fn the_motion_moves_a_mean_as_a_whole_and_leaves_a_step_alone() {
         points: 100,
         outliers: 0.0,
         reach: 0.0,
+        reach_sigma: 0.0,
     };
     let mut weights = Vec::new();
     mean(&cells, &mut weights).unwrap();

@@ -1,14 +1,20 @@
-//! Stage 3, align: the taught coordinates of a row's pixels, and how far they deviate from golden there.
+//! Stage 3, align: the taught coordinates of a row's pixels, and how far they deviate from golden there: in height, for cells, and along the
+//! normal, for squares.
 
 use super::Production;
-use super::displaced::{BlockNumbers, GoldenMap, OffsetRow, align_row, taught_coordinates};
+use super::displaced::{
+    BlockNumbers, Deviations, GoldenMap, OffsetRow, align_row, mask, pick, scaled,
+    taught_coordinates,
+};
 use super::height::HeightRow;
 use super::pose::PoseField;
 use super::recent::RecentRows;
 use super::{common, pose};
-use crate::inspect::Weight;
+use crate::inspect::Factor;
 use crate::inspect::gauge::{Grid, Sum};
+use crate::math::nearest::whole;
 use crate::pipeline::NO_OFFSET;
+use crate::simd::{Lanes, back_end_entry};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -20,6 +26,8 @@ pub(super) struct TaughtCoordinates {
     blocks: Vec<BlockNumbers>,
     column: Vec<i32>,
     row: Vec<i32>,
+    /// Deviations in height, nm; [`NO_OFFSET`] where the part is not compared.
+    deviation: Vec<i32>,
 }
 
 impl TaughtCoordinates {
@@ -29,11 +37,12 @@ impl TaughtCoordinates {
             blocks: pose::blocks_of_row(width),
             column: vec![0; width],
             row: vec![0; width],
+            deviation: vec![NO_OFFSET; width],
         }
     }
 
     /// Takes the part's motion back in row `v`, whose heights were found last: its deviations become those from golden at the
-    /// taught coordinates. Those of a part that lies as taught stay. Coordinates are found for cells and weights only.
+    /// taught coordinates, along the normal. Coordinates are found for cells only.
     pub fn align(
         &mut self,
         plan: &Production,
@@ -42,101 +51,110 @@ impl TaughtCoordinates {
         columns: Range<usize>,
         (heights, recent): (&HeightRow, &mut RecentRows),
     ) {
-        if pose.placed.is_some() {
-            let columns = common(&columns, &recent.extent(v));
-            if !columns.is_empty() {
-                self.displace(plan, pose, v, columns, (heights, recent));
+        let backend = plan.decoder.backend();
+        match pose.placed {
+            Some(_) => {
+                let columns = common(&columns, &recent.extent(v));
+                if columns.is_empty() {
+                    return;
+                }
+                pose.row(backend, (v, plan.size().1), &columns, &mut self.blocks);
+                let (golden, row) = (golden_map(plan), offset_row(v, heights, &self.blocks));
+                let mut overflow = false;
+                let out = Deviations {
+                    height: &mut self.deviation,
+                    normal: recent.row_mut(v).0,
+                };
+                align_row(backend, golden, row, columns.clone(), out, &mut overflow);
+                if overflow {
+                    recent.overflow = Some(v);
+                }
             }
-        } else if plan.needs_coordinates() {
-            self.row[columns.clone()].fill(v as i32);
-            for u in columns {
-                self.column[u] = u as i32;
+            None => {
+                let normal = &mut recent.row_mut(v).0[columns.clone()];
+                let factors = &plan.taught.factors()[v * plan.size().0..][columns.clone()];
+                self.deviation[columns.clone()].copy_from_slice(normal);
+                turn_to_normal(backend, factors, normal);
             }
+        }
+        if !plan.gauges.patches.is_empty() {
+            self.find(plan, pose, v, columns, heights);
         }
     }
 
-    fn displace(
+    /// Finds the taught coordinates of columns of row `v`, which was aligned last.
+    pub fn find(
         &mut self,
         plan: &Production,
         pose: &PoseField,
         v: usize,
         columns: Range<usize>,
-        (heights, recent): (&HeightRow, &mut RecentRows),
+        heights: &HeightRow,
     ) {
-        let (width, height) = plan.size();
-        let backend = plan.decoder.backend();
-        pose.row(backend, (v, height), &columns, &mut self.blocks);
-        let golden = GoldenMap {
-            height: &plan.cubics.surface().height,
-            taught: plan.taught.pixels(),
-            width,
-        };
-        let row = OffsetRow {
-            v,
-            offset: &heights.offset,
-            blocks: &self.blocks,
-        };
-        let mut overflow = false;
-        let deviation = recent.row_mut(v).0;
-        align_row(
-            backend,
-            golden,
-            row,
-            columns.clone(),
-            deviation,
-            &mut overflow,
-        );
-        if plan.needs_coordinates() {
-            let taught = (&mut *self.column, &mut *self.row);
-            taught_coordinates(backend, golden, row, columns, taught);
-        }
-        if overflow {
-            recent.overflow = Some(v);
-        }
-    }
-
-    /// Multiplies the deviations of row `v`, which was aligned last, by golden's weights at the taught coordinates.
-    pub fn weigh(&self, plan: &Production, v: usize, recent: &mut RecentRows) {
-        if let Some(weighted) = &plan.weighted {
-            let span = recent.extent(v);
-            let (columns, rows) = (&self.column[span.clone()], &self.row[span.clone()]);
-            weighted.apply(&plan.taught, columns, rows, &mut recent.row_mut(v).0[span]);
-        }
-    }
-
-    /// Golden's weight at the taught coordinates of pixel `u`.
-    pub fn weight(&self, plan: &Production, u: usize) -> Weight {
-        match plan.weighted {
-            Some(_) => {
-                let place = self.row[u] as usize * plan.size().0 + self.column[u] as usize;
-                plan.taught.weight(place)
+        let taught = (&mut *self.column, &mut *self.row);
+        if pose.placed.is_some() {
+            let (golden, row) = (golden_map(plan), offset_row(v, heights, &self.blocks));
+            taught_coordinates(plan.decoder.backend(), golden, row, columns, taught);
+        } else {
+            taught.1[columns.clone()].fill(v as i32);
+            for u in columns {
+                taught.0[u] = u as i32;
             }
-            None => Weight::FULL,
         }
+    }
+
+    /// What the height difference at pixel `u`, whose coordinates were found last, was multiplied by.
+    pub fn factor(&self, plan: &Production, u: usize) -> f64 {
+        let place = self.row[u] as usize * plan.size().0 + self.column[u] as usize;
+        plan.taught.factor(place)
     }
 
     /// Adds the compared pixels of a span to the cells that hold their taught coordinates.
-    pub fn add_to_cells(
-        &self,
-        grid: &Grid,
-        deviation: &[i32],
-        span: Range<usize>,
-        cells: &mut [Sum],
-    ) {
+    pub fn add_to_cells(&self, grid: &Grid, span: Range<usize>, cells: &mut [Sum]) {
         for u in span {
-            if deviation[u] == NO_OFFSET {
+            let deviation = self.deviation[u];
+            if deviation == NO_OFFSET {
                 continue;
             }
             let cell = &mut cells[grid.cell(self.column[u], self.row[u])];
             cell.count += 1;
-            cell.deviation += i64::from(deviation[u]);
+            cell.deviation += i64::from(deviation);
         }
     }
 }
 
-impl Production {
-    /// Whether the cells of a gauge or weights are looked up by taught coordinates.
-    fn needs_coordinates(&self) -> bool {
-        !self.gauges.patches.is_empty() || self.weighted.is_some()
+fn golden_map(plan: &Production) -> GoldenMap<'_> {
+    GoldenMap {
+        height: &plan.cubics.surface().height,
+        taught: plan.taught.pixels(),
+        factor: plan.taught.factors(),
+        width: plan.size().0,
+    }
+}
+
+fn offset_row<'a>(v: usize, heights: &'a HeightRow, blocks: &'a [BlockNumbers]) -> OffsetRow<'a> {
+    OffsetRow {
+        v,
+        offset: &heights.offset,
+        blocks,
+    }
+}
+
+back_end_entry! {
+    /// Multiplies deviations in height by these factors.
+    fn turn_to_normal [] = along_normal(factors: &[Factor], deviations: &mut [i32])
+}
+
+#[inline(always)]
+fn along_normal<V: Lanes>(_: V, factors: &[Factor], deviations: &mut [i32]) {
+    let factors = &factors[..deviations.len()];
+    for i in 0..deviations.len() {
+        let nm = deviations[i];
+        let known = mask(nm != NO_OFFSET);
+        deviations[i] = pick(
+            known,
+            whole(scaled(nm as f32, factors[i].units())),
+            NO_OFFSET,
+        );
     }
 }

@@ -4,7 +4,6 @@ use super::coordinates::TaughtCoordinates;
 use super::coverage::{add_variances, count_known};
 use super::height::HeightRow;
 use super::pose::PoseField;
-use super::recent::RecentRows;
 use super::{Measure, Production, common};
 use crate::inspect::gauge::Sum;
 use crate::phase::Trust;
@@ -12,6 +11,7 @@ use crate::pipeline::{HeightTally, PhaseMap};
 use crate::simd::{Lanes, back_end_entry};
 use alloc::vec;
 use alloc::vec::Vec;
+use core::ops::Range;
 
 /// Sums over the rows of a strip. Whole numbers, so that the order of summation does not matter.
 #[derive(Clone, Debug, Default)]
@@ -62,14 +62,13 @@ impl Counts {
         pose: &PoseField,
         v: usize,
         (decoded, heights): (&PhaseMap, &HeightRow),
-        (coordinates, recent): (&TaughtCoordinates, &RecentRows),
+        (coordinates, extent): (&TaughtCoordinates, Range<usize>),
     ) {
         let backend = plan.decoder.backend();
         self.tally.add(&heights.tally);
         self.exact += heights.exact;
         let trusts = &decoded.trust[plan.window[v].clone()];
         count_trusts(backend, trusts, &mut self.trusts);
-        let extent = recent.extent(v);
         for (at, gauge) in plan.gauges.list.iter().enumerate() {
             if gauge.measure != Measure::Coverage {
                 continue;
@@ -83,11 +82,10 @@ impl Counts {
                 add_variances(backend, threshold, offsets, modulations, variance);
             }
         }
-        let deviation = recent.row(v);
         for (patch, cells) in plan.gauges.patches.iter().zip(&mut self.cells) {
             for (_, columns) in pose.region(plan, patch.region).row(v) {
                 let span = common(columns, &extent);
-                coordinates.add_to_cells(&patch.grid, deviation, span, cells);
+                coordinates.add_to_cells(&patch.grid, span, cells);
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Stage 5, gauge: the reading of a deviation, the square with the largest mean.
 //!
-//! The mean over n pixels of weights w has, with σ_p the noise of a pixel's height and C the covariance of the motion that was
-//! taken back,
+//! Height differences are multiplied by the factors w of their pixels: the share along golden's normal times the weight. The mean over n
+//! pixels has, with σ_p the noise of a pixel's height and C the covariance of the motion that was taken back,
 //!
 //! ```text
 //! σ² = Σ w² σ_p² / n² + gᵀ C g        g = Σ w j / n
@@ -17,8 +17,8 @@ use super::height::base_nm;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
 use super::{Input, Production, Strip};
-use crate::inspect::Reading;
 use crate::inspect::align::{Placed, form};
+use crate::inspect::{Largest, Reading};
 use crate::units::Height;
 
 /// Pixels of a square whose Jacobians are averaged, in each direction.
@@ -32,7 +32,7 @@ pub(super) struct SquareNoise {
     /// Σ w² σ_p², mm².
     variance: f64,
     /// Σ w.
-    weight: f64,
+    factors: f64,
     /// Σ j, and how many.
     jacobian: [f64; 6],
     sampled: f64,
@@ -44,7 +44,7 @@ impl SquareNoise {
         Self {
             stride: (side / SAMPLES).max(1),
             variance: 0.0,
-            weight: 0.0,
+            factors: 0.0,
             jacobian: [0.0; 6],
             sampled: 0.0,
         }
@@ -55,10 +55,10 @@ impl SquareNoise {
         u.is_multiple_of(self.stride) && v.is_multiple_of(self.stride)
     }
 
-    /// Adds a pixel: its weight, σ_p in mm and, of a sampled one, its Jacobian.
-    pub fn add(&mut self, weight: f64, sigma: f64, jacobian: Option<[f64; 6]>) {
-        self.variance += weight * weight * sigma * sigma;
-        self.weight += weight;
+    /// Adds a pixel: its factor, σ_p in mm and, of a sampled one, its Jacobian.
+    pub fn add(&mut self, factor: f64, sigma: f64, jacobian: Option<[f64; 6]>) {
+        self.variance += factor * factor * sigma * sigma;
+        self.factors += factor;
         if let Some(jacobian) = jacobian {
             self.sampled += 1.0;
             for (sum, value) in self.jacobian.iter_mut().zip(jacobian) {
@@ -67,16 +67,18 @@ impl SquareNoise {
         }
     }
 
-    /// The variances of the mean over `count` pixels, mm²: by the pixels' noise and by the motion.
-    fn variances(&self, count: f64, placed: Option<&Placed>) -> (f64, f64) {
+    /// The variances of the mean over `count` pixels, mm²: by the pixels' noise and by the motion; and its lever, by which an error of all
+    /// heights changes it.
+    fn variances(&self, count: f64, placed: Option<&Placed>) -> (f64, f64, f64) {
         // Beside an edge no pixel may have a facet: the surface is then taken to be flat.
         let mean = match self.sampled > 0.0 {
             true => self.jacobian.map(|sum| sum / self.sampled),
             false => [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
         };
-        let g = mean.map(|value| value * self.weight / count);
+        let lever = self.factors / count;
+        let g = mean.map(|value| value * lever);
         let motion = placed.map_or(0.0, |placed| form(&g, &placed.covariance, &g).max(0.0));
-        (self.variance / (count * count), motion)
+        (self.variance / (count * count), motion, lever)
     }
 }
 
@@ -95,16 +97,19 @@ impl Production {
         let smoothed = self.square_variance(side);
         let mut variances = found.iter().map(|square| {
             let noise = self.noise_of(square, side, input, pose, strip);
-            let (pixels, motion) = noise.variances(square.count as f64, pose.placed.as_ref());
-            (pixels * smoothed, motion)
+            let (pixels, motion, lever) =
+                noise.variances(square.count as f64, pose.placed.as_ref());
+            (pixels * smoothed, motion, lever)
         });
-        let (pixels, motion) = variances.next()?;
+        let (pixels, motion, lever) = variances.next()?;
         let others = found[1..].iter().zip(variances);
-        let others = others.map(|(square, (pixels, motion))| [magnitude(square), pixels + motion]);
+        let others =
+            others.map(|(square, (pixels, motion, _))| [magnitude(square), pixels + motion]);
         // What good parts read: golden's noise and that of this measurement.
         let golden = self.golden_variance(noisier) / smoothed;
         let largest = self.largest.get(gauge).copied().unwrap_or_default();
         let largest = largest.times(libm::sqrt(1.0 + 1.0 / golden));
+        let largest = self.of_displaced(largest, gauge, pose.placed.as_ref());
         let extreme = largest.uncertain([magnitude(best), pixels + motion], others);
         let sigma = libm::sqrt(extreme.variance + (1.0 - extreme.defect) * motion);
         Some(Reading {
@@ -116,9 +121,24 @@ impl Production {
                 libm::sqrt(
                     golden * (extreme.defect * pixels + motion * smoothed / self.spot_variance()),
                 ),
-                libm::hypot(self.displaced(pose.placed.as_ref()), self.rippled()),
+                libm::hypot(self.displaced(pose.placed.as_ref()), self.rippled() * lever),
             ),
         })
+    }
+
+    /// What good parts read that lie so, where noise alone would make this: golden is interpolated between pixels, which a part that is
+    /// displaced by a pixel shows in full.
+    fn of_displaced(&self, noise: Largest, gauge: usize, placed: Option<&Placed>) -> Largest {
+        let displaced = self.displaced.get(gauge).copied().flatten();
+        let (Some(displaced), Some(placed)) = (displaced, placed) else {
+            return noise;
+        };
+        let share = (placed.reach / self.pixel_mm.max(f64::MIN_POSITIVE)).min(1.0);
+        let between = |noise: f64, displaced: f64| noise + share * (displaced - noise).max(0.0);
+        Largest {
+            mean: between(noise.mean, displaced.mean),
+            scatter: between(noise.scatter, displaced.scatter),
+        }
     }
 
     /// The noise of the pixels of a square.
@@ -185,6 +205,7 @@ mod tests {
             points: 100,
             outliers: 0.0,
             reach: 0.0,
+            reach_sigma: 0.0,
         };
         let mut noise = SquareNoise::new(8);
         for at in 0..64 {
@@ -193,7 +214,8 @@ mod tests {
             noise.add(0.5, 0.1, lift.then_some([0.0, 0.0, 2.0, 0.0, 0.0, 0.0]));
         }
         assert_eq!(noise.sampled, 16.0);
-        let (pixels, motion) = noise.variances(64.0, Some(&placed));
+        let (pixels, motion, lever) = noise.variances(64.0, Some(&placed));
+        assert_eq!(lever, 0.5);
         assert!((libm::sqrt(pixels) - 0.5 * 0.1 / 8.0).abs() < 1e-12);
         assert!((libm::sqrt(motion) - 0.5 * 2.0 * 0.02).abs() < 1e-12);
         assert_eq!(noise.variances(64.0, None).1, 0.0);

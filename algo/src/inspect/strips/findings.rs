@@ -174,6 +174,16 @@ impl Production {
             self.gather(patches.end - 1, side, strips, buffers);
         }
         let CellBuffers { cells, weights, .. } = buffers;
+        let of_deviations = matches!(
+            measure,
+            Measure::RmsDeviation { .. } | Measure::OutOfTolerance { .. }
+        );
+        if of_deviations {
+            for cell in &mut *cells {
+                cell.deviation *= cell.taught.normal;
+                cell.taught = cell.taught.along_normal();
+            }
+        }
         let pixels = |taught: &[TaughtCell]| taught.iter().map(|cell| cell.pixels).sum::<u32>();
         // A region without cells as a square of its area.
         let smoothed = self.square_variance(match side {
@@ -182,7 +192,11 @@ impl Production {
         });
         let variance = |taught: &[TaughtCell]| {
             let pixels = pixels(taught);
-            let sum: f64 = taught.iter().map(|cell| cell.variance).sum();
+            let variances = taught.iter().map(|cell| match of_deviations {
+                true => cell.along_normal().variance,
+                false => cell.variance,
+            });
+            let sum: f64 = variances.sum();
             sum / f64::from(pixels.max(1)) * noisier * noisier * smoothed
         };
         let pixel = variance(taught);

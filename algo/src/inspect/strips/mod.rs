@@ -6,9 +6,9 @@
 //! 1. **decode** (`decode`): frames → absolute phase Φ, modulation, trust;
 //! 2. **height** (`height`): Φ → height offset z − z₀ above the golden surface, on the pixel's own ray;
 //! 3. **align** (`coordinates`, `displaced`): takes the part's motion back by the pose field (`pose`): the pixel's taught coordinates,
-//!    and its deviation from golden there;
-//! 4. **accumulate** (`counts`, `coverage`, `weighted`, `squares`): counts, the sums of the gauges' cells ([`gauge`](super::gauge)), and
-//!    the square with the largest mean weighted deviation; for the squares, the rows before this one are kept (`recent`);
+//!    and its deviation from golden there, in height and, weighted, along golden's normal ([`normal_shares`](super::normal_shares));
+//! 4. **accumulate** (`counts`, `coverage`, `squares`): counts, the sums of the gauges' cells ([`gauge`](super::gauge)), and
+//!    the square with the largest mean deviation along the normal; for the squares, the rows before this one are kept (`recent`);
 //! 5. **gauge** (`findings`, `deviation`, `uncertainty`): after all strips, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few points of each are kept: the
@@ -37,11 +37,11 @@ mod pair;
 mod plan;
 mod pose;
 mod recent;
+mod rendered;
 mod squares;
 mod strip;
 mod taught;
 mod uncertainty;
-mod weighted;
 
 pub use findings::{Findings, Skipped};
 pub use gauges::{Gauge, MAX_GAUGES, Unmeasurable};

@@ -4,15 +4,14 @@ use super::coverage::Threshold;
 use super::gauges::{Gauge, Gauges, Unmeasurable};
 use super::taught::Taught;
 use super::uncertainty::CalibrationError;
-use super::weighted::WeightedTiles;
 use crate::frame::SampleNoise;
-use crate::geometry::Triangulator;
+use crate::geometry::{Triangulator, Vector};
 use crate::inspect::Largest;
 use crate::inspect::align::{Alignment, GoldenSurface, levels};
 use crate::phase::Decoder;
 use crate::pipeline::{HeightCubics, VARIANCE_UNIT_NM};
 use crate::simd::Backend;
-use crate::units::{AbsolutePhase, Modulation};
+use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -45,6 +44,8 @@ pub struct Parts {
     pub golden_noise: f64,
     /// Per gauge, what a deviation is on good parts whose only noise is golden's; of other gauges not used.
     pub largest: Vec<Largest>,
+    /// Per gauge, what a deviation is on good parts that lie elsewhere than golden; none where it is not known.
+    pub displaced: Vec<Option<Largest>>,
     /// The error of the head's calibration.
     pub calibration: CalibrationError,
     /// RMS of the periodic error of a mean height by this sequence, mm.
@@ -60,8 +61,6 @@ pub struct Production {
     pub(super) triangulator: Arc<Triangulator>,
     pub(super) cubics: Arc<HeightCubics>,
     pub(super) taught: Taught,
-    /// None if every compared pixel counts in full.
-    pub(super) weighted: Option<WeightedTiles>,
     /// Columns of each row that are looked at.
     pub(super) window: Vec<Range<usize>>,
     /// Pixels inside the window that are compared.
@@ -79,6 +78,9 @@ pub struct Production {
     /// See [`Parts`].
     pub(super) golden_noise: f64,
     pub(super) largest: Vec<Largest>,
+    pub(super) displaced: Vec<Option<Largest>>,
+    /// What a pixel in the middle of the frame sees of a surface at the middle height, mm.
+    pub(super) pixel_mm: f64,
     pub(super) calibration: CalibrationError,
     pub(super) ripple: f64,
 }
@@ -103,6 +105,7 @@ impl Production {
             aligned,
             golden_noise,
             largest,
+            displaced,
             calibration,
             ripple,
         } = parts;
@@ -130,14 +133,19 @@ impl Production {
         let span_nm = (range.high - range.low) * 1e6;
         let threshold = Threshold::new(&decoder, noise);
         let gauges = Gauges::new(gauges, golden, alignment.as_ref(), span_nm, threshold)?;
+        let levels = levels(&cubics.surface().height, width, &window);
+        let height = Height::from_mm(levels.0);
+        let middle = (width / 2, window.len() / 2);
+        let sees = |u: usize| triangulator.point(u, middle.1, height);
+        let pixel = sees(middle.0).zip(sees(middle.0 + 1));
         Ok(Self {
-            levels: levels(&cubics.surface().height, width, &window),
+            levels,
+            pixel_mm: pixel.map_or(0.0, |(one, next)| (next - one).length()),
             variance_scale: ((turns / VARIANCE_UNIT_NM) * (turns / VARIANCE_UNIT_NM)) as f32,
             decoder,
             map,
             triangulator,
             cubics,
-            weighted: WeightedTiles::new(width, &taught),
             taught,
             window,
             compared,
@@ -147,6 +155,7 @@ impl Production {
             gauges,
             golden_noise,
             largest,
+            displaced,
             calibration,
             ripple,
         })
@@ -169,6 +178,11 @@ impl Production {
     pub fn with_backend(self, backend: Backend) -> Self {
         let decoder = self.decoder.with_backend(backend);
         Self { decoder, ..self }
+    }
+
+    /// Corners of the box around the part as taught, mm; none if parts are not aligned.
+    pub fn corners(&self) -> &[Vector] {
+        self.alignment.as_ref().map_or(&[], Alignment::corners)
     }
 
     /// The columns of each row that are looked at.

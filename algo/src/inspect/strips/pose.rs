@@ -1,11 +1,11 @@
 //! The pose field: by how much the motion of a part displaces what each pixel sees.
 //!
 //! A pixel that sees height z sees the part's point p. With the motion taken back, p is seen at (u, v) + (du, dv) and lies dz higher.
-//! These three values are worked out at nodes, for two heights each, and interpolated between: over the distance of two nodes
-//! and the heights of a part they are linear in good approximation (0.003 pixels, see [`SPACING`]).
+//! These three values are worked out at nodes, for three heights each, and interpolated between: over the distance of two nodes they are linear
+//! and over the heights of a part quadratic in good approximation (0.003 pixels, see [`SPACING`]).
 
 use super::Production;
-use super::displaced::{BLOCK, BlockNumbers, Node, VALUES, between, interpolate};
+use super::displaced::{BLOCK, BlockNumbers, Node, between, interpolate};
 use crate::geometry::Vector;
 use crate::inspect::Region;
 use crate::inspect::align::{Motion, Placed};
@@ -19,8 +19,8 @@ use core::ops::Range;
 /// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by 0.003 pixels between them.
 const SPACING: usize = 64;
 
-/// The points that a node's pixel sees below and above the middle height; NaN where it sees nothing.
-type Sight = [Vector; 2];
+/// The points that a node's pixel sees below, at and above the middle height; NaN where it sees nothing.
+type Sight = [Vector; 3];
 
 /// How the part of a cycle lies, and what that does to every pixel.
 #[derive(Debug)]
@@ -134,7 +134,7 @@ impl Production {
     fn sight(&self, (u, v): (usize, usize)) -> Sight {
         let (middle, half) = self.levels;
         let nothing = Vector::new(f64::NAN, f64::NAN, f64::NAN);
-        [middle - half, middle + half].map(|z| self.seen(u, v, z).unwrap_or(nothing))
+        [middle - half, middle, middle + half].map(|z| self.seen(u, v, z).unwrap_or(nothing))
     }
 
     /// The displacements by a motion of the blocks between nodes along row `v`, given with their columns; NaN where one sees
@@ -167,15 +167,16 @@ impl Production {
             let (column, row) = to.unwrap_or((f64::NAN, f64::NAN));
             [column - u as f64, row - v as f64, back.z - point.z]
         };
-        let [low, high] = sight.map(at);
-        core::array::from_fn(|i| match i.checked_sub(VALUES) {
-            None => (low[i] + high[i]) / 2.0,
-            Some(i) => (high[i] - low[i]) / (2.0 * self.levels.1),
-        })
+        let ([low, middle, high], half) = (sight.map(at), self.levels.1);
+        [
+            middle,
+            core::array::from_fn(|i| (high[i] - low[i]) / (2.0 * half)),
+            core::array::from_fn(|i| (high[i] - 2.0 * middle[i] + low[i]) / (2.0 * half * half)),
+        ]
     }
 
     /// The point at height `z` that pixel (u, v) sees.
-    fn seen(&self, u: usize, v: usize, z: f64) -> Option<Vector> {
+    pub(super) fn seen(&self, u: usize, v: usize, z: f64) -> Option<Vector> {
         self.triangulator
             .point(u, v, crate::units::Height::from_mm(z))
     }

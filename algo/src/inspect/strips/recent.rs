@@ -10,7 +10,7 @@ use core::ops::Range;
 pub(super) struct RecentRows {
     width: usize,
     rows: usize,
-    /// Deviations from golden in nm, weighted once a row was counted; [`NO_OFFSET`] where the part is not compared.
+    /// Deviations from golden along the normal in nm, weighted; [`NO_OFFSET`] where the part is not compared.
     deviation: Vec<i32>,
     /// The columns of each row outside of which no pixel is compared.
     extent: Vec<Range<usize>>,

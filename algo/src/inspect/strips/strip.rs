@@ -66,15 +66,13 @@ impl Strip {
                 self.align(plan, pose, v, columns);
                 if self.rows.contains(&v) {
                     let measured = (&self.decoded, &self.heights);
-                    let aligned = (&self.coordinates, &self.recent);
+                    let aligned = (&self.coordinates, self.recent.extent(v));
                     self.counts.add(plan, pose, v, measured, aligned);
                     if let Some(heights) = &mut heights {
                         let row = (v - self.rows.start) * width;
                         self.heights.store(plan, v, &mut heights[row..row + width]);
                     }
                 }
-                // Counts and cells are not weighed, squares are.
-                self.coordinates.weigh(plan, v, &mut self.recent);
             }
             let rows = (&self.rows, &written);
             self.squares.slide(plan, pose, v, &self.recent, rows);
@@ -135,17 +133,19 @@ impl Strip {
     ) {
         self.measure(plan, input, v, columns.clone());
         self.align(plan, pose, v, columns.clone());
+        self.coordinates
+            .find(plan, pose, v, columns.clone(), &self.heights);
         let deviation = self.recent.row(v);
         for u in columns {
             if deviation[u] != NO_OFFSET {
                 let slope = plan.slope((u, v), self.decoded.phase[u]);
-                let weight = self.coordinates.weight(plan, u).share();
+                let factor = self.coordinates.factor(plan, u);
                 let sigma = plan.sigma_nm(self.decoded.modulation[u], slope);
                 let lift = noise.is_sampled(u, v).then(|| {
                     let offset = self.heights.offset[u];
                     plan.lift(pose.placed.as_ref()?, (u, v), offset)
                 });
-                noise.add(weight, sigma * 1e-6, lift.flatten());
+                noise.add(factor, sigma * 1e-6, lift.flatten());
             }
         }
     }

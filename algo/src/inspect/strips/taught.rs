@@ -1,6 +1,6 @@
 //! The part as taught: where parts are compared with it, how noisy its heights were, and how much deviations count.
 
-use crate::inspect::Weight;
+use crate::inspect::{Factor, Weight};
 use crate::pipeline::{COMPARED, SIGMA, SQUARE};
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -13,18 +13,23 @@ pub struct Taught {
     pixels: Vec<u16>,
     /// Empty where all that is compared counts in full.
     weights: Vec<Weight>,
+    /// What deviations are multiplied by.
+    factors: Vec<Factor>,
 }
 
 impl Taught {
     /// Unit of σ in nm.
     const SIGMA_UNIT_NM: f64 = 32.0;
 
-    /// From the weights of pixels and σ of their heights in mm, NaN where not known. σ is stored in units of 32 nm, at most
-    /// half a mm.
-    pub fn new(pixels: impl Iterator<Item = (Weight, f64)>) -> Self {
+    /// From the weights of pixels, the shares of their height differences that lie along the normal
+    /// ([`normal_shares`](crate::inspect::normal_shares)), and σ of their heights in mm, NaN where not known. σ is stored in units of
+    /// 32 nm, at most half a mm.
+    pub fn new(pixels: impl Iterator<Item = (Weight, f32, f64)>) -> Self {
         let mut weights = Vec::with_capacity(pixels.size_hint().0);
-        let stored = |(weight, mm): (Weight, f64)| {
+        let mut factors = Vec::with_capacity(pixels.size_hint().0);
+        let stored = |(weight, share, mm): (Weight, f32, f64)| {
             weights.push(weight);
+            factors.push(Factor::of(weight.share() * f64::from(share)));
             let units = libm::rint(mm * 1e6 / Self::SIGMA_UNIT_NM);
             let sigma = match units.is_finite() {
                 true => units.clamp(1.0, f64::from(SIGMA)) as u16,
@@ -36,12 +41,16 @@ impl Taught {
         if !weights.iter().any(|weight| weight.partial()) {
             weights = Vec::new();
         }
-        Self { pixels, weights }
+        Self {
+            pixels,
+            weights,
+            factors,
+        }
     }
 
     /// Bytes that it takes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.pixels) + size_of_val(&*self.weights)
+        size_of_val(&*self.pixels) + size_of_val(&*self.weights) + size_of_val(&*self.factors)
     }
 
     /// All pixels, row-major: [`COMPARED`], [`SQUARE`] and σ.
@@ -65,13 +74,18 @@ impl Taught {
     }
 
     /// How much the deviation at a compared place counts.
-    pub(in crate::inspect) fn weight(&self, place: usize) -> Weight {
+    fn weight(&self, place: usize) -> Weight {
         self.weights.get(place).copied().unwrap_or(Weight::FULL)
     }
 
-    /// All weights, row-major; none where all that is compared counts in full.
-    pub(super) fn weights(&self) -> &[Weight] {
-        &self.weights
+    /// What height differences at all places are multiplied by, row-major: the share along the normal times the weight.
+    pub(super) fn factors(&self) -> &[Factor] {
+        &self.factors
+    }
+
+    /// The same at one place.
+    pub(in crate::inspect) fn factor(&self, place: usize) -> f64 {
+        self.factors[place].number()
     }
 
     /// Whether the part is compared at a place, and its deviation counts in full.

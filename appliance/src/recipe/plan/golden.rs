@@ -10,11 +10,12 @@ use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation, PhaseDelta};
 use rayon::prelude::*;
 
-/// The weight of each pixel's deviation, and the uncertainty of its taught height. The sequence has `brighter` times the modulation of
-/// golden, by which `noise` goes.
+/// The weight of each pixel's deviation, which lies by these `shares` along the normal, and the uncertainty of its taught height. The sequence
+/// has `brighter` times the modulation of golden, by which `noise` goes.
 pub(super) fn taught(
     (noise, brighter): (SampleNoise, f64),
     arrays: &Arrays,
+    shares: &[f32],
     decoder: &Decoder,
 ) -> Taught {
     let full_scale = f64::from(decoder.full_scale());
@@ -29,7 +30,8 @@ pub(super) fn taught(
         true => Weight::from_bits(valid),
         false => Weight::NONE,
     });
-    Taught::new(weights.zip(sigmas))
+    let pixels = weights.zip(shares).zip(sigmas);
+    Taught::new(pixels.map(|((weight, &share), sigma)| (weight, share, sigma)))
 }
 
 /// σ of a sample, the same at all pixels, with which σ_z of the compared part has the RMS that it has by `noise`; counts.

@@ -2,7 +2,7 @@
 
 use crate::recipe::Demands;
 use crate::station::{
-    COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Verdict,
+    COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Unit, Verdict,
 };
 use algo::inspect::{Findings, Placed};
 use std::sync::Arc;
@@ -13,6 +13,8 @@ const CONTRADICTING: f64 = 0.03;
 const UNFIT: f64 = 0.67;
 /// Largest share of points off the taught surface: a defect covers less, wrong fringe orders more.
 const OUTLIERS: f64 = 0.2;
+/// A part lies out of place where it does so by this many errors of its way.
+const SURE: f64 = 2.0;
 /// Least share of the picture's variance along golden's edges that golden explains where two frames are used.
 pub(super) const ALIKE: f64 = 0.8;
 
@@ -46,7 +48,7 @@ impl Demands {
         inspection.fitness_permille = (fitness.min(1.0) * 1000.0).round() as u16;
         inspection.skipped = findings.skipped;
         inspection.placement = findings.placed.as_ref().map(placement);
-        inspection.reason = self.not_judged(inspection, coverage).map(Arc::from);
+        inspection.reason = self.not_judged(inspection, findings).map(Arc::from);
         inspection.judged = match &inspection.reason {
             Some(_) => Verdict::Invalid,
             None if inspection.gauges.iter().all(|gauge| gauge.decision.pass) => Verdict::Pass,
@@ -55,7 +57,8 @@ impl Demands {
     }
 
     /// Why the part cannot be judged; `None` if it can. The inspection lacks only its verdict.
-    fn not_judged(&self, inspection: &Inspection, coverage: f64) -> Option<String> {
+    fn not_judged(&self, inspection: &Inspection, findings: &Findings) -> Option<String> {
+        let coverage = findings.coverage;
         if coverage < self.min_coverage {
             return Some(format!(
                 "only {:.1} % of the taught surface is resolved, {:.1} % are needed: is the part in place \
@@ -65,7 +68,11 @@ impl Demands {
             ));
         }
         let lies = inspection.placement.as_ref();
-        if let Some(placement) = lies.filter(|lies| lies.reach_mm > self.tolerance_mm) {
+        let off = findings
+            .placed
+            .as_ref()
+            .is_some_and(|placed| self.is_off(placed));
+        if let Some(placement) = lies.filter(|_| off) {
             let [x, y, z, ..] = placement.values.map(Option::unwrap_or_default);
             return Some(format!(
                 "the part lies up to {:.2} mm off its place ({x:+.2}, {y:+.2}, {z:+.2} mm and turned), {:.2} mm are \
@@ -119,6 +126,11 @@ impl Demands {
         })
     }
 
+    /// Whether a part surely lies farther from its place than is allowed: one that lies at the tolerance does not.
+    fn is_off(&self, placed: &Placed) -> bool {
+        placed.reach - SURE * placed.reach_sigma > self.tolerance_mm
+    }
+
     /// Why a longer sequence should be tried; `None` if this one is good enough.
     pub(super) fn step_up(
         &self,
@@ -133,16 +145,23 @@ impl Demands {
             Some("too little of the surface is resolved")
         } else if fitness < UNFIT {
             Some("the pattern has lost its contrast")
-        } else if placed.is_some_and(|placed| placed.reach > self.tolerance_mm) {
+        } else if placed.is_some_and(|placed| self.is_off(placed)) {
             Some("the part lies outside of what the sequence is safe for")
         } else if placed.is_some_and(|placed| placed.outliers > OUTLIERS) {
             Some("many points lie off the taught surface")
         } else if inspection.guarded().next().is_some() {
             Some("a value lies too close to a limit")
+        } else if findings.skipped.unexpected > 0 && inspection.gauges.iter().any(is_low_share) {
+            Some("a share is below its limit, and the sequence leaves places of the part out")
         } else {
             None
         }
     }
+}
+
+/// Whether it is a share below its limit.
+fn is_low_share(gauge: &GaugeValue) -> bool {
+    gauge.unit == Unit::Share && gauge.decision.low
 }
 
 /// The placement that is shown with the result.

@@ -5,6 +5,7 @@ mod golden;
 mod judge;
 mod layers;
 mod patterns;
+mod rendered;
 mod run;
 mod trial;
 mod window;
@@ -21,7 +22,7 @@ use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_L
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::HeightRange;
-use algo::inspect::{Findings, Input, PairPlaced, Production, Strips};
+use algo::inspect::{Findings, Input, PairPlaced, Production, Strips, normal_shares};
 use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
@@ -185,19 +186,19 @@ impl Plan {
         let base = sequences.first().and_then(|first| first.offset);
         let base = base.filter(|_| !arrays.sequence_offset.is_empty());
         let mut shots = Vec::new();
-        let prepared = || {
+        let surface = golden::surface(size.0, &arrays, golden::offset(&arrays, base));
+        let shares = normal_shares(&triangulator, &surface);
+        let prepared = {
             let noise = conditions.noise;
             let range = (range, camera.2, conditions.least_modulation);
             // Golden was measured with the full sequence, the last.
             let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
             let runs = sequences.into_iter();
-            let golden = (&arrays, base);
+            let golden = (&arrays, &shares[..], base);
             runs.map(|sequence| Prepared::of(sequence, (noise, taught), golden, range, &mut shots))
-                .collect::<Result<Vec<_>, _>>()
+                .collect::<Result<Vec<_>, _>>()?
         };
-        let surface = || golden::surface(size.0, &arrays, golden::offset(&arrays, base));
-        let (prepared, surface) = rayon::join(prepared, surface);
-        let prepared = prepared?;
+        drop(shares);
         let patterns = shots.len() * raster.0 as usize * raster.1 as usize;
         if patterns > MAX_PATTERN_BYTES {
             return Err(format!(
@@ -229,6 +230,7 @@ impl Plan {
             noise: conditions.noise,
             noise_counts,
             calibration: conditions.calibration,
+            good_parts: conditions.good_parts,
             golden,
             picture: (modulation, away as f64),
         };
@@ -318,16 +320,26 @@ impl Plan {
         exposed: Instant,
     ) -> Inspection {
         let sequence = arriving.sequence();
+        let mut laps = Laps::since(exposed);
+        let found = self.with_arrived(arriving, frames, |finest| {
+            self.run(sequence, frames, finest, None, &mut laps)
+        });
+        self.judged(sequence, found, &mut laps)
+    }
+
+    /// The inspection by the findings of a sequence, or by why there are none.
+    fn judged(
+        &self,
+        sequence: usize,
+        found: Result<(Findings, Option<f64>), String>,
+        laps: &mut Laps,
+    ) -> Inspection {
         let simulated = if self.simulated { SIMULATED } else { 0 };
         let kind = self.runs.get(sequence).map(|run| run.kind);
         let mut inspection = Inspection {
             flags: kind.map_or(0, sequence_flag) | simulated,
             ..Inspection::default()
         };
-        let mut laps = Laps::since(exposed);
-        let found = self.with_arrived(arriving, frames, |finest| {
-            self.run(sequence, frames, finest, None, &mut laps)
-        });
         match found {
             Ok((findings, likeness)) => {
                 self.demands.judge(&findings, &mut inspection);
@@ -346,7 +358,7 @@ impl Plan {
             }
         }
         laps.end(Stage::Judgement);
-        inspection.stages = laps.stages;
+        inspection.stages = laps.stages.clone();
         inspection
     }
 

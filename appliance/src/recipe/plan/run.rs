@@ -2,6 +2,7 @@
 
 use super::golden;
 use crate::recipe::archive::Arrays;
+use crate::recipe::good_parts::GoodPartsFile;
 use crate::recipe::{RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
@@ -48,6 +49,7 @@ pub(super) struct Shared {
     pub noise: SampleNoise,
     pub noise_counts: f64,
     pub calibration: CalibrationError,
+    pub good_parts: Option<GoodPartsFile>,
     pub golden: GoldenNoise,
     /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what two frames need.
     pub picture: (Vec<f32>, f64),
@@ -83,11 +85,11 @@ pub(super) struct Prepared {
 impl Prepared {
     /// Prepares a sequence for phases of `range` with at least so much modulation; the recipe's arrays can be dropped then. `rasters` are
     /// what all runs show; what only this one shows is added. `fundamental` is that of the waveform that golden's modulation was measured
-    /// with; `base` is the offset of the sequence that the golden surface is by.
+    /// with; deviations lie by `shares` along the normal; `base` is the offset of the sequence that the golden surface is by.
     pub fn of(
         sequence: RecipeSequence,
         (noise, fundamental): (SampleNoise, f64),
-        (arrays, base): (&Arrays, Option<usize>),
+        (arrays, shares, base): (&Arrays, &[f32], Option<usize>),
         (range, bit_depth, least): (PhaseRange, u8, LeastModulation),
         rasters: &mut Vec<Shot>,
     ) -> Result<Self, String> {
@@ -113,7 +115,7 @@ impl Prepared {
         Ok(Self {
             kind,
             indices: indices.collect(),
-            taught: golden::taught((noise, brighter), arrays, &decoder),
+            taught: golden::taught((noise, brighter), arrays, shares, &decoder),
             map: golden::map(arrays, kind, offsets),
             decoder,
             brighter,
@@ -179,6 +181,10 @@ impl Prepared {
             ripple_mm,
             ..
         } = self;
+        let displaced = |gauge: &Gauge| match gauge.measure {
+            Measure::Deviation { side } => shared.good_parts.and_then(|of| of.displaced(side)),
+            _ => None,
+        };
         let bytes = size_of_val(map.as_deref().unwrap_or(&[])) + taught.bytes();
         let production = Production::new(Parts {
             decoder,
@@ -193,6 +199,7 @@ impl Prepared {
             aligned: shared.aligned,
             golden_noise,
             largest: largest.map(|largest| largest.times(over_full)).collect(),
+            displaced: shared.gauges.iter().map(displaced).collect(),
             calibration: shared.calibration,
             ripple: ripple_mm,
         });

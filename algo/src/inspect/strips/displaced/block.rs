@@ -1,8 +1,8 @@
 //! A block whose pixels are looked at one after the other.
 
 use super::linear::{BLOCK, BlockNumbers, Linear, Whole, floor, is_near};
-use super::pixel::{deviation_of, height, is_small};
-use super::{GoldenMap, OffsetRow};
+use super::pixel::{deviation_of, height, is_small, scaled};
+use super::{Deviations, GoldenMap, OffsetRow};
 use crate::math::nearest::whole;
 use crate::pipeline::{NO_OFFSET, SQUARE};
 use crate::units::Height;
@@ -44,13 +44,14 @@ impl<'a> Block<'a> {
 
 impl Block<'_> {
     /// Writes its deviations, pixel by pixel. The answer is whether some deviation is large.
-    pub fn align(&self, golden: GoldenMap<'_>, out: &mut [i32]) -> bool {
+    pub fn align(&self, golden: GoldenMap<'_>, out: &mut Deviations<'_>) -> bool {
         let from = self.from.pixels();
         let width = golden.width;
         let rows = golden.height.len() / width;
         let mut large = false;
-        for (i, out) in out.iter_mut().enumerate() {
-            *out = NO_OFFSET;
+        out.leave_open();
+        let out = out.height.iter_mut().zip(out.normal.iter_mut());
+        for (i, (height_nm, normal_nm)) in out.enumerate() {
             if self.offsets[i] == NO_OFFSET {
                 continue;
             }
@@ -74,10 +75,10 @@ impl Block<'_> {
             let corners = [upper[0].nm(), upper[1].nm(), lower[0].nm(), lower[1].nm()];
             let nm = deviation_of((z, rise), (along - left, down - top), corners);
             large |= !is_small(nm);
-            *out = match is_small(nm) {
-                true => whole(nm),
-                // One above the value for "no offset".
-                false => (nm as i32).max(NO_OFFSET + 1),
+            let along_normal = scaled(nm, golden.factor[place].units());
+            (*height_nm, *normal_nm) = match is_small(nm) {
+                true => (whole(nm), whole(along_normal)),
+                false => (large_whole(nm), large_whole(along_normal)),
             };
         }
         large
@@ -100,4 +101,9 @@ impl Block<'_> {
             line[i] = (self.v as i32).wrapping_add(from[1] + pixels[1]);
         }
     }
+}
+
+/// A whole number of any size, one above the value for "no offset" at least.
+fn large_whole(nm: f32) -> i32 {
+    (nm as i32).max(NO_OFFSET + 1)
 }

@@ -8,7 +8,8 @@
 //! by pixel (`block`). Plain loops over slices, compiled for each back-end's instructions.
 //!
 //! # Equations
-//! With the displacement (du, dv, dz) at height z, a pixel's deviation is (z + dz) − G(u + du, v + dv), G golden's height.
+//! With the displacement (du, dv, dz) at height z, a pixel's deviation in height is (z + dz) − G(u + du, v + dv), G golden's height. That along
+//! the normal is the same times the factor of the first of the four pixels.
 //!
 //! # Accuracy
 //! The three ways have the same bits (`blocks_have_the_bits_of_one_pixel_after_the_other`); the deviation is within 50 nm of one of
@@ -20,15 +21,17 @@ mod next;
 mod pixel;
 mod same;
 
+use crate::inspect::Factor;
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Backend, Lanes, back_end_entry};
 use crate::units::Height;
 use block::Block;
 use core::ops::Range;
 pub(super) use linear::{
-    BLOCK, BlockNumbers, Linear, Node, VALUES, Whole, between, floor, interpolate, is_near,
+    BLOCK, BlockNumbers, Linear, Node, Whole, between, floor, interpolate, is_near,
 };
 use next::align_next;
+pub(super) use pixel::{mask, pick, scaled};
 use same::align_same;
 
 /// The golden map that rows are compared with.
@@ -37,7 +40,31 @@ pub(super) struct GoldenMap<'a> {
     pub height: &'a [Height],
     /// See [`crate::pipeline::CubicInput`].
     pub taught: &'a [u16],
+    /// What deviations in height are multiplied by.
+    pub factor: &'a [Factor],
     pub width: usize,
+}
+
+/// Deviations of a row, nm; [`NO_OFFSET`] where the part is not compared.
+pub(super) struct Deviations<'a> {
+    /// In height.
+    pub height: &'a mut [i32],
+    /// Along the normal, weighted.
+    pub normal: &'a mut [i32],
+}
+
+impl Deviations<'_> {
+    fn of(&mut self, columns: Range<usize>) -> Deviations<'_> {
+        Deviations {
+            height: &mut self.height[columns.clone()],
+            normal: &mut self.normal[columns],
+        }
+    }
+
+    fn leave_open(&mut self) {
+        self.height.fill(NO_OFFSET);
+        self.normal.fill(NO_OFFSET);
+    }
 }
 
 /// A row of height offsets to be aligned.
@@ -89,7 +116,7 @@ pub(super) fn align_row(
     golden: GoldenMap<'_>,
     row: OffsetRow<'_>,
     columns: Range<usize>,
-    deviation: &mut [i32],
+    mut out: Deviations<'_>,
     overflow: &mut bool,
 ) {
     *overflow = false;
@@ -98,23 +125,23 @@ pub(super) fn align_row(
         if start.is_multiple_of(BLOCK) {
             let mut blocks = 0;
             let left = start..columns.end;
-            align_same(backend, golden, row, left, deviation, &mut blocks);
+            align_same(backend, golden, row, left, &mut out, &mut blocks);
             start += blocks * BLOCK;
             if start >= columns.end {
                 break;
             }
         }
         let end = ((start / BLOCK + 1) * BLOCK).min(columns.end);
-        let out = &mut deviation[start..end];
+        let mut here = out.of(start..end);
         match Block::new(golden, row, start..end) {
             Some(block) => {
                 let mut done = false;
-                align_next(backend, golden, &block, out, &mut done);
+                align_next(backend, golden, &block, &mut here, &mut done);
                 if !done {
-                    *overflow |= block.align(golden, out);
+                    *overflow |= block.align(golden, &mut here);
                 }
             }
-            None => out.fill(NO_OFFSET),
+            None => here.leave_open(),
         }
         start = end;
     }

@@ -1,9 +1,9 @@
 //! Blocks whose pixels have one of four neighbouring whole displacements.
 
-use super::GoldenMap;
 use super::block::Block;
 use super::linear::BLOCK;
-use super::pixel::{deviation_of, height, is_small, mask, pick, square};
+use super::pixel::{deviation_of, height, is_small, mask, pick, scaled, square};
+use super::{Deviations, GoldenMap};
 use crate::math::nearest::whole;
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};
@@ -15,7 +15,7 @@ back_end_entry! {
     fn align_next [] = next(
         golden: GoldenMap<'_>,
         block: &Block<'_>,
-        out: &mut [i32],
+        out: &mut Deviations<'_>,
         done: &mut bool,
     )
 }
@@ -25,28 +25,31 @@ fn next<V: Lanes>(
     _: V,
     golden: GoldenMap<'_>,
     block: &Block<'_>,
-    out: &mut [i32],
+    out: &mut Deviations<'_>,
     done: &mut bool,
 ) {
     *done = false;
     let (from, [left, top]) = (block.from.pixels(), block.from.lower(block.numbers));
     let from = [from[0] + left, from[1] + top];
     let place = match golden.inside((block.u, block.v), from, 3) {
-        Some((place, pixels)) if out.len() == BLOCK && pixels >= BLOCK + 2 => place,
+        Some((place, pixels)) if out.height.len() == BLOCK && pixels >= BLOCK + 2 => place,
         _ => return,
     };
     let below = place + golden.width;
-    let (Some(first), Some(second), Some(third), Some(upper), Some(lower)) = (
+    let (Some(first), Some(second), Some(third), Some(upper), Some(lower), Some(high), Some(low)) = (
         neighbours(golden.height, place),
         neighbours(golden.height, below),
         neighbours(golden.height, below + golden.width),
         neighbours(golden.taught, place),
         neighbours(golden.taught, below),
+        neighbours(golden.factor, place),
+        neighbours(golden.factor, below),
     ) else {
         return;
     };
     let (bases, offsets) = (&block.bases[..BLOCK], &block.offsets[..BLOCK]);
-    let (linear, out) = (block.linear, &mut out[..BLOCK]);
+    let linear = block.linear;
+    let (heights, normals) = (&mut out.height[..BLOCK], &mut out.normal[..BLOCK]);
     let (left, top) = (left as f32, top as f32);
     let mut refused = 0;
     for i in 0..BLOCK {
@@ -80,9 +83,15 @@ fn next<V: Lanes>(
             pick(right, upper[1][i].into(), upper[0][i].into()),
         );
         let nm = deviation_of((z, rise), shares, corners);
+        let units = pick(
+            under,
+            pick(right, low[1][i].units(), low[0][i].units()),
+            pick(right, high[1][i].units(), high[0][i].units()),
+        );
         let measured = mask(offsets[i] != NO_OFFSET);
         let known = measured & square(taught);
-        out[i] = pick(known, whole(nm), NO_OFFSET);
+        heights[i] = pick(known, whole(nm), NO_OFFSET);
+        normals[i] = pick(known, whole(scaled(nm, units)), NO_OFFSET);
         refused |= (measured & !inside) | (known & !mask(is_small(nm)));
     }
     *done = refused == 0;

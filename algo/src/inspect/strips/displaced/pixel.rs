@@ -1,6 +1,7 @@
 //! A pixel: the height that it sees, and its deviation from golden between four heights.
 
 use super::super::squares::narrow::MAX_NARROW_NM;
+use crate::inspect::Factor;
 use crate::pipeline::SQUARE;
 use crate::units::Height;
 
@@ -23,6 +24,12 @@ pub fn deviation_of((z, rise): (i32, f32), (along, down): (f32, f32), corners: [
     let golden = along * upper as f32 + down * (under + along * twist);
     let above = z.wrapping_sub(first) as f32;
     (above + rise) - golden
+}
+
+/// A deviation in nm times a factor in its units.
+#[inline(always)]
+pub fn scaled(nm: f32, units: i32) -> f32 {
+    nm * (units as f32 * Factor::UNIT as f32)
 }
 
 /// Whether a deviation in nm is at most [`MAX_NARROW_NM`].

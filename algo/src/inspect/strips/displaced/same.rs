@@ -2,8 +2,8 @@
 
 use super::super::squares::narrow::MAX_NARROW_NM;
 use super::linear::{BLOCK, Linear, Whole};
-use super::pixel::{deviation_of, height, mask, pick, square};
-use super::{GoldenMap, OffsetRow};
+use super::pixel::{deviation_of, height, mask, pick, scaled, square};
+use super::{Deviations, GoldenMap, OffsetRow};
 use crate::math::nearest::whole;
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};
@@ -16,7 +16,7 @@ back_end_entry! {
         golden: GoldenMap<'_>,
         row: OffsetRow<'_>,
         columns: Range<usize>,
-        deviation: &mut [i32],
+        out: &mut Deviations<'_>,
         done: &mut usize,
     )
 }
@@ -27,7 +27,7 @@ fn same<V: Lanes>(
     golden: GoldenMap<'_>,
     row: OffsetRow<'_>,
     columns: Range<usize>,
-    deviation: &mut [i32],
+    out: &mut Deviations<'_>,
     done: &mut usize,
 ) {
     *done = 0;
@@ -46,15 +46,17 @@ fn same<V: Lanes>(
     let seen = chunks(golden.height, base, pixels).zip(chunks(row.offset, columns.start, pixels));
     let upper = chunks(golden.height, place, pixels).zip(chunks(golden.height, place + 1, pixels));
     let lower = chunks(golden.height, below, pixels).zip(chunks(golden.height, below + 1, pixels));
-    let taught = chunks(golden.taught, place, pixels);
-    let out = deviation[columns.start..][..pixels]
-        .as_chunks_mut::<BLOCK>()
-        .0;
+    let taught = chunks(golden.taught, place, pixels).zip(chunks(golden.factor, place, pixels));
+    let columns = columns.start..columns.start + pixels;
+    let heights = out.height[columns.clone()].as_chunks_mut::<BLOCK>().0;
+    let normals = out.normal[columns].as_chunks_mut::<BLOCK>().0;
+    let out = heights.iter_mut().zip(normals);
     let mut blocks_done = 0;
-    for ((numbers, (bases, offsets)), (((upper, lower), taught), out)) in blocks
-        .iter()
-        .zip(seen)
-        .zip(upper.zip(lower).zip(taught).zip(out))
+    for ((numbers, (bases, offsets)), (((upper, lower), (taught, factors)), (heights, normals))) in
+        blocks
+            .iter()
+            .zip(seen)
+            .zip(upper.zip(lower).zip(taught).zip(out))
     {
         v.fetch(golden.height, ahead + blocks_done * BLOCK, 0);
         let mut measured = 0;
@@ -63,7 +65,8 @@ fn same<V: Lanes>(
         }
         if measured == 0 {
             // Beside the part, and in its openings.
-            out.fill(NO_OFFSET);
+            heights.fill(NO_OFFSET);
+            normals.fill(NO_OFFSET);
             blocks_done += 1;
             continue;
         }
@@ -84,7 +87,8 @@ fn same<V: Lanes>(
             let nm = deviation_of((z, rise), (along, down), corners);
             let measured = mask(offsets[i] != NO_OFFSET);
             let known = measured & square(taught[i].into());
-            out[i] = pick(known, whole(nm), NO_OFFSET);
+            heights[i] = pick(known, whole(nm), NO_OFFSET);
+            normals[i] = pick(known, whole(scaled(nm, factors[i].units())), NO_OFFSET);
             farthest = farthest.max(order(along).max(order(down)) & measured.cast_unsigned());
             largest = largest.max(order(nm.abs()) & known.cast_unsigned());
         }

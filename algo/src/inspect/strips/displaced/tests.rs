@@ -26,9 +26,14 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
         .clone()
         .map(|at| if scatter(at) % 9 == 0 { 0 } else { SQUARE })
         .collect();
+    let factor: Vec<_> = places
+        .clone()
+        .map(|at| Factor::of(f64::from(scatter(at) % 100).abs() / 90.0))
+        .collect();
     let golden = GoldenMap {
         height: &height,
         taught: &taught,
+        factor: &factor,
         width: WIDTH,
     };
     let mut kinds = [0; 2];
@@ -41,7 +46,7 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
     ] {
         let node = |at: usize| {
             let value = [shift + bend * at as f64, bend - shift * 0.5, 0.01];
-            [value[0], value[1], value[2], 0.02, -0.03, 0.001]
+            [value, [0.02, -0.03, 0.001], [1e-4, -2e-4, 3e-5]]
         };
         let block = |at: usize| {
             let (left, column) = (at / 2, at % 2 * BLOCK);
@@ -64,13 +69,16 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
                 blocks: &blocks,
             };
             let found = |backend, columns: Range<usize>| {
-                let mut deviation = vec![NO_OFFSET; WIDTH];
+                let (mut height, mut normal) = (vec![NO_OFFSET; WIDTH], vec![NO_OFFSET; WIDTH]);
                 let (mut column, mut line) = (vec![0; WIDTH], vec![0; WIDTH]);
                 let mut overflow = false;
-                let out = (&mut *deviation, &mut overflow);
-                align_row(backend, golden, row, columns.clone(), out.0, out.1);
+                let out = Deviations {
+                    height: &mut height,
+                    normal: &mut normal,
+                };
+                align_row(backend, golden, row, columns.clone(), out, &mut overflow);
                 taught_coordinates(backend, golden, row, columns, (&mut column, &mut line));
-                (deviation, column, line, overflow)
+                ((height, normal), column, line, overflow)
             };
             for backend in Backend::available() {
                 let whole = found(backend, 0..WIDTH);
@@ -78,10 +86,12 @@ fn blocks_have_the_bits_of_one_pixel_after_the_other() {
                 for u in 0..WIDTH {
                     // A single pixel has the neighbours of no other.
                     let one = found(backend, u..u + 1);
-                    assert_eq!(one.0[u], whole.0[u], "{shift} {bend}, {v} {u}");
+                    let (one_by, all_by) = (&one.0, &whole.0);
+                    assert_eq!(one_by.0[u], all_by.0[u], "{shift} {bend}, {v} {u}");
+                    assert_eq!(one_by.1[u], all_by.1[u], "{shift} {bend}, {v} {u}");
                     assert_eq!((one.1[u], one.2[u]), (whole.1[u], whole.2[u]));
                     overflow |= one.3;
-                    kinds[usize::from(whole.0[u] == NO_OFFSET)] += 1;
+                    kinds[usize::from(whole.0.0[u] == NO_OFFSET)] += 1;
                 }
                 assert_eq!(overflow, whole.3);
             }

@@ -346,8 +346,13 @@ mod tests {
         };
         let mut counts = [0; 4];
         for shift in [0.0, 0.3, -7.4, 12.6] {
-            let node =
-                |at: f64| -> Node { [shift + 0.2 * at, 0.4 * shift, 0.01, 0.02, -0.03, 0.001] };
+            let node = |at: f64| -> Node {
+                [
+                    [shift + 0.2 * at, 0.4 * shift, 0.01],
+                    [0.02, -0.03, 0.001],
+                    [0.0; 3],
+                ]
+            };
             let numbers = between([&node(0.0), &node(1.0)], 64, 0, 0.3);
             for (v, start) in (0..ROWS).flat_map(|v| [(v, 0), (v, 32), (v, 64)]) {
                 let length = BLOCK.min(WIDTH - start);

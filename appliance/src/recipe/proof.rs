@@ -1,0 +1,205 @@
+//! Teaching proves its recipe: cycles as production runs them, on the part as it lies and on golden wherever else it may lie.
+//!
+//! Limits are predicted from noise; what noise does not explain is found here, where nothing is at stake yet. Each cycle is that of a
+//! [`Plan`]: the same sequences, limits and guard band. A limit that would refuse the recipe's own part is moved until it holds, and teaching
+//! says so.
+
+use super::archive::Arrays;
+use super::golden::COVERAGE_CHANGE;
+use super::plan::Plan;
+use super::teach::TeachError;
+use super::{GaugeKind, Recipe, RecipeFile};
+use crate::head::calibration::Calibration;
+use crate::station::{COVERAGE_FACTOR, Inspection, Unit, Verdict};
+use algo::geometry::Vector;
+use algo::inspect::Motion;
+use algo::units::Modulation;
+use hal::head::Head;
+use std::time::{Duration, Instant};
+
+/// Cycles of the part as it lies.
+const STILL: usize = 5;
+/// Placements that are worked out: the scatter of the largest deviation is then known to a fifth.
+const PLACEMENTS: usize = 16;
+/// Placements reach this share of the tolerance: what is worked out has the error of the motion, too.
+const REACH: f64 = 0.98;
+/// Limits are this many times as far from the expected value as the farthest of the cycles.
+const FARTHER: f64 = 1.2;
+
+/// The part as taught, judged at places within the recipe's placement tolerance; none where parts are not aligned, or if cycles begin
+/// with two frames.
+///
+/// # Errors
+/// In words, if the recipe cannot be planned.
+pub(super) fn displaced(
+    manifest: &RecipeFile,
+    arrays: &Arrays,
+    calibration: &Calibration,
+) -> Result<Vec<Inspection>, String> {
+    let recipe = Recipe::check(manifest, arrays.clone())?;
+    let (_, _, bit_depth) = recipe.conditions.camera;
+    let full_scale = f64::from((1_u32 << bit_depth) - 1);
+    let taught = recipe.sequences.last().map_or(1.0, |of| of.fundamental());
+    let light = recipe.sequences.iter().map(|sequence| {
+        let unit = f64::from(u16::MAX) / full_scale * sequence.fundamental() / taught;
+        let bits = |counts: &f32| (f64::from(*counts) * unit).round() as u16;
+        let counts = arrays.modulation.iter();
+        counts
+            .map(|counts| Modulation::from_bits(bits(counts)))
+            .collect()
+    });
+    let light: Vec<Vec<Modulation>> = light.collect();
+    let plan = Plan::new(recipe, calibration, false).map_err(|error| error.to_string())?;
+    let places = placements(plan.corners(), REACH * manifest.placement_tolerance_mm);
+    let judged = (1..).zip(&places);
+    Ok(judged
+        .map_while(|(seed, motion)| plan.inspect_rendered(motion, &light, seed))
+        .collect())
+}
+
+/// Motions that take the farthest corner of a box by `reach` mm, in all six components: points of a lattice that fills their cube evenly (as
+/// R. Korobov's, with powers of the root of x⁷ = x + 1).
+fn placements(corners: &[Vector], reach: f64) -> Vec<Motion> {
+    const ROOT: f64 = 1.112_775_684_278_706;
+    if corners.is_empty() {
+        return Vec::new();
+    }
+    let size = corners
+        .iter()
+        .map(|corner| corner.length())
+        .fold(1.0, f64::max);
+    let motion = |at: usize| {
+        let share = |axis: i32| {
+            let along = 0.5 + at as f64 * ROOT.powi(-axis);
+            2.0 * along.fract() - 1.0
+        };
+        let scaled = |scale: f64| {
+            let turn = Vector::new(share(4), share(5), share(6)) * (scale / size);
+            let shift = Vector::new(share(1), share(2), share(3)) * scale;
+            Motion::new(Vector::default(), shift, turn)
+        };
+        let whole = scaled(reach);
+        let ways = corners
+            .iter()
+            .map(|corner| (whole.apply(*corner) - *corner).length());
+        scaled(reach * reach / ways.fold(reach * 1e-3, f64::max))
+    };
+    (1..=PLACEMENTS).map(motion).collect()
+}
+
+/// The part in front of the head, judged as production does.
+///
+/// # Errors
+/// If a device fails, the recipe cannot be run, or `progress` ended it.
+pub(super) fn as_it_lies(
+    plan: &Plan,
+    head: &mut Head,
+    calibration: &Calibration,
+    timeout: Duration,
+    progress: &dyn Fn(f64) -> bool,
+) -> Result<Vec<Inspection>, TeachError> {
+    plan.load(head, calibration)?;
+    let mut judged = Vec::new();
+    while judged.len() < STILL {
+        let mut sequence = 0;
+        loop {
+            if !progress(judged.len() as f64 / STILL as f64) {
+                return Err(TeachError::Ended);
+            }
+            let mut frames = Vec::new();
+            let mut keep = |_, frame| frames.push(frame);
+            head.acquire(plan.indices(sequence), timeout, &mut keep)?;
+            let inspection = plan.inspect(sequence, &frames, Instant::now());
+            sequence += 1;
+            if inspection.step_up.is_none() || sequence == plan.sequence_count() {
+                judged.push(inspection);
+                break;
+            }
+        }
+    }
+    Ok(judged)
+}
+
+/// Moves the limits that some of these cycles of good parts do not keep, so that all do; says which.
+pub(super) fn hold(manifest: &mut RecipeFile, judged: &[Inspection]) -> Vec<String> {
+    let mut words = Vec::new();
+    let guard_k = manifest.guard_k;
+    for (at, gauge) in manifest.gauges.iter_mut().enumerate() {
+        let found = judged
+            .iter()
+            .filter_map(|inspection| inspection.gauges.get(at));
+        let ranges = found.filter_map(|found| {
+            let band = guard_k * found.uncertainty.unwrap_or(0.0) / COVERAGE_FACTOR;
+            found.value.map(|value| (value, band))
+        });
+        let ranges: Vec<(f64, f64)> = ranges.collect();
+        let least = ranges.iter().map(|(value, band)| value - band);
+        let most = ranges.iter().map(|(value, band)| value + band);
+        let (least, most) = (
+            least.fold(f64::INFINITY, f64::min),
+            most.fold(f64::NEG_INFINITY, f64::max),
+        );
+        let is_share = gauge.measures.unit() == Unit::Share;
+        let wider = |limit: f64, value: f64, sign: f64| match is_share {
+            true => (value + sign * COVERAGE_CHANGE).clamp(0.0, 1.0),
+            // Hundredths print as such.
+            false => sign * (value.abs().max(limit.abs()) * FARTHER * 100.0).ceil() / 100.0,
+        };
+        let before = (gauge.low, gauge.high);
+        let room = if is_share { COVERAGE_CHANGE } else { 0.0 };
+        if let Some(low) = gauge.low.filter(|low| least - room < *low) {
+            gauge.low = Some(wider(low, least, -1.0));
+        }
+        if let Some(high) = gauge.high.filter(|high| most > *high) {
+            gauge.high = Some(wider(high, most, 1.0));
+        }
+        // A deviation is as wide to both sides.
+        if let (GaugeKind::Deviation { .. }, Some(low), Some(high)) =
+            (&gauge.measures, gauge.low, gauge.high)
+        {
+            let limit = high.max(-low);
+            (gauge.low, gauge.high) = (Some(-limit), Some(limit));
+        }
+        if before != (gauge.low, gauge.high) {
+            let limit = |limit: Option<f64>| limit.map_or("none".into(), |at| format!("{at:+.3}"));
+            words.push(format!(
+                "{}: its limits are {} to {} instead of {} to {}, so that good parts keep them wherever they lie",
+                gauge.name,
+                limit(gauge.low),
+                limit(gauge.high),
+                limit(before.0),
+                limit(before.1)
+            ));
+        }
+    }
+    words
+}
+
+/// Why most of these cycles of the part itself were not judged, if so: no limit of a gauge helps there.
+pub(super) fn not_judged(judged: &[Inspection]) -> Option<String> {
+    let invalid = judged.iter().filter(|inspection| {
+        inspection.verdict() == Verdict::Invalid && inspection.guarded().next().is_none()
+    });
+    let reasons: Vec<_> = invalid.filter_map(|of| of.reason.clone()).collect();
+    let first = reasons
+        .first()
+        .filter(|_| 2 * reasons.len() > judged.len())?;
+    Some(format!(
+        "{} of {} parts that lie as taught would be INVALID: {first}",
+        reasons.len(),
+        judged.len()
+    ))
+}
+
+/// Mean and standard deviation of the magnitudes of a gauge's values, and the largest; none if there are not several.
+pub(super) fn magnitudes(judged: &[Inspection], gauge: usize) -> Option<(f64, f64, f64)> {
+    let values = judged
+        .iter()
+        .filter_map(|inspection| inspection.gauges.get(gauge)?.value);
+    let values: Vec<f64> = values.map(f64::abs).collect();
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    let most = values.iter().copied().fold(0.0, f64::max);
+    (values.len() > 1).then(|| (mean, (squares / (count - 1.0)).sqrt(), most))
+}
