@@ -70,9 +70,14 @@ fn a_trigger_after_the_answer_sees_the_part_that_was_put_there_over_the_page() {
         (good([0.0, 0.0, 1e12]), 422, "shift_mm"),
         (json!({ "part": { "kind": "teapot" } }), 400, "teapot"),
         (
-            json!({ "part": { "kind": "plane", "defects": [] } }),
+            json!({ "part": { "kind": "empty", "defects": [] } }),
             400,
             "defects",
+        ),
+        (
+            json!({ "part": { "kind": "tube", "defects": [{ "kind": "missing_hole", "index": 1 }] } }),
+            422,
+            "dents only",
         ),
         (json!({ "placement": {} }), 400, "part"),
     ] {

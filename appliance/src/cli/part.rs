@@ -14,7 +14,7 @@ pub struct SimulatedPart {
     /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, plane, board or empty.
     #[arg(long, value_name = "KIND")]
     part: Option<String>,
-    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm, missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
+    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm along its normal, or of sheet_metal missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
     #[arg(long, value_name = "KIND:NUMBERS")]
     defect: Vec<String>,
     /// Place the simulated board in this one of the ten poses that are recommended for a calibration; 10 lies in z = 0.

@@ -3,7 +3,7 @@
 use hal::bounds::clipped;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
-use sim::parts::Board;
+use sim::parts::{Board, Defect};
 use sim::{Part, Placement, Scenario};
 
 /// The most defects of a part: each ray is traced against all of them.
@@ -106,13 +106,12 @@ impl Placed {
 
     /// The same part without its defects, in its designed pose.
     pub fn good(&self) -> Self {
-        let mut value = value(&self.part);
-        if let Some(defects) = value.get_mut("defects") {
-            *defects = json!([]);
+        let mut part = self.part.clone();
+        if let Some(defects) = part.defects_mut() {
+            defects.clear();
         }
         Self {
-            // A part without defects is still valid JSON of a part.
-            part: serde_json::from_value(value).unwrap_or_default(),
+            part,
             ..Self::default()
         }
     }
@@ -159,9 +158,8 @@ impl Placed {
             return Err(format!("{text:?} is not a defect: write {form}"));
         }
         let named = known.1.iter().zip(numbers).map(|((name, _), n)| (*name, n));
-        self.part = with_defect(&self.part, defect(kind, named))
-            .map_err(|error| format!("a {} has no {kind}: {error}", self::kind(&self.part)))?;
-        Ok(())
+        add(&mut self.part, defect(kind, named))
+            .map_err(|error| format!("a {} has no {kind}: {error}", self::kind(&self.part)))
     }
 
     /// Checks every number.
@@ -169,7 +167,7 @@ impl Placed {
     /// # Errors
     /// Naming the one that is out of its range.
     pub fn check(&self) -> Result<(), String> {
-        let defects = value(&self.part)["defects"].as_array().map_or(0, Vec::len);
+        let defects = self.part.defects().len();
         if defects > MAX_DEFECTS {
             return Err(format!(
                 "{defects} defects: at most {MAX_DEFECTS} are simulated on a part"
@@ -205,30 +203,42 @@ fn defect<'a>(kind: &str, numbers: impl Iterator<Item = (&'a str, f64)>) -> Valu
     defect.into()
 }
 
-/// The part with one more defect, if it can have one of this kind.
-fn with_defect(part: &Part, defect: Value) -> Result<Part, String> {
-    let mut value = value(part);
-    let defects = value.get_mut("defects").and_then(Value::as_array_mut);
-    defects.ok_or("it can have no defects")?.push(defect);
-    serde_json::from_value(value).map_err(|error| error.to_string())
+/// Adds a defect, if the part can have one of this kind.
+fn add(part: &mut Part, defect: Value) -> Result<(), String> {
+    let defect: Defect = serde_json::from_value(defect).map_err(|error| error.to_string())?;
+    part.can_have(&defect)?;
+    if let Some(defects) = part.defects_mut() {
+        defects.push(defect);
+    }
+    Ok(())
+}
+
+/// x and y of a place of a stock part that both devices see with some millimetres around it.
+fn seen_place(part: &Part) -> [f64; 2] {
+    match part {
+        // Walls that face both devices.
+        Part::Flowerpot(_) => [-60.0, 52.0],
+        Part::Cone(_) => [-20.0, 35.0],
+        // A flank.
+        Part::Sawtooth(_) => [9.0, -8.0],
+        _ => [0.0, -8.0],
+    }
 }
 
 /// Every stock part with an example of each defect that it can have, and the recommended poses of a board.
 pub fn kinds() -> Vec<Value> {
     let offers = |part: &Part| -> Vec<Value> {
+        let [x, y] = seen_place(part);
+        let placed = |(name, number): &(&'static str, f64)| match *name {
+            "x" => (*name, x),
+            "y" => (*name, y),
+            name => (name, *number),
+        };
         let all = DEFECTS
             .iter()
-            .map(|(kind, numbers)| defect(kind, numbers.iter().copied()));
-        let is_one = |defect: &Value| {
-            with_defect(part, defect.clone()).is_ok_and(|part| {
-                let placed = Placed {
-                    part,
-                    ..Placed::default()
-                };
-                placed.check().is_ok()
-            })
-        };
-        all.filter(is_one).collect()
+            .map(|(kind, numbers)| defect(kind, numbers.iter().map(placed)));
+        all.filter(|defect| add(&mut part.clone(), defect.clone()).is_ok())
+            .collect()
     };
     let parts = Part::stock().into_iter();
     parts

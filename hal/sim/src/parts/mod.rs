@@ -4,6 +4,8 @@
 //! change them.
 
 mod board;
+mod bump;
+mod defect;
 mod dented;
 mod shapes;
 mod sheet_metal;
@@ -15,8 +17,9 @@ use super::limits::within;
 use super::optics::Vector;
 
 pub use board::Board;
+pub use defect::Defect;
 pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
-pub use sheet_metal::{Defect, SheetMetal};
+pub use sheet_metal::SheetMetal;
 pub use spline::Spline;
 
 /// A part by kind, with its measures in mm.
@@ -97,6 +100,11 @@ impl Part {
         let positive = |key: &str, value: f64| within(&format!("part.{key}"), value, 1e-3, 1000.0);
         let coordinate =
             |key: &str, value: f64| within(&format!("part.{key}"), value, -1000.0, 1000.0);
+        Defect::check(self.defects())?;
+        self.defects()
+            .iter()
+            .try_for_each(|defect| self.can_have(defect))
+            .map_err(|words| format!("part.defects: {words}"))?;
         match self {
             Self::Cone(part) => {
                 positive("half_size", part.half_size)?;
@@ -129,17 +137,7 @@ impl Part {
                 positive("depth", part.depth)?;
                 // The wall leans outwards by at least 0.025 mm per mm of depth: a height field has no upright walls.
                 let least = part.bottom_diameter + 0.05 * part.depth;
-                within("part.rim_diameter", part.rim_diameter, least, 1000.0)?;
-                part.defects.iter().try_for_each(|defect| {
-                    match defect {
-                    Defect::Dent { .. } => defect.check_dent(),
-                    Defect::MissingHole { .. } | Defect::BentFlange { .. } => Err(
-                        "part.defects of a flowerpot has another kind of defect than a dent: write \
-                         kind = \"dent\""
-                            .into(),
-                    ),
-                }
-                })
+                within("part.rim_diameter", part.rim_diameter, least, 1000.0)
             }
             Self::Spline(part) => part.check(),
             Self::Plane(part) => positive("half_size", part.half_size),
@@ -149,19 +147,69 @@ impl Part {
         }
     }
 
+    /// Its defects.
+    #[must_use]
+    pub fn defects(&self) -> &[Defect] {
+        match self {
+            Self::Cone(Cone { defects, .. })
+            | Self::Sawtooth(Sawtooth { defects, .. })
+            | Self::Sphere(Sphere { defects, .. })
+            | Self::Tube(Tube { defects, .. })
+            | Self::Flowerpot(Flowerpot { defects, .. })
+            | Self::Plane(Plane { defects, .. })
+            | Self::SheetMetal(SheetMetal { defects, .. }) => defects,
+            Self::Spline(part) => &part.defects,
+            Self::Board(_) | Self::Empty {} => &[],
+        }
+    }
+
+    /// Its defects, to be changed; `None` if it can have none.
+    pub fn defects_mut(&mut self) -> Option<&mut Vec<Defect>> {
+        match self {
+            Self::Cone(Cone { defects, .. })
+            | Self::Sawtooth(Sawtooth { defects, .. })
+            | Self::Sphere(Sphere { defects, .. })
+            | Self::Tube(Tube { defects, .. })
+            | Self::Flowerpot(Flowerpot { defects, .. })
+            | Self::Plane(Plane { defects, .. })
+            | Self::SheetMetal(SheetMetal { defects, .. }) => Some(defects),
+            Self::Spline(part) => Some(&mut part.defects),
+            Self::Board(_) | Self::Empty {} => None,
+        }
+    }
+
+    /// Whether it can have a defect of this kind.
+    ///
+    /// # Errors
+    /// If it cannot: which ones it can have.
+    pub fn can_have(&self, defect: &Defect) -> Result<(), &'static str> {
+        match (self, defect) {
+            (Self::Board(_) | Self::Empty {}, _) => Err("it can have no defects"),
+            (Self::SheetMetal(_), _) | (_, Defect::Dent { .. }) => Ok(()),
+            (_, Defect::MissingHole { .. } | Defect::BentFlange { .. }) => {
+                Err("it can have dents only: write kind = \"dent\"")
+            }
+        }
+    }
+
     /// The surface to trace; `None` for [`Part::Empty`].
     pub(crate) fn surface(&self) -> Option<Box<dyn Surface>> {
-        Some(match self {
+        let good: Box<dyn Surface> = match self {
             Self::Cone(part) => Box::new(part.clone()),
             Self::Sawtooth(part) => Box::new(part.clone()),
             Self::Sphere(part) => Box::new(part.clone()),
             Self::Tube(part) => Box::new(part.clone()),
-            Self::Flowerpot(part) => Box::new(dented::Dented::new(part.clone(), &part.defects)),
+            Self::Flowerpot(part) => Box::new(part.clone()),
             Self::Spline(part) => Box::new((**part).clone()),
             Self::Plane(part) => Box::new(part.clone()),
             Self::Board(part) => Box::new(part.clone()),
             Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),
             Self::Empty {} => return None,
+        };
+        let is_dent = |defect: &Defect| matches!(defect, Defect::Dent { .. });
+        Some(match self.defects().iter().any(is_dent) {
+            true => Box::new(dented::Dented::new(good, self.defects())),
+            false => good,
         })
     }
 }

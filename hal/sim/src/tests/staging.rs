@@ -139,7 +139,7 @@ fn going_back_to_a_placed_part_costs_nothing() {
         built.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
     };
     for _ in 0..5 {
-        for part in all_parts().iter().take(4) {
+        for part in all_parts().iter().skip(1).take(4) {
             stage
                 .place_with_progress(part, &Placement::default(), &count)
                 .unwrap();
@@ -148,7 +148,7 @@ fn going_back_to_a_placed_part_costs_nothing() {
     assert_eq!(
         built.into_inner(),
         4 * 48,
-        "each of four parts is traced once, row by row"
+        "each of four parts that were not there from the start is traced once, row by row"
     );
 }
 
