@@ -4,7 +4,7 @@ use hal::bounds::clipped;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use sim::parts::{Board, Defect};
-use sim::{Part, Placement, Scenario};
+use sim::{Material, Part, Placement, Scenario};
 
 /// The most defects of a part: each ray is traced against all of them.
 const MAX_DEFECTS: usize = 16;
@@ -29,6 +29,8 @@ const DEFECTS: [(&str, &[(&str, f64)]); 3] = [
 pub struct Placed {
     /// The part with its defects.
     pub part: Part,
+    /// What it is made of; none = the scenario's light says how it reflects.
+    pub material: Option<Material>,
     /// Where it lies.
     pub placement: Placement,
 }
@@ -38,6 +40,7 @@ pub struct Placed {
 #[serde(deny_unknown_fields)]
 struct PlacedFile {
     part: Value,
+    material: Option<Material>,
     placement: Option<Placement>,
     pose: Option<u8>,
 }
@@ -53,6 +56,7 @@ impl TryFrom<PlacedFile> for Placed {
                 ..Self::default()
             },
         };
+        placed.material = file.material;
         match (file.placement, file.pose) {
             (Some(_), Some(_)) => return Err("placement and pose: write one of them".into()),
             (Some(placement), None) => placed.placement = placement,
@@ -104,7 +108,7 @@ impl Placed {
         Ok(())
     }
 
-    /// The same part without its defects, in its designed pose.
+    /// The same part of the same material without its defects, in its designed pose.
     pub fn good(&self) -> Self {
         let mut part = self.part.clone();
         if let Some(defects) = part.defects_mut() {
@@ -112,6 +116,7 @@ impl Placed {
         }
         Self {
             part,
+            material: self.material,
             ..Self::default()
         }
     }

@@ -138,6 +138,36 @@ fn the_example_of_a_dent_lies_where_both_devices_see_it_on_every_part() {
 }
 
 #[test]
+fn a_part_keeps_its_material_when_its_defects_are_taken_away_and_has_none_by_itself() {
+    let read = |value: Value| -> Result<Placed, String> {
+        serde_json::from_value(value).map_err(|error| error.to_string())
+    };
+    let dent = json!({ "kind": "dent", "x": 0, "y": 10, "depth_mm": 0.3, "diameter_mm": 8 });
+    let tube = json!({ "kind": "tube", "defects": [dent] });
+    let oiled = read(json!({ "part": tube, "material": "oiled" })).unwrap();
+    assert_eq!(oiled.material, Some(Material::Oiled));
+    let expected = Placed {
+        material: Some(Material::Oiled),
+        ..Placed::stock("tube").unwrap()
+    };
+    assert_eq!(oiled.good(), expected);
+    for none in [
+        json!({ "part": "tube" }),
+        json!({ "part": "tube", "material": null }),
+    ] {
+        assert_eq!(read(none).unwrap().material, None);
+    }
+    let error = read(json!({ "part": "tube", "material": "wood" })).unwrap_err();
+    assert!(
+        error.contains("wood") && error.contains("rolled_steel"),
+        "{error}"
+    );
+    for (material, name) in Material::ALL {
+        assert_eq!(serde_json::to_value(material).unwrap(), name);
+    }
+}
+
+#[test]
 fn a_board_is_placed_by_the_number_of_a_pose() {
     let read = |value: Value| -> Result<Placed, String> {
         serde_json::from_value(value).map_err(|error| error.to_string())

@@ -92,7 +92,7 @@ fn counts(frame: &Frame) -> Vec<f64> {
 
 #[test]
 fn a_scenario_is_read_over_its_defaults_and_refuses_what_it_does_not_know() {
-    let text = "bit_depth = 10\n[rig.camera]\nwidth = 640\n[part]\nkind = \"sheet_metal\"\n\
+    let text = "bit_depth = 10\nmaterial = \"oiled\"\n[rig.camera]\nwidth = 640\n[part]\nkind = \"sheet_metal\"\n\
         [[part.defects]]\nkind = \"dent\"\nx = 1.0\ny = 2.0\ndepth_mm = 1.0\ndiameter_mm = 9.0\n";
     let scenario = Scenario::from_toml(text, "s.toml").unwrap();
     assert_eq!(
@@ -121,6 +121,9 @@ fn a_scenario_is_read_over_its_defaults_and_refuses_what_it_does_not_know() {
         ("[part]\nkind = \"empty\"\nsize = 1", "size"),
         ("[part]\nkind = \"cone\"\nheight = 1", "height"),
         ("[light]\nambient = nan", "light.ambient is NaN"),
+        ("[light]\nspecular = 4.1", "light.specular is 4.1"),
+        ("[light]\nshininess = 0.5", "light.shininess is 0.5"),
+        ("material = \"wood\"", "rolled_steel"),
         (
             "[placement]\ntilt_deg = [90.0, 0.0]",
             "placement.tilt_deg is 90",
