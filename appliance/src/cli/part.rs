@@ -13,7 +13,7 @@ use sim::parts::Board;
 /// The part in front of a simulated head, if not the scenario's.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SimulatedPart {
-    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, plane, board or empty.
+    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, face, handset, plane, board or empty.
     #[arg(long, value_name = "KIND")]
     part: Option<String>,
     /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm along its normal, or of sheet_metal missing_hole:INDEX or bent_flange:DEGREES; more than once for more.

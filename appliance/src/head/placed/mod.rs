@@ -226,6 +226,9 @@ fn seen_place(part: &Part) -> [f64; 2] {
         Part::Cone(_) => [-20.0, 35.0],
         // A flank.
         Part::Sawtooth(_) => [9.0, -8.0],
+        // The forehead, and the grip between ridge and shoulder.
+        Part::Face(_) => [0.0, 62.0],
+        Part::Handset(_) => [17.0, 0.0],
         _ => [0.0, -8.0],
     }
 }

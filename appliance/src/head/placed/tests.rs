@@ -76,7 +76,7 @@ fn every_number_is_bounded() {
 #[test]
 fn the_page_is_offered_every_stock_part_with_the_defects_that_it_can_have() {
     let kinds = kinds();
-    assert_eq!(kinds.len(), 10);
+    assert_eq!(kinds.len(), 12);
     for one in &kinds {
         let mut defective: Placed = serde_json::from_value(json!({ "part": one["part"] })).unwrap();
         let defects = one["defects"].as_array().unwrap();

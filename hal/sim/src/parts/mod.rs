@@ -7,6 +7,9 @@ mod board;
 mod bump;
 mod defect;
 mod dented;
+mod face;
+mod handset;
+mod relief;
 mod shapes;
 mod sheet_metal;
 mod spline;
@@ -18,6 +21,8 @@ use super::optics::Vector;
 
 pub use board::Board;
 pub use defect::Defect;
+pub use face::Face;
+pub use handset::Handset;
 pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
 pub use sheet_metal::SheetMetal;
 pub use spline::Spline;
@@ -38,6 +43,10 @@ pub enum Part {
     Flowerpot(Flowerpot),
     /// A free-form surface.
     Spline(Box<Spline>),
+    /// A face.
+    Face(Face),
+    /// The base of a telephone's handset.
+    Handset(Handset),
     /// A flat square.
     Plane(Plane),
     /// A printed checkerboard.
@@ -80,7 +89,7 @@ pub(crate) trait Surface: Send + Sync {
 impl Part {
     /// One good part of each kind with its default measures.
     #[must_use]
-    pub fn stock() -> [Self; 10] {
+    pub fn stock() -> [Self; 12] {
         [
             Self::SheetMetal(SheetMetal::default()),
             Self::Flowerpot(Flowerpot::default()),
@@ -89,6 +98,8 @@ impl Part {
             Self::Sphere(Sphere::default()),
             Self::Tube(Tube::default()),
             Self::Spline(Box::default()),
+            Self::Face(Face::default()),
+            Self::Handset(Handset::default()),
             Self::Plane(Plane::default()),
             Self::Board(Board::default()),
             Self::Empty {},
@@ -143,7 +154,8 @@ impl Part {
             Self::Plane(part) => positive("half_size", part.half_size),
             Self::Board(part) => part.check(),
             Self::SheetMetal(part) => part.check(),
-            Self::Empty {} => Ok(()),
+            // Their measures are given.
+            Self::Face(_) | Self::Handset(_) | Self::Empty {} => Ok(()),
         }
     }
 
@@ -156,6 +168,8 @@ impl Part {
             | Self::Sphere(Sphere { defects, .. })
             | Self::Tube(Tube { defects, .. })
             | Self::Flowerpot(Flowerpot { defects, .. })
+            | Self::Face(Face { defects })
+            | Self::Handset(Handset { defects })
             | Self::Plane(Plane { defects, .. })
             | Self::SheetMetal(SheetMetal { defects, .. }) => defects,
             Self::Spline(part) => &part.defects,
@@ -171,6 +185,8 @@ impl Part {
             | Self::Sphere(Sphere { defects, .. })
             | Self::Tube(Tube { defects, .. })
             | Self::Flowerpot(Flowerpot { defects, .. })
+            | Self::Face(Face { defects })
+            | Self::Handset(Handset { defects })
             | Self::Plane(Plane { defects, .. })
             | Self::SheetMetal(SheetMetal { defects, .. }) => Some(defects),
             Self::Spline(part) => Some(&mut part.defects),
@@ -201,6 +217,8 @@ impl Part {
             Self::Tube(part) => Box::new(part.clone()),
             Self::Flowerpot(part) => Box::new(part.clone()),
             Self::Spline(part) => Box::new((**part).clone()),
+            Self::Face(_) => Box::new(Face::surface()),
+            Self::Handset(_) => Box::new(Handset::surface()),
             Self::Plane(part) => Box::new(part.clone()),
             Self::Board(part) => Box::new(part.clone()),
             Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),

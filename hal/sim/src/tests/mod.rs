@@ -59,6 +59,8 @@ fn dent(part: &Part, depth_mm: f64) -> Defect {
         Part::Flowerpot(_) => [-60.0, 52.0],
         Part::SheetMetal(_) => [58.0, -5.0],
         Part::Sawtooth(_) => [9.0, 12.0],
+        Part::Face(_) => [-20.0, 62.0],
+        Part::Handset(_) => [20.0, 26.0],
         _ => [-20.0, 35.0],
     };
     Defect::Dent {
