@@ -109,6 +109,8 @@ try {
       await page.waitForFunction(() => document.querySelector("#notice").textContent.includes("part is in place") && !document.querySelector("#part-put").disabled);
       await page.evaluate(() => { document.querySelector("#notice").textContent = ""; });
     };
+    assert.equal(await page.locator("#part-material option").count(), 4);
+    await page.selectOption("#part-material", "matte");
     await page.selectOption("#defect-kind", "dent");
     await page.click("#defect-add");
     assert.equal(await page.locator("#part-defects input").count(), 4);
@@ -120,6 +122,7 @@ try {
     await put();
     await trigger();
     await verdict("PASS");
+    assert.equal(await page.inputValue("#part-material"), "matte");
     await page.fill("#place-0", "0");
     await put();
   });

@@ -30,6 +30,8 @@ const CONE: Limits = limits("cone", [0.44, 0.52, 0.64, 0.84]);
 const SAWTOOTH: Limits = limits("sawtooth", [0.42, 0.52, 0.64, 0.80]);
 const SPHERE: Limits = limits("sphere", [0.45, 0.53, 0.65, 0.86]);
 const SPLINE: Limits = limits("spline", [0.44, 0.52, 0.64, 0.85]);
+/// Of face and handset with 12 frames, as the limits above.
+const FREE_FORM_RATIO: f64 = 0.46;
 /// Largest RMS error of the cone without noise, mm: its tip is where fringes shear most.
 const CONE_WITHOUT_NOISE_MM: f64 = 0.006;
 
@@ -95,6 +97,27 @@ fn without_noise_only_the_cameras_rounding_and_edges_are_left_of_the_cones_error
     let rms = run.unwrap().values.rms_mm;
     println!("{:.2} µm", 1000.0 * rms);
     assert!(rms <= CONE_WITHOUT_NOISE_MM, "{rms} mm");
+}
+
+#[test]
+fn the_better_pattern_beats_the_papers_own_on_face_and_handset_and_resolves_nearly_all_of_them() {
+    for part in ["face", "handset"] {
+        let scene = Scene {
+            camera: MIDDLE,
+            ..Scene::named(part).unwrap()
+        };
+        let mut runner = Runner::new(&scene, OpticsKind::Sharp).unwrap();
+        let paper = runner.run(Method::Paper { image_pitch: 5 }, 1).unwrap();
+        let better = runner.run(Method::Better(BetterSequence::TWELVE), 1);
+        let values = better.unwrap().values;
+        let ratio = values.rms_mm / paper.values.rms_mm;
+        println!("{part}: {ratio:.3}, {values:?}");
+        assert!(ratio <= FREE_FORM_RATIO, "{part}: {ratio:.3}");
+        assert!(values.coverage >= 0.999, "{part}: {}", values.coverage);
+        assert!(values.gross_px <= 2.0, "{part}: {}", values.gross_px);
+        let ratio = values.error_over_sigma;
+        assert!(ERROR_OVER_SIGMA.contains(&ratio), "{part}: {ratio}");
+    }
 }
 
 #[test]

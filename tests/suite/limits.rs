@@ -13,13 +13,15 @@ use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
 
-const STOCK: [&str; 8] = [
+const STOCK: [&str; 10] = [
     "cone",
     "sawtooth",
     "sphere",
     "tube",
     "flowerpot",
     "spline",
+    "face",
+    "handset",
     "plane",
     "sheet_metal",
 ];

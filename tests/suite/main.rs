@@ -52,6 +52,7 @@ mod rooms;
 mod sequences;
 mod service;
 mod shared_recordings;
+mod shiny;
 mod simulated_board;
 mod simulated_part;
 mod station;

@@ -10,7 +10,7 @@ use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
 use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile, safe};
 use hal::head::Head;
-use sim::parts::{Cone, Plane, Sawtooth, SheetMetal, Sphere, Spline};
+use sim::parts::{Cone, Face, Handset, Plane, Sawtooth, SheetMetal, Sphere, Spline};
 use sim::scenario::Noise;
 use sim::{Part, Placement, Scenario, Stage};
 use std::time::{Duration, Instant};
@@ -132,6 +132,8 @@ fn moved_parts_have_no_wrong_fringe_order_inside_the_safe_masks() {
         ("sawtooth", Part::Sawtooth(Sawtooth::default())),
         ("sphere", Part::Sphere(Sphere::default())),
         ("spline", Part::Spline(Box::<Spline>::default())),
+        ("face", Part::Face(Face::default())),
+        ("handset", Part::Handset(Handset::default())),
         ("sheet metal", Part::SheetMetal(SheetMetal::default())),
     ];
     // Two at the limit of the tolerance and one inside, all of length ≤ 1 mm.

@@ -70,11 +70,21 @@ fn a_trigger_after_the_answer_sees_the_part_that_was_put_there_over_the_page() {
         (good([0.0, 0.0, 1e12]), 422, "shift_mm"),
         (json!({ "part": { "kind": "teapot" } }), 400, "teapot"),
         (
-            json!({ "part": { "kind": "plane", "defects": [] } }),
+            json!({ "part": { "kind": "empty", "defects": [] } }),
             400,
             "defects",
         ),
+        (
+            json!({ "part": { "kind": "tube", "defects": [{ "kind": "missing_hole", "index": 1 }] } }),
+            422,
+            "dents only",
+        ),
         (json!({ "placement": {} }), 400, "part"),
+        (
+            json!({ "part": "plane", "material": "wood" }),
+            400,
+            "rolled_steel",
+        ),
     ] {
         let (got, answer) = browser.json("PUT", put, &wrong);
         assert_eq!(got, status, "{wrong}: {answer}");
@@ -85,6 +95,28 @@ fn a_trigger_after_the_answer_sees_the_part_that_was_put_there_over_the_page() {
     }
     assert_eq!(browser.get(put), before);
     assert_eq!(plc.measure(9)[8], FAIL);
+    // Another material in the same place is another part.
+    assert_eq!(before["material"], Value::Null);
+    assert_eq!(
+        before["materials"],
+        json!(["matte", "rolled_steel", "oiled"])
+    );
+    for material in ["oiled", "matte"] {
+        let mut body = good([0.0; 3]);
+        body["material"] = json!(material);
+        let (status, answer) = browser.json("PUT", put, &body);
+        assert_eq!(
+            (status, &answer["material"]),
+            (200, &json!(material)),
+            "{answer}"
+        );
+        let verdict = plc.measure(if material == "oiled" { 10 } else { 11 })[8];
+        assert_eq!(
+            verdict == PASS,
+            material == "matte",
+            "{material}: {verdict}"
+        );
+    }
 }
 
 #[test]
@@ -100,6 +132,8 @@ fn a_start_with_a_defective_part_teaches_a_good_one_and_then_shows_the_defective
             DENT,
             "--shift",
             "-0.2,0,0",
+            "--material",
+            "matte",
         ]);
         let daemon = Daemon::of(command);
         let mut plc = Plc::connect(&daemon);
@@ -107,6 +141,7 @@ fn a_start_with_a_defective_part_teaches_a_good_one_and_then_shows_the_defective
         let shown = Browser::new(&daemon).get("/api/simulation/part");
         assert_eq!(shown["part"]["defects"][0]["kind"], "dent");
         assert_eq!(shown["placement"]["shift_mm"], json!([-0.2, 0.0, 0.0]));
+        assert_eq!(shown["material"], "matte");
         assert_eq!(daemon.terminate().code(), Some(0));
     }
     let daemon = Daemon::start(&place);
@@ -130,10 +165,12 @@ fn a_part_that_cannot_be_simulated_is_a_usage_error_with_the_remedy() {
         "plane has no bent_flange",
     );
     refused(&["--defect", "missing_hole:7"], "index");
+    refused(&["--part", "tube", "--material", "wood"], "rolled_steel");
     refused(&["--shift", "1,2"], "3 numbers");
     refused(&["--tilt", "90,0"], "from -80 to 80");
     refused(&["--rotate", "nan"], "from -360 to 360");
     let replay = "[head]\nbackend = \"replay\"\nrecordings = [\"none\"]\n";
     std::fs::write(&config, replay).unwrap();
     refused(&["--part", "plane"], "not simulated");
+    refused(&["--material", "oiled"], "not simulated");
 }

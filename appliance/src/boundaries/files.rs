@@ -334,6 +334,8 @@ fn a_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit(
         "tube",
         "flowerpot",
         "spline",
+        "face",
+        "handset",
         "plane",
         "board",
     ] {

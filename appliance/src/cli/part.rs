@@ -5,18 +5,23 @@ use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::placed::Placed;
 use crate::production::backend;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, clipped};
+use sim::Material;
 use sim::parts::Board;
 
 /// The part in front of a simulated head, if not the scenario's.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SimulatedPart {
-    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, plane, board or empty.
+    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, face, handset, plane, board or empty.
     #[arg(long, value_name = "KIND")]
     part: Option<String>,
-    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm, missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
+    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm along its normal, or of sheet_metal missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
     #[arg(long, value_name = "KIND:NUMBERS")]
     defect: Vec<String>,
+    /// What the simulated part is made of: matte, rolled_steel or oiled. If it is left out, the scenario's light says how a part reflects.
+    #[arg(long, value_name = "NAME", value_parser = material())]
+    material: Option<Material>,
     /// Place the simulated board in this one of the ten poses that are recommended for a calibration; 10 lies in z = 0.
     #[arg(long, value_name = "NUMBER", value_parser = number(1, Board::POSES.len() as u8), conflicts_with_all = ["shift", "tilt", "rotate"])]
     pose: Option<u8>,
@@ -37,7 +42,7 @@ impl SimulatedPart {
     /// # Errors
     /// If the configured head is not simulated, or there is no such part, defect or placement (64).
     pub fn placed(&self, head: &HeadConfig) -> Result<Option<Placed>, Failure> {
-        let asked = self.part.is_some() || !self.defect.is_empty();
+        let asked = self.part.is_some() || !self.defect.is_empty() || self.material.is_some();
         if !asked
             && self.pose.is_none()
             && self.shift.is_none()
@@ -50,7 +55,7 @@ impl SimulatedPart {
             |words: String| Failure::because(Exit::Usage, "put a part in front of the head", words);
         if head.backend != Backend::Sim {
             return Err(usage(
-                "the configured head is not simulated: leave out --part, --defect, --pose, --shift, --tilt and --rotate".into(),
+                "the configured head is not simulated: leave out --part, --defect, --material, --pose, --shift, --tilt and --rotate".into(),
             ));
         }
         let scenario = backend::scenario(head.scenario.as_deref())?;
@@ -58,9 +63,11 @@ impl SimulatedPart {
             Some(kind) => Placed::stock(kind).map_err(usage)?,
             None => Placed {
                 part: scenario.part,
+                material: scenario.material,
                 placement: scenario.placement,
             },
         };
+        placed.material = self.material.or(placed.material);
         for defect in &self.defect {
             let added = placed.add_defect(defect).and_then(|()| placed.check());
             added.map_err(|words| usage(format!("--defect {}: {words}", clipped(defect))))?;
@@ -76,4 +83,15 @@ impl SimulatedPart {
         placed.check().map_err(usage)?;
         Ok(Some(placed))
     }
+}
+
+/// A material by its name.
+fn material() -> impl TypedValueParser<Value = Material> {
+    let names = Material::ALL.map(|(_, name)| name);
+    PossibleValuesParser::new(names).try_map(|name| {
+        let known = Material::ALL.iter().find(|(_, known)| *known == name);
+        known
+            .map(|(material, _)| *material)
+            .ok_or("no such material")
+    })
 }

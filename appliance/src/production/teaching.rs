@@ -138,7 +138,8 @@ impl Worker {
             let words = "putting the part in front of the head";
             tell(station, job, share, words);
         };
-        let place = || stage.place_with_progress(&placed.part, &placed.placement, &progress);
+        let (part, lies) = (&placed.part, &placed.placement);
+        let place = || stage.place_with_progress(part, placed.material, lies, &progress);
         let shown = self.computing.on(|| self.pool.install(place));
         if let Err(error) = shown {
             self.progress.warn(&error.to_string());

@@ -6,6 +6,7 @@
 mod blur;
 pub mod controller;
 mod limits;
+pub mod material;
 pub mod optics;
 pub mod parts;
 pub mod scenario;
@@ -18,6 +19,7 @@ mod trace;
 pub mod transport;
 
 pub use hal::virtual_head::Faults;
+pub use material::Material;
 pub use parts::Part;
 pub use scenario::{Placement, Scenario};
 pub use stage::{Stage, Staged, head, head_with_progress};

@@ -46,6 +46,8 @@ impl Scenario {
         within("refresh_hz", self.refresh_hz, 1.0, 1000.0)?;
         within("light.ambient", self.light.ambient, 0.0, 100.0)?;
         within("light.diffuse", self.light.diffuse, 0.0, 100.0)?;
+        within("light.specular", self.light.specular, 0.0, 4.0)?;
+        within("light.shininess", self.light.shininess, 1.0, 500.0)?;
         let noise = &self.noise;
         within("noise.full_well_e", noise.full_well_e, 100.0, 1e7)?;
         within("noise.read_noise_e", noise.read_noise_e, 0.0, 1000.0)?;

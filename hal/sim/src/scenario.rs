@@ -4,6 +4,7 @@
 
 use serde::{Deserialize, Deserializer, Serialize};
 
+use super::material::Material;
 use super::optics::{Lens, turn, turned};
 use super::parts::Part;
 use super::timing::Timing;
@@ -28,6 +29,9 @@ pub struct Scenario {
     pub sub_rays: u32,
     /// Refresh rate of the projector, 1…1000 Hz.
     pub refresh_hz: f64,
+    /// What the part is made of. If it is not given, `light` says how the part reflects.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub material: Option<Material>,
     /// Camera and projector.
     pub rig: Rig,
     /// Ambient light, and how much light the part reflects.
@@ -77,14 +81,19 @@ pub struct RigDevice {
     pub knocked_deg: [f64; 3],
 }
 
-/// Phong's model without its specular part: I = ambient + diffuse · max(0, n·l) · pattern/255, 1 = full scale.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Phong's model: I = ambient + pattern/255 · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess), 1 = full scale. n is the surface's
+/// normal, l the direction to the projector, v that to the camera, and r is l mirrored about n.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Lighting {
     /// Light that does not come from the projector.
     pub ambient: f64,
     /// Share of the projector's light that a surface reflects which faces the projector.
     pub diffuse: f64,
+    /// Share of the projector's light that a surface reflects which mirrors the projector into the camera, 0…4.
+    pub specular: f64,
+    /// How narrow the highlight is: the exponent of its cosine, 1…500.
+    pub shininess: f64,
 }
 
 /// Noise of the camera. The defaults are what public photon models state of cameras with Sony's IMX296: saturation capacity 10 636 e⁻,
@@ -144,6 +153,7 @@ impl Default for Scenario {
             colour: false,
             sub_rays: 4,
             refresh_hz: 60.0,
+            material: None,
             rig: Rig::default(),
             light: Lighting::default(),
             noise: Noise::default(),
@@ -186,6 +196,8 @@ impl Default for Lighting {
         Self {
             ambient: 0.04,
             diffuse: 0.86,
+            specular: 0.0,
+            shininess: 1.0,
         }
     }
 }

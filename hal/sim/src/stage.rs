@@ -4,6 +4,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use super::limits::within;
+use super::material::Material;
 use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::scene::SimScene;
@@ -29,6 +30,7 @@ pub struct Stage {
 #[derive(Clone, Debug)]
 pub struct Staged {
     part: Part,
+    material: Option<Material>,
     placement: Placement,
     pub(super) transport: Arc<Transport>,
 }
@@ -37,13 +39,16 @@ impl Staged {
     fn new(
         scenario: &Scenario,
         part: &Part,
+        material: Option<Material>,
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Self {
+        let transport = Transport::build(scenario, part, material, placement, progress);
         Self {
             part: part.clone(),
+            material,
             placement: *placement,
-            transport: Arc::new(Transport::build(scenario, part, placement, progress)),
+            transport: Arc::new(transport),
         }
     }
 }
@@ -68,7 +73,13 @@ pub fn head_with_progress(
         .check()
         .map_err(|problem| Error::unsupported("simulating this scenario", problem))?;
     let scenario = Arc::new(scenario.clone());
-    let staged = Staged::new(&scenario, &scenario.part, &scenario.placement, progress);
+    let staged = Staged::new(
+        &scenario,
+        &scenario.part,
+        scenario.material,
+        &scenario.placement,
+        progress,
+    );
     let scene = SimScene::new(Arc::clone(&scenario), staged.clone());
     let (head, control) = virtual_head::head(scene, scenario.mechanics());
     let stage = Stage {
@@ -81,26 +92,30 @@ pub fn head_with_progress(
 }
 
 impl Stage {
-    /// Replaces the part; the next exposure sees the new one. The light transport of the last few parts is
-    /// kept, so going back to one of them takes no time.
+    /// Replaces the part by another of the scenario's material; the next exposure sees the new one. The light transport of the last few
+    /// parts is kept, so going back to one of them takes no time.
     ///
     /// # Errors
     /// `Unsupported` if a measure of the part or the placement is out of its range.
     pub fn place(&self, part: &Part, placement: &Placement) -> Result<(), Error> {
-        self.place_with_progress(part, placement, &|_| ())
+        self.place_with_progress(part, self.scenario.material, placement, &|_| ())
     }
 
-    /// As [`Stage::place`]; `progress` is called with the share done, 0…1, from any thread.
+    /// As [`Stage::place`], with a part of this material; without one the scenario's `light` says how it reflects. `progress` is called with
+    /// the share done, 0…1, from any thread.
     ///
     /// # Errors
     /// As [`Stage::place`].
     pub fn place_with_progress(
         &self,
         part: &Part,
+        material: Option<Material>,
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<(), Error> {
-        let known = |staged: &Staged| staged.part == *part && staged.placement == *placement;
+        let known = |staged: &Staged| {
+            staged.part == *part && staged.material == material && staged.placement == *placement
+        };
         let recalled = {
             let mut remembered = self.remembered();
             let at = remembered.iter().position(known);
@@ -108,7 +123,7 @@ impl Stage {
         };
         let staged = match recalled {
             Some(known) => known,
-            None => self.work_out(part, placement, progress)?,
+            None => self.work_out(part, material, placement, progress)?,
         };
         let mut remembered = self.remembered();
         if remembered.len() == MAX_REMEMBERED {
@@ -119,7 +134,7 @@ impl Stage {
         Ok(())
     }
 
-    /// Computes the light transport of `part` without putting it in place. This is what takes long; meanwhile frames may be taken of
+    /// Computes the light transport of `part` of a material, if any, without putting it in place. This is what takes long; meanwhile frames may be taken of
     /// the present part. `progress` is called with the share done, 0…1, from any thread.
     ///
     /// # Errors
@@ -127,13 +142,20 @@ impl Stage {
     pub fn work_out(
         &self,
         part: &Part,
+        material: Option<Material>,
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Staged, Error> {
         part.check()
             .and_then(|()| placement.check())
             .map_err(|problem| Error::unsupported("placing this part", problem))?;
-        Ok(Staged::new(&self.scenario, part, placement, progress))
+        Ok(Staged::new(
+            &self.scenario,
+            part,
+            material,
+            placement,
+            progress,
+        ))
     }
 
     /// Puts a part in place whose light transport is computed; the next exposure sees it.
@@ -141,11 +163,11 @@ impl Stage {
         self.control.scene(|scene| scene.place(staged));
     }
 
-    /// The part that is in place, and how it lies.
+    /// The part that is in place, its material, and how it lies.
     #[must_use]
-    pub fn placed(&self) -> (Part, Placement) {
+    pub fn placed(&self) -> (Part, Option<Material>, Placement) {
         let staged = self.control.scene(|scene| scene.placed());
-        (staged.part, staged.placement)
+        (staged.part, staged.material, staged.placement)
     }
 
     fn remembered(&self) -> MutexGuard<'_, Vec<Staged>> {

@@ -3,17 +3,20 @@
 //! A frame is linear in the raster, so the geometry is computed once per placed part: for each of n × n sub-rays per
 //! camera pixel the point of the surface, its normal, whether it sees the projector, and the projector
 //! point (ξ, η) that lights it. The weights of the projector pixels whose light reaches it (`Spread`), of all sub-rays of a pixel, are
-//! merged into one row of a sparse matrix; a frame is then matrix × raster. The model of light is
-//! I = albedo · (ambient + diffuse · max(0, n·l) · pattern), averaged over the sub-rays, without fall-off with distance. Ambient light
-//! reaches shadowed points, too; a sub-ray that meets nothing has I = 0. Beyond the raster the projector is dark.
+//! merged into one row of a sparse matrix; a frame is then matrix × raster. The model of light is Phong's (1975),
+//! I = albedo · (ambient + pattern · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess)), averaged over the sub-rays, without
+//! fall-off with distance: n is the normal, l the direction to the projector, v that to the camera, and r = 2 (n·l) n − l. A surface that
+//! faces away from the projector has no highlight. Ambient light reaches shadowed points, too; a sub-ray that meets nothing has I = 0.
+//! Beyond the raster the projector is dark.
 //!
 //! The result does not depend on the number of threads: every pixel is computed by itself.
 
 use rayon::prelude::*;
 
+use super::material::Material;
 use super::optics::{Lens, Vector, dot, minus, normalised, plus, turn, turned, turned_back};
 use super::parts::Part;
-use super::scenario::{Placement, Scenario};
+use super::scenario::{Lighting, Placement, Scenario};
 use super::spread::{self, Spread};
 use super::trace::{Hit, Traced, facing};
 
@@ -34,8 +37,8 @@ pub struct Truth {
 const LANES: usize = 4;
 /// A raster is followed by so many dark pixels, which the last taps read with weight 0.
 pub(super) const PADDING: usize = LANES - 1;
-/// The weight of a pixel that arrives completely. Rounding to whole weights changes the light by 3e-5 to 5e-5 of white RMS
-/// (36 to 100 weights, each off by at most 1/131 070).
+/// The weight of a pixel that arrives completely, reflected as brightly as the part can: diffuse + specular. Rounding to whole weights
+/// changes the light by 3e-5 to 5e-5 of that RMS (36 to 100 weights, each off by at most 1/131 070).
 const WHOLE: f32 = 65_535.0;
 
 /// The sparse matrix from rasters to frames, and the ground truth: of one camera row, or of all. Light is in units of full scale.
@@ -92,11 +95,12 @@ pub(crate) fn rotation_of(placement: &Placement) -> [f64; 9] {
 }
 
 impl Transport {
-    /// Traces `part` at `placement` with the rig and lighting of `scenario`; `progress` is called with the share done, 0…1, from
-    /// any thread.
+    /// Traces `part`, made of `material` or reflecting as the lighting says, at `placement` with the rig and lighting of `scenario`;
+    /// `progress` is called with the share done, 0…1, from any thread.
     pub fn build(
         scenario: &Scenario,
         part: &Part,
+        material: Option<Material>,
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Self {
@@ -104,12 +108,15 @@ impl Transport {
         let projector = scenario.rig.projector.lens();
         let placed = Placed::new(placement, &camera, &projector);
         let surface = part.surface();
+        let light = &scenario.light;
+        let reflection = Reflection::new(&material.map_or(*light, |made| made.under(light)));
         let tracer = Tracer {
             scenario,
             camera: &camera,
             projector: &projector,
             spread: Spread::new(spread::split(scenario.optics.projector_blur_px).0),
             placed: &placed,
+            reflection: &reflection,
             traced: surface.as_deref().map(Traced::new),
         };
         let height = scenario.rig.camera.height;
@@ -124,7 +131,7 @@ impl Transport {
             })
             .collect();
         let mut whole = Self::join(rows);
-        whole.unit = scenario.light.diffuse as f32 / WHOLE;
+        whole.unit = reflection.brightest as f32 / WHOLE;
         whole
     }
 
@@ -186,7 +193,46 @@ struct Tracer<'a> {
     projector: &'a Lens,
     spread: Spread,
     placed: &'a Placed,
+    reflection: &'a Reflection,
     traced: Option<Traced<'a>>,
+}
+
+/// How a part reflects: shares of the brightest that it can be, so that no weight is larger than [`WHOLE`].
+struct Reflection {
+    /// diffuse + specular.
+    brightest: f64,
+    diffuse: f64,
+    specular: f64,
+    shininess: f64,
+}
+
+impl Reflection {
+    fn new(light: &Lighting) -> Self {
+        let brightest = light.diffuse + light.specular;
+        // A black part has weights, which are multiplied by 0.
+        let [diffuse, specular] = match brightest > 0.0 {
+            true => [light.diffuse / brightest, light.specular / brightest],
+            false => [1.0, 0.0],
+        };
+        Self {
+            brightest,
+            diffuse,
+            specular,
+            shininess: light.shininess,
+        }
+    }
+
+    /// The share of the light from `towards` that goes to `eye`; none if it comes from behind.
+    fn share(&self, normal: Vector, towards: Vector, eye: Vector) -> Option<f64> {
+        let cosine = facing(normal, towards)?;
+        let mut share = self.diffuse * cosine;
+        if self.specular > 0.0 {
+            // r·v with r = 2 (n·l) n − l.
+            let mirrored = 2.0 * cosine * dot(normal, eye) - dot(towards, eye);
+            share += self.specular * mirrored.max(0.0).powf(self.shininess);
+        }
+        Some(share)
+    }
 }
 
 /// A point of the part that the projector lights: its place on the raster, and the share of the light that it reflects.
@@ -268,14 +314,14 @@ impl Tracer<'_> {
     /// How the projector lights this point; none if it does not.
     fn lit(&self, hit: &Hit) -> Option<Lit> {
         let towards = normalised(minus(self.placed.lamp, hit.point));
-        let cosine = facing(hit.normal, towards)?;
+        let eye = normalised(minus(self.placed.eye, hit.point));
+        let share = self.reflection.share(hit.normal, towards, eye)? * hit.albedo;
         let raster = self.projector.project(self.placed.to_world(hit.point))?;
         let device = &self.scenario.rig.projector;
         let on = |place: f64, pixels: u32| (-0.5..f64::from(pixels) - 0.5).contains(&place);
         if !on(raster[0], device.width) || !on(raster[1], device.height) {
             return None;
         }
-        let share = cosine * hit.albedo;
         (!self.traced.as_ref()?.shadowed(hit, towards)).then_some(Lit { raster, share })
     }
 
@@ -317,6 +363,8 @@ impl Tracer<'_> {
         }
         for (row, sums) in (top..).zip(sums.chunks_exact(columns)) {
             for (column, sums) in (left..).step_by(LANES).zip(sums.chunks_exact(LANES)) {
+                // The shares of a pixel's sub-rays add up to at most 1, and the spread of each to 1.
+                debug_assert!(sums.iter().all(|sum| *sum < WHOLE + 0.5));
                 let weights = std::array::from_fn(|lane| sums[lane].round() as u16);
                 if weights != [0; LANES] {
                     let first = (row * i64::from(device.width) + column) as u32;

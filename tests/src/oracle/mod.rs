@@ -8,6 +8,7 @@ pub mod decode;
 pub mod demodulate;
 pub mod device;
 pub mod height;
+pub mod light;
 pub mod pattern;
 pub mod pixel;
 pub mod reason;

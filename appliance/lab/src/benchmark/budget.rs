@@ -129,7 +129,7 @@ pub fn budgets(
         .position(|sequence| sequence.frames.len() == 4);
     let mut found = Vec::new();
     let cycles = four.into_iter().chain([full]);
-    let (part, _) = stage.placed();
+    let (part, ..) = stage.placed();
     for (production, lies) in cycles.flat_map(|at| Lies::ALL.map(|lies| (at, lies))) {
         progress(
             0.8,

@@ -1,7 +1,7 @@
 //! Parts and optics of the experiments, and what each part is judged by.
 
 use super::methods::Method;
-use sim::parts::{Cone, Flowerpot, Sawtooth, Sphere, Spline, Tube};
+use sim::parts::{Cone, Face, Flowerpot, Handset, Sawtooth, Sphere, Spline, Tube};
 use sim::scenario::{Noise, Optics};
 use sim::{Part, Placement, Scenario};
 
@@ -39,7 +39,7 @@ pub enum Judged {
 }
 
 /// Names of all parts.
-pub const PARTS: [&str; 7] = [
+pub const PARTS: [&str; 9] = [
     "cone",
     "sawtooth",
     "sphere",
@@ -47,6 +47,8 @@ pub const PARTS: [&str; 7] = [
     "cone-tilted",
     "flowerpot",
     "tube",
+    "face",
+    "handset",
 ];
 
 /// Columns and rows of the study's camera.
@@ -67,6 +69,8 @@ impl Scene {
             "spline" => ("Fig. 15", Part::Spline(Box::<Spline>::default())),
             "cone-tilted" => ("Fig. 12, tilted by 7°", Part::Cone(Cone::default())),
             "flowerpot" => ("Fig. 16", Part::Flowerpot(Flowerpot::default())),
+            "face" => ("Fig. 18", Part::Face(Face::default())),
+            "handset" => ("Fig. 19", Part::Handset(Handset::default())),
             _ => ("Fig. 17", Part::Tube(Tube::default())),
         };
         let judged = match name {

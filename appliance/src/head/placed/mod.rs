@@ -3,8 +3,8 @@
 use hal::bounds::clipped;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
-use sim::parts::Board;
-use sim::{Part, Placement, Scenario};
+use sim::parts::{Board, Defect};
+use sim::{Material, Part, Placement, Scenario};
 
 /// The most defects of a part: each ray is traced against all of them.
 const MAX_DEFECTS: usize = 16;
@@ -29,6 +29,8 @@ const DEFECTS: [(&str, &[(&str, f64)]); 3] = [
 pub struct Placed {
     /// The part with its defects.
     pub part: Part,
+    /// What it is made of; none = the scenario's light says how it reflects.
+    pub material: Option<Material>,
     /// Where it lies.
     pub placement: Placement,
 }
@@ -38,6 +40,7 @@ pub struct Placed {
 #[serde(deny_unknown_fields)]
 struct PlacedFile {
     part: Value,
+    material: Option<Material>,
     placement: Option<Placement>,
     pose: Option<u8>,
 }
@@ -53,6 +56,7 @@ impl TryFrom<PlacedFile> for Placed {
                 ..Self::default()
             },
         };
+        placed.material = file.material;
         match (file.placement, file.pose) {
             (Some(_), Some(_)) => return Err("placement and pose: write one of them".into()),
             (Some(placement), None) => placed.placement = placement,
@@ -104,15 +108,15 @@ impl Placed {
         Ok(())
     }
 
-    /// The same part without its defects, in its designed pose.
+    /// The same part of the same material without its defects, in its designed pose.
     pub fn good(&self) -> Self {
-        let mut value = value(&self.part);
-        if let Some(defects) = value.get_mut("defects") {
-            *defects = json!([]);
+        let mut part = self.part.clone();
+        if let Some(defects) = part.defects_mut() {
+            defects.clear();
         }
         Self {
-            // A part without defects is still valid JSON of a part.
-            part: serde_json::from_value(value).unwrap_or_default(),
+            part,
+            material: self.material,
             ..Self::default()
         }
     }
@@ -159,9 +163,8 @@ impl Placed {
             return Err(format!("{text:?} is not a defect: write {form}"));
         }
         let named = known.1.iter().zip(numbers).map(|((name, _), n)| (*name, n));
-        self.part = with_defect(&self.part, defect(kind, named))
-            .map_err(|error| format!("a {} has no {kind}: {error}", self::kind(&self.part)))?;
-        Ok(())
+        add(&mut self.part, defect(kind, named))
+            .map_err(|error| format!("a {} has no {kind}: {error}", self::kind(&self.part)))
     }
 
     /// Checks every number.
@@ -169,7 +172,7 @@ impl Placed {
     /// # Errors
     /// Naming the one that is out of its range.
     pub fn check(&self) -> Result<(), String> {
-        let defects = value(&self.part)["defects"].as_array().map_or(0, Vec::len);
+        let defects = self.part.defects().len();
         if defects > MAX_DEFECTS {
             return Err(format!(
                 "{defects} defects: at most {MAX_DEFECTS} are simulated on a part"
@@ -205,30 +208,45 @@ fn defect<'a>(kind: &str, numbers: impl Iterator<Item = (&'a str, f64)>) -> Valu
     defect.into()
 }
 
-/// The part with one more defect, if it can have one of this kind.
-fn with_defect(part: &Part, defect: Value) -> Result<Part, String> {
-    let mut value = value(part);
-    let defects = value.get_mut("defects").and_then(Value::as_array_mut);
-    defects.ok_or("it can have no defects")?.push(defect);
-    serde_json::from_value(value).map_err(|error| error.to_string())
+/// Adds a defect, if the part can have one of this kind.
+fn add(part: &mut Part, defect: Value) -> Result<(), String> {
+    let defect: Defect = serde_json::from_value(defect).map_err(|error| error.to_string())?;
+    part.can_have(&defect)?;
+    if let Some(defects) = part.defects_mut() {
+        defects.push(defect);
+    }
+    Ok(())
+}
+
+/// x and y of a place of a stock part that both devices see with some millimetres around it.
+fn seen_place(part: &Part) -> [f64; 2] {
+    match part {
+        // Walls that face both devices.
+        Part::Flowerpot(_) => [-60.0, 52.0],
+        Part::Cone(_) => [-20.0, 35.0],
+        // A flank.
+        Part::Sawtooth(_) => [9.0, -8.0],
+        // The forehead, and the grip between ridge and shoulder.
+        Part::Face(_) => [0.0, 62.0],
+        Part::Handset(_) => [17.0, 0.0],
+        _ => [0.0, -8.0],
+    }
 }
 
 /// Every stock part with an example of each defect that it can have, and the recommended poses of a board.
 pub fn kinds() -> Vec<Value> {
     let offers = |part: &Part| -> Vec<Value> {
+        let [x, y] = seen_place(part);
+        let placed = |(name, number): &(&'static str, f64)| match *name {
+            "x" => (*name, x),
+            "y" => (*name, y),
+            name => (name, *number),
+        };
         let all = DEFECTS
             .iter()
-            .map(|(kind, numbers)| defect(kind, numbers.iter().copied()));
-        let is_one = |defect: &Value| {
-            with_defect(part, defect.clone()).is_ok_and(|part| {
-                let placed = Placed {
-                    part,
-                    ..Placed::default()
-                };
-                placed.check().is_ok()
-            })
-        };
-        all.filter(is_one).collect()
+            .map(|(kind, numbers)| defect(kind, numbers.iter().map(placed)));
+        all.filter(|defect| add(&mut part.clone(), defect.clone()).is_ok())
+            .collect()
     };
     let parts = Part::stock().into_iter();
     parts

@@ -6,7 +6,7 @@
 use crate::head::placed::{Placed, kinds};
 use crate::production::Order;
 use serde_json::{Value, json};
-use sim::{Stage, Staged};
+use sim::{Material, Stage, Staged};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender, SyncSender};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -56,8 +56,16 @@ impl Simulation {
         match self.stage.get() {
             None => json!({ "simulated": false }),
             Some(stage) => {
-                let (part, placement) = stage.placed();
-                json!({ "simulated": true, "part": part, "placement": placement, "kinds": kinds() })
+                let (part, material, placement) = stage.placed();
+                let materials = Material::ALL.map(|(_, name)| name);
+                json!({
+                    "simulated": true,
+                    "part": part,
+                    "material": material,
+                    "placement": placement,
+                    "kinds": kinds(),
+                    "materials": materials,
+                })
             }
         }
     }
@@ -78,7 +86,7 @@ impl Simulation {
             return Err(PutError::Busy(words.into()));
         };
         let staged = stage
-            .work_out(&placed.part, &placed.placement, &|_| ())
+            .work_out(&placed.part, placed.material, &placed.placement, &|_| ())
             .map_err(|error| PutError::Unfit(error.to_string()))?;
         let (done, in_place) = mpsc::sync_channel(1);
         let waiting = Arc::new(Mutex::new(Some(staged)));

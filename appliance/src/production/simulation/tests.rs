@@ -20,7 +20,10 @@ fn small() -> (Simulation, mpsc::Receiver<Order>, Stage) {
 #[test]
 fn a_part_is_in_place_only_once_the_measuring_task_has_put_it_there() {
     let (simulation, inbox, stage) = small();
-    let other = Placed::stock("plane").unwrap();
+    let other = Placed {
+        material: Some(Material::Oiled),
+        ..Placed::stock("plane").unwrap()
+    };
     let putting = {
         let (simulation, other) = (simulation.clone(), other.clone());
         std::thread::spawn(move || simulation.put(&other))
@@ -32,7 +35,8 @@ fn a_part_is_in_place_only_once_the_measuring_task_has_put_it_there() {
     assert!(!putting.is_finished());
     placing.carry_out();
     assert_eq!(putting.join().unwrap(), Ok(()));
-    assert_eq!(stage.placed(), (other.part, other.placement));
+    let there = (other.part, other.material, other.placement);
+    assert_eq!(stage.placed(), there);
 }
 
 #[test]

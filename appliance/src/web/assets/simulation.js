@@ -46,6 +46,8 @@ function showPart(answer) {
   show("simulation", answer.simulated);
   if (!answer.simulated) return;
   ({ kinds, part } = answer);
+  fill($("part-material"), new Option("as the scenario's light", ""), ...answer.materials.map((name) => new Option(words(name), name)));
+  $("part-material").value = answer.material || "";
   fill($("part-kind"), ...kinds.map((one) => new Option(words(one.part.kind), one.part.kind)));
   $("part-kind").value = part.kind;
   showPlacement(answer.placement);
@@ -65,7 +67,8 @@ async function put() {
   const number = (at) => Number($(`place-${at}`).value);
   const placement = { shift_mm: [0, 1, 2].map(number), tilt_deg: [3, 4].map(number), rotation_deg: number(5) };
   text("simulation-words", "the light of the part is being computed…");
-  await place({ part, placement }, "the part is in place: the next cycle sees it");
+  const material = $("part-material").value || null;
+  await place({ part, material, placement }, "the part is in place: the next cycle sees it");
   text("simulation-words", "");
 }
 

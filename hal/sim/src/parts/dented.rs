@@ -3,16 +3,16 @@
 //! A dent of depth d and diameter D at the point c of the surface lowers z by d/n_z · cos²(π/2 · r / (D/2)), where r is the distance in
 //! space from c to the undented surface, and n the unit normal at c: d is measured along the normal, and D across the surface.
 
-use super::Surface;
-use super::sheet_metal::{BUMP_SLOPE, Defect, bump};
+use super::bump::{BUMP_SLOPE, bump};
+use super::{Defect, Surface};
 use crate::optics::Vector;
 
 /// Half the distance over which slopes are computed, mm.
 const SLOPE_MM: f64 = 1e-3;
 
 /// A surface and its dents.
-pub(super) struct Dented<S> {
-    surface: S,
+pub(super) struct Dented {
+    surface: Box<dyn Surface>,
     dents: Vec<Dent>,
 }
 
@@ -23,9 +23,9 @@ struct Dent {
     half_width: f64,
 }
 
-impl<S: Surface> Dented<S> {
+impl Dented {
     /// The surface with the dents among the defects; other defects are ignored.
-    pub fn new(surface: S, defects: &[Defect]) -> Self {
+    pub fn new(surface: Box<dyn Surface>, defects: &[Defect]) -> Self {
         let dent = |defect: &Defect| match *defect {
             Defect::Dent {
                 x,
@@ -49,7 +49,7 @@ impl<S: Surface> Dented<S> {
     }
 }
 
-impl<S: Surface> Surface for Dented<S> {
+impl Surface for Dented {
     fn height(&self, x: f64, y: f64) -> f64 {
         let z = self.surface.height(x, y);
         let drop = |dent: &Dent| {
@@ -66,6 +66,10 @@ impl<S: Surface> Surface for Dented<S> {
 
     fn present(&self, x: f64, y: f64) -> bool {
         self.surface.present(x, y)
+    }
+
+    fn albedo(&self, x: f64, y: f64) -> f64 {
+        self.surface.albedo(x, y)
     }
 
     fn slope_bound(&self) -> f64 {

@@ -4,7 +4,12 @@
 //! change them.
 
 mod board;
+mod bump;
+mod defect;
 mod dented;
+mod face;
+mod handset;
+mod relief;
 mod shapes;
 mod sheet_metal;
 mod spline;
@@ -15,8 +20,11 @@ use super::limits::within;
 use super::optics::Vector;
 
 pub use board::Board;
+pub use defect::Defect;
+pub use face::Face;
+pub use handset::Handset;
 pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
-pub use sheet_metal::{Defect, SheetMetal};
+pub use sheet_metal::SheetMetal;
 pub use spline::Spline;
 
 /// A part by kind, with its measures in mm.
@@ -35,6 +43,10 @@ pub enum Part {
     Flowerpot(Flowerpot),
     /// A free-form surface.
     Spline(Box<Spline>),
+    /// A face.
+    Face(Face),
+    /// The base of a telephone's handset.
+    Handset(Handset),
     /// A flat square.
     Plane(Plane),
     /// A printed checkerboard.
@@ -77,7 +89,7 @@ pub(crate) trait Surface: Send + Sync {
 impl Part {
     /// One good part of each kind with its default measures.
     #[must_use]
-    pub fn stock() -> [Self; 10] {
+    pub fn stock() -> [Self; 12] {
         [
             Self::SheetMetal(SheetMetal::default()),
             Self::Flowerpot(Flowerpot::default()),
@@ -86,6 +98,8 @@ impl Part {
             Self::Sphere(Sphere::default()),
             Self::Tube(Tube::default()),
             Self::Spline(Box::default()),
+            Self::Face(Face::default()),
+            Self::Handset(Handset::default()),
             Self::Plane(Plane::default()),
             Self::Board(Board::default()),
             Self::Empty {},
@@ -97,6 +111,11 @@ impl Part {
         let positive = |key: &str, value: f64| within(&format!("part.{key}"), value, 1e-3, 1000.0);
         let coordinate =
             |key: &str, value: f64| within(&format!("part.{key}"), value, -1000.0, 1000.0);
+        Defect::check(self.defects())?;
+        self.defects()
+            .iter()
+            .try_for_each(|defect| self.can_have(defect))
+            .map_err(|words| format!("part.defects: {words}"))?;
         match self {
             Self::Cone(part) => {
                 positive("half_size", part.half_size)?;
@@ -129,39 +148,86 @@ impl Part {
                 positive("depth", part.depth)?;
                 // The wall leans outwards by at least 0.025 mm per mm of depth: a height field has no upright walls.
                 let least = part.bottom_diameter + 0.05 * part.depth;
-                within("part.rim_diameter", part.rim_diameter, least, 1000.0)?;
-                part.defects.iter().try_for_each(|defect| {
-                    match defect {
-                    Defect::Dent { .. } => defect.check_dent(),
-                    Defect::MissingHole { .. } | Defect::BentFlange { .. } => Err(
-                        "part.defects of a flowerpot has another kind of defect than a dent: write \
-                         kind = \"dent\""
-                            .into(),
-                    ),
-                }
-                })
+                within("part.rim_diameter", part.rim_diameter, least, 1000.0)
             }
             Self::Spline(part) => part.check(),
             Self::Plane(part) => positive("half_size", part.half_size),
             Self::Board(part) => part.check(),
             Self::SheetMetal(part) => part.check(),
-            Self::Empty {} => Ok(()),
+            // Their measures are given.
+            Self::Face(_) | Self::Handset(_) | Self::Empty {} => Ok(()),
+        }
+    }
+
+    /// Its defects.
+    #[must_use]
+    pub fn defects(&self) -> &[Defect] {
+        match self {
+            Self::Cone(Cone { defects, .. })
+            | Self::Sawtooth(Sawtooth { defects, .. })
+            | Self::Sphere(Sphere { defects, .. })
+            | Self::Tube(Tube { defects, .. })
+            | Self::Flowerpot(Flowerpot { defects, .. })
+            | Self::Face(Face { defects })
+            | Self::Handset(Handset { defects })
+            | Self::Plane(Plane { defects, .. })
+            | Self::SheetMetal(SheetMetal { defects, .. }) => defects,
+            Self::Spline(part) => &part.defects,
+            Self::Board(_) | Self::Empty {} => &[],
+        }
+    }
+
+    /// Its defects, to be changed; `None` if it can have none.
+    pub fn defects_mut(&mut self) -> Option<&mut Vec<Defect>> {
+        match self {
+            Self::Cone(Cone { defects, .. })
+            | Self::Sawtooth(Sawtooth { defects, .. })
+            | Self::Sphere(Sphere { defects, .. })
+            | Self::Tube(Tube { defects, .. })
+            | Self::Flowerpot(Flowerpot { defects, .. })
+            | Self::Face(Face { defects })
+            | Self::Handset(Handset { defects })
+            | Self::Plane(Plane { defects, .. })
+            | Self::SheetMetal(SheetMetal { defects, .. }) => Some(defects),
+            Self::Spline(part) => Some(&mut part.defects),
+            Self::Board(_) | Self::Empty {} => None,
+        }
+    }
+
+    /// Whether it can have a defect of this kind.
+    ///
+    /// # Errors
+    /// If it cannot: which ones it can have.
+    pub fn can_have(&self, defect: &Defect) -> Result<(), &'static str> {
+        match (self, defect) {
+            (Self::Board(_) | Self::Empty {}, _) => Err("it can have no defects"),
+            (Self::SheetMetal(_), _) | (_, Defect::Dent { .. }) => Ok(()),
+            (_, Defect::MissingHole { .. } | Defect::BentFlange { .. }) => {
+                Err("it can have dents only: write kind = \"dent\"")
+            }
         }
     }
 
     /// The surface to trace; `None` for [`Part::Empty`].
     pub(crate) fn surface(&self) -> Option<Box<dyn Surface>> {
-        Some(match self {
+        let good: Box<dyn Surface> = match self {
             Self::Cone(part) => Box::new(part.clone()),
             Self::Sawtooth(part) => Box::new(part.clone()),
             Self::Sphere(part) => Box::new(part.clone()),
             Self::Tube(part) => Box::new(part.clone()),
-            Self::Flowerpot(part) => Box::new(dented::Dented::new(part.clone(), &part.defects)),
+            Self::Flowerpot(part) => Box::new(part.clone()),
             Self::Spline(part) => Box::new((**part).clone()),
+            Self::Face(_) => Box::new(Face::surface()),
+            Self::Handset(_) => Box::new(Handset::surface()),
             Self::Plane(part) => Box::new(part.clone()),
             Self::Board(part) => Box::new(part.clone()),
             Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),
             Self::Empty {} => return None,
+        };
+        let is_dent = |defect: &Defect| matches!(defect, Defect::Dent { .. });
+        Some(match self.defects().iter().any(is_dent) {
+            true => Box::new(dented::Dented::new(good, self.defects())),
+            false => good,
         })
     }
 }

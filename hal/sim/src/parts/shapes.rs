@@ -20,6 +20,8 @@ pub struct Cone {
     pub depth: f64,
     /// z of the top.
     pub top: f64,
+    /// Dents; a good part has none.
+    pub defects: Vec<Defect>,
 }
 
 impl Default for Cone {
@@ -29,6 +31,7 @@ impl Default for Cone {
             radius: 66.0,
             depth: 160.0,
             top: 80.0,
+            defects: Vec::new(),
         }
     }
 }
@@ -71,6 +74,8 @@ pub struct Sawtooth {
     pub lo: f64,
     /// z of the ridges.
     pub hi: f64,
+    /// Dents; a good part has none.
+    pub defects: Vec<Defect>,
 }
 
 impl Default for Sawtooth {
@@ -82,6 +87,7 @@ impl Default for Sawtooth {
             x0: -100.0,
             lo: -13.5,
             hi: 13.5,
+            defects: Vec::new(),
         }
     }
 }
@@ -120,6 +126,8 @@ pub struct Sphere {
     pub centre_z: f64,
     /// z below which the sphere is cut off.
     pub cut: f64,
+    /// Dents; a good part has none.
+    pub defects: Vec<Defect>,
 }
 
 impl Default for Sphere {
@@ -128,6 +136,7 @@ impl Default for Sphere {
             radius: 125.0,
             centre_z: -75.0,
             cut: -10.4,
+            defects: Vec::new(),
         }
     }
 }
@@ -167,6 +176,8 @@ pub struct Tube {
     pub half_length: f64,
     /// z of the axis.
     pub centre_z: f64,
+    /// Dents; a good part has none.
+    pub defects: Vec<Defect>,
 }
 
 impl Default for Tube {
@@ -175,6 +186,7 @@ impl Default for Tube {
             diameter: 127.34,
             half_length: 47.5,
             centre_z: -20.0,
+            defects: Vec::new(),
         }
     }
 }
@@ -218,8 +230,7 @@ pub struct Flowerpot {
     pub bottom_diameter: f64,
     /// Height of the wall.
     pub depth: f64,
-    /// Dents of its wall; depth is along the wall's normal, diameter across the wall.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    /// Dents; a good part has none.
     pub defects: Vec<Defect>,
 }
 
@@ -258,11 +269,16 @@ impl Surface for Flowerpot {
 pub struct Plane {
     /// Half the side of the square.
     pub half_size: f64,
+    /// Dents; a good part has none.
+    pub defects: Vec<Defect>,
 }
 
 impl Default for Plane {
     fn default() -> Self {
-        Self { half_size: 250.0 }
+        Self {
+            half_size: 250.0,
+            defects: Vec::new(),
+        }
     }
 }
 

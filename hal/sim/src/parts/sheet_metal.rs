@@ -1,14 +1,14 @@
-//! The default part: a stamped sheet-metal bracket with holes, a slot, a bead, a flange, and its defects.
+//! The default part: a stamped sheet-metal bracket with holes, a slot, a bead, a flange.
 //!
 //! 150 × 110 mm seen from above, upper side of the plate at z = 8 mm: three round holes and a slot, a raised
 //! bead, drawn edges, and the +x edge bent down as a flange. The measures are made up for this project.
 
 use serde::{Deserialize, Serialize};
 
-use super::Surface;
+use super::bump::{BUMP_SLOPE, bump};
+use super::{Defect, Surface};
 use crate::limits::within;
 use crate::optics::Vector;
-use hal::bounds::length;
 
 /// z of the plate's upper side.
 const PLATE_Z: f64 = 8.0;
@@ -41,9 +41,6 @@ const BEAD_HEIGHT: f64 = 2.2;
 const EDGE_DROP: f64 = 0.4;
 const EDGE_WIDTH: f64 = 1.6;
 
-/// Most defects of a scenario.
-const MAX_DEFECTS: usize = 64;
-
 /// The bracket and its defects.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -52,60 +49,12 @@ pub struct SheetMetal {
     pub defects: Vec<Defect>,
 }
 
-/// One defect of a part; the bracket has all of them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum Defect {
-    /// A round, smooth dent. The bracket is stamped from above: its dents go down in z, also where the flange slopes.
-    Dent {
-        /// Centre, mm.
-        x: f64,
-        /// Centre, mm.
-        y: f64,
-        /// Depth in mm; negative is a bump.
-        depth_mm: f64,
-        /// Diameter, mm.
-        diameter_mm: f64,
-    },
-    /// A round hole that was not punched.
-    MissingHole {
-        /// 0 and 1 are the small ones at −x, +y and −y; 2 is the large one.
-        index: usize,
-    },
-    /// A flange that is bent too far or too little.
-    BentFlange {
-        /// Degrees in excess of the nominal angle; negative if bent too little.
-        degrees: f64,
-    },
-}
-
-impl Defect {
-    /// Checks the measures of a dent; other defects pass. The error names the key and its range.
-    pub(super) fn check_dent(&self) -> Result<(), String> {
-        let Self::Dent {
-            x,
-            y,
-            depth_mm,
-            diameter_mm,
-        } = *self
-        else {
-            return Ok(());
-        };
-        within("part.defects.x", x, -100.0, 100.0)?;
-        within("part.defects.y", y, -100.0, 100.0)?;
-        within("part.defects.diameter_mm", diameter_mm, 0.5, 200.0)?;
-        let deepest = diameter_mm / 2.0;
-        within("part.defects.depth_mm", depth_mm, -deepest, deepest)
-    }
-}
-
 impl SheetMetal {
     pub(super) fn check(&self) -> Result<(), String> {
         let mut degrees_more = 0.0;
-        length("part.defects", self.defects.len(), 0, MAX_DEFECTS)?;
         for defect in &self.defects {
             match *defect {
-                Defect::Dent { .. } => defect.check_dent()?,
+                Defect::Dent { .. } => {}
                 Defect::MissingHole { index } => {
                     within("part.defects.index", index, 0, HOLES.len() - 1)?;
                 }
@@ -136,32 +85,22 @@ impl Run {
     }
 }
 
-/// The surface of one bracket.
+/// The surface of one bracket without its dents.
 pub(super) struct Stamping {
     sin: f64,
     cos: f64,
     /// x of the flange's end.
     right: f64,
     holes: Vec<[f64; 3]>,
-    /// x, y, depth, diameter.
-    dents: Vec<[f64; 4]>,
 }
 
 impl Stamping {
     pub(super) fn new(part: &SheetMetal) -> Self {
         let mut degrees = FLANGE_DEG;
         let mut missing = Vec::new();
-        let mut dents = Vec::new();
         for defect in &part.defects {
             match *defect {
-                Defect::Dent {
-                    x,
-                    y,
-                    depth_mm,
-                    diameter_mm,
-                } => {
-                    dents.push([x, y, depth_mm, diameter_mm]);
-                }
+                Defect::Dent { .. } => {}
                 Defect::MissingHole { index } => missing.push(index),
                 Defect::BentFlange { degrees: more } => degrees += more,
             }
@@ -176,7 +115,6 @@ impl Stamping {
             cos,
             right: BEND_LINE + BEND_RADIUS * sin + FLANGE_LENGTH * cos,
             holes: holes.map(|(_, hole)| *hole).collect(),
-            dents,
         }
     }
 
@@ -204,27 +142,12 @@ impl Stamping {
     }
 }
 
-/// cos² from 1 at distance 0 to 0 at `half_width`, smooth at both; its slope is at most π / (2 · half_width).
-pub(super) fn bump(distance: f64, half_width: f64) -> f64 {
-    if distance >= half_width {
-        return 0.0;
-    }
-    let cos = (std::f64::consts::FRAC_PI_2 * distance / half_width).cos();
-    cos * cos
-}
-
-/// The largest slope of [`bump`], multiplied by the half-width.
-pub(super) const BUMP_SLOPE: f64 = std::f64::consts::FRAC_PI_2;
-
 impl Surface for Stamping {
     fn height(&self, x: f64, y: f64) -> f64 {
         let mut z = PLATE_Z - self.flange_drop(x);
         z += BEAD_HEIGHT * bump(BEAD.distance(x, y), BEAD.half_width);
         let drawn = (1.0 - self.inside(x, y) / EDGE_WIDTH).clamp(0.0, 1.0);
         z -= EDGE_DROP * drawn * drawn;
-        for [dent_x, dent_y, depth, diameter] in &self.dents {
-            z -= depth * bump((x - dent_x).hypot(y - dent_y), diameter / 2.0);
-        }
         z
     }
 
@@ -238,25 +161,17 @@ impl Surface for Stamping {
     }
 
     fn slope_bound(&self) -> f64 {
-        let dents: f64 = self
-            .dents
-            .iter()
-            .map(|[_, _, depth, diameter]| depth.abs() * BUMP_SLOPE * 2.0 / diameter)
-            .sum();
         // The bead ends before the bend and away from the drawn edges, so its slope and theirs never add up.
         let bead = BEAD_HEIGHT * BUMP_SLOPE / BEAD.half_width;
         let edge = 2.0 * EDGE_DROP / EDGE_WIDTH;
-        (self.sin / self.cos + edge).max(bead) + dents
+        (self.sin / self.cos + edge).max(bead)
     }
 
     fn bounds(&self) -> [Vector; 2] {
-        let depths = || self.dents.iter().map(|[_, _, depth, _]| depth);
-        let down: f64 = depths().map(|depth| depth.max(0.0)).sum();
-        let up: f64 = depths().map(|depth| (-depth).max(0.0)).sum();
-        let low = PLATE_Z - self.flange_drop(self.right) - EDGE_DROP - down;
+        let low = PLATE_Z - self.flange_drop(self.right) - EDGE_DROP;
         [
             [LEFT, -HALF_HEIGHT, low],
-            [self.right, HALF_HEIGHT, PLATE_Z + BEAD_HEIGHT + up],
+            [self.right, HALF_HEIGHT, PLATE_Z + BEAD_HEIGHT],
         ]
     }
 }

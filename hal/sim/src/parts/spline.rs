@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::Surface;
 use super::shapes::{in_square, square};
+use super::{Defect, Surface};
 use crate::limits::within;
 use crate::optics::Vector;
 
@@ -19,6 +19,8 @@ pub struct Spline {
     pub half_size: f64,
     /// Control values in mm, row = y, column = x.
     pub control: [[f64; CONTROL]; CONTROL],
+    /// Dents; a good part has none.
+    pub defects: Vec<Defect>,
 }
 
 impl Default for Spline {
@@ -26,6 +28,7 @@ impl Default for Spline {
         Self {
             half_size: 100.0,
             control: STUDY,
+            defects: Vec::new(),
         }
     }
 }

@@ -9,7 +9,7 @@ mod surfaces;
 
 use std::time::{Duration, Instant};
 
-use super::parts::{Board, Cone, Defect, Flowerpot, Plane, Sawtooth, SheetMetal, Sphere, Tube};
+use super::parts::{Board, Defect};
 use super::{Part, Scenario, head};
 use hal::contract::check_head;
 use hal::frame::{Frame, Samples};
@@ -29,45 +29,43 @@ fn small(part: Part) -> Scenario {
     scenario
 }
 
+/// Every stock part, and every one that can have dents with a dent and a bump; the sheet metal has its other defects too.
 fn all_parts() -> Vec<Part> {
-    vec![
-        Part::Cone(Cone::default()),
-        Part::Sawtooth(Sawtooth::default()),
-        Part::Sphere(Sphere::default()),
-        Part::Tube(Tube::default()),
-        Part::Flowerpot(Flowerpot::default()),
-        Part::Spline(Box::default()),
-        Part::Plane(Plane::default()),
-        Part::Board(Board {
+    let stock = Part::stock().map(|part| match part {
+        Part::Board(board) => Part::Board(Board {
             bow_um: 300.0,
-            ..Board::default()
+            ..board
         }),
-        Part::SheetMetal(SheetMetal::default()),
-        Part::SheetMetal(SheetMetal {
-            defects: vec![
-                Defect::Dent {
-                    x: 10.0,
-                    y: -5.0,
-                    depth_mm: 1.5,
-                    diameter_mm: 20.0,
-                },
-                Defect::MissingHole { index: 1 },
-                Defect::BentFlange { degrees: 6.0 },
-            ],
-        }),
-        Part::Flowerpot(Flowerpot {
-            defects: [1.5, -0.6].map(wall_dent).to_vec(),
-            ..Flowerpot::default()
-        }),
-        Part::Empty {},
-    ]
+        part => part,
+    });
+    let dented = stock.iter().filter_map(|part| {
+        let mut part = part.clone();
+        let dents = [1.5, -0.6].map(|depth_mm| dent(&part, depth_mm));
+        let others = [
+            Defect::MissingHole { index: 1 },
+            Defect::BentFlange { degrees: 6.0 },
+        ];
+        let can_have = |defect: &Defect| part.can_have(defect).is_ok();
+        let defects: Vec<_> = dents.into_iter().chain(others).filter(can_have).collect();
+        *part.defects_mut()? = defects;
+        Some(part)
+    });
+    stock.iter().cloned().chain(dented).collect()
 }
 
-/// A dent in the middle of the flowerpot's wall.
-fn wall_dent(depth_mm: f64) -> Defect {
+/// A dent at a place where the part slopes.
+fn dent(part: &Part, depth_mm: f64) -> Defect {
+    let [x, y] = match part {
+        Part::Flowerpot(_) => [-60.0, 52.0],
+        Part::SheetMetal(_) => [58.0, -5.0],
+        Part::Sawtooth(_) => [9.0, 12.0],
+        Part::Face(_) => [-20.0, 62.0],
+        Part::Handset(_) => [20.0, 26.0],
+        _ => [-20.0, 35.0],
+    };
     Defect::Dent {
-        x: -60.0,
-        y: 52.0,
+        x,
+        y,
         depth_mm,
         diameter_mm: 8.0,
     }
@@ -96,7 +94,7 @@ fn counts(frame: &Frame) -> Vec<f64> {
 
 #[test]
 fn a_scenario_is_read_over_its_defaults_and_refuses_what_it_does_not_know() {
-    let text = "bit_depth = 10\n[rig.camera]\nwidth = 640\n[part]\nkind = \"sheet_metal\"\n\
+    let text = "bit_depth = 10\nmaterial = \"oiled\"\n[rig.camera]\nwidth = 640\n[part]\nkind = \"sheet_metal\"\n\
         [[part.defects]]\nkind = \"dent\"\nx = 1.0\ny = 2.0\ndepth_mm = 1.0\ndiameter_mm = 9.0\n";
     let scenario = Scenario::from_toml(text, "s.toml").unwrap();
     assert_eq!(
@@ -125,6 +123,9 @@ fn a_scenario_is_read_over_its_defaults_and_refuses_what_it_does_not_know() {
         ("[part]\nkind = \"empty\"\nsize = 1", "size"),
         ("[part]\nkind = \"cone\"\nheight = 1", "height"),
         ("[light]\nambient = nan", "light.ambient is NaN"),
+        ("[light]\nspecular = 4.1", "light.specular is 4.1"),
+        ("[light]\nshininess = 0.5", "light.shininess is 0.5"),
+        ("material = \"wood\"", "rolled_steel"),
         (
             "[placement]\ntilt_deg = [90.0, 0.0]",
             "placement.tilt_deg is 90",

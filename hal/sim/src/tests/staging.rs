@@ -2,7 +2,7 @@
 
 use super::{all_parts, small};
 use crate::parts::{Defect, Plane, SheetMetal};
-use crate::{Part, Placement, Scenario, Stage, head};
+use crate::{Material, Part, Placement, Scenario, Stage, head};
 
 /// Pixels whose truth is not NaN, and the largest difference of truth from the good part.
 fn against_good(stage: &Stage, defects: Vec<Defect>) -> (usize, f32) {
@@ -139,17 +139,34 @@ fn going_back_to_a_placed_part_costs_nothing() {
         built.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
     };
     for _ in 0..5 {
-        for part in all_parts().iter().take(4) {
-            stage
-                .place_with_progress(part, &Placement::default(), &count)
-                .unwrap();
+        for material in [None, Some(Material::Oiled)] {
+            for part in all_parts().iter().skip(1).take(2) {
+                stage
+                    .place_with_progress(part, material, &Placement::default(), &count)
+                    .unwrap();
+                assert_eq!(stage.placed().1, material);
+            }
         }
     }
     assert_eq!(
         built.into_inner(),
         4 * 48,
-        "each of four parts is traced once, row by row"
+        "each of two parts is traced once in either material, row by row"
     );
+}
+
+#[test]
+fn a_part_that_is_placed_without_a_word_on_its_material_is_of_the_scenarios() {
+    let scenario = Scenario {
+        material: Some(Material::RolledSteel),
+        ..small(Part::default())
+    };
+    let (_, stage) = head(&scenario).unwrap();
+    assert_eq!(stage.placed().1, scenario.material);
+    stage
+        .place(&Part::Plane(Plane::default()), &Placement::default())
+        .unwrap();
+    assert_eq!(stage.placed().1, scenario.material);
 }
 
 #[test]

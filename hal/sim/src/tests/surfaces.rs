@@ -1,8 +1,8 @@
 //! Surfaces and rays: slopes and material stay within their bounds, and traced rays meet the surface where a march in small steps does.
 
-use super::{all_parts, wall_dent};
+use super::all_parts;
 use crate::optics::{Lens, Vector, along};
-use crate::parts::Flowerpot;
+use crate::parts::Defect;
 use crate::trace::Traced;
 use crate::{Part, Scenario};
 
@@ -43,35 +43,84 @@ fn no_slope_is_above_its_bound_and_no_material_outside_of_its_box() {
     }
 }
 
-#[test]
-fn a_dent_of_a_wall_is_as_deep_along_its_normal_and_as_wide_across_it_as_it_says() {
-    let [good, dented] = [vec![], vec![wall_dent(0.3)]].map(|defects| {
-        let pot = Flowerpot {
-            defects,
-            ..Flowerpot::default()
-        };
-        Part::Flowerpot(pot).surface().unwrap()
+/// What a dent of 0.4 mm depth and 8 mm diameter, centred at the point of the surface above (x, y), removes along the normal there: in
+/// steps of 1 mm across the surface, along the steepest direction and perpendicular to it, from −5 to 5 mm.
+fn removed(part: &Part, [x, y]: [f64; 2]) -> [Vec<f64>; 2] {
+    let good = part.surface().unwrap();
+    let mut part = part.clone();
+    part.defects_mut().unwrap().push(Defect::Dent {
+        x,
+        y,
+        depth_mm: 0.4,
+        diameter_mm: 8.0,
     });
-    let centre = [-60.0_f64, 52.0];
-    // The wall of a pot has the same slope everywhere, its bound; n_z of its normal follows.
-    let normal_z = 1.0 / good.slope_bound().hypot(1.0);
-    let depth = |x: f64, y: f64| (good.height(x, y) - dented.height(x, y)) * normal_z;
-    assert!((depth(centre[0], centre[1]) - 0.3).abs() < 1e-6);
-    // Across the surface, up the wall and around it: half the depth at a quarter of the diameter (2 mm) from the centre, none beyond half
-    // the diameter (4 mm).
-    let radius = centre[0].hypot(centre[1]);
-    let [outwards, around] = [
-        [centre[0] / radius, centre[1] / radius],
-        [-centre[1] / radius, centre[0] / radius],
-    ];
-    for ([x, y], per_mm) in [(outwards, normal_z), (around, 1.0)] {
-        let at = |mm: f64| depth(centre[0] + x * mm * per_mm, centre[1] + y * mm * per_mm);
-        for side in [-1.0, 1.0] {
-            // Around the pot the place 2 mm along the tangent is farther from the axis by 2²/2r = 0.025 mm, where the wall is higher in z, so
-            // that its distance in space from the centre is a little more than 2 mm: hence the tolerance.
-            assert!((at(2.0 * side) - 0.15).abs() < 0.005, "{}", at(2.0 * side));
-            assert_eq!(at(4.01 * side), 0.0);
+    let dented = part.surface().unwrap();
+    let half = 1e-4;
+    let along_x = (good.height(x + half, y) - good.height(x - half, y)) / (2.0 * half);
+    let along_y = (good.height(x, y + half) - good.height(x, y - half)) / (2.0 * half);
+    let slope = along_x.hypot(along_y);
+    let normal_z = 1.0 / slope.hypot(1.0);
+    let up = match slope > 1e-6 {
+        true => [along_x / slope, along_y / slope],
+        false => [1.0, 0.0],
+    };
+    [(up, normal_z), ([-up[1], up[0]], 1.0)].map(|([to_x, to_y], per_mm)| {
+        let depth = |mm: i32| {
+            let mm = f64::from(mm) * per_mm;
+            let (x, y) = (x + to_x * mm, y + to_y * mm);
+            (good.height(x, y) - dented.height(x, y)) * normal_z
+        };
+        (-5..=5).map(depth).collect()
+    })
+}
+
+#[test]
+fn a_dent_is_as_deep_along_the_normal_and_as_wide_across_the_surface_as_it_says_on_every_part() {
+    // cos²(π/2 · r / 4 mm) of 0.4 mm.
+    let expected = |mm: f64| 0.4 * (std::f64::consts::PI * mm.min(4.0) / 8.0).cos().powi(2);
+    let mut dented = 0;
+    for mut part in Part::stock() {
+        let Defect::Dent { x, y, .. } = super::dent(&part, 0.0) else {
+            continue;
+        };
+        if part.defects_mut().is_none() {
+            continue;
         }
+        dented += 1;
+        for profile in removed(&part, [x, y]) {
+            assert!((profile[5] - 0.4).abs() < 1e-6, "{part:?}: {profile:?}");
+            for (mm, found) in (-5_i32..).zip(profile) {
+                // Places that are as far apart across a curved surface are nearer or farther in space, hence the tolerance.
+                let off = (found - expected(f64::from(mm.abs()))).abs();
+                assert!(off < 0.02, "{part:?} at {mm} mm: {found}");
+            }
+        }
+    }
+    assert_eq!(
+        dented,
+        Part::stock().len() - 2,
+        "all but board and empty stage"
+    );
+}
+
+#[test]
+fn a_dent_of_a_flat_face_goes_down_in_z_as_deep_as_it_says() {
+    let mut bracket = Part::default();
+    let good = bracket.surface().unwrap();
+    bracket.defects_mut().unwrap().push(Defect::Dent {
+        x: 0.0,
+        y: -8.0,
+        depth_mm: 0.6,
+        diameter_mm: 14.0,
+    });
+    let dented = bracket.surface().unwrap();
+    for step in -8_i32..=8 {
+        let off = f64::from(step);
+        let share = (std::f64::consts::FRAC_PI_2 * off.abs().min(7.0) / 7.0)
+            .cos()
+            .powi(2);
+        let found = good.height(off, -8.0) - dented.height(off, -8.0);
+        assert!((found - 0.6 * share).abs() < 1e-12, "{found} at {off} mm");
     }
 }
 
@@ -83,9 +132,10 @@ fn marched(part: &Part, origin: Vector, direction: Vector) -> Option<f64> {
         (z - surface.height(x, y), surface.present(x, y))
     };
     let step = 0.01;
-    let mut t = 400.0;
+    // All parts lie between z = −100 and 100.
+    let [mut t, end] = [100.0, -100.0].map(|z| (z - origin[2]) / direction[2]);
     let mut last = over(t).0;
-    while t < 900.0 {
+    while t < end {
         t += step;
         let (value, present) = over(t);
         if (value > 0.0) != (last > 0.0) && present {
