@@ -51,6 +51,7 @@ mod rooms;
 mod sequences;
 mod service;
 mod shared_recordings;
+mod shown;
 mod simulated_board;
 mod simulated_part;
 mod station;

@@ -17,8 +17,8 @@ use super::height::base_nm;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
 use super::{Input, Production, Strip};
-use crate::inspect::Reading;
 use crate::inspect::align::{Placed, form};
+use crate::inspect::{Reading, Square};
 use crate::units::Height;
 
 /// Pixels of a square whose Jacobians are averaged, in each direction.
@@ -118,6 +118,11 @@ impl Production {
                 ),
                 libm::hypot(self.displaced(pose.placed.as_ref()), self.rippled()),
             ),
+            square: Some(Square {
+                column: best.column,
+                row: best.row,
+                side,
+            }),
         })
     }
 
