@@ -46,12 +46,14 @@ fn periodic(bed: &mut Bed, taught: &TaughtRecipe, arrays: &Arrays, sequence: usi
     let mut bins = [(0.0, 0.0); BINS];
     for _ in 0..CAPTURES {
         let frames = frames(bed, &plan, sequence);
-        let layers = plan.layers(sequence, &frames).unwrap();
-        for (at, &deviation) in layers.deviation_mm.iter().enumerate() {
-            if arrays.valid[at] != 0 && deviation.is_finite() {
+        let heights = plan.heights(sequence, &frames).unwrap();
+        let golden = &plan.production().cubics().surface().height;
+        for (at, &height) in heights.iter().enumerate() {
+            if arrays.valid[at] != 0 && height.is_finite() {
+                let deviation = f64::from(height) - golden[at].mm();
                 let share = arrays.golden_phase[at].rem_euclid(1.0);
                 let (sum, count) = &mut bins[(share * BINS as f64) as usize % BINS];
-                (*sum, *count) = (*sum + f64::from(deviation), *count + 1.0);
+                (*sum, *count) = (*sum + deviation, *count + 1.0);
             }
         }
     }

@@ -53,6 +53,7 @@ mod sequences;
 mod service;
 mod shared_recordings;
 mod shiny;
+mod shown;
 mod simulated_board;
 mod simulated_part;
 mod station;

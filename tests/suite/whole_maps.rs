@@ -1,7 +1,7 @@
 //! A whole measured height map against the golden one, pixel by pixel: deviation and coverage of regions. Production by strips is
 //! compared with it.
 
-use algo::inspect::{Reading, Region};
+use algo::inspect::{Reading, Region, Square};
 use algo::pipeline::{HeightMap, Window};
 use algo::units::Height;
 
@@ -62,6 +62,7 @@ impl<'a> Comparison<'a> {
             sigma: (sigma > 0.0).then_some(sigma),
             expected: None,
             systematic: 0.0,
+            square: Some(Square { column, row, side }),
         })
     }
 
@@ -93,6 +94,7 @@ impl<'a> Comparison<'a> {
             sigma: None,
             expected: None,
             systematic: 0.0,
+            square: None,
         }
     }
 

@@ -14,7 +14,7 @@ mod table;
 mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
-pub use gauge::{Axis, Measure, Reading, TooFine};
+pub use gauge::{Axis, Measure, Reading, Square, TooFine};
 pub use largest::Largest;
 pub(crate) use mask::components;
 pub use mask::eroded;
@@ -23,7 +23,7 @@ pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
 pub use strips::{
-    CalibrationError, Findings, Found, Gauge, Input, MAX_GAUGES, PairBuffers, PairPlaced, Parts,
-    Picture, Production, Skipped, Strips, Taught, Unmeasurable,
+    CalibrationError, Findings, Found, Gauge, Input, MAX_GAUGES, Maps, PairBuffers, PairPlaced,
+    Parts, Picture, Production, Skipped, Strips, Taught, Unmeasurable,
 };
 pub use weight::{Factor, Weight};

@@ -4,11 +4,11 @@
 use super::options::Measuring;
 use crate::error::{Exit, Failure};
 use crate::history::kept::{self, Kept, missing};
-use crate::history::{Entry, Reader, difference, seq_of};
+use crate::history::{Entry, GaugeEntry, Reader, difference, seq_of};
 use crate::recipe::plan::PlanError;
 use crate::recipe::{Recipe, Store};
 use crate::station::result::flag::SIMULATED;
-use crate::station::{Inspection, ResultRecord};
+use crate::station::{Inspection, ResultRecord, Square};
 use crate::storage::unpack::Unpacked;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -193,17 +193,24 @@ fn table(entry: &Entry, from: &str) -> String {
     ];
     lines.extend(entry.gauges.iter().map(|gauge| {
         format!(
-            "{:<20} {:>10} {:<3} σ {:>8}  U {:>8}  limits {} to {}",
+            "{:<20} {:>10} {:<3} σ {:>8}  U {:>8}  limits {} to {}{}",
             gauge.name,
             number(gauge.value),
             gauge.unit,
             number(gauge.sigma),
             number(gauge.uncertainty),
             number(gauge.low),
-            number(gauge.high)
+            number(gauge.high),
+            place(gauge),
         )
     }));
     lines.join("\n")
+}
+
+/// Where the value is, in camera pixels.
+fn place(gauge: &GaugeEntry) -> String {
+    let at = |square: &Square| format!("  at column {}, row {}", square.column, square.row);
+    gauge.square.as_ref().map(at).unwrap_or_default()
 }
 
 fn because(entry: &Entry) -> String {

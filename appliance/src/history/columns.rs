@@ -2,7 +2,7 @@
 
 use super::entry::{Entry, GaugeEntry};
 use super::reader::rows;
-use crate::station::{Placement, Verdict};
+use crate::station::{Placement, Square, Verdict};
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 use rusqlite::{Connection, Row, Transaction};
 
@@ -37,7 +37,7 @@ columns!(Entry in "result"; stages;
     seq time_utc_us recipe fingerprint part_id press_stroke token verdict error_code reason flags valid_points coverage_permille
     temperature_c height_noise_mm fitness_permille exposure_us total_us recording;
     uptime_s boot_id unkept placement);
-columns!(GaugeEntry in "gauge"; result place; name unit value sigma low high decision; uncertainty expected);
+columns!(GaugeEntry in "gauge"; result place; name unit value sigma low high decision; uncertainty expected square);
 
 /// Stores a result with its gauges.
 pub(super) fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
@@ -81,15 +81,23 @@ impl FromSql for Verdict {
     }
 }
 
-impl ToSql for Placement {
-    fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
-        // Numbers that are finite are always JSON.
-        Ok(serde_json::to_string(self).unwrap_or_default().into())
-    }
+/// Stores a type as JSON.
+macro_rules! as_json {
+    ($($of:ident)*) => {$(
+        impl ToSql for $of {
+            fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
+                // Numbers that are finite are always JSON.
+                Ok(serde_json::to_string(self).unwrap_or_default().into())
+            }
+        }
+
+        impl FromSql for $of {
+            fn column_result(value: ValueRef<'_>) -> FromSqlResult<Self> {
+                let read = serde_json::from_str(value.as_str()?);
+                read.map_err(|error| FromSqlError::Other(error.into()))
+            }
+        }
+    )*};
 }
 
-impl FromSql for Placement {
-    fn column_result(value: ValueRef<'_>) -> FromSqlResult<Self> {
-        serde_json::from_str(value.as_str()?).map_err(|error| FromSqlError::Other(error.into()))
-    }
-}
+as_json!(Placement Square);

@@ -1,7 +1,7 @@
 //! A result as the history keeps it, and a filter of results.
 
 use crate::station::result::flag;
-use crate::station::{Placement, ResultRecord, Verdict};
+use crate::station::{Placement, ResultRecord, Square, Verdict};
 use serde::{Deserialize, Serialize};
 
 /// One stored result. Lengths in mm, times in µs; as JSON the keys are the fields' names.
@@ -86,6 +86,8 @@ pub struct GaugeEntry {
     pub uncertainty: Option<f64>,
     /// The magnitude that is expected on a good part, where noise moves the value away from 0; `None` in results of older programs.
     pub expected: Option<f64>,
+    /// The square that the value is of, where it is a deviation; `None` in results of older programs.
+    pub square: Option<Square>,
     /// Lower limit.
     pub low: Option<f64>,
     /// Upper limit.
@@ -189,6 +191,7 @@ fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
             sigma: finite(gauge.sigma),
             uncertainty: finite(gauge.uncertainty),
             expected: finite(gauge.expected),
+            square: gauge.square,
             low: finite(gauge.low),
             high: finite(gauge.high),
             decision: gauge.decision.bits(),
@@ -202,18 +205,22 @@ const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
 /// The bit of a decision that follows from σ.
 const DOUBTFUL: u16 = 1 << 4;
 
-/// A replayed gauge as far as it can be compared with the stored one: older programs have stored no uncertainty, and their σ of extremes
-/// was another one.
+/// A replayed gauge as far as it can be compared with the stored one: older programs have stored no square; still older ones no
+/// uncertainty, and their σ of extremes was another one.
 fn comparable(stored: &GaugeEntry, replayed: &GaugeEntry) -> GaugeEntry {
+    let replayed = GaugeEntry {
+        square: stored.square.and(replayed.square),
+        ..replayed.clone()
+    };
     if !is_older(stored) {
-        return replayed.clone();
+        return replayed;
     }
     GaugeEntry {
         sigma: stored.sigma,
         uncertainty: None,
         expected: None,
         decision: (replayed.decision & !DOUBTFUL) | (stored.decision & DOUBTFUL),
-        ..replayed.clone()
+        ..replayed
     }
 }
 

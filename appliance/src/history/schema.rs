@@ -63,13 +63,14 @@ CREATE TABLE gauge (
 ";
 
 /// Columns that came later, with their tables; older databases get them when they are opened for writing.
-const ADDED: [(&str, &str, &str); 6] = [
+const ADDED: [(&str, &str, &str); 7] = [
     ("result", "uptime_s", "INTEGER"),
     ("result", "boot_id", "TEXT"),
     ("result", "unkept", "TEXT"),
     ("result", "placement", "TEXT"),
     ("gauge", "uncertainty", "REAL"),
     ("gauge", "expected", "REAL"),
+    ("gauge", "square", "TEXT"),
 ];
 /// A table that came later: when a start of the daemon was, by the clock of a signed-in user's browser.
 const STARTS: &str =

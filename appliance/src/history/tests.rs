@@ -21,6 +21,7 @@ fn entry(seq: u32, recipe: u16, verdict: Verdict) -> Entry {
         sigma: None,
         uncertainty: Some(value / 7.0),
         expected: None,
+        square: None,
         low: Some(-0.25),
         high: Some(0.1 + 0.2),
         decision: 3,

@@ -6,7 +6,7 @@ use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::good_parts::{GoodPartsFile, Noise, ROOM, SIDES};
 use super::planner::{self, Choice};
-use super::proof;
+use super::proof::{self, Magnitudes};
 use super::{
     AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile, SequenceFile,
 };
@@ -336,10 +336,9 @@ impl GoldenPart<'_> {
         }
         let judged = proof::displaced(&tried, arrays, self.calibration)?;
         let others = manifest.gauges.len() - 1;
-        let found = |at: usize| proof::magnitudes(&judged, if at == 0 { 0 } else { at + others });
-        let fits = |(mean, scatter, most): (f64, f64, f64)| {
-            most.max(mean + FARTHEST * scatter) < ROOM * good_parts.limit_mm
-        };
+        let gauge_of = |at: usize| if at == 0 { 0 } else { at + others };
+        let found = |at: usize| Magnitudes::of(&judged, gauge_of(at));
+        let fits = |of: Magnitudes| of.middle + FARTHEST * of.spread < ROOM * good_parts.limit_mm;
         let at = (0..sides.len()).find(|at| found(*at).is_none_or(fits));
         let at = at.unwrap_or(sides.len() - 1);
         if at > 0 {
@@ -347,19 +346,22 @@ impl GoldenPart<'_> {
             good_parts = noise.weigh_smallest(&mut arrays.valid, DEVIATION_MM, &sides[at..=at]);
             set_deviation(&mut manifest.gauges[0], &good_parts);
         }
-        if let Some((mean, scatter, _)) = found(at) {
-            (good_parts.displaced_mm, good_parts.displaced_scatter_mm) = (mean, scatter);
+        let taken = found(at);
+        if let Some(Magnitudes { middle, spread }) = taken {
+            (good_parts.displaced_mm, good_parts.displaced_scatter_mm) = (middle, spread);
         }
         let mut words = good_parts.words();
         manifest.good_parts = Some(good_parts);
         // Values by the squares that were taken, in the order of the recipe's gauges.
-        let judged = judged.into_iter().map(|mut inspection| {
-            let taken = if at == 0 { 0 } else { at + others };
-            if let Some(value) = inspection.gauges.get(taken).cloned() {
-                inspection.gauges[0] = value;
+        let judged = judged.into_iter().filter_map(|mut inspection| {
+            let deviation = inspection.gauges.get(gauge_of(at)).cloned()?;
+            let wrong = taken.zip(deviation.value);
+            if wrong.is_some_and(|(of, value)| of.is_wrong(value)) {
+                return None;
             }
+            inspection.gauges[0] = deviation;
             inspection.gauges.truncate(others + 1);
-            inspection
+            Some(inspection)
         });
         let judged: Vec<Inspection> = judged.collect();
         words.extend(proof::hold(manifest, &judged));

@@ -191,15 +191,45 @@ pub(super) fn not_judged(judged: &[Inspection]) -> Option<String> {
     ))
 }
 
-/// Mean and standard deviation of the magnitudes of a gauge's values, and the largest; none if there are not several.
-pub(super) fn magnitudes(judged: &[Inspection], gauge: usize) -> Option<(f64, f64, f64)> {
-    let values = judged
-        .iter()
-        .filter_map(|inspection| inspection.gauges.get(gauge)?.value);
-    let values: Vec<f64> = values.map(f64::abs).collect();
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    let most = values.iter().copied().fold(0.0, f64::max);
-    (values.len() > 1).then(|| (mean, (squares / (count - 1.0)).sqrt(), most))
+/// What a gauge's values are in magnitude: middle and spread.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Magnitudes {
+    /// Their median.
+    pub middle: f64,
+    /// Their standard deviation, by the median distance from the median: of placements that are worked out, single ones can be wrong where
+    /// golden is seen at a grazing angle.
+    pub spread: f64,
+}
+
+/// Median distance of normal numbers from their median, over their standard deviation.
+const MEDIAN_DISTANCE: f64 = 0.674_5;
+/// Values that are farther than this many spreads from the middle were worked out wrong.
+const WRONG: f64 = 8.0;
+
+impl Magnitudes {
+    /// Of a gauge; none if it has no values.
+    pub fn of(judged: &[Inspection], gauge: usize) -> Option<Self> {
+        let values = judged
+            .iter()
+            .filter_map(|inspection| inspection.gauges.get(gauge)?.value);
+        let values: Vec<f64> = values.map(f64::abs).collect();
+        let middle = median(values.clone())?;
+        let distances = values.iter().map(|value| (value - middle).abs()).collect();
+        Some(Self {
+            middle,
+            spread: median(distances)? / MEDIAN_DISTANCE,
+        })
+    }
+
+    /// Whether a value was worked out wrong.
+    pub fn is_wrong(&self, value: f64) -> bool {
+        value.abs() - self.middle > WRONG * self.spread.max(self.middle / WRONG)
+    }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let upper = values.len() / 2;
+    let middle = values.get(upper.saturating_sub(1 - values.len() % 2)..=upper)?;
+    Some(middle.iter().sum::<f64>() / middle.len() as f64)
 }

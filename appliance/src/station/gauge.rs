@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// What a gauge's value is: registers 554–569.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -147,6 +147,26 @@ pub struct Measured {
     pub systematic: f64,
     /// The magnitude that is expected on a good part, of a value that noise moves away from 0.
     pub expected: Option<f64>,
+    /// Where the value is, of a deviation.
+    pub square: Option<Square>,
+}
+
+/// A square of camera pixels of the measured frame.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Square {
+    /// The column of its middle.
+    pub column: u32,
+    /// The row of its middle.
+    pub row: u32,
+    /// Pixels along each side.
+    pub side: u32,
+}
+
+impl From<algo::inspect::Square> for Square {
+    fn from(square: algo::inspect::Square) -> Self {
+        let [column, row, side] = [square.column, square.row, square.side].map(|px| px as u32);
+        Self { column, row, side }
+    }
 }
 
 impl Measured {
@@ -180,6 +200,8 @@ pub struct GaugeValue {
     pub uncertainty: Option<f64>,
     /// The magnitude that is expected on a good part; `None` where it is that of the part.
     pub expected: Option<f64>,
+    /// Where the value is; `None` where it is that of the whole region.
+    pub square: Option<Square>,
     /// The lower limit.
     pub low: Option<f64>,
     /// The upper limit.
@@ -201,6 +223,7 @@ impl GaugeValue {
             value,
             sigma,
             expected,
+            square,
             ..
         } = measured;
         Self {
@@ -210,6 +233,7 @@ impl GaugeValue {
             sigma,
             uncertainty: measured.uncertainty().map(|u| COVERAGE_FACTOR * u),
             expected,
+            square,
             low: limits.low,
             high: limits.high,
             decision: Decision::of(&measured, &limits),

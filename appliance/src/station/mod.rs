@@ -74,7 +74,7 @@ pub use clock::Micros;
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
 pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Unstored};
 pub use fault::Fault;
-pub use gauge::{COVERAGE_FACTOR, Decision, GaugeLimits, GaugeValue, Measured, Unit};
+pub use gauge::{COVERAGE_FACTOR, Decision, GaugeLimits, GaugeValue, Measured, Square, Unit};
 pub use handle::{StationHandle, tick};
 pub use health::{
     Drift, FULL_STORAGE_MIB, HOT_PROJECTOR_C, Health, Pace, Power, ProjectorHealth, System,

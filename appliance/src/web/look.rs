@@ -5,11 +5,11 @@ use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::{Value, json};
 
-use super::map::{Map, map};
+use super::map::{Drawn, Map, map};
 use super::problem::Problem;
 use super::site::Site;
 use super::view;
-use crate::recipe::plan::Layers;
+use crate::recipe::plan::{Layers, Shown};
 use crate::station::snapshot::status;
 
 /// The description of this API.
@@ -45,6 +45,8 @@ pub(super) async fn readiness(State(site): State<Site>) -> Response {
 
 /// The pictures of a measured part.
 const LAYERS: [&str; 3] = ["height", "deviation", "modulation"];
+/// The direction in which deviations are measured.
+const DIRECTION: &str = "along the normal";
 
 pub(super) async fn picture(
     State(site): State<Site>,
@@ -73,12 +75,64 @@ pub(super) fn place_of(layer: &str) -> Result<usize, Problem> {
 
 /// One of the maps of a part, by its place in [`LAYERS`].
 pub(super) fn map_of(layers: &Layers, at: usize, seq: u32) -> Map {
-    let (values, unit, symmetric) = [
-        (&layers.height_mm, "mm", false),
-        (&layers.deviation_mm, "mm", true),
-        (&layers.modulation, "counts", false),
+    let limit = layers.shown.gauge.as_ref().and_then(|gauge| {
+        let limits = [gauge.low, gauge.high].into_iter().flatten();
+        limits.map(f64::abs).max_by(f64::total_cmp)
+    });
+    let (values, unit, drawn) = [
+        (&layers.height_mm, "mm", Drawn::Plain),
+        (&layers.deviation_mm, "mm", Drawn::Deviation { limit }),
+        (&layers.modulation, "counts", Drawn::Plain),
     ][at];
-    map(values, layers.width, unit, symmetric, Some(seq))
+    let mut map = map(values, layers.width, unit, drawn, Some(seq));
+    let words = [
+        "z of each pixel, as the part lies".into(),
+        words(&layers.shown),
+        "modulation of the finest fringes, as the part lies".into(),
+    ];
+    map.description["words"] = words[at].clone().into();
+    if LAYERS[at] == "deviation" {
+        map.description["shown"] = described(&layers.shown);
+    }
+    map
+}
+
+/// What a map of deviations shows, for people.
+fn words(shown: &Shown) -> String {
+    let motion = match (shown.aligned, shown.placed) {
+        (true, true) => "motion taken back",
+        (true, false) => "motion not found and not taken back",
+        (false, _) => "as the part lies",
+    };
+    let Shown { side, gauge, .. } = shown;
+    let mean = match side {
+        1 => "pixel by pixel".into(),
+        side => format!("mean over {side} × {side} px"),
+    };
+    let colours = match gauge {
+        Some(gauge) if gauge.low.or(gauge.high).is_some() => {
+            format!("colours to twice the limits of {}", gauge.name)
+        }
+        Some(gauge) => format!("{} has no limits", gauge.name),
+        None => "no gauge of this recipe measures it".into(),
+    };
+    format!("deviation from golden {DIRECTION}, {motion}, {mean}; {colours}")
+}
+
+/// The same for programs.
+fn described(shown: &Shown) -> Value {
+    let Shown {
+        side,
+        placed,
+        ref gauge,
+        ..
+    } = *shown;
+    let gauge = gauge.as_ref().map(|gauge| {
+        json!({
+            "name": &*gauge.name, "value": gauge.value, "square": gauge.square, "low": gauge.low, "high": gauge.high,
+        })
+    });
+    json!({ "side": side, "motion_taken_back": placed, "gauge": gauge })
 }
 
 pub(super) async fn registers(State(site): State<Site>) -> Json<Value> {

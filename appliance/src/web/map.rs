@@ -8,10 +8,25 @@ use serde_json::json;
 const MAX_WIDTH: usize = 640;
 /// The word for "no value".
 const NONE: u16 = u16::MAX;
+/// The colours of deviations reach this many times as far as the gauge's limits, so that what is just outside differs from what is
+/// far outside.
+const BEYOND: f64 = 2.0;
 /// Share of the values at each end that the colour scale leaves out, so that single outliers do not stretch it.
 const TAIL: f64 = 0.005;
 /// The header that describes the map.
 const MAP: HeaderName = HeaderName::from_static("x-map");
+
+/// How a map is drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Drawn {
+    /// Colours over the range of the values; every so many pixels one is sent.
+    Plain,
+    /// Colours that reach equally far to both sides of zero; of the pixels that become one, the largest deviation is sent.
+    Deviation {
+        /// The larger of the gauge's limits; without one the colours go by the values.
+        limit: Option<f64>,
+    },
+}
 
 /// A map ready to be sent.
 #[derive(Clone, Debug, PartialEq)]
@@ -19,17 +34,14 @@ pub struct Map {
     /// Little-endian u16: value = low + step · word; 65535 = none.
     pub words: Vec<u8>,
     /// `width`, `height` of the map, `stride` (camera pixels per map pixel), `low`, `step`, `unit`, `scale` (both ends of
-    /// the colours), `seq` (of the result; absent for golden).
+    /// the colours), `seq` (of the result; absent for golden), and what the map is of.
     pub description: serde_json::Value,
 }
 
-/// Makes a map of `width` columns. With `symmetric` the colours reach equally far to both sides of zero.
-pub fn map(values: &[f32], width: usize, unit: &str, symmetric: bool, seq: Option<u32>) -> Map {
+/// Makes a map of `width` columns.
+pub fn map(values: &[f32], width: usize, unit: &str, drawn: Drawn, seq: Option<u32>) -> Map {
     let stride = width.div_ceil(MAX_WIDTH).max(1);
-    let rows = values.chunks_exact(width.max(1)).step_by(stride);
-    let thin: Vec<f32> = rows
-        .flat_map(|row| row.iter().step_by(stride).copied())
-        .collect();
+    let thin = thinned(values, (width, stride), drawn);
     let columns = width.div_ceil(stride).max(1);
     let mut known: Vec<f32> = thin
         .iter()
@@ -62,11 +74,13 @@ pub fn map(values: &[f32], width: usize, unit: &str, symmetric: bool, seq: Optio
         .flat_map(|value| word(value).to_le_bytes())
         .collect();
     let (dark, bright) = (at(TAIL), at(1.0 - TAIL));
-    let scale = if symmetric {
-        let far = dark.abs().max(bright.abs());
-        [-far, far]
-    } else {
-        [dark, bright]
+    let scale = match drawn {
+        Drawn::Plain => [dark, bright],
+        Drawn::Deviation { limit } => {
+            let limit = limit.filter(|limit| *limit > 0.0);
+            let far = limit.map_or(dark.abs().max(bright.abs()), |limit| BEYOND * limit);
+            [-far, far]
+        }
     };
     let description = json!({
         "width": columns, "height": thin.len() / columns, "stride": stride, "low": low, "step": step, "unit": unit,
@@ -75,11 +89,51 @@ pub fn map(values: &[f32], width: usize, unit: &str, symmetric: bool, seq: Optio
     Map { words, description }
 }
 
+/// One value for each square of `stride` pixels, of those that lie in the frame.
+fn thinned(values: &[f32], (width, stride): (usize, usize), drawn: Drawn) -> Vec<f32> {
+    let width = width.max(1);
+    let rows = values.len() / width;
+    let mut thin = Vec::with_capacity(rows.div_ceil(stride) * width.div_ceil(stride));
+    for top in (0..rows).step_by(stride) {
+        for left in (0..width).step_by(stride) {
+            let first = values[top * width + left];
+            if drawn == Drawn::Plain {
+                thin.push(first);
+                continue;
+            }
+            let right = (left + stride).min(width);
+            let rows = (top..(top + stride).min(rows)).map(|row| row * width);
+            let square = rows.flat_map(|row| &values[row + left..row + right]);
+            // A comparison with NaN is false.
+            let larger = |most: f32, &mm: &f32| match most.is_nan() || mm.abs() > most.abs() {
+                true => mm,
+                false => most,
+            };
+            thin.push(square.fold(f32::NAN, larger));
+        }
+    }
+    thin
+}
+
+/// JSON for a header, which takes ASCII alone.
+fn ascii(json: &serde_json::Value) -> String {
+    let mut text = String::new();
+    for letter in json.to_string().chars() {
+        if letter.is_ascii() {
+            text.push(letter);
+            continue;
+        }
+        for unit in letter.encode_utf16(&mut [0; 2]) {
+            text += &format!("\\u{unit:04x}");
+        }
+    }
+    text
+}
+
 impl IntoResponse for Map {
     fn into_response(self) -> Response {
         let kind = HeaderValue::from_static("application/octet-stream");
-        // JSON of plain numbers and ASCII words is a header value.
-        let description = HeaderValue::from_str(&self.description.to_string());
+        let description = HeaderValue::from_str(&ascii(&self.description));
         let description = description.unwrap_or(HeaderValue::from_static("{}"));
         (
             [(header::CONTENT_TYPE, kind), (MAP, description)],
@@ -110,7 +164,7 @@ mod tests {
                 }
             })
             .collect();
-        let map = map(&values, 20, "mm", false, Some(3));
+        let map = map(&values, 20, "mm", Drawn::Plain, Some(3));
         // 30 mm over 65534 steps.
         let half_step = 0.5 * 30.0 / 65_534.0 + 1e-6;
         for (at, value) in values.iter().enumerate() {
@@ -131,7 +185,7 @@ mod tests {
         let values: Vec<f32> = (0..width * rows)
             .map(|i| (i % width) as f32 / 1456.0 - 0.25)
             .collect();
-        let map = map(&values, width, "mm", true, None);
+        let map = map(&values, width, "mm", Drawn::Deviation { limit: None }, None);
         assert_eq!(map.description["stride"], 3);
         assert_eq!(
             (&map.description["width"], &map.description["height"]),
@@ -143,9 +197,49 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_deviation_stays_when_a_map_is_thinned_out_and_colours_go_by_the_limit() {
+        let (width, rows) = (1000, 7);
+        let mut values = vec![f32::NAN; width * rows];
+        values[3 * width + 501] = 0.01;
+        values[2 * width + 500] = -0.25;
+        values[6 * width + 999] = 0.1;
+        let map = map(
+            &values,
+            width,
+            "mm",
+            Drawn::Deviation { limit: Some(0.15) },
+            None,
+        );
+        assert_eq!(map.description["stride"], 2);
+        let known: Vec<(usize, f64)> = (0..map.words.len() / 2)
+            .filter_map(|at| Some((at, read(&map, at)?)))
+            .collect();
+        let [(dent, deep), (bump, high)] = known[..] else {
+            panic!("{known:?}");
+        };
+        assert_eq!((dent, bump), (500 + 250, 3 * 500 + 499));
+        assert!(
+            (deep + 0.25).abs() < 1e-5 && (high - 0.1).abs() < 1e-5,
+            "{known:?}"
+        );
+        assert_eq!(map.description["scale"], json!([-0.3, 0.3]));
+    }
+
+    #[test]
+    fn a_description_is_a_header_whatever_the_gauge_is_called() {
+        let json = json!({ "name": "Fläche 🙂 \"a\"" });
+        let header = ascii(&json);
+        assert!(HeaderValue::from_str(&header).is_ok(), "{header}");
+        assert_eq!(
+            serde_json::from_str::<serde_json::Value>(&header).unwrap(),
+            json
+        );
+    }
+
+    #[test]
     fn a_map_without_any_value_is_still_a_map() {
         for values in [&[f32::NAN; 6][..], &[]] {
-            let map = map(values, 3, "mm", true, None);
+            let map = map(values, 3, "mm", Drawn::Deviation { limit: None }, None);
             assert!(map.words.iter().all(|byte| *byte == 0xFF));
         }
     }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::body;
 use super::downloads::{Content, send};
-use super::map::{Map, map};
+use super::map::{Drawn, Map, map};
 use super::orders::{self, Reload};
 use super::problem::Problem;
 use super::site::Site;
@@ -101,8 +101,20 @@ pub(super) async fn picture(
         let LoadedRecipe { recipe, .. } = site.recipes.load_to_edit(number)?;
         let width = recipe.conditions.camera.0 as usize;
         match layer.as_str() {
-            "height" => Ok(map(&recipe.arrays.golden_height, width, "mm", false, None)),
-            "modulation" => Ok(map(&recipe.arrays.modulation, width, "counts", false, None)),
+            "height" => Ok(map(
+                &recipe.arrays.golden_height,
+                width,
+                "mm",
+                Drawn::Plain,
+                None,
+            )),
+            "modulation" => Ok(map(
+                &recipe.arrays.modulation,
+                width,
+                "counts",
+                Drawn::Plain,
+                None,
+            )),
             _ => Err(Problem::missing("a recipe has height and modulation")),
         }
     })

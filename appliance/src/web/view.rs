@@ -137,6 +137,7 @@ fn gauge(gauge: &GaugeValue) -> Value {
         "sigma": gauge.sigma,
         "uncertainty": gauge.uncertainty,
         "expected": gauge.expected,
+        "square": gauge.square,
         "lowest": gauge.low,
         "highest": gauge.high,
         "pass": decision.pass,

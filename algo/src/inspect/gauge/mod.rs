@@ -31,6 +31,19 @@ pub struct Reading {
     pub expected: Option<f64>,
     /// What is the same in every measurement and so not in σ, 1 σ: the effect of golden's noise and of the calibration's error.
     pub systematic: f64,
+    /// Where the value is, of a deviation.
+    pub square: Option<Square>,
+}
+
+/// A square of camera pixels of the measured frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Square {
+    /// The column of its middle.
+    pub column: usize,
+    /// The row of its middle.
+    pub row: usize,
+    /// Pixels along each side.
+    pub side: usize,
 }
 
 /// A value with the parts of its error.

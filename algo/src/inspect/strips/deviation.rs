@@ -18,7 +18,7 @@ use super::pose::PoseField;
 use super::squares::extreme::Extreme;
 use super::{Input, Production, Strip};
 use crate::inspect::align::{Placed, form};
-use crate::inspect::{Largest, Reading};
+use crate::inspect::{Largest, Reading, Square};
 use crate::units::Height;
 
 /// Pixels of a square whose Jacobians are averaged, in each direction.
@@ -123,6 +123,11 @@ impl Production {
                 ),
                 libm::hypot(self.displaced(pose.placed.as_ref()), self.rippled() * lever),
             ),
+            square: Some(Square {
+                column: best.column,
+                row: best.row,
+                side,
+            }),
         })
     }
 

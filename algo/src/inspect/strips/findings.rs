@@ -124,6 +124,7 @@ impl Production {
                     sigma: Some(coverage::sigma(variance, pixels)),
                     expected: None,
                     systematic: 0.0,
+                    square: None,
                 })
             }
             Measure::Deviation { side } => {
@@ -146,6 +147,7 @@ impl Production {
                         sigma * libm::sqrt(self.golden_variance(noisier) / self.spot_variance()),
                         value * self.calibration.length,
                     ),
+                    square: None,
                 })
             }
             _ => self.of_cells(gauge, noisier, pose, strips, cells),

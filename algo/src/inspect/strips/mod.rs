@@ -15,7 +15,7 @@
 //! motion is found from these, in the order of the rows.
 //!
 //! # Shapes and units
-//! No map of the whole frame is written, except z if it is asked for. Strips overlap by half of the largest square, so each
+//! No map of the whole frame is written, except those that are asked for (`maps`). Strips overlap by half of the largest square, so each
 //! finds all squares about its own rows. Offsets and deviations are in nm.
 //!
 //! # Accuracy
@@ -33,6 +33,7 @@ mod findings;
 mod gauges;
 mod height;
 mod input;
+mod maps;
 mod pair;
 mod plan;
 mod pose;
@@ -46,6 +47,7 @@ mod uncertainty;
 pub use findings::{Findings, Skipped};
 pub use gauges::{Gauge, MAX_GAUGES, Unmeasurable};
 pub use input::Input;
+pub use maps::Maps;
 pub use pair::{Found, PairBuffers, PairPlaced, Picture};
 pub use plan::{Parts, Production};
 pub use taught::Taught;
@@ -112,7 +114,11 @@ impl Production {
     ) -> Result<Findings, DecodeError> {
         let input = Input::Frames(frames);
         let placed = self.place(input, strips)?;
-        self.inspect_placed(input, strips, placed, heights)
+        let maps = Maps {
+            heights,
+            deviation: None,
+        };
+        self.inspect_placed(input, strips, placed, maps)
     }
 
     /// The first half: how the part lies, from a few rows of each strip. None if parts are not aligned ([`Parts::aligned`]), or if
@@ -151,7 +157,8 @@ impl Production {
         Ok(fitting.fit(&strips.samples, &mut strips.fitting))
     }
 
-    /// The second half: the readings of a part that lies so, from the input and strips that it was placed with.
+    /// The second half: the readings of a part that lies so, from the input and strips that it was placed with, and `maps`
+    /// of it.
     ///
     /// # Errors
     /// As [`Self::inspect`].
@@ -160,22 +167,21 @@ impl Production {
         input: Input<'_>,
         strips: &mut Strips,
         placed: Option<Placed>,
-        heights: Option<&mut [f32]>,
+        maps: Maps<'_>,
     ) -> Result<Findings, DecodeError> {
         self.check(input)?;
         strips.pose.set(self, placed);
-        let (pose, width) = (&strips.pose, self.size().0);
-        match heights {
-            None => for_each_item(&mut strips.strips, |strip| {
-                strip.inspect(self, pose, input, None);
-            }),
-            Some(map) => {
-                let maps = map.chunks_mut((strips.rows * width).max(1));
-                let work = strips.strips.iter_mut().zip(maps).collect();
-                for_each(work, |_, (strip, map)| {
-                    strip.inspect(self, pose, input, Some(map));
-                });
-            }
+        let pose = &strips.pose;
+        if maps.is_empty() {
+            for_each_item(&mut strips.strips, |strip| {
+                strip.inspect(self, pose, input, Maps::default());
+            });
+        } else {
+            let maps = maps.split((strips.rows * self.size().0).max(1));
+            let work = strips.strips.iter_mut().zip(maps).collect();
+            for_each(work, |_, (strip, maps)| {
+                strip.inspect(self, pose, input, maps);
+            });
         }
         Ok(self.findings(input, strips))
     }

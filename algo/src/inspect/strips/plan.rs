@@ -190,6 +190,11 @@ impl Production {
         &self.window
     }
 
+    /// The gauges, in the order of their readings.
+    pub fn gauges(&self) -> &[Gauge] {
+        &self.gauges.list
+    }
+
     /// How phases become heights.
     pub fn cubics(&self) -> &HeightCubics {
         &self.cubics

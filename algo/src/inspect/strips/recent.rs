@@ -52,6 +52,16 @@ impl RecentRows {
         self.extent[v % self.rows].clone()
     }
 
+    /// Writes the deviations of row `v` in mm; NaN where the part is not compared.
+    pub fn store(&self, v: usize, deviation: &mut [f32]) {
+        for (mm, &nm) in deviation.iter_mut().zip(self.row(v)) {
+            *mm = match nm {
+                NO_OFFSET => f32::NAN,
+                nm => (f64::from(nm) / 1e6) as f32,
+            };
+        }
+    }
+
     /// The deviations of row `v` and its extent; an empty row if it is none of the `written` ones.
     pub fn row_of(&self, v: usize, written: &Range<usize>) -> (&[i32], Range<usize>) {
         match written.contains(&v) {

@@ -7,7 +7,7 @@ use super::height::HeightRow;
 use super::pose::PoseField;
 use super::recent::RecentRows;
 use super::squares::Squares;
-use super::{Input, Production};
+use super::{Input, Maps, Production};
 use crate::inspect::align::{Alignment, Sample};
 use crate::pipeline::{NO_OFFSET, PhaseMap};
 use alloc::vec::Vec;
@@ -44,13 +44,13 @@ impl Strip {
         }
     }
 
-    /// Inspects its rows, and those above and below that its squares reach into; `heights` gets z of its own rows in mm.
+    /// Inspects its rows, and those above and below that its squares reach into; `maps` get its own rows.
     pub fn inspect(
         &mut self,
         plan: &Production,
         pose: &PoseField,
         input: Input<'_>,
-        mut heights: Option<&mut [f32]>,
+        mut maps: Maps<'_>,
     ) {
         self.recent.overflow = None;
         self.counts.clear();
@@ -68,10 +68,16 @@ impl Strip {
                     let measured = (&self.decoded, &self.heights);
                     let aligned = (&self.coordinates, self.recent.extent(v));
                     self.counts.add(plan, pose, v, measured, aligned);
-                    if let Some(heights) = &mut heights {
+                    if let Some(heights) = &mut maps.heights {
                         let row = (v - self.rows.start) * width;
                         self.heights.store(plan, v, &mut heights[row..row + width]);
                     }
+                }
+                if let Some(deviation) = &mut maps.deviation
+                    && self.rows.contains(&v)
+                {
+                    let row = (v - self.rows.start) * width;
+                    self.recent.store(v, &mut deviation[row..row + width]);
                 }
             }
             let rows = (&self.rows, &written);

@@ -66,6 +66,7 @@ impl Production {
             sigma: Some(libm::sqrt(pixels + motion)),
             expected: None,
             systematic: libm::sqrt(golden + wrong * wrong * lever * lever),
+            square: None,
         }
     }
 

@@ -30,6 +30,7 @@ impl Demands {
                     sigma: reading.sigma,
                     systematic: reading.systematic,
                     expected: reading.expected,
+                    square: reading.square.map(Into::into),
                 }),
                 GaugeLimits {
                     low: limits.low,

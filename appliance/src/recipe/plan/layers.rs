@@ -1,40 +1,83 @@
 //! Maps of a measured part for the page (height, deviation from golden, modulation), and its point cloud.
 
-use super::Plan;
+use super::{Laps, Plan};
 use crate::head::seam;
 use crate::output::cloud::ply;
+use crate::station::Square;
+use algo::inspect::{Findings, Maps, Measure};
 use algo::pipeline;
 use algo::units::{Height, Modulation};
 use hal::frame::Frame;
-use std::sync::PoisonError;
+use std::sync::{Arc, PoisonError};
+use std::time::Instant;
 
 /// Maps of one part, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layers {
     /// Pixels per row.
     pub width: usize,
-    /// z in mm, NaN where not resolved.
+    /// z in mm as the part lies, NaN where not resolved.
     pub height_mm: Vec<f32>,
-    /// Height above golden in mm, NaN where either is not known.
+    /// Deviation from golden in mm as [`Self::shown`] says, NaN where the part is not compared.
     pub deviation_mm: Vec<f32>,
+    /// Which deviation that is.
+    pub shown: Shown,
     /// Modulation of the finest level in counts.
     pub modulation: Vec<f32>,
+}
+
+/// What a map of deviations shows: what a gauge of the recipe was judged by.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shown {
+    /// Each pixel has the mean over the square of so many pixels about it; 1 = its own deviation.
+    pub side: usize,
+    /// Whether the recipe has the part's motion taken back.
+    pub aligned: bool,
+    /// Whether it was found, and taken back.
+    pub placed: bool,
+    /// The gauge; none if the recipe has none of the deviation.
+    pub gauge: Option<ShownGauge>,
+}
+
+/// The gauge that a map of deviations is of: of several, the one that uses most of its limits.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShownGauge {
+    /// Its name in the recipe.
+    pub name: Arc<str>,
+    /// Its value in mm; none if it could not be measured.
+    pub value: Option<f64>,
+    /// Where the value is.
+    pub square: Option<Square>,
+    /// The lower limit.
+    pub low: Option<f64>,
+    /// The upper limit.
+    pub high: Option<f64>,
+}
+
+impl ShownGauge {
+    /// The share of its limit that the value uses; below 0 without a value.
+    fn used(&self) -> f64 {
+        let Some(value) = self.value else { return -1.0 };
+        let limit = if value < 0.0 { self.low } else { self.high };
+        limit.map_or(0.0, |limit| value.abs() / limit.abs())
+    }
 }
 
 impl Plan {
     /// The maps of a part from the frames of a sequence; `None` if the frames do not fit.
     pub fn layers(&self, sequence: usize, frames: &[Frame]) -> Option<Layers> {
-        let height_mm = self.heights(sequence, frames)?;
+        let [mut height_mm, mut deviation_mm] = [(); 2].map(|()| self.unknown());
+        let maps = Maps {
+            heights: Some(&mut height_mm),
+            deviation: Some(&mut deviation_mm),
+        };
+        let mut strips = self.strips();
+        let mut laps = Laps::since(Instant::now());
+        let found = self.run(&mut strips, (sequence, frames), None, maps, &mut laps);
+        let shown = self.shown(&found.ok()?.0);
         let production = &self.runs.get(sequence)?.production;
-        let golden = &production.cubics().surface().height;
-        let deviation = height_mm.iter().zip(golden).map(|(&here, golden)| {
-            if golden.is_known() {
-                here - golden.mm() as f32
-            } else {
-                f32::NAN
-            }
-        });
-        let deviation_mm = deviation.collect();
+        let deviation_mm = production.square_means(&strips, &deviation_mm, shown.side);
+        drop(strips);
         let full_scale = production.decoder().full_scale();
         let modulation = self.modulation(sequence, frames)?;
         let counts = modulation.iter();
@@ -42,8 +85,61 @@ impl Plan {
             width: production.cubics().surface().width,
             height_mm,
             deviation_mm,
+            shown,
             modulation: counts.map(|b| b.counts(full_scale) as f32).collect(),
         })
+    }
+
+    /// z in mm of each pixel from the frames of a sequence, NaN where not resolved; `None` if the frames do not fit.
+    pub fn heights(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<f32>> {
+        let mut height_mm = self.unknown();
+        let maps = Maps {
+            heights: Some(&mut height_mm),
+            deviation: None,
+        };
+        let mut laps = Laps::since(Instant::now());
+        let found = self.run(
+            &mut self.strips(),
+            (sequence, frames),
+            None,
+            maps,
+            &mut laps,
+        );
+        found.ok().map(|_| height_mm)
+    }
+
+    /// A map of a frame without values.
+    fn unknown(&self) -> Vec<f32> {
+        let (columns, rows, _) = self.conditions.camera;
+        vec![f32::NAN; columns as usize * rows as usize]
+    }
+
+    /// Which deviation a map of the part shows.
+    fn shown(&self, findings: &Findings) -> Shown {
+        let limits = self.demands.limits.iter().zip(&findings.readings);
+        let gauges = self.production().gauges().iter().zip(limits);
+        let deviations = gauges.filter_map(|(gauge, (limits, reading))| {
+            let Measure::Deviation { side } = gauge.measure else {
+                return None;
+            };
+            let square = reading.and_then(|reading| reading.square);
+            let gauge = ShownGauge {
+                name: Arc::clone(&limits.name),
+                value: reading.map(|reading| reading.value),
+                square: square.map(Into::into),
+                low: limits.low,
+                high: limits.high,
+            };
+            Some((square.map_or(side, |square| square.side), gauge))
+        });
+        let used = |(_, gauge): &(usize, ShownGauge)| gauge.used();
+        let gauge = deviations.max_by(|a, b| used(a).total_cmp(&used(b)));
+        Shown {
+            side: gauge.as_ref().map_or(1, |(side, _)| *side),
+            aligned: self.demands.aligned,
+            placed: findings.placed.is_some(),
+            gauge: gauge.map(|(_, gauge)| gauge),
+        }
     }
 
     /// The modulation of a part whose heights were just computed.
@@ -62,17 +158,24 @@ impl Plan {
 
     /// The point cloud of a part as binary PLY, with its modulation as intensity; `None` as for [`Self::layers`].
     pub fn cloud(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<u8>> {
-        let layers = self.layers(sequence, frames)?;
+        let height_mm = self.heights(sequence, frames)?;
+        let modulation = self.modulation(sequence, frames)?;
         let production = &self.runs.get(sequence)?.production;
-        let full_scale = f32::from(production.decoder().full_scale());
+        let full_scale = production.decoder().full_scale();
         // NaN becomes an unknown height.
-        let heights = layers.height_mm.iter();
+        let heights = height_mm.iter();
         let heights = heights.map(|&mm| Height::from_mm(f64::from(mm)));
         let shade = |at: usize| {
-            let intensity = layers.modulation[at] * 2.0 / full_scale * 255.0;
+            let counts = modulation[at].counts(full_scale) as f32;
+            let intensity = counts * 2.0 / f32::from(full_scale) * 255.0;
             (intensity as u8, f32::NAN)
         };
         let triangulator = production.triangulator();
-        Some(ply(triangulator, layers.width, heights, shade))
+        Some(ply(
+            triangulator,
+            production.cubics().surface().width,
+            heights,
+            shade,
+        ))
     }
 }

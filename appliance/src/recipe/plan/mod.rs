@@ -11,7 +11,7 @@ mod trial;
 mod window;
 
 pub use arriving::Arriving;
-pub use layers::Layers;
+pub use layers::{Layers, Shown, ShownGauge};
 
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
@@ -22,13 +22,13 @@ use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_L
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::HeightRange;
-use algo::inspect::{Findings, Input, PairPlaced, Production, Strips, normal_shares};
+use algo::inspect::{Findings, Input, Maps, PairPlaced, Production, Strips, normal_shares};
 use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
 use hal::frame::Frame;
 use run::{Pair, Prepared, Run, Shared};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 /// A recipe joined with the head's calibration. Of the recipe's arrays only what production reads is kept.
@@ -322,7 +322,8 @@ impl Plan {
         let sequence = arriving.sequence();
         let mut laps = Laps::since(exposed);
         let found = self.with_arrived(arriving, frames, |finest| {
-            self.run(sequence, frames, finest, None, &mut laps)
+            let of = (sequence, frames);
+            self.run(&mut self.strips(), of, finest, Maps::default(), &mut laps)
         });
         self.judged(sequence, found, &mut laps)
     }
@@ -362,23 +363,19 @@ impl Plan {
         inspection
     }
 
-    /// z in mm of each pixel from the frames of a sequence, for the page, NaN where not resolved; `None` if the frames do not fit.
-    pub fn heights(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<f32>> {
-        let (columns, rows, _) = self.conditions.camera;
-        let mut height_mm = vec![f32::NAN; columns as usize * rows as usize];
-        let mut laps = Laps::since(Instant::now());
-        let heights = Some(&mut height_mm[..]);
-        self.run(sequence, frames, None, heights, &mut laps).ok()?;
-        Some(height_mm)
+    /// The buffers of an inspection.
+    fn strips(&self) -> MutexGuard<'_, Strips> {
+        // A poisoned lock does no harm: strips are cleared before they are used.
+        self.strips.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The findings, and of two frames how much the picture is like golden's.
+    /// The findings from the frames of a sequence, and of two frames how much the picture is like golden's.
     fn run(
         &self,
-        sequence: usize,
-        frames: &[Frame],
+        strips: &mut Strips,
+        (sequence, frames): (usize, &[Frame]),
         finest: Option<(&Arrived, &[FrameView<'_>])>,
-        heights: Option<&mut [f32]>,
+        maps: Maps<'_>,
         laps: &mut Laps,
     ) -> Result<(Findings, Option<f64>), String> {
         let run = self.runs.get(sequence);
@@ -394,25 +391,23 @@ impl Plan {
             Some((arrived, last)) => Input::Finest(arrived, last),
             None => Input::Frames(&views),
         };
-        // A poisoned lock does no harm: strips are cleared before they are used.
-        let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
         let production = &run.production;
         if let Some(Pair { picture, buffers }) = &run.pair {
             let mut buffers = buffers.lock().unwrap_or_else(PoisonError::into_inner);
-            let placed = production.place_pair(&views, picture.as_ref(), &mut strips, &mut buffers);
+            let placed = production.place_pair(&views, picture.as_ref(), strips, &mut buffers);
             laps.end(Stage::Alignment);
             let findings = placed.and_then(|PairPlaced { found, placed }| {
                 let input = Input::Phases(buffers.phases());
-                let findings = production.inspect_placed(input, &mut strips, placed, heights)?;
+                let findings = production.inspect_placed(input, strips, placed, maps)?;
                 Ok((findings, Some(found.map_or(0.0, |found| found.likeness))))
             });
             laps.end(Stage::Strips);
             return findings.map_err(|error| error.to_string());
         }
-        let placed = production.place(input, &mut strips);
+        let placed = production.place(input, strips);
         laps.end(Stage::Alignment);
         let findings = placed
-            .and_then(|placed| production.inspect_placed(input, &mut strips, placed, heights))
+            .and_then(|placed| production.inspect_placed(input, strips, placed, maps))
             .map_err(|error| error.to_string());
         laps.end(Stage::Strips);
         Ok((findings?, None))

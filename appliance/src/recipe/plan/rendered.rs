@@ -3,9 +3,8 @@
 use super::{Laps, Plan};
 use crate::station::Inspection;
 use algo::geometry::Vector;
-use algo::inspect::{Input, Motion};
+use algo::inspect::{Input, Maps, Motion};
 use algo::units::Modulation;
-use std::sync::PoisonError;
 use std::time::Instant;
 
 impl Plan {
@@ -22,12 +21,12 @@ impl Plan {
             let run = self.runs.get(sequence).filter(|run| run.pair.is_none())?;
             let phases = run.production.rendered(motion, &light[sequence], seed);
             let mut laps = Laps::since(Instant::now());
-            let mut strips = self.strips.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut strips = self.strips();
             let input = Input::Phases(&phases);
             let placed = run.production.place(input, &mut strips);
             let findings = placed.and_then(|placed| {
                 run.production
-                    .inspect_placed(input, &mut strips, placed, None)
+                    .inspect_placed(input, &mut strips, placed, Maps::default())
             });
             drop(strips);
             let findings = findings.map(|findings| (findings, None));

@@ -3,12 +3,13 @@ import { $, fill, make, show, text } from "./element.js";
 import { ask, map } from "./api.js";
 import { paint } from "./colour.js";
 import { about, limits, measures, milliseconds, moment, quantity, signed } from "./number.js";
+import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
 import { nameOf } from "./times.js";
 import { decided, tag, uncertainty } from "./verdict.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
-const state = { seq: 0, layer: "height", asked: 0 };
+const state = { seq: 0, layer: "height", asked: 0, failed: [] };
 
 function gauge(entry) {
   const decision = decided(entry);
@@ -53,6 +54,8 @@ function empty(words) {
   const canvas = $("kept-map");
   canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
   fill($("kept-scale"));
+  fill($("kept-ring"));
+  text("kept-shown", "");
   text("kept-words", words);
   show("kept-words", true);
 }
@@ -68,6 +71,8 @@ async function picture() {
   if (turn !== state.asked) return;
   paint($("kept-map"), loaded, state.layer);
   drawScale($("kept-scale"), loaded.about, state.layer);
+  over($("kept-ring"), loaded.about, ...rings(loaded.about, state.failed));
+  text("kept-shown", loaded.about.words);
   show("kept-words", false);
 }
 
@@ -82,6 +87,7 @@ export async function openKept(seq, boot) {
   }
   if (state.seq !== seq) return;
   const { result, no_frames } = found;
+  state.failed = result.gauges.filter((one) => one.square && !decided(one).pass).map((one) => one.square);
   text("kept-number", `no. ${seq}`);
   $("kept-verdict").className = `tag ${result.verdict.toLowerCase()}`;
   text("kept-verdict", result.verdict);

@@ -57,6 +57,7 @@ assets! {
     "/trend.js" "text/javascript; charset=utf-8" "trend.js";
     "/times.js" "text/javascript; charset=utf-8" "times.js";
     "/picture.js" "text/javascript; charset=utf-8" "picture.js";
+    "/ring.js" "text/javascript; charset=utf-8" "ring.js";
     "/colour.js" "text/javascript; charset=utf-8" "colour.js";
     "/question.js" "text/javascript; charset=utf-8" "question.js";
     "/recipes.js" "text/javascript; charset=utf-8" "recipes.js";

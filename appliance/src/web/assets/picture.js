@@ -2,6 +2,7 @@
 import { $, draw, fill, show, text } from "./element.js";
 import { ask, map } from "./api.js";
 import { paint } from "./colour.js";
+import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
 import { signed } from "./number.js";
 
@@ -22,9 +23,8 @@ function failing() {
 function drawOutlines() {
   const svg = $("outlines");
   if (!state.map) { fill(svg); return; }
-  const { width, height, stride } = state.map.about;
-  svg.setAttribute("viewBox", `0 0 ${width * stride} ${height * stride}`);
-  if (!state.recipe || !state.result) { fill(svg); return; }
+  const { about } = state.map;
+  if (!state.recipe || !state.result) { over(svg, about, ...rings(about, decisive())); return; }
   const bad = new Map();
   for (const { gauge, kind } of failing()) {
     for (const name of [gauge.region, gauge.measures.from]) if (name && bad.get(name) !== "fail") bad.set(name, kind);
@@ -36,13 +36,13 @@ function drawOutlines() {
   const { regions } = state.recipe;
   const quiet = regions.filter((region) => !bad.has(region.name)).map((region) => outline(region, "quiet"));
   const loud = regions.filter((region) => bad.has(region.name));
-  fill(svg, ...quiet, ...loud.map((region) => outline(region, "under")), ...loud.map((region) => outline(region, bad.get(region.name))), ...(state.deviation ? most(state.deviation) : []));
+  over(svg, about, ...quiet, ...loud.map((region) => outline(region, "under")), ...loud.map((region) => outline(region, bad.get(region.name))), ...rings(about, decisive()));
 }
 
 // Measures that compare the part with golden pixel by pixel, so that a place in the picture explains why they fail.
-const COMPARING = ["deviation", "rms_deviation", "out_of_tolerance"];
+const COMPARING = ["rms_deviation", "out_of_tolerance"];
 
-// The regions of failed gauges that compare the part with golden.
+// The regions of failed gauges that compare the part with golden and have no square of their own.
 function deviating() {
   const names = failing().filter(({ gauge, kind }) => kind === "fail" && COMPARING.includes(gauge.measures.kind)).map(({ gauge }) => gauge.region);
   return state.recipe ? state.recipe.regions.filter((region) => names.includes(region.name)) : [];
@@ -58,29 +58,25 @@ function inside(polygon, u, v) {
   return within;
 }
 
-// A ring around the place in the failing regions that deviates most. Deviations are averaged over squares of some pixels, so that
-// single outliers do not count.
+// What decided: the squares of the deviations that failed; without any, where other gauges failed that compare with golden, the pixel of
+// the map in their regions that deviates most.
+function decisive() {
+  const gauges = state.result ? state.result.gauges : [];
+  const squares = gauges.filter((gauge) => gauge.square && gauge.valid && !gauge.pass).map((gauge) => gauge.square);
+  return squares.length || !state.deviation ? squares : most(state.deviation);
+}
+
 function most(map) {
   const { width, height, stride } = map.about;
   const regions = deviating();
-  const half = Math.max(1, Math.round(4 / stride)), least = (2 * half + 1) * (2 * half + 1) / 2;
   let best = 0, at = null;
-  for (let v = half; v < height - half; v += half) {
-    for (let u = half; u < width - half; u += half) {
-      if (!regions.some((region) => inside(region.polygon, u * stride, v * stride))) continue;
-      let sum = 0, count = 0;
-      for (let row = v - half; row <= v + half; row += 1) {
-        for (let column = u - half; column <= u + half; column += 1) {
-          const value = map.values[row * width + column];
-          if (!Number.isNaN(value)) { sum += value; count += 1; }
-        }
-      }
-      if (count > least && Math.abs(sum / count) > best) { best = Math.abs(sum / count); at = [u, v]; }
+  for (let v = 0; v < height; v += 1) {
+    for (let u = 0; u < width; u += 1) {
+      const size = Math.abs(map.values[v * width + u]);
+      if (size > best && regions.some((region) => inside(region.polygon, u * stride, v * stride))) { best = size; at = { column: u * stride, row: v * stride, side: stride }; }
     }
   }
-  if (!at) return [];
-  const place = { cx: at[0] * stride, cy: at[1] * stride, r: width * stride / 18, "vector-effect": "non-scaling-stroke" };
-  return ["most", "most over"].map((kind) => draw("circle", Object.assign({ class: kind }, place)));
+  return at ? [at] : [];
 }
 
 function readCursor() {
@@ -89,7 +85,8 @@ function readCursor() {
   const u = Math.min(width - 1, Math.max(0, state.at[0])), v = Math.min(height - 1, Math.max(0, state.at[1]));
   state.at = [u, v];
   const value = state.map.values[v * width + u];
-  const words = Number.isNaN(value) ? "nothing measured here" : `${signed(value, UNITS[unit] || 2)} ${unit}`;
+  const none = state.layer === "deviation" ? "not compared with golden" : "nothing measured here";
+  const words = Number.isNaN(value) ? none : `${signed(value, UNITS[unit] || 2)} ${unit}`;
   text("cursor", `column ${u * stride} px, row ${v * stride} px: ${words}`);
 }
 
@@ -132,6 +129,7 @@ async function load() {
   state.deviation = deviation;
   paint($("map"), loaded, layer);
   show("no-picture", false);
+  text("shown", loaded.about.words);
   drawScale($("scale"), state.map.about, state.layer);
   drawOutlines();
 }
@@ -142,6 +140,7 @@ function empty(words) {
   const canvas = $("map");
   canvas.getContext("2d").clearRect(0, 0, canvas.width, canvas.height);
   text("no-picture", words);
+  text("shown", "");
   show("no-picture", true);
   text("cursor", "point at the picture to read a value");
   drawOutlines();

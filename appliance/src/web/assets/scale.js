@@ -21,6 +21,12 @@ export function drawScale(svg, about, layer) {
     parts.push(draw("rect", { x: left, y: y.toFixed(2), width: wide, height: ((bottom - top) / count + 0.5).toFixed(2), fill: `rgb(${colour.join(",")})` }));
   }
   const span = high - low;
+  const gauge = about.shown && about.shown.gauge;
+  for (const limit of gauge ? [gauge.low, gauge.high] : []) {
+    if (limit === null || limit < low || limit > high) continue;
+    const y = bottom - (bottom - top) * (limit - low) / span;
+    parts.push(draw("line", { x1: left - 2, x2: left + wide + 4, y1: y, y2: y, class: "limit" }));
+  }
   if (span > 0) {
     const step = round(span / 5);
     const places = Math.max(0, -Math.floor(Math.log10(step)));
