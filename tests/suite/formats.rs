@@ -26,7 +26,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 68] = [
+const KEYS: [&str; 71] = [
     "alignment",
     "calibration",
     "camera",
@@ -56,11 +56,14 @@ const KEYS: [&str; 68] = [
     "golden_captures",
     "good_parts",
     "good_parts.beyond",
+    "good_parts.displaced_mm",
+    "good_parts.displaced_scatter_mm",
     "good_parts.largest_mm",
     "good_parts.least_weight",
     "good_parts.left_out",
     "good_parts.limit_mm",
     "good_parts.scatter_mm",
+    "good_parts.smoothing_px",
     "good_parts.tolerance_mm",
     "good_parts.weighed",
     "guard_k",

@@ -241,6 +241,8 @@ fn are_found(dents: usize, sub_rays: u32) {
     for kind in ["sheet_metal", "flowerpot"] {
         let mut scenario = scenario(kind, 3);
         scenario.sub_rays = sub_rays;
+        // With the paper's noise squares are larger, and on a wall at a grazing angle a square of pixels is much wider than a dent.
+        scenario.noise = Noise::default();
         let mut line = line(&scenario);
         let pot = kind == "flowerpot";
         let mut smallest = f64::INFINITY;
@@ -317,8 +319,9 @@ fn dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_p
 
 #[test]
 fn a_head_that_is_too_noisy_for_the_tolerance_says_so_with_the_numbers_and_good_parts_pass() {
-    let mut scenario = small("flowerpot", 1);
-    scenario.noise.noise_counts = Some(1.25 * Noise::PAPER);
+    let mut scenario = small("plane", 1);
+    (scenario.rig.camera.width, scenario.rig.camera.height) = (128, 128);
+    scenario.noise.noise_counts = Some(4.0 * Noise::PAPER);
     let mut line = line(&scenario);
     let GoodPartsFile {
         limit_mm,

@@ -1,11 +1,11 @@
 //! Measurement in strips, as in production, compared with exact triangulation and with the comparison of whole maps.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
-use super::whole_maps::{Comparison, Golden};
+use super::whole_maps::{Comparison, Golden, factors};
 use algo::frame::SampleNoise;
-use algo::inspect::{Factor, Findings, Measure, Production, Region, Weight, normal_shares};
+use algo::inspect::{Findings, Measure, Production, Region};
 use algo::phase::Trust;
-use algo::pipeline::{HeightMap, KnownSurface, decode};
+use algo::pipeline::{HeightMap, decode};
 use algo::simd::Backend;
 use algo::units::{AbsolutePhase, Height, PhaseDelta};
 use appliance::head::seam;
@@ -301,22 +301,6 @@ fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
         .collect()
 }
 
-/// What height differences are multiplied by: the share along golden's normal times the weight.
-pub(crate) fn factors(recipe: &Recipe, plan: &Plan, height: &[Height]) -> Vec<f64> {
-    let valid = &recipe.arrays.valid;
-    let surface = KnownSurface {
-        width: recipe.conditions.camera.0 as usize,
-        phase: Vec::new(),
-        height: height.to_vec(),
-    };
-    let shares = normal_shares(plan.production().triangulator(), &surface);
-    let factors = valid.iter().zip(shares).map(|(&bits, share)| {
-        let weight = Weight::from_bits(bits).share();
-        Factor::of(weight * f64::from(share)).number()
-    });
-    factors.collect()
-}
-
 fn golden(recipe: &Recipe, plan: &Plan) -> Golden {
     let arrays = &recipe.arrays;
     // As the first sequence measured it.
@@ -328,17 +312,20 @@ fn golden(recipe: &Recipe, plan: &Plan) -> Golden {
     let by_first = |at: usize| {
         f64::from(arrays.golden_height[at]) + f64::from(arrays.height_slope[at]) * turns(at)
     };
-    let heights = (0..pixels).map(by_first).zip(&arrays.valid);
-    let height: Vec<_> = heights
-        .map(|(mm, &valid)| match valid {
-            0 => Height::UNKNOWN,
-            _ => Height::from_mm(mm),
-        })
+    // Slopes are taken over pixels that are not compared, too.
+    let all: Vec<_> = (0..pixels)
+        .map(|at| Height::from_mm(by_first(at)))
         .collect();
+    let compared = all.iter().zip(&arrays.valid);
     Golden {
         width: recipe.conditions.camera.0 as usize,
-        factor: factors(recipe, plan, &height),
-        height,
+        factor: factors(recipe, plan, &all),
+        height: compared
+            .map(|(&height, &valid)| match valid {
+                0 => Height::UNKNOWN,
+                _ => height,
+            })
+            .collect(),
     }
 }
 

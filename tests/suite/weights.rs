@@ -1,8 +1,8 @@
 //! Weighted deviations: measurement in strips compared with the comparison of whole maps, for parts in place and displaced parts.
 
 use super::placement::{bed, scenario, taught};
-use super::production::{compare, expected, factors, frames, parts, plan, plan_with};
-use super::whole_maps::{Comparison, Golden};
+use super::production::{compare, expected, frames, parts, plan, plan_with};
+use super::whole_maps::{Comparison, Golden, factors};
 use algo::inspect::Weight;
 use algo::pipeline::HeightMap;
 use algo::units::Height;

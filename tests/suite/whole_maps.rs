@@ -1,9 +1,11 @@
 //! A whole measured height map against the golden one, pixel by pixel: deviation and coverage of regions. Production by strips is
 //! compared with it.
 
-use algo::inspect::{Reading, Region, Square};
-use algo::pipeline::{HeightMap, Window};
+use algo::inspect::{Factor, Reading, Region, Square, Weight, normal_shares};
+use algo::pipeline::{HeightMap, KnownSurface, Window};
 use algo::units::Height;
+use appliance::recipe::Recipe;
+use appliance::recipe::plan::Plan;
 
 /// The part as taught, row-major over the camera's frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -131,6 +133,22 @@ fn at(golden: &Golden, measured: &HeightMap, place: usize) -> Option<(i64, f64)>
     };
     let deviation = f64::from(height.nm() - taught.nm()) * factor;
     Some((deviation.round() as i64, variance))
+}
+
+/// What height differences are multiplied by: the share along golden's normal times the weight.
+pub(crate) fn factors(recipe: &Recipe, plan: &Plan, height: &[Height]) -> Vec<f64> {
+    let valid = &recipe.arrays.valid;
+    let surface = KnownSurface {
+        width: recipe.conditions.camera.0 as usize,
+        phase: Vec::new(),
+        height: height.to_vec(),
+    };
+    let shares = normal_shares(plan.production().triangulator(), &surface);
+    let factors = valid.iter().zip(shares).map(|(&bits, share)| {
+        let weight = Weight::from_bits(bits).share();
+        Factor::of(weight * f64::from(share)).number()
+    });
+    factors.collect()
 }
 
 #[cfg(test)]

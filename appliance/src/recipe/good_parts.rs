@@ -20,6 +20,9 @@ use algo::pipeline::KnownSurface;
 use hal::bounds::within;
 use serde::{Deserialize, Serialize};
 
+/// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be measured that well, else the limit is
+/// wider.
+pub(super) const DEVIATION_MM: f64 = 0.15;
 /// At most this share of the compared pixels counts with less weight or not at all; else the limit is wider.
 const WEIGHED: f64 = 0.05;
 /// Squares have at most a σ of the limit by this: of a part with 10⁴ squares of just this σ, one in 10⁶ exceeds the limit.
