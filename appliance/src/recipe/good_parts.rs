@@ -7,7 +7,7 @@
 //!
 //! Squares are as small as noise allows: the smallest whose largest deviation on good parts stays below a third of the limit, so that small
 //! deep defects are seen at nearly their depth. Parts that lie elsewhere than golden deviate by more than noise, as golden is interpolated
-//! between pixels: teaching tries that with golden, displaced ([`super::proof`]).
+//! between pixels: teaching tries that with golden, displaced (`proof`).
 //!
 //! Leaving such pixels out instead misses nearly all dents among them
 //! (`dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_pixels`).

@@ -60,8 +60,8 @@ pub(super) fn displaced(
         .collect())
 }
 
-/// Motions that take the farthest corner of a box by `reach` mm, in all six components: points of a lattice that fills their cube evenly (as
-/// R. Korobov's, with powers of the root of x⁷ = x + 1).
+/// Motions that take the farthest corner of a box by `reach` mm, in all six components: points of an additive recurrence that fills their cube
+/// evenly, with powers of the root of x⁷ = x + 1 (M. Roberts, *The unreasonable effectiveness of quasirandom sequences*, 2018).
 fn placements(corners: &[Vector], reach: f64) -> Vec<Motion> {
     const ROOT: f64 = 1.112_775_684_278_706;
     if corners.is_empty() {
