@@ -1,13 +1,13 @@
 //! Every stock part, taught with default settings: good parts that lie anywhere within the placement tolerance pass, and dents do not.
 
-use super::placement::{Bed, TIMEOUT, bed, taught_within};
+use super::limits::cycle;
+use super::placement::{Bed, bed, taught_within};
 use algo::geometry::Vector;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
 use appliance::station::{Inspection, Verdict};
 use sim::parts::Defect;
 use sim::{Part, Placement, Scenario};
-use std::time::Instant;
 use tests::random::Random;
 
 /// The placement tolerance of the default configuration, mm.
@@ -95,21 +95,10 @@ impl Line {
         placement
     }
 
-    /// Runs a cycle as in production: longer sequences follow if a shorter one is not enough.
+    /// Judges the part where a placement puts it.
     fn judge(&mut self, placement: &Placement) -> Inspection {
         self.bed.stage.place(&self.part, placement).unwrap();
-        let mut sequence = 0;
-        loop {
-            let mut frames = Vec::new();
-            let mut keep = |_, frame| frames.push(frame);
-            let indices = self.plan.indices(sequence);
-            self.bed.head.acquire(indices, TIMEOUT, &mut keep).unwrap();
-            let found = self.plan.inspect(sequence, &frames, Instant::now());
-            sequence += 1;
-            if found.step_up.is_none() || sequence == self.plan.sequence_count() {
-                return found;
-            }
-        }
+        cycle(&mut self.bed, &self.plan)
     }
 }
 

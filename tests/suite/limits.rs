@@ -78,6 +78,22 @@ fn taught(scenario: &Scenario) -> (Bed, Recipe, GoodPartsFile) {
     (bed, taught.recipe, predicted)
 }
 
+/// Runs a cycle as in production: longer sequences follow if a shorter one is not enough.
+pub(crate) fn cycle(bed: &mut Bed, plan: &Plan) -> Inspection {
+    let mut sequence = 0;
+    loop {
+        let mut frames = Vec::new();
+        let mut keep = |_, frame| frames.push(frame);
+        let indices = plan.indices(sequence);
+        bed.head.acquire(indices, TIMEOUT, &mut keep).unwrap();
+        let found = plan.inspect(sequence, &frames, Instant::now());
+        sequence += 1;
+        if found.step_up.is_none() || sequence == plan.sequence_count() {
+            return found;
+        }
+    }
+}
+
 impl Line {
     fn new(mut bed: Bed, recipe: Recipe, predicted: GoodPartsFile) -> Self {
         let plan = Plan::new(recipe, &bed.calibration, true).unwrap();
@@ -90,20 +106,8 @@ impl Line {
         }
     }
 
-    /// Runs a cycle as in production: longer sequences follow if a shorter one is not enough.
     fn judge(&mut self) -> Inspection {
-        let mut sequence = 0;
-        loop {
-            let mut frames = Vec::new();
-            let mut keep = |_, frame| frames.push(frame);
-            let indices = self.plan.indices(sequence);
-            self.bed.head.acquire(indices, TIMEOUT, &mut keep).unwrap();
-            let found = self.plan.inspect(sequence, &frames, Instant::now());
-            sequence += 1;
-            if found.step_up.is_none() || sequence == self.plan.sequence_count() {
-                return found;
-            }
-        }
+        cycle(&mut self.bed, &self.plan)
     }
 
     /// |deviation| of `parts` good parts, mm; all must pass.

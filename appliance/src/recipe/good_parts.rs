@@ -65,7 +65,7 @@ pub struct GoodPartsFile {
     /// The side of the squares that all of this is of, pixels.
     #[serde(default = "largest_side")]
     pub smoothing_px: usize,
-    /// The largest deviation of good parts that lie anywhere within the placement tolerance: mean and standard deviation, mm; 0 if it was not
+    /// The largest deviation of good parts that lie anywhere within the placement tolerance: median and spread, mm; 0 if it was not
     /// tried.
     #[serde(default)]
     pub displaced_mm: f64,

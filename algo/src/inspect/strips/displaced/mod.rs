@@ -1,7 +1,7 @@
 //! Stage 3, align: taught coordinates of a displaced row and its deviations from golden there.
 //!
 //! # Idea
-//! The pose field gives the displacement of each pixel; inside a block it is taken as linear in column and height (`linear`). Golden's
+//! The pose field gives the displacement of each pixel; inside a block it is linear in column and quadratic in height (`linear`). Golden's
 //! height between four pixels is bilinear. Neighbouring blocks whose pixels have one whole displacement are worked on together for as
 //! long as that holds (`same`); of a block whose pixels have one of four neighbouring ones, each pixel picks its four heights
 //! from nine (`next`). In both ways golden is read along rows, many pixels at a time, and each pixel is checked. All other blocks go pixel
