@@ -132,6 +132,7 @@ struct Read {
     values: Vec<f64>,
     sigmas: Vec<f64>,
     invalid: usize,
+    failed: usize,
 }
 
 impl Read {
@@ -142,7 +143,10 @@ impl Read {
                 println!("{kind}: INVALID, {:?}", found.reason);
                 self.invalid += 1;
             }
-            verdict => panic!("{kind}: a good part is {verdict:?}: {:?}", found.gauges),
+            verdict => {
+                println!("{kind}: {verdict:?}, {:?}", found.gauges);
+                self.failed += 1;
+            }
         }
         self.values.extend(found.gauges[0].value.map(f64::abs));
         self.sigmas.extend(found.gauges[0].sigma);
@@ -169,14 +173,14 @@ impl Read {
 /// Teaches each stock part and measures good ones, as they were taught and elsewhere: none fails, hardly one is INVALID, and none comes near
 /// the limit. Returns how the deviations of each kind scatter over their σ.
 fn good_parts_pass(still: usize, placements: usize, scenario: fn(Part) -> Scenario) -> Vec<f64> {
-    let mut ratios = Vec::new();
+    let (mut ratios, mut refused) = (Vec::new(), Vec::new());
     for (kind, part) in stock() {
         let mut line = Line::new(&scenario(part));
         let mut as_it_lies = Read::default();
         for _ in 0..still {
             as_it_lies.add(&kind, &line.judge(&Placement::default()));
         }
-        assert_eq!(as_it_lies.invalid, 0, "{kind}");
+        assert_eq!((as_it_lies.failed, as_it_lies.invalid), (0, 0), "{kind}");
         let (mut read, mut random) = (Read::default(), Random::new(5));
         for _ in 0..placements {
             let placement = line.placement(&mut random);
@@ -184,18 +188,17 @@ fn good_parts_pass(still: usize, placements: usize, scenario: fn(Part) -> Scenar
         }
         let (share, ratio) = (read.largest() / line.limit_mm, read.scatter_over_sigma());
         println!(
-            "{kind:12} {placements} placements: largest deviation {:.4} mm, {share:.2} of the limit; scatter/σ {ratio:.2}, {} INVALID",
+            "{kind:12} {placements} placements: largest deviation {:.4} mm, {share:.2} of the limit; scatter/σ {ratio:.2}, {} FAIL, {} INVALID",
             read.largest(),
+            read.failed,
             read.invalid
         );
-        assert!(share <= MOST_OF_LIMIT, "{kind}: {share}");
-        assert!(
-            read.invalid * 100 <= placements,
-            "{kind}: {} INVALID",
-            read.invalid
-        );
+        if share > MOST_OF_LIMIT || read.failed > 0 || read.invalid * 100 > placements {
+            refused.push(kind);
+        }
         ratios.push(ratio);
     }
+    assert!(refused.is_empty(), "{refused:?}");
     ratios
 }
 
@@ -209,11 +212,6 @@ fn quick(part: Part) -> Scenario {
         sub_rays: 2,
         ..Scenario::default()
     }
-}
-
-#[test]
-fn good_parts_of_every_stock_kind_pass_wherever_they_lie_within_the_tolerance() {
-    good_parts_pass(1, 2, quick);
 }
 
 #[test]
@@ -244,6 +242,7 @@ const DENTED: [(&str, [f64; 2]); 5] = [
 
 /// Puts a dent of 0.3 mm and 8 mm where both devices see it on parts that lie anywhere: all fail.
 fn dents_fail(placements: usize, scenario: fn(Part) -> Scenario) {
+    let mut missed = 0;
     for (kind, [x, y]) in DENTED {
         let (_, part) = stock().into_iter().find(|(name, _)| name == kind).unwrap();
         let mut line = Line::new(&scenario(part.clone()));
@@ -263,15 +262,16 @@ fn dents_fail(placements: usize, scenario: fn(Part) -> Scenario) {
             let found = line.judge(&placement);
             let value = found.gauges[0].value.unwrap_or(f64::NAN);
             least = least.min(-value);
-            assert_eq!(
-                found.verdict(),
-                Verdict::Fail,
-                "{kind}: {value}, {:?}",
-                found.reason
-            );
+            if found.verdict() != Verdict::Fail {
+                println!("{kind}: {value:.4} mm, {:?}", found.reason);
+                missed += 1;
+            }
         }
-        println!("{kind:12} {placements} dents of 0.3 mm found, the least at {least:.3} mm");
+        println!(
+            "{kind:12} {missed} of {placements} dents of 0.3 mm missed, the least at {least:.3} mm"
+        );
     }
+    assert_eq!(missed, 0);
 }
 
 #[test]

@@ -26,7 +26,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 71] = [
+const KEYS: [&str; 73] = [
     "alignment",
     "calibration",
     "camera",
@@ -66,6 +66,8 @@ const KEYS: [&str; 71] = [
     "good_parts.smoothing_px",
     "good_parts.tolerance_mm",
     "good_parts.weighed",
+    "good_parts.wider",
+    "good_parts.wider_px",
     "guard_k",
     "least_modulation",
     "min_coverage",
@@ -99,14 +101,15 @@ const KEYS: [&str; 71] = [
     "taught_by",
     "version",
 ];
-/// Keys that `recipe.json` may have in addition, and a member of the recipe.
-const OPTIONAL: [&str; 12] = [
+/// Keys that `recipe.json` may have in addition, and members of the recipe.
+const OPTIONAL: [&str; 13] = [
     "calibration_sigma",
     "height_mm",
     "length_mm",
     "exposure_us",
     "exposures",
     "amplitude.npy",
+    "smoothing.npy",
     "fringes",
     "from",
     "tolerance_mm",

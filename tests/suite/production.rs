@@ -320,6 +320,7 @@ fn golden(recipe: &Recipe, plan: &Plan) -> Golden {
     Golden {
         width: recipe.conditions.camera.0 as usize,
         factor: factors(recipe, plan, &all),
+        sides: arrays.smoothing.clone(),
         height: compared
             .map(|(&height, &valid)| match valid {
                 0 => Height::UNKNOWN,

@@ -29,9 +29,6 @@ const NEAR_PX: f64 = 4.0;
 const SHIFT_MM: f64 = 0.6;
 const TURN_DEG: f64 = 0.1;
 const DEPTH_MM: f64 = 0.5;
-/// The same on the flowerpot's wall. A good pot that is displaced reads up to 0.34 mm where its wall is seen at a grazing angle, which is what
-/// a dent of 0.5 mm reads, too: the largest square is then no longer in the dent.
-const DEPTH_ON_THE_POT_MM: f64 = 1.0;
 const DIAMETER_MM: f64 = 14.0;
 
 /// A picture: its description, and its values, NaN where there is none.
@@ -131,11 +128,7 @@ impl Line {
 
     /// A dented part that lies so: the picture's largest square is the gauge's, live and from the history, and lies in the dent.
     fn shows_the_dent(&mut self, (x, y): (f64, f64), placement: &Placement) -> f64 {
-        let depth = match self.pot {
-            true => DEPTH_ON_THE_POT_MM,
-            false => DEPTH_MM,
-        };
-        let dented = part(self.pot, vec![dent(x, y, depth)]);
+        let dented = part(self.pot, vec![dent(x, y, DEPTH_MM)]);
         let (verdict, seq) = self.measure(&dented, placement);
         let result = self.browser.get("/api/snapshot")["result"].clone();
         let gauge = result["gauges"][0].clone();

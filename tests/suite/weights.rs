@@ -116,6 +116,7 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
         });
         let (height, factor) = golden.unzip();
         Golden {
+            sides: recipe.arrays.smoothing.clone(),
             width,
             height,
             factor,

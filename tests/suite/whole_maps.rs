@@ -16,6 +16,8 @@ pub(crate) struct Golden {
     pub height: Vec<Height>,
     /// What height differences there are multiplied by: their share along the normal times their weight.
     pub factor: Vec<f64>,
+    /// The least side of the squares about each pixel; empty where any will do.
+    pub sides: Vec<u8>,
 }
 
 /// A measured height map beside the golden one. Places that only one of them knows do not count.
@@ -81,7 +83,11 @@ impl<'a> Comparison<'a> {
                 let place = row * self.golden.width + column;
                 self.deviations[place].is_some()
             })
-            .filter_map(|(row, column)| self.smoothed(row, column, side))
+            .filter_map(|(row, column)| {
+                let least = self.golden.sides.get(row * self.golden.width + column);
+                let side = least.map_or(side, |least| side.max(usize::from(*least)));
+                self.smoothed(row, column, side)
+            })
             .max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))
     }
 
@@ -162,6 +168,7 @@ mod tests {
             width: WIDTH,
             height: vec![Height::from_nm(0); WIDTH * WIDTH],
             factor: vec![1.0; WIDTH * WIDTH],
+            sides: Vec::new(),
         };
         let measured = HeightMap {
             width: WIDTH,

@@ -199,8 +199,15 @@ fn carry<'a>(values: impl Iterator<Item = &'a mut f32>) {
 }
 
 /// The distribution of the largest |deviation| of good parts.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct LargestDeviation {
+    /// Of the squares of each side.
+    fields: Vec<Field>,
+}
+
+/// The squares of one side.
+#[derive(Clone, Debug, PartialEq)]
+struct Field {
     side: f64,
     /// How many squares have a σ in each bin ([`sigma_of`]), by the number of axes along which they are the end of a run.
     bins: [Vec<u32>; 3],
@@ -249,17 +256,25 @@ impl LargestDeviation {
             bins[ends.into_iter().filter(|end| *end).count()][bin as usize] += 1;
         }
         let side = side.max(1) as f64;
-        Self { side, bins }
+        let fields = vec![Field { side, bins }];
+        Self { fields }
+    }
+
+    /// Together with squares of another side.
+    pub fn add(&mut self, other: Self) {
+        self.fields.extend(other.fields);
     }
 
     /// Λ(x): the mean number of clumps of squares that deviate by more than `limit` mm, above 0.
     fn clumps(&self, limit: f64) -> f64 {
         let mut clumps = 0.0;
-        for (ends, bins) in self.bins.iter().enumerate() {
-            let bins = bins.iter().enumerate();
-            for (bin, &count) in bins.filter(|(_, count)| **count > 0) {
-                let t = limit / sigma_of(bin);
-                clumps += f64::from(count) * clumps_per_square(t, self.side, 2 - ends as i32);
+        for Field { side, bins } in &self.fields {
+            for (ends, bins) in bins.iter().enumerate() {
+                let bins = bins.iter().enumerate();
+                for (bin, &count) in bins.filter(|(_, count)| **count > 0) {
+                    let t = limit / sigma_of(bin);
+                    clumps += f64::from(count) * clumps_per_square(t, *side, 2 - ends as i32);
+                }
             }
         }
         clumps
@@ -299,7 +314,8 @@ impl LargestDeviation {
     /// The largest deviation that is expected, mm.
     fn top(&self) -> f64 {
         let largest = |bins: &Vec<u32>| bins.iter().rposition(|count| *count > 0);
-        let largest = self.bins.iter().filter_map(largest).max();
+        let bins = self.fields.iter().flat_map(|field| &field.bins);
+        let largest = bins.filter_map(largest).max();
         largest.map_or(0.0, |bin| REACH * sigma_of(bin))
     }
 }

@@ -59,7 +59,7 @@ const HALVINGS: usize = 30;
 const FAR: f64 = 8.0;
 
 impl Largest {
-    /// Of the squares of `side` pixels about the pixels of a region, where deviations have the noise of the `taught` heights alone;
+    /// Of the squares about the pixels of a region, of `side` pixels or what is needed more, where deviations have the noise of the `taught` heights alone;
     /// with `times` the noise it is [`Self::times`] as large. `width` is that of the frame.
     pub fn of(taught: &Taught, width: usize, region: &Region, side: usize) -> Self {
         let pixels = taught.pixels().len();
@@ -76,12 +76,17 @@ impl Largest {
             pixel: &pixel,
             motion: &vec![0.0; pixels],
         };
-        let squares = noise.of_squares(&weights, side);
-        let mut inside = vec![f32::NAN; pixels];
-        for place in region.places(width) {
-            inside[place] = squares[place];
+        let mut largest = LargestDeviation::default();
+        for own in taught.sides(side) {
+            let squares = noise.of_squares(&weights, own);
+            let mut inside = vec![f32::NAN; pixels];
+            let places = region.places(width);
+            for place in places.filter(|&place| taught.side(place, side) == own) {
+                inside[place] = squares[place];
+            }
+            largest.add(LargestDeviation::new(&inside, width, own));
         }
-        let (mean, scatter) = LargestDeviation::new(&inside, width, side).mean_and_scatter();
+        let (mean, scatter) = largest.mean_and_scatter();
         Self { mean, scatter }
     }
 

@@ -13,8 +13,8 @@ use zip::{CompressionMethod, ZipWriter};
 
 /// The manifest's name in the archive.
 const MANIFEST: &str = "recipe.json";
-/// The manifest and ten arrays.
-const MAX_MEMBERS: usize = 11;
+/// The manifest and eleven arrays.
+const MAX_MEMBERS: usize = 12;
 /// The largest manifest that is read, in bytes.
 const MAX_MANIFEST: u64 = 1 << 20;
 /// The fingerprint in the manifest while the fingerprint is computed.
@@ -77,6 +77,8 @@ arrays! {
     sequence_offset: i16,
     /// The light of each pixel of the projector's raster, in 1/255 of what its pattern asks for; empty where that is all of it.
     amplitude: u8,
+    /// Least side of the squares of a deviation about each pixel, in pixels; empty where any will do.
+    smoothing: u8,
 }
 
 /// What is wrong with a file that is not a ZIP, lacks a member, or has one that cannot be read; with the remedy.

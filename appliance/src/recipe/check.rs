@@ -12,6 +12,9 @@ use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
 use std::io::{Cursor, Read, Seek};
 
+/// Most different sides of squares of one recipe, with 0 where any will do: each takes time in every cycle.
+const MAX_SIDES: usize = 5;
+
 /// A recipe whose parts fit each other, parsed into what planning and measuring need.
 #[derive(Clone, Debug)]
 pub struct Recipe {
@@ -161,7 +164,8 @@ impl Recipe {
                 1
             };
             let expected = pixels.and_then(|pixels| pixels.checked_mul(maps));
-            if Some(length) != expected && !(of_short && length == 0) {
+            let optional = of_short || name == "smoothing";
+            if Some(length) != expected && !(optional && length == 0) {
                 return Err(format!(
                     "{name} has {length} values for a camera of {width}x{height} and {} sequences",
                     file.sequences.len()
@@ -183,6 +187,15 @@ impl Recipe {
                 amplitude.len(),
                 amplitude.iter().filter(|share| **share == 0).count(),
                 file.exposures
+            ));
+        }
+        let mut sides = arrays.smoothing.clone();
+        sides.sort_unstable();
+        sides.dedup();
+        if sides.len() > MAX_SIDES || sides.iter().any(|&side| side > 0 && side % 2 == 0) {
+            return Err(format!(
+                "smoothing has {} different values: it has at most {MAX_SIDES}, 0 or odd, as squares have a middle pixel",
+                sides.len()
             ));
         }
         let function = match file.pattern {

@@ -102,7 +102,7 @@ impl TaughtRecipe {
     /// # Errors
     /// In words, if they do not fit each other.
     pub(super) fn of(mut manifest: RecipeFile, arrays: Arrays) -> Result<Self, String> {
-        let choice = planner::choose(&manifest.sequences, &manifest.gauges);
+        let choice = planner::choose(&manifest.sequences, &manifest.gauges, 0);
         manifest.production = choice.production;
         let mut recipe = Recipe::check(&manifest, arrays)?;
         let (bytes, fingerprint) = archive::pack(&manifest, &recipe.arrays)?;
@@ -161,7 +161,7 @@ impl GoldenPart<'_> {
         };
         let mut arrays = self.arrays(&surface, naming.placement_tolerance_mm);
         let sequences = self.sequences(&arrays);
-        let choice = planner::choose(&sequences, &gauges);
+        let choice = planner::choose(&sequences, &gauges, 0);
         let range = self.triangulator.range();
         let calibration = self.calibration;
         let (width, height, bit_depth) = calibration.frames();
@@ -211,7 +211,13 @@ impl GoldenPart<'_> {
         };
         let mut words = self.set_limits(surface, &mut manifest, &mut arrays)?;
         // The smaller the squares, the less noise is allowed.
-        let mut choice = planner::choose(&manifest.sequences, &manifest.gauges);
+        let widest = arrays
+            .smoothing
+            .iter()
+            .copied()
+            .max()
+            .map_or(0, usize::from);
+        let mut choice = planner::choose(&manifest.sequences, &manifest.gauges, widest);
         manifest.production = choice.production;
         choice.reasons.append(&mut words);
         let (bytes, _) = archive::pack(&manifest, &arrays)?;
@@ -280,6 +286,7 @@ impl GoldenPart<'_> {
             phase_reach: phase_reach(self.triangulator, surface, placement_tolerance_mm),
             sequence_offset: self.offsets.iter().flat_map(mean).collect(),
             amplitude: self.illumination.amplitude.clone(),
+            smoothing: Vec::new(),
         }
     }
 }

@@ -5,13 +5,14 @@
 //! found. If that concerned more than a small share of the pixels, the limit is wider instead, and teaching reports that the
 //! tolerance cannot be held.
 //!
-//! Squares are as small as noise allows: the smallest whose largest deviation on good parts stays below a third of the limit, so that small
-//! deep defects are seen at nearly their depth. Parts that lie elsewhere than golden deviate by more than noise, as golden is interpolated
-//! between pixels: teaching tries that with golden, displaced (`proof`).
+//! Squares are as small as noise allows about each pixel: their largest deviation on good parts stays below a third of the limit, so that small
+//! deep defects are seen at nearly their depth (`sides`). Parts that lie elsewhere than golden deviate by more than noise, as golden is
+//! interpolated between pixels: teaching tries that with golden, displaced (`proof`).
 //!
 //! Leaving such pixels out instead misses nearly all dents among them
 //! (`dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_pixels`).
 
+use super::sides::{Farthest, Sides};
 use crate::station::Unit;
 use algo::geometry::Triangulator;
 use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_variance};
@@ -26,7 +27,7 @@ pub(super) const DEVIATION_MM: f64 = 0.15;
 /// At most this share of the compared pixels counts with less weight or not at all; else the limit is wider.
 const WEIGHED: f64 = 0.05;
 /// Squares have at most a σ of the limit by this: of a part with 10⁴ squares of just this σ, one in 10⁶ exceeds the limit.
-const SIGMAS: f64 = 6.5;
+pub(super) const SIGMAS: f64 = 6.5;
 /// At most this share of good parts is predicted to exceed the limit.
 const BEYOND: f64 = 1e-6;
 /// Sides of squares in camera pixels, the smallest first. A single pixel may be a wild one. In the largest a dent of 8 mm is still seen at
@@ -65,6 +66,12 @@ pub struct GoodPartsFile {
     /// The side of the squares that all of this is of, pixels.
     #[serde(default = "largest_side")]
     pub smoothing_px: usize,
+    /// The largest side of the squares about the pixels where that would be too noisy; 0 where there are none.
+    #[serde(default)]
+    pub wider_px: usize,
+    /// Share of the compared pixels that these are about.
+    #[serde(default)]
+    pub wider: f64,
     /// The largest deviation of good parts that lie anywhere within the placement tolerance: median and spread, mm; 0 if it was not
     /// tried.
     #[serde(default)]
@@ -94,29 +101,21 @@ pub(super) struct Noise<'a> {
     pub golden: f64,
 }
 
-impl Noise<'_> {
-    /// The limit of the deviation for a tolerance, in the smallest squares of the given sides that noise allows, else in the largest. `mask` is
-    /// not 0 where the part can be compared; it is overwritten with the weights of the pixels ([`Weight::bits`]) for this limit.
-    pub fn weigh_smallest(
-        &self,
-        mask: &mut Vec<u8>,
-        tolerance_mm: f64,
-        sides: &[usize],
-    ) -> GoodPartsFile {
-        let (last, smaller) = sides.split_last().unwrap_or((&SIDES[0], &[]));
-        for side in smaller {
-            let mut weighed = mask.clone();
-            let (found, extreme) = self.weigh(&mut weighed, tolerance_mm, *side);
-            if found.limit_mm <= tolerance_mm && extreme < ROOM * tolerance_mm {
-                *mask = weighed;
-                return found;
-            }
-        }
-        self.weigh(mask, tolerance_mm, *last).0
-    }
+/// The part with the weights that its noise asks for.
+pub(super) struct Weighed {
+    /// What good parts deviate by in the largest squares.
+    pub found: GoodPartsFile,
+    width: usize,
+    weights: Vec<Weight>,
+    /// The variances of [`DeviationNoise`].
+    pixel: Vec<f32>,
+    motion: Vec<f32>,
+}
 
-    /// The same in squares of one side. The second value is what the deviation of hardly any good part exceeds, mm.
-    fn weigh(&self, mask: &mut [u8], tolerance_mm: f64, side: usize) -> (GoodPartsFile, f64) {
+impl Noise<'_> {
+    /// The limit of the deviation for a tolerance, and the weights of the pixels for this limit, in squares of the largest side. `mask` is
+    /// not 0 where the part can be compared.
+    pub fn weigh(&self, mask: &[u8], tolerance_mm: f64) -> Weighed {
         let width = self.surface.width;
         let valid: Vec<bool> = mask.iter().map(|&valid| valid != 0).collect();
         let both = 1.0 + self.golden as f32;
@@ -134,7 +133,7 @@ impl Noise<'_> {
         let whole = self.taught(&full);
         let whole = self.golden_surface(&whole);
         // The motion is found from what counts in full, and what does depends on the motion: once each.
-        let (_, weights) = limited(&noise, &valid, tolerance_mm, side);
+        let (_, weights) = limited(&noise, &valid, tolerance_mm);
         let taught = self.taught(&weights);
         let window = vec![0..width; valid.len() / width.max(1)];
         let mut motion = motion_variance(self.golden_surface(&taught), whole, &window);
@@ -142,14 +141,7 @@ impl Noise<'_> {
             *variance = along_normal((variance, share));
         }
         noise.motion = &motion;
-        let (limit_mm, weights) = limited(&noise, &valid, tolerance_mm, side);
-        let squares = noise.of_squares(&weights, side);
-        let largest = LargestDeviation::new(&squares, width, side);
-        let limit_mm = match largest.beyond(limit_mm) > BEYOND {
-            true => rounded_up(largest.limit(BEYOND)),
-            false => limit_mm,
-        };
-        let (largest_mm, scatter_mm) = largest.mean_and_scatter();
+        let (limit_mm, weights) = limited(&noise, &valid, tolerance_mm);
         let (mut all, mut weighed) = (0.0, 0.0);
         for (area, weight) in areas(whole).into_iter().zip(&weights) {
             let area = f64::from(area);
@@ -161,25 +153,35 @@ impl Noise<'_> {
             .clone()
             .map(|weight| weight.share())
             .fold(1.0, f64::min);
-        for (mask, weight) in mask.iter_mut().zip(&weights) {
-            *mask = weight.bits();
-        }
         let found = GoodPartsFile {
             tolerance_mm,
             limit_mm,
-            largest_mm,
-            scatter_mm,
-            beyond: largest.beyond(limit_mm),
+            largest_mm: 0.0,
+            scatter_mm: 0.0,
+            beyond: 0.0,
             left_out: 1.0 - compared.count() as f64 / count(&valid).max(1.0),
             weighed: weighed / f64::max(all, f64::MIN_POSITIVE),
             least_weight,
-            smoothing_px: side,
+            smoothing_px: 0,
+            wider_px: 0,
+            wider: 0.0,
             displaced_mm: 0.0,
             displaced_scatter_mm: 0.0,
         };
-        (found, largest.limit(BEYOND))
+        let mut weighed = Weighed {
+            found,
+            width,
+            weights,
+            pixel,
+            motion,
+        };
+        let largest = weighed.predict(&Sides::largest());
+        if largest.beyond(limit_mm) > BEYOND {
+            weighed.found.limit_mm = rounded_up(largest.limit(BEYOND));
+            weighed.predict(&Sides::largest());
+        }
+        weighed
     }
-
     /// Golden with these weights, and the noise with which production takes it ([`Taught`]).
     fn taught(&self, weights: &[Weight]) -> Taught {
         let sigmas = self
@@ -200,13 +202,65 @@ impl Noise<'_> {
     }
 }
 
+impl Weighed {
+    /// The weights of the pixels ([`Weight::bits`]).
+    pub fn bits(&self) -> Vec<u8> {
+        self.weights.iter().map(|weight| weight.bits()).collect()
+    }
+
+    /// Sets what good parts are predicted to deviate by in squares of these sides; returns the distribution.
+    pub fn predict(&mut self, sides: &Sides) -> LargestDeviation {
+        let mut largest = LargestDeviation::default();
+        let compared = |place: &usize| self.weights[*place].compared();
+        let places = || (0..self.weights.len()).filter(compared);
+        for side in sides.all() {
+            let mut sigmas = self.sigmas(side);
+            for (place, sigma) in sigmas.iter_mut().enumerate() {
+                *sigma = if sides.at(place) == side {
+                    *sigma
+                } else {
+                    f32::NAN
+                };
+            }
+            largest.add(LargestDeviation::new(&sigmas, self.width, side));
+        }
+        let wider = places().filter(|place| sides.at(*place) > sides.smallest);
+        let (wider, all) = (wider.count(), places().count());
+        let found = &mut self.found;
+        (found.largest_mm, found.scatter_mm) = largest.mean_and_scatter();
+        found.beyond = largest.beyond(found.limit_mm);
+        found.smoothing_px = sides.smallest;
+        let widest = sides.all().into_iter().max();
+        found.wider_px = widest.filter(|side| *side > sides.smallest).unwrap_or(0);
+        found.wider = wider as f64 / all.max(1) as f64;
+        largest
+    }
+
+    /// Squares as small as noise allows, and as `farthest` does, where the image of a part moves by up to `away` pixels.
+    pub fn sides(&self, farthest: &Farthest, away: usize) -> Sides {
+        let sigmas = SIDES.map(|side| self.sigmas(side));
+        let full = |place: usize| {
+            let weight = self.weights[place];
+            weight.compared().then_some(!weight.partial())
+        };
+        let limit = self.found.limit_mm;
+        Sides::new((&sigmas, farthest), full, limit, (self.width, away))
+    }
+
+    /// σ of the mean over the square of `side` pixels about each pixel, mm; NaN where there is none.
+    fn sigmas(&self, side: usize) -> Vec<f32> {
+        let noise = DeviationNoise {
+            width: self.width,
+            pixel: &self.pixel,
+            motion: &self.motion,
+        };
+        noise.of_squares(&self.weights, side)
+    }
+}
+
 /// The limit, at least the tolerance, that all but [`WEIGHED`] of the pixels can hold, and the weights with which the others can.
-fn limited(
-    noise: &DeviationNoise<'_>,
-    valid: &[bool],
-    tolerance_mm: f64,
-    side: usize,
-) -> (f64, Vec<Weight>) {
+fn limited(noise: &DeviationNoise<'_>, valid: &[bool], tolerance_mm: f64) -> (f64, Vec<Weight>) {
+    let side = SIDES[SIDES.len() - 1];
     let least = (1.0 - WEIGHED) * count(valid);
     let mut limit = tolerance_mm;
     loop {
@@ -244,6 +298,8 @@ impl GoodPartsFile {
         within("weighed", self.weighed, 0.0, 1.0)?;
         within("least_weight", self.least_weight, 1.0 / 256.0, 1.0)?;
         within("smoothing_px", self.smoothing_px, 1, usize::from(u16::MAX))?;
+        within("wider_px", self.wider_px, 0, usize::from(u8::MAX))?;
+        within("wider", self.wider, 0.0, 1.0)?;
         within("displaced_mm", self.displaced_mm, 0.0, longest)?;
         let scatter = self.displaced_scatter_mm;
         within("displaced_scatter_mm", scatter, 0.0, longest)
@@ -270,6 +326,8 @@ impl GoodPartsFile {
             weighed,
             least_weight,
             smoothing_px,
+            wider_px,
+            wider,
             displaced_mm,
             displaced_scatter_mm,
         } = *self;
@@ -289,8 +347,16 @@ impl GoodPartsFile {
             ),
             false => format!("deviation: {expected}"),
         }];
+        let elsewhere = match wider_px {
+            0 => String::new(),
+            side => format!(
+                ", over up to {side} × {side} where it is too noisy or too bent for that, {:.1} % of it",
+                wider * 100.0
+            ),
+        };
         lines.push(format!(
-            "deviations are means over {smoothing_px} × {smoothing_px} pixels: a defect that is narrower is seen at less than its depth"
+            "deviations are means over {smoothing_px} × {smoothing_px} pixels of the part{elsewhere}: a defect that is narrower is \
+             seen at less than its depth"
         ));
         if displaced_mm > 0.0 {
             lines.push(format!(

@@ -31,6 +31,7 @@ pub mod planner;
 mod proof;
 pub mod replace;
 mod shots;
+mod sides;
 pub mod store;
 pub mod teach;
 

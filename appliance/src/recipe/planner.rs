@@ -23,10 +23,14 @@ pub struct Choice {
 }
 
 /// The largest σ_z, RMS over the surface, in mm, that is allowed by the limits of gauges with a smoothing square (deviations,
-/// flatness, peak-to-valley). Gauges that average over regions are far less noisy and do not count.
-pub fn allowed_sigma(gauges: &[GaugeFile]) -> f64 {
+/// flatness, peak-to-valley). Squares of deviations have `widest` pixels where they must. Gauges that average over regions are
+/// far less noisy and do not count.
+pub fn allowed_sigma(gauges: &[GaugeFile], widest: usize) -> f64 {
     let allowed = gauges.iter().filter_map(|gauge| {
-        let side = gauge.measures.smoothing_px()?;
+        let side = match &gauge.measures {
+            GaugeKind::Deviation { smoothing_px } => widest.max(*smoothing_px),
+            other => other.smoothing_px()?,
+        };
         let limits = match gauge.measures {
             GaugeKind::OutOfTolerance { tolerance_mm, .. } => [Some(tolerance_mm), None],
             _ => [gauge.low, gauge.high],
@@ -43,9 +47,9 @@ pub fn allowed_sigma(gauges: &[GaugeFile]) -> f64 {
     allowed.fold(f64::INFINITY, f64::min)
 }
 
-/// Chooses the cheapest sequence that is good enough; the full one, which is the last, if none is.
-pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile]) -> Choice {
-    let allowed = allowed_sigma(gauges);
+/// Chooses the cheapest sequence that is good enough; the full one, which is the last, if none is. `widest` is as for [`allowed_sigma`].
+pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile], widest: usize) -> Choice {
+    let allowed = allowed_sigma(gauges, widest);
     // Only the full sequence resolves material where golden has none.
     let looks_for_more = gauges
         .iter()
@@ -133,7 +137,7 @@ mod tests {
     #[test]
     fn the_cheapest_sequence_that_is_safe_and_quiet_enough_is_taken() {
         let quiet = [0.05, 0.045, 0.03];
-        let choose = |safe, limit| choose(&sequences(quiet, safe), &gauge(limit)).production;
+        let choose = |safe, limit| choose(&sequences(quiet, safe), &gauge(limit), 0).production;
         assert_eq!(choose([1.0, 1.0, 1.0], 0.25), 0);
         assert_eq!(choose([0.9, 0.99, 1.0], 0.25), 1);
         assert_eq!(choose([0.9, 0.9, 1.0], 0.25), 2);
@@ -152,7 +156,7 @@ mod tests {
             high: Some(0.25),
         });
         let sequences = sequences([0.05, 0.045, 0.03], [1.0; 3]);
-        let choice = choose(&sequences, &gauges);
+        let choice = choose(&sequences, &gauges, 0);
         assert_eq!(choice.production, 2);
         assert!(
             choice.reasons[0].contains("opening"),
@@ -166,6 +170,7 @@ mod tests {
         let choice = choose(
             &sequences([0.05, 0.045, 0.03], [0.9, 1.0, 1.0]),
             &gauge(0.25),
+            0,
         );
         assert!(choice.reasons[0].contains("4 frames") && choice.reasons[0].contains("not safe"));
         let unseen = "unseen at 2e-9 of its pixels (2e-3 where it is darkest)";

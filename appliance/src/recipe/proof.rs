@@ -6,6 +6,7 @@
 
 use super::archive::Arrays;
 use super::plan::Plan;
+use super::sides::Farthest;
 use super::teach::TeachError;
 use super::{GaugeKind, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
@@ -29,35 +30,60 @@ const REACH: f64 = 0.98;
 /// Limits are this many times as far from the expected value as the farthest of the cycles.
 const FARTHER: f64 = 1.2;
 
-/// The part as taught, judged at places within the recipe's placement tolerance; none where parts are not aligned, or if cycles begin
-/// with two frames.
-///
-/// # Errors
-/// In words, if the recipe cannot be planned.
-pub(super) fn displaced(
-    manifest: &RecipeFile,
-    arrays: &Arrays,
-    calibration: &Calibration,
-) -> Result<Vec<Inspection>, String> {
-    let recipe = Recipe::check(manifest, arrays.clone())?;
-    let (_, _, bit_depth) = recipe.conditions.camera;
-    let full_scale = f64::from((1_u32 << bit_depth) - 1);
-    let taught = recipe.sequences.last().map_or(1.0, |of| of.fundamental());
-    let light = recipe.sequences.iter().map(|sequence| {
-        let unit = f64::from(u16::MAX) / full_scale * sequence.fundamental() / taught;
-        let bits = |counts: &f32| (f64::from(*counts) * unit).round() as u16;
-        let counts = arrays.modulation.iter();
-        counts
-            .map(|counts| Modulation::from_bits(bits(counts)))
-            .collect()
-    });
-    let light: Vec<Vec<Modulation>> = light.collect();
-    let plan = Plan::new(recipe, calibration, false).map_err(|error| error.to_string())?;
-    let places = placements(plan.corners(), REACH * manifest.placement_tolerance_mm);
-    let judged = (1..).zip(&places);
-    Ok(judged
-        .map_while(|(seed, motion)| plan.inspect_rendered(motion, &light, seed))
-        .collect())
+/// A recipe that is tried before any part is judged by it.
+pub(super) struct Proof {
+    plan: Plan,
+    /// Golden's modulation by each of the plan's sequences.
+    light: Vec<Vec<Modulation>>,
+    places: Vec<Motion>,
+}
+
+impl Proof {
+    /// # Errors
+    /// In words, if the recipe cannot be planned.
+    pub fn new(
+        manifest: &RecipeFile,
+        arrays: &Arrays,
+        calibration: &Calibration,
+    ) -> Result<Self, String> {
+        let recipe = Recipe::check(manifest, arrays.clone())?;
+        let (_, _, bit_depth) = recipe.conditions.camera;
+        let full_scale = f64::from((1_u32 << bit_depth) - 1);
+        let taught = recipe.sequences.last().map_or(1.0, |of| of.fundamental());
+        let light = recipe.sequences.iter().map(|sequence| {
+            let unit = f64::from(u16::MAX) / full_scale * sequence.fundamental() / taught;
+            let bits = |counts: &f32| (f64::from(*counts) * unit).round() as u16;
+            let counts = arrays.modulation.iter();
+            counts
+                .map(|counts| Modulation::from_bits(bits(counts)))
+                .collect()
+        });
+        let light = light.collect();
+        let plan = Plan::new(recipe, calibration, false).map_err(|error| error.to_string())?;
+        let places = placements(plan.corners(), REACH * manifest.placement_tolerance_mm);
+        Ok(Self {
+            plan,
+            light,
+            places,
+        })
+    }
+
+    /// The part as taught, judged at places within the recipe's placement tolerance; none where parts are not aligned, or if cycles begin
+    /// with two frames. `farthest` gets what it deviates by in squares of all sides.
+    pub fn displaced(&self, mut farthest: Option<&mut Farthest>) -> Vec<Inspection> {
+        let judged = (1..).zip(&self.places);
+        let judged = judged.map_while(|(seed, motion)| {
+            let farthest = farthest.as_deref_mut();
+            self.plan
+                .inspect_rendered(motion, &self.light, seed, farthest)
+        });
+        judged.collect()
+    }
+
+    /// How many pixels the image of a part moves by at most.
+    pub fn away(&self) -> usize {
+        self.plan.away()
+    }
 }
 
 /// Motions that take the farthest corner of a box by `reach` mm, in all six components: points of an additive recurrence that fills their cube

@@ -127,15 +127,24 @@ impl Production {
                     square: None,
                 })
             }
-            Measure::Deviation { side } => {
-                for below in 1..strips.len() {
-                    if let [above, below] = &mut strips[below - 1..=below] {
-                        below.squares.extremes[gauge].join(&mut above.squares.extremes[gauge]);
+            Measure::Deviation { .. } => {
+                let mut largest: Option<Reading> = None;
+                let squares = self.gauges.squares.iter().enumerate();
+                for (at, squares) in squares.filter(|(_, squares)| squares.gauge == gauge) {
+                    for below in 1..strips.len() {
+                        if let [above, below] = &mut strips[below - 1..=below] {
+                            below.squares.extremes[at].join(&mut above.squares.extremes[at]);
+                        }
                     }
+                    let found = rivals(strips.iter().map(|strip| &strip.squares.extremes[at]));
+                    let (found, strip) = ((&found[..], squares.side), strips.first_mut()?);
+                    let next = self.deviation(found, input, pose, strip, (gauge, noisier));
+                    let less = |next: &Reading| {
+                        largest.is_some_and(|of| libm::fabs(next.value) < libm::fabs(of.value))
+                    };
+                    largest = next.filter(|next| !less(next)).or(largest);
                 }
-                let found = rivals(strips.iter().map(|strip| &strip.squares.extremes[gauge]));
-                let strip = strips.first_mut()?;
-                self.deviation((&found, side), input, pose, strip, (gauge, noisier))
+                largest
             }
             Measure::Placement(component) => {
                 let (value, sigma) = pose.placed.as_ref()?.component(component)?;

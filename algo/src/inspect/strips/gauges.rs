@@ -53,6 +53,44 @@ pub(super) struct Patch {
     pub taught: Vec<TaughtCell>,
 }
 
+/// The squares of one side that a gauge of deviation looks at.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct SquaresOf {
+    /// Which gauge.
+    pub gauge: usize,
+    /// The side of its squares where it may be the smallest.
+    pub smallest: usize,
+    pub side: usize,
+    /// Whether there are places with squares of another side.
+    pub partly: bool,
+}
+
+/// A side of squares, and where there are some of this side: the box around their middles.
+#[derive(Clone, Debug)]
+pub(super) struct Side {
+    pub side: usize,
+    pub rows: Range<usize>,
+    pub columns: Range<usize>,
+}
+
+impl Side {
+    /// The rows or columns that squares about the middles reach, of a frame with any.
+    pub fn reached(&self, middles: &Range<usize>) -> Range<usize> {
+        let half = self.side / 2;
+        middles.start.saturating_sub(half)..middles.end + half
+    }
+
+    /// Includes another box.
+    fn widen(&mut self, rows: Range<usize>, columns: Range<usize>) {
+        let hull = |a: &Range<usize>, b: Range<usize>| match a.is_empty() {
+            true => b,
+            false => a.start.min(b.start)..a.end.max(b.end),
+        };
+        self.rows = hull(&self.rows, rows);
+        self.columns = hull(&self.columns, columns);
+    }
+}
+
 /// All gauges, and what was planned of them.
 #[derive(Debug)]
 pub(super) struct Gauges {
@@ -63,8 +101,10 @@ pub(super) struct Gauges {
     pub patches: Vec<Patch>,
     /// Per gauge which patches are its own: one, two of a step, or none.
     pub patches_of: Vec<Range<usize>>,
-    /// The sides of the squares of deviations, each once.
-    pub sides: Vec<usize>,
+    /// The squares of all gauges of deviation, gauge by gauge.
+    pub squares: Vec<SquaresOf>,
+    /// The sides of these squares, each once.
+    pub sides: Vec<Side>,
     /// What the uncertainty of a coverage follows from.
     pub threshold: Threshold,
 }
@@ -82,15 +122,41 @@ impl Gauges {
             let gauges = list.len();
             return Err(Unmeasurable::TooMany { gauges });
         }
-        let mut sides = Vec::new();
-        for gauge in &list {
-            if let Measure::Deviation { side } = gauge.measure
-                && !sides.contains(&side)
-            {
+        let (mut squares, mut sides) = (Vec::new(), Vec::new());
+        for (at, gauge) in list.iter().enumerate() {
+            let Measure::Deviation { side: smallest } = gauge.measure else {
+                continue;
+            };
+            let all = golden.taught.sides(smallest);
+            for &side in &all {
                 if !extreme::fits(side, span_nm) {
                     return Err(Unmeasurable::TooSmooth { side });
                 }
-                sides.push(side);
+                let partly = all.len() > 1;
+                squares.push(SquaresOf {
+                    gauge: at,
+                    smallest,
+                    side,
+                    partly,
+                });
+                let known = sides.iter().position(|known: &Side| known.side == side);
+                let known = known.unwrap_or_else(|| {
+                    sides.push(Side {
+                        side,
+                        rows: 0..0,
+                        columns: 0..0,
+                    });
+                    sides.len() - 1
+                });
+                let size = (golden.surface.width, golden.surface.height.len());
+                let own = |place: &usize| golden.taught.side(*place, smallest) == side;
+                match partly {
+                    true => (0..size.1).filter(own).for_each(|place| {
+                        let (row, column) = (place / size.0, place % size.0);
+                        sides[known].widen(row..row + 1, column..column + 1);
+                    }),
+                    false => sides[known].widen(0..size.1 / size.0.max(1), 0..size.0),
+                }
             }
         }
         let about = alignment.map_or((Vector::default(), 1.0), |a| (a.centre, a.radius));
@@ -120,6 +186,7 @@ impl Gauges {
             regions,
             patches,
             patches_of,
+            squares,
             sides,
             threshold,
         })
@@ -127,6 +194,6 @@ impl Gauges {
 
     /// The largest side of a square; none if there is no deviation.
     pub fn largest_side(&self) -> Option<usize> {
-        self.sides.iter().copied().max()
+        self.sides.iter().map(|of| of.side).max()
     }
 }

@@ -37,8 +37,8 @@ impl<'a> Maps<'a> {
 }
 
 impl Production {
-    /// The mean deviation over the square of `side` pixels about each pixel, mm, from [`Maps::deviation`] of what was inspected last in
-    /// these strips. NaN where a gauge would not look: the middle is not compared, less than half of the square is, or the
+    /// The mean deviation over the square about each pixel for a gauge of squares of `side` pixels, mm, from [`Maps::deviation`] of what was
+    /// inspected last in these strips. NaN where a gauge would not look: the middle is not compared, less than half of the square is, or the
     /// middle lies outside of the regions, moved with the part, that gauges compare with golden. Without such gauges there
     /// are means wherever the part is compared.
     ///
@@ -50,16 +50,16 @@ impl Production {
             let mm = deviation[place];
             mm.is_finite().then_some([1.0, f64::from(mm)])
         });
-        let least = least_support(side) as f64;
         let shown = self.compared_regions(strips, deviation.len());
         let means = deviation.iter().zip(shown).enumerate();
         means
             .map(|(place, (mm, shown))| {
-                let [count, sum] = match shown && mm.is_finite() {
-                    true => sums.square(place / width, place % width, side),
-                    false => [0.0, 0.0],
-                };
-                match count > 0.0 && count >= least {
+                if !(shown && mm.is_finite()) {
+                    return f32::NAN;
+                }
+                let side = self.taught.side(place, side);
+                let [count, sum] = sums.square(place / width, place % width, side);
+                match count > 0.0 && count >= least_support(side) as f64 {
                     true => (sum / count) as f32,
                     false => f32::NAN,
                 }

@@ -15,6 +15,8 @@ pub struct Taught {
     weights: Vec<Weight>,
     /// What deviations are multiplied by.
     factors: Vec<Factor>,
+    /// The least side of the squares about each pixel; empty where any will do.
+    sides: Vec<u8>,
 }
 
 impl Taught {
@@ -45,12 +47,48 @@ impl Taught {
             pixels,
             weights,
             factors,
+            sides: Vec::new(),
         }
+    }
+
+    /// With the least side that the squares of a deviation have about each pixel, row-major; empty where any will do.
+    #[must_use]
+    pub fn with_least_sides(self, sides: Vec<u8>) -> Self {
+        Self { sides, ..self }
+    }
+
+    /// The side of the square about a place for a deviation in squares of `side` pixels.
+    pub(in crate::inspect) fn side(&self, place: usize, side: usize) -> usize {
+        let least = self.sides.get(place).copied().unwrap_or_default();
+        side.max(usize::from(least))
+    }
+
+    /// All sides that [`Self::side`] has, each once, the smallest first.
+    pub(in crate::inspect) fn sides(&self, side: usize) -> Vec<usize> {
+        let mut known = [false; 256];
+        for &least in &self.sides {
+            known[usize::from(least)] = true;
+        }
+        let least = (0..known.len()).filter(|&least| known[least]);
+        let mut sides: Vec<usize> = least.map(|least| side.max(least)).collect();
+        sides.dedup();
+        if sides.is_empty() {
+            sides.push(side);
+        }
+        sides
+    }
+
+    /// The least sides of the pixels of row `v` of a frame of `width` columns; empty where any will do.
+    pub(super) fn least_sides(&self, v: usize, width: usize) -> &[u8] {
+        self.sides.get(v * width..(v + 1) * width).unwrap_or(&[])
     }
 
     /// Bytes that it takes.
     pub fn bytes(&self) -> usize {
-        size_of_val(&*self.pixels) + size_of_val(&*self.weights) + size_of_val(&*self.factors)
+        size_of_val(&*self.pixels)
+            + size_of_val(&*self.weights)
+            + size_of_val(&*self.factors)
+            + self.sides.len()
     }
 
     /// All pixels, row-major: [`COMPARED`], [`SQUARE`] and σ.

@@ -31,7 +31,8 @@ pub(super) fn taught(
         false => Weight::NONE,
     });
     let pixels = weights.zip(shares).zip(sigmas);
-    Taught::new(pixels.map(|((weight, &share), sigma)| (weight, share, sigma)))
+    let taught = Taught::new(pixels.map(|((weight, &share), sigma)| (weight, share, sigma)));
+    taught.with_least_sides(arrays.smoothing.clone())
 }
 
 /// σ of a sample, the same at all pixels, with which σ_z of the compared part has the RMS that it has by `noise`; counts.

@@ -13,8 +13,10 @@ const CONTRADICTING: f64 = 0.03;
 const UNFIT: f64 = 0.67;
 /// Largest share of points off the taught surface: a defect covers less, wrong fringe orders more.
 const OUTLIERS: f64 = 0.2;
-/// A part lies out of place where it does so by this many errors of its way.
+/// A part lies out of place where it does so by this many errors of its way, and by this share of what is allowed: a defect pulls the part's
+/// place by that.
 const SURE: f64 = 2.0;
+const PULLED: f64 = 0.02;
 /// Least share of the picture's variance along golden's edges that golden explains where two frames are used.
 pub(super) const ALIKE: f64 = 0.8;
 
@@ -129,7 +131,7 @@ impl Demands {
 
     /// Whether a part surely lies farther from its place than is allowed: one that lies at the tolerance does not.
     fn is_off(&self, placed: &Placed) -> bool {
-        placed.reach - SURE * placed.reach_sigma > self.tolerance_mm
+        placed.reach - SURE * placed.reach_sigma > (1.0 + PULLED) * self.tolerance_mm
     }
 
     /// Why a longer sequence should be tried; `None` if this one is good enough.

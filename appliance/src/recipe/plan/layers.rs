@@ -109,7 +109,7 @@ impl Plan {
     }
 
     /// A map of a frame without values.
-    fn unknown(&self) -> Vec<f32> {
+    pub(super) fn unknown(&self) -> Vec<f32> {
         let (columns, rows, _) = self.conditions.camera;
         vec![f32::NAN; columns as usize * rows as usize]
     }

@@ -177,7 +177,13 @@ impl Plan {
             true => window::pixels(&triangulator, demands.tolerance_mm),
             false => 0,
         };
-        let mut window = window::of(&gauges, size, away);
+        let widest = arrays
+            .smoothing
+            .iter()
+            .copied()
+            .max()
+            .map_or(0, usize::from);
+        let mut window = window::of(&gauges, size, (away, widest));
         if aligned {
             window::add_compared(&mut window, &arrays.valid, size.0);
         }

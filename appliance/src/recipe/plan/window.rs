@@ -10,13 +10,13 @@ use std::ops::Range;
 pub(super) fn of(
     gauges: &[Gauge],
     (width, height): (usize, usize),
-    away: usize,
+    (away, widest): (usize, usize),
 ) -> Vec<Range<usize>> {
     let mut window = vec![0..0; height];
     for gauge in gauges {
         let margin = away
             + match gauge.measure {
-                Measure::Deviation { side } => side / 2,
+                Measure::Deviation { side } => side.max(widest) / 2,
                 _ => 0,
             };
         for (row, columns) in [Some(&gauge.region), gauge.from.as_ref()]

@@ -10,7 +10,7 @@ pub(super) mod rivals;
 
 use super::pose::PoseField;
 use super::recent::RecentRows;
-use super::{Measure, Production, common};
+use super::{Production, common};
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};
 use alloc::vec;
@@ -29,7 +29,9 @@ pub(super) struct Squares {
     /// For each side the packed sums down the columns, with half a side of padding at both ends.
     columns: Vec<Vec<i64>>,
     narrow: NarrowSums,
-    /// Per gauge: the squares of largest deviation.
+    /// The deviations of a row about whose pixels squares have the side that is looked at; of plans with several sides.
+    centres: Vec<i32>,
+    /// The largest of the plan's squares.
     pub extremes: Vec<Extremes>,
 }
 
@@ -37,15 +39,15 @@ impl Squares {
     /// Of a strip's own rows.
     pub fn new(plan: &Production, rows: &Range<usize>) -> Self {
         let (width, sides) = (plan.size().0, &plan.gauges.sides);
-        let padding = sides.iter().max().map_or(0, |side| side / 2 * 2);
-        let padded = sides.iter().map(|side| vec![0; width + side / 2 * 2]);
-        let extremes = plan.gauges.list.iter().map(|gauge| match gauge.measure {
-            Measure::Deviation { side } => Extremes::new(side, rows, width),
-            _ => Extremes::default(),
-        });
+        let padding = plan.gauges.largest_side().map_or(0, |side| side / 2 * 2);
+        let padded = sides.iter().map(|of| vec![0; width + of.side / 2 * 2]);
+        let squares = plan.gauges.squares.iter();
+        let partly = squares.clone().any(|squares| squares.partly);
+        let extremes = squares.map(|squares| Extremes::new(squares.side, rows, width));
         Self {
             columns: padded.collect(),
             narrow: NarrowSums::new(width + padding),
+            centres: vec![NO_OFFSET; if partly { width } else { 0 }],
             extremes: extremes.collect(),
         }
     }
@@ -68,41 +70,61 @@ impl Squares {
         (own, written): (&Range<usize>, &Range<usize>),
     ) {
         let backend = plan.decoder.backend();
-        for (&side, sums) in plan.gauges.sides.iter().zip(&mut self.columns) {
-            let half = side / 2;
-            let (new, entering) = recent.row_of(v, written);
+        let Self {
+            columns,
+            narrow: narrow_sums,
+            centres,
+            extremes,
+        } = self;
+        for (of, sums) in plan.gauges.sides.iter().zip(columns) {
+            let (side, half) = (of.side, of.side / 2);
+            let written = common(written, &of.reached(&of.rows));
+            let row_of = |v: usize| {
+                let (row, extent) = recent.row_of(v, &written);
+                (row, common(&extent, &of.reached(&of.columns)))
+            };
+            let (new, entering) = row_of(v);
             // Above the frame this is no written row.
-            let (old, leaving) = recent.row_of(v.wrapping_sub(2 * half + 1), written);
+            let (old, leaving) = row_of(v.wrapping_sub(2 * half + 1));
             let changed = hull(entering, leaving);
             let inside = &mut sums[half + changed.start..half + changed.end];
             slide_columns(backend, inside, &new[changed.clone()], &old[changed]);
             let seen = (v.saturating_sub(2 * half)..=v)
-                .map(|v| recent.row_of(v, written).1)
+                .map(|v| row_of(v).1)
                 .fold(0..0, hull);
-            let Some(middle) = v.checked_sub(half).filter(|v| own.contains(v)) else {
+            let seen = common(&seen, &of.columns);
+            let middle = v.checked_sub(half).filter(|v| own.contains(v));
+            let Some(middle) = middle.filter(|_| !seen.is_empty()) else {
                 continue;
             };
             let overflows = recent.overflow.is_some_and(|row| row + 2 * half >= v);
             let narrow = !overflows && NarrowSums::hold(side);
             if narrow {
-                self.narrow.add(backend, sums, side, seen.clone());
+                narrow_sums.add(backend, sums, side, seen.clone());
             }
-            let row = SquareRow {
-                sums,
-                centres: recent.row(middle),
-                side,
-                row: middle,
-            };
-            let gauges = plan.gauges.list.iter().zip(&mut self.extremes);
-            for (at, (gauge, extremes)) in gauges.enumerate() {
-                if gauge.measure == (Measure::Deviation { side }) {
-                    for (_, span) in pose.region(plan, at).row(middle) {
-                        let span = common(span, &seen);
-                        extremes.update(middle, &span, |found, span| match narrow {
-                            true => self.narrow.search(backend, &row, span, found),
-                            false => row.search_both(found, span),
-                        });
+            let squares = plan.gauges.squares.iter().zip(&mut *extremes);
+            for (squares, extremes) in squares.filter(|(squares, _)| squares.side == side) {
+                let mut row = SquareRow {
+                    sums,
+                    centres: recent.row(middle),
+                    side,
+                    row: middle,
+                };
+                if squares.partly {
+                    let least = plan.taught.least_sides(middle, plan.size().0);
+                    let places = row.centres.iter().zip(least);
+                    for (centre, (&nm, &least)) in centres.iter_mut().zip(places) {
+                        let own = squares.smallest.max(usize::from(least)) == side;
+                        *centre = if own { nm } else { NO_OFFSET };
                     }
+                    row.centres = centres;
+                }
+                for (_, span) in pose.region(plan, squares.gauge).row(middle) {
+                    let span = common(span, &seen);
+                    extremes.update(middle, &span, |found, span| match narrow {
+                        true => narrow_sums.search(backend, &row, span, found),
+                        false => row.search_both(found, span),
+                    });
                 }
             }
         }

@@ -1,0 +1,215 @@
+//! The side of the square about each pixel whose mean deviation is compared: as small as noise and golden's interpolation allow there.
+//!
+//! A small deep defect is seen at its depth only in squares that are no larger than it. Where heights are noisy, or where golden is bent and so
+//! deviates from itself when it is displaced, only larger squares keep good parts inside the limits. Both differ from place to place,
+//! so the side does: on a cone squares are large about the tip alone.
+
+use super::good_parts::{ROOM, SIDES, SIGMAS};
+use algo::inspect::{Production, Strips};
+
+/// The side that squares have where nothing asks for a larger one, and the least side about each pixel, 0 where a pixel is not compared;
+/// empty where all have the smallest.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Sides {
+    pub smallest: usize,
+    pub least: Vec<u8>,
+}
+
+/// The side about pixels that no smaller one is good enough for.
+const LARGEST: usize = SIDES[SIDES.len() - 1];
+/// What placements that are worked out deviate by is to stay below this share of the limit: parts deviate by up to twice as much beside
+/// creases, as golden was seen through pixels of their width.
+const PLACED: f64 = 1.0 / 6.0;
+/// At least this share of the compared pixels has a side beside the largest: looking at each takes time.
+const WORTH: f64 = 0.01;
+
+/// The two largest |means| over the squares of each of [`SIDES`] about each pixel, over placements that are worked out.
+#[derive(Debug, Default)]
+pub(super) struct Farthest([Vec<[f32; 2]>; SIDES.len()]);
+
+impl Farthest {
+    /// Looks at what was inspected last in these strips.
+    pub fn look(&mut self, production: &Production, strips: &Strips, deviation: &[f32]) {
+        for (side, farthest) in SIDES.into_iter().zip(&mut self.0) {
+            farthest.resize(deviation.len(), [0.0; 2]);
+            let means = production.square_means(strips, deviation, side);
+            for ([first, second], mean) in farthest.iter_mut().zip(means) {
+                // NaN is less than nothing.
+                let mean = mean.abs();
+                if mean > *first {
+                    (*first, *second) = (mean, *first);
+                } else if mean > *second {
+                    *second = mean;
+                }
+            }
+        }
+    }
+
+    /// What one placement at least reaches beside the farthest: a single one can be worked out wrong.
+    fn at(&self, side: usize, place: usize) -> f64 {
+        let second = self.0[side].get(place).map_or(0.0, |[_, second]| *second);
+        f64::from(second)
+    }
+}
+
+impl Sides {
+    /// The largest everywhere.
+    pub fn largest() -> Self {
+        Self {
+            smallest: LARGEST,
+            least: Vec::new(),
+        }
+    }
+
+    /// As small as they may be for a limit in mm, in a frame of `width` columns: `sigmas` are σ of the means over squares of each of
+    /// [`SIDES`] in mm, NaN where there is none. Only pixels that count in full, as `full` says, have smaller ones than the largest; the
+    /// image of a part moves by up to `away` pixels.
+    pub fn new(
+        (sigmas, farthest): (&[Vec<f32>; SIDES.len()], &Farthest),
+        full: impl Fn(usize) -> Option<bool>,
+        limit: f64,
+        (width, away): (usize, usize),
+    ) -> Self {
+        let quiet = |side: usize, place: usize| {
+            // NaN is not above.
+            let noisy = f64::from(sigmas[side][place]) * SIGMAS > ROOM * limit;
+            !noisy && farthest.at(side, place) < PLACED * limit
+        };
+        let own = |place: usize| match full(place) {
+            None => 0,
+            Some(false) => LARGEST as u8,
+            Some(true) => {
+                let side = (0..SIDES.len()).find(|&side| quiet(side, place));
+                side.map_or(LARGEST, |side| SIDES[side]) as u8
+            }
+        };
+        let pixels = sigmas[0].len();
+        let least: Vec<u8> = (0..pixels).map(own).collect();
+        let mut least = dilated(&least, width, away);
+        for (place, least) in least.iter_mut().enumerate() {
+            *least = full(place).map_or(0, |_| *least);
+        }
+        Self::worth_it(least)
+    }
+
+    /// Without sides that hardly any pixel has: the next larger ones serve these.
+    fn worth_it(mut least: Vec<u8>) -> Self {
+        let all = least.iter().filter(|side| **side > 0).count() as f64;
+        for sides in SIDES.windows(2) {
+            let own = least
+                .iter_mut()
+                .filter(|side| usize::from(**side) == sides[0]);
+            let own: Vec<&mut u8> = own.collect();
+            if (own.len() as f64) < WORTH * all {
+                own.into_iter().for_each(|side| *side = sides[1] as u8);
+            }
+        }
+        let known = || {
+            least
+                .iter()
+                .map(|side| usize::from(*side))
+                .filter(|side| *side > 0)
+        };
+        let smallest = known().min().unwrap_or(LARGEST);
+        if known().all(|side| side == smallest) {
+            least = Vec::new();
+        }
+        Self { smallest, least }
+    }
+
+    /// The side about a pixel.
+    pub fn at(&self, place: usize) -> usize {
+        let least = self.least.get(place).copied().unwrap_or_default();
+        self.smallest.max(usize::from(least))
+    }
+
+    /// All sides that there are, the smallest first.
+    pub fn all(&self) -> Vec<usize> {
+        let larger = SIDES.into_iter().filter(|side| *side > self.smallest);
+        let larger = larger.filter(|side| self.least.contains(&(*side as u8)));
+        std::iter::once(self.smallest).chain(larger).collect()
+    }
+}
+
+/// The largest value within so many columns and rows of each pixel.
+fn dilated(values: &[u8], width: usize, by: usize) -> Vec<u8> {
+    let width = width.max(1);
+    let rows = values.len() / width;
+    let near = |at: usize, end: usize| at.saturating_sub(by)..(at + by + 1).min(end);
+    let mut along = vec![0; values.len()];
+    for (out, row) in along.chunks_mut(width).zip(values.chunks(width)) {
+        for (column, out) in out.iter_mut().enumerate() {
+            *out = row[near(column, width)].iter().copied().max().unwrap_or(0);
+        }
+    }
+    let mut all = vec![0; values.len()];
+    for (row, out) in all.chunks_mut(width).enumerate() {
+        for above in near(row, rows) {
+            for (out, &value) in out.iter_mut().zip(&along[above * width..][..width]) {
+                *out = value.max(*out);
+            }
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTH: usize = 40;
+    const PIXELS: usize = WIDTH * WIDTH;
+
+    /// σ of all sides where that of a pixel is as given.
+    fn sigmas(pixel: impl Fn(usize) -> f32) -> [Vec<f32>; SIDES.len()] {
+        SIDES.map(|side| (0..PIXELS).map(|at| pixel(at) / side as f32).collect())
+    }
+
+    #[test]
+    fn squares_are_large_only_where_noise_or_a_displaced_part_asks_for_it() {
+        let quiet = sigmas(|_| 0.01);
+        let everywhere = |_: usize| Some(true);
+        let none = Farthest::default();
+        let new = |sigmas, farthest: &Farthest, away| {
+            Sides::new((sigmas, farthest), everywhere, 0.15, (WIDTH, away))
+        };
+        let all = Sides {
+            smallest: 3,
+            least: Vec::new(),
+        };
+        assert_eq!(new(&quiet, &none, 2), all);
+        // One row is noisy: about it, as far as a part moves, squares are the largest.
+        let noisy = sigmas(|at| if at / WIDTH == 20 { 0.1 } else { 0.01 });
+        let sides = new(&noisy, &none, 2);
+        let rows: Vec<usize> = (0..WIDTH).map(|row| sides.at(row * WIDTH + 5)).collect();
+        let expected = |row: usize| if (18..=22).contains(&row) { 9 } else { 3 };
+        assert_eq!(rows, (0..WIDTH).map(expected).collect::<Vec<_>>());
+        // One placement may be worked out wrong, two are believed.
+        let mut farthest = Farthest::default();
+        for side in &mut farthest.0 {
+            side.resize(PIXELS, [0.0; 2]);
+            side[0] = [0.6, 0.0];
+        }
+        assert_eq!(new(&quiet, &farthest, 0), all);
+        farthest.0.iter_mut().for_each(|side| side[0] = [0.6, 0.05]);
+        assert_eq!(new(&quiet, &farthest, 0).all(), [3, 9]);
+        // All the same, but too noisy.
+        let everywhere = new(&sigmas(|_| 0.1), &none, 0);
+        assert_eq!(everywhere, Sides::largest());
+    }
+
+    #[test]
+    fn few_pixels_are_not_worth_a_side_of_their_own() {
+        let mut least = vec![3; 1000];
+        least[600..].fill(5);
+        least[900..].fill(7);
+        least[999] = 0;
+        let sides = Sides::worth_it(least);
+        assert_eq!(sides.all(), [3, 5, 7]);
+        assert_eq!([0, 700, 950, 999].map(|at| sides.at(at)), [3, 5, 7, 3]);
+        let mut least = vec![9; 1000];
+        least[0] = 3;
+        least[1] = 7;
+        assert_eq!(Sides::worth_it(least), Sides::largest());
+    }
+}

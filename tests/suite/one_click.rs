@@ -1,0 +1,100 @@
+//! A stranger's way: the shipped program with default settings, each stock part put in front of the simulated head over the API, taught with one
+//! click, and triggered by a PLC.
+
+use crate::every_part::stock;
+use crate::page::Browser;
+use crate::station_plc::{Daemon, Place, Plc};
+use serde_json::json;
+use sim::{Part, Placement};
+use std::fs;
+
+const PASS: u16 = 1;
+
+/// No corner of any stock part moves by more than the tolerance of 1 mm.
+const ELSEWHERE: Placement = Placement {
+    shift_mm: [0.4, -0.3, 0.3],
+    tilt_deg: [0.06, -0.05],
+    rotation_deg: 0.08,
+};
+
+/// A station with nothing but a scenario of its own.
+struct Station {
+    daemon: Daemon,
+    browser: Browser,
+    plc: Plc,
+    triggers: u16,
+    _place: Place,
+}
+
+impl Station {
+    fn new(scenario: &str) -> Self {
+        let place = Place::new();
+        fs::write(place.path("small.toml"), scenario).unwrap();
+        let daemon = Daemon::start(&place);
+        let mut browser = Browser::new(&daemon);
+        browser.sign_in(&daemon);
+        Self {
+            plc: Plc::connect(&daemon),
+            daemon,
+            browser,
+            triggers: 0,
+            _place: place,
+        }
+    }
+
+    fn put(&mut self, part: &Part, placement: &Placement) {
+        let placed = json!({ "part": part, "placement": placement });
+        let (status, answer) = self.browser.json("PUT", "/api/simulation/part", &placed);
+        assert_eq!(status, 200, "{answer}");
+    }
+
+    fn teach(&mut self, number: usize) {
+        let before = self.browser.get("/api/snapshot")["recipe"]["fingerprint"].clone();
+        let path = format!("/api/recipes/{number}/teach");
+        let (status, answer) = self.browser.json("POST", &path, &json!({}));
+        assert_eq!(status, 202, "{answer}");
+        self.browser.wait_for_another(before.as_str().unwrap());
+    }
+
+    /// Triggers, and says what is wrong if the part does not pass.
+    fn passes(&mut self) -> Result<(), String> {
+        self.triggers += 1;
+        match self.plc.measure(self.triggers)[8] {
+            PASS => Ok(()),
+            _ => Err(self.browser.get("/api/snapshot")["result"].to_string()),
+        }
+    }
+}
+
+/// Teaches each stock part and triggers it so many times as it lies, and once elsewhere.
+fn good_parts_pass(still: usize, scenario: &str) {
+    let mut station = Station::new(scenario);
+    let mut refused = Vec::new();
+    for (number, (kind, part)) in (2..).zip(stock()) {
+        station.put(&part, &Placement::default());
+        station.teach(number);
+        let mut verdicts: Vec<_> = (0..still).map(|_| station.passes()).collect();
+        station.put(&part, &ELSEWHERE);
+        verdicts.push(station.passes());
+        let wrong: Vec<String> = verdicts.into_iter().filter_map(Result::err).collect();
+        println!(
+            "{kind:12} taught with one click: {} of {} PASS",
+            still + 1 - wrong.len(),
+            still + 1
+        );
+        refused.extend(wrong.into_iter().map(|words| format!("{kind}: {words}")));
+    }
+    assert!(refused.is_empty(), "{}", refused.join("\n"));
+    drop(station.daemon);
+}
+
+#[test]
+fn every_stock_part_that_is_taught_with_one_click_passes() {
+    good_parts_pass(1, "sub_rays = 2\n");
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn every_stock_part_that_is_taught_with_one_click_passes_twenty_times() {
+    good_parts_pass(20, "");
+}
