@@ -1,10 +1,11 @@
 //! Every stock part, taught with default settings: good parts that lie anywhere within the placement tolerance pass, and dents do not.
 
 use super::limits::cycle;
-use super::placement::{Bed, bed, taught_within};
+use super::placement::{Bed, bed, taught_exposed, taught_within};
 use algo::geometry::Vector;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
+use appliance::recipe::{Recipe, RecipeFile};
 use appliance::station::{Inspection, Verdict};
 use sim::parts::Defect;
 use sim::{Part, Placement, Scenario};
@@ -25,9 +26,9 @@ pub(crate) fn stock() -> Vec<(String, Part)> {
 }
 
 /// A taught part in front of its head.
-struct Line {
-    bed: Bed,
-    plan: Plan,
+pub(crate) struct Line {
+    pub(crate) bed: Bed,
+    pub(crate) plan: Plan,
     part: Part,
     /// Corners of the box around what was taught.
     corners: Vec<Vector>,
@@ -35,20 +36,17 @@ struct Line {
 }
 
 impl Line {
-    fn new(scenario: &Scenario) -> Self {
+    pub(crate) fn new(scenario: &Scenario) -> Self {
         let mut bed = bed(scenario);
         let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
-        Self::of(bed, taught, scenario)
+        let limit_mm = taught.manifest.gauges[0].high.unwrap();
+        Self::of(bed, taught.recipe, limit_mm, scenario)
     }
 
-    fn of(mut bed: Bed, taught: TaughtRecipe, scenario: &Scenario) -> Self {
-        let limit_mm = taught.manifest.gauges[0].high.unwrap();
-        let arrays = &taught.recipe.arrays;
+    fn of(mut bed: Bed, recipe: Recipe, limit_mm: f64, scenario: &Scenario) -> Self {
+        let arrays = &recipe.arrays;
         let (height, valid) = (arrays.golden_height.clone(), arrays.valid.clone());
-        let plan = Plan::new(taught.recipe, &bed.calibration, true).unwrap();
-        bed.head
-            .load(plan.rasters(&bed.calibration).unwrap())
-            .unwrap();
+        let plan = planned(&mut bed, recipe);
         let width = plan.conditions().camera.0 as usize;
         let triangulator = plan.production().triangulator();
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
@@ -71,7 +69,7 @@ impl Line {
     }
 
     /// A placement with all six components uniform, scaled so that no corner moves farther than the tolerance.
-    fn placement(&self, random: &mut Random) -> Placement {
+    pub(crate) fn placement(&self, random: &mut Random) -> Placement {
         let mut share = || 2.0 * random.share() - 1.0;
         let reach = self
             .corners
@@ -96,10 +94,18 @@ impl Line {
     }
 
     /// Judges the part where a placement puts it.
-    fn judge(&mut self, placement: &Placement) -> Inspection {
+    pub(crate) fn judge(&mut self, placement: &Placement) -> Inspection {
         self.bed.stage.place(&self.part, placement).unwrap();
         cycle(&mut self.bed, &self.plan)
     }
+}
+
+/// A recipe's plan, with its patterns loaded.
+fn planned(bed: &mut Bed, recipe: Recipe) -> Plan {
+    let plan = Plan::new(recipe, &bed.calibration, true).unwrap();
+    let rasters = plan.rasters(&bed.calibration).unwrap();
+    bed.head.load(rasters).unwrap();
+    plan
 }
 
 /// Where a placement takes a point.
@@ -231,6 +237,66 @@ fn two_hundred_good_parts_of_every_stock_kind_pass_wherever_they_lie_within_the_
     assert!((0.8..=1.2).contains(&together), "{together}");
 }
 
+/// Ways to measure by a recipe: cycles that begin with each of its sequences, and with two frames.
+fn ways(taught: TaughtRecipe) -> Vec<(String, Recipe)> {
+    let (manifest, arrays) = (&taught.manifest, &taught.recipe.arrays);
+    let begin_with = |production: usize| {
+        let frames = manifest.sequences[production].frames.len();
+        let manifest = RecipeFile {
+            production,
+            ..manifest.clone()
+        };
+        let recipe = Recipe::check(&manifest, arrays.clone()).unwrap();
+        (format!("{frames} frames first"), recipe)
+    };
+    let mut all: Vec<_> = (0..manifest.sequences.len()).map(begin_with).collect();
+    let two = taught.with_two_frames().unwrap();
+    all.push(("two frames first".into(), two.recipe));
+    all
+}
+
+#[test]
+#[ignore = "takes an hour: `.ci/run full`"]
+fn good_parts_of_every_stock_kind_pass_by_every_sequence_exposure_and_bit_depth() {
+    const PLACEMENTS: usize = 20;
+    let (mut failed, mut invalid, mut all) = (0, 0, 0);
+    for (kind, part) in stock() {
+        for (bit_depth, exposures) in [(8, 1), (8, 2), (10, 1), (12, 1)] {
+            let scenario = Scenario {
+                bit_depth,
+                ..quick(part.clone())
+            };
+            let mut bed = bed(&scenario);
+            let taught = taught_exposed(&mut bed, TOLERANCE_MM, exposures).unwrap();
+            let limit_mm = taught.manifest.gauges[0].high.unwrap();
+            let mut line = Line::of(bed, taught.recipe.clone(), limit_mm, &scenario);
+            let ways = match (bit_depth, exposures) {
+                (8, 1) => ways(taught),
+                _ => vec![("first as taught".into(), taught.recipe)],
+            };
+            for (way, recipe) in ways {
+                line.plan = planned(&mut line.bed, recipe);
+                let (mut read, mut random) = (Read::default(), Random::new(5));
+                for _ in 0..PLACEMENTS {
+                    let placement = line.placement(&mut random);
+                    read.add(&kind, &line.judge(&placement));
+                }
+                println!(
+                    "{kind:12} {bit_depth} bits, {exposures} exposures, {way}: largest deviation {:.4} mm, {} FAIL, {} INVALID of {PLACEMENTS}",
+                    read.largest(),
+                    read.failed,
+                    read.invalid
+                );
+                failed += read.failed;
+                invalid += read.invalid;
+                all += PLACEMENTS;
+            }
+        }
+    }
+    assert_eq!(failed, 0);
+    assert!(invalid * 100 <= all, "{invalid} of {all}");
+}
+
 /// Parts with a place that both devices see, x and y in mm.
 const DENTED: [(&str, [f64; 2]); 5] = [
     ("sheet_metal", [0.0, -8.0]),
@@ -272,6 +338,38 @@ fn dents_fail(placements: usize, scenario: fn(Part) -> Scenario) {
         );
     }
     assert_eq!(missed, 0);
+}
+
+/// Dents that are narrow: 0.5 mm and 3 mm, seven pixels of the default camera and twenty of a large one.
+fn narrow_dents_fail(placements: usize, [width, height]: [u32; 2]) {
+    let dent = Defect::Dent {
+        x: 0.0,
+        y: -8.0,
+        depth_mm: 0.5,
+        diameter_mm: 3.0,
+    };
+    let mut scenario = quick(Part::default());
+    (scenario.rig.camera.width, scenario.rig.camera.height) = (width, height);
+    let mut line = Line::new(&scenario);
+    line.part.defects_mut().unwrap().push(dent);
+    let mut random = Random::new(13);
+    let mut least = f64::INFINITY;
+    for _ in 0..placements {
+        let placement = line.placement(&mut random);
+        let found = line.judge(&placement);
+        assert_eq!(found.verdict(), Verdict::Fail, "{found:?}");
+        least = least.min(-found.gauges[0].value.unwrap());
+    }
+    println!(
+        "{width} × {height}: {placements} dents of 3 mm found, the least at {least:.3} mm of 0.5"
+    );
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn fifty_narrow_dents_fail_in_the_frames_of_small_and_large_cameras() {
+    narrow_dents_fail(50, [512, 512]);
+    narrow_dents_fail(50, [1456, 1088]);
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Shiny parts in front of the simulated head, compared with the textbook's own rendering of some of them.
 
+use crate::every_part::{Line, stock};
+use appliance::station::Verdict;
 use hal::frame::Samples;
 use hal::projector::Raster;
 use sim::parts::{Sphere, Tube};
@@ -7,7 +9,9 @@ use sim::{Material, Part, Placement, Scenario, head};
 use std::time::Duration;
 use tests::oracle::Device;
 use tests::oracle::light::{Body, Phong};
+use tests::random::Random;
 
+const TIMEOUT: Duration = Duration::from_secs(2);
 /// Pixels each way, and rays of a pixel each way.
 const SIZE: u32 = 96;
 const SUB_RAYS: u32 = 4;
@@ -186,4 +190,58 @@ fn a_matte_part_has_the_light_that_a_part_without_a_material_has_by_default() {
     assert_eq!(samples(&other), samples(&matte));
     other.light.ambient = 0.1;
     assert_ne!(samples(&other), samples(&matte));
+}
+
+/// Parts of a material that shines, taught and measured wherever they lie: no verdict is wrong, and hardly a pixel is.
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn good_parts_that_shine_get_no_wrong_verdict_and_hardly_a_wrong_pixel() {
+    const PLACEMENTS: usize = 50;
+    const WRONG_MM: f32 = 0.3;
+    for material in [Material::RolledSteel, Material::Oiled] {
+        let (mut resolved, mut wrong, mut invalid) = (0, 0, 0);
+        for (kind, part) in stock() {
+            if !["sheet_metal", "tube", "sphere"].contains(&&*kind) {
+                continue;
+            }
+            let mut line = Line::new(&Scenario {
+                part,
+                sub_rays: 2,
+                material: Some(material),
+                ..Scenario::default()
+            });
+            let mut random = Random::new(17);
+            let mut refused = 0;
+            for _ in 0..PLACEMENTS {
+                let placement = line.placement(&mut random);
+                let found = line.judge(&placement);
+                assert_ne!(
+                    found.verdict(),
+                    Verdict::Fail,
+                    "{material:?} {kind}: {found:?}"
+                );
+                if found.verdict() == Verdict::Invalid {
+                    println!("{material:?} {kind}: {:?}", found.reason);
+                    refused += 1;
+                }
+                let full = line.plan.sequence_count() - 1;
+                let mut frames = Vec::new();
+                let mut keep = |_, frame| frames.push(frame);
+                let indices = line.plan.indices(full);
+                line.bed.head.acquire(indices, TIMEOUT, &mut keep).unwrap();
+                let heights = line.plan.heights(full, &frames).unwrap();
+                let truth = line.bed.stage.truth().height;
+                for (mm, truth) in heights.iter().zip(&truth).filter(|(mm, _)| mm.is_finite()) {
+                    resolved += 1;
+                    wrong += u32::from((mm - truth).abs() > WRONG_MM);
+                }
+            }
+            println!("{material:?} {kind}: {refused} of {PLACEMENTS} INVALID");
+            invalid += refused;
+        }
+        println!(
+            "{material:?}: {invalid} INVALID, {wrong} of {resolved} pixels off by more than {WRONG_MM} mm"
+        );
+        assert!(wrong <= resolved / 100_000, "{wrong} of {resolved}");
+    }
 }

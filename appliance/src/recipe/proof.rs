@@ -69,11 +69,12 @@ impl Proof {
     }
 
     /// The part as taught, judged at places within the recipe's placement tolerance; none where parts are not aligned, or if cycles begin
-    /// with two frames. `farthest` gets what it deviates by in squares of all sides.
+    /// with two frames. `farthest` gets what it deviates by in squares of all sides; then there is no noise.
     pub fn displaced(&self, mut farthest: Option<&mut Farthest>) -> Vec<Inspection> {
         let judged = (1..).zip(&self.places);
         let judged = judged.map_while(|(seed, motion)| {
             let farthest = farthest.as_deref_mut();
+            let seed = farthest.is_none().then_some(seed);
             self.plan
                 .inspect_rendered(motion, &self.light, seed, farthest)
         });

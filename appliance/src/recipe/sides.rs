@@ -17,9 +17,9 @@ pub(super) struct Sides {
 
 /// The side about pixels that no smaller one is good enough for.
 const LARGEST: usize = SIDES[SIDES.len() - 1];
-/// What placements that are worked out deviate by is to stay below this share of the limit: parts deviate by up to twice as much beside
-/// creases, as golden was seen through pixels of their width.
-const PLACED: f64 = 1.0 / 6.0;
+/// What placements that are worked out without noise deviate by is to stay below this share of the limit: beside creases parts deviate by twice
+/// as much, as golden knows only what its pixels see of a crease, and noise comes on top.
+const PLACED: f64 = 0.1;
 /// At least this share of the compared pixels has a side beside the largest: looking at each takes time.
 const WORTH: f64 = 0.01;
 
@@ -121,6 +121,16 @@ impl Sides {
     pub fn at(&self, place: usize) -> usize {
         let least = self.least.get(place).copied().unwrap_or_default();
         self.smallest.max(usize::from(least))
+    }
+
+    /// The most that placements which are worked out without noise deviate by in these squares, mm.
+    pub fn bend(&self, farthest: &Farthest) -> f64 {
+        let most = SIDES.iter().enumerate().map(|(at, side)| {
+            let places = 0..farthest.0[at].len();
+            let own = places.filter(|place| self.at(*place) == *side);
+            own.map(|place| farthest.at(at, place)).fold(0.0, f64::max)
+        });
+        most.fold(0.0, f64::max)
     }
 
     /// All sides that there are, the smallest first.

@@ -30,8 +30,13 @@ const LAST_STEP_MM: f64 = 1e-4;
 
 impl Production {
     /// The phases of the part as taught after a motion. `modulation` is golden's by this sequence, row-major; other seeds give
-    /// other noise.
-    pub fn rendered(&self, motion: &Motion, modulation: &[Modulation], seed: u64) -> PhaseMap {
+    /// other noise, none gives none.
+    pub fn rendered(
+        &self,
+        motion: &Motion,
+        modulation: &[Modulation],
+        seed: Option<u64>,
+    ) -> PhaseMap {
         let (width, height) = self.size();
         let map = self.map();
         let mut rows = vec![None; width * height];
@@ -63,7 +68,7 @@ impl Production {
         motion: &Motion,
         modulation: &[Modulation],
         (u, v): (usize, usize),
-        seed: u64,
+        seed: Option<u64>,
     ) -> Option<(AbsolutePhase, Modulation)> {
         let (width, height) = self.size();
         let place = v * width + u;
@@ -87,7 +92,8 @@ impl Production {
         if libm::fabs(step) > LAST_STEP_MM || column >= width || row >= height {
             return None;
         }
-        let [first, second] = normal((seed << 32) ^ place as u64);
+        let draw = |seed: u64| normal((seed << 32) ^ place as u64);
+        let [first, second] = seed.map_or([0.0; 2], draw);
         let full = f64::from(u16::MAX);
         let noise = |of: Modulation| {
             self.noise

@@ -10,12 +10,12 @@ use std::time::Instant;
 
 impl Plan {
     /// Judges the part as taught after a motion, by one sequence after the other as production does. `light` is golden's modulation by
-    /// each of the plan's sequences; other seeds give other noise. `farthest` looks at the deviations. `None` for sequences of two frames.
+    /// each of the plan's sequences; other seeds give other noise, none gives none. `farthest` looks at the deviations. `None` for sequences of two frames.
     pub(in crate::recipe) fn inspect_rendered(
         &self,
         motion: &Motion,
         light: &[Vec<Modulation>],
-        seed: u64,
+        seed: Option<u64>,
         mut farthest: Option<&mut Farthest>,
     ) -> Option<Inspection> {
         let mut deviation = match &farthest {
