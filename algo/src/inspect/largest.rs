@@ -99,6 +99,12 @@ impl Largest {
         }
     }
 
+    /// The share of parts that stay below a limit in mm, if they are normally distributed.
+    pub fn below(self, limit: f64) -> f64 {
+        let scatter = self.scatter.max(f64::MIN_POSITIVE);
+        0.5 * libm::erfc((self.mean - limit) / scatter / SQRT_2)
+    }
+
     /// The error of the largest of deviations that were found in squares that share no pixel: their magnitudes and variances.
     pub(super) fn uncertain(
         self,

@@ -81,6 +81,13 @@ arrays! {
     smoothing: u8,
 }
 
+impl Arrays {
+    /// The largest side of a square that pixels ask for; 0 where any will do.
+    pub fn widest(&self) -> usize {
+        self.smoothing.iter().copied().max().map_or(0, usize::from)
+    }
+}
+
 /// What is wrong with a file that is not a ZIP, lacks a member, or has one that cannot be read; with the remedy.
 pub(super) fn broken(what: impl std::fmt::Display) -> String {
     let what = shortened(&what.to_string());

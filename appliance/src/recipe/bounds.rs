@@ -121,6 +121,9 @@ impl RecipeFile {
                 .check_bounds()
                 .map_err(|error| format!("comparison.{which}.{error}"))?;
         }
+        for tried in &self.tried {
+            within("tried.passes", tried.passes, 0.0, 1.0)?;
+        }
         if let Some(good_parts) = &self.good_parts {
             good_parts
                 .check_bounds()

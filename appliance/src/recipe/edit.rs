@@ -50,7 +50,15 @@ pub fn edit(
     file.min_coverage = edit.min_coverage.unwrap_or(file.min_coverage);
     file.guard_k = edit.guard_k.unwrap_or(file.guard_k);
     file.regions = edit.regions.unwrap_or(file.regions);
-    file.gauges = edit.gauges.unwrap_or(file.gauges);
+    let before = std::mem::take(&mut file.gauges);
+    file.gauges = edit.gauges.unwrap_or_else(|| before.clone());
+    // Of gauges that were changed nothing is known.
+    let of = |gauges: &[GaugeFile], name: &str| {
+        let gauge = gauges.iter().find(|gauge| gauge.name == name);
+        gauge.cloned()
+    };
+    file.tried
+        .retain(|tried| of(&before, &tried.gauge) == of(&file.gauges, &tried.gauge));
     let regions = file.regions.iter().map(|region| &region.name);
     let gauges = file.gauges.iter().map(|gauge| &gauge.name);
     check_names("region", regions)?;

@@ -95,6 +95,31 @@ pub struct RecipeFile {
     /// The deviation of good parts, as predicted when it was taught; `None` in recipes of older programs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub good_parts: Option<GoodPartsFile>,
+    /// Per gauge that was tried with golden at other places, how many good parts would pass; empty if nothing was tried.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub tried: Vec<TriedFile>,
+}
+
+/// How a gauge judges good parts that lie anywhere within the placement tolerance.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TriedFile {
+    /// Its name.
+    pub gauge: String,
+    /// The share of such parts that it would let pass, as predicted from those that were tried.
+    pub passes: f64,
+}
+
+impl TriedFile {
+    /// In words.
+    pub fn words(&self, tolerance_mm: f64) -> String {
+        // More is not known from a few parts that were tried.
+        let percent = (self.passes * 100.0).min(99.99);
+        format!(
+            "{} would pass {percent:.2} % of good parts that lie anywhere within {tolerance_mm} mm",
+            self.gauge
+        )
+    }
 }
 
 #[expect(

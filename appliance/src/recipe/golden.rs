@@ -102,7 +102,7 @@ impl TaughtRecipe {
     /// # Errors
     /// In words, if they do not fit each other.
     pub(super) fn of(mut manifest: RecipeFile, arrays: Arrays) -> Result<Self, String> {
-        let choice = planner::choose(&manifest.sequences, &manifest.gauges, 0);
+        let choice = planner::choose(&manifest.sequences, &manifest.gauges, arrays.widest());
         manifest.production = choice.production;
         let mut recipe = Recipe::check(&manifest, arrays)?;
         let (bytes, fingerprint) = archive::pack(&manifest, &recipe.arrays)?;
@@ -208,15 +208,11 @@ impl GoldenPart<'_> {
             gauges,
             comparison: self.comparison.clone(),
             good_parts: None,
+            tried: Vec::new(),
         };
         let mut words = self.set_limits(surface, &mut manifest, &mut arrays)?;
         // The smaller the squares, the less noise is allowed.
-        let widest = arrays
-            .smoothing
-            .iter()
-            .copied()
-            .max()
-            .map_or(0, usize::from);
+        let widest = arrays.widest();
         let mut choice = planner::choose(&manifest.sequences, &manifest.gauges, widest);
         manifest.production = choice.production;
         choice.reasons.append(&mut words);

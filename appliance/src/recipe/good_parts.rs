@@ -41,6 +41,10 @@ const STEP_MM: f64 = 0.01;
 const WIDER: f64 = 1.1;
 const WIDEST: f64 = 20.0;
 
+/// Diameter of a dent of which a mean over a square has nine tenths of the depth, over the square's side: of a depth that falls as cos²(πr/D) the
+/// mean over side a is 1 − (π²/6) a²/D².
+pub(super) const DENT: f64 = 4.06;
+
 /// The deviation of good parts, as predicted when the part was taught.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -72,6 +76,10 @@ pub struct GoodPartsFile {
     /// Share of the compared pixels that these are about.
     #[serde(default)]
     pub wider: f64,
+    /// Diameter of a dent that is seen at nine tenths of its depth in squares of `smoothing_px` where the part faces the camera, mm; 0
+    /// if not known. U says nothing of narrower ones.
+    #[serde(default)]
+    pub dent_mm: f64,
     /// The largest deviation of good parts that lie anywhere within the placement tolerance: median and spread, mm; 0 if it was not
     /// tried.
     #[serde(default)]
@@ -165,6 +173,7 @@ impl Noise<'_> {
             smoothing_px: 0,
             wider_px: 0,
             wider: 0.0,
+            dent_mm: 0.0,
             displaced_mm: 0.0,
             displaced_scatter_mm: 0.0,
         };
@@ -300,6 +309,7 @@ impl GoodPartsFile {
         within("smoothing_px", self.smoothing_px, 1, usize::from(u16::MAX))?;
         within("wider_px", self.wider_px, 0, usize::from(u8::MAX))?;
         within("wider", self.wider, 0.0, 1.0)?;
+        within("dent_mm", self.dent_mm, 0.0, longest)?;
         within("displaced_mm", self.displaced_mm, 0.0, longest)?;
         let scatter = self.displaced_scatter_mm;
         within("displaced_scatter_mm", scatter, 0.0, longest)
@@ -328,6 +338,7 @@ impl GoodPartsFile {
             smoothing_px,
             wider_px,
             wider,
+            dent_mm,
             displaced_mm,
             displaced_scatter_mm,
         } = *self;
@@ -354,9 +365,14 @@ impl GoodPartsFile {
                 wider * 100.0
             ),
         };
+        let seen = match dent_mm > 0.0 {
+            true => format!(
+                "a dent of {dent_mm:.1} mm across is seen at nine tenths of its depth, a narrower one at less, which U does not cover"
+            ),
+            false => "a defect that is narrower is seen at less than its depth".into(),
+        };
         lines.push(format!(
-            "deviations are means over {smoothing_px} × {smoothing_px} pixels of the part{elsewhere}: a defect that is narrower is \
-             seen at less than its depth"
+            "deviations are means over {smoothing_px} × {smoothing_px} pixels of the part{elsewhere}: {seen}"
         ));
         if displaced_mm > 0.0 {
             lines.push(format!(

@@ -3,7 +3,7 @@
 
 use super::archive::Arrays;
 use super::golden::GoldenPart;
-use super::good_parts::{DEVIATION_MM, GoodPartsFile, Noise};
+use super::good_parts::{DENT, DEVIATION_MM, GoodPartsFile, Noise};
 use super::proof::{self, COVERAGE_CHANGE, Magnitudes, Proof};
 use super::sides::Farthest;
 use super::{GaugeFile, GaugeKind, RecipeFile, SequenceFile};
@@ -13,7 +13,7 @@ use algo::pipeline::KnownSurface;
 /// What displaced parts deviate by beside their sharpest creases, and how far that scatters from placement to placement, as multiples of what is
 /// worked out: golden knows only what its pixels see of a crease (parts in front of the simulated head: `tests/suite/every_part.rs`).
 const BEND: f64 = 2.0;
-const BEND_SPREAD: f64 = 0.25;
+const BEND_SPREAD: f64 = 0.12;
 
 impl GoldenPart<'_> {
     /// Sets the squares and the limits of the gauges by what good parts are predicted to read, wherever they lie within the placement tolerance;
@@ -46,6 +46,8 @@ impl GoldenPart<'_> {
         let bend = sides.bend(&farthest);
         weighed.predict(&sides);
         let mut good_parts = weighed.found;
+        let pixel_mm = proof.pixel_mm().unwrap_or_default();
+        good_parts.dent_mm = DENT * sides.smallest as f64 * pixel_mm;
         set_deviation(&mut manifest.gauges[0], &good_parts);
         arrays.smoothing = sides.least;
         let mut judged = Proof::new(manifest, arrays, self.calibration)?.displaced(None);
@@ -60,6 +62,9 @@ impl GoldenPart<'_> {
         let mut words = good_parts.words();
         manifest.good_parts = Some(good_parts);
         words.extend(proof::hold(manifest, &judged));
+        manifest.tried = proof::tried(manifest, &judged);
+        let tolerance_mm = manifest.placement_tolerance_mm;
+        words.extend(manifest.tried.iter().map(|of| of.words(tolerance_mm)));
         Ok(words)
     }
 

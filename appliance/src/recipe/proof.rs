@@ -5,14 +5,15 @@
 //! says so.
 
 use super::archive::Arrays;
+use super::file::TriedFile;
 use super::plan::Plan;
 use super::sides::Farthest;
 use super::teach::TeachError;
-use super::{GaugeKind, Recipe, RecipeFile};
+use super::{GaugeFile, GaugeKind, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
-use crate::station::{COVERAGE_FACTOR, Inspection, Unit, Verdict};
+use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, Unit, Verdict};
 use algo::geometry::Vector;
-use algo::inspect::Motion;
+use algo::inspect::{Largest, Motion};
 use algo::units::Modulation;
 use hal::head::Head;
 use std::time::{Duration, Instant};
@@ -84,6 +85,11 @@ impl Proof {
     /// How many pixels the image of a part moves by at most.
     pub fn away(&self) -> usize {
         self.plan.away()
+    }
+
+    /// What a pixel sees of a surface that faces the camera, mm.
+    pub fn pixel_mm(&self) -> Option<f64> {
+        self.plan.pixel_mm()
     }
 }
 
@@ -203,6 +209,50 @@ pub(super) fn hold(manifest: &mut RecipeFile, judged: &[Inspection]) -> Vec<Stri
         }
     }
     words
+}
+
+/// How many good parts each gauge would let pass, by these cycles of good parts.
+pub(super) fn tried(manifest: &RecipeFile, judged: &[Inspection]) -> Vec<TriedFile> {
+    let passes = |(at, gauge): (usize, &GaugeFile)| {
+        let found = judged
+            .iter()
+            .filter_map(|inspection| inspection.gauges.get(at));
+        let band = |found: &GaugeValue| {
+            let band = found.uncertainty.unwrap_or(0.0) / COVERAGE_FACTOR;
+            manifest.guard_k * band
+        };
+        let bands = found.clone().map(band).fold(0.0, f64::max);
+        let values: Vec<f64> = found.filter_map(|found| found.value).collect();
+        let parts = match (&gauge.measures, manifest.good_parts) {
+            (GaugeKind::Deviation { .. }, Some(of)) => of.displaced(of.smoothing_px)?,
+            _ => normal(&values)?,
+        };
+        let above = gauge
+            .high
+            .map_or(0.0, |high| 1.0 - parts.below(high - bands));
+        let below = match gauge.measures {
+            GaugeKind::Deviation { .. } => 0.0,
+            _ => gauge.low.map_or(0.0, |low| parts.below(low + bands)),
+        };
+        Some(TriedFile {
+            gauge: gauge.name.clone(),
+            passes: (1.0 - above - below).max(0.0),
+        })
+    };
+    let gauges = manifest.gauges.iter().enumerate();
+    gauges.filter_map(passes).collect()
+}
+
+/// Mean and scatter of some values, for the next one; none of fewer than two.
+fn normal(values: &[f64]) -> Option<Largest> {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares = values.iter().map(|value| (value - mean).powi(2));
+    let variance = squares.sum::<f64>() / (count - 1.0);
+    (values.len() > 1).then(|| Largest {
+        mean,
+        scatter: (variance * (1.0 + 1.0 / count)).sqrt(),
+    })
 }
 
 /// Why most of these cycles of the part itself were not judged, if so: no limit of a gauge helps there.

@@ -97,5 +97,6 @@ pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<Taught
     manifest.two_frames = replaced.two_frames;
     // The prediction is for the limits that teaching sets.
     manifest.good_parts = None;
+    manifest.tried = Vec::new();
     TaughtRecipe::of(manifest, recipe.arrays)
 }

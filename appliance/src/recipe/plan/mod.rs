@@ -177,13 +177,7 @@ impl Plan {
             true => window::pixels(&triangulator, demands.tolerance_mm),
             false => 0,
         };
-        let widest = arrays
-            .smoothing
-            .iter()
-            .copied()
-            .max()
-            .map_or(0, usize::from);
-        let mut window = window::of(&gauges, size, (away, widest));
+        let mut window = window::of(&gauges, size, (away, arrays.widest()));
         if aligned {
             window::add_compared(&mut window, &arrays.valid, size.0);
         }

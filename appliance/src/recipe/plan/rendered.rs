@@ -61,4 +61,9 @@ impl Plan {
     pub(in crate::recipe) fn away(&self) -> usize {
         window::pixels(self.production().triangulator(), self.demands.tolerance_mm)
     }
+
+    /// What a pixel in the middle of the frame sees of a surface that faces the camera, mm.
+    pub(in crate::recipe) fn pixel_mm(&self) -> Option<f64> {
+        window::pitch(self.production().triangulator())
+    }
 }

@@ -55,10 +55,16 @@ fn widen(columns: &mut Range<usize>, by: Range<usize>) {
 
 /// About how many pixels the image of a part that is displaced by `mm` moves at most.
 pub(super) fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
-    let camera = triangulator.camera();
-    let (u, v) = (camera.width() as f64 / 2.0, camera.height() as f64 / 2.0);
-    let at = |u: f64, v: f64| triangulator.point(u as usize, v as usize, Height::from_nm(0));
-    let pitch = at(u, v).zip(at(u + 1.0, v)).map(|(a, b)| (b - a).length());
+    let middle = triangulator.camera().width() as f64 / 2.0;
     // One pixel more for rounding.
-    pitch.map_or(0, |pitch| (mm / pitch).ceil().min(u) as usize + 1)
+    let pixels = |pitch: f64| (mm / pitch).ceil().min(middle) as usize + 1;
+    pitch(triangulator).map_or(0, pixels)
+}
+
+/// What a pixel in the middle of the frame sees of a surface that faces the camera, mm.
+pub(super) fn pitch(triangulator: &Triangulator) -> Option<f64> {
+    let camera = triangulator.camera();
+    let (u, v) = (camera.width() / 2, camera.height() / 2);
+    let at = |u: usize| triangulator.point(u, v, Height::from_nm(0));
+    at(u).zip(at(u + 1)).map(|(a, b)| (b - a).length())
 }

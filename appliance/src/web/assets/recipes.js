@@ -137,6 +137,7 @@ function held(good) {
   const words = [good.limit_mm > good.tolerance_mm
     ? `The default limit of ±${good.tolerance_mm.toFixed(2)} mm would reject good parts: the limit was set to ${limit}. ${expected}. More light, less noise or another pose narrows it.`
     : `${expected}; the limit was set to ${limit}.`];
+  if (good.smoothing_px) words.push(`Deviations are means over ${good.smoothing_px} × ${good.smoothing_px} pixels${good.wider_px ? `, over up to ${good.wider_px} × ${good.wider_px} on ${(100 * good.wider).toFixed(1)} % of the part, where it is too noisy or too bent for that` : ""}: ${good.dent_mm > 0 ? `a dent of ${good.dent_mm.toFixed(1)} mm across is seen at nine tenths of its depth, a narrower one at less, which U does not cover` : "a defect that is narrower is seen at less than its depth"}.`);
   if (good.weighed > 0) words.push(`${(100 * good.weighed).toFixed(2)} % of the surface is so dark or so steep that a deviation there must be larger to be found, by a factor of ${(1 / good.least_weight).toFixed(1)} at its worst place: another pose or more light lowers it.`);
   if (good.left_out > 0) words.push(`${(100 * good.left_out).toFixed(2)} % of the surface's pixels are too dark or too steep to be compared: another pose brings them back.`);
   return words.join(" ");
@@ -149,6 +150,7 @@ export async function compare(number) {
   text("comparison-name", `recipe ${recipe.number} · ${recipe.name}`);
   show("comparison", true);
   text("comparison-limits", held(recipe.good_parts));
+  fill($("comparison-tried"), ...(recipe.tried || []).map(({ gauge, passes }) => make("li", "", `${gauge} would pass ${(100 * Math.min(passes, 0.9999)).toFixed(2)} % of good parts that lie anywhere within ${recipe.placement_tolerance_mm} mm`)));
   if (!comparison) {
     fill($("comparison-rows"));
     text("comparison-words", "this recipe was made from a recording: there is nothing to compare it with");
