@@ -82,7 +82,7 @@ arrays! {
 }
 
 impl Arrays {
-    /// The largest side of a square that pixels ask for; 0 where any will do.
+    /// The largest of [`Self::smoothing`]; 0 where any side will do.
     pub fn widest(&self) -> usize {
         self.smoothing.iter().copied().max().map_or(0, usize::from)
     }

@@ -6,7 +6,7 @@
 //!   files that are being uploaded; [`exchange`] lists, exports and imports, [`edit`] changes.
 //! - Made: [`teach`] measures the part, `illumination` chooses its light, [`adaptive`] makes its pattern, [`captures`] measures the part
 //!   with this pattern by every sequence that production may use (`candidates`), [`golden`] makes the recipe, [`planner`] chooses the
-//!   sequence, [`good_parts`] squares and limit of the deviation, `limits` sets and `proof` tries those of all gauges; [`replace`] keeps names and gauges of a recipe that is taught again.
+//!   sequence, [`good_parts`] squares and limit of the deviation, `sides` those squares from place to place, `limits` sets and `proof` tries the limits of all gauges; [`replace`] keeps names and gauges of a recipe that is taught again.
 
 pub mod adaptive;
 pub mod archive;

@@ -2,13 +2,13 @@
 //!
 //! A small deep defect is seen at its depth only in squares that are no larger than it. Where heights are noisy, or where golden is bent and so
 //! deviates from itself when it is displaced, only larger squares keep good parts inside the limits. Both differ from place to place,
-//! so the side does: on a cone squares are large about the tip alone.
+//! so the side does: on a cone squares are large at its tip and its rim alone.
 
 use super::good_parts::{ROOM, SIDES, SIGMAS};
 use algo::inspect::{Production, Strips};
 
-/// The side that squares have where nothing asks for a larger one, and the least side about each pixel, 0 where a pixel is not compared;
-/// empty where all have the smallest.
+/// The side that squares have where nothing asks for a larger one, and the least side about each pixel, 0 where no part is
+/// compared; empty where all have the smallest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Sides {
     pub smallest: usize,
@@ -85,11 +85,7 @@ impl Sides {
         };
         let pixels = sigmas[0].len();
         let least: Vec<u8> = (0..pixels).map(own).collect();
-        let mut least = dilated(&least, width, away);
-        for (place, least) in least.iter_mut().enumerate() {
-            *least = full(place).map_or(0, |_| *least);
-        }
-        Self::worth_it(least)
+        Self::worth_it(dilated(&least, width, away))
     }
 
     /// Without sides that hardly any pixel has: the next larger ones serve these.
