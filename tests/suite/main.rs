@@ -59,6 +59,7 @@ mod simulated_board;
 mod simulated_part;
 mod station;
 mod station_plc;
+mod stalled;
 mod stress;
 mod together;
 mod triangulation;

@@ -3,7 +3,7 @@
 use crate::written::FRINGED;
 use std::fs;
 use std::io::{BufRead as _, BufReader};
-use std::net::SocketAddr;
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc;
@@ -125,6 +125,37 @@ impl Daemon {
             http,
             log,
         }
+    }
+
+    /// Starts the program with a stderr that tells the test nothing, and waits until it is ready.
+    pub fn unheard(place: &Place, stderr: impl Into<Stdio>) -> Self {
+        let free = || TcpListener::bind("127.0.0.1:0").unwrap();
+        let [modbus, http] = [free(), free()].map(|free| free.local_addr().unwrap());
+        let mut command = Command::new(FRINGED);
+        command
+            .args(["serve", "--modbus", &modbus.to_string()])
+            .args(["--http", &http.to_string(), "--config"])
+            .arg(place.path("fringed.toml"))
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(stderr);
+        let daemon = Self {
+            child: command.spawn().unwrap(),
+            modbus,
+            http,
+            log: String::new(),
+        };
+        // It opens its head and teaches meanwhile.
+        let began = Instant::now();
+        let ready = || {
+            let there = TcpStream::connect(modbus).is_ok();
+            there && Plc::at(modbus).status().has(READY)
+        };
+        while !ready() {
+            assert!(began.elapsed() < 4 * PATIENCE, "it is not ready");
+            std::thread::yield_now();
+        }
+        daemon
     }
 
     pub fn pid(&self) -> u32 {

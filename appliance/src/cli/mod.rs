@@ -40,6 +40,7 @@ use crate::VERSION;
 use crate::error::{Exit, Failure};
 use crate::modbus::{registers_csv, registers_json};
 use crate::system::journal::{self, Severity};
+use crate::system::stderr;
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, Parser, Subcommand};
 use options::Json;
@@ -114,6 +115,13 @@ pub fn main() -> ExitCode {
 
 /// Parses the arguments of this process, runs the command and returns its exit code. Options may stand before the command or after it.
 pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode {
+    journal::take_panics();
+    let code = carry_out(run);
+    stderr::end();
+    code
+}
+
+fn carry_out<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode {
     let words = options::behind_the_command(&A::command(), std::env::args_os());
     let arguments = match A::try_parse_from(words) {
         Ok(arguments) => arguments,

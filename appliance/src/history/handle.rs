@@ -14,7 +14,7 @@ use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::sync::mpsc::{SyncSender, sync_channel};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::time::Duration;
 
 /// Longest wait of a sign-in for its time to be stored.
@@ -134,9 +134,11 @@ impl History {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// Ends the threads once they have stored what they can; `last_seq` is the last of all.
-    pub fn stop(&self, last_seq: u32) {
+    /// Ends the threads once they have stored what they can; `last_seq` is the last of all. Answers whether they will: not while
+    /// a card that hangs has filled the queue.
+    pub fn stop(&self, last_seq: u32) -> bool {
         // A thread that is gone has stopped.
-        let _ = self.queue.send(Message::Stop { last_seq });
+        let stop = self.queue.try_send(Message::Stop { last_seq });
+        !matches!(stop, Err(TrySendError::Full(_)))
     }
 }

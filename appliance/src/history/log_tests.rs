@@ -22,7 +22,9 @@ struct End<'a>(&'a History, &'a AtomicBool);
 impl Drop for End<'_> {
     fn drop(&mut self) {
         self.1.store(true, Ordering::Relaxed);
-        self.0.stop(0);
+        while !self.0.stop(0) {
+            std::thread::yield_now();
+        }
     }
 }
 

@@ -491,7 +491,7 @@ fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_i
     assert_eq!(log.lock().unwrap().len(), 2, "locked, and written again");
     let expected: Vec<u32> = (1..=60).rev().collect();
     assert_eq!(seqs(&reader, &Filter::default()), expected);
-    history.stop(60);
+    assert!(history.stop(60));
     running.join().unwrap();
     assert_eq!(state.counted().unwrap().last, 60);
 }
@@ -593,7 +593,7 @@ fn what_was_shown_and_not_stored_before_a_kill_is_stored_once_by_the_next_start(
     drop((killed, never));
     let (history, task, next, _) = opened(&state, 3);
     assert_eq!((stored(), next), (vec![4, 3, 2, 1], 5));
-    history.stop(4);
+    assert!(history.stop(4));
     task.run(&station().0);
     let (_, _, next, _) = opened(&state, 4);
     assert_eq!((stored(), next), (vec![4, 3, 2, 1], 5));
@@ -630,7 +630,7 @@ fn a_part_whose_frames_are_not_wanted_says_so_and_a_start_is_dated_while_the_his
     history.record(&record);
     history.keep(&record, || unreachable!());
     assert!(history.date(0xB007, 1));
-    history.stop(1);
+    assert!(history.stop(1));
     running.join().unwrap();
     let reader = Reader::of(folder.path());
     let entry = reader.result(1).unwrap().unwrap();

@@ -35,8 +35,8 @@ use crate::storage::state::{StateFolder, random};
 use crate::system::computing::Computing;
 use crate::system::journal::{self, Severity};
 use crate::system::progress::Progress;
-use crate::system::{runtime, socket};
-use crate::web::access::Access;
+use crate::system::{runtime, socket, stderr};
+use crate::web::access::{Access, NewSecret};
 use crate::{lines, modbus, web};
 use sim::Stage;
 use std::net::SocketAddr;
@@ -98,6 +98,8 @@ impl Daemon {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
         };
+        // Whatever is said from here on, nothing waits for whoever reads it.
+        stderr::detach();
         crate::system::memory::give_back();
         let state = StateFolder::open(&path)?;
         let recipes = Store::of_state(&state)?;

@@ -41,7 +41,10 @@ impl Daemon {
         drop(self.survey);
         join(surveying);
         // Last, so that the results of the others are stored.
-        self.history.stop(self.station.snapshot().result_seq);
+        let last_seq = self.station.snapshot().result_seq;
+        while !self.history.stop(last_seq) && Instant::now() < until {
+            std::thread::sleep(POLLING);
+        }
         join(self.writing);
     }
 }

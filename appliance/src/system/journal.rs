@@ -1,5 +1,7 @@
 //! Lines on stderr: with the program's name in front for people, with a priority for a journal, which adds name and time itself.
 
+use super::stderr;
+use std::backtrace::{Backtrace, BacktraceStatus};
 use std::sync::OnceLock;
 
 /// How much a line matters, as syslog numbers it.
@@ -17,14 +19,42 @@ pub enum Severity {
 
 /// Writes one or more lines in the daemon's name.
 pub fn write(severity: Severity, words: &str) {
-    write_of("fringed", severity, words);
+    stderr::write(&form_of_own(severity, words));
 }
 
 /// Writes one or more lines in the name of `program`.
 pub fn write_of(program: &str, severity: Severity, words: &str) {
+    stderr::write(&form(program, is_read_by_a_journal(), severity, words));
+}
+
+/// Lines in the daemon's name, as they are written.
+pub(super) fn form_of_own(severity: Severity, words: &str) -> String {
+    form("fringed", is_read_by_a_journal(), severity, words)
+}
+
+/// Writes panics as lines of the log, too: the system's own way is to wait for stderr in the thread that panics.
+pub fn take_panics() {
+    std::panic::set_hook(Box::new(|panic| {
+        let thread = std::thread::current();
+        let name = thread.name().unwrap_or("without a name");
+        if name == stderr::THREAD {
+            return;
+        }
+        let trace = Backtrace::capture();
+        let mut words = format!("the thread {name} {panic}");
+        if trace.status() == BacktraceStatus::Captured {
+            words += &format!("\n{trace}");
+        }
+        write(Severity::Error, &words);
+        if name == "main" {
+            stderr::end();
+        }
+    }));
+}
+
+fn is_read_by_a_journal() -> bool {
     static JOURNAL: OnceLock<bool> = OnceLock::new();
-    let journal = *JOURNAL.get_or_init(stderr_is_a_journal);
-    eprint!("{}", form(program, journal, severity, words));
+    *JOURNAL.get_or_init(stderr_is_a_journal)
 }
 
 /// The lines with their prefix.

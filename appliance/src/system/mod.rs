@@ -12,6 +12,7 @@ pub mod notify;
 pub mod priority;
 pub mod progress;
 pub mod socket;
+pub mod stderr;
 pub mod stop_signal;
 
 /// A current-thread runtime for sockets.
