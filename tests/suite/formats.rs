@@ -26,7 +26,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 77] = [
+const KEYS: [&str; 79] = [
     "alignment",
     "calibration",
     "camera",
@@ -43,8 +43,10 @@ const KEYS: [&str; 77] = [
     "comparison.fixed.frames",
     "comparison.fixed.sigma_mm",
     "expansion_range_turns",
+    "exposure_us",
     "fingerprint",
     "format",
+    "gain",
     "gauges",
     "gauges.high",
     "gauges.low",
@@ -106,11 +108,10 @@ const KEYS: [&str; 77] = [
     "version",
 ];
 /// Keys that `recipe.json` may have in addition, and members of the recipe.
-const OPTIONAL: [&str; 13] = [
+const OPTIONAL: [&str; 12] = [
     "calibration_sigma",
     "height_mm",
     "length_mm",
-    "exposure_us",
     "exposures",
     "amplitude.npy",
     "smoothing.npy",

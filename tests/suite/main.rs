@@ -16,6 +16,7 @@ mod drift;
 mod every_part;
 mod experiment;
 mod exposures;
+mod exposing;
 mod faint;
 mod foreign;
 mod formats;

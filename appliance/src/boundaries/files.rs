@@ -9,6 +9,7 @@ use crate::head::calibration::file::{
 use crate::head::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use crate::head::calibration::opencv::{Declared, Sizes, from_two};
 use crate::head::calibration::{Calibration, HeightsBy};
+use crate::head::exposing::Exposing;
 use crate::head::seam;
 use crate::measure::measure;
 use algo::pattern::Shot;
@@ -80,6 +81,10 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
                 level: 100.0,
                 counts: 3.0,
             }],
+            exposing: Some(Exposing {
+                exposure_us: 16_667,
+                gain: 2.0,
+            }),
         }),
         response: Some((0..256).map(f64::from).collect()),
         contrast: Some(ContrastFile {

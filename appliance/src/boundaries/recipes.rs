@@ -85,7 +85,7 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
     let (file, arrays) = (&bed.file, &bed.recipe.arrays);
     let mut full = file.clone();
     full.fingerprint = "0".repeat(64);
-    full.exposure_us = Some(5000.0);
+    (full.exposure_us, full.gain) = (Some(5000.0), Some(2.0));
     let kinds = [
         r#"{ "kind": "out_of_tolerance", "smoothing_px": 3, "tolerance_mm": 0.1 }"#,
         r#"{ "kind": "volume", "above_mm": 8.0 }"#,

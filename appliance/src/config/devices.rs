@@ -1,7 +1,7 @@
 //! Checks the configuration of real devices: the ranges that the types do not express.
 
 use super::{Config, HeadConfig};
-use crate::head::commission::MOST_GAIN;
+use crate::head::exposing::MOST_GAIN;
 use hal::bounds::{MAX_SIDE, text, within};
 use hal::setup::{CameraSetup, ProjectorSetup, TriggerSetup};
 

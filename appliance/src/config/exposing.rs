@@ -2,7 +2,7 @@
 
 use super::devices::NO_GAIN;
 use super::{Backend, HeadConfig};
-use crate::head::commission::{Exposing, LEAST_GAIN};
+use crate::head::exposing::{Exposing, LEAST_GAIN};
 
 impl HeadConfig {
     /// The least gain that the camera can be set to.

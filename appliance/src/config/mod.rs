@@ -8,7 +8,8 @@ pub use keys::{Key, TABLE, keys};
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::place::IN_STATE;
-use crate::head::commission::{Commissioning, Exposing};
+use crate::head::commission::Commissioning;
+use crate::head::exposing::Exposing;
 use crate::head::placed::Placed;
 use hal::bounds::{length, shortened, text, within};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};

@@ -8,6 +8,7 @@ pub mod capture;
 pub mod commission;
 pub mod doctor;
 pub mod examine;
+pub mod exposing;
 pub mod geometry;
 pub mod live;
 pub mod means;

@@ -232,7 +232,9 @@ fn recording(part: &JudgedPart) -> Recording {
             .map(|(shot, frame)| seam::recorded(shot, frame.clone()))
             .collect(),
         range_mm: Some(conditions.range_mm),
-        exposure_us: conditions.exposure_us,
+        exposure_us: conditions
+            .exposing
+            .map(|set| f64::from(set.exposure_us) * f64::from(conditions.exposures)),
         part_id: Some(record.part_id.to_string()),
         recipe: Some(RecipeReference {
             number: u32::from(id.number),

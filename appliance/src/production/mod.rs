@@ -313,7 +313,8 @@ impl Worker {
         let fingerprint = calibration.fingerprint();
         let kept = stamp
             .as_ref()
-            .and_then(|stamp| self.shelf.take(stamp, &fingerprint));
+            .and_then(|stamp| self.shelf.take(stamp, &fingerprint))
+            .filter(|plan| plan.conditions().set_otherwise(calibration).is_none());
         let (plan, fallback) = match kept {
             Some(plan) => (plan, None),
             None => {
@@ -349,7 +350,9 @@ impl Worker {
 
 fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
     let result = match error {
-        PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
+        PlanError::OtherCalibration { .. } | PlanError::OtherExposing { .. } => {
+            RecipeResult::OtherCalibration
+        }
         PlanError::Unfit { .. } => RecipeResult::Corrupt,
     };
     (result, error.to_string())

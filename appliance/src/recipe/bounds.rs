@@ -8,6 +8,7 @@ use super::file::{
     GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile, UnseenFile,
 };
 use crate::head::calibration::CalibrationSigma;
+use crate::head::exposing::MAX_GAIN;
 use crate::station::MAX_GAUGES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use algo::phase::LeastModulation;
@@ -79,6 +80,9 @@ impl RecipeFile {
         within("range_mm", high, low, MAX_RANGE_MM)?;
         if let Some(exposure) = self.exposure_us {
             within("exposure_us", exposure, 1.0, MAX_EXPOSURE_US)?;
+        }
+        if let Some(gain) = self.gain {
+            within("gain", gain, 0.0, MAX_GAIN)?;
         }
         within("exposures", self.exposures, 1, MAX_EXPOSURES)?;
         let (least, most) = (MIN_NOISE_COUNTS, MAX_NOISE_COUNTS);

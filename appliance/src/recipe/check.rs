@@ -5,6 +5,8 @@ use super::demands::Demands;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::{check_limits, gauges};
 use super::good_parts::GoodPartsFile;
+use crate::head::calibration::Calibration;
+use crate::head::exposing::Exposing;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
 use algo::inspect::{CalibrationError, Gauge};
@@ -61,8 +63,8 @@ pub struct Conditions {
     pub pattern: PatternFile,
     /// Working range of z in mm.
     pub range_mm: [f64; 2],
-    /// Exposure in µs; none where the head has no such setting.
-    pub exposure_us: Option<f64>,
+    /// What the camera was set to, where that is known.
+    pub exposing: Option<Exposing>,
     /// Each frame is exposed so many times as long as the head is set to.
     pub exposures: u32,
     /// σ of one sample in counts, at half the light of white.
@@ -274,6 +276,14 @@ impl From<&RecipeFile> for RecipeId {
     }
 }
 
+impl Conditions {
+    /// What the recipe was taught with and what the head is set to, where they are not the same: then its noise is not the head's.
+    pub fn set_otherwise(&self, head: &Calibration) -> Option<[Exposing; 2]> {
+        let (taught, present) = self.exposing.zip(head.exposing)?;
+        (!taught.agrees(&present)).then_some([taught, present])
+    }
+}
+
 impl From<&RecipeFile> for Conditions {
     fn from(file: &RecipeFile) -> Self {
         let (camera, projector) = (&file.camera, &file.projector);
@@ -282,7 +292,13 @@ impl From<&RecipeFile> for Conditions {
             raster: (projector.width, projector.height),
             pattern: file.pattern.clone(),
             range_mm: file.range_mm,
-            exposure_us: file.exposure_us,
+            exposing: file
+                .exposure_us
+                .zip(file.gain)
+                .map(|(exposure_us, gain)| Exposing {
+                    exposure_us: exposure_us.round() as u32,
+                    gain,
+                }),
             exposures: file.exposures,
             noise_counts: file.noise_counts,
             noise: SampleNoise::new(

@@ -54,9 +54,12 @@ pub struct RecipeFile {
     pub alignment: AlignmentKind,
     /// Working range of z in mm.
     pub range_mm: [f64; 2],
-    /// Exposure in µs; `None` if the head has no such setting.
+    /// Exposure in µs that the head was set to; `None` where that is not known: taught from a recording, or by an older program.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure_us: Option<f64>,
+    /// Gain that the camera was set to; `None` as the exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
     /// Each frame is exposed so many times as long as the head is set to, 1 to 4; 1, which is left out, in recipes of older programs.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub exposures: u32,

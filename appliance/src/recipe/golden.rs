@@ -192,8 +192,10 @@ impl GoldenPart<'_> {
             placement_tolerance_mm: naming.placement_tolerance_mm,
             alignment: AlignmentKind::Rigid,
             range_mm: [range.low, range.high],
-            // Heads take their exposure from the configuration.
-            exposure_us: None,
+            exposure_us: calibration
+                .exposing
+                .map(|exposing| f64::from(exposing.exposure_us)),
+            gain: calibration.exposing.map(|exposing| exposing.gain),
             exposures: self.illumination.exposures,
             noise_counts: calibration.noise_counts,
             read_noise_counts: Some(self.noise.read_counts()),

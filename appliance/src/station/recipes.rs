@@ -41,7 +41,7 @@ impl RecipeResult {
             Self::Ok => "it was loaded",
             Self::Unknown => "there is no such recipe",
             Self::Corrupt => "it is damaged or does not fit this head",
-            Self::OtherCalibration => "it was made for another calibration",
+            Self::OtherCalibration => "it was made for another calibration, exposure or gain",
             Self::Busy => "a load or teach was refused or interrupted",
         }
     }

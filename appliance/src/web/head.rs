@@ -15,7 +15,8 @@ use super::problem::Problem;
 use super::site::Site;
 use crate::head::board;
 use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
-use crate::head::commission::{Exposing, Solving, Step};
+use crate::head::commission::{Solving, Step};
+use crate::head::exposing::Exposing;
 use crate::head::live::Show;
 use crate::production::commissioning::Asked;
 use crate::station::{Event, Request as Command};
@@ -138,6 +139,10 @@ fn exposure(site: &Site, wanted: Exposure) -> Result<Asked, Problem> {
         }
     }
     Ok(Asked {
+        if exposing.exposure_us != head.exposing.exposure_us {
+            let whole = exposing.check_refreshes(head.refresh);
+            whole.map_err(Problem::unfit)?;
+        }
         step: Step::Exposure,
         exposing: given.then_some((exposing, wanted.keep)),
     })

@@ -186,8 +186,8 @@ fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
     };
     match Plan::try_out(recipe, &calibration) {
         Ok(()) => Ok(None),
-        Err(error @ PlanError::OtherCalibration { .. }) => Ok(Some(error.to_string())),
-        Err(error) => Err(error.to_string()),
+        Err(error @ PlanError::Unfit { .. }) => Err(error.to_string()),
+        Err(error) => Ok(Some(error.to_string())),
     }
 }
 

@@ -147,9 +147,11 @@ impl Calibrate {
             models_from = from;
             let (frames, raster) = (calibration.frames(), calibration.raster());
             let noise = calibration.noise_counts;
+            let exposing = calibration.exposing;
             calibration = Calibration::new(frames, raster, (&camera, &projector), noise)
                 .and_then(|imported| fits(&imported).map(|()| imported))
                 .map_err(|error| content(format!("import {models_from}: {error}")))?;
+            calibration.exposing = exposing;
         } else if let Some((file, stored)) = &stored
             && file.models_from != OF_SCENARIO
         {

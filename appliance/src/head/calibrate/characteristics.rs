@@ -56,6 +56,7 @@ impl Characteristics {
         calibration.response = inverted(&self.response)?;
         calibration.noise_counts = self.noise.counts;
         calibration.noise = self.noise.by_signal();
+        calibration.exposing = self.noise.exposing;
         calibration.contrast = Some(self.contrast.clone());
         Ok(())
     }
@@ -66,7 +67,7 @@ pub(super) fn scene(words: impl Into<String>) -> Failure {
     Failure::new(Exit::Unavailable, words)
 }
 
-/// Measures what does not depend on the geometry, and gives it to head and `calibration`. The response `before` is kept where the new one
+/// Measures what does not depend on the geometry, and gives it to head and `calibration`, which says what the camera is set to. The response `before` is kept where the new one
 /// equals it within noise. `progress` gets the share done and what is measured next; `notes` remarks for the user.
 ///
 /// # Errors
@@ -146,6 +147,7 @@ pub fn characterise(
                     counts: point.counts,
                 })
                 .collect(),
+            exposing: calibration.exposing,
         },
         response: greys,
         contrast,

@@ -1,8 +1,10 @@
 //! Bounds of every value of `calibration.json`. Whether the models are usable cameras is checked by the geometry.
 
 use super::file::{CalibrationFile, MapFile};
+use crate::head::exposing::MAX_GAIN;
 use hal::bounds::{
-    MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS, fingerprint, length, text, within,
+    MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS, fingerprint,
+    length, text, within,
 };
 
 /// Lowest temperature of a head, °C.
@@ -60,6 +62,11 @@ impl CalibrationFile {
             within("noise.read_counts", noise.read_counts, 0.0, most)?;
             within("noise.shot", noise.shot, 0.0, most)?;
             length("noise.levels", noise.levels.len(), 0, MAX_LEVELS)?;
+            if let Some(exposing) = &noise.exposing {
+                let exposure = f64::from(exposing.exposure_us);
+                within("noise.exposing.exposure_us", exposure, 0.0, MAX_EXPOSURE_US)?;
+                within("noise.exposing.gain", exposing.gain, 0.0, MAX_GAIN)?;
+            }
             for level in &noise.levels {
                 within("noise.levels.level", level.level, 0.0, most)?;
                 within("noise.levels.counts", level.counts, 0.0, most)?;

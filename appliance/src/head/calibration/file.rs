@@ -3,6 +3,7 @@
 use super::CalibrationSigma;
 use super::geometry::GeometryFile;
 use super::{Calibration, HeightsBy, size};
+use crate::head::exposing::Exposing;
 use crate::head::seam;
 use crate::storage::hex;
 use crate::system::clock;
@@ -145,6 +146,9 @@ pub struct NoiseFile {
     pub shot: f64,
     /// The measured levels.
     pub levels: Vec<LevelFile>,
+    /// The exposure and gain at which it was measured; `None` in files of older programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exposing: Option<Exposing>,
 }
 
 impl NoiseFile {
@@ -329,6 +333,7 @@ impl CalibrationFile {
         let nominal = SampleNoise::constant(NOMINAL_NOISE);
         Ok(Calibration {
             noise: self.noise.as_ref().map_or(nominal, NoiseFile::by_signal),
+            exposing: self.noise.as_ref().and_then(|noise| noise.exposing),
             contrast: self.contrast.clone(),
             plane: self.plane(),
             heights_by: self.heights_by,
@@ -379,7 +384,11 @@ impl CalibrationFile {
         let first = self.missing().is_empty()
             && self.geometry.is_none()
             && self.plane().is_none()
-            && !self.timing.as_ref().is_some_and(newer);
+            && !self.timing.as_ref().is_some_and(newer)
+            && self
+                .noise
+                .as_ref()
+                .is_none_or(|noise| noise.exposing.is_none());
         self.version = if first { 1 } else { VERSION };
         // The bounds ask for a fingerprint's form before there is one.
         self.fingerprint = NO_CHECKSUM.into();

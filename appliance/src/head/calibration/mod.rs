@@ -11,6 +11,7 @@ pub use current::Current;
 
 use file::ContrastFile;
 
+use crate::head::exposing::Exposing;
 use crate::head::seam;
 use crate::storage::hex;
 use algo::frame::SampleNoise;
@@ -59,6 +60,8 @@ pub struct Calibration {
     pub noise_counts: f64,
     /// The noise of one sample by its mean signal.
     pub noise: SampleNoise,
+    /// The exposure and gain that the noise belongs to, where they are known.
+    pub exposing: Option<Exposing>,
     /// Contrast of fringes against their pitch, if it was measured.
     pub contrast: Option<ContrastFile>,
     /// The projector's measured grey response, where it is not linear.
@@ -100,6 +103,7 @@ impl Calibration {
             heights_by: HeightsBy::Models,
             noise_counts,
             noise: SampleNoise::constant(noise_counts),
+            exposing: None,
             contrast: None,
             response: None,
             linear: false,
@@ -125,6 +129,16 @@ impl Calibration {
             linear: scenario.optics.gamma == 1.0,
             ..head
         })
+    }
+
+    /// Takes the exact noise of a simulated head that is set to this exposure and gain.
+    pub fn simulate_noise(&mut self, scenario: &Scenario, exposing: Exposing) {
+        let mut set = scenario.clone();
+        set.optics.gain = exposing.gain;
+        let [read, shot] = set.noise_variance();
+        self.noise_counts = set.noise_sigma_counts();
+        self.noise = SampleNoise::new(read.sqrt(), shot);
+        self.exposing = Some(exposing);
     }
 
     /// What a level of so many shifts shows on this head: the waveform with the most modulation where the light is linear, else a

@@ -39,6 +39,14 @@ impl Commissioning {
             .ok_or_else(|| {
                 missing("delay, response and noise are not measured: do the step timing first")
             })?;
+        let (was, is) = (measured.noise.exposing, subject.calibration.exposing);
+        if let Some((was, is)) = was.zip(is)
+            && !was.agrees(&is)
+        {
+            return Err(missing(&format!(
+                "noise was measured at {was}, and the camera is set to {is}: do the step timing first"
+            )));
+        }
         let (models, models_from, geometry) = match (&self.models, before) {
             (Some(models), _) => {
                 let board = self.board.as_deref().unwrap_or_default();

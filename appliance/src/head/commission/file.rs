@@ -5,6 +5,7 @@ use super::poses::PoseFile;
 use super::step::Name;
 use crate::head::calibrate::Characteristics;
 use crate::head::calibration::geometry::GeometryFile;
+use crate::head::exposing::{Exposing, LEAST_GAIN};
 use crate::head::geometry::covered;
 use crate::head::scale::Scale;
 use crate::storage::folder::write_whole;
@@ -15,7 +16,6 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::io;
 use std::path::Path;
-use std::time::Duration;
 
 /// Its name in the state folder.
 pub const FILE: &str = "commissioning.json";
@@ -25,37 +25,6 @@ const VERSION: u32 = 1;
 const MAX_BOARD: usize = 64;
 /// Most poses that are kept.
 pub const MAX_POSES: usize = crate::head::calibration::geometry::MAX_POSES;
-
-/// Least gain of any camera: a simulated one may be darker than its light.
-pub const LEAST_GAIN: f64 = 0.01;
-/// Largest gain of any camera.
-pub const MOST_GAIN: f64 = 64.0;
-
-/// Exposure and gain of the camera.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Exposing {
-    /// Exposure, µs.
-    pub exposure_us: u32,
-    /// Gain, 1 = none.
-    pub gain: f64,
-}
-
-impl Exposing {
-    /// The exposure.
-    pub fn exposure(&self) -> Duration {
-        Duration::from_micros(u64::from(self.exposure_us))
-    }
-
-    /// Checks the ranges; `least_gain` is that of the camera.
-    ///
-    /// # Errors
-    /// In words that name the key and its range.
-    pub fn check(&self, least_gain: f64) -> Result<(), String> {
-        within("exposure_us", self.exposure_us, 1, 1_000_000)?;
-        within("gain", self.gain, least_gain, MOST_GAIN)
-    }
-}
 
 /// Models of camera and projector that were made from the poses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ mod outcome;
 mod poses;
 mod step;
 
-pub use file::{Commissioning, Exposing, FILE, LEAST_GAIN, MOST_GAIN, Models};
+pub use file::{Commissioning, FILE, Models};
 pub use outcome::Outcome;
 pub use poses::{PoseFile, Solving};
 pub use step::{Name, Step, Subject};

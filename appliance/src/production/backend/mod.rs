@@ -8,8 +8,8 @@ use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::place::{Loaded, Place};
-use crate::head::commission::Exposing;
 use crate::head::examine::{LONGEST_DARK, first_light};
+use crate::head::exposing::Exposing;
 use crate::head::seam;
 use crate::history::RECIPE;
 use crate::recipe::plan::{Plan, PlanError};
@@ -140,21 +140,19 @@ impl Opened {
         config.backend == Backend::Rpi || self.stage.as_ref().is_some_and(bare)
     }
 
-    /// Sets exposure and gain of the camera, and keeps them in the configuration for when the head is opened again.
+    /// Sets exposure and gain of the camera to those of a configuration that was changed, or changed back, to `exposing`.
     ///
     /// # Errors
     /// If the head cannot expose in this way, or a device is not there.
-    pub fn expose(&mut self, config: &mut HeadConfig, exposing: Exposing) -> Result<(), Failure> {
-        let before = config.clone();
-        config.expose(exposing);
-        let set = match &self.stage {
-            Some(stage) => exposed(stage, exposing),
-            None => self.reopen(config),
-        };
-        if set.is_err() {
-            *config = before;
+    pub fn expose(&mut self, config: &HeadConfig, exposing: Exposing) -> Result<(), Failure> {
+        let timing = self.head.timing();
+        match &self.stage {
+            Some(stage) => exposed(stage, exposing)?,
+            None => self.reopen(config)?,
         }
-        set
+        self.head.set_timing(timing);
+        self.adopt(config);
+        Ok(())
     }
 
     /// Exposure and gain of the camera.
@@ -174,10 +172,21 @@ impl Opened {
     /// Uses the stored calibration if there is one, else that of the back-end.
     pub fn adopt(&mut self, config: &HeadConfig) {
         self.fallback = None;
+        let exposing = self.exposing(config);
         self.problem = match stored(config) {
-            Ok(None) => self
-                .is_bare(config)
-                .then(|| devices::uncalibrated().message),
+            Ok(None) => {
+                match &self.stage {
+                    Some(stage) if stage.scenario().calibrated => {
+                        let scenario = stage.scenario();
+                        self.calibration.simulate_noise(scenario, exposing);
+                    }
+                    // Recordings were taken with whatever their head was set to.
+                    _ if config.backend == Backend::Replay => {}
+                    _ => self.calibration.exposing = Some(exposing),
+                }
+                self.is_bare(config)
+                    .then(|| devices::uncalibrated().message)
+            }
             Ok(Some((loaded, calibration))) => {
                 let misfit = misfit(config, &self.calibration, &calibration);
                 if misfit.is_none() {
@@ -185,7 +194,9 @@ impl Opened {
                     self.calibration = calibration;
                     self.fallback = loaded.fallback.clone();
                 }
-                misfit.or_else(|| unfinished(config, &loaded))
+                misfit
+                    .or_else(|| unfinished(config, &loaded))
+                    .or_else(|| set_otherwise(&loaded, exposing))
             }
             Err(problem) => Some(problem),
         };
@@ -274,6 +285,17 @@ fn unfinished(config: &HeadConfig, stored: &Loaded) -> Option<String> {
             "calibration {} has models, but {} of the head are still to be measured: run `fringed calibrate`",
             place.display(),
             missing.join(", ")
+        )
+    })
+}
+
+/// Why the noise of a stored calibration is not that of the head as it is set; `None` if it is, or its setting is not known.
+fn set_otherwise(stored: &Loaded, now: Exposing) -> Option<String> {
+    let measured = stored.file.noise.as_ref()?.exposing?;
+    (!measured.agrees(&now)).then(|| {
+        format!(
+            "the camera is set to {now}, and its noise was measured at {measured}: set that again, or measure anew with the steps timing and \
+             plane or `fringed calibrate`, and teach the recipes again"
         )
     })
 }

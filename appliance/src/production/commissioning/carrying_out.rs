@@ -1,10 +1,11 @@
 //! The measuring task carries out a step.
 
 use super::{Asked, OpenHead, PICTURES};
-use crate::config::Backend;
+use crate::config::{Backend, HeadConfig};
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::place::Place;
-use crate::head::commission::{Commissioning, Exposing, Name, Outcome, Step, Subject};
+use crate::head::commission::{Commissioning, Name, Outcome, Step, Subject};
+use crate::head::exposing::Exposing;
 use crate::head::live::{Picture, outlines};
 use crate::production::{SIGN_OF_LIFE, Worker, active};
 use crate::recipe::plan::Plan;
@@ -27,9 +28,20 @@ impl Worker {
             self.carry_out(job, &asked);
             let same =
                 self.opened.problem.is_none() && self.opened.calibration.fingerprint() == before;
-            if !same && plan.take().is_some() {
-                self.progress
-                    .warn("the head has another calibration: teach the recipes anew");
+            let otherwise = |plan: &Plan| {
+                let set = plan.conditions().set_otherwise(&self.opened.calibration);
+                set.map(|[taught, now]| {
+                    format!("the camera is set to {now}, and the active recipe was taught with {taught}: teach it again, or load another")
+                })
+            };
+            let words = match same {
+                true => plan.as_deref().and_then(otherwise),
+                false => Some("the head has another calibration: teach the recipes anew".into()),
+            };
+            if let Some(words) = words
+                && plan.take().is_some()
+            {
+                self.progress.warn(&words);
             }
             // Steps show patterns of their own.
             self.restore(plan);
@@ -47,13 +59,22 @@ impl Worker {
             // What other devices have shown is of no use here; exposure and gain are those of this camera already.
             kept = Commissioning::of(head, kept.exposing);
         }
-        if let Err(problem) = self.set_exposing(asked, &mut kept) {
+        let before = (self.config.clone(), self.opened.exposing(&self.config));
+        if let Err(problem) = self.set_exposing(asked) {
             kept.steps
                 .insert(asked.step.name(), Outcome::failed(&problem));
             return self.keep(kept);
         }
         let timing = self.opened.head.timing();
         let (white, ended) = self.step(job, &asked.step, &mut kept);
+        if let Some((exposing, keep)) = asked.exposing {
+            let outcome = kept.steps.get(&asked.step.name());
+            match !ended && outcome.is_some_and(|outcome| outcome.passed) {
+                true if keep => keep_exposing(&mut kept, exposing),
+                true => {}
+                false => self.expose_again(before),
+            }
+        }
         if ended {
             // What it has found so far is not kept.
             self.opened.head.set_timing(timing);
@@ -104,8 +125,12 @@ impl Worker {
         progress(0.0, "beginning");
         let opened = &mut self.opened;
         let mut calibration = opened.calibration.clone();
+        calibration.exposing = Some(opened.exposing(&self.config));
         let calibrated = opened.problem.is_none();
-        let exact = calibrated && opened.stage.is_some();
+        let exact = opened
+            .stage
+            .as_ref()
+            .is_some_and(|stage| stage.scenario().calibrated);
         let place = self.config.calibration.as_deref().unwrap_or(Path::new(""));
         let (pool, computing) = (&self.pool, &self.computing);
         let run = |head: &mut Head| {
@@ -163,25 +188,29 @@ impl Worker {
     }
 
     /// Sets exposure and gain, if the step asks for it.
-    fn set_exposing(&mut self, asked: &Asked, kept: &mut Commissioning) -> Result<(), String> {
-        let Some((exposing, keep)) = asked.exposing else {
+    fn set_exposing(&mut self, asked: &Asked) -> Result<(), String> {
+        let Some((exposing, _)) = asked.exposing else {
             return Ok(());
         };
-        let before = self.opened.exposing(&self.config);
-        if exposing != before {
-            let timing = self.opened.head.timing();
-            let set = self.opened.expose(&mut self.config, exposing);
+        if exposing != self.opened.exposing(&self.config) {
+            let mut config = self.config.clone();
+            config.expose(exposing);
+            let set = self.opened.expose(&config, exposing);
             set.map_err(|failure| failure.message)?;
-            self.opened.head.set_timing(timing);
-        }
-        if keep {
-            if kept.exposing != Some(exposing) {
-                // Response and noise were measured with other ones.
-                kept.steps.remove(&Name::Timing);
-            }
-            kept.exposing = Some(exposing);
+            self.config = config;
         }
         Ok(())
+    }
+
+    /// Takes exposure and gain back after a step that did not pass.
+    fn expose_again(&mut self, (config, exposing): (HeadConfig, Exposing)) {
+        if exposing != self.opened.exposing(&self.config)
+            && let Err(failure) = self.opened.expose(&config, exposing)
+        {
+            // A head that is lost is opened again by this configuration.
+            self.progress.warn(&failure.message);
+        }
+        self.config = config;
     }
 
     fn keep(&self, kept: Commissioning) {
@@ -229,7 +258,16 @@ impl Worker {
                 Some(_) => Vec::new(),
             },
             least_gain: self.config.least_gain(),
-            refresh_us: opened.head.refresh().as_micros() as u64,
+            refresh: opened.head.refresh(),
         }));
     }
+}
+
+/// Keeps exposure and gain for later starts.
+fn keep_exposing(kept: &mut Commissioning, exposing: Exposing) {
+    if kept.exposing != Some(exposing) {
+        // Response and noise were measured with other ones.
+        kept.steps.remove(&Name::Timing);
+    }
+    kept.exposing = Some(exposing);
 }

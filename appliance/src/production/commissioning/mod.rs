@@ -8,13 +8,14 @@ pub mod live;
 mod view;
 
 use crate::head::calibration::Calibration;
-use crate::head::commission::{Commissioning, Exposing, Step};
+use crate::head::commission::{Commissioning, Step};
+use crate::head::exposing::Exposing;
 use crate::head::live::Outline;
 use crate::production::drift::Trend;
 use crate::station::{Event, Request, StationHandle};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Folder of the pictures of poses in the state folder.
 const PICTURES: &str = "commissioning";
@@ -45,8 +46,8 @@ pub struct OpenHead {
     pub volume: Vec<Outline>,
     /// The least gain that the camera can be set to.
     pub least_gain: f64,
-    /// Time between two refreshes of the projector, µs.
-    pub refresh_us: u64,
+    /// Time between two refreshes of the projector.
+    pub refresh: Duration,
 }
 
 /// The step that runs.

@@ -31,7 +31,7 @@ impl Commission {
             "problem": head.problem,
             "camera": {
                 "columns": width, "rows": height, "bits": bits, "exposure_us": head.exposing.exposure_us, "gain": head.exposing.gain, "least_gain": head.least_gain,
-                "refresh_us": head.refresh_us, "adjustable": head.adjustable,
+                "refresh_us": head.refresh.as_micros() as u64, "adjustable": head.adjustable,
             },
             "projector": { "columns": columns, "rows": rows },
             "volume": head.volume,

@@ -1,6 +1,7 @@
 //! A recipe joined with the head's calibration. Planning can fail; judging a part with the plan always ends in an inspection.
 
 mod arriving;
+mod error;
 mod golden;
 mod judge;
 mod layers;
@@ -11,6 +12,7 @@ mod trial;
 mod window;
 
 pub use arriving::Arriving;
+pub use error::PlanError;
 pub use layers::{Layers, Shown, ShownGauge};
 
 use crate::head::calibration::Calibration;
@@ -50,32 +52,6 @@ pub struct Plan {
     simulated: bool,
 }
 
-/// A recipe that cannot be run on this head.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PlanError {
-    /// It was made for another calibration.
-    #[error(
-        "recipe {number} was made for calibration {made_for}, this head has {present}: teach it again on \
-         this head"
-    )]
-    OtherCalibration {
-        /// The recipe's number.
-        number: u16,
-        /// First digits of the fingerprint in the recipe.
-        made_for: String,
-        /// First digits of the head's.
-        present: String,
-    },
-    /// Something in it does not fit.
-    #[error("recipe {number}: {reason}")]
-    Unfit {
-        /// The recipe's number.
-        number: u16,
-        /// In words, with the remedy.
-        reason: String,
-    },
-}
-
 /// A frame is inspected in this many strips: enough for four threads, with few rows that two strips both need.
 pub const STRIPS: usize = 4;
 /// Heights are planned this many pixels around the taught part at least: a part that is not aligned may be displaced by that.
@@ -87,7 +63,7 @@ impl Plan {
     /// Joins a recipe and a calibration.
     ///
     /// # Errors
-    /// If the recipe was made for another calibration or does not fit the head.
+    /// If the recipe was made for another calibration, exposure or gain, or does not fit the head.
     pub fn new(
         recipe: Recipe,
         calibration: &Calibration,
@@ -101,6 +77,13 @@ impl Plan {
                 number,
                 made_for: digits(&recipe.id.calibration),
                 present: digits(&present),
+            });
+        }
+        if let Some([taught, present]) = recipe.conditions.set_otherwise(calibration) {
+            return Err(PlanError::OtherExposing {
+                number,
+                taught,
+                present,
             });
         }
         Self::again(recipe, calibration, simulated)
