@@ -247,7 +247,7 @@ impl Promise {
             }
         }
         let numbering = Numbering {
-            counted: folder.counted().map_err(|error| words(&error))?,
+            counted: folder.counted(),
             counter: folder.counter(),
             serial: folder.serial().map_err(|error| words(&error))?,
             run: 7,

@@ -27,9 +27,9 @@ fn get(daemon: &Daemon, path: &str) -> String {
         daemon.http
     );
     stream.write_all(head.as_bytes()).unwrap();
-    let mut answer = String::new();
-    stream.read_to_string(&mut answer).unwrap();
-    answer
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    String::from_utf8_lossy(&answer).into_owned()
 }
 
 /// Page, /healthz and Modbus answer, a recipe is refused and another one loaded, and parts get their verdicts; each at once.

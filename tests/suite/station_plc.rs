@@ -147,13 +147,16 @@ impl Daemon {
         };
         // It opens its head and teaches meanwhile.
         let began = Instant::now();
-        let ready = || {
-            let there = TcpStream::connect(modbus).is_ok();
-            there && Plc::at(modbus).status().has(READY)
-        };
-        while !ready() {
+        let early = || {
             assert!(began.elapsed() < 4 * PATIENCE, "it is not ready");
             std::thread::yield_now();
+        };
+        while TcpStream::connect(modbus).is_err() {
+            early();
+        }
+        let mut plc = Plc::at(modbus);
+        while !plc.status().has(READY) {
+            early();
         }
         daemon
     }

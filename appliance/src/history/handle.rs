@@ -3,8 +3,8 @@
 use super::entry::Entry;
 use super::keeper::{self, Keeper};
 use super::recordings::JudgedPart;
-use super::seqs::{Numbering, Seqs};
-use super::spool::{Spool, is_after};
+use super::seqs::{AHEAD, Numbering, Seqs};
+use super::spool::{SLOTS, Spool, is_after};
 use super::task::{MAX_WAITING, Message, Task};
 use super::writer::Writer;
 use super::{Bounds, DATABASE, HistoryError, RECORDINGS};
@@ -19,6 +19,9 @@ use std::time::Duration;
 
 /// Longest wait of a sign-in for its time to be stored.
 const DATING: Duration = Duration::from_secs(2);
+
+/// As many numbers are skipped where the counter is lost: those of results that were shown and not stored.
+const UNKNOWN: u32 = SLOTS + AHEAD;
 
 /// The way to the history's threads. Cheap to clone.
 #[derive(Clone)]
@@ -50,14 +53,29 @@ pub fn open(
     let owner = std::fs::metadata(state).map_err(|error| failed("", error))?;
     // Where the system has no shared memory, or another process has it, a kill skips numbers and loses results that wait.
     let spool = Spool::open(&numbering.serial, owner.uid()).ok();
-    let counted = numbering.counted;
-    let found = spool.as_ref().and_then(|spool| spool.of_run(counted.run));
+    let found = spool.as_ref().and_then(|spool| match &numbering.counted {
+        Ok(counted) => spool.of_run(counted.run),
+        Err(_) => spool.of_any_run(),
+    });
+    let counted = numbering.counted.clone().unwrap_or_default();
     let (last, mut shown) = found.unwrap_or((counted.last, Vec::new()));
     let stored = writer.last_seq()?;
     shown.retain(|entry| stored.is_none_or(|stored| is_after(entry.seq, stored)));
     // A counter that was lost or taken from an older copy of the folder must not bring back a number.
     let last = stored.filter(|&seq| is_after(seq, last)).unwrap_or(last);
-    let next = last.wrapping_add(1);
+    let lost = numbering.counted.clone().err();
+    let skipped = match lost {
+        Some(_) => UNKNOWN,
+        None => 0,
+    };
+    let next = last.wrapping_add(skipped).wrapping_add(1);
+    let lost = lost.map(|problem| {
+        numbering.counter.put_aside();
+        format!(
+            "{problem}: it is put aside as result-seq.damaged; which results were shown last is not known, so RESULT_SEQ goes on \
+             with {next}, behind all that the history has"
+        )
+    });
     let waiting = match writer.store(shown.iter()) {
         Ok(()) => Vec::new(),
         // It stays in the spool until it is stored.
@@ -79,7 +97,13 @@ pub fn open(
         keeper,
     };
     let task = Task::new(history.clone(), inbox, writer, keeping, waiting);
-    Ok((history, task, next, complaint))
+    let complaints = lost.into_iter().chain(complaint);
+    Ok((
+        history,
+        task,
+        next,
+        complaints.reduce(|all, more| all + "\n" + &more),
+    ))
 }
 
 impl History {

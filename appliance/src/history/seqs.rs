@@ -20,8 +20,8 @@ const FEW: i32 = (AHEAD / 4 * 3) as i32;
 /// What numbers results.
 #[derive(Debug)]
 pub struct Numbering {
-    /// What the card said at the start.
-    pub counted: Counted,
+    /// What the card said at the start, or why that is not known.
+    pub counted: Result<Counted, String>,
     /// The counter on the card.
     pub counter: Counter,
     /// The device's.
@@ -42,7 +42,8 @@ impl Numbering {
         next: u32,
     ) -> io::Result<(Seqs, Option<Spool>)> {
         let (used, reserved) = (next.wrapping_sub(1), next.wrapping_add(AHEAD - 1));
-        let (before, run) = (self.counted.run, self.run);
+        let before = self.counted.map_or(0, |counted| counted.run);
+        let run = self.run;
         // Killed before the card names this run, the next start still finds the run before.
         let spool = spool.filter(|spool| {
             let begun = spool.begin([before, run], used).is_ok();
@@ -203,7 +204,7 @@ mod tests {
     /// Reserves without shared memory.
     fn reserved(state: &StateFolder, next: u32) -> Seqs {
         let numbering = Numbering {
-            counted: Counted::default(),
+            counted: Ok(Counted::default()),
             counter: state.counter(),
             serial: String::new(),
             run: 1,
@@ -228,7 +229,7 @@ mod tests {
         };
         let begin = |run, next| {
             let numbering = Numbering {
-                counted: state.counted().unwrap(),
+                counted: state.counted(),
                 counter: state.counter(),
                 serial: serial.clone(),
                 run,

@@ -57,12 +57,20 @@ impl Spool {
     /// The last SEQ that the run which the card names has shown, and the results that are here, oldest first. `None` where the
     /// content belongs to another run, or nothing is here.
     pub fn of_run(&self, run: u32) -> Option<(u32, Vec<Entry>)> {
-        let last = self.begun(run)?;
+        self.begun(run).map(|last| self.since(last))
+    }
+
+    /// The same of whichever run was the last, for when the card does not name one.
+    pub fn of_any_run(&self) -> Option<(u32, Vec<Entry>)> {
+        self.numbers(0).map(|[_, _, last]| self.since(last))
+    }
+
+    fn since(&self, last: u32) -> (u32, Vec<Entry>) {
         let mut results: Vec<Entry> = (0..SLOTS).filter_map(|slot| self.read(slot)).collect();
         results.sort_by_key(|entry| entry.seq.wrapping_sub(last) as i32);
         let newest = results.last().map(|entry| entry.seq);
         let shown = newest.filter(|&seq| is_after(seq, last));
-        Some((shown.unwrap_or(last), results))
+        (shown.unwrap_or(last), results)
     }
 
     /// The SEQ behind which a run began, if the content belongs to it.
@@ -214,6 +222,7 @@ mod tests {
         assert_eq!(spool.of_run(9), Some((40, Vec::new())));
         spool.begin([0, 10], 40).unwrap();
         assert_eq!(spool.of_run(0), None);
+        assert_eq!(spool.of_any_run(), Some((40, Vec::new())));
         spool.remove();
     }
 

@@ -455,7 +455,7 @@ pub(super) fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Opti
         recordings: 0,
     };
     let numbering = Numbering {
-        counted: state.counted().unwrap(),
+        counted: state.counted(),
         counter: state.counter(),
         serial: state.serial().unwrap(),
         run,

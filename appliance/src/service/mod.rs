@@ -103,7 +103,7 @@ impl Daemon {
         crate::system::memory::give_back();
         let state = StateFolder::open(&path)?;
         let recipes = Store::of_state(&state)?;
-        let access = open_access(&state)?;
+        let access = open_access(&state, &progress)?;
         let wires = backend::lines(&config.lines)?;
         let runtime = runtime()?;
         let (plc, page) = runtime.block_on(listen(config))?;
@@ -281,12 +281,15 @@ impl Daemon {
 const SECRET: &str = "fringed.secret";
 
 /// Opens the access control; the secret of a new device is written to stderr here and never again.
-fn open_access(state: &StateFolder) -> Result<Access, Failure> {
+fn open_access(state: &StateFolder, progress: &Progress) -> Result<Access, Failure> {
     let folder = state.path().join("access");
     let given =
         std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
-    let (access, secret) = Access::open(&folder, given.as_deref())?;
-    if let Some(secret) = secret {
+    let (access, made) = Access::open(&folder, given.as_deref())?;
+    if let Some(NewSecret { secret, complaint }) = made {
+        if let Some(complaint) = complaint {
+            progress.warn(&complaint);
+        }
         // Also with `--quiet`: without the secret it is impossible to sign in.
         let words = format!(
             "the secret of this device, shown this once: {secret} (sign in on the page with it; for another one \
@@ -328,7 +331,7 @@ fn open_history(
         recordings: u64::from(config.history.recordings_mib) << 20,
     };
     let numbering = Numbering {
-        counted: state.counted()?,
+        counted: state.counted(),
         counter: state.counter(),
         serial: state.serial()?,
         // Run 0 means that none was recorded.

@@ -1,8 +1,10 @@
 //! Files that a loss of power leaves whole, and a folder of them.
 
 use crate::error::{Exit, Failure};
+use rustix::fs::OFlags;
 use std::fs;
-use std::io::{self, Write as _};
+use std::io::{self, Read as _, Write as _};
+use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
 /// An output folder. Each file in it is whole at any time; an older one of the same name is replaced.
@@ -95,6 +97,33 @@ pub fn write_whole_with(
     written
 }
 
+/// Reads a file of the state folder whole. What is no file is refused at once: a pipe, a device or a link to one would be read for
+/// ever. So is one of more than `most` bytes.
+///
+/// # Errors
+/// Whatever the file system answers; `InvalidData` for what is refused.
+pub fn read_whole(path: &Path, most: u64) -> io::Result<Vec<u8>> {
+    let wrong = |words: String| io::Error::new(io::ErrorKind::InvalidData, words);
+    // Opening a pipe would wait for its writer.
+    let flags = OFlags::NONBLOCK.bits().cast_signed();
+    let file = fs::OpenOptions::new()
+        .read(true)
+        .custom_flags(flags)
+        .open(path)?;
+    let about = file.metadata()?;
+    if !about.is_file() {
+        return Err(wrong("it is not a file".into()));
+    }
+    let mut bytes = Vec::new();
+    if about.len() <= most {
+        file.take(most + 1).read_to_end(&mut bytes)?;
+    }
+    match about.len().max(bytes.len() as u64) > most {
+        true => Err(wrong(format!("it has more than {most} bytes"))),
+        false => Ok(bytes),
+    }
+}
+
 /// Copies a file: see [`write_whole_with`].
 ///
 /// # Errors
@@ -150,6 +179,24 @@ pub fn sync_folder_of(file: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_never_ends_is_refused_at_once_and_a_file_is_read_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("file"), [7; 100]).unwrap();
+        assert_eq!(read_whole(&path("file"), 100).unwrap(), [7; 100]);
+        let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
+        rustix::fs::mknodat(rustix::fs::CWD, path("pipe"), kind, mode, 0).unwrap();
+        std::os::unix::fs::symlink("/dev/zero", path("endless")).unwrap();
+        fs::create_dir(path("folder")).unwrap();
+        for (name, most) in [("file", 99), ("pipe", 99), ("endless", 99), ("folder", 99)] {
+            let error = read_whole(&path(name), most).unwrap_err();
+            assert_eq!(error.kind(), io::ErrorKind::InvalidData, "{name}");
+        }
+        let none = read_whole(&path("none"), 1).unwrap_err();
+        assert_eq!(none.kind(), io::ErrorKind::NotFound);
+    }
 
     #[test]
     fn a_second_name_replaces_another_file_and_leaves_nothing_else_behind() {

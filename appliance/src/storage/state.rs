@@ -1,7 +1,7 @@
 //! The state folder: its lock, the result counter and the device's serial.
 
 use crate::error::{Exit, Failure};
-use crate::storage::folder::write_whole;
+use crate::storage::folder::{read_whole, write_whole};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -18,6 +18,8 @@ pub struct StateFolder {
 const COUNTER: &str = "result-seq";
 /// The serial's file.
 const SERIAL: &str = "serial";
+/// Longest of these files, bytes.
+const MOST: u64 = 4096;
 
 impl StateFolder {
     /// The platform's state folder for this program.
@@ -85,28 +87,21 @@ impl StateFolder {
     /// What the counter's file says; 0 without a file.
     ///
     /// # Errors
-    /// If it is damaged: guessing would let a SEQ be used twice.
-    pub fn counted(&self) -> Result<Counted, Failure> {
+    /// In words: it cannot be read or is damaged. Guessing would let a SEQ be used twice.
+    pub fn counted(&self) -> Result<Counted, String> {
         let file = self.path.join(COUNTER);
-        let text = match fs::read_to_string(&file) {
-            Ok(text) => text,
+        let wrong = |problem: String| format!("read {}: {problem}", file.display());
+        let bytes = match read_whole(&file, MOST) {
+            Ok(bytes) => bytes,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Ok(Counted::default());
             }
-            Err(error) => {
-                let what = format!("read {}", file.display());
-                return Err(Failure::because(Exit::CannotCreate, what, error));
-            }
+            Err(error) => return Err(wrong(error.to_string())),
         };
+        let text = String::from_utf8_lossy(&bytes);
         Counted::read(&text).ok_or_else(|| {
-            Failure::new(
-                Exit::CannotCreate,
-                format!(
-                    "read {}: {:?} is no number: write the SEQ of the last result there",
-                    file.display(),
-                    text.trim()
-                ),
-            )
+            let begin: String = text.trim().chars().take(40).collect();
+            wrong(format!("{begin:?} is no number"))
         })
     }
 
@@ -123,7 +118,8 @@ impl StateFolder {
     /// If it can neither be read nor written.
     pub fn serial(&self) -> Result<String, Failure> {
         let file = self.path.join(SERIAL);
-        if let Ok(serial) = fs::read_to_string(&file)
+        if let Ok(serial) = read_whole(&file, MOST)
+            && let Ok(serial) = String::from_utf8(serial)
             && !serial.trim().is_empty()
         {
             return Ok(serial.trim().to_owned());
@@ -172,6 +168,12 @@ pub struct Counter {
 }
 
 impl Counter {
+    /// Puts a file that cannot be used beside the one that is written next.
+    pub fn put_aside(&self) {
+        // Where it cannot be renamed it is replaced.
+        let _ = fs::rename(&self.file, self.file.with_extension("damaged"));
+    }
+
     /// Stores that SEQs up to this one may be in use. It is written in place, within one sector: it needs no room on a full card,
     /// and a loss of power leaves the old numbers or the new ones.
     ///
@@ -233,7 +235,7 @@ mod tests {
         for damaged in ["4x", "", "4 y", "4 5 6", "-4", "4294967296"] {
             fs::write(folder.path().join(COUNTER), damaged).unwrap();
             let refused = state.counted().unwrap_err();
-            assert!(refused.message.contains("result-seq"), "{damaged}");
+            assert!(refused.contains("result-seq"), "{damaged}");
         }
         fs::write(folder.path().join(COUNTER), "4\n").unwrap();
         assert_eq!(state.counted().unwrap(), Counted { last: 4, run: 0 });

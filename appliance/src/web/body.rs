@@ -84,11 +84,7 @@ pub async fn file(site: &Site, body: Body) -> Result<Upload, Problem> {
     sent?;
     let stored = stored.unwrap_or_else(|_| Err(ErrorKind::Other.into()));
     let file = stored.map_err(|error: std::io::Error| {
-        let status = match error.kind() {
-            ErrorKind::StorageFull => StatusCode::INSUFFICIENT_STORAGE,
-            _ => StatusCode::INTERNAL_SERVER_ERROR,
-        };
-        Problem::new(status, format!("store the file: {error}: free space"))
+        Problem::unstored(format!("store the file: {error}: free space"), &error)
     })?;
     let _place = place;
     Ok(Upload { file, _place })

@@ -24,7 +24,9 @@ use crate::system::priority;
 
 /// The number of a live picture, which its figures have as well.
 const NUMBER: HeaderName = HeaderName::from_static("x-picture");
-/// Longest length on a board, mm.
+/// Shortest length on a board that can be checked, mm.
+const MIN_LENGTH_MM: f64 = 1e-3;
+/// Longest one, mm.
 const MAX_LENGTH_MM: f64 = 1e5;
 
 pub(super) async fn state(State(site): State<Site>) -> Json<Value> {
@@ -137,12 +139,12 @@ fn exposure(site: &Site, wanted: Exposure) -> Result<Asked, Problem> {
             let words = "set the exposure: recordings cannot be exposed anew";
             return Err(Problem::unfit(words));
         }
-    }
-    Ok(Asked {
         if exposing.exposure_us != head.exposing.exposure_us {
             let whole = exposing.check_refreshes(head.refresh);
             whole.map_err(Problem::unfit)?;
         }
+    }
+    Ok(Asked {
         step: Step::Exposure,
         exposing: given.then_some((exposing, wanted.keep)),
     })
@@ -166,9 +168,9 @@ fn geometry(site: &Site, wanted: Poses) -> Result<Step, String> {
             board_sigma_ppm,
         } => {
             let length = check_length_mm.unwrap_or(1.0);
-            if !(length > 0.0 && length <= MAX_LENGTH_MM) {
+            if !(MIN_LENGTH_MM..=MAX_LENGTH_MM).contains(&length) {
                 let words = format!(
-                    "check_length_mm is {length}: write a length above 0 to {MAX_LENGTH_MM}"
+                    "check_length_mm is {length:?}: write {MIN_LENGTH_MM} to {MAX_LENGTH_MM}"
                 );
                 return Err(words);
             }

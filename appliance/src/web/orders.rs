@@ -146,6 +146,11 @@ pub(super) async fn teach(
             "recipe {number}: numbers are 1 to 9999"
         )));
     }
+    // Without a head the station says why below.
+    let unknown = site.commission.head().and_then(|head| head.problem);
+    if let Some(problem) = unknown {
+        return Err(Problem::busy(format!("teach: {problem}")));
+    }
     let Teaching {
         replace: may_replace,
         keep_gauges,

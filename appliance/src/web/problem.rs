@@ -3,6 +3,7 @@
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::json;
+use std::io::{self, ErrorKind};
 
 /// Seconds in Retry-After, where too many requests are being answered.
 const RETRY_AFTER_S: &str = "5";
@@ -46,6 +47,16 @@ impl Problem {
     /// 422: understood, but its content cannot be used.
     pub fn unfit(words: impl Into<String>) -> Self {
         Self::new(StatusCode::UNPROCESSABLE_ENTITY, words)
+    }
+
+    /// A file could not be written: 507 if there is no room, else 500.
+    pub fn unstored(words: impl Into<String>, error: &io::Error) -> Self {
+        let full = [ErrorKind::StorageFull, ErrorKind::QuotaExceeded].contains(&error.kind());
+        let status = match full {
+            true => StatusCode::INSUFFICIENT_STORAGE,
+            false => StatusCode::INTERNAL_SERVER_ERROR,
+        };
+        Self::new(status, words)
     }
 
     /// 500: the program or its machine is at fault.

@@ -34,7 +34,9 @@ impl From<ChangeError> for Problem {
             ChangeError::Nothing(_) | ChangeError::Missing { .. } => Self::missing(words),
             ChangeError::Outdated(_) => Self::busy(words),
             ChangeError::Unfit(_) => Self::unfit(words),
-            ChangeError::Store(_) | ChangeError::Write { .. } => Self::broken(words),
+            ChangeError::Store(error) | ChangeError::Write { source: error, .. } => {
+                Self::unstored(words, &error)
+            }
         }
     }
 }
@@ -207,7 +209,8 @@ pub(super) async fn import(
         let note = tried(site, recipe).map_err(Problem::unfit)?;
         let saved = site.recipes.take(upload.file, number);
         saved.map_err(|error| {
-            Problem::broken(format!("store recipe {number}: {error}: free space"))
+            let words = format!("store recipe {number}: {error}: free space");
+            Problem::unstored(words, &error)
         })?;
         Ok(json!({ "number": number, "name": name, "fingerprint": fingerprint, "note": note }))
     });

@@ -1,9 +1,11 @@
 //! The HTTP server: accepts connections within their limits, and closes those that are too slow.
 
 use std::convert::Infallible;
-use std::future::Future;
+use std::future::{Future, poll_fn};
+use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::Router;
@@ -13,6 +15,7 @@ use hyper::server::conn::http1;
 use hyper::service::{Service as _, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
+use tokio::io::AsyncWrite as _;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_io_timeout::TimeoutStream;
 
@@ -31,6 +34,8 @@ const MOST_EACH: usize = 16;
 const HEADER_TIME: Duration = Duration::from_secs(10);
 /// Longest wait for a client to accept the next bytes of an answer.
 const WRITE_TIME: Duration = Duration::from_secs(15);
+/// Longest wait for a client to end what it sends after an answer that refuses it.
+const LAST_TIME: Duration = Duration::from_secs(10);
 /// The most header lines of a request.
 const MOST_HEADERS: usize = 64;
 /// The most bytes of a connection that are buffered.
@@ -72,29 +77,58 @@ async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Ro
     let mut stream = TimeoutStream::new(stream);
     stream.set_write_timeout(Some(WRITE_TIME));
     let asked = slot.clone();
+    let refused = Arc::new(AtomicBool::new(false));
+    let refusing = refused.clone();
     let inner = TowerToHyperService::new(router);
     let service = service_fn(move |mut request: Request<Incoming>| {
         asked.mark(None);
         request.extensions_mut().insert(Peer(peer.ip()));
         let (answered, answering) = (asked.clone(), inner.call(request));
-        async move {
+        let refused = refusing.clone();
+        Box::pin(async move {
             let Ok(response) = answering.await;
+            let refuses =
+                response.status().is_client_error() || response.status().is_server_error();
+            refused.store(refuses, Ordering::Relaxed);
             if response.extensions().get::<Following>().is_none() {
                 answered.mark(Some(Instant::now()));
             }
             Ok::<_, Infallible>(response)
-        }
+        })
     });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(HEADER_TIME)
         .max_headers(MOST_HEADERS)
         .max_buf_size(READ_AHEAD)
-        .serve_connection(TokioIo::new(Box::pin(stream)), service);
-    // A connection that the client breaks off is not an error of the server.
+        .serve_connection(TokioIo::new(Box::pin(stream)), service)
+        .without_shutdown();
+    let answering = async {
+        // A connection that the client breaks off is not an error of the server.
+        let Ok(ended) = connection.await else { return };
+        let mut stream = ended.io.into_inner();
+        // Fails only where the client is gone.
+        let _ = poll_fn(|context| stream.as_mut().poll_shutdown(context)).await;
+        if refused.load(Ordering::Relaxed) {
+            let _ = tokio::time::timeout(LAST_TIME, drain(stream.get_ref())).await;
+        }
+    };
     tokio::select! {
-        _ = connection => {}
+        () = answering => {}
         () = slot.left() => {}
+    }
+}
+
+/// Reads what a client still sends, until it ends: a socket that is closed before breaks off the answer on its way to the client.
+async fn drain(stream: &TcpStream) -> io::Result<()> {
+    let mut sent = vec![0; READ_AHEAD];
+    loop {
+        stream.readable().await?;
+        match stream.try_read(&mut sent) {
+            Ok(0) => return Ok(()),
+            Err(error) if error.kind() != ErrorKind::WouldBlock => return Err(error),
+            _ => tokio::task::yield_now().await,
+        }
     }
 }
 

@@ -87,7 +87,7 @@ impl Page {
             runtime,
             address,
             access,
-            secret: secret.expect("a new device makes its secret"),
+            secret: secret.expect("a new device makes its secret").secret,
             token: RefCell::default(),
             recipes,
             _folder: folder,

@@ -1,7 +1,7 @@
 //! The files of a calibration: `calibration.json`, its previous generation, and the phase maps beside them.
 
 use super::file::CalibrationFile;
-use crate::storage::folder::{name_also, sync_folder_of, write_whole};
+use crate::storage::folder::{name_also, read_whole, sync_folder_of, write_whole};
 use crate::storage::hex;
 use sha2::{Digest, Sha256};
 use std::fs;
@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 
 /// Its path in a state folder.
 pub const IN_STATE: &str = "calibration/calibration.json";
+/// Longest file, bytes.
+const MAX_BYTES: u64 = 64 << 20;
 /// Digits of a map's checksum in its file name, so that maps of two generations never share a name.
 const DIGITS: usize = 16;
 
@@ -136,7 +138,7 @@ impl Place {
 
 /// Reads the calibration in a file, if there is one.
 fn read(path: &Path) -> Option<Result<CalibrationFile, String>> {
-    match fs::read(path) {
+    match read_whole(path, MAX_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
         Err(error) => Some(Err(format!("{error}: make it readable, or calibrate anew"))),
         Ok(bytes) => Some(CalibrationFile::read(&bytes)),

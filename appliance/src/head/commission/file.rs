@@ -8,7 +8,7 @@ use crate::head::calibration::geometry::GeometryFile;
 use crate::head::exposing::{Exposing, LEAST_GAIN};
 use crate::head::geometry::covered;
 use crate::head::scale::Scale;
-use crate::storage::folder::write_whole;
+use crate::storage::folder::{read_whole, write_whole};
 use hal::bounds::{length, shortened, text, within};
 use hal::model::DeviceModel;
 use serde::{Deserialize, Serialize};
@@ -21,6 +21,8 @@ use std::path::Path;
 pub const FILE: &str = "commissioning.json";
 const FORMAT: &str = "fringed commissioning";
 const VERSION: u32 = 1;
+/// Longest file, bytes: as many poses and nodes as there may be take less.
+const MAX_BYTES: u64 = 512 << 20;
 /// Longest name of a board, bytes.
 const MAX_BOARD: usize = 64;
 /// Most poses that are kept.
@@ -83,7 +85,7 @@ impl Commissioning {
     pub fn load(state: &Path) -> Result<Self, String> {
         let path = state.join(FILE);
         let wrong = |problem: String| format!("read {}: {problem}", path.display());
-        let bytes = match fs::read(&path) {
+        let bytes = match read_whole(&path, MAX_BYTES) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
             Err(error) => return Err(wrong(format!("{error}: make it readable"))),
             Ok(bytes) => bytes,

@@ -2,13 +2,12 @@
 
 use crate::head::examine::{DRIFT_REMEDY, MOST_DRIFT_PX};
 use crate::station::Drift;
-use crate::storage::folder::write_whole;
+use crate::storage::folder::{read_whole, write_whole};
 use crate::system::clock;
 use algo::pipeline::Epipolar;
 use hal::bounds::{length, shortened, text};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,6 +16,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 pub const FILE: &str = "drift.json";
 const FORMAT: &str = "fringed drift";
 const VERSION: u32 = 1;
+/// Longest file, bytes.
+const MAX_BYTES: u64 = 4 << 20;
 /// Most checks that are kept; the oldest are forgotten first.
 const MOST_KEPT: usize = 256;
 /// Most checks that the page shows.
@@ -104,7 +105,7 @@ impl Trend {
     /// What is kept in the state folder, and a complaint if that cannot be used: then the trend begins anew.
     pub fn open(state: &Path) -> (Self, Option<String>) {
         let path = state.join(FILE);
-        let read = match fs::read(&path) {
+        let read = match read_whole(&path, MAX_BYTES) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Checks::default()),
             Err(error) => Err(error.to_string()),
             Ok(bytes) => Checks::read(&bytes),
@@ -193,6 +194,7 @@ impl Trend {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     const HEAD: &str = "01234567";
 

@@ -1,12 +1,14 @@
 //! Counts of the daemon's starts with a state folder, and of those that followed an end without a stop.
 
-use crate::storage::folder::write_whole;
-use std::fs;
+use crate::storage::folder::{read_whole, write_whole};
 use std::io;
 use std::path::Path;
 
 /// The file: starts, unclean starts, the daemon's condition, and starts after it hung, e.g. `12 1 running 0`.
 const FILE: &str = "boots";
+
+/// Longest file, bytes.
+const MAX_BYTES: u64 = 4096;
 
 /// The daemon's condition. If it ends without a stop, the file keeps the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -48,7 +50,8 @@ pub struct Boots {
 impl Boots {
     /// The counts including this start. They begin at zero if the file is damaged: no decision depends on them.
     pub fn begin(folder: &Path) -> Self {
-        let text = fs::read_to_string(folder.join(FILE)).unwrap_or_default();
+        let text = read_whole(&folder.join(FILE), MAX_BYTES).unwrap_or_default();
+        let text = String::from_utf8(text).unwrap_or_default();
         let mut words = text.split_whitespace();
         let number = |word: Option<&str>| word.and_then(|word| word.parse().ok()).unwrap_or(0_u32);
         let (starts, unclean) = (number(words.next()), number(words.next()));
@@ -86,6 +89,7 @@ impl Boots {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fs;
 
     fn start(folder: &Path) -> Boots {
         let boots = Boots::begin(folder);

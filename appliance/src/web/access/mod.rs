@@ -11,6 +11,7 @@ mod secret;
 mod session;
 
 pub use changes::{Change, Changes};
+pub use secret::NewSecret;
 pub use session::{MAX_AGE_S, Token};
 
 use crate::error::{Exit, Failure};
@@ -58,11 +59,11 @@ pub enum Refused {
 
 impl Access {
     /// Opens the folder, creating it where it does not exist. The secret is that of the file `given`, if it exists. Otherwise the first
-    /// start makes one and answers with it: it must be shown, because only its hash is stored.
+    /// start, or one that finds the stored hash damaged, makes one and answers with it: it must be shown, because only its hash is stored.
     ///
     /// # Errors
     /// If the folder cannot be read or written (exit code 73), or the given secret cannot be used (78).
-    pub fn open(folder: &Path, given: Option<&Path>) -> Result<(Self, Option<String>), Failure> {
+    pub fn open(folder: &Path, given: Option<&Path>) -> Result<(Self, Option<NewSecret>), Failure> {
         let failed = |error: String| {
             let what = format!("open {}", folder.display());
             Failure::because(Exit::CannotCreate, what, error)
@@ -139,7 +140,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let now = Instant::now();
         let (access, shown) = Access::open(folder.path(), None).unwrap();
-        let secret = shown.unwrap();
+        let secret = shown.unwrap().secret;
         let token = access.sign_in(HERE, &secret, now).unwrap();
         assert!(access.is_signed_in(token.text(), now));
         access.sign_out(token.text());
@@ -163,7 +164,7 @@ mod tests {
         assert!(access.sign_in(HERE, "0123A-BCDEF-GHJKM", now).is_ok());
         std::fs::remove_file(&file).unwrap();
         let (access, shown) = open();
-        assert!(access.sign_in(HERE, &shown.unwrap(), now).is_ok());
+        assert!(access.sign_in(HERE, &shown.unwrap().secret, now).is_ok());
         assert!(access.sign_in(HERE, "0123A-BCDEF-GHJKM", now).is_err());
     }
 
@@ -171,7 +172,7 @@ mod tests {
     fn wrong_guesses_make_their_address_wait_and_no_other() {
         let folder = tempfile::tempdir().unwrap();
         let (access, secret) = Access::open(folder.path(), None).unwrap();
-        let (secret, now) = (secret.unwrap(), Instant::now());
+        let (secret, now) = (secret.unwrap().secret, Instant::now());
         for _ in 0..patience::FREE {
             assert_eq!(access.sign_in(HERE, "guess", now), Err(Refused::Wrong));
         }
@@ -188,7 +189,7 @@ mod tests {
         let folders = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
         let secrets = folders
             .each_ref()
-            .map(|folder| Access::open(folder.path(), None).unwrap().1.unwrap());
+            .map(|folder| Access::open(folder.path(), None).unwrap().1.unwrap().secret);
         assert_ne!(secrets[0], secrets[1]);
         let stored = std::fs::read_to_string(folders[0].path().join("secret")).unwrap();
         assert!(stored.starts_with("$argon2id$"), "{stored}");
@@ -196,10 +197,22 @@ mod tests {
     }
 
     #[test]
-    fn a_damaged_secret_file_is_an_error_with_the_remedy_and_lets_nobody_in() {
+    fn a_damaged_secret_file_is_put_aside_and_lets_nobody_in_but_with_a_new_secret() {
         let folder = tempfile::tempdir().unwrap();
-        std::fs::write(folder.path().join("secret"), "$argon2id$broken").unwrap();
-        let refused = Access::open(folder.path(), None).unwrap_err();
-        assert!(refused.message.contains("delete it"), "{refused}");
+        let now = Instant::now();
+        let (_, before) = Access::open(folder.path(), None).unwrap();
+        let before = before.unwrap().secret;
+        for damaged in [&b"$argon2id$broken"[..], b"", b"\xff\xfe"] {
+            std::fs::write(folder.path().join("secret"), damaged).unwrap();
+            let (access, shown) = Access::open(folder.path(), None).unwrap();
+            let NewSecret { secret, complaint } = shown.unwrap();
+            assert!(complaint.unwrap().contains("put aside as secret.damaged"));
+            assert!(access.sign_in(HERE, &before, now).is_err());
+            assert!(access.sign_in(HERE, &secret, now).is_ok());
+            let kept = std::fs::read(folder.path().join("secret.damaged")).unwrap();
+            assert_eq!(kept, damaged);
+            let again = Access::open(folder.path(), None).unwrap().1;
+            assert_eq!(again, None);
+        }
     }
 }

@@ -1,6 +1,6 @@
 //! The device's secret: configured, or made at the first start and stored as an argon2id hash.
 
-use crate::storage::folder::write_whole;
+use crate::storage::folder::{read_whole, write_whole};
 use argon2::Argon2;
 use argon2::password_hash::phc::PasswordHash;
 use argon2::password_hash::{PasswordHasher, PasswordVerifier};
@@ -15,6 +15,8 @@ const LENGTH: usize = 20;
 const GROUP: usize = 5;
 /// Longest text that is hashed; a secret is shorter.
 const LONGEST: usize = 64;
+/// Longest file with a hash, bytes.
+const MOST: u64 = 4096;
 /// Letters and digits of the shortest secret that may be given: 60 bits where they are random.
 const SHORTEST: usize = 12;
 
@@ -44,29 +46,50 @@ pub(super) fn given(file: &Path) -> Result<Option<String>, String> {
     hash(text).map(Some)
 }
 
-/// The stored hash; without one, a new secret with its hash.
+/// A secret that was made, and is to be shown.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct NewSecret {
+    /// The secret.
+    pub secret: String,
+    /// What was wrong with the stored hash of the one before, if there was one.
+    pub complaint: Option<String>,
+}
+
+/// The stored hash; without one that can be used, a new secret with its hash.
 ///
 /// # Errors
 /// In words, with the remedy.
-pub(super) fn open(file: &Path) -> Result<(String, Option<String>), String> {
-    match std::fs::read_to_string(file) {
-        Ok(text) => {
-            let hash = text.trim();
-            PasswordHash::new(hash).map_err(|error| {
-                format!("secret is damaged ({error}): delete it, the next start makes a new one")
-            })?;
-            Ok((hash.to_owned(), None))
+pub(super) fn open(file: &Path) -> Result<(String, Option<NewSecret>), String> {
+    let complaint = match read(file) {
+        Ok(Some(hash)) => return Ok((hash, None)),
+        Ok(None) => None,
+        Err(problem) => {
+            // Where it cannot be renamed it is replaced.
+            let _ = std::fs::rename(file, file.with_extension("damaged"));
+            let file = file.display();
+            Some(format!(
+                "read {file}: {problem}: it is put aside as secret.damaged, and the device has a new secret"
+            ))
         }
-        Err(error) if error.kind() == ErrorKind::NotFound => {
-            let secret = make()?;
-            let hash = hash(&secret)?;
-            write_whole(file, format!("{hash}\n").as_bytes())
-                .and_then(|()| close_to_others(file))
-                .map_err(|error| format!("write secret: {error}: free space"))?;
-            Ok((hash, Some(secret)))
-        }
-        Err(error) => Err(format!("read secret: {error}")),
-    }
+    };
+    let secret = make()?;
+    let hash = hash(&secret)?;
+    write_whole(file, format!("{hash}\n").as_bytes())
+        .and_then(|()| close_to_others(file))
+        .map_err(|error| format!("write secret: {error}: free space"))?;
+    Ok((hash, Some(NewSecret { secret, complaint })))
+}
+
+/// The stored hash, if there is one.
+fn read(file: &Path) -> Result<Option<String>, String> {
+    let bytes = match read_whole(file, MOST) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        read => read.map_err(|error| error.to_string())?,
+    };
+    let text = String::from_utf8(bytes).map_err(|_| "it is not text".to_owned())?;
+    let hash = text.trim();
+    PasswordHash::new(hash).map_err(|error| format!("it is damaged ({error})"))?;
+    Ok(Some(hash.to_owned()))
 }
 
 /// Whether a text is the secret; dashes, spaces and the case of letters do not matter.

@@ -92,7 +92,7 @@ async fn a_boundary_value_in_any_address_or_body_is_answered_and_never_breaks_th
     served.site.recipes.save(1, &bed.bytes).unwrap();
     let state = StateFolder::open(served._folder.path()).unwrap();
     let numbering = Numbering {
-        counted: state.counted().unwrap(),
+        counted: state.counted(),
         counter: state.counter(),
         serial: "S".into(),
         run: 1,

@@ -80,7 +80,7 @@ async fn served() -> Served {
         handle,
         site,
         dated,
-        secret: secret.unwrap(),
+        secret: secret.unwrap().secret,
         _folder: folder,
     }
 }
