@@ -3,6 +3,7 @@
 mod adapt;
 mod bad_input;
 mod bench;
+mod better_direction;
 mod board;
 mod calibrate;
 mod calibrated_station;
@@ -24,6 +25,7 @@ mod gauges;
 mod golden;
 mod guide;
 mod heights_by;
+mod heterodyne;
 mod history;
 mod hostile;
 mod house;

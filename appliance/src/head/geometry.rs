@@ -1,16 +1,16 @@
 //! The geometry of a head from recordings of a checkerboard: one pose at a time, then all together.
 
 use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
-use super::scan::Scan;
-use super::seam;
+use super::channel::Channel;
 use algo::calibration::{
     Adjusted, Arrow, Board, CalibrationError, Fringes, MeasuredBoard, Picture, Prediction,
     Residuals, View, calibrate, look,
 };
 use algo::geometry::Pinhole;
+use algo::phase::LeastModulation;
 use algo::pipeline::PhaseMap;
 use hal::replay::Recording;
-use hal::replay::recording::{PatternSpec, RecordedFrame};
+use hal::replay::recording::PatternSpec;
 
 /// Columns and rows of the frame that are looked at for corners.
 pub const CELLS: (usize, usize) = (8, 6);
@@ -71,31 +71,28 @@ impl SeenPose {
     }
 }
 
-/// The phases of one pattern of a recording, and the offset of each of its levels.
+/// The absolute phases of one pattern of a recording, and the offset of each of its levels.
 fn decoded(
     recording: &Recording,
     pattern: usize,
     levels: &mut Vec<Picture>,
 ) -> Result<PhaseMap, String> {
-    let projector = &recording.projector;
-    let (columns, rows) = (projector.width as usize, projector.height as usize);
-    let function = seam::phase_function(&recording.patterns[pattern], columns, rows)
-        .map_err(|error| error.to_string())?;
-    let taken = recording.frames.iter();
-    let taken: Vec<&RecordedFrame> = taken.filter(|frame| frame.pattern == pattern).collect();
-    let shots: Vec<_> = taken.iter().map(|frame| seam::shot(frame)).collect();
-    let frames = taken.iter().map(|taken| &taken.frame);
-    let scan = Scan::new(function.range(), &shots, frames)?;
-    if scan.needs_map() {
-        return Err(
-            "its levels can be unwrapped about a known map only: take geometric ones, the coarsest of at most one fringe".into(),
-        );
+    // Not the least of the camera's noise: in black squares the light of bright ones around them would have a phase, which is not the place's.
+    let channel = Channel::new(recording, pattern, LeastModulation::default())?;
+    let unwrapping = channel.unwrapping(None, &Err("the models are to be made".into()))?;
+    if unwrapping.missing().is_some() {
+        return Err(format!(
+            "levels of ratios {:?} have no absolute phase by themselves: take geometric ones, the coarsest of at most one fringe, \
+             levels with a chain of beats, or a Gray code",
+            channel.ratios()
+        ));
     }
+    let scan = &channel.scan;
     for level in scan.sequence.levels() {
         let frames = level.frames.iter().map(|&at| scan.frames[usize::from(at)]);
         levels.push(Picture::mean(&frames.collect::<Vec<_>>()));
     }
-    scan.phases(None)
+    Ok(channel.decode(&unwrapping)?.absolute)
 }
 
 /// Models of camera and projector from poses of a board.

@@ -9,9 +9,11 @@ use super::calibration::file::{CalibrationFile, MapFile, ReferenceFile};
 use super::calibration::geometry::GeometryFile;
 use super::calibration::place::Place;
 use super::calibration::{Calibration, HeightsBy};
+use super::direction::Sensitivity;
 use super::examine::{PLATE_PITCH, ReferencePlane, plate};
 use crate::error::{Exit, Failure};
 use algo::geometry::FittedMap;
+use algo::pattern::PhaseFunction;
 use characteristics::scene;
 use hal::head::Head;
 use hal::model::PlaneModel;
@@ -103,6 +105,7 @@ pub fn complete(
         notes.push("no plate was measured: the reference plane is that of the models".into());
         None
     };
+    notes.extend(fringes_along(&calibration));
     progress(1.0, "calibrated");
     let file = CalibrationFile {
         temperature_c: basis.temperature_c,
@@ -127,6 +130,17 @@ pub fn complete(
         maps,
         notes,
     })
+}
+
+/// That parts cannot be measured well on this head, if the fringes that teaching projects, which follow the columns, run along its epipolar lines.
+fn fringes_along(calibration: &Calibration) -> Option<String> {
+    let (columns, rows) = calibration.raster();
+    let function = PhaseFunction::vertical(columns as usize, rows as usize, 1.0).ok()?;
+    let triangulator = calibration.triangulator(function, None).ok()?;
+    let poor = Sensitivity::of(&triangulator)?.poor()?;
+    Some(format!(
+        "parts are measured by fringes along the projector's columns, and {poor}: stand the projector beside the camera, as its rows run, or turn it by 90° about its axis"
+    ))
 }
 
 /// The description of the reference phase maps; their bytes go to `maps`.
