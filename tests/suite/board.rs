@@ -252,6 +252,23 @@ fn models_of_another_head_are_refused_for_a_recording() {
 }
 
 #[test]
+fn a_mirrored_device_and_fringes_in_another_order_are_named_instead_of_asking_for_more_poses() {
+    let mut mirrored = poses();
+    mirrored.iter_mut().for_each(|pose| pose.mirrored = true);
+    Poses::rendered(&mirrored).refused(CHECKER, &[], &["mirrored", "camera or of the projector"]);
+    // The frames of the horizontal fringes are described as those of the vertical ones.
+    let exchanged = Poses::rendered(&poses());
+    for name in &exchanged.names {
+        let manifest = name.join("recording.json");
+        let text = fs::read_to_string(&manifest).unwrap();
+        let text = text.replace("\"horizontal\"", "\"other\"");
+        let text = text.replace("\"vertical\"", "\"horizontal\"");
+        fs::write(&manifest, text.replace("\"other\"", "\"vertical\"")).unwrap();
+    }
+    exchanged.refused(CHECKER, &[], &["horizontal fringes", "changed places"]);
+}
+
+#[test]
 fn poses_under_beats_or_a_gray_code_give_the_same_models_as_geometric_ones() {
     for projected in [Projected::Heterodyne, Projected::Gray] {
         let poses = Poses::under(projected, &poses());
@@ -270,4 +287,31 @@ fn poses_under_beats_or_a_gray_code_give_the_same_models_as_geometric_ones() {
     let text = text.replace("\"fringes\":16.0", "\"fringes\":32.0");
     fs::write(&manifest, text).unwrap();
     dense.refused(CHECKER, &[], &["pose-1", "no absolute phase", "Gray code"]);
+}
+
+#[test]
+fn a_place_that_is_given_twice_and_squares_in_metres_are_refused() {
+    let mut twice = Poses::rendered(&poses());
+    let copied = twice.folder.path().join("pose-7");
+    board::write(&poses()[1], 99, &copied);
+    twice.names.insert(4, copied);
+    twice.refused(CHECKER, &[], &["pose-7", "pose-2", "lies where it lies"]);
+    twice.names.remove(4);
+    twice.refused("checker:6x8:0.01", &[], &["pose-1", "0.01 mm", "mm, 10 if"]);
+}
+
+#[test]
+fn a_last_pose_that_is_tilted_is_said_to_be_z_0_and_to_be_looked_at() {
+    let mut tilted = poses();
+    let all = Poses::rendered(&tilted);
+    let flat = all.calibrate(CHECKER, &[]).succeeded();
+    let report: Value = serde_json::from_str(&flat.stdout).unwrap();
+    assert_eq!(report["notes"], serde_json::json!([]));
+    tilted.swap(0, 5);
+    let run = Poses::rendered(&tilted).calibrate(CHECKER, &[]).succeeded();
+    let report: Value = serde_json::from_str(&run.stdout).unwrap();
+    let note = report["notes"][0].as_str().unwrap();
+    for word in ["pose-6", "tilted", "flat", "last pose"] {
+        assert!(note.contains(word), "{note}");
+    }
 }

@@ -18,6 +18,7 @@ pub mod rasters;
 pub mod scale;
 pub mod scan;
 pub mod seam;
+pub mod standing;
 
 #[cfg(test)]
 mod traits;
