@@ -59,8 +59,10 @@ impl LaidPlate {
             None => "lay it into z = 0 of the models, or import models with the pose of this plate"
                 .into(),
         };
+        let side = if *height_mm < 0.0 { "below" } else { "above" };
         format!(
-            "the plate does not lie in the plane z = 0, it is tilted by {tilt_degrees:.1}° against it and {height_mm:.1} mm above it: {remedy}"
+            "the plate does not lie in the plane z = 0, it is tilted by {tilt_degrees:.1}° against it and on average {:.1} mm {side} it: {remedy}",
+            height_mm.abs()
         )
     }
 }
