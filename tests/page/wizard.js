@@ -73,10 +73,13 @@ export async function wizard({ browser, program, step, folder }) {
     await reload(name);
   }
 
+  // While it is on its way, no step can begin.
   async function put(button, part) {
     await page.evaluate(() => { document.querySelector("#notice").hidden = true; });
     await page.click(button);
+    await page.waitForSelector("#pose-take:disabled", { state: "attached" });
     await notice(part);
+    await page.waitForSelector("#pose-take:enabled", { state: "attached" });
   }
 
   async function shot(name, form, target, opened) {
@@ -201,6 +204,7 @@ export async function wizard({ browser, program, step, folder }) {
       await ended("geometry");
       const { state: outcome, said, remedy } = await state("geometry");
       assert.equal(outcome, "done", `${said.join("; ")}: ${remedy}`);
+      assert.ok(await page.locator("#step-geometry").getAttribute("open") !== null, "a step that is done folds away with what it found");
       await shot("solved", "phone-light", "#pose-coverage", "#step-geometry");
       await reload("geometry");
       await page.waitForSelector("#geometry-result:not([hidden])", { state: "attached" });

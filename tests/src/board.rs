@@ -34,6 +34,8 @@ pub struct Pose {
     pub moved: f64,
     /// Columns of the raster that are dark, from the left.
     pub dark: f64,
+    /// Whether the projector's picture is mirrored.
+    pub mirrored: bool,
 }
 
 impl Pose {
@@ -45,6 +47,7 @@ impl Pose {
             blur: 1.0,
             moved: 0.0,
             dark: 0.0,
+            mirrored: false,
         }
     }
 }
@@ -116,16 +119,69 @@ fn met(pose: &Pose, (x, y): (f64, f64), shift: f64) -> Option<(f64, f64, f64)> {
     ))
 }
 
+/// What is projected, vertical first, then horizontal.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Projected {
+    /// Three shifts of one and of sixteen fringes.
+    #[default]
+    Geometric,
+    /// Three shifts of fifteen and of sixteen fringes.
+    Heterodyne,
+    /// Three shifts of sixteen fringes, and a Gray code of 32 cells.
+    Gray,
+}
+
+/// Bits of the Gray code.
+const BITS: u32 = 5;
+
+impl Projected {
+    /// The light of each frame at a phase of the sixteen fringes, 0 to 1.
+    fn light(self, phase: f64) -> Vec<f64> {
+        let sines = |fringes: f64| {
+            let turns = phase * fringes / FRINGES;
+            (0..3).map(move |k| 0.5 + 0.5 * (TAU * (turns + f64::from(k) / 3.0)).sin())
+        };
+        match self {
+            Self::Geometric => sines(1.0).chain(sines(FRINGES)).collect(),
+            Self::Heterodyne => sines(FRINGES - 1.0).chain(sines(FRINGES)).collect(),
+            Self::Gray => {
+                let cells = f64::from(1_u32 << BITS);
+                let cell = (phase / FRINGES * cells).clamp(0.0, cells - 1.0) as u32;
+                let code = cell ^ (cell >> 1);
+                let bits = (0..BITS).rev().map(|bit| f64::from(code >> bit & 1));
+                sines(FRINGES).chain(bits).collect()
+            }
+        }
+    }
+
+    /// Ratio and shift of each frame that is no bit of a code.
+    fn levels(self) -> Vec<(f64, f64)> {
+        let ratios = match self {
+            Self::Geometric => vec![1.0 / FRINGES, 1.0],
+            Self::Heterodyne => vec![1.0 - 1.0 / FRINGES, 1.0],
+            Self::Gray => vec![1.0],
+        };
+        let shifts = |ratio| (0..3).map(move |k| (ratio, f64::from(k) / 3.0));
+        ratios.into_iter().flat_map(shifts).collect()
+    }
+}
+
 /// Writes the recording of a pose into a new folder: three shifts of one and of sixteen fringes, vertical, then horizontal.
 pub fn write(pose: &Pose, seed: u64, folder: &Path) {
+    write_as(pose, Projected::Geometric, seed, folder);
+}
+
+/// As [`write`], under something else.
+pub fn write_as(pose: &Pose, projected: Projected, seed: u64, folder: &Path) {
     fs::create_dir_all(folder.join("frames")).expect("the folder can be made");
     let mut random = Random::new(seed);
-    let mut entries = Vec::new();
+    let (mut entries, mut codes) = (Vec::new(), Vec::new());
+    let dark = projected.light(0.0).len();
     for pattern in 0..2 {
         let shift = if pattern == 0 { 0.0 } else { pose.moved };
-        let mut frames = vec![Vec::new(); 6];
+        let mut frames = vec![Vec::new(); dark];
         for at in 0..FRAME.0 * FRAME.1 {
-            let mut sums = [0.0; 6];
+            let mut sums = vec![0.0; dark];
             for ray in 0..SUB * SUB {
                 let off = |at: usize| pose.blur * ((at as f64 + 0.5) / SUB as f64 - 0.5);
                 let place = |at: usize, size: usize, ray: usize| {
@@ -139,11 +195,13 @@ pub fn write(pose: &Pose, seed: u64, folder: &Path) {
                 if xi < pose.dark {
                     continue;
                 }
+                let xi = match pose.mirrored {
+                    true => RASTER.0 as f64 - 1.0 - xi,
+                    false => xi,
+                };
                 let phase = [xi / RASTER.0 as f64, eta / RASTER.1 as f64][pattern] * FRINGES;
-                for (frame, sum) in sums.iter_mut().enumerate() {
-                    let ratio = [1.0 / FRINGES, 1.0][frame / 3];
-                    let turns = ratio * phase + (frame % 3) as f64 / 3.0;
-                    *sum += albedo * (0.5 + 0.5 * (TAU * turns).sin());
+                for (sum, light) in sums.iter_mut().zip(projected.light(phase)) {
+                    *sum += albedo * light;
                 }
             }
             for (frame, sum) in frames.iter_mut().zip(sums) {
@@ -151,22 +209,36 @@ pub fn write(pose: &Pose, seed: u64, folder: &Path) {
                 frame.push(counts.round() as u8);
             }
         }
-        for (at, counts) in frames.iter().enumerate() {
-            let file = format!("frames/{pattern}-{at}.png");
-            png(&folder.join(&file), counts);
-            let (ratio, shift) = ([1.0 / FRINGES, 1.0][at / 3], (at % 3) as f64 / 3.0);
+        let files: Vec<String> = (0..dark)
+            .map(|at| format!("frames/{pattern}-{at}.png"))
+            .collect();
+        for (file, counts) in files.iter().zip(&frames) {
+            png(&folder.join(file), counts);
+        }
+        let levels = projected.levels();
+        for ((ratio, shift), file) in levels.iter().zip(&files) {
             entries.push(
                 json!({ "file": file, "pattern": pattern, "ratio": ratio, "shift_turns": shift }),
             );
         }
+        if files.len() > levels.len() {
+            let length = [RASTER.0, RASTER.1][pattern] as f64;
+            let cell = length / f64::from(1_u32 << BITS);
+            codes.push(
+                json!({ "pattern": pattern, "cell_px": cell, "bits": files[levels.len()..] }),
+            );
+        }
     }
-    let manifest = json!({
+    let mut manifest = json!({
         "format": "fringed-recording", "version": 1,
         "camera": { "width": FRAME.0, "height": FRAME.1, "bit_depth": 8 },
         "projector": { "width": RASTER.0, "height": RASTER.1 },
         "pattern": [{ "kind": "vertical", "fringes": FRINGES }, { "kind": "horizontal", "fringes": FRINGES }],
         "frames": entries,
     });
+    if !codes.is_empty() {
+        (manifest["version"], manifest["codes"]) = (json!(2), json!(codes));
+    }
     fs::write(folder.join("recording.json"), manifest.to_string()).expect("it can be written");
 }
 

@@ -34,6 +34,8 @@ pub struct Scene {
     pub patches: bool,
     /// Seed of the noise.
     pub seed: u64,
+    /// Whether the projector stands above the camera instead of beside it.
+    pub above: bool,
 }
 
 /// Height of the bump's top above the plane, mm, and its radius on the plane.
@@ -51,6 +53,7 @@ impl Scene {
             noise: 0.025,
             patches: true,
             seed: 1,
+            above: false,
         }
     }
 
@@ -58,18 +61,23 @@ impl Scene {
     pub fn record(&self) -> Recording {
         let (columns, rows) = self.projector;
         let format = FrameFormat::packed(self.size, self.size, self.bit_depth);
+        let mut models = [rig::camera(self.size), rig::projector(columns, rows)];
+        if self.above {
+            models = models.map(rig::above);
+        }
+        let [camera, projector] = models;
         let mut recording = Recording {
             width: self.size,
             height: self.size,
             bit_depth: self.bit_depth,
             description: "a tilted plane with a bump".to_owned(),
             source: "rendered by the integration suite".to_owned(),
-            camera_model: Some(rig::camera(self.size)),
+            camera_model: Some(camera),
             noise_counts: None,
             projector: RecordedProjector {
                 width: columns,
                 height: rows,
-                model: Some(rig::projector(columns, rows)),
+                model: Some(projector),
                 plane: None,
             },
             patterns: self.patterns.clone(),

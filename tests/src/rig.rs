@@ -22,6 +22,15 @@ pub fn projector(columns: u32, rows: u32) -> DeviceModel {
     )
 }
 
+/// A device that is as far from +z towards +y as this one is towards +x, and lies like it.
+pub fn above(device: DeviceModel) -> DeviceModel {
+    let (sin, cos) = (-device.rotation[2], device.rotation[0]);
+    DeviceModel {
+        rotation: [1.0, 0.0, 0.0, 0.0, -cos, sin, 0.0, -sin, -cos],
+        ..device
+    }
+}
+
 fn looking_at_origin(
     (width, height): (u32, u32),
     (fov_x, fov_y): (f64, f64),

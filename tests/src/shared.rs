@@ -19,8 +19,17 @@ pub fn recordings() -> PathBuf {
 
 /// The folder of a shared recording. If it is absent, returns none and marks the calling test as skipped.
 pub fn folder(name: &str) -> Option<PathBuf> {
-    let folder = recordings().join(name);
-    if folder.join("recording.json").is_file() {
+    unless_absent(recordings().join(name), "recording.json")
+}
+
+/// The folder of one of the small inputs as other programs store them. If it is absent, as with [`folder`].
+pub fn case(name: &str) -> Option<PathBuf> {
+    unless_absent(root().join("../shared/cases").join(name), "README.md")
+}
+
+/// A folder that has this file, else a mark for the calling test.
+fn unless_absent(folder: PathBuf, file: &str) -> Option<PathBuf> {
+    if folder.join(file).is_file() {
         return Some(folder);
     }
     let marks = marks();

@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use tempfile::TempDir;
-use tests::board::{self, BOARD, FOCAL, PROJECTOR, Pose, poses};
+use tests::board::{self, BOARD, FOCAL, PROJECTOR, Pose, Projected, poses};
 use tests::program::{Program, Run};
 
 /// The rendered board, as the command line takes it.
@@ -20,11 +20,15 @@ struct Poses {
 
 impl Poses {
     fn rendered(poses: &[Pose]) -> Self {
+        Self::under(Projected::Geometric, poses)
+    }
+
+    fn under(projected: Projected, poses: &[Pose]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let names = (1..=poses.len()).map(|at| folder.path().join(format!("pose-{at}")));
         let names: Vec<_> = names.collect();
         for (at, (pose, name)) in poses.iter().zip(&names).enumerate() {
-            board::write(pose, at as u64, name);
+            board::write_as(pose, projected, at as u64, name);
         }
         Self { folder, names }
     }
@@ -245,4 +249,69 @@ fn models_of_another_head_are_refused_for_a_recording() {
     let run = measure(&garbage);
     assert_eq!(run.code, 65, "{}", run.stderr);
     assert!(run.stderr.contains("840 × 360"), "{}", run.stderr);
+}
+
+#[test]
+fn a_mirrored_device_and_fringes_in_another_order_are_named_instead_of_asking_for_more_poses() {
+    let mut mirrored = poses();
+    mirrored.iter_mut().for_each(|pose| pose.mirrored = true);
+    Poses::rendered(&mirrored).refused(CHECKER, &[], &["mirrored", "camera or of the projector"]);
+    // The frames of the horizontal fringes are described as those of the vertical ones.
+    let exchanged = Poses::rendered(&poses());
+    for name in &exchanged.names {
+        let manifest = name.join("recording.json");
+        let text = fs::read_to_string(&manifest).unwrap();
+        let text = text.replace("\"horizontal\"", "\"other\"");
+        let text = text.replace("\"vertical\"", "\"horizontal\"");
+        fs::write(&manifest, text.replace("\"other\"", "\"vertical\"")).unwrap();
+    }
+    exchanged.refused(CHECKER, &[], &["horizontal fringes", "changed places"]);
+}
+
+#[test]
+fn poses_under_beats_or_a_gray_code_give_the_same_models_as_geometric_ones() {
+    for projected in [Projected::Heterodyne, Projected::Gray] {
+        let poses = Poses::under(projected, &poses());
+        let run = poses.calibrate(CHECKER, &[]).succeeded();
+        let report: Value = serde_json::from_str(&run.stdout).unwrap();
+        let found = &report["calibration"];
+        for (device, focal) in [("camera", FOCAL.0), ("projector", FOCAL.1)] {
+            let off = number(&found[device]["model"]["fx"]) / focal - 1.0;
+            assert!(off.abs() < 3e-3, "{projected:?}: {device} is off by {off}");
+        }
+    }
+    let dense = Poses::under(Projected::Heterodyne, &poses()[..1]);
+    let manifest = dense.names[0].join("recording.json");
+    let text = fs::read_to_string(&manifest).unwrap();
+    // 16 and 15 fringes of 32: their beat spans two turns.
+    let text = text.replace("\"fringes\":16.0", "\"fringes\":32.0");
+    fs::write(&manifest, text).unwrap();
+    dense.refused(CHECKER, &[], &["pose-1", "no absolute phase", "Gray code"]);
+}
+
+#[test]
+fn a_place_that_is_given_twice_and_squares_in_metres_are_refused() {
+    let mut twice = Poses::rendered(&poses());
+    let copied = twice.folder.path().join("pose-7");
+    board::write(&poses()[1], 99, &copied);
+    twice.names.insert(4, copied);
+    twice.refused(CHECKER, &[], &["pose-7", "pose-2", "lies where it lies"]);
+    twice.names.remove(4);
+    twice.refused("checker:6x8:0.01", &[], &["pose-1", "0.01 mm", "mm, 10 if"]);
+}
+
+#[test]
+fn a_last_pose_that_is_tilted_is_said_to_be_z_0_and_to_be_looked_at() {
+    let mut tilted = poses();
+    let all = Poses::rendered(&tilted);
+    let flat = all.calibrate(CHECKER, &[]).succeeded();
+    let report: Value = serde_json::from_str(&flat.stdout).unwrap();
+    assert_eq!(report["notes"], serde_json::json!([]));
+    tilted.swap(0, 5);
+    let run = Poses::rendered(&tilted).calibrate(CHECKER, &[]).succeeded();
+    let report: Value = serde_json::from_str(&run.stdout).unwrap();
+    let note = report["notes"][0].as_str().unwrap();
+    for word in ["pose-6", "tilted", "flat", "last pose"] {
+        assert!(note.contains(word), "{note}");
+    }
 }

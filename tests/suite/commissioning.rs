@@ -2,6 +2,7 @@
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place};
+use crate::technician::{BOARD, STEP, Technician};
 use serde_json::{Value, json};
 use sim::{Part, Placement, Scenario};
 use std::fs;
@@ -36,7 +37,6 @@ flip_to_light_us = 30000
 readout_us = 6000
 stamp = \"exposure_end\"
 ";
-const BOARD: &str = "checker:9x13:10";
 /// Poses of the simulated board that are taken before and after a restart; in the last one it lies in z = 0.
 const FIRST: [u32; 3] = [1, 3, 5];
 const SECOND: [u32; 3] = [7, 9, 10];
@@ -44,135 +44,25 @@ const SECOND: [u32; 3] = [7, 9, 10];
 const MOST_RMS_MM: f64 = 0.05;
 /// Pixels whose neighbours differ by more than this in height lie at an edge, mm.
 const EDGE_MM: f64 = 0.5;
-/// Longest time of a step.
-const STEP: Duration = Duration::from_secs(240);
 
-/// A technician: signed in, one request after the other.
-struct Technician {
-    browser: Browser,
-}
-
-impl Technician {
-    fn sign_in(daemon: &Daemon, secret: &str) -> Self {
-        let mut browser = Browser::new(daemon);
-        let (status, answer) = browser.json(
-            "POST",
-            "/api/session",
-            &json!({ "secret": secret, "time_ms": 0 }),
-        );
-        assert_eq!(status, 200, "{answer}");
-        Self { browser }
-    }
-
-    fn head(&mut self) -> Value {
-        self.browser.get("/api/head")
-    }
-
-    fn step_of(head: &Value, name: &str) -> Value {
-        let steps = head["steps"].as_array().unwrap();
-        let found = steps.iter().find(|step| step["name"] == name);
-        found.unwrap_or_else(|| panic!("{name}: {head}")).clone()
-    }
-
-    /// Carries a step out to its end.
-    fn step(&mut self, name: &str, body: &Value) -> Value {
-        let path = format!("/api/head/steps/{name}");
-        let (status, answer) = self.browser.json("POST", &path, body);
-        assert_eq!(status, 202, "{name} {body}: {answer}");
-        let began = Instant::now();
-        loop {
-            let head = self.head();
-            if head["running"].is_null() {
-                return Self::step_of(&head, name);
-            }
-            assert!(began.elapsed() < STEP, "{name}: {head}");
-            std::thread::yield_now();
-        }
-    }
-
-    fn passes(&mut self, name: &str, body: &Value) -> Value {
-        let step = self.step(name, body);
-        assert_eq!(step["state"], "done", "{step}");
-        step
-    }
-
-    fn lay(&mut self, placed: &Value) {
-        let (status, answer) = self.browser.json("PUT", "/api/simulation/part", placed);
-        assert_eq!(status, 200, "{placed}: {answer}");
-    }
-
-    fn pose(&mut self, number: u32) -> Value {
-        self.lay(&json!({ "part": "board", "pose": number }));
-        let body = json!({ "action": "pose", "board": BOARD, "pose": number });
-        self.step("geometry", &body);
-        let poses = self.head()["geometry"]["poses"].clone();
-        let mut poses = poses.as_array().unwrap().iter();
-        poses.find(|pose| pose["number"] == number).unwrap().clone()
-    }
-
-    fn looks(&mut self, show: &str) -> Value {
-        let path = format!("/api/head/live?show={show}");
-        let (status, png) = self.browser.ask("GET", &path, &[]);
-        assert_eq!(status, 200, "{show}: {}", String::from_utf8_lossy(&png));
-        let picture = png::Decoder::new(std::io::Cursor::new(png))
-            .read_info()
-            .unwrap();
-        assert_eq!(picture.info().width, 512);
-        self.browser.get("/api/head/live/figures")
-    }
-
-    /// Waits until the station is ready.
-    fn ready(&mut self) {
-        let began = Instant::now();
-        loop {
-            let snapshot = self.browser.get("/api/snapshot");
-            if snapshot["ready"] == true {
-                return;
-            }
-            let working = ["boot", "ready", "loading", "teaching"].map(Value::from);
-            assert!(
-                working.contains(&snapshot["state"]) && began.elapsed() < STEP,
-                "{snapshot}"
-            );
-            std::thread::yield_now();
-        }
-    }
-
-    /// The result of a trigger.
-    fn measure(&mut self) -> Value {
-        let before = self.browser.get("/api/snapshot")["counters"]["sequence"].clone();
-        let (status, answer) = self.browser.json("POST", "/api/trigger", &json!({}));
-        assert_eq!(status, 202, "{answer}");
-        let began = Instant::now();
-        loop {
-            let snapshot = self.browser.get("/api/snapshot");
-            if snapshot["counters"]["sequence"] != before && snapshot["ready"] == true {
-                return snapshot["result"].clone();
-            }
-            assert!(began.elapsed() < STEP, "{snapshot}");
-            std::thread::yield_now();
-        }
-    }
-
-    /// The heights of the last part, mm, NaN where there are none.
-    fn heights(&mut self) -> Vec<f64> {
-        let mut stream = self.browser.begin("GET", "/api/picture/height", 0);
-        stream.flush().unwrap();
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).unwrap();
-        let end = answer.windows(4).position(|four| four == b"\r\n\r\n");
-        let (head, words) = answer.split_at(end.unwrap() + 4);
-        let head = String::from_utf8_lossy(head).into_owned();
-        let map = head.lines().find_map(|line| line.strip_prefix("x-map: "));
-        let map: Value = serde_json::from_str(map.unwrap()).unwrap();
-        assert_eq!((&map["width"], &map["stride"]), (&json!(512), &json!(1)));
-        let (low, step) = (map["low"].as_f64().unwrap(), map["step"].as_f64().unwrap());
-        let height = |word: &[u8]| match u16::from_le_bytes([word[0], word[1]]) {
-            u16::MAX => f64::NAN,
-            word => low + step * f64::from(word),
-        };
-        words.chunks_exact(2).map(height).collect()
-    }
+/// The heights of the last part, mm, NaN where there are none.
+fn heights(technician: &Technician) -> Vec<f64> {
+    let mut stream = technician.browser.begin("GET", "/api/picture/height", 0);
+    stream.flush().unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    let end = answer.windows(4).position(|four| four == b"\r\n\r\n");
+    let (head, words) = answer.split_at(end.unwrap() + 4);
+    let head = String::from_utf8_lossy(head).into_owned();
+    let map = head.lines().find_map(|line| line.strip_prefix("x-map: "));
+    let map: Value = serde_json::from_str(map.unwrap()).unwrap();
+    assert_eq!((&map["width"], &map["stride"]), (&json!(512), &json!(1)));
+    let (low, step) = (map["low"].as_f64().unwrap(), map["step"].as_f64().unwrap());
+    let height = |word: &[u8]| match u16::from_le_bytes([word[0], word[1]]) {
+        u16::MAX => f64::NAN,
+        word => low + step * f64::from(word),
+    };
+    words.chunks_exact(2).map(height).collect()
 }
 
 /// RMS deviation from the true heights of a part, mm, away from edges, and over how many pixels.
@@ -331,7 +221,7 @@ fn a_bare_head_is_commissioned_over_the_page_and_then_judges_parts_right() {
         "done"
     );
     assert_eq!(technician.measure()["verdict"], "PASS");
-    let (rms, pixels) = rms(&technician.heights(), &Part::SheetMetal(Default::default()));
+    let (rms, pixels) = rms(&heights(&technician), &Part::SheetMetal(Default::default()));
     println!("heights are {rms:.4} mm RMS off the truth over {pixels} pixels; {result}");
     assert!(
         rms <= MOST_RMS_MM && pixels > 10_000,

@@ -115,8 +115,18 @@ pub(super) fn camera(
     Some((lens, poses.collect()))
 }
 
-/// Lens and pose of the projector, from points in the camera's coordinates and the projector pixels that light them.
-pub(super) fn projector(points: &[(Vector, (f64, f64))]) -> Option<(Lens, Pose)> {
+/// What makes a mirrored projector one that is not, without a turn of more than 45° about its axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Mirrored {
+    /// One axis is reversed.
+    Axis,
+    /// ξ and η are exchanged.
+    Swapped,
+}
+
+/// Lens and pose of the projector, from points in the camera's coordinates and the projector pixels that light them. A mirrored picture of
+/// either device has no such pose: the error says how. `None` if the points do not determine it.
+pub(super) fn projector(points: &[(Vector, (f64, f64))]) -> Option<Result<(Lens, Pose), Mirrored>> {
     let n = points.len().max(1) as f64;
     let centre = points
         .iter()
@@ -159,9 +169,14 @@ pub(super) fn projector(points: &[(Vector, (f64, f64))]) -> Option<(Lens, Pose)>
     let (x, y) = (a * (1.0 / size) + z * -cx, b * (1.0 / size) + z * -cy);
     let (fx, fy) = (x.length(), y.length());
     let turn = Pose::from_axes(x, y, Vector::default()).inverse();
-    // A mirrored picture has no such pose.
+    // Rasters lie like the camera's rows, or upside down.
     if !(x.cross(y).dot(z) > 0.0) {
-        return None;
+        let along_rows = libm::fabs(x.x) >= libm::fabs(x.y);
+        return Some(Err(if along_rows {
+            Mirrored::Axis
+        } else {
+            Mirrored::Swapped
+        }));
     }
     let depth = 1.0 / size;
     let shift = Vector::new(
@@ -182,11 +197,11 @@ pub(super) fn projector(points: &[(Vector, (f64, f64))]) -> Option<(Lens, Pose)>
         distortion: [0.0; 5],
     };
     let back = about_centre.turned(centre);
-    Some((
+    Some(Ok((
         lens,
         Pose {
             rows,
             shift: about_centre.shift - back,
         },
-    ))
+    )))
 }

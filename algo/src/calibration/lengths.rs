@@ -57,12 +57,6 @@ impl Adjusted {
             flatness: libm::sqrt(squares / points.len() as f64),
         })
     }
-
-    /// Angle between the board's normal and the camera's axis in a pose, rad.
-    pub fn tilt(&self, pose: usize) -> f64 {
-        let normal = self.rig.poses[pose].turned(Vector::new(0.0, 0.0, -1.0));
-        libm::atan2(libm::hypot(normal.x, normal.y), normal.z)
-    }
 }
 
 /// A plane n·p = d.

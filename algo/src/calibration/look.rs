@@ -13,6 +13,10 @@ const MOST_BLUR: f64 = 0.05;
 const MOST_MOTION: f64 = 0.12;
 /// Least share of the bright squares that must have a projector point.
 const LEAST_COVERED: f64 = 0.9;
+/// RMS distance of the corners of two pictures up to which the board lies in one place, as a share of a square's side, and in px: a pose that
+/// is nearer repeats the errors of another one and not only its corners, so that the residuals of both say less than they seem to. A board
+/// that is only tilted by 8° moves as far.
+const SAME_PLACE: (f64, f64) = (0.03, MOST_MOTION);
 
 /// A pose that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -79,6 +83,18 @@ pub fn look(board: &Board, levels: &[Picture], fringes: &Fringes<'_>) -> Result<
         return Err(PoseError::OffFringes { share });
     }
     Ok(View { found, nodes })
+}
+
+impl FoundBoard {
+    /// Whether the board lies where it lies in another picture of the same camera, whichever way round.
+    pub fn lies_as_in(&self, other: &Self) -> bool {
+        let round = Self {
+            corners: other.corners.iter().rev().copied().collect(),
+            step: other.step,
+        };
+        let pixels = apart(self, other).min(apart(self, &round));
+        pixels <= (SAME_PLACE.0 * self.step).max(SAME_PLACE.1)
+    }
 }
 
 /// Each corner's mean over the levels that all have it.

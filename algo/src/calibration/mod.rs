@@ -16,6 +16,7 @@ mod predict;
 mod print;
 mod rig;
 mod solve;
+mod standing;
 
 pub use adjust::{Adjusted, Residuals, Undetermined, View};
 pub use arrows::Arrow;
@@ -28,7 +29,8 @@ pub use picture::Picture;
 pub use pose::Pose;
 pub use predict::{LENGTH, Prediction};
 pub use rig::Rig;
-pub use solve::{CalibrationError, calibrate};
+pub use solve::{CalibrationError, calibrate, estimate};
+pub use standing::Standing;
 
 #[cfg(test)]
 mod tests;

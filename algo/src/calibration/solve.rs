@@ -2,7 +2,7 @@
 
 use super::adjust::{Adjusted, Undetermined, View, adjust};
 use super::board::Board;
-use super::initial::{self, Pair};
+use super::initial::{self, Mirrored, Pair};
 use super::pose::Pose;
 use super::rig::{Rig, SHARED};
 use crate::geometry::Vector;
@@ -84,6 +84,16 @@ pub enum CalibrationError {
         /// RMS in the projector, px.
         projector: f64,
     },
+    /// All poses fit if one axis of the projector's raster is reversed.
+    #[error(
+        "the picture of the camera or of the projector is mirrored: all poses fit if one of them is reversed: turn off its mirroring (flip, rear projection), and take all poses again"
+    )]
+    Mirrored,
+    /// All poses fit if ξ and η are exchanged.
+    #[error(
+        "vertical and horizontal fringes have changed places: all poses fit if they are exchanged: record or import the frames of the vertical fringes first, or turn off the mirroring of camera or projector if they are"
+    )]
+    Swapped,
     /// The poses do not determine the models.
     #[error(transparent)]
     Undetermined(#[from] Undetermined),
@@ -104,7 +114,7 @@ impl CalibrationError {
 /// Calibrates camera and projector with all views of a board. `frame` is the size of the camera's picture.
 ///
 /// # Errors
-/// If the views do not determine the models, or one of them does not fit the others.
+/// If the views do not determine the models, or one of them does not fit the others; if a picture is mirrored, which of both axes.
 pub fn calibrate(
     board: &Board,
     frame: (usize, usize),
@@ -114,7 +124,32 @@ pub fn calibrate(
         return Err(CalibrationError::Few { given: views.len() });
     }
     sharp(views)?;
-    let first = first(board, frame, views)?;
+    match first(board, frame, views).ok_or(Undetermined)? {
+        Ok(rig) => adjusted(rig, views),
+        // The finding is named only if nothing else is wrong.
+        Err(mirrored) => {
+            let righted: Vec<View> = views.iter().map(|view| mirrored.righted(view)).collect();
+            let rig = first(board, frame, &righted).and_then(Result::ok);
+            adjusted(rig.ok_or(Undetermined)?, &righted)?;
+            Err(match mirrored {
+                Mirrored::Axis => CalibrationError::Mirrored,
+                Mirrored::Swapped => CalibrationError::Swapped,
+            })
+        }
+    }
+}
+
+/// The geometry of these views as it is known before it is adjusted: angles are right within a few degrees. `None` if there are too few, or
+/// they do not determine it.
+pub fn estimate(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Rig> {
+    if views.len() < LEAST_POSES {
+        return None;
+    }
+    first(board, frame, views)?.ok()
+}
+
+/// Adjusts a rig from first values, and checks what is left.
+fn adjusted(first: Rig, views: &[View]) -> Result<Adjusted, CalibrationError> {
     let flat = adjust(first, views, false)?;
     fits(&flat)?;
     let bowed = (views.len() >= BOWED_FROM)
@@ -133,8 +168,8 @@ pub fn calibrate(
     Ok(adjusted)
 }
 
-/// First values in closed form.
-fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Result<Rig, Undetermined> {
+/// First values in closed form; the error says how one picture is mirrored, `None` that the views do not determine them.
+fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Result<Rig, Mirrored>> {
     let pairs: Vec<Vec<Pair>> = views
         .iter()
         .map(|view| {
@@ -145,28 +180,41 @@ fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Result<Rig, Un
             pair.collect()
         })
         .collect();
-    let (camera, poses) = initial::camera(board, frame, &pairs).ok_or(Undetermined)?;
+    let (camera, poses) = initial::camera(board, frame, &pairs)?;
     let mut points = Vec::new();
     for (view, pose) in views.iter().zip(&poses) {
         let back = pose.inverse();
         for node in &view.nodes {
-            let (x, y) = camera
-                .undistorted(node.at.0, node.at.1)
-                .ok_or(Undetermined)?;
+            let (x, y) = camera.undistorted(node.at.0, node.at.1)?;
             let ray = Vector::new(x, y, 1.0);
             let (from, along) = (back.shift, back.turned(ray));
             points.push((ray * (-from.z / along.z), node.lit_by));
         }
     }
-    let (projector, relative) = initial::projector(&points).ok_or(Undetermined)?;
-    Ok(Rig {
+    let rig = initial::projector(&points)?.map(|(projector, relative)| Rig {
         board: *board,
         camera,
         projector,
         relative,
         poses,
         bow: [0.0; 3],
-    })
+    });
+    Some(rig)
+}
+
+impl Mirrored {
+    /// The view by a projector that is not mirrored.
+    fn righted(self, view: &View) -> View {
+        let mut righted = view.clone();
+        for node in &mut righted.nodes {
+            let (xi, eta) = node.lit_by;
+            node.lit_by = match self {
+                Self::Axis => (-xi, eta),
+                Self::Swapped => (eta, xi),
+            };
+        }
+        righted
+    }
 }
 
 fn median(values: impl Iterator<Item = f64>) -> f64 {

@@ -7,8 +7,7 @@ use crate::config::Config;
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
-use crate::head::seam;
-use crate::measure::{measure, measure_after, primary_of};
+use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, Opened};
 use crate::recipe::bounds::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
 use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe};
@@ -22,7 +21,6 @@ use algo::adaptive::ProjectorMap;
 use algo::frame::SampleNoise;
 use hal::bounds::text;
 use hal::replay::Recording;
-use hal::replay::recording::PatternSpec;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -267,19 +265,14 @@ impl Teach {
             .map_err(|lacks| wrong(&format!("it {lacks}: add both models")))?;
         let phases = &measured.phases[measured.primary];
         crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
-        let at = primary_of(&recording);
-        let frames = recording.frames.iter().filter(|frame| frame.pattern == at);
-        let full: Vec<_> = frames.map(seam::shot).collect();
+        let at = measured.primary;
+        let full = &measured.shots;
         let part = GoldenPart {
             calibration: &calibration,
-            pattern: match recording.patterns[at] {
-                PatternSpec::Vertical { fringes } => PatternFile::Vertical { fringes },
-                PatternSpec::Horizontal { fringes } => PatternFile::Horizontal { fringes },
-                PatternSpec::File { .. } => PatternFile::File,
-            },
+            pattern: PatternFile::of(&recording.patterns[at]),
             // Recordings cannot be exposed anew.
             illumination: Illumination::default(),
-            full: &full,
+            full,
             decoder: &measured.decoder,
             triangulator: &surface.triangulator,
             phases,
@@ -289,6 +282,17 @@ impl Teach {
             captures: 1,
             comparison: None,
         };
-        part.recipe(naming).map_err(|error| wrong(&error))
+        let mut taught = part.recipe(naming).map_err(|error| wrong(&error))?;
+        if full.len()
+            < recording
+                .frames
+                .iter()
+                .filter(|frame| frame.pattern == at)
+                .count()
+        {
+            let words = "levels that are unwrapped by beats are for teaching alone: cycles take the finest one, about the golden phase";
+            taught.choice.reasons.push(words.into());
+        }
+        Ok(taught)
     }
 }

@@ -1,22 +1,26 @@
 //! The geometry of a head from recordings of a checkerboard: one pose at a time, then all together.
 
 use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
-use super::scan::Scan;
-use super::seam;
+use super::channel::Channel;
+use super::standing::Ground;
 use algo::calibration::{
-    Adjusted, Arrow, Board, CalibrationError, Fringes, MeasuredBoard, Picture, Prediction,
-    Residuals, View, calibrate, look,
+    Adjusted, Arrow, Board, CalibrationError, FoundBoard, Fringes, MeasuredBoard, Picture,
+    Prediction, Residuals, View, calibrate, look,
 };
 use algo::geometry::Pinhole;
+use algo::phase::LeastModulation;
 use algo::pipeline::PhaseMap;
 use hal::replay::Recording;
-use hal::replay::recording::{PatternSpec, RecordedFrame};
+use hal::replay::recording::PatternSpec;
 
 /// Columns and rows of the frame that are looked at for corners.
 pub const CELLS: (usize, usize) = (8, 6);
+/// Least and largest width of what a camera sees of a board's plane, mm. No head has less, and a board whose size is stated in metres is a
+/// thousand times as large.
+const VIEW_MM: (f64, f64) = (5.0, 1e5);
 
 /// One pose of the board, as a head saw it.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct SeenPose {
     /// Name of its recording.
     pub recording: String,
@@ -62,6 +66,7 @@ impl SeenPose {
             ),
         };
         let view = look(board, &levels, &fringes).map_err(|error| error.to_string())?;
+        sized(board, &view.found, recording.width)?;
         Ok(Self {
             recording: name.to_owned(),
             frames: (recording.width, recording.height, recording.bit_depth),
@@ -69,33 +74,59 @@ impl SeenPose {
             view,
         })
     }
+
+    /// The first of some poses in which the board lies where it lies in this one.
+    pub fn again_in<'a>(&self, others: impl IntoIterator<Item = &'a Self>) -> Option<&'a Self> {
+        let same = |other: &&Self| self.view.found.lies_as_in(&other.view.found);
+        others.into_iter().find(same)
+    }
 }
 
-/// The phases of one pattern of a recording, and the offset of each of its levels.
+/// What is wrong with a pose that is another one again.
+pub fn same_place(other: &str) -> String {
+    format!("the board lies where it lies in {other}")
+}
+
+/// The absolute phases of one pattern of a recording, and the offset of each of its levels.
 fn decoded(
     recording: &Recording,
     pattern: usize,
     levels: &mut Vec<Picture>,
 ) -> Result<PhaseMap, String> {
-    let projector = &recording.projector;
-    let (columns, rows) = (projector.width as usize, projector.height as usize);
-    let function = seam::phase_function(&recording.patterns[pattern], columns, rows)
-        .map_err(|error| error.to_string())?;
-    let taken = recording.frames.iter();
-    let taken: Vec<&RecordedFrame> = taken.filter(|frame| frame.pattern == pattern).collect();
-    let shots: Vec<_> = taken.iter().map(|frame| seam::shot(frame)).collect();
-    let frames = taken.iter().map(|taken| &taken.frame);
-    let scan = Scan::new(function.range(), &shots, frames)?;
-    if scan.needs_map() {
-        return Err(
-            "its levels can be unwrapped about a known map only: take geometric ones, the coarsest of at most one fringe".into(),
-        );
+    // Not the least of the camera's noise: in black squares the light of bright ones around them would have a phase, which is not the place's.
+    let channel = Channel::new(recording, pattern, LeastModulation::default())?;
+    let unwrapping = channel.unwrapping(None, &Err("the models are to be made".into()))?;
+    if unwrapping.missing().is_some() {
+        return Err(format!(
+            "levels of ratios {:?} have no absolute phase by themselves: take geometric ones, the coarsest of at most one fringe, \
+             levels with a chain of beats, or a Gray code",
+            channel.ratios()
+        ));
     }
+    let scan = &channel.scan;
     for level in scan.sequence.levels() {
         let frames = level.frames.iter().map(|&at| scan.frames[usize::from(at)]);
         levels.push(Picture::mean(&frames.collect::<Vec<_>>()));
     }
-    scan.phases(None)
+    Ok(channel.decode(&unwrapping)?.absolute)
+}
+
+/// Checks that a board of such squares can lie in front of a head.
+///
+/// # Errors
+/// In words: by their size and their picture, the camera sees less than a head can, or more.
+fn sized(board: &Board, found: &FoundBoard, columns: u32) -> Result<(), String> {
+    let square = board.square;
+    let across = square * f64::from(columns) / found.step;
+    let (distance, unit, factor) = match across {
+        across if across < VIEW_MM.0 => ("near", "metres", 1e3),
+        across if across > VIEW_MM.1 => ("far", "micrometres", 1e-3),
+        _ => return Ok(()),
+    };
+    Err(format!(
+        "squares of {square} mm would lie so {distance} that the camera's picture is {across:.2} mm wide there: state the side of a square in mm, {} if {square} is in {unit}",
+        square * factor
+    ))
 }
 
 /// Models of camera and projector from poses of a board.
@@ -113,6 +144,8 @@ pub struct Geometry {
     pub measured: Vec<Option<MeasuredBoard>>,
     /// The residuals of each pose: of its corners in the camera, and of its points in the projector.
     pub arrows: Vec<[Vec<Arrow>; 2]>,
+    /// The last pose, which is z = 0.
+    pub ground: Ground,
     /// Largest angle between the board in two poses, degrees.
     pub tilt_degrees: f64,
     /// Share of the camera's frame in which there were corners.
@@ -133,6 +166,15 @@ impl Geometry {
             return Err(format!(
                 "{}: its frames or its projector's raster have another size than those of {}: calibrate with recordings of one head",
                 other.recording, first.recording
+            ));
+        }
+        let places = poses.iter().enumerate();
+        let again = places.filter_map(|(at, pose)| Some((pose.again_in(&poses[..at])?, pose)));
+        if let Some((before, pose)) = again.into_iter().next() {
+            return Err(format!(
+                "{}: {}: leave it out, or take it again with the board elsewhere and tilted",
+                pose.recording,
+                same_place(&before.recording)
             ));
         }
         let frame = (first.frames.0 as usize, first.frames.1 as usize);
@@ -157,6 +199,10 @@ impl Geometry {
             .ok_or_else(|| "camera and projector see no part of the volume of all poses together: place the board where both see it".to_owned())?;
         let file = file(board, sigma_ppm, poses, &adjusted, &prediction, baseline);
         Ok(Self {
+            ground: Ground {
+                pose: poses[last].recording.clone(),
+                standing: adjusted.rig.standing(last),
+            },
             camera,
             projector,
             file,
@@ -201,7 +247,7 @@ fn file(
         corners: pose.view.found.located(),
         camera_px: adjusted.residuals[at][0].rms(),
         projector_px: adjusted.residuals[at][1].rms(),
-        tilt_degrees: adjusted.tilt(at).to_degrees(),
+        tilt_degrees: adjusted.rig.tilt(at).to_degrees(),
         distance_mm: adjusted.rig.poses[at].shift.length(),
     };
     GeometryFile {

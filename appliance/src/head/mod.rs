@@ -5,7 +5,9 @@ pub mod calibrate;
 pub mod calibrated;
 pub mod calibration;
 pub mod capture;
+pub mod channel;
 pub mod commission;
+pub mod direction;
 pub mod doctor;
 pub mod examine;
 pub mod exposing;
@@ -17,6 +19,7 @@ pub mod rasters;
 pub mod scale;
 pub mod scan;
 pub mod seam;
+pub mod standing;
 
 #[cfg(test)]
 mod traits;

@@ -1,7 +1,7 @@
 //! Makes a phase function for the part of a preliminary recording (`fringed adapt`).
 
 use crate::error::Failure;
-use crate::head::seam;
+use crate::head::{direction, seam};
 use crate::measure::{measure, wrong};
 use algo::adaptive::noise::Light;
 use algo::adaptive::{Optics, ProjectorMap, noise, paper};
@@ -76,6 +76,11 @@ pub fn adapt(
     let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
     let crossed = crossed(recording, options.method).map_err(|error| wrong(&error))?;
     let measurement = measure(recording, folder)?;
+    if direction::word(&recording.patterns[measurement.primary]) != "vertical" {
+        return Err(wrong(
+            &"patterns are adapted along the rows of the projector, and its fringes along the columns hardly depend on the height here: stand the projector beside the camera",
+        ));
+    }
     let surface = measurement.heights.as_ref().map_err(|missing| {
         wrong(&format!(
             "{missing}: calibrate the head and add both models, or record with fringed record"

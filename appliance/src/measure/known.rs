@@ -1,6 +1,7 @@
 //! The phase that is expected in a recording: a recipe's golden map, the prediction from a preliminary measurement, or a map from a
 //! file.
 
+use crate::head::channel::Expected;
 use crate::head::seam;
 use crate::recipe::{Recipe, SequenceKind, safe};
 use algo::adaptive::ProjectorMap;
@@ -18,7 +19,7 @@ const SAME: f64 = 1e-9;
 #[derive(Debug)]
 pub(super) struct Known {
     /// "golden", "preliminary" or "given", for reports.
-    pub name: &'static str,
+    name: &'static str,
     /// Which of the recording's patterns it is of.
     pub pattern: usize,
     /// Φ, row-major over the camera's frame, unknown where it was not resolved.
@@ -27,9 +28,13 @@ pub(super) struct Known {
     reach: Option<Vec<f32>>,
 }
 
-impl Known {
-    /// The map for levels that are unwrapped in this way; for those of limited reach it is unknown outside of their safe mask.
-    pub fn map(&self, unwrapping: Unwrapping) -> Vec<AbsolutePhase> {
+impl Expected for Known {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// For levels of limited reach it is unknown outside of their safe mask.
+    fn map(&self, unwrapping: Unwrapping) -> Vec<AbsolutePhase> {
         let limit = match unwrapping {
             Unwrapping::Single => SequenceKind::SingleLevel.reach(),
             Unwrapping::DenseTwo { .. } => SequenceKind::TwoLevels.reach(),
@@ -40,7 +45,9 @@ impl Known {
             _ => self.phase.clone(),
         }
     }
+}
 
+impl Known {
     /// The phase that the recording's pattern has on the surface of a preliminary measurement.
     ///
     /// # Errors
@@ -56,7 +63,7 @@ impl Known {
             )
             .into());
         }
-        let pattern = super::primary_of(recording);
+        let pattern = super::vertical_of(recording);
         let projector = &recording.projector;
         let (columns, rows) = (projector.width as usize, projector.height as usize);
         let function = seam::phase_function(&recording.patterns[pattern], columns, rows)?;
@@ -85,7 +92,7 @@ impl Known {
         let turns = map.elements.iter();
         Ok(Self {
             name: "given",
-            pattern: super::primary_of(recording),
+            pattern: super::vertical_of(recording),
             phase: turns
                 .map(|&turns| AbsolutePhase::from_turns(turns))
                 .collect(),

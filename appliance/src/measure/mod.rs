@@ -1,7 +1,6 @@
 //! Measures a recording: phase, height and report (`fringed measure`).
 
 pub mod adapt;
-mod channel;
 pub mod import;
 mod known;
 pub mod layout;
@@ -14,6 +13,8 @@ pub use report::{Manner, Report};
 pub use score::{GROSS_MM, Score, Truth};
 
 use crate::error::{Exit, Failure};
+use crate::head::channel::{Channel, Expected};
+use crate::head::direction::{self, Sensitivity};
 use crate::head::scan::Scan;
 use crate::head::seam;
 use crate::output::cloud::Surface;
@@ -21,10 +22,9 @@ use crate::recipe::Recipe;
 use algo::adaptive::ProjectorMap;
 use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
-use algo::pattern::PhaseFunction;
+use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::{Decoder, LeastModulation};
 use algo::pipeline::{self, PhaseMap};
-use channel::Channel;
 use hal::npy::Array;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference};
@@ -48,13 +48,16 @@ pub struct Measurement {
     pub heights: Result<Surface, String>,
     /// How the primary pattern was decoded.
     pub decoder: Decoder,
+    /// What those of its frames show that this decoder takes.
+    pub shots: Vec<Shot>,
     /// The summary.
     pub report: Report,
     /// Mean of the finest level's frames of the primary pattern, scaled to 8 bits.
     pub intensity: Vec<u8>,
 }
 
-/// Measures every pattern of a recording; the first vertical one gives the height.
+/// Measures every pattern of a recording. The one whose phase changes most with the height gives the heights, without models the first vertical
+/// one.
 ///
 /// # Errors
 /// If levels cannot be unwrapped or a model is absurd; the message names `folder`.
@@ -118,9 +121,6 @@ fn measure_about(
 ) -> Result<Measurement, Failure> {
     let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
     let devices = Geometry::of(recording, recipe).map_err(|error| wrong(&error))?;
-    let primary = known
-        .as_ref()
-        .map_or_else(|| primary_of(recording), |known| known.pattern);
     let mut stage_us = BTreeMap::new();
     let mut stage_ended = |stage, started: Instant| {
         let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
@@ -129,13 +129,14 @@ fn measure_about(
     let least = recipe.map(|recipe| recipe.conditions.least_modulation);
     let least = least.unwrap_or_else(|| least_modulation(recording));
     let (mut phases, mut wrapped, mut wrapped_only) = (Vec::new(), Vec::new(), Vec::new());
-    let mut chosen = None;
+    let mut channels = Vec::new();
     for at in 0..recording.patterns.len() {
         let channel = Channel::new(recording, at, least).map_err(|error| wrong(&error))?;
         let started = Instant::now();
         let geometry = devices.triangulator(&channel.function);
         let geometry = geometry.map_err(|error| wrong(&error))?;
         let golden = known.as_ref().filter(|known| known.pattern == at);
+        let golden = golden.map(|known| known as &dyn Expected);
         let unwrapping = channel.unwrapping(golden, &geometry);
         let unwrapping = unwrapping.map_err(|error| wrong(&error))?;
         stage_ended("map", started);
@@ -145,13 +146,26 @@ fn measure_about(
         phases.push(decoded.absolute);
         wrapped.push(decoded.wrapped);
         wrapped_only.push(unwrapping.missing().map(str::to_owned));
-        if at == primary {
-            chosen = Some((channel, geometry, unwrapping));
-        }
+        channels.push((channel, geometry, unwrapping));
     }
-    let Some((channel, geometry, unwrapping)) = chosen else {
-        return Err(wrong(&"the recording has no pattern"));
+    let sensitivities: Vec<Option<Sensitivity>> = channels
+        .iter()
+        .map(|(_, geometry, unwrapping)| {
+            let triangulator = geometry.as_ref().ok()?;
+            unwrapping
+                .missing()
+                .is_none()
+                .then(|| Sensitivity::of(triangulator))?
+        })
+        .collect();
+    let primary = match &known {
+        Some(known) => known.pattern,
+        None => primary_of(recording, &sensitivities),
     };
+    if channels.len() <= primary {
+        return Err(wrong(&"the recording has no pattern"));
+    }
+    let (channel, geometry, unwrapping) = channels.swap_remove(primary);
     let started = Instant::now();
     let stated = recording.noise_counts;
     let stated = stated.or_else(|| recipe.map(|recipe| recipe.conditions.noise_counts));
@@ -198,6 +212,11 @@ fn measure_about(
     );
     let report = Report {
         no_phase: no_phase.cloned(),
+        heights_by: (heights.is_ok() && recording.patterns.len() > 1)
+            .then(|| direction::word(&recording.patterns[primary])),
+        poor_heights: sensitivities[primary]
+            .and_then(|of| of.poor())
+            .map(|poor| format!("{poor}: project fringes of the other direction")),
         ..report
     };
     Ok(Measurement {
@@ -208,6 +227,7 @@ fn measure_about(
         primary,
         heights,
         decoder: channel.scan.decoder,
+        shots: channel.shots,
         report,
     })
 }
@@ -218,8 +238,20 @@ fn least_modulation(recording: &Recording) -> LeastModulation {
     recording.noise_counts.map(of_noise).unwrap_or_default()
 }
 
-/// The pattern that gives the height: the first vertical one, else the first.
-pub fn primary_of(recording: &Recording) -> usize {
+/// The pattern that gives the height: that whose phase changes most with it, else the first vertical one, else the first.
+fn primary_of(recording: &Recording, sensitivities: &[Option<Sensitivity>]) -> usize {
+    let mut best = (0.0, vertical_of(recording));
+    for (at, found) in sensitivities.iter().enumerate() {
+        let slope = found.map_or(0.0, |found| found.turns_per_mm);
+        if slope > best.0 {
+            best = (slope, at);
+        }
+    }
+    best.1
+}
+
+/// The first vertical pattern, else the first.
+fn vertical_of(recording: &Recording) -> usize {
     let vertical = |spec: &PatternSpec| matches!(spec, PatternSpec::Vertical { .. });
     recording.patterns.iter().position(vertical).unwrap_or(0)
 }

@@ -48,6 +48,12 @@ pub struct Report {
     /// Why there is only the wrapped phase of the finest level, if there is no absolute phase.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_phase: Option<String>,
+    /// The fringes that heights are by, of several: vertical, horizontal or file.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub heights_by: Option<&'static str>,
+    /// Why heights scatter much, if these fringes hardly depend on them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poor_heights: Option<String>,
     /// Why there is no height, if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_height: Option<String>,
@@ -109,6 +115,8 @@ impl Report {
             stage_us,
             noise_counts,
             no_phase: None,
+            heights_by: None,
+            poor_heights: None,
             no_height: heights.as_ref().err().cloned(),
             no_sigma: noise_counts.is_none().then_some(
                 "the recording has no camera.noise_counts and no level of 4 shifts to estimate it",
@@ -165,6 +173,12 @@ impl Report {
         }
         if let Some([low, high]) = self.height_mm {
             line("height", format!("{low:.3} to {high:.3} mm"));
+        }
+        if let Some(fringes) = self.heights_by {
+            line("  by fringes", fringes.into());
+        }
+        if let Some(words) = &self.poor_heights {
+            line("  poor", words.clone());
         }
         if let Some(reason) = &self.no_height {
             line("height", format!("none: {reason}"));

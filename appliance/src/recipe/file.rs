@@ -5,6 +5,7 @@ use super::good_parts::GoodPartsFile;
 use crate::head::calibration::CalibrationSigma;
 use algo::pattern::Shot;
 use algo::units::AbsolutePhase;
+use hal::replay::recording::PatternSpec;
 use serde::{Deserialize, Serialize};
 
 /// The name of the format.
@@ -179,6 +180,17 @@ pub enum PatternFile {
     },
     /// Φ_P in the member `phase_function.npy`.
     File,
+}
+
+impl PatternFile {
+    /// That of a recording.
+    pub fn of(pattern: &PatternSpec) -> Self {
+        match *pattern {
+            PatternSpec::Vertical { fringes } => Self::Vertical { fringes },
+            PatternSpec::Horizontal { fringes } => Self::Horizontal { fringes },
+            PatternSpec::File { .. } => Self::File,
+        }
+    }
 }
 
 /// A sequence, its predicted noise on this part, and the share of the part that it can unwrap.

@@ -30,7 +30,9 @@ const MIN_LENGTH_MM: f64 = 1e-3;
 const MAX_LENGTH_MM: f64 = 1e5;
 
 pub(super) async fn state(State(site): State<Site>) -> Json<Value> {
-    Json(site.commission.view(&site.station.snapshot()))
+    let mut view = site.commission.view(&site.station.snapshot());
+    view["placing"] = site.simulation.is_placing().into();
+    Json(view)
 }
 
 /// A step without options.
@@ -72,6 +74,11 @@ pub(super) async fn step(
     request: Request,
 ) -> Result<Accepted, Problem> {
     let asked = asked(&site, &name, request.into_body()).await?;
+    if site.simulation.is_placing() {
+        return Err(Problem::busy(format!(
+            "commission the head, step {name}: another part is being put in front of the simulated head: try again when it is there"
+        )));
+    }
     // Also says why, if the head is not open or the station has something to do.
     let snapshot = site.station.snapshot();
     if site.commission.head().is_none() || !site.commission.begin(&site.station, asked) {

@@ -100,7 +100,7 @@ pub struct Recording {
     pub noise_counts: Option<f64>,
     /// The projector.
     pub projector: RecordedProjector,
-    /// One or two patterns, for example vertical and horizontal fringes. Heights are from the first vertical one, else from the first.
+    /// One or two patterns, for example vertical and horizontal fringes. Heights are from the one whose phase changes most with them.
     pub patterns: Vec<PatternSpec>,
     /// The frames in the order of the manifest.
     pub frames: Vec<RecordedFrame>,

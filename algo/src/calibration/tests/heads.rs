@@ -2,7 +2,7 @@
 
 use super::Random;
 use crate::calibration::{
-    Board, CalibrationError, Corner, FoundBoard, Node, Pose, Rig, View, calibrate,
+    Board, CalibrationError, Corner, FoundBoard, Node, Pose, Rig, View, calibrate, estimate,
 };
 use crate::geometry::{Lens, Vector};
 use std::string::ToString;
@@ -311,4 +311,114 @@ fn a_pose_of_another_board_and_poses_that_determine_nothing_are_refused() {
     let error = calibrate(&board, FRAME, &flat).unwrap_err();
     assert!(error.pose().is_none(), "{error}");
     assert!(error.to_string().contains("tilt"), "{error}");
+}
+
+#[test]
+fn a_mirrored_projector_and_exchanged_fringes_are_named() {
+    let board = Board {
+        columns: 6,
+        rows: 8,
+        square: 14.0,
+    };
+    let mut random = Random::new(11);
+    let truth = head(&mut random, &board, 6, 0.0);
+    let seen = views(&mut random, &truth);
+    assert!(calibrate(&board, FRAME, &seen).is_ok());
+    let (columns, rows) = (RASTER.0 as f64, RASTER.1 as f64);
+    let lit = |by: &dyn Fn(f64, f64) -> (f64, f64)| {
+        let mut lit = seen.clone();
+        for node in lit.iter_mut().flat_map(|view| &mut view.nodes) {
+            node.lit_by = by(node.lit_by.0, node.lit_by.1);
+        }
+        calibrate(&board, FRAME, &lit).unwrap_err()
+    };
+    for (by, wanted) in [
+        (
+            &(|xi: f64, eta: f64| (columns - 1.0 - xi, eta)) as &dyn Fn(f64, f64) -> (f64, f64),
+            CalibrationError::Mirrored,
+        ),
+        (
+            &|xi, eta| (xi, rows - 1.0 - eta),
+            CalibrationError::Mirrored,
+        ),
+        (&|xi, eta| (eta, xi), CalibrationError::Swapped),
+        // As many fringes along both axes.
+        (
+            &|xi, eta| (eta * columns / rows, xi * rows / columns),
+            CalibrationError::Swapped,
+        ),
+    ] {
+        assert_eq!(lit(by), wanted);
+    }
+    // Turned upside down is not mirrored.
+    let mut turned = seen.clone();
+    for node in turned.iter_mut().flat_map(|view| &mut view.nodes) {
+        let (xi, eta) = node.lit_by;
+        node.lit_by = (columns - 1.0 - xi, rows - 1.0 - eta);
+    }
+    assert!(calibrate(&board, FRAME, &turned).is_ok());
+}
+
+#[test]
+fn a_board_that_did_not_move_lies_in_the_same_place_and_one_that_was_tilted_does_not() {
+    let board = Board {
+        columns: 9,
+        rows: 13,
+        square: 10.0,
+    };
+    let mut random = Random::new(5);
+    let mut truth = head(&mut random, &board, 1, 0.0);
+    truth.poses = [[0.0; 2], [0.0; 2], [0.2, 0.0], [0.0, 0.2]]
+        .map(|[x, y]| Pose {
+            shift: Vector::new(-20.0, 30.0, 450.0),
+            ..turned(x, y, 0.0)
+        })
+        .into();
+    let seen = views(&mut random, &truth);
+    let [first, again, tilted, aside] = &seen[..] else {
+        panic!("{}", seen.len());
+    };
+    assert!(first.found.lies_as_in(&again.found));
+    for other in [tilted, aside] {
+        assert!(!first.found.lies_as_in(&other.found));
+    }
+    let mut round = again.clone();
+    round.found.corners.reverse();
+    assert!(first.found.lies_as_in(&round.found));
+}
+
+#[test]
+fn the_plane_of_a_head_has_its_normal_between_both_devices_before_and_after_the_adjustment() {
+    let board = Board {
+        columns: 6,
+        rows: 8,
+        square: 14.0,
+    };
+    let mut random = Random::new(3);
+    let mut truth = head(&mut random, &board, 6, 0.0);
+    for (tilt, doubtful) in [(0.0, false), (0.5, true)] {
+        // Flat between the devices, or tilted across their plane.
+        let last = truth.poses.len() - 1;
+        truth.poses[last] = Pose {
+            shift: Vector::new(0.0, 0.0, 430.0),
+            ..turned(tilt, -0.2, 0.0)
+        };
+        let seen = views(&mut random, &truth);
+        let exact = truth.standing(last);
+        let estimated = estimate(&board, FRAME, &seen).unwrap().standing(last);
+        let found = calibrate(&board, FRAME, &seen).unwrap().rig.standing(last);
+        assert_eq!(exact.is_doubtful(), doubtful, "{exact:?}");
+        assert_eq!(found.is_doubtful(), doubtful, "{found:?}");
+        assert_eq!(estimated.is_doubtful(), doubtful, "{estimated:?}");
+        let off = |of: f64, than: f64| (of - than).abs().to_degrees();
+        assert!(off(found.camera, exact.camera) < 0.5, "{found:?} {exact:?}");
+        assert!(
+            off(estimated.camera, exact.camera) < 5.0,
+            "{estimated:?} {exact:?}"
+        );
+        assert!(
+            off(estimated.aside, exact.aside) < 5.0,
+            "{estimated:?} {exact:?}"
+        );
+    }
 }

@@ -99,6 +99,7 @@ impl Poses {
         if same.is_some_and(|before| before.reference.is_some()) {
             notes.push("the reference plane was measured with other models: run `fringed calibrate` with a plate".into());
         }
+        notes.extend(geometry.ground.remedy());
         let sealed = file(head, &geometry, same).sealed();
         let (file, bytes) = sealed.map_err(|error| content(&error))?;
         place.save(&bytes, &[]).map_err(|error| {

@@ -2,19 +2,23 @@
 //! each measurement uses the results of those before it.
 
 mod characteristics;
+mod laid_plate;
 
 pub use characteristics::{Characteristics, characterise, settled};
 
 use super::calibration::file::{CalibrationFile, MapFile, ReferenceFile};
-use super::calibration::geometry::GeometryFile;
+use super::calibration::geometry::{GeometryFile, PoseFile};
 use super::calibration::place::Place;
 use super::calibration::{Calibration, HeightsBy};
+use super::direction::Sensitivity;
 use super::examine::{PLATE_PITCH, ReferencePlane, plate};
 use crate::error::{Exit, Failure};
 use algo::geometry::FittedMap;
+use algo::pattern::PhaseFunction;
 use characteristics::scene;
 use hal::head::Head;
 use hal::model::PlaneModel;
+use laid_plate::LaidPlate;
 use std::time::Duration;
 
 /// Longest wait for a flip or a frame beyond the plan.
@@ -98,11 +102,14 @@ pub fn complete(
         let vertical = plate(head, &calibration, true, TIMEOUT)?;
         progress(0.5, "reference plane, horizontal fringes");
         let horizontal = plate(head, &calibration, false, TIMEOUT)?;
-        Some(reference(&calibration, &vertical, &horizontal, &mut maps)?)
+        let ground = basis.geometry.as_ref().and_then(|of| of.poses.last());
+        let planes = [&vertical, &horizontal];
+        Some(reference(&calibration, planes, ground, &mut maps)?)
     } else {
         notes.push("no plate was measured: the reference plane is that of the models".into());
         None
     };
+    notes.extend(fringes_along(&calibration));
     progress(1.0, "calibrated");
     let file = CalibrationFile {
         temperature_c: basis.temperature_c,
@@ -129,20 +136,39 @@ pub fn complete(
     })
 }
 
-/// The description of the reference phase maps; their bytes go to `maps`.
+/// That parts cannot be measured well on this head, if the fringes that teaching projects, which follow the columns, run along its epipolar lines.
+fn fringes_along(calibration: &Calibration) -> Option<String> {
+    let (columns, rows) = calibration.raster();
+    let function = PhaseFunction::vertical(columns as usize, rows as usize, 1.0).ok()?;
+    let triangulator = calibration.triangulator(function, None).ok()?;
+    let poor = Sensitivity::of(&triangulator)?.poor()?;
+    Some(format!(
+        "parts are measured by fringes along the projector's columns, and {poor}: stand the projector beside the camera, as its rows run, or turn it by 90° about its axis"
+    ))
+}
+
+/// The description of the reference phase maps; their bytes go to `maps`. `ground` is the pose that z = 0 of the models goes by, if they were
+/// made from poses.
 fn reference(
     calibration: &Calibration,
-    vertical: &ReferencePlane,
-    horizontal: &ReferencePlane,
+    [vertical, horizontal]: [&ReferencePlane; 2],
+    ground: Option<&PoseFile>,
     maps: &mut Vec<(String, Vec<u8>)>,
 ) -> Result<ReferenceFile, Failure> {
     let corrections = [&vertical.plate.correction, &horizontal.plate.correction];
     let models_off_px = PLATE_PITCH * rms(corrections, calibration.frames());
     if !(models_off_px <= MOST_OFF_PX) {
-        return Err(models(format!(
-            "the models are off the measured plate by {models_off_px:.1} projector pixels, more than {MOST_OFF_PX}: put the \
-             plate into the plane z = 0 of the models, or import the models of this head"
-        )));
+        let of_models = || {
+            format!(
+                "the models are off the measured plate by {models_off_px:.1} projector pixels, more than {MOST_OFF_PX}: put the \
+                 plate into the plane z = 0 of the models, or import the models of this head"
+            )
+        };
+        let laid = LaidPlate::of(calibration, corrections);
+        let laid = laid.filter(|laid| laid.apart_px <= MOST_OFF_PX);
+        return Err(models(
+            laid.map_or_else(of_models, |laid| laid.elsewhere(ground)),
+        ));
     }
     let mut map = |name: &str, plane: &ReferencePlane| {
         let bytes = hal::npy::write(calibration.camera.width(), &plane.map());
@@ -169,12 +195,18 @@ fn reference(
 
 /// RMS of the corrections of projector points over the frame, in their unit.
 fn rms(corrections: [&FittedMap; 2], (width, height, _): (u32, u32, u8)) -> f64 {
-    const GRID: u32 = 16;
-    let place = |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
-    let squares = (0..GRID * GRID).map(|at| {
-        let (u, v) = (place(at % GRID, width), place(at / GRID, height));
+    let squares = grid((width, height)).map(|(u, v)| {
         let square = |of: &FittedMap| of.at(u, v).powi(2);
         corrections.into_iter().map(square).sum::<f64>()
     });
     (squares.sum::<f64>() / f64::from(GRID * GRID)).sqrt()
+}
+
+/// Places along each side of the frame that are looked at.
+const GRID: u32 = 16;
+
+/// Places all over a frame.
+fn grid((width, height): (u32, u32)) -> impl Iterator<Item = (f64, f64)> {
+    let place = |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
+    (0..GRID * GRID).map(move |at| (place(at % GRID, width), place(at / GRID, height)))
 }

@@ -99,15 +99,15 @@ fn found(made: &Made) -> Outcome {
     let off = plane.map_or(0.0, |plane| plane.models_off_px);
     let residual = plane.map_or(0.0, |plane| plane.vertical.residual_turns);
     let print = &file.fingerprint[..8];
+    let mut said = vec![format!(
+        "the models are off the plate by {off:.3} px; calibration {print} is stored and in use"
+    )];
+    said.extend(made.notes.iter().cloned());
+    let figures = json!({
+        "models_off_px": off, "residual_turns": residual, "fingerprint": file.fingerprint,
+    });
     Outcome {
-        figures: json!({
-            "models_off_px": off, "residual_turns": residual, "fingerprint": file.fingerprint,
-        }),
-        ..Outcome::passed(
-            format!(
-                "the models are off the plate by {off:.3} px; calibration {print} is stored and in use"
-            ),
-            json!({}),
-        )
+        said,
+        ..Outcome::passed("", figures)
     }
 }

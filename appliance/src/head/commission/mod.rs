@@ -5,11 +5,13 @@
 
 mod completing;
 mod file;
+mod laid;
 mod outcome;
 mod poses;
 mod step;
 
 pub use file::{Commissioning, FILE, Models};
+pub use laid::Laid;
 pub use outcome::Outcome;
-pub use poses::{PoseFile, Solving};
+pub use poses::{PoseFile, Solving, pose_name};
 pub use step::{Name, Step, Subject};

@@ -4,10 +4,9 @@ use super::file::{Commissioning, MAX_POSES, Models};
 use super::outcome::Outcome;
 use super::step::Subject;
 use crate::head::board;
-use crate::head::calibration::Calibration;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::capture::Shown;
-use crate::head::geometry::{Geometry, SeenPose};
+use crate::head::geometry::{Geometry, SeenPose, same_place};
 use crate::head::scale::Scale;
 use crate::head::seam;
 use algo::calibration::{Board, Corner, FoundBoard, Node, Picture, View};
@@ -75,7 +74,7 @@ impl PoseFile {
         Ok(())
     }
 
-    fn seen(&self, number: u32, calibration: &Calibration) -> SeenPose {
+    fn seen(&self, number: u32, [columns, rows, bits, across, down]: [u32; 5]) -> SeenPose {
         let corner = |[u, v, blur]: [f64; 3]| Corner { u, v, blur };
         let node = |[u, v, xi, eta, column, row]: &[f64; 6]| Node {
             at: (*u, *v),
@@ -83,9 +82,9 @@ impl PoseFile {
             square: (*column as usize, *row as usize),
         };
         SeenPose {
-            recording: format!("pose {number}"),
-            frames: calibration.frames(),
-            raster: calibration.raster(),
+            recording: pose_name(number),
+            frames: (columns, rows, bits as u8),
+            raster: (across, down),
             view: View {
                 found: FoundBoard {
                     corners: self.corners.iter().map(|found| found.map(corner)).collect(),
@@ -95,6 +94,11 @@ impl PoseFile {
             },
         }
     }
+}
+
+/// The name of a pose where recordings have theirs.
+pub fn pose_name(number: u32) -> String {
+    format!("pose {number}")
 }
 
 /// What the user knows of the board.
@@ -107,9 +111,12 @@ pub struct Solving {
 }
 
 impl Commissioning {
-    /// The first number that no pose has.
+    /// The first number without a pose that can be used.
     pub fn free_pose(&self) -> u32 {
-        let taken = |number: &u32| self.poses.contains_key(number);
+        let taken = |number: &u32| {
+            let pose = self.poses.get(number);
+            pose.is_some_and(|pose| pose.problem.is_none())
+        };
         (1..).find(|number| !taken(number)).unwrap_or(1)
     }
 
@@ -123,7 +130,8 @@ impl Commissioning {
         Outcome::passed(format!("{left} poses are kept"), json!({}))
     }
 
-    /// Takes the frames of a pose, keeps what they show, and returns the white frame.
+    /// Takes the frames of a pose, and keeps what they show: the poses of another board are forgotten then, unless this one cannot be used. Returns
+    /// the white frame if it is kept.
     ///
     /// # Errors
     /// Of a device.
@@ -133,11 +141,6 @@ impl Commissioning {
         board: &Board,
         number: u32,
     ) -> Result<(Outcome, Option<Frame>), Error> {
-        let name = board::name(board);
-        if self.board.as_ref() != Some(&name) {
-            self.poses.clear();
-            self.board = Some(name);
-        }
         let unfit = |words: String| Error::unsupported(words, "use a projector of more pixels");
         let shown = Shown::pose(subject.calibration).map_err(unfit)?;
         let rasters = shown.rasters(subject.calibration)?;
@@ -151,7 +154,8 @@ impl Commissioning {
         })?;
         (subject.progress)(0.6, "looking for the board");
         let recording = shown.recording(subject.calibration, &mut taken.into_iter());
-        let seen = SeenPose::of(&recording, &format!("pose {number}"), board);
+        let seen = SeenPose::of(&recording, &pose_name(number), board)
+            .and_then(|seen| self.elsewhere(board, number, seen));
         let pose = match &seen {
             Ok(pose) => PoseFile::of(Some(&pose.view.found), &pose.view.nodes, None),
             Err(problem) => {
@@ -164,7 +168,17 @@ impl Commissioning {
         };
         let (located, of) = (pose.located(), board.columns * board.rows);
         let figures = json!({ "pose": number, "corners": located, "of": of });
-        self.poses.insert(number, pose);
+        let name = board::name(board);
+        let other = self.board.as_ref() != Some(&name);
+        // Poses of another board are forgotten when there is one of this board.
+        let kept = !other || seen.is_ok() || self.poses.is_empty();
+        if kept {
+            if other {
+                self.poses.clear();
+                self.board = Some(name);
+            }
+            self.poses.insert(number, pose);
+        }
         let outcome = match seen {
             Ok(_) => Outcome {
                 figures,
@@ -179,58 +193,59 @@ impl Commissioning {
                 ..Outcome::failed(&problem)
             },
         };
-        Ok((outcome, recording.white))
+        Ok((outcome, recording.white.filter(|_| kept)))
+    }
+
+    /// A pose in which the board lies elsewhere than in all others that can be used.
+    ///
+    /// # Errors
+    /// In words: it did not move.
+    fn elsewhere(&self, board: &Board, number: u32, seen: SeenPose) -> Result<SeenPose, String> {
+        if self.board.as_ref() != Some(&board::name(board)) {
+            return Ok(seen);
+        }
+        let others: Vec<SeenPose> = self.usable(Some(number)).collect();
+        match seen.again_in(&others) {
+            None => Ok(seen),
+            Some(other) => Err(format!(
+                "{}: move and tilt it, then take the pose again",
+                same_place(&other.recording)
+            )),
+        }
+    }
+
+    /// The poses that can be used, without this one.
+    pub(super) fn usable(&self, without: Option<u32>) -> impl Iterator<Item = SeenPose> {
+        let usable = self
+            .poses
+            .iter()
+            .filter(move |(number, pose)| pose.problem.is_none() && Some(**number) != without);
+        usable.map(|(number, pose)| pose.seen(*number, self.head))
     }
 
     /// Makes the models of all poses that can be used.
-    pub(super) fn solve(
-        &mut self,
-        calibration: &Calibration,
-        before: Option<&CalibrationFile>,
-        solving: Solving,
-    ) -> Outcome {
-        match self.solved(calibration, before, solving) {
+    pub(super) fn solve(&mut self, before: Option<&CalibrationFile>, solving: Solving) -> Outcome {
+        match self.solved(before, solving) {
             Err(problem) => Outcome {
                 said: vec![problem.clone()],
                 remedy: Some(problem),
                 ..Outcome::failed("")
             },
             Ok(models) => {
-                let file = &models.geometry;
-                let said = format!(
-                    "residuals camera {:.3} px, projector {:.3} px RMS over {} poses; σ of heights {:.4} mm, of a length of 100 mm {:.4} mm",
-                    file.camera_px,
-                    file.projector_px,
-                    file.poses.len(),
-                    file.height_sigma_mm,
-                    file.length_sigma_mm
-                );
-                let figures = json!({
-                    "camera_px": file.camera_px, "projector_px": file.projector_px, "height_sigma_mm": file.height_sigma_mm,
-                    "length_sigma_mm": file.length_sigma_mm, "poses": file.poses.len(),
-                });
+                let outcome = models.found(self.head);
                 self.models = Some(models);
-                Outcome::passed(said, figures)
+                outcome
             }
         }
     }
 
-    fn solved(
-        &self,
-        calibration: &Calibration,
-        before: Option<&CalibrationFile>,
-        solving: Solving,
-    ) -> Result<Models, String> {
+    fn solved(&self, before: Option<&CalibrationFile>, solving: Solving) -> Result<Models, String> {
         let Some(name) = &self.board else {
             return Err("no pose was taken: take at least 3, better 10".into());
         };
         let board = board::parse(name)?;
         Scale::check_length(&board, solving.check_length_mm)?;
-        let usable = self.poses.iter().filter(|(_, pose)| pose.problem.is_none());
-        let poses: Vec<SeenPose> = usable
-            .take(MAX_POSES)
-            .map(|(number, pose)| pose.seen(*number, calibration))
-            .collect();
+        let poses: Vec<SeenPose> = self.usable(None).take(MAX_POSES).collect();
         let geometry = Geometry::of(&board, solving.board_sigma_ppm, &poses)?;
         let scale = Scale::of(solving.check_length_mm, before, &geometry.file)?;
         Ok(Models {

@@ -7,6 +7,7 @@ use crate::head::calibrate::{Characteristics, characterise};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::doctor::examine_for;
+use crate::head::geometry::SeenPose;
 use algo::calibration::Board;
 use hal::frame::Frame;
 use hal::head::Head;
@@ -123,6 +124,7 @@ impl Step {
             ))
         };
         let mut white = None;
+        let poses: Vec<SeenPose> = kept.usable(None).collect();
         let outcome = match self {
             Self::Devices => doctor(
                 subject,
@@ -144,7 +146,7 @@ impl Step {
             Self::Forget(number) => kept.forget(*number),
             Self::Solve(solving) => {
                 (subject.progress)(0.1, "adjusting the models");
-                kept.solve(subject.calibration, subject.before.as_ref(), *solving)
+                kept.solve(subject.before.as_ref(), *solving)
             }
             Self::Plane => kept.complete(subject).unwrap_or_else(Outcome::from),
         };
@@ -152,16 +154,20 @@ impl Step {
         if matches!(self, Self::Solve(_)) && outcome.passed {
             kept.steps.remove(&Name::Plane);
         }
-        // The step is done by its models, and a pose that was taken or forgotten leaves them.
-        match self {
-            Self::Pose(..) | Self::Forget(_) if outcome.passed => {
-                let done = kept
-                    .steps
-                    .get(&Name::Geometry)
-                    .is_some_and(|step| step.passed);
-                if !done {
-                    kept.steps.remove(&Name::Geometry);
-                }
+        if matches!(self, Self::Pose(..) | Self::Forget(_)) {
+            // Models are those of all poses that can be used, or there are none.
+            let now: Vec<SeenPose> = kept.usable(None).collect();
+            if now != poses {
+                kept.models = None;
+            }
+        }
+        match (self, &kept.models) {
+            (Self::Pose(..) | Self::Forget(_), None) if outcome.passed => {
+                kept.steps.remove(&Name::Geometry);
+            }
+            (Self::Pose(..) | Self::Forget(_), Some(models)) if outcome.passed => {
+                let outcome = models.found(kept.head);
+                kept.steps.insert(Name::Geometry, outcome);
             }
             _ => drop(kept.steps.insert(self.name(), outcome)),
         }

@@ -1,7 +1,7 @@
 //! What looks wrong with an imported recording: its levels are unwrapped as stated and under the other conventions, and the
 //! frames of each level are compared with a sine.
 
-use crate::measure::channel::Channel;
+use crate::head::channel::Channel;
 use crate::measure::layout::{Convention, ShiftSign, Shifts};
 use crate::measure::least_modulation;
 use algo::chain::Chain;

@@ -13,7 +13,7 @@ use crate::head::exposing::Exposing;
 use crate::head::seam;
 use crate::history::RECIPE;
 use crate::recipe::plan::{Plan, PlanError};
-use crate::recipe::{Recipe, archive};
+use crate::recipe::{PatternFile, Recipe, archive};
 use algo::pattern::Shot;
 use hal::head::{Head, Timing};
 use hal::replay::Recording;
@@ -42,8 +42,8 @@ pub struct Opened {
 /// The recordings that a replay head plays.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// What each frame of a recording shows.
-    shots: Vec<Shot>,
+    /// What each frame of a recording shows, and of which pattern.
+    shots: Vec<(PatternFile, Shot)>,
     /// Fingerprint of the calibration that they were taken with, if a station kept them with their recipe.
     calibration: Option<String>,
 }
@@ -53,7 +53,14 @@ impl Played {
         let recipe = fs::File::open(folder.join(RECIPE)).ok();
         let manifest = recipe.and_then(|file| archive::manifest(file).ok());
         Self {
-            shots: recording.frames.iter().map(seam::shot).collect(),
+            shots: recording
+                .frames
+                .iter()
+                .map(|frame| {
+                    let pattern = PatternFile::of(&recording.patterns[frame.pattern]);
+                    (pattern, seam::shot(frame))
+                })
+                .collect(),
             calibration: manifest.map(|manifest| manifest.calibration),
         }
     }
@@ -64,11 +71,15 @@ impl Played {
     /// # Errors
     /// If the recipe was made for another calibration or does not fit the frames.
     pub fn plan(&self, recipe: Recipe, calibration: &Calibration) -> Result<Plan, PlanError> {
+        let own = |(pattern, shot): &(PatternFile, Shot)| {
+            (*pattern == recipe.conditions.pattern).then_some(*shot)
+        };
+        let shown: Vec<Option<Shot>> = self.shots.iter().map(own).collect();
         let plan = match self.calibration.as_ref() == Some(&recipe.id.calibration) {
             true => Plan::again(recipe, calibration, false),
             false => Plan::new(recipe, calibration, false),
         };
-        Ok(plan?.only(&self.shots))
+        Ok(plan?.only(&shown))
     }
 }
 

@@ -91,7 +91,9 @@ impl Worker {
             let corners = pose.map_or(&[][..], |pose| &pose.corners);
             let marked: Vec<[f64; 2]> =
                 corners.iter().flatten().map(|[u, v, _]| [*u, *v]).collect();
-            self.keep_picture(*number, white.as_ref(), &marked);
+            if let Some(white) = &white {
+                self.keep_picture(*number, white, &marked);
+            }
             self.progress.log(&format!(
                 "pose {number}: {} of {} corners",
                 marked.len(),
@@ -219,15 +221,12 @@ impl Worker {
         }
     }
 
-    /// Keeps the picture of a pose, or removes that of a former one.
-    fn keep_picture(&self, number: u32, white: Option<&Frame>, marked: &[[f64; 2]]) {
+    /// Keeps the picture of a pose.
+    fn keep_picture(&self, number: u32, white: &Frame, marked: &[[f64; 2]]) {
         let file = self.commission.picture_file(number);
-        let kept = match white {
-            None => fs::remove_file(&file),
-            Some(frame) => fs::create_dir_all(self.commission.state.join(PICTURES))
-                .and_then(|()| write_whole(&file, &Picture::of(frame).png(marked))),
-        };
-        if let (Err(error), Some(_)) = (kept, white) {
+        let kept = fs::create_dir_all(self.commission.state.join(PICTURES))
+            .and_then(|()| write_whole(&file, &Picture::of(white).png(marked)));
+        if let Err(error) = kept {
             self.progress
                 .warn(&format!("write {}: {error}: free space", file.display()));
         }

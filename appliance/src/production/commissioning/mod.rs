@@ -8,7 +8,7 @@ pub mod live;
 mod view;
 
 use crate::head::calibration::Calibration;
-use crate::head::commission::{Commissioning, Step};
+use crate::head::commission::{Commissioning, Laid, Step};
 use crate::head::exposing::Exposing;
 use crate::head::live::Outline;
 use crate::production::drift::Trend;
@@ -65,6 +65,8 @@ struct Inside {
     running: Option<Running>,
     head: Option<OpenHead>,
     kept: Commissioning,
+    /// How the board lies in its poses.
+    laid: Laid,
 }
 
 /// Commissioning, for the measuring task and for those who ask for steps. Cheap to clone.
@@ -87,6 +89,7 @@ impl Commission {
             }
         };
         let inside = Inside {
+            laid: kept.laid(),
             kept,
             ..Inside::default()
         };
@@ -192,7 +195,9 @@ impl Commission {
     /// In words: it cannot be stored; it is known until the next start.
     fn keep(&self, mut kept: Commissioning) -> Result<(), String> {
         let saved = kept.save(&self.state);
-        self.inside().kept = kept;
+        let laid = kept.laid();
+        let mut inside = self.inside();
+        (inside.kept, inside.laid) = (kept, laid);
         saved
     }
 }

@@ -1,7 +1,7 @@
 //! The head and its commissioning as `GET /api/head` answers.
 
 use super::{Commission, Inside, OpenHead};
-use crate::head::commission::{Commissioning, Name, Outcome};
+use crate::head::commission::{Name, Outcome, pose_name};
 use crate::station::Snapshot;
 use serde_json::{Value, json};
 
@@ -37,7 +37,7 @@ impl Commission {
             "volume": head.volume,
             "running": running,
             "steps": steps(&inside, snapshot),
-            "geometry": geometry(&inside.kept, head),
+            "geometry": geometry(&inside, head),
             "drift": self.drift.view(&head.calibration.fingerprint()),
         })
     }
@@ -49,7 +49,12 @@ fn steps(inside: &Inside, snapshot: &Snapshot) -> Vec<Value> {
         .into_iter()
         .map(|name| {
             let outcome = inside.kept.steps.get(&name);
-            step(name.word(), outcome, running == Some(name.word()))
+            let mut step = step(name.word(), outcome, running == Some(name.word()));
+            let ground = inside.laid.ground.as_ref();
+            if let (Name::Geometry, None, Some(ground)) = (name, outcome, ground) {
+                (step["said"], step["remedy"]) = (json!([ground.words()]), json!(ground.remedy()));
+            }
+            step
         })
         .collect();
     let state = match (&snapshot.teach, &snapshot.recipe) {
@@ -86,21 +91,22 @@ fn step(name: &str, outcome: Option<&Outcome>, running: bool) -> Value {
 }
 
 /// The poses, and the models if there are any. What a pose has left in the models is known by its name there.
-fn geometry(kept: &Commissioning, head: &OpenHead) -> Value {
+fn geometry(inside: &Inside, head: &OpenHead) -> Value {
+    let (kept, laid) = (&inside.kept, &inside.laid);
     let models = kept.models.as_ref();
     let of = kept.board.as_deref().and_then(corners_of).unwrap_or(0);
     let poses: Vec<Value> = kept
         .poses
         .iter()
         .map(|(number, pose)| {
-            let name = format!("pose {number}");
+            let name = pose_name(*number);
             let fitted = models.and_then(|models| {
                 let mut poses = models.geometry.poses.iter();
                 poses.find(|fitted| fitted.recording == name)
             });
             json!({
                 "number": number, "corners": pose.located(), "of": of, "usable": pose.problem.is_none(), "problem": pose.problem,
-                "tilt_degrees": fitted.map(|pose| pose.tilt_degrees), "camera_px": fitted.map(|pose| pose.camera_px),
+                "tilt_degrees": laid.tilt(*number), "camera_px": fitted.map(|pose| pose.camera_px),
                 "projector_px": fitted.map(|pose| pose.projector_px),
             })
         })
@@ -112,8 +118,11 @@ fn geometry(kept: &Commissioning, head: &OpenHead) -> Value {
             "length_sigma_mm": file.length_sigma_mm, "baseline_mm": file.baseline_mm, "scale": models.scale,
         })
     });
+    let plane = laid.ground.as_ref().map(
+        |ground| json!({ "pose": ground.pose, "said": ground.words(), "remedy": ground.remedy() }),
+    );
     json!({
-        "board": kept.board, "poses": poses, "frame_covered": kept.covered(head.calibration.frames()),
+        "board": kept.board, "poses": poses, "plane": plane, "frame_covered": kept.covered(head.calibration.frames()),
         "tilt_degrees": models.map(|models| models.tilt_degrees), "result": result,
     })
 }

@@ -7,6 +7,7 @@ use crate::head::placed::{Placed, kinds};
 use crate::production::Order;
 use serde_json::{Value, json};
 use sim::{Material, Stage, Staged};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender, SyncSender};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::Duration;
@@ -30,7 +31,16 @@ pub enum PutError {
 pub struct Simulation {
     stage: Arc<OnceLock<Stage>>,
     orders: Sender<Order>,
-    alone: Arc<Mutex<()>>,
+    placing: Arc<AtomicBool>,
+}
+
+/// While it is there, a part is being put in place.
+struct Alone(Arc<AtomicBool>);
+
+impl Drop for Alone {
+    fn drop(&mut self) {
+        self.0.store(false, Ordering::Release);
+    }
 }
 
 impl Simulation {
@@ -39,7 +49,7 @@ impl Simulation {
         Self {
             stage: Arc::default(),
             orders,
-            alone: Arc::default(),
+            placing: Arc::default(),
         }
     }
 
@@ -70,6 +80,11 @@ impl Simulation {
         }
     }
 
+    /// Whether a part is being put in place: until it is there, the head sees the one before.
+    pub fn is_placing(&self) -> bool {
+        self.placing.load(Ordering::Acquire)
+    }
+
     /// Puts a part in place; returns when the next cycle sees it, after seconds.
     ///
     /// # Errors
@@ -80,11 +95,12 @@ impl Simulation {
             unfit("the head is not simulated: its part is the one that lies there".into())
         })?;
         placed.check().map_err(unfit)?;
-        let Ok(_alone) = self.alone.try_lock() else {
+        if self.placing.swap(true, Ordering::AcqRel) {
             let words =
                 "put the part in place: another one is being put there; try again when it is";
             return Err(PutError::Busy(words.into()));
-        };
+        }
+        let _alone = Alone(self.placing.clone());
         let staged = stage
             .work_out(&placed.part, placed.material, &placed.placement, &|_| ())
             .map_err(|error| PutError::Unfit(error.to_string()))?;

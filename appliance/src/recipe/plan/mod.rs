@@ -105,18 +105,6 @@ impl Plan {
             .map_err(|reason| PlanError::Unfit { number, reason })
     }
 
-    /// Keeps only the sequence that consists of these shots: a head that plays a recording has no other frames. If there is no
-    /// such sequence, nothing changes.
-    pub fn only(mut self, shots: &[Shot]) -> Self {
-        if let Some(sequence) = self.sequence_of(shots) {
-            let mut run = self.runs.swap_remove(sequence);
-            run.indices = (0..shots.len()).collect();
-            self.runs = vec![run];
-            self.shots = shots.to_vec();
-        }
-        self
-    }
-
     fn join(recipe: Recipe, calibration: &Calibration, simulated: bool) -> Result<Self, String> {
         let Recipe {
             id,

@@ -1,11 +1,34 @@
 //! The patterns of a plan: their rasters, and how a head shows them.
 
 use super::Plan;
+use super::run::Run;
 use crate::head::calibration::Calibration;
+use algo::pattern::Shot;
 use hal::head::Head;
 use hal::projector::Raster;
 
 impl Plan {
+    /// Keeps only the longest sequence whose frames are all among those that show these shots of its own pattern (`None` for frames of another
+    /// one): a head that plays a recording has no other frames. If there is no such sequence, nothing changes.
+    pub fn only(mut self, shown: &[Option<Shot>]) -> Self {
+        let indices = |sequence| -> Option<Vec<usize>> {
+            let place = |shot| shown.iter().position(|other| *other == Some(shot));
+            self.shots(sequence).map(place).collect()
+        };
+        let sequences = (0..self.sequence_count()).rev();
+        let found = sequences
+            .into_iter()
+            .find_map(|at| Some((at, indices(at)?)));
+        if let Some((sequence, indices)) = found {
+            let first = self.shots[self.runs[sequence].indices[0]];
+            let run = self.runs.swap_remove(sequence);
+            self.runs = vec![Run { indices, ..run }];
+            // Whatever is shown for the other frames, the recorded ones come.
+            self.shots = shown.iter().map(|shot| shot.unwrap_or(first)).collect();
+        }
+        self
+    }
+
     /// The rasters of all sequences; those of the first come first, in the order of its frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
         let function = self.production().triangulator().function();

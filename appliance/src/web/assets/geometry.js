@@ -59,12 +59,12 @@ function figures({ corners, of, tilt_degrees, camera_px, projector_px }) {
   return words.join(" · ");
 }
 
-function row(pose, running) {
+function row(pose, busy) {
   const { number, usable, problem } = pose;
   const look = button(`Pose ${number}`, "open", () => { state.chosen = number; showPose(); });
   const forget = button("Forget", "", () => send({ action: "forget", pose: number }));
   forget.setAttribute("aria-label", `Forget pose ${number}`);
-  forget.disabled = running;
+  forget.disabled = busy;
   const words = make("div", "", make("span", usable ? "" : "bad", usable ? "✓ can be used" : `✗ cannot be used: ${problem}`), make("small", "", figures(pose)));
   const line = make("li", "", look, words, forget);
   line.dataset.pose = number;
@@ -101,8 +101,8 @@ function showResult(result) {
   text("result-scale", SCALES[result.scale] || result.scale);
 }
 
-function showPoses(poses, running) {
-  const key = JSON.stringify([poses, running]);
+function showPoses(poses, busy) {
+  const key = JSON.stringify([poses, busy]);
   if (key === state.key) return;
   state.key = key;
   const last = (some) => (some.length ? some[some.length - 1].number : 0);
@@ -113,13 +113,13 @@ function showPoses(poses, running) {
     state.chosen = last(taken);
     $("board-pose").value = String(Math.min(GOOD, last(poses) + 1));
   } else if (!poses.some((pose) => pose.number === state.chosen)) state.chosen = last(poses);
-  fill($("poses"), ...poses.map((pose) => row(pose, running)));
+  fill($("poses"), ...poses.map((pose) => row(pose, busy)));
   showPose();
 }
 
-export function showGeometry({ geometry, running }) {
+export function showGeometry(geometry, busy) {
   showBoard(geometry.board);
-  showPoses(geometry.poses, Boolean(running));
+  showPoses(geometry.poses, busy);
   const { poses, frame_covered: covered, tilt_degrees: tilts, result } = geometry;
   text("pose-next", advice(poses.filter((pose) => pose.usable).length, result));
   text("covered", `${(100 * covered).toFixed(0)} %`);
@@ -142,9 +142,6 @@ export function start() {
     ["part-place", () => ({ part: "sheet_metal" }), "a good part is in place"],
   ];
   for (const [id, wanted, words] of putters) {
-    $(id).addEventListener("click", async () => {
-      $(id).disabled = true;
-      try { await place(wanted(), words); } finally { $(id).disabled = false; }
-    });
+    $(id).addEventListener("click", () => place(wanted(), words));
   }
 }

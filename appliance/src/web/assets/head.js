@@ -6,6 +6,7 @@ import { trend } from "./trend.js";
 import { openLive, showCamera, showVolume, start as startLive } from "./live.js";
 import { showSteps, start as startSteps } from "./steps.js";
 import { showGeometry, start as startGeometry } from "./geometry.js";
+import { isPlacing } from "./simulation.js";
 
 const EVERY_MS = 500;
 let timer = 0;
@@ -44,8 +45,10 @@ async function refresh() {
   openLive(visible, head.running ? head.running.said : "");
   showCamera(head.camera);
   showVolume(head);
-  showSteps(head);
-  showGeometry(head);
+  // Nothing begins while a step runs, or while the part that it is to see is not there yet.
+  const busy = Boolean(head.running) || head.placing || isPlacing();
+  showSteps(head, busy);
+  showGeometry(head.geometry, busy);
   showDrift(head.drift);
   for (const line of document.querySelectorAll(".simulated")) line.hidden = !head.simulated;
 }

@@ -8,6 +8,7 @@ const UNITS = { x: "mm", y: "mm", depth_mm: "mm", diameter_mm: "mm", degrees: "�
 let kinds = [];
 let part = null;
 let asked = "";
+let placing = false;
 
 const copy = (value) => JSON.parse(JSON.stringify(value));
 const words = (name) => name.replace(/_(mm|deg)$/, "").replace(/_/g, " ");
@@ -54,13 +55,23 @@ function showPart(answer) {
   showDefects();
 }
 
-// Puts something else in front of the simulated head.
+// Whether something is on its way in front of the simulated head.
+export const isPlacing = () => placing;
+
+// Puts something else in front of the simulated head. Meanwhile the head sees what was there before, so no step begins.
 export async function place(wanted, words) {
-  const answer = await change(() => {
-    notice("the light of it is being computed…");
-    return ask("PUT", PLACE, wanted);
-  }, words);
-  if (answer) showPart(answer);
+  const moved = (now) => {
+    placing = now;
+    window.dispatchEvent(new Event("head"));
+  };
+  moved(true);
+  try {
+    const answer = await change(() => {
+      notice("the light of it is being computed…");
+      return ask("PUT", PLACE, wanted);
+    }, words);
+    if (answer) showPart(answer);
+  } finally { moved(false); }
 }
 
 async function put() {

@@ -8,7 +8,7 @@ import { teachNext } from "./recipes.js";
 
 const NAMES = ["devices", "aim", "exposure", "timing", "geometry", "plane", "teach"];
 const STATES = { open: ["", "to do"], running: ["…", "running"], done: ["✓", "done"], failed: ["✗", "failed"] };
-const state = { next: "", states: {} };
+const state = { next: "", ended: "", states: {} };
 
 const title = (name) => $(`step-${name}`).querySelector("h3").textContent;
 const order = (name, body) => ask("POST", `/api/head/steps/${name}`, body);
@@ -37,7 +37,7 @@ function announce(step) {
   if (failed) $(`step-${step.name}`).open = true;
 }
 
-function showStep(step, running) {
+function showStep(step, running, busy) {
   const place = $(`step-${step.name}`);
   const now = running && running.step === step.name ? running : null;
   const [mark, words] = STATES[step.state];
@@ -56,13 +56,13 @@ function showStep(step, running) {
   bar.value = now ? now.share : 0;
   place.querySelector(".now").textContent = now ? now.said : "";
   place.querySelector(".at").textContent = step.at_unix_s ? `last run ${moment({ utc_us: 1e6 * step.at_unix_s })}` : "";
-  for (const button of place.querySelectorAll("button:not(.open, .end)")) button.disabled = Boolean(running);
+  for (const button of place.querySelectorAll("button:not(.open, .end)")) button.disabled = busy;
   place.querySelector(".end").hidden = !now;
   announce(step);
 }
 
-// The next step, if there is one: the first that is not done, on a calibrated head only teaching. It is opened when it becomes the next;
-// what somebody opens or closes stays so.
+// The next step, if there is one: the first that is not done, on a calibrated head only teaching. It is opened when it becomes the next. The
+// step before it stays open with what it has found, the one before that is folded; what somebody opens or closes stays so.
 function advance({ calibrated, steps, problem }) {
   const next = steps.find((step) => step.state !== "done" && (!calibrated || step.name === "teach"));
   const name = next ? next.name : "";
@@ -70,13 +70,14 @@ function advance({ calibrated, steps, problem }) {
   text("bare-problem", (problem || "").replace(/`/g, ""));
   text("bare-next", next ? `step ${NAMES.indexOf(name) + 1} of ${NAMES.length}, ${title(name)}` : "");
   if (name === state.next) return;
-  if (state.next) $(`step-${state.next}`).open = false;
+  if (state.ended && state.ended !== name) $(`step-${state.ended}`).open = false;
+  state.ended = state.next;
   state.next = name;
   if (next) $(`step-${name}`).open = true;
 }
 
-export function showSteps(head) {
-  for (const step of head.steps) showStep(step, head.running);
+export function showSteps(head, busy) {
+  for (const step of head.steps) showStep(step, head.running, busy);
   text("setup-words", head.running ? `${title(head.running.step)} is running: ${head.running.said}` : "");
   advance(head);
 }

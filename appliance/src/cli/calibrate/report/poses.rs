@@ -122,6 +122,7 @@ impl Report<'_> {
             );
             line("bow", found);
         }
+        line("plane", geometry.ground.words());
         line("baseline", format!("{:.2} mm", file.baseline_mm));
         line(
             "scale",

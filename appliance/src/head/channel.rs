@@ -1,12 +1,11 @@
 //! The frames of one pattern of a recording: how its levels can be unwrapped, and its phases.
 
-use super::known::Known;
-use crate::head::scan::Scan;
-use crate::head::seam;
+use super::scan::Scan;
+use super::seam;
 use algo::chain::{Cells, Chain, CodePictures, GrayCode};
 use algo::frame::FrameView;
 use algo::geometry::Triangulator;
-use algo::pattern::{Level, PhaseFunction};
+use algo::pattern::{self, Level, PhaseFunction, Shot};
 use algo::phase::LeastModulation;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::AbsolutePhase;
@@ -15,9 +14,14 @@ use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedCode};
 
 /// The frames of one pattern of a recording, with its phase function.
-pub(super) struct Channel<'a> {
+pub struct Channel<'a> {
+    /// Φ_P.
     pub function: PhaseFunction,
+    /// Its frames and levels.
     pub scan: Scan<'a>,
+    /// What the frames of the levels show that the scan's decoder takes: of all, or of the finest alone if the production kernels do not know
+    /// the levels' form.
+    pub shots: Vec<Shot>,
     /// Whether the production kernels know the levels' form.
     recognised: bool,
     code: Option<Code<'a>>,
@@ -30,8 +34,17 @@ struct Code<'a> {
     cells: Cells,
 }
 
+/// A phase that is expected of a part, for levels that are unwrapped about a known map.
+pub trait Expected {
+    /// Its name for reports.
+    fn name(&self) -> &'static str;
+
+    /// Φ of each pixel, row-major, for levels that are unwrapped in this way; unknown where it is not safe for them.
+    fn map(&self, unwrapping: pattern::Unwrapping) -> Vec<AbsolutePhase>;
+}
+
 /// How the levels of a pattern become an absolute phase.
-pub(super) enum Unwrapping {
+pub enum Unwrapping {
     /// By the production kernels, about a map with this name where they need one.
     Planned(Option<(&'static str, Vec<AbsolutePhase>)>),
     /// By a chain of beats, or from a Gray code.
@@ -41,7 +54,7 @@ pub(super) enum Unwrapping {
 }
 
 /// The phases of a pattern.
-pub(super) struct Phases {
+pub struct Phases {
     /// The absolute phase; without any phase where it is missing.
     pub absolute: PhaseMap,
     /// The wrapped phase of the finest level.
@@ -74,11 +87,17 @@ impl<'a> Channel<'a> {
             }
         };
         let scan = scan.trusting(least);
+        let finest = scan.sequence.levels().last().map(|level| level.ratio);
+        let shots = shots
+            .into_iter()
+            .filter(|shot| recognised || Some(shot.ratio) == finest)
+            .collect();
         let code = recording.codes.iter().find(|code| code.pattern == pattern);
         let code = code.map(|code| Code::new(code, recording, spec, &scan));
         Ok(Self {
             function,
             scan,
+            shots,
             recognised,
             code: code.transpose()?,
             bit_depth: recording.bit_depth,
@@ -93,7 +112,7 @@ impl<'a> Channel<'a> {
     /// the levels have no absolute phase.
     pub fn unwrapping(
         &self,
-        known: Option<&Known>,
+        known: Option<&dyn Expected>,
         geometry: &Result<Triangulator, String>,
     ) -> Result<Unwrapping, String> {
         if self.code.is_some() {
@@ -110,7 +129,7 @@ impl<'a> Channel<'a> {
             return Ok(Unwrapping::Planned(None));
         }
         let map = match (known, geometry) {
-            (Some(known), _) => (known.name, known.map(self.scan.decoder.unwrapping())),
+            (Some(known), _) => (known.name(), known.map(self.scan.decoder.unwrapping())),
             (None, Ok(triangulator)) => ("reference", triangulator.reference_map()),
             (None, Err(missing)) => {
                 let missing = || {
