@@ -26,7 +26,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 77] = [
+const KEYS: [&str; 78] = [
     "alignment",
     "calibration",
     "camera",
@@ -54,6 +54,7 @@ const KEYS: [&str; 77] = [
     "gauges.name",
     "gauges.region",
     "golden_captures",
+    "golden_offset_counts",
     "good_parts",
     "good_parts.beyond",
     "good_parts.dent_mm",

@@ -27,6 +27,7 @@ mod heights_by;
 mod history;
 mod hostile;
 mod house;
+mod ill_head;
 mod imports;
 mod independent_simulator;
 mod inputs;
