@@ -26,7 +26,7 @@ const MEMBERS: [&str; 10] = [
 ];
 
 /// Keys of `recipe.json`, version 1, in a taught recipe. Do not change these either.
-const KEYS: [&str; 79] = [
+const KEYS: [&str; 80] = [
     "alignment",
     "calibration",
     "camera",
@@ -56,6 +56,7 @@ const KEYS: [&str; 79] = [
     "gauges.name",
     "gauges.region",
     "golden_captures",
+    "golden_offset_counts",
     "good_parts",
     "good_parts.beyond",
     "good_parts.dent_mm",

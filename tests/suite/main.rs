@@ -31,6 +31,7 @@ mod heterodyne;
 mod history;
 mod hostile;
 mod house;
+mod ill_head;
 mod imports;
 mod independent_simulator;
 mod inputs;

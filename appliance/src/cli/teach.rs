@@ -279,6 +279,7 @@ impl Teach {
             heights: &surface.map,
             offsets: &[],
             noise: SampleNoise::constant(noise),
+            offset_counts: None,
             captures: 1,
             comparison: None,
         };

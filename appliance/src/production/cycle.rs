@@ -5,7 +5,8 @@ use super::{ABORTED, DEVICE_TIMEOUT, Worker};
 use crate::error::code_of;
 use crate::history::JudgedPart;
 use crate::recipe::plan::{Arriving, Plan};
-use crate::station::result::flag::{RETRIED, STEPPED_UP};
+use crate::station::result::flag::{RETRIED, STEPPED_UP, WARM_UP};
+use crate::station::snapshot::warning;
 use crate::station::{
     Event, Inspection, Job, JobId, Pace, ResultRecord, Stage, Stages, error_code,
 };
@@ -69,6 +70,16 @@ impl Worker {
                 self.station.event(Event::ExposureDone { job: id });
             }
             inspection.flags |= flags;
+            if exposure.retaken > 0 {
+                inspection.warnings |= warning::FRAME_SLIP;
+            }
+            if self.warm_up.is_under_way() {
+                inspection.flags |= WARM_UP;
+            }
+            if inspection.error_code == error_code::OUT_OF_PLACE {
+                // A head that was knocked sees each part out of place.
+                self.watch.due.suspect();
+            }
             inspection.stages = stages;
             inspection.cpu_us = us(cpu);
             let judged_by = JudgedBy { sequence, frames };

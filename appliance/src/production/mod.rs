@@ -12,6 +12,7 @@ pub mod shelf;
 pub mod simulation;
 pub mod stopwatch;
 mod teaching;
+pub mod warm_up;
 
 pub use aborts::Aborts;
 
@@ -29,6 +30,7 @@ use crate::production::simulation::Placing;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::Stamp;
 use crate::recipe::{LoadError, Store};
+use crate::station::snapshot::warning;
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, ProjectorHealth, RecipeKey, RecipeResult, Request,
     StationHandle,
@@ -43,7 +45,8 @@ use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+use warm_up::WarmUp;
 
 /// What the measuring task is to do.
 pub enum Order {
@@ -109,6 +112,8 @@ pub struct Worker {
     pub live: bool,
     /// When the geometry is checked.
     pub watch: Watch,
+    /// Whether the head is warming up.
+    pub warm_up: WarmUp,
 }
 
 impl Worker {
@@ -173,6 +178,7 @@ impl Worker {
                     self.lost = self.opened.head.rest().err();
                     self.tell_projector(self.opened.head.controller());
                     self.tell_camera(self.opened.head.camera_temperature_c());
+                    self.tell_warm_up();
                     if self.lost.is_none() {
                         self.rest_and_check(plan.as_ref());
                     }
@@ -208,6 +214,16 @@ impl Worker {
         }
     }
 
+    /// Reports whether the head is warming up, if that has changed.
+    fn tell_warm_up(&mut self) {
+        let health = &self.station.snapshot().health;
+        let celsius = [health.camera_temperature_c, health.projector.temperature_c];
+        if self.warm_up.note(celsius, Instant::now()) {
+            let warnings = self.station.snapshot().warnings & warning::OF_A_PART;
+            self.tell_station(warnings);
+        }
+    }
+
     /// Reports whether the head's calibration can be trusted, and what is known of the head.
     fn tell_condition(&mut self) {
         self.tell_head();
@@ -223,11 +239,17 @@ impl Worker {
         for words in [problem, fallback, dark].into_iter().flatten() {
             self.progress.warn(words);
         }
-        self.station.event(Event::Condition(Condition {
-            calibration_valid: self.opened.problem.is_none(),
-            ..Condition::default()
-        }));
+        self.tell_station(0);
         self.tell_drift();
+    }
+
+    /// Tells the station what is known of the head; `warnings` are those of the last part.
+    fn tell_station(&self, warnings: u16) {
+        self.station.event(Event::Condition(Condition {
+            warming_up: self.warm_up.is_under_way(),
+            calibration_valid: self.opened.problem.is_none(),
+            warnings,
+        }));
     }
 
     /// Answers the requests about the last cycle.

@@ -93,6 +93,10 @@ impl RecipeFile {
         if let Some(shot) = self.shot_noise {
             within("shot_noise", shot, 0.0, most)?;
         }
+        if let Some(counts) = self.golden_offset_counts {
+            let full_scale = f64::from((1_u32 << camera.bit_depth) - 1);
+            within("golden_offset_counts", counts, 0.0, full_scale)?;
+        }
         within("golden_captures", self.golden_captures, 1, MAX_CAPTURES)?;
         if let Some(counts) = self.least_modulation {
             let [least, most] = LeastModulation::BOUNDS;

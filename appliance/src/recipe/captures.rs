@@ -6,6 +6,7 @@
 //!
 //! The captures are averaged as two means, from which follows what of that difference is noise.
 
+use super::light;
 use super::teach::TeachError;
 use crate::head::calibrated::CalibratedHead;
 use crate::head::means;
@@ -42,6 +43,8 @@ pub struct Captured {
     pub offsets: Vec<Offsets>,
     /// The noise of a sample by the modulation of its pixel, by the full sequence.
     pub noise: SampleNoise,
+    /// Median of the mean samples of its pixels by the full sequence, counts of the camera.
+    pub offset_counts: Option<f64>,
 }
 
 impl Captured {
@@ -68,25 +71,30 @@ impl Captured {
         };
         let shots = distinct(sequences);
         let least = calibration.least_modulation();
+        let full_scale = f64::from((1_u32 << calibration.bit_depth) - 1);
         let decode = |shown: &[Shot], means: &[Frame], map: &[AbsolutePhase]| {
             let frame = |shot| shots.iter().position(|other| other == shot);
             let frames = shown.iter().filter_map(frame).map(|at| &means[at]);
             let scan = Scan::new(function.range(), shown, frames)?.trusting(least);
             let phases = scan.phases(scan.needs_map().then_some(map))?;
-            Ok::<_, String>((scan.noise(calibration, &phases), phases))
+            let counts = light::offset_counts(&scan.frames, &phases);
+            // Means of frames have more bits than the camera's samples.
+            let unit = full_scale / f64::from(scan.decoder.full_scale());
+            let offset = counts.map(|counts| counts * unit);
+            Ok::<_, String>((scan.noise(calibration, &phases), offset, phases))
         };
         illumination.load(head, function, &shots, calibration)?;
         let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
-        let mut noise = calibration.noise;
+        let (mut noise, mut offset_counts) = (calibration.noise, None);
         for mean in 0..MEANS {
             let share = |share: f64| progress((mean as f64 + share) / MEANS as f64);
             let means = means::take(head, shots.len(), *timeout, &share)?;
             let means = means.ok_or(TeachError::Ended)?;
-            let (by_modulation, phases) =
+            let (by_modulation, offset, phases) =
                 decode(full, &means, expected).map_err(|error| rig(&error))?;
-            noise = by_modulation;
+            (noise, offset_counts) = (by_modulation, offset);
             let offsets = short.iter().map(|shown| {
-                let (_, by) = decode(shown, &means, &phases.phase)?;
+                let (.., by) = decode(shown, &means, &phases.phase)?;
                 Ok(offsets(&by, &phases))
             });
             let offsets: Result<_, String> = offsets.collect();
@@ -116,6 +124,7 @@ impl Captured {
                 .map(<[_; MEANS]>::from)
                 .collect(),
             noise,
+            offset_counts,
         })
     }
 }

@@ -73,6 +73,8 @@ pub struct Conditions {
     pub noise: SampleNoise,
     /// Captures that golden is the mean of.
     pub golden_captures: usize,
+    /// Median of the mean samples over golden's surface, counts; none where it is not known.
+    pub golden_offset_counts: Option<f64>,
     /// The least modulation that is trusted.
     pub least_modulation: LeastModulation,
     /// σ by the uncertainty of the calibration; 0 where it is not known.
@@ -306,6 +308,7 @@ impl From<&RecipeFile> for Conditions {
                 file.shot_noise.unwrap_or(0.0),
             ),
             golden_captures: file.golden_captures,
+            golden_offset_counts: file.golden_offset_counts,
             least_modulation: file
                 .least_modulation
                 .and_then(LeastModulation::new)

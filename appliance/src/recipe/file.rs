@@ -72,6 +72,10 @@ pub struct RecipeFile {
     /// Variance of a sample in counts² that a count of golden's modulation adds.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shot_noise: Option<f64>,
+    /// Median of the mean of each pixel's samples over golden's surface, counts: with it a pattern that is blurred is told from one that is too dark.
+    /// `None` where it was taught from a recording and in recipes of older programs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub golden_offset_counts: Option<f64>,
     /// Captures that golden is the mean of; 1, which is left out, where it was taught from a recording and in recipes of older programs.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub golden_captures: usize,

@@ -77,6 +77,8 @@ pub struct GoldenPart<'a> {
     pub offsets: &'a [Offsets],
     /// The noise of a sample by the modulation of its pixel in one capture.
     pub noise: SampleNoise,
+    /// Median of the mean samples of its pixels, counts; none where it was not measured.
+    pub offset_counts: Option<f64>,
     /// Captures that all of this is the mean of; σ is that of one.
     pub captures: usize,
     /// Fixed against adaptive pattern, if a fixed one was measured as well.
@@ -200,6 +202,7 @@ impl GoldenPart<'_> {
             noise_counts: calibration.noise_counts,
             read_noise_counts: Some(self.noise.read_counts()),
             shot_noise: Some(self.noise.shot()),
+            golden_offset_counts: self.offset_counts,
             golden_captures: self.captures,
             least_modulation: Some(self.decoder.least_modulation().eight_bit()),
             calibration_sigma: calibration.sigma,

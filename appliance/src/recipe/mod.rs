@@ -1,7 +1,7 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
 //! - On disk: [`mod@file`] is the manifest, [`bounds`] the bounds of its values, [`archive`] the ZIP with its fingerprint.
-//! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], [`plan`] joins that with the head's calibration.
+//! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], [`plan`] joins that with the head's calibration; `light` tells bad light from bad parts.
 //! - Stored: [`store`] keeps the files of a station, [`generations`] previous generations and deleted recipes, [`incoming`]
 //!   files that are being uploaded; [`exchange`] lists, exports and imports, [`edit`] changes.
 //! - Made: [`teach`] measures the part, `illumination` chooses its light, [`adaptive`] makes its pattern, [`captures`] measures the part
@@ -25,7 +25,9 @@ pub mod golden;
 pub mod good_parts;
 mod illumination;
 pub mod incoming;
+mod light;
 mod limits;
+mod median;
 pub mod plan;
 pub mod planner;
 mod proof;

@@ -6,6 +6,7 @@
 
 use super::archive::Arrays;
 use super::file::TriedFile;
+use super::median::median;
 use super::plan::Plan;
 use super::sides::Farthest;
 use super::teach::TeachError;
@@ -305,11 +306,4 @@ impl Magnitudes {
     pub fn is_wrong(&self, value: f64) -> bool {
         value.abs() - self.middle > WRONG * self.spread.max(self.middle / WRONG)
     }
-}
-
-fn median(mut values: Vec<f64>) -> Option<f64> {
-    values.sort_by(f64::total_cmp);
-    let upper = values.len() / 2;
-    let middle = values.get(upper.saturating_sub(1 - values.len() % 2)..=upper)?;
-    Some(middle.iter().sum::<f64>() / middle.len() as f64)
 }

@@ -179,6 +179,7 @@ pub fn teach_while(
         heights: &golden.heights,
         offsets: &golden.offsets,
         noise: golden.noise,
+        offset_counts: golden.offset_counts,
         captures: CAPTURES,
         comparison: Some(comparison),
     };

@@ -26,6 +26,7 @@ use crate::production::latest::LastCycleRequests;
 use crate::production::opening::Opening;
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Simulation;
+use crate::production::warm_up::WarmUp;
 use crate::production::{Aborts, Order, Worker};
 use crate::service::survey::Survey;
 use crate::station::{
@@ -231,6 +232,7 @@ impl Daemon {
                     commission,
                     live: false,
                     watch: Watch::every(checks),
+                    warm_up: WarmUp::default(),
                 };
                 worker.run(&inbox, begin, first);
             })?

@@ -61,9 +61,10 @@ impl Station {
         effects: &mut Effects,
     ) {
         if let Some(cycle) = self.take_cycle(job, "a result", effects) {
-            if inspection.error_code == 0 {
+            if inspection.error_code == 0 || error_code::is_of_part(inspection.error_code) {
                 self.failure = None;
             }
+            self.condition.warnings = inspection.warnings;
             self.publish(cycle, inspection, effects);
         }
     }

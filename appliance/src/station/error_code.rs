@@ -36,6 +36,28 @@ pub const ABORTED: u16 = 802;
 /// The measuring task failed without naming a code of its own.
 pub const UNNAMED: u16 = 899;
 
+/// A part was measured but cannot be judged: nothing of the pattern's light comes back from it.
+pub const EMPTY: u16 = 901;
+/// What lies there does not look like the part that was taught.
+pub const NOT_THE_PART: u16 = 902;
+/// The part lies farther from its place than the recipe allows.
+pub const OUT_OF_PLACE: u16 = 903;
+/// Much less light comes back than when the part was taught.
+pub const TOO_DARK: u16 = 904;
+/// So much light comes back that samples are at full scale.
+pub const SATURATED: u16 = 905;
+/// The fine fringes have lost their contrast.
+pub const BLURRED: u16 = 906;
+/// A value lies too close to a limit to prove PASS or FAIL.
+pub const GUARD_BAND: u16 = 907;
+/// A gauge found nothing to measure.
+pub const NOT_MEASURED: u16 = 908;
+
+/// Whether a code says why a part could not be judged, not that the station failed.
+pub fn is_of_part(code: u16) -> bool {
+    code / 100 == 9
+}
+
 /// The code of a failure: [`UNNAMED`] in place of 0, which means no error.
 pub(super) fn or_unnamed(code: u16) -> u16 {
     if code == 0 { UNNAMED } else { code }
@@ -53,6 +75,7 @@ pub fn family(code: u16) -> &'static str {
         6 => "storage",
         // Reserved: no code is in this family yet.
         7 => "thermal",
+        9 => "part",
         _ => "internal",
     }
 }

@@ -37,7 +37,8 @@ pub struct Condition {
     pub warming_up: bool,
     /// STATUS bit 15.
     pub calibration_valid: bool,
-    /// WARNING bits, see [`super::snapshot::warning`]; `PLC_LOST` and `CLOCK_UNSYNCED` are the station's own and ignored here.
+    /// WARNING bits, see [`super::snapshot::warning`]; `PLC_LOST` and `CLOCK_UNSYNCED` are the station's own and ignored here. Those of
+    /// the next inspection replace them.
     pub warnings: u16,
 }
 

@@ -122,6 +122,8 @@ pub struct Inspection {
     pub reason: Option<Arc<str>>,
     /// 0, or why it is INVALID as a code.
     pub error_code: u16,
+    /// What its frames show of the head: WARNING bits `LOW_LIGHT`, `SATURATION`, `PATTERN_UNFIT`, `FRAME_SLIP`.
+    pub warnings: u16,
     /// The recipe's gauges, in its order.
     pub gauges: heapless::Vec<GaugeValue, MAX_GAUGES>,
     /// Resolved pixels.

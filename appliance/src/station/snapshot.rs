@@ -70,6 +70,8 @@ pub mod warning {
     pub const POWER: u16 = 1 << 8;
     /// Camera and projector no longer stand to each other as they were calibrated.
     pub const GEOMETRY: u16 = 1 << 9;
+    /// Those that the frames of a part show.
+    pub const OF_A_PART: u16 = LOW_LIGHT | SATURATION | PATTERN_UNFIT | FRAME_SLIP;
     /// The words for bits 0–9, in order.
     pub const WORDS: [&str; 10] = [
         "temperature",

@@ -39,6 +39,11 @@ impl Due {
         self.cycles = self.cycles.saturating_add(1);
     }
 
+    /// A part was measured that a head out of adjustment would explain: the check need not wait for more cycles.
+    pub fn suspect(&mut self) {
+        self.cycles = self.cycles.max(self.every);
+    }
+
     /// There was an order.
     pub fn disturbed(&mut self) {
         self.rested = 0;
@@ -110,6 +115,16 @@ mod tests {
         due.done(false);
         due.cycle();
         assert_eq!(rest(&mut due, false), Some(SHORTEST));
+    }
+
+    #[test]
+    fn a_suspicion_is_checked_without_more_cycles() {
+        let mut due = Due::every(100);
+        due.suspect();
+        assert_eq!(rest(&mut due, false), Some(SHORTEST));
+        let mut never = Due::every(0);
+        never.suspect();
+        assert_eq!(rest(&mut never, false), None);
     }
 
     #[test]

@@ -1,6 +1,8 @@
 //! From findings to a verdict, or to the reason why a longer sequence should be tried.
 
 use crate::recipe::Demands;
+use crate::recipe::light::{Illness, Light};
+use crate::station::error_code::{BLURRED, GUARD_BAND, NOT_MEASURED, NOT_THE_PART, OUT_OF_PLACE};
 use crate::station::{
     COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Unit, Verdict,
 };
@@ -17,8 +19,22 @@ const OUTLIERS: f64 = 0.2;
 /// place by that.
 const SURE: f64 = 2.0;
 const PULLED: f64 = 0.02;
+/// A part that fails with less fitness is not judged: its limits were set for a quarter of the noise.
+const ILL: f64 = 0.25;
+/// What lies farther off than so many times what is allowed is another part.
+const FAR: f64 = 10.0;
+/// Turns below this are not told, degrees.
+const LEAST_TURN: f64 = 0.05;
 /// Least share of the picture's variance along golden's edges that golden explains where two frames are used.
 pub(super) const ALIKE: f64 = 0.8;
+
+/// Why a part cannot be judged.
+struct Reason {
+    /// ERROR_CODE.
+    code: u16,
+    /// With the remedy.
+    words: String,
+}
 
 impl Demands {
     /// Judges the findings.
@@ -51,7 +67,10 @@ impl Demands {
         inspection.fitness_permille = (fitness.min(1.0) * 1000.0).round() as u16;
         inspection.skipped = findings.skipped;
         inspection.placement = findings.placed.as_ref().map(placement);
-        inspection.reason = self.not_judged(inspection, findings).map(Arc::from);
+        if let Some(Reason { code, words }) = self.not_judged(inspection, findings) {
+            inspection.reason = Some(words.into());
+            inspection.error_code = code;
+        }
         inspection.judged = match &inspection.reason {
             Some(_) => Verdict::Invalid,
             None if inspection.gauges.iter().all(|gauge| gauge.decision.pass) => Verdict::Pass,
@@ -60,33 +79,25 @@ impl Demands {
     }
 
     /// Why the part cannot be judged; `None` if it can. The inspection lacks only its verdict.
-    fn not_judged(&self, inspection: &Inspection, findings: &Findings) -> Option<String> {
-        let coverage = findings.coverage;
-        if coverage < self.min_coverage {
-            return Some(format!(
-                "only {:.1} % of the taught surface is resolved, {:.1} % are needed: is the part in place \
-                 and the light on?",
-                coverage * 100.0,
-                self.min_coverage * 100.0
-            ));
+    fn not_judged(&self, inspection: &Inspection, findings: &Findings) -> Option<Reason> {
+        if findings.coverage < self.min_coverage {
+            let words = self.unresolved(findings.coverage);
+            return Some(Reason {
+                code: NOT_THE_PART,
+                words: format!(
+                    "{words}, in the light that it was taught in: is it the part that was taught, and in place?"
+                ),
+            });
         }
-        let lies = inspection.placement.as_ref();
-        let off = findings
-            .placed
-            .as_ref()
-            .is_some_and(|placed| self.is_off(placed));
-        if let Some(placement) = lies.filter(|_| off) {
-            let [x, y, z, ..] = placement.values.map(Option::unwrap_or_default);
-            return Some(format!(
-                "the part lies up to {:.2} mm off its place ({x:+.2}, {y:+.2}, {z:+.2} mm and turned), {:.2} mm are \
-                 allowed: put it in place",
-                placement.reach_mm, self.tolerance_mm
-            ));
+        let placed = findings.placed.as_ref();
+        if let Some(placed) = placed.filter(|placed| self.is_off(placed)) {
+            return Some(self.off(placed));
         }
-        if self.aligned && lies.is_none() {
-            let words =
-                "too little of the part lies where it was taught to be aligned: is it in place?";
-            return Some(words.into());
+        if self.aligned && placed.is_none() {
+            return Some(Reason {
+                code: NOT_THE_PART,
+                words: "too little of the part lies where it was taught to be aligned: is it the part that was taught, and in place?".into(),
+            });
         }
         let gauges = inspection.gauges.iter();
         let missing: Vec<&str> = gauges
@@ -94,16 +105,94 @@ impl Demands {
             .map(|gauge| &*gauge.name)
             .collect();
         if missing.is_empty() {
-            return self.undecided(inspection);
+            let words = self.undecided(inspection)?;
+            let code = GUARD_BAND;
+            return Some(Reason { code, words });
         }
-        let left_out = match lies.map(Placement::undetermined).as_deref() {
+        let left_out = match inspection
+            .placement
+            .as_ref()
+            .map(Placement::undetermined)
+            .as_deref()
+        {
             None | Some([]) => String::new(),
             Some(names) => format!("; the part's shape does not determine {}", names.join(", ")),
         };
         let missing = missing.join(", ");
-        Some(format!(
-            "gauge {missing} found nothing to measure{left_out}"
-        ))
+        Some(Reason {
+            code: NOT_MEASURED,
+            words: format!("gauge {missing} found nothing to measure{left_out}"),
+        })
+    }
+
+    /// How much of the surface is resolved, and how much is needed.
+    fn unresolved(&self, coverage: f64) -> String {
+        format!(
+            "only {:.1} % of the taught surface is resolved, {:.1} % are needed",
+            coverage * 100.0,
+            self.min_coverage * 100.0
+        )
+    }
+
+    /// Of a part that lies off its place: so far that it is another one, or to be put in place.
+    fn off(&self, placed: &Placed) -> Reason {
+        let [x, y, z, turns @ ..] = placed.motion.values();
+        let degrees = turns
+            .iter()
+            .map(|turn| turn * turn)
+            .sum::<f64>()
+            .sqrt()
+            .to_degrees();
+        let turned = match degrees < LEAST_TURN {
+            true => String::new(),
+            false => format!(", turned by {degrees:.1}°"),
+        };
+        let lies = format!(
+            "lies up to {:.2} mm off its place ({x:+.2}, {y:+.2}, {z:+.2} mm{turned})",
+            placed.reach
+        );
+        let allowed = self.tolerance_mm;
+        match placed.reach > FAR * allowed || placed.outliers > OUTLIERS {
+            true => Reason {
+                code: NOT_THE_PART,
+                words: format!(
+                    "this does not look like the part that was taught, which {lies} if it is there: put that part in place, or load the recipe of this one"
+                ),
+            },
+            false => Reason {
+                code: OUT_OF_PLACE,
+                words: format!("the part {lies}, {allowed:.2} mm are allowed: put it in place"),
+            },
+        }
+    }
+
+    /// Whether the light may be why a part was measured badly: hardly anything of it is seen, or it is much noisier than as taught.
+    pub(super) fn doubts_the_light(inspection: &Inspection) -> bool {
+        inspection.error_code == NOT_THE_PART || fitness(inspection) < UNFIT
+    }
+
+    /// Says what is the matter with the light of a part that was measured badly. One that fails in light as bad as that is not judged.
+    pub(super) fn explain(&self, light: Option<Light>, inspection: &mut Inspection) {
+        let illness = light.and_then(Light::illness);
+        inspection.warnings |= illness.map_or(0, Illness::warning);
+        let coverage = f64::from(inspection.coverage_permille) / 1000.0;
+        let found = match (inspection.error_code, inspection.judged) {
+            (NOT_THE_PART, _) if illness.is_some() && coverage < self.min_coverage => {
+                self.unresolved(coverage)
+            }
+            (0, Verdict::Fail) if fitness(inspection) < ILL => {
+                let noisier = 1.0 / fitness(inspection).max(1e-3);
+                format!("its heights are {noisier:.1} times as noisy as when it was taught")
+            }
+            _ => return,
+        };
+        let cause = illness.map_or_else(
+            || "check light, focus and exposure of the head".into(),
+            Illness::words,
+        );
+        inspection.reason = Some(format!("{found}: {cause}").into());
+        inspection.error_code = illness.map_or(BLURRED, Illness::code);
+        inspection.judged = Verdict::Invalid;
     }
 
     /// Which values lie too close to a limit, and what to do; `None` if none does, or if another one lies outside its limits.
@@ -160,6 +249,11 @@ impl Demands {
             None
         }
     }
+}
+
+/// Taught noise over measured noise of the height.
+fn fitness(inspection: &Inspection) -> f64 {
+    f64::from(inspection.fitness_permille) / 1000.0
 }
 
 /// Whether it is a share below its limit.

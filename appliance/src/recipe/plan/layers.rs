@@ -143,7 +143,7 @@ impl Plan {
     }
 
     /// The modulation of a part whose heights were just computed.
-    fn modulation(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<Modulation>> {
+    pub(super) fn modulation(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<Modulation>> {
         let run = self.runs.get(sequence)?;
         if let Some(pair) = &run.pair {
             let buffers = pair.buffers.lock().unwrap_or_else(PoisonError::into_inner);

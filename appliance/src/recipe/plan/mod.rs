@@ -18,6 +18,7 @@ pub use layers::{Layers, Shown, ShownGauge};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::head::seam;
+use crate::recipe::light::{GoldenLight, Light};
 use crate::recipe::{Conditions, Demands, Recipe, RecipeId, RecipeSequence, SequenceKind};
 use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
@@ -49,6 +50,8 @@ pub struct Plan {
     runs: Vec<Run>,
     /// The buffers of an inspection, allocated once.
     strips: Mutex<Strips>,
+    /// Golden's light, for parts that cannot be judged.
+    golden_light: GoldenLight,
     simulated: bool,
 }
 
@@ -179,6 +182,7 @@ impl Plan {
                 MAX_PATTERN_BYTES >> 20
             ));
         }
+        let golden_light = GoldenLight::of(&arrays, conditions.golden_offset_counts);
         let noise_counts = golden::even_noise(conditions.noise, &arrays);
         let modulation = match two_frames {
             true => std::mem::take(&mut arrays.modulation),
@@ -219,6 +223,7 @@ impl Plan {
             illumination,
             shots,
             runs,
+            golden_light,
             simulated,
         })
     }
@@ -296,13 +301,13 @@ impl Plan {
             let of = (sequence, frames);
             self.run(&mut self.strips(), of, finest, Maps::default(), &mut laps)
         });
-        self.judged(sequence, found, &mut laps)
+        self.judged((sequence, frames), found, &mut laps)
     }
 
-    /// The inspection by the findings of a sequence, or by why there are none.
+    /// The inspection by the findings of the frames of a sequence, or by why there are none.
     fn judged(
         &self,
-        sequence: usize,
+        (sequence, frames): (usize, &[Frame]),
         found: Result<(Findings, Option<f64>), String>,
         laps: &mut Laps,
     ) -> Inspection {
@@ -322,6 +327,10 @@ impl Plan {
                         false => self.demands.step_up(&findings, &inspection),
                     };
                 }
+                if inspection.step_up.is_none() && Demands::doubts_the_light(&inspection) {
+                    let light = self.light(sequence, frames);
+                    self.demands.explain(light, &mut inspection);
+                }
             }
             Err(reason) => {
                 inspection.judged = Verdict::Invalid;
@@ -332,6 +341,14 @@ impl Plan {
         laps.end(Stage::Judgement);
         inspection.stages = laps.stages.clone();
         inspection
+    }
+
+    /// The light of a part from the frames of a sequence; none if the frames do not fit.
+    fn light(&self, sequence: usize, frames: &[Frame]) -> Option<Light> {
+        let full_scale = self.runs.get(sequence)?.production.decoder().full_scale();
+        let modulation = self.modulation(sequence, frames)?;
+        let views: Result<Vec<FrameView<'_>>, _> = frames.iter().map(seam::view).collect();
+        Light::of(&self.golden_light, &views.ok()?, (&modulation, full_scale))
     }
 
     /// The buffers of an inspection.
