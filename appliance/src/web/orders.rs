@@ -1,20 +1,23 @@
 //! Orders to the station: trigger, reset, load and teach.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::{Path, Request as Asked, State};
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::Json;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::body;
+use super::gate;
 use super::problem::Problem;
 use super::site::Site;
 use crate::recipe::replace;
 use crate::station::control::{ERROR_RESET, TRIGGER};
-use crate::station::{ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
+use crate::station::{Client, ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
 
 /// The answer to an accepted order; its progress comes with the events.
 pub(super) type Accepted = (StatusCode, Json<Value>);
@@ -33,26 +36,35 @@ pub(super) fn not_now(what: &str, snapshot: &Snapshot) -> Problem {
 /// Why a trigger was rejected, from the snapshot after it.
 fn rejected(snapshot: &Snapshot) -> Problem {
     let words = snapshot.refusal_words();
-    Problem::busy(format!("trigger: {}", words.unwrap_or_default()))
+    let words = words.unwrap_or_else(|| "another client waits for its turn: try again".into());
+    Problem::busy(format!("trigger: {words}"))
 }
 
 /// A rising edge without a write, so the PLC's registers stay as it wrote them.
-fn edge(site: &Site, rising: u16) -> std::sync::Arc<Snapshot> {
-    let write = ControlWrite::default();
-    site.station.event(Event::Write { write, rising })
+fn edge(site: &Site, rising: u16, headers: &HeaderMap) -> Arc<Snapshot> {
+    let mut session = DefaultHasher::new();
+    gate::token(headers).hash(&mut session);
+    site.station.event(Event::Write {
+        write: ControlWrite::default(),
+        rising,
+        client: Client::Page(session.finish()),
+    })
 }
 
-pub(super) async fn trigger(State(site): State<Site>) -> Result<Accepted, Problem> {
+pub(super) async fn trigger(
+    State(site): State<Site>,
+    headers: HeaderMap,
+) -> Result<Accepted, Problem> {
     let before = site.station.snapshot().triggers;
-    let after = edge(&site, TRIGGER);
+    let after = edge(&site, TRIGGER, &headers);
     if after.triggers == before {
         return Err(rejected(&after));
     }
     Ok(accepted())
 }
 
-pub(super) async fn reset(State(site): State<Site>) -> Accepted {
-    edge(&site, ERROR_RESET);
+pub(super) async fn reset(State(site): State<Site>, headers: HeaderMap) -> Accepted {
+    edge(&site, ERROR_RESET, &headers);
     accepted()
 }
 
