@@ -53,6 +53,7 @@ mod rooms;
 mod sequences;
 mod service;
 mod shared_recordings;
+mod shares;
 mod shiny;
 mod shown;
 mod simulated_board;
