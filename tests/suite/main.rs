@@ -35,6 +35,7 @@ mod licences;
 mod light;
 mod limits;
 mod measured;
+mod messages;
 mod one_click;
 mod outputs;
 mod page;
