@@ -301,6 +301,7 @@ impl Worker {
             let result = match error {
                 LoadError::Unknown(_) => RecipeResult::Unknown,
                 LoadError::Corrupt { .. } => RecipeResult::Corrupt,
+                LoadError::Unfit { .. } | LoadError::Shared { .. } => RecipeResult::Unfit,
             };
             (result, error.to_string())
         };
@@ -341,7 +342,7 @@ impl Worker {
             .map_err(|error| {
                 let message = error.to_string();
                 self.lost = Some(error).filter(recovery::is_lost);
-                (RecipeResult::Corrupt, message)
+                (RecipeResult::Unfit, message)
             })?;
         Ok((plan, fallback))
     }
@@ -349,8 +350,10 @@ impl Worker {
 
 fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
     let result = match error {
-        PlanError::OtherCalibration { .. } => RecipeResult::OtherCalibration,
-        PlanError::Unfit { .. } => RecipeResult::Corrupt,
+        PlanError::OtherCalibration { .. } | PlanError::OtherHead { .. } => {
+            RecipeResult::OtherCalibration
+        }
+        PlanError::Unfit { .. } => RecipeResult::Unfit,
     };
     (result, error.to_string())
 }
@@ -374,7 +377,7 @@ fn broken(panic: &(dyn Any + Send)) -> (RecipeResult, String) {
          with the diagnostic bundle",
         said.unwrap_or("the log has more")
     );
-    (RecipeResult::Corrupt, message)
+    (RecipeResult::Unfit, message)
 }
 
 fn active(plan: &Plan) -> ActiveRecipe {

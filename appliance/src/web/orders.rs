@@ -162,18 +162,30 @@ pub(super) async fn teach(
         replace: may_replace,
         keep_gauges,
     } = body::json_if_any(request.into_body()).await?;
-    site.change(move |site| match (may_replace, keep_gauges) {
-        (false, true) => Err(Problem::unfit(
-            "teach: keep_gauges needs replace: the gauges of the recipe that is replaced stay",
-        )),
-        (false, false) => {
-            let instead = "send {\"replace\": true} to replace it";
-            replace::refuse_taken(&site.recipes, number, instead).map_err(Problem::busy)
+    site.change(move |site| {
+        let replaced = site.recipes.present(number);
+        match (may_replace, keep_gauges) {
+            (false, true) => {
+                return Err(Problem::unfit(
+                    "teach: keep_gauges needs replace: the gauges of the recipe that is replaced stay",
+                ));
+            }
+            (false, false) => {
+                let words = (
+                    "teach",
+                    "send {\"replace\": true} to replace it",
+                    "teach number",
+                );
+                replace::refuse_taken(&site.recipes, number, words).map_err(Problem::busy)?;
+            }
+            (true, true) if replaced.is_none() => {
+                return Err(Problem::missing(replace::no_gauges(number)));
+            }
+            (true, _) => {}
         }
-        (true, _) if keep_gauges && site.recipes.present(number).is_none() => {
-            Err(Problem::missing(replace::no_gauges(number)))
-        }
-        (true, _) => Ok(()),
+        let part_number = replace::naming(number, replaced.as_ref()).part_number;
+        let shared = site.recipes.refuse_shared(number, &part_number);
+        shared.map_err(|words| Problem::busy(format!("teach: {words}")))
     })
     .await?;
     let order = Request::Teach {

@@ -5,6 +5,7 @@ mod golden;
 mod judge;
 mod layers;
 mod patterns;
+mod refused;
 mod rendered;
 mod run;
 mod trial;
@@ -12,13 +13,16 @@ mod window;
 
 pub use arriving::Arriving;
 pub use layers::{Layers, Shown, ShownGauge};
+pub use refused::PlanError;
 
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::head::seam;
 use crate::recipe::{Conditions, Demands, Recipe, RecipeId, RecipeSequence, SequenceKind};
 use crate::station::error_code::WRONG_FRAMES;
-use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
+use crate::station::result::flag::{
+    FULL_SEQUENCE, JUDGES_NOTHING, SIMULATED, SINGLE_LEVEL, TWO_LEVELS,
+};
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::HeightRange;
@@ -48,32 +52,6 @@ pub struct Plan {
     /// The buffers of an inspection, allocated once.
     strips: Mutex<Strips>,
     simulated: bool,
-}
-
-/// A recipe that cannot be run on this head.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum PlanError {
-    /// It was made for another calibration.
-    #[error(
-        "recipe {number} was made for calibration {made_for}, this head has {present}: teach it again on \
-         this head"
-    )]
-    OtherCalibration {
-        /// The recipe's number.
-        number: u16,
-        /// First digits of the fingerprint in the recipe.
-        made_for: String,
-        /// First digits of the head's.
-        present: String,
-    },
-    /// Something in it does not fit.
-    #[error("recipe {number}: {reason}")]
-    Unfit {
-        /// The recipe's number.
-        number: u16,
-        /// In words, with the remedy.
-        reason: String,
-    },
 }
 
 /// A frame is inspected in this many strips: enough for four threads, with few rows that two strips both need.
@@ -118,6 +96,8 @@ impl Plan {
         simulated: bool,
     ) -> Result<Self, PlanError> {
         let number = recipe.id.number;
+        refused::same_devices(&recipe.conditions, calibration)
+            .map_err(|reason| PlanError::OtherHead { number, reason })?;
         Self::join(recipe, calibration, simulated)
             .map_err(|reason| PlanError::Unfit { number, reason })
     }
@@ -154,20 +134,7 @@ impl Plan {
             amplitude: std::mem::take(&mut arrays.amplitude),
         };
         arrays.height_curvature = Vec::new();
-        let camera = conditions.camera;
-        if camera != calibration.frames() {
-            return Err(format!(
-                "it is for a camera of {camera:?}, the head's has {:?}: teach it again",
-                calibration.frames()
-            ));
-        }
-        let raster = conditions.raster;
-        if raster != calibration.raster() {
-            return Err(format!(
-                "it is for a projector of {raster:?}, the head's has {:?}: teach it again",
-                calibration.raster()
-            ));
-        }
+        let (camera, raster) = (conditions.camera, conditions.raster);
         let size = (camera.0 as usize, camera.1 as usize);
         let [low, high] = conditions.range_mm;
         let triangulator = calibration.triangulator(function, Some(HeightRange { low, high }));
@@ -336,9 +303,13 @@ impl Plan {
         laps: &mut Laps,
     ) -> Inspection {
         let simulated = if self.simulated { SIMULATED } else { 0 };
+        let nothing = match self.demands.judges_nothing {
+            true => JUDGES_NOTHING,
+            false => 0,
+        };
         let kind = self.runs.get(sequence).map(|run| run.kind);
         let mut inspection = Inspection {
-            flags: kind.map_or(0, sequence_flag) | simulated,
+            flags: kind.map_or(0, sequence_flag) | simulated | nothing,
             ..Inspection::default()
         };
         match found {

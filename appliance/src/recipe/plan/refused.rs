@@ -1,0 +1,61 @@
+//! Why a recipe cannot be run on a head.
+
+use crate::head::calibration::Calibration;
+use crate::recipe::Conditions;
+
+/// A recipe that cannot be run on this head.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum PlanError {
+    /// It was made for another calibration.
+    #[error(
+        "recipe {number} was made for calibration {made_for}, this head has {present}: teach it again on \
+         this head"
+    )]
+    OtherCalibration {
+        /// The recipe's number.
+        number: u16,
+        /// First digits of the fingerprint in the recipe.
+        made_for: String,
+        /// First digits of the head's.
+        present: String,
+    },
+    /// It was made on a head with another camera or projector.
+    #[error("recipe {number} was made on another head: {reason}: teach it again on this head")]
+    OtherHead {
+        /// The recipe's number.
+        number: u16,
+        /// In words.
+        reason: String,
+    },
+    /// Something in it does not fit.
+    #[error("recipe {number}: {reason}")]
+    Unfit {
+        /// The recipe's number.
+        number: u16,
+        /// In words, with the remedy.
+        reason: String,
+    },
+}
+
+/// Checks that camera and projector have the size that the recipe was made for.
+///
+/// # Errors
+/// In words: which of them has not.
+pub(super) fn same_devices(
+    conditions: &Conditions,
+    calibration: &Calibration,
+) -> Result<(), String> {
+    let (camera, here) = (conditions.camera, calibration.frames());
+    if camera != here {
+        return Err(format!(
+            "it is for a camera of {camera:?}, this head's has {here:?}"
+        ));
+    }
+    let (raster, here) = (conditions.raster, calibration.raster());
+    match raster == here {
+        true => Ok(()),
+        false => Err(format!(
+            "it is for a projector of {raster:?}, this head's has {here:?}"
+        )),
+    }
+}
