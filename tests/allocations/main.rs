@@ -50,7 +50,12 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
     let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
     let mut file = taught.manifest.clone();
+    file.judges_nothing = true;
     file.gauges = gauges(&file.regions[0].name);
+    let mut other = file.regions[0].clone();
+    other.name = "other".into();
+    other.polygon[0][0] += 1.0;
+    file.regions.push(other);
     let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).unwrap();
     let plan = Plan::new(Recipe::from_bytes(&bytes).unwrap(), &calibration, true).unwrap();
     head.load(plan.rasters(&calibration).unwrap()).unwrap();
@@ -98,7 +103,7 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     assert!(publishing.count_total <= PUBLISHING, "{publishing:?}");
 }
 
-/// One gauge of every kind, all in one region.
+/// One gauge of every kind, all in one region; the step is from the region "other".
 fn gauges(region: &str) -> Vec<GaugeFile> {
     let smoothing_px = 5;
     let kinds = [
@@ -111,7 +116,7 @@ fn gauges(region: &str) -> Vec<GaugeFile> {
         GaugeKind::Coverage,
         GaugeKind::MeanHeight,
         GaugeKind::Step {
-            from: region.into(),
+            from: "other".into(),
         },
         GaugeKind::Flatness { smoothing_px },
         GaugeKind::PeakToValley { smoothing_px },

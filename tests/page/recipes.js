@@ -68,6 +68,32 @@ export async function recipes({ page, step, verdict, trigger }) {
     assert.deepEqual(versions[2], versions[0]);
   });
 
+  await step("a file whose number is taken asks where it goes, and replaces nothing unasked", async () => {
+    await open();
+    const before = await recipe(1);
+    const bytes = await page.evaluate(async () => Array.from(new Uint8Array(await (await fetch("/api/recipes/1/file")).arrayBuffer())));
+    const undo = async () => {
+      const button = page.locator("#recipe-rows tr.before button").first();
+      const [, wanted] = /\(([0-9a-f]{8}),/.exec(await button.textContent());
+      await button.click();
+      await active({ fingerprint: wanted });
+      await page.waitForFunction((digits) => !document.querySelector("#recipe-rows tr.before").textContent.includes(digits), wanted);
+    };
+    await undo();
+    const other = await recipe(1);
+    await page.setInputFiles("#import-file", { name: "1.recipe", mimeType: "application/zip", buffer: Buffer.from(bytes) });
+    await page.click("#import button");
+    await page.waitForSelector("#question:not([hidden])");
+    assert.ok((await page.textContent("#question-words")).includes(`Recipe 1 is ${other.name} with`));
+    const choices = await page.locator("#question-choices button").allTextContents();
+    assert.deepEqual(choices, ["Import as recipe 2", "Replace recipe 1", "Cancel"]);
+    await page.keyboard.press("Escape");
+    await page.waitForSelector("#question", { state: "hidden" });
+    assert.equal((await recipe(1)).fingerprint, other.fingerprint);
+    await undo();
+    assert.deepEqual(await recipe(1), before);
+  });
+
   await step("a recipe is deleted after a question, not while it is active, and comes back", async () => {
     await rows.first().locator("button:has-text('Delete')").click();
     await notice("load another recipe first");

@@ -239,6 +239,20 @@ fn models_made_with_opencv_are_imported_and_stay() {
     check(&scenario, &first);
     let from = first["calibration"]["models_from"].as_str().unwrap();
     assert!(from.contains("camera.yml") && from.contains("projector.yml"));
+    // To another file: the station's calibration stays.
+    let stored = fs::read(folder.path().join("state/calibration/calibration.json")).unwrap();
+    let out = folder.path().join("elsewhere.json");
+    let to = ["--unit", "m", "--out", out.to_str().unwrap()];
+    with(&to).succeeded();
+    let elsewhere: Value = serde_json::from_slice(&fs::read(&out).unwrap()).unwrap();
+    assert_eq!(
+        elsewhere["fingerprint"],
+        first["calibration"]["fingerprint"]
+    );
+    assert_eq!(
+        fs::read(folder.path().join("state/calibration/calibration.json")).unwrap(),
+        stored
+    );
     let again = calibrated(folder.path(), &scenario, &[]);
     for key in ["camera", "projector", "models_from", "fingerprint"] {
         assert_eq!(

@@ -89,7 +89,12 @@ pub(crate) fn regions(plate: [[f64; 2]; 4], bead: [[f64; 2]; 4]) -> Vec<RegionFi
 }
 
 pub(crate) fn plan(bed: &Bed, file: &RecipeFile, arrays: &Arrays) -> Plan {
-    let (bytes, _) = pack(file, arrays).unwrap();
+    let limited = |gauge: &GaugeFile| gauge.low.is_some() || gauge.high.is_some();
+    let file = RecipeFile {
+        judges_nothing: !file.gauges.iter().any(limited),
+        ..file.clone()
+    };
+    let (bytes, _) = pack(&file, arrays).unwrap();
     Plan::new(Recipe::from_bytes(&bytes).unwrap(), &bed.calibration, true).unwrap()
 }
 

@@ -220,7 +220,8 @@ fn recipes_are_listed_exported_imported_and_deleted_and_nothing_damaged_or_forei
     let only = &listed["recipes"][0];
     assert_eq!(
         (&only["number"], &only["previous"]),
-        (&1.into(), &true.into())
+        (&1.into(), &false.into()),
+        "the same recipe again takes no previous generation's place"
     );
     assert_eq!(only["bytes"], exported.len());
     assert!(recipe(&["list"]).succeeded().stdout.contains("PART-0001"));

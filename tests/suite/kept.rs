@@ -101,8 +101,9 @@ fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_delete
             gauge.retain(|key, _| key != "low" && key != "high");
         }
         let fingerprint = &recipe["fingerprint"];
-        let edit =
-            serde_json::json!({ "fingerprint": fingerprint, "gauges": gauges, "name": name });
+        let edit = serde_json::json!({
+            "fingerprint": fingerprint, "gauges": gauges, "name": name, "judges_nothing": true,
+        });
         let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
         assert_eq!(status, 200, "{answer}");
         browser.wait_for_another(fingerprint.as_str().unwrap());

@@ -1,9 +1,11 @@
-//! Two clients change the same recipe at the same time: no change is lost whose answer was success.
+//! Two clients at the same time: no change of a recipe is lost whose answer was success, and none of two that trigger is starved.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, Place};
+use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY};
 use serde_json::{Value, json};
 use std::sync::Barrier;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 const ROUNDS: usize = 60;
 const DONE: u16 = 200;
@@ -79,7 +81,7 @@ fn an_edit_does_not_undo_an_import_that_came_while_it_was_made() {
                 rename(&mut editor, &base, "edited").0
             });
             together.wait();
-            let (status, answer) = importer.ask("POST", "/api/recipes", &imported);
+            let (status, answer) = importer.ask("POST", "/api/recipes?replace=true", &imported);
             assert_eq!(status, 201, "{}", String::from_utf8_lossy(&answer));
             edit.join().unwrap()
         });
@@ -89,4 +91,43 @@ fn an_edit_does_not_undo_an_import_that_came_while_it_was_made() {
         assert_eq!(editor.get("/api/recipes/1")["name"], name, "round {round}");
     }
     println!("{conflicts} of {} edits came too late", ROUNDS / 2);
+}
+
+/// Triggers until `ended`, asking for the status so many times in between; returns how many were accepted. Tokens begin at `first`.
+fn trigger(daemon: &Daemon, first: u16, asks: usize, ended: &AtomicBool) -> u32 {
+    let mut plc = Plc::connect(daemon);
+    let mut accepted = 0;
+    let mut token = first;
+    while !ended.load(Ordering::Relaxed) {
+        if plc.write_and_read_status(1, &[token]).last_token() == token {
+            accepted += 1;
+            token += 1;
+        }
+        for _ in 0..asks {
+            plc.status();
+        }
+    }
+    accepted
+}
+
+#[test]
+fn of_two_clients_that_trigger_without_a_pause_each_is_granted_in_turn() {
+    /// Cycles of both, and the least of each.
+    const CYCLES: u32 = 60;
+    const LEAST: u32 = CYCLES / 3;
+    let place = Place::new();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    let before = plc.wait("READY", |status| status.has(READY)).triggers();
+    let ended = AtomicBool::new(false);
+    let (fast, slow) = std::thread::scope(|scope| {
+        let fast = scope.spawn(|| trigger(&daemon, 1, 0, &ended));
+        let slow = scope.spawn(|| trigger(&daemon, 30_000, 20, &ended));
+        let began = Instant::now();
+        while plc.status().triggers() - before < CYCLES && began.elapsed() < PATIENCE {}
+        ended.store(true, Ordering::Relaxed);
+        (fast.join().unwrap(), slow.join().unwrap())
+    });
+    println!("{fast} of the fast client, {slow} of the slow one");
+    assert!(fast >= LEAST && slow >= LEAST, "{fast} {slow}");
 }

@@ -3,6 +3,7 @@
 use super::Tally;
 use crate::head::calibration::Calibration;
 use crate::recipe::archive::{members, pack, parse, seal};
+use crate::recipe::exchange::Destination;
 use crate::recipe::golden::Naming;
 use crate::recipe::plan::Plan;
 use crate::recipe::teach::teach;
@@ -90,12 +91,17 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
         r#"{ "kind": "out_of_tolerance", "smoothing_px": 3, "tolerance_mm": 0.1 }"#,
         r#"{ "kind": "volume", "above_mm": 8.0 }"#,
         r#"{ "kind": "flatness", "smoothing_px": 4 }"#,
-        r#"{ "kind": "step", "from": "frame" }"#,
+        r#"{ "kind": "step", "from": "other" }"#,
         r#"{ "kind": "tilt", "about": "x" }"#,
         r#"{ "kind": "placement", "component": "about_z" }"#,
     ];
-    for kind in kinds {
+    let mut other = full.regions[0].clone();
+    other.name = "other".into();
+    other.polygon[0][0] += 1.0;
+    full.regions.push(other);
+    for (at, kind) in kinds.into_iter().enumerate() {
         let mut gauge = full.gauges[0].clone();
+        gauge.name = format!("kind {at}");
         gauge.measures = serde_json::from_str(kind).unwrap();
         (gauge.low, gauge.high) = (Some(-0.5), Some(0.5));
         if gauge.measures.unit() == crate::station::Unit::Share {
@@ -216,7 +222,7 @@ fn a_recipe_is_tried_out_on_the_head_before_it_is_taken() {
     let import = |bytes: &[u8]| {
         std::fs::write(&arriving, bytes).unwrap();
         store
-            .import(&arriving, try_out)
+            .import(&arriving, Destination::default(), "replace it", try_out)
             .map_err(|error| error.to_string())
     };
     let changed = |change: fn(&mut RecipeFile)| {

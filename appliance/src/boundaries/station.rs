@@ -9,7 +9,7 @@ use crate::recipe::archive::pack;
 use crate::service::{Caller, Daemon};
 use crate::station::snapshot::status;
 use crate::station::{
-    ActiveRecipe, ControlWrite, Effect, Event, Identity, Limits, Masked, Micros, RecipeKey,
+    ActiveRecipe, Client, ControlWrite, Effect, Event, Identity, Limits, Masked, Micros, RecipeKey,
     Request, Settings, Station, StationHandle, error_code,
 };
 use crate::system::progress::Progress;
@@ -68,6 +68,7 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
     let write = Event::Write {
         write: online,
         rising: 0,
+        client: Client::default(),
     };
     daemon.station.event(write);
     let load = Request::Load(RecipeKey::Number(2));

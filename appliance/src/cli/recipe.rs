@@ -8,7 +8,7 @@ use super::numbers::number;
 use super::options::{Files, Json, Quiet};
 use crate::error::{Exit, Failure};
 use crate::production::backend;
-use crate::recipe::exchange::Listed;
+use crate::recipe::exchange::{Destination, Listed};
 use crate::recipe::plan::Plan;
 use crate::recipe::{ChangeError, LoadError, Store};
 use crate::station::control::MAX_RECIPE;
@@ -33,10 +33,16 @@ pub enum RecipeCommand {
         #[arg(value_parser = names::file("recipe"))]
         file: PathBuf,
     },
-    /// Take a recipe from a file; the one of the same number stays as the previous generation.
+    /// Take a recipe from a file.
     Import {
         /// The file.
         file: PathBuf,
+        /// Store it under this number instead of the one in the file.
+        #[arg(long, value_parser = number(1, MAX_RECIPE))]
+        number: Option<u16>,
+        /// Replace the recipe that has this number; it stays as the previous generation, `fringed recipe undo` brings it back.
+        #[arg(long)]
+        replace: bool,
         #[command(flatten)]
         files: Files,
         #[command(flatten)]
@@ -80,7 +86,13 @@ impl RecipeCommand {
                 recipe.quiet.say(words);
                 Ok(())
             }
-            Self::Import { file, files, quiet } => {
+            Self::Import {
+                file,
+                number,
+                replace,
+                files,
+                quiet,
+            } => {
                 let store = store(files)?;
                 let head = files.head(&files.configuration()?);
                 let calibration = backend::calibration(&head)?;
@@ -88,12 +100,19 @@ impl RecipeCommand {
                     let tried = Plan::try_out(recipe, &calibration);
                     tried.map_err(|error| error.to_string())
                 };
-                let imported = store.import(file, fits)?;
-                let digits = imported.fingerprint.get(..8).unwrap_or_default();
+                let to = Destination {
+                    number: *number,
+                    replace: *replace,
+                };
+                let imported = store.import(file, to, "add --replace", fits)?;
+                let id = &imported.id;
+                let digits = id.fingerprint.get(..8).unwrap_or_default();
+                let note = imported.note();
+                let note = note.map_or_else(String::new, |note| format!(": {note}"));
                 quiet.say(|| {
                     format!(
-                        "imported recipe {} ({}), fingerprint {digits}",
-                        imported.number, imported.name
+                        "imported recipe {} ({}), fingerprint {digits}{note}",
+                        id.number, id.name
                     )
                 });
                 Ok(())
@@ -110,7 +129,11 @@ impl RecipeCommand {
             Self::Undo(recipe) => {
                 let number = recipe.number;
                 let state = at_rest(&recipe.files, "Undo")?;
-                let file = Store::of_state(&state)?.undo(number)?;
+                let head = recipe.files.head(&recipe.files.configuration()?);
+                let calibration = backend::calibration(&head).ok();
+                let calibration = calibration.map(|calibration| calibration.fingerprint());
+                let store = Store::of_state(&state)?;
+                let file = store.undo(number, calibration.as_deref())?;
                 let digits = file.fingerprint.get(..8).unwrap_or_default();
                 recipe.quiet.say(|| {
                     format!(
@@ -145,10 +168,12 @@ impl From<ChangeError> for Failure {
             ChangeError::Load(LoadError::Unknown(_))
             | ChangeError::Nothing(_)
             | ChangeError::Missing { .. } => Exit::Missing,
-            ChangeError::Load(LoadError::Corrupt { .. })
-            | ChangeError::Outdated(_)
-            | ChangeError::Unfit(_) => Exit::Content,
-            ChangeError::Store(_) | ChangeError::Write { .. } => Exit::CannotCreate,
+            ChangeError::Load(_) | ChangeError::Outdated(_) | ChangeError::Unfit(_) => {
+                Exit::Content
+            }
+            ChangeError::Store(_) | ChangeError::Write { .. } | ChangeError::Taken { .. } => {
+                Exit::CannotCreate
+            }
         };
         Self::new(exit, error.to_string())
     }

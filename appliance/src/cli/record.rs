@@ -1,12 +1,16 @@
-//! `fringed record DIR`: a sequence from the configured head as a recording.
+//! `fringed record DIR [--recipe FILE]`: a sequence from the configured head as a recording.
 
 use super::names;
 use super::numbers::number;
 use super::options::{Files, Quiet, Threads};
+use super::part::SimulatedPart;
 use crate::error::{Exit, Failure};
 use crate::head::scan::take;
 use crate::head::seam;
+use crate::history::kept;
 use crate::production::backend::{self, Opened};
+use crate::recipe::Recipe;
+use crate::recipe::plan::Plan;
 use algo::pattern::{PhaseFunction, Sequence};
 use hal::bounds::MAX_FRINGES;
 use hal::replay::Recording;
@@ -15,12 +19,15 @@ use hal::replay::recording::PatternSpec;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Record a geometric sequence of vertical fringes.
+/// Record a geometric sequence of vertical fringes, or what a recipe projects first.
 #[derive(Debug, clap::Args)]
 pub struct Record {
     /// Folder for the recording; must not exist yet.
     #[arg(value_parser = names::folder())]
     folder: PathBuf,
+    /// Record the sequence for production of this recipe file, for `measure --recipe`.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["fringes", "levels", "steps"])]
+    recipe: Option<PathBuf>,
     /// Fringes over the projector's width; without it, one per 12 pixels.
     #[arg(long, value_name = "N", value_parser = number(1e-3, MAX_FRINGES))]
     fringes: Option<f64>,
@@ -31,6 +38,8 @@ pub struct Record {
     #[arg(long, default_value_t = 4, value_parser = number(3u8, 64))]
     steps: u8,
     #[command(flatten)]
+    part: SimulatedPart,
+    #[command(flatten)]
     files: Files,
     #[command(flatten)]
     threads: Threads,
@@ -38,6 +47,8 @@ pub struct Record {
     quiet: Quiet,
 }
 
+/// Frames of the fringe and its complement.
+const PAIR: usize = 2;
 /// Longest wait for one frame.
 const TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -45,17 +56,22 @@ impl Record {
     /// Opens the head, takes the sequence and writes it.
     ///
     /// # Errors
-    /// If the head cannot be opened, the pattern cannot be shown, or the folder cannot be written.
+    /// If the recipe cannot be read or does not fit the head, the head cannot be opened, the pattern cannot be shown, or the folder cannot
+    /// be written.
     pub fn run(&self) -> Result<(), Failure> {
-        let config = self.files.configuration()?;
+        let mut config = self.files.configuration()?;
+        config.head.part = self.part.placed(&config.head)?;
+        let recipe = self.recipe.as_deref().map(kept::read).transpose()?;
         let progress = self.quiet.progress();
         let on_progress =
             |share: f64| progress.tell(0.8 * share, "working out the light of the scene");
         let pool = self.threads.pool(config.threads)?;
         let mut opened = pool.install(|| backend::open(&self.files.head(&config), &on_progress))?;
         opened.calibrated()?;
-        let taken = self.take(&mut opened, &|share| {
-            progress.tell(0.8 + 0.2 * share, "recording")
+        let on_progress = |share: f64| progress.tell(0.8 + 0.2 * share, "recording");
+        let taken = pool.install(|| match recipe {
+            Some(recipe) => take_of_recipe(&mut opened, recipe, &on_progress),
+            None => self.take(&mut opened, &on_progress),
         });
         progress.clear();
         opened.dark.iter().for_each(|words| progress.warn(words));
@@ -83,20 +99,61 @@ impl Record {
         let shots = Sequence::geometric(function.range(), levels, steps);
         let taken = take(head, calibration, &function, &shots, TIMEOUT, on_progress)?;
         let recorded = shots.into_iter().zip(taken);
-        let truth = stage.as_ref().map(sim::Stage::truth);
-        Ok(Recording {
+        let recording = Recording {
             description: format!("{levels} levels of {steps} shifts, {fringes} vertical fringes"),
-            source: match stage {
-                Some(_) => "fringed's simulated head".into(),
-                None => "a head of fringed".into(),
-            },
             patterns: vec![PatternSpec::Vertical { fringes }],
             frames: recorded
                 .map(|(shot, frame)| seam::recorded(shot, frame))
                 .collect(),
-            truth_height: truth.as_ref().map(|truth| truth.height.clone()),
-            truth_class: truth.map(|truth| truth.class),
             ..calibration.recording()
-        })
+        };
+        Ok(of_head(recording, stage.as_ref()))
+    }
+}
+
+/// Takes the sequence for production of a recipe. Two frames alone have no phase, so the sequence behind them is taken.
+fn take_of_recipe(
+    opened: &mut Opened,
+    recipe: Recipe,
+    on_progress: &dyn Fn(f64),
+) -> Result<Recording, Failure> {
+    let Opened {
+        head,
+        calibration,
+        stage,
+        ..
+    } = opened;
+    let number = recipe.id.number;
+    // It may have been taught from a recording, which does not have the whole calibration.
+    let plan = Plan::again(recipe, calibration, stage.is_some())
+        .map_err(|error| Failure::new(Exit::Content, format!("record: {error}")))?;
+    let mut sequences = 0..plan.sequence_count();
+    let sequence = sequences.find(|&sequence| plan.indices(sequence).len() > PAIR);
+    let sequence = sequence.unwrap_or_default();
+    plan.load(head, calibration)?;
+    let indices = plan.indices(sequence);
+    let mut frames = Vec::with_capacity(indices.len());
+    head.acquire(indices, TIMEOUT, &mut |_, frame| {
+        frames.push(frame);
+        on_progress(frames.len() as f64 / indices.len() as f64);
+    })?;
+    let recording = Recording {
+        description: format!("{} frames of recipe {number}", frames.len()),
+        ..plan.recording(sequence, &frames, calibration)
+    };
+    Ok(of_head(recording, stage.as_ref()))
+}
+
+/// Says where a recording comes from, and of a simulated part what is true.
+fn of_head(recording: Recording, stage: Option<&sim::Stage>) -> Recording {
+    let truth = stage.map(sim::Stage::truth);
+    Recording {
+        source: match stage {
+            Some(_) => "fringed's simulated head".into(),
+            None => "a head of fringed".into(),
+        },
+        truth_height: truth.as_ref().map(|truth| truth.height.clone()),
+        truth_class: truth.map(|truth| truth.class),
+        ..recording
     }
 }

@@ -3,6 +3,7 @@
 use super::names;
 use super::numbers::number;
 use super::options::Measuring;
+use super::part::SimulatedPart;
 use crate::config::Config;
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
@@ -66,6 +67,8 @@ pub struct Teach {
     #[arg(long, value_name = "FILE.recipe", value_parser = names::file("recipe"))]
     out: Option<PathBuf>,
     #[command(flatten)]
+    part: SimulatedPart,
+    #[command(flatten)]
     measuring: Measuring,
 }
 
@@ -121,7 +124,16 @@ impl Teach {
     /// If the part cannot be taught, the number is taken, or the recipe cannot be stored; a recipe stored before is unchanged.
     pub fn run(&self) -> Result<(), Failure> {
         let options = &self.measuring;
-        let config = options.files.configuration()?;
+        let mut config = options.files.configuration()?;
+        let part = self.part.placed(&config.head)?;
+        if let Some(golden) = self.golden.as_ref().filter(|_| part.is_some()) {
+            let words = format!(
+                "teach from {}: a recording has its own part: leave out --golden, or the part's options",
+                golden.display()
+            );
+            return Err(Failure::new(Exit::Usage, words));
+        }
+        config.head.part = part;
         // Opened before anything is measured, and locked until the recipe is stored.
         let target = match &self.out {
             Some(out) => Target::File(out),
@@ -131,11 +143,19 @@ impl Teach {
                 "use *Recipes*, *Teach* on its page",
             )?),
         };
-        let replaced = match &target {
+        let recipes = match &target {
             Target::File(_) => None,
-            Target::State(state) => self.replaced(&Store::of_state(state)?)?,
+            Target::State(state) => Some(Store::of_state(state)?),
+        };
+        let replaced = match &recipes {
+            Some(recipes) => self.replaced(recipes)?,
+            None => None,
         };
         let naming = self.naming(replaced.as_ref());
+        if let Some(recipes) = &recipes {
+            let shared = recipes.refuse_shared(self.number, &naming.part_number);
+            shared.map_err(|words| Failure::new(Exit::CannotCreate, format!("teach: {words}")))?;
+        }
         let pool = options.threads.pool(config.threads)?;
         let taught = match &self.golden {
             Some(golden) => pool.install(|| self.teach_recordings(golden, &naming))?,
@@ -181,7 +201,8 @@ impl Teach {
     fn replaced(&self, recipes: &Store) -> Result<Option<RecipeFile>, Failure> {
         let number = self.number;
         if !self.replace {
-            replace::refuse_taken(recipes, number, "add --replace (and --keep-gauges)")
+            let words = ("teach", "add --replace (and --keep-gauges)", "teach number");
+            replace::refuse_taken(recipes, number, words)
                 .map_err(|words| Failure::new(Exit::CannotCreate, words))?;
         }
         let replaced = recipes.present(number);

@@ -11,7 +11,7 @@ use crate::head::calibration::place::IN_STATE;
 use crate::head::commission::Commissioning;
 use crate::head::exposing::Exposing;
 use crate::head::placed::Placed;
-use hal::bounds::{length, shortened, text, within};
+use hal::bounds::{clipped, length, shortened, text, within};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
@@ -87,6 +87,7 @@ pub struct StationConfig {
 #[serde(default, deny_unknown_fields)]
 pub struct ModbusConfig {
     /// Address and port.
+    #[serde(deserialize_with = "listen")]
     pub listen: SocketAddr,
     /// Order of the words of 32- and 64-bit values.
     pub word_order: WordOrder,
@@ -111,11 +112,23 @@ pub enum WordOrder {
     Swapped,
 }
 
+/// Reads an address with its port; the parser's own message does not say that the port is missing.
+fn listen<'a, D: serde::Deserializer<'a>>(source: D) -> Result<SocketAddr, D::Error> {
+    let text = String::deserialize(source)?;
+    text.parse().map_err(|_| {
+        serde::de::Error::custom(format!(
+            "listen = {:?} is no address with a port: write both, as 127.0.0.1:8080",
+            clipped(&text)
+        ))
+    })
+}
+
 /// The page.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct HttpConfig {
     /// Address and port.
+    #[serde(deserialize_with = "listen")]
     pub listen: SocketAddr,
     /// Host names of the page, besides IP addresses and localhost.
     pub hosts: Vec<String>,
@@ -333,6 +346,10 @@ mod tests {
             ("[modbus]\nconnections = 1", "modbus.connections"),
             ("[head]\nbackend = \"replay\"", "head.recordings"),
             ("[modbus]\nlisten = \"nowhere\"", "listen"),
+            (
+                "[http]\nlisten = \"192.168.1.5\"",
+                "write both, as 127.0.0.1:8080",
+            ),
             ("[head.camera]\nexposure_us = 0", "head.camera.exposure_us"),
             ("[head.camera]\nperiod_us = 9", "head.camera.period_us"),
             ("[head.camera]\ngain = nan", "head.camera.gain"),

@@ -205,13 +205,16 @@ const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
 /// The bit of a decision that follows from σ.
 const DOUBTFUL: u16 = 1 << 4;
 
-/// A replayed gauge as far as it can be compared with the stored one: older programs have stored no square; still older ones no
-/// uncertainty, and their σ of extremes was another one.
+/// A replayed gauge as far as it can be compared with the stored one: older programs have stored no square, and 0 for a σ that is not
+/// known; still older ones no uncertainty, and their σ of extremes was another one.
 fn comparable(stored: &GaugeEntry, replayed: &GaugeEntry) -> GaugeEntry {
-    let replayed = GaugeEntry {
+    let mut replayed = GaugeEntry {
         square: stored.square.and(replayed.square),
         ..replayed.clone()
     };
+    if stored.sigma == Some(0.0) && replayed.sigma.is_none() {
+        (replayed.sigma, replayed.uncertainty) = (stored.sigma, stored.uncertainty);
+    }
     if !is_older(stored) {
         return replayed;
     }

@@ -129,7 +129,9 @@ impl Kept {
 pub fn missing(error: &LoadError) -> Failure {
     let exit = match error {
         LoadError::Unknown(_) => Exit::Missing,
-        LoadError::Corrupt { .. } => Exit::Content,
+        LoadError::Corrupt { .. } | LoadError::Unfit { .. } | LoadError::Shared { .. } => {
+            Exit::Content
+        }
     };
     Failure::new(exit, format!("{error}; or name its file with --recipe"))
 }

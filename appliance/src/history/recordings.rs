@@ -5,15 +5,13 @@
 //! the store or another recording has it, counts once towards the quota, and goes with its last link.
 
 use crate::head::calibration::Calibration;
-use crate::head::seam;
 use crate::recipe::plan::Plan;
-use crate::recipe::{PatternFile, Store, archive};
+use crate::recipe::{Store, archive};
 use crate::station::{ResultRecord, Verdict};
 use crate::storage::folder::{name_also, rename_whole};
 use hal::frame::Frame;
 use hal::replay::Recording;
 use hal::replay::recorder::{self, RecorderError};
-use hal::replay::recording::{PatternSpec, RecipeReference};
 use std::collections::{BTreeMap, VecDeque};
 use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
@@ -217,8 +215,6 @@ fn recording(part: &JudgedPart) -> Recording {
         plan,
         calibration,
     } = part;
-    let (id, conditions) = (plan.id(), plan.conditions());
-    let shown = plan.shots(*sequence).zip(frames);
     Recording {
         description: format!(
             "result {}, recipe {}, {}",
@@ -227,35 +223,8 @@ fn recording(part: &JudgedPart) -> Recording {
             record.verdict.word()
         ),
         source: "kept by fringed".into(),
-        patterns: vec![pattern(plan)],
-        frames: shown
-            .map(|(shot, frame)| seam::recorded(shot, frame.clone()))
-            .collect(),
-        range_mm: Some(conditions.range_mm),
-        exposure_us: conditions
-            .exposing
-            .map(|set| f64::from(set.exposure_us) * f64::from(conditions.exposures)),
         part_id: Some(record.part_id.to_string()),
-        recipe: Some(RecipeReference {
-            number: u32::from(id.number),
-            fingerprint: id.fingerprint.clone(),
-        }),
-        ..calibration.recording()
-    }
-}
-
-fn pattern(plan: &Plan) -> PatternSpec {
-    match plan.conditions().pattern {
-        PatternFile::Vertical { fringes } => PatternSpec::Vertical { fringes },
-        PatternFile::Horizontal { fringes } => PatternSpec::Horizontal { fringes },
-        PatternFile::File => {
-            let function = plan.production().triangulator().function();
-            PatternSpec::File {
-                rows: function.rows(),
-                columns: function.columns(),
-                turns: function.turns(),
-            }
-        }
+        ..plan.recording(*sequence, frames, calibration)
     }
 }
 

@@ -10,7 +10,7 @@ pub use signals::{Follower, Signals};
 use crate::error::Failure;
 use crate::production::backend::Wires;
 use crate::station::control::TRIGGER;
-use crate::station::{ControlWrite, Event, StationHandle};
+use crate::station::{Client, ControlWrite, Event, StationHandle};
 use crate::system::progress::Progress;
 use crate::system::runtime;
 use hal::clock::monotonic;
@@ -124,7 +124,11 @@ impl Wires {
         while start.poll_start()?.is_some() {
             // An edge without a write: the registers of the PLC stay as it wrote them.
             let (write, rising) = (ControlWrite::default(), TRIGGER);
-            station.event(Event::Write { write, rising });
+            station.event(Event::Write {
+                write,
+                rising,
+                client: Client::Line,
+            });
         }
         Ok(())
     }

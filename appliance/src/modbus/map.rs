@@ -131,7 +131,7 @@ macro_rules! registers {
 registers! {
     control CONTROL 0..=31, true, now: Snapshot {
         0 CONTROL Bits x 1 = now.control.control, "0 ONLINE request, 1 TRIGGER edge, 2 RESULT_ACK edge, 3 RECIPE_LOAD edge, 4 ERROR_RESET edge, 5 ABORT edge, 6 BUFFERED mode, 7 TEACH edge, 8-15 must be 0";
-        1 TRIGGER_TOKEN U16 x 1 = now.control.token, "a write that changes it to a non-zero value triggers; echoed at 116 and 202";
+        1 TRIGGER_TOKEN U16 x 1 = now.control.token, "a write of a value other than 0 and LAST_TOKEN triggers; echoed at 116 and 202";
         2 RECIPE_SELECT U16 x 1 = now.control.recipe_select, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER; a trigger is accepted only if it is the active recipe, or 0";
         3 PLC_HEARTBEAT U16 x 1 = now.control.plc_heartbeat, "any changing value; stale for longer than plc_timeout sets a warning bit";
         4 PART_ID U32 x 1 = now.control.part_id, "the piece's serial, latched at the trigger, returned with the result";
@@ -147,7 +147,7 @@ registers! {
         105 ACTIVE_RECIPE U16 x 1 = now.active().unwrap_or(0), "number of the active recipe, 0 none";
         106 RECIPE_CRC32 U32 x 1 = now.recipe.as_ref().map_or(0, |recipe| recipe.crc), "first 32 bits of the active recipe's fingerprint";
         108 REQUESTED_RECIPE U16 x 1 = now.requested_recipe, "number of the last requested recipe";
-        109 RECIPE_RESULT U16 x 1 = now.recipe_result.number(), "0 ok, 1 unknown, 2 corrupt, 3 made for another calibration, 4 busy";
+        109 RECIPE_RESULT U16 x 1 = now.recipe_result.number(), "0 ok, 1 unknown, 2 damaged, 3 made for another head or calibration, 4 busy, 5 cannot be used as it is stored";
         110 TRIGGERS U32 x 1 = now.triggers, "accepted triggers since the start";
         112 RESULT_SEQ U32 x 1 = now.result_seq, "last completed result; continues across restarts";
         114 MISSED U32 x 1 = now.missed, "rejected triggers since the start";
@@ -172,13 +172,13 @@ registers! {
         218 EXPOSURE_TIME U32 x 1 = record.exposure_us, "us, trigger to exposure done";
         220 TOTAL_TIME U32 x 1 = record.total_us, "us, trigger to result";
         222 VALID_POINTS U32 x 1 = record.inspection.valid_points, "resolved pixels";
-        224 COVERAGE U16 x 1 = record.inspection.coverage_permille, "per mille of the regions";
+        224 COVERAGE U16 x 1 = record.inspection.coverage_permille, "per mille of the taught surface that is resolved, as min_coverage of the recipe; a gauge of the coverage is of its region";
         225 TEMPERATURE I16 x 1 = tenths(record.inspection.temperature_c), "head, 0.1 degC, 0x8000 not known";
         226 HEIGHT_NOISE U16 x 1 = saturated_u16(record.inspection.height_noise_mm * 10_000.0), "0.1 um, 1 sigma, from the measured modulation";
         227 GAUGE_COUNT U16 x 1 = record.inspection.gauges.len() as u16, "0-16";
         228 PRESS_STROKE U32 x 1 = record.press_stroke, "as latched at the trigger";
         230 FITNESS U16 x 1 = record.inspection.fitness_permille, "per mille, 1000 = pattern as taught";
-        231 FLAGS Bits x 1 = record.flags(), "0 a pattern was retried, 1 single level used, 2 two levels used, 3 full sequence used, 4 stepped up from a shorter one, 5 simulated head, 6 warm-up, 7 at least one doubtful decision";
+        231 FLAGS Bits x 1 = record.flags(), "0 a pattern was retried, 1 single level used, 2 two levels used, 3 full sequence used, 4 stepped up from a shorter one, 5 simulated head, 6 warm-up, 7 at least one doubtful decision, 8 the recipe judges nothing: no gauge has a limit that a part can miss";
         232 GAUGE_STEPS I32 x 16 = gauges(record, INVALID_I32, |gauge| i32_steps(measured(gauge, gauge.value), gauge.unit.steps())), "value in the unit's step: length 0.1 um, angle 0.0001 deg, volume 0.01 mm3, share 0.1 per mille; saturates at +-(2^31-1), 0x80000000 invalid";
         264 GAUGE_VALUE F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.value))), "the same in mm, deg, mm3, share 0-1; NaN (0x7FC00000) invalid";
         296 GAUGE_DECISION Bits x 16 = gauges(record, 0, |gauge| gauge.decision.bits()), "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma); 1 and 4 without 0, 2, 3: inside its limits, but nearer to one than the recipe's guard band";

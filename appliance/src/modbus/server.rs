@@ -3,6 +3,7 @@
 use std::future::Future;
 use std::net::{IpAddr, SocketAddr};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use tokio::net::{TcpListener, TcpStream};
@@ -13,7 +14,7 @@ use super::places::Clients;
 use super::refusals::{Refusals, Refused};
 use super::service::{FrameFlaw, PlcService};
 use crate::config::ModbusConfig;
-use crate::station::{ConnectionEdges, StationHandle};
+use crate::station::{Client, ConnectionEdges, StationHandle};
 use crate::system::socket::holds;
 
 /// The server's settings.
@@ -47,6 +48,7 @@ pub async fn serve(
     shutdown: impl Future<Output = ()>,
 ) {
     let server = Server::new(listener);
+    let connections = AtomicU64::new(0);
     let admit = |peer: IpAddr| {
         if !holds(&options.config.readers, peer) {
             refusals.note(Refused::Connection, peer);
@@ -61,6 +63,7 @@ pub async fn serve(
     };
     let on_connected = |stream: TcpStream, peer: SocketAddr| {
         let connection = admit(peer.ip()).map(|(place, may_write)| {
+            let number = connections.fetch_add(1, Ordering::Relaxed);
             // Nagle's algorithm would delay the small answers. If it cannot be switched off the connection still works.
             let _ = stream.set_nodelay(true);
             let flaw = FrameFlaw::default();
@@ -69,7 +72,7 @@ pub async fn serve(
                 word_order: options.config.word_order,
                 strict_unit_id: options.config.strict_unit_id,
                 flaw: flaw.clone(),
-                edges: Mutex::new(ConnectionEdges::default()),
+                edges: Mutex::new(ConnectionEdges::of(Client::Plc(number))),
                 peer: peer.ip(),
                 may_write,
                 refusals: refusals.clone(),

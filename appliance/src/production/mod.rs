@@ -323,6 +323,7 @@ impl Worker {
             let result = match error {
                 LoadError::Unknown(_) => RecipeResult::Unknown,
                 LoadError::Corrupt { .. } => RecipeResult::Corrupt,
+                LoadError::Unfit { .. } | LoadError::Shared { .. } => RecipeResult::Unfit,
             };
             (result, error.to_string())
         };
@@ -364,7 +365,7 @@ impl Worker {
             .map_err(|error| {
                 let message = error.to_string();
                 self.lost = Some(error).filter(recovery::is_lost);
-                (RecipeResult::Corrupt, message)
+                (RecipeResult::Unfit, message)
             })?;
         Ok((plan, fallback))
     }
@@ -372,10 +373,10 @@ impl Worker {
 
 fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
     let result = match error {
-        PlanError::OtherCalibration { .. } | PlanError::OtherExposing { .. } => {
-            RecipeResult::OtherCalibration
-        }
-        PlanError::Unfit { .. } => RecipeResult::Corrupt,
+        PlanError::OtherCalibration { .. }
+        | PlanError::OtherExposing { .. }
+        | PlanError::OtherHead { .. } => RecipeResult::OtherCalibration,
+        PlanError::Unfit { .. } => RecipeResult::Unfit,
     };
     (result, error.to_string())
 }
@@ -399,7 +400,7 @@ fn broken(panic: &(dyn Any + Send)) -> (RecipeResult, String) {
          with the diagnostic bundle",
         said.unwrap_or("the log has more")
     );
-    (RecipeResult::Corrupt, message)
+    (RecipeResult::Unfit, message)
 }
 
 fn active(plan: &Plan) -> ActiveRecipe {

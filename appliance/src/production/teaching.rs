@@ -69,6 +69,8 @@ impl Worker {
             replace::check_kept(file, (width, height)).map_err(TeachError::Rig)?;
         }
         let naming = replace::naming(number, replaced);
+        let shared = self.recipes.refuse_shared(number, &naming.part_number);
+        shared.map_err(TeachError::Rig)?;
         let (station, bar, aborts) = (&self.station, &self.progress, &self.aborts);
         let (pulse, computing) = (&self.pulse, &self.computing);
         let progress = |fraction: f64, words: &str| {

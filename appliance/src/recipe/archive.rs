@@ -169,28 +169,52 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
     }
 }
 
-/// Whether the content agrees with the fingerprint, read through a small buffer.
+/// Whether it is a recipe that this program reads, and its content agrees with the fingerprint; read through a small buffer.
 pub fn is_sound(source: impl Read + Seek) -> bool {
+    agrees(source, |text| Some(parse(text).ok()?.fingerprint))
+}
+
+/// Whether the content agrees with the fingerprint that the manifest states, whatever else that says: it is not damaged.
+pub(super) fn is_undamaged(source: impl Read + Seek) -> bool {
+    #[derive(serde::Deserialize)]
+    struct Stated {
+        fingerprint: String,
+    }
+    agrees(source, |text| {
+        Some(serde_json::from_str::<Stated>(text).ok()?.fingerprint)
+    })
+}
+
+fn agrees(source: impl Read + Seek, stated: impl FnOnce(&str) -> Option<String>) -> bool {
     let computed = || -> Option<bool> {
         let mut zip = Members::open(source, MAX_MEMBERS).ok()?;
-        let (file, zeroed) = read_manifest(&mut zip).ok()?;
-        let mut hash = Fingerprint::new(zeroed.as_bytes());
+        let text = manifest_text(&mut zip).ok()?;
+        let fingerprint = stated(&text)?;
+        let mut hash = Fingerprint::new(zeroed(&text, &fingerprint).as_bytes());
         for name in arrays_of(&zip) {
             hash.stream(&name, zip.member(&name).ok()?).ok()?;
         }
-        Some(hash.finish() == file.fingerprint)
+        Some(hash.finish() == fingerprint)
     };
     computed() == Some(true)
 }
 
 /// The manifest, and its text with the fingerprint replaced by zeros.
 fn read_manifest(zip: &mut Members<impl Read + Seek>) -> Result<(RecipeFile, String), String> {
+    let text = manifest_text(zip)?;
+    let file = parse(&text)?;
+    let zeroed = zeroed(&text, &file.fingerprint);
+    Ok((file, zeroed))
+}
+
+fn manifest_text(zip: &mut Members<impl Read + Seek>) -> Result<String, String> {
     let text = zip.content(MANIFEST, MAX_MANIFEST);
     let text = text.map_err(|error| broken(format!("{MANIFEST}: {error}")))?;
-    let text = String::from_utf8(text).map_err(broken)?;
-    let file = parse(&text)?;
-    let zeroed = text.replacen(&file.fingerprint, NO_FINGERPRINT, 1);
-    Ok((file, zeroed))
+    String::from_utf8(text).map_err(broken)
+}
+
+fn zeroed(manifest: &str, fingerprint: &str) -> String {
+    manifest.replacen(fingerprint, NO_FINGERPRINT, 1)
 }
 
 /// The names of all members but the manifest, in order.
@@ -305,4 +329,31 @@ pub fn short(fingerprint: &str) -> u32 {
         .get(..8)
         .and_then(|digits| u32::from_str_radix(digits, 16).ok())
         .unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fingerprint_is_computed_as_the_documentation_says() {
+        let manifest = format!("{{\"fingerprint\": \"{NO_FINGERPRINT}\"}}");
+        let members = || vec![("b.npy", b"second".to_vec()), ("a.npy", b"first".to_vec())];
+        let (_, fingerprint) = seal(&manifest, members()).unwrap();
+        // docs/formats.md: of each member, recipe.json first and the others by name, the length of its name, its name, the number of
+        // its bytes, its bytes.
+        let all = [
+            ("recipe.json", manifest.as_bytes()),
+            ("a.npy", b"first"),
+            ("b.npy", b"second"),
+        ];
+        let mut bytes = Vec::new();
+        for (name, content) in all {
+            for part in [name.as_bytes(), content] {
+                bytes.extend((part.len() as u64).to_le_bytes());
+                bytes.extend(part);
+            }
+        }
+        assert_eq!(fingerprint, hex(&Sha256::digest(&bytes)));
+    }
 }

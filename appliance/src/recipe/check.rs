@@ -3,7 +3,7 @@
 use super::archive::{Arrays, short, unpack};
 use super::demands::Demands;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
-use super::gauge::{check_limits, gauges};
+use super::gauge::gauges;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
@@ -126,11 +126,11 @@ impl Recipe {
     /// As above.
     pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, String> {
         let (file, recipe) = Self::read_to_edit(source, size)?;
-        check_limits(&file.gauges).map_err(|error| format!("{error}: change the limits"))?;
+        file.check_judging()?;
         Ok(recipe)
     }
 
-    /// As [`Self::read`], with the manifest and without checking the limits of gauges: an edit may be about to correct them.
+    /// As [`Self::read`], with the manifest and without checking whether it can judge: an edit may be about to correct them.
     ///
     /// # Errors
     /// As above.
@@ -144,12 +144,12 @@ impl Recipe {
         Ok((file, recipe))
     }
 
-    /// Checks that manifest and arrays fit each other, and the limits of the gauges.
+    /// Checks that manifest and arrays fit each other, and that the recipe can judge.
     ///
     /// # Errors
     /// In words: what does not fit.
     pub fn check(file: &RecipeFile, arrays: Arrays) -> Result<Self, String> {
-        check_limits(&file.gauges)?;
+        file.check_judging()?;
         Self::fit(file, arrays)
     }
 

@@ -15,6 +15,8 @@ pub struct Demands {
     pub(super) tolerance_mm: f64,
     /// Guard bands are this many times u wide.
     pub(super) guard_k: f64,
+    /// Whether no part can fail: the result says so.
+    pub(super) judges_nothing: bool,
     /// Whether the part's motion is found and taken back before it is gauged.
     pub(super) aligned: bool,
 }
@@ -41,6 +43,7 @@ impl From<&RecipeFile> for Demands {
             min_coverage: file.min_coverage,
             tolerance_mm: file.placement_tolerance_mm,
             guard_k: file.guard_k,
+            judges_nothing: file.judges_nothing,
             aligned: file.alignment == AlignmentKind::Rigid,
         }
     }

@@ -2,11 +2,11 @@
 
 use super::bounds::LONGEST_NAME;
 use super::golden::TaughtRecipe;
+use super::judging::check_unique;
 use super::store::LoadedRecipe;
 use super::{ChangeError, GaugeFile, Recipe, RegionFile, Store};
 use hal::bounds::clipped;
 use serde::Deserialize;
-use std::collections::HashSet;
 
 /// A change to a recipe; what is `None` stays as it is.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -22,14 +22,27 @@ pub struct Edit {
     pub min_coverage: Option<f64>,
     /// Width of the guard bands, in multiples of u.
     pub guard_k: Option<f64>,
+    /// Whether the recipe may be without any limit. One that has limits then judges all the same.
+    pub judges_nothing: Option<bool>,
     /// All regions.
     pub regions: Option<Vec<RegionFile>>,
     /// All gauges.
     pub gauges: Option<Vec<GaugeFile>>,
 }
 
+/// A stored change.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Edited {
+    /// The new fingerprint.
+    pub fingerprint: String,
+    /// What was changed, in words.
+    pub changed: String,
+    /// The gauges that a PLC finds in other slots now, in words; `None` if there are none.
+    pub other_slots: Option<String>,
+}
+
 /// Changes a stored recipe; what was stored before stays as the previous generation. `fits` tries the changed recipe on the
-/// head and says in words why it cannot be used there. Returns the new fingerprint.
+/// head and says in words why it cannot be used there.
 ///
 /// # Errors
 /// The recipe cannot be read, was changed since, would not be usable, or cannot be stored.
@@ -38,27 +51,34 @@ pub fn edit(
     number: u16,
     edit: Edit,
     fits: impl FnOnce(Recipe) -> Result<(), String>,
-) -> Result<String, ChangeError> {
+) -> Result<Edited, ChangeError> {
     let LoadedRecipe {
         mut file, recipe, ..
     } = store.load_to_edit(number)?;
+    let before = file.clone();
     if file.fingerprint != edit.fingerprint {
         return Err(ChangeError::Outdated(number));
     }
     file.name = edit.name.map_or(file.name, |name| name.trim().to_owned());
-    file.part_number = edit.part_number.unwrap_or(file.part_number);
+    if let Some(part_number) = edit.part_number {
+        let shared = store.refuse_shared(number, &part_number);
+        shared.map_err(ChangeError::Unfit)?;
+        file.part_number = part_number;
+    }
     file.min_coverage = edit.min_coverage.unwrap_or(file.min_coverage);
     file.guard_k = edit.guard_k.unwrap_or(file.guard_k);
     file.regions = edit.regions.unwrap_or(file.regions);
-    let before = std::mem::take(&mut file.gauges);
-    file.gauges = edit.gauges.unwrap_or_else(|| before.clone());
+    file.gauges = edit.gauges.unwrap_or(file.gauges);
+    // Limits that are added end it.
+    file.judges_nothing =
+        edit.judges_nothing.unwrap_or(file.judges_nothing) && file.is_without_limits();
     // Of gauges that were changed nothing is known.
     let of = |gauges: &[GaugeFile], name: &str| {
         let gauge = gauges.iter().find(|gauge| gauge.name == name);
         gauge.cloned()
     };
     file.tried
-        .retain(|tried| of(&before, &tried.gauge) == of(&file.gauges, &tried.gauge));
+        .retain(|tried| of(&before.gauges, &tried.gauge) == of(&file.gauges, &tried.gauge));
     let regions = file.regions.iter().map(|region| &region.name);
     let gauges = file.gauges.iter().map(|gauge| &gauge.name);
     check_names("region", regions)?;
@@ -69,15 +89,21 @@ pub fn edit(
     fits(changed.recipe).map_err(ChangeError::Unfit)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
     match store.replace(number, &edit.fingerprint, &changed.bytes) {
-        Ok(true) => Ok(changed.manifest.fingerprint),
+        Ok(true) => Ok(Edited {
+            changed: changed.manifest.differences(&before),
+            other_slots: changed.manifest.other_slots(&before),
+            fingerprint: changed.manifest.fingerprint,
+        }),
         Ok(false) => Err(ChangeError::Outdated(number)),
         Err(error) => Err(ChangeError::Store(error)),
     }
 }
 
-fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> Result<(), ChangeError> {
-    let mut seen = HashSet::new();
-    for name in names {
+fn check_names<'a>(
+    what: &str,
+    names: impl Iterator<Item = &'a String> + Clone,
+) -> Result<(), ChangeError> {
+    for name in names.clone() {
         let length = name.chars().count();
         if name.trim().is_empty() || length > LONGEST_NAME {
             let words = format!(
@@ -86,10 +112,6 @@ fn check_names<'a>(what: &str, names: impl Iterator<Item = &'a String>) -> Resul
             );
             return Err(ChangeError::Unfit(words));
         }
-        if !seen.insert(name) {
-            let words = format!("two of them are called {name:?}: give each {what} its own name");
-            return Err(ChangeError::Unfit(words));
-        }
     }
-    Ok(())
+    check_unique(what, names).map_err(ChangeError::Unfit)
 }

@@ -1,10 +1,12 @@
-//! Lists, exports and imports stored recipes. A file is imported only if it is whole and can be used on this head.
+//! Lists, exports and imports stored recipes. A file is imported only if it is whole, and replaces a recipe only on request.
 
 use super::archive::{self, broken};
-use super::store::{ChangeError, LoadError, Store, is_sound, write};
+use super::incoming::Incoming;
+use super::replace::refuse_taken;
+use super::store::{ChangeError, LoadError, Store, is_sound, manifest_at, write};
 use super::{Recipe, RecipeFile, RecipeId, SequenceKind};
 use crate::storage::folder::copy_whole;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -38,6 +40,53 @@ pub struct Listed {
     pub previous: bool,
     /// Why the newest generation cannot be read.
     pub problem: Option<String>,
+}
+
+/// Where an imported recipe goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Destination {
+    /// The number that it gets; none: the one in the file.
+    pub number: Option<u16>,
+    /// The recipe that has the number may be replaced; it stays as the previous generation.
+    pub replace: bool,
+}
+
+/// An imported recipe.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Imported {
+    /// What it is called now.
+    pub id: RecipeId,
+    /// Fingerprint of the recipe that it replaces.
+    pub replaced: Option<String>,
+    /// The recipe whose part number it had, which it was stored without.
+    pub without_part_number_of: Option<u16>,
+}
+
+impl Imported {
+    /// What was changed, in words.
+    pub fn changed(&self) -> String {
+        let RecipeId {
+            number,
+            name,
+            fingerprint,
+            ..
+        } = &self.id;
+        let replaced = match &self.replaced {
+            Some(before) => format!(" in place of {before:.8}"),
+            None => String::new(),
+        };
+        format!("recipe {number} ({name}), fingerprint {fingerprint:.8}{replaced}")
+    }
+
+    /// What is not as in the file, in words.
+    pub fn note(&self) -> Option<String> {
+        self.without_part_number_of.map(|other| {
+            format!(
+                "it has no part number, because recipe {other} has the one of the file: edit it"
+            )
+        })
+    }
 }
 
 impl Store {
@@ -91,17 +140,19 @@ impl Store {
         }
     }
 
-    /// Imports a recipe from a file under the number in its manifest; the recipe with this number before stays as the previous
-    /// generation. `fits` tries the recipe on the head and says in words why it cannot be used there.
+    /// Imports a recipe from a file; one that is replaced stays as the previous generation. `fits` tries the recipe on the head and
+    /// says in words why it cannot be used there.
     ///
     /// # Errors
-    /// If the file is not a whole recipe, of a newer version, or does not fit the head, or if the store cannot be written. The
-    /// store is then unchanged.
+    /// If the file is not a whole recipe, of a newer version, or does not fit the head; if the number is taken and not to be replaced,
+    /// with `replace` as the remedy; or if the store cannot be written. The store is then unchanged.
     pub fn import(
         &self,
         source: &Path,
+        to: Destination,
+        replace: &str,
         fits: impl FnOnce(Recipe) -> Result<(), String>,
-    ) -> Result<RecipeId, ChangeError> {
+    ) -> Result<Imported, ChangeError> {
         let refused = |reason| ChangeError::Unfit(format!("import {}: {reason}", source.display()));
         let missing = |error| ChangeError::Missing {
             path: source.to_path_buf(),
@@ -116,10 +167,73 @@ impl Store {
         let recipe = incoming.recipe().map_err(&refused)?;
         let id = recipe.id.clone();
         fits(recipe).map_err(&refused)?;
-        let target = self.path(id.number);
-        let taken = self.take_locked(incoming, id.number);
-        taken.map_err(write(&target))?;
-        Ok(id)
+        self.take_locked(incoming, id, to, replace)
+    }
+
+    /// Stores a received recipe, which was checked and has this `id`; one that is replaced stays as the previous generation.
+    ///
+    /// # Errors
+    /// If the number is taken and not to be replaced, with `replace` as the remedy, another recipe has the part number, or the store
+    /// cannot be written. The store is then unchanged.
+    pub fn take(
+        &self,
+        incoming: Incoming,
+        id: RecipeId,
+        to: Destination,
+        replace: &str,
+    ) -> Result<Imported, ChangeError> {
+        let _alone = self.lock().map_err(write(&self.folder))?;
+        self.take_locked(incoming, id, to, replace)
+    }
+
+    fn take_locked(
+        &self,
+        incoming: Incoming,
+        mut id: RecipeId,
+        to: Destination,
+        replace: &str,
+    ) -> Result<Imported, ChangeError> {
+        let number = to.number.unwrap_or(id.number);
+        let path = self.path(number);
+        let replaced = self.present(number).map(|file| file.fingerprint);
+        let whole = |id, replaced| Imported {
+            id,
+            replaced,
+            without_part_number_of: None,
+        };
+        // Stored again, it would take the place of the previous generation.
+        if manifest_at(&path).is_some_and(|file| file.fingerprint == id.fingerprint)
+            && is_sound(&path)
+        {
+            return Ok(whole(id, None));
+        }
+        if !to.replace {
+            let words = ("import", replace, "import it as number");
+            let refused = refuse_taken(self, number, words);
+            refused.map_err(|words| ChangeError::Taken { number, words })?;
+        }
+        if number == id.number {
+            let shared = self.refuse_shared(number, &id.part_number);
+            shared.map_err(|words| ChangeError::Unfit(format!("import: {words}")))?;
+            self.put_received(incoming, number).map_err(write(&path))?;
+            return Ok(whole(id, replaced));
+        }
+        // A copy of a recipe does not take its part number from it.
+        let other = self.other_holder(number, &id.part_number);
+        let (mut file, recipe) = incoming.read().map_err(ChangeError::Unfit)?;
+        file.number = number;
+        if other.is_some() {
+            file.part_number.clear();
+        }
+        let packed = archive::pack(&file, &recipe.arrays);
+        let (bytes, fingerprint) = packed.map_err(ChangeError::Unfit)?;
+        self.put(number, &bytes).map_err(write(&path))?;
+        (id.number, id.part_number, id.fingerprint) = (number, file.part_number, fingerprint);
+        Ok(Imported {
+            id,
+            replaced,
+            without_part_number_of: other,
+        })
     }
 }
 

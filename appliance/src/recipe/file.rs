@@ -93,6 +93,9 @@ pub struct RecipeFile {
     /// out, in recipes of older programs.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub guard_k: f64,
+    /// Whether it only measures: no gauge has a limit that a part can miss. Left out if it judges.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub judges_nothing: bool,
     /// Polygons in camera pixels.
     pub regions: Vec<RegionFile>,
     /// At most 16.

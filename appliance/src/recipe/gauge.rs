@@ -167,7 +167,7 @@ impl GaugeFile {
     ///
     /// # Errors
     /// In words, with the gauge's name.
-    fn check_limits(&self) -> Result<(), String> {
+    pub(super) fn check_limits(&self) -> Result<(), String> {
         let Self {
             name,
             measures,
@@ -193,14 +193,16 @@ impl GaugeFile {
             _ => Ok(()),
         }
     }
-}
 
-/// Refuses gauges with limits that no part can keep, or that their units cannot have.
-///
-/// # Errors
-/// In words, with the name of the first such gauge.
-pub(super) fn check_limits(gauges: &[GaugeFile]) -> Result<(), String> {
-    gauges.iter().try_for_each(GaugeFile::check_limits)
+    /// Whether a part can miss one of its limits: those at the ends of what its unit can have are kept by every part.
+    pub(super) fn can_fail(&self) -> bool {
+        let [least, most] = self.measures.unit().range();
+        let least = match self.measures.is_never_negative() {
+            true => 0.0,
+            false => least,
+        };
+        self.low.is_some_and(|low| low > least) || self.high.is_some_and(|high| high < most)
+    }
 }
 
 /// The gauges that are computed, for frames of (width, height) pixels.
@@ -276,7 +278,7 @@ mod tests {
             } else {
                 -most
             };
-            let check = |low, high| check_limits(&[gauge(&kind, low, high)]);
+            let check = |low, high| gauge(&kind, low, high).check_limits();
             for (low, high) in [
                 (None, None),
                 (Some(least), Some(most)),
@@ -304,9 +306,24 @@ mod tests {
             GaugeKind::Flatness { smoothing_px },
             GaugeKind::PeakToValley { smoothing_px },
         ] {
-            assert!(check_limits(&[gauge(&kind, None, Some(-0.1))]).is_err());
-            assert_eq!(check_limits(&[gauge(&kind, Some(-0.1), Some(0.1))]), Ok(()));
+            assert!(gauge(&kind, None, Some(-0.1)).check_limits().is_err());
+            let both = gauge(&kind, Some(-0.1), Some(0.1));
+            assert_eq!(both.check_limits(), Ok(()));
         }
+    }
+
+    #[test]
+    fn a_limit_that_every_part_keeps_cannot_fail() {
+        let coverage = GaugeKind::Coverage;
+        let flatness = GaugeKind::Flatness { smoothing_px: 9 };
+        let can_fail = |kind, low, high| gauge(kind, low, high).can_fail();
+        for kind in [&coverage, &flatness, &GaugeKind::MeanHeight] {
+            assert!(!can_fail(kind, None, None));
+            assert!(can_fail(kind, Some(0.5), None) && can_fail(kind, None, Some(0.5)));
+        }
+        assert!(!can_fail(&coverage, Some(0.0), Some(1.0)));
+        assert!(!can_fail(&flatness, Some(-0.1), None));
+        assert!(can_fail(&GaugeKind::MeanHeight, Some(-0.1), None));
     }
 
     #[test]

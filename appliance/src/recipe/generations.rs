@@ -4,7 +4,6 @@
 //! two generations are being exchanged, a second link to the newest one. A kill between any two renames loses no generation.
 
 use super::RecipeFile;
-use super::gauge::check_limits;
 use super::store::{ChangeError, LoadError, Store, is_sound, manifest_at, write};
 use crate::storage::folder::{name_also, rename_whole, sync_folder_of};
 use std::fs;
@@ -65,12 +64,13 @@ impl Store {
     }
 
     /// Exchanges the newest and the previous generation, or restores a deleted recipe. A second undo reverses the first.
-    /// Returns the manifest of what is now the newest generation.
+    /// `calibration` is the fingerprint of the head's, where it is known: a generation that was made for another one does not take
+    /// the place of one that this head can use. Returns the manifest of what is now the newest generation.
     ///
     /// # Errors
-    /// If there is nothing to restore, it is damaged or made for another calibration than the newest generation, or the files
-    /// cannot be renamed.
-    pub fn undo(&self, number: u16) -> Result<RecipeFile, ChangeError> {
+    /// If there is nothing to restore, it is damaged, was made for another calibration than the head's, or has the part number of
+    /// another recipe, or the files cannot be renamed.
+    pub fn undo(&self, number: u16, calibration: Option<&str>) -> Result<RecipeFile, ChangeError> {
         let _alone = self.lock().map_err(write(&self.folder))?;
         let before = self.before(number).ok_or(ChangeError::Nothing(number))?;
         let unfit = |reason| {
@@ -79,12 +79,14 @@ impl Store {
         };
         let restored = read(&before, number).map_err(unfit)?;
         let (path, previous, kept) = (self.path(number), self.previous(number), self.kept(number));
-        if let Some(newest) = manifest_at(&path)
-            && newest.calibration != restored.calibration
-        {
-            let reason = "was made for another calibration: teach it again";
+        let is_of_head =
+            |file: &RecipeFile| calibration.is_none_or(|head| file.calibration == head);
+        if !is_of_head(&restored) && manifest_at(&path).is_some_and(|newest| is_of_head(&newest)) {
+            let reason = "was made for another head or calibration: teach it again";
             return Err(unfit(reason.into()));
         }
+        let shared = self.refuse_shared(number, &restored.part_number);
+        shared.map_err(|words| ChangeError::Unfit(format!("undo recipe {number}: {words}")))?;
         let rename = |from: &Path, to: &Path| rename_whole(from, to).map_err(write(to));
         if !path.exists() {
             rename(&before, &path)?;
@@ -146,15 +148,17 @@ fn remove(file: &Path) -> io::Result<bool> {
 /// In words: why it cannot be used.
 fn read(path: &Path, number: u16) -> Result<RecipeFile, String> {
     let read = Store::read(path, number).ok_or("is gone: teach the recipe again")?;
-    read.and_then(|(file, _)| check_limits(&file.gauges).map(|()| file))
+    read.and_then(|(file, _)| file.check_judging().map(|()| file))
         .map_err(|reason| format!("cannot be used: {reason}"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recipe::Recipe;
     use crate::recipe::archive::{self, Arrays};
     use serde_json::json;
+    use std::io::Cursor;
 
     /// A small whole recipe.
     fn packed(number: u16, name: &str, calibration: &str) -> Vec<u8> {
@@ -216,7 +220,7 @@ mod tests {
     fn undo_exchanges_the_two_generations_and_undo_again_takes_it_back() {
         let place = Place::with(&["first", "second"]);
         for (newest, before) in [("first", "second"), ("second", "first")] {
-            assert_eq!(place.store.undo(7).unwrap().name, newest);
+            assert_eq!(place.store.undo(7, None).unwrap().name, newest);
             assert_eq!(
                 (place.newest(), place.before()),
                 (newest.into(), Some(before.into()))
@@ -238,9 +242,9 @@ mod tests {
             let undone = done == 2;
             assert_eq!(place.newest() == "first", undone);
             // The next undo finds the other one, and so does the one after it.
-            place.store.undo(7).unwrap();
+            place.store.undo(7, None).unwrap();
             assert_eq!(place.newest() == "first", !undone);
-            place.store.undo(7).unwrap();
+            place.store.undo(7, None).unwrap();
             assert_eq!(place.newest() == "first", undone);
         }
     }
@@ -258,7 +262,7 @@ mod tests {
             place.store.delete(7),
             Err(ChangeError::Load(LoadError::Unknown(_)))
         ));
-        assert_eq!(place.store.undo(7).unwrap().name, "second");
+        assert_eq!(place.store.undo(7, None).unwrap().name, "second");
         assert_eq!(place.newest(), "second");
         assert_eq!(place.store.deleted(), [0; 0]);
     }
@@ -269,7 +273,7 @@ mod tests {
         place.store.delete(7).unwrap();
         place.store.save(7, &packed(7, "second", "c")).unwrap();
         assert_eq!(place.before().unwrap(), "first");
-        place.store.undo(7).unwrap();
+        place.store.undo(7, None).unwrap();
         assert_eq!(
             (place.newest(), place.before()),
             ("first".into(), Some("second".into()))
@@ -283,8 +287,8 @@ mod tests {
     fn a_damaged_newest_generation_is_undone_and_does_not_come_back() {
         let place = Place::with(&["first", "second"]);
         fs::write(place.file(""), "torn").unwrap();
-        assert_eq!(place.store.undo(7).unwrap().name, "first");
-        let refused = place.store.undo(7).unwrap_err();
+        assert_eq!(place.store.undo(7, None).unwrap().name, "first");
+        let refused = place.store.undo(7, None).unwrap_err();
         assert!(refused.to_string().contains("cannot be used"), "{refused}");
         assert_eq!(place.newest(), "first");
         // A deletion keeps the generation that is whole.
@@ -292,24 +296,49 @@ mod tests {
         fs::rename(place.file(".previous"), place.file("")).unwrap();
         fs::rename(place.file(".whole"), place.file(".previous")).unwrap();
         place.store.delete(7).unwrap();
-        assert_eq!(place.store.undo(7).unwrap().name, "first");
+        assert_eq!(place.store.undo(7, None).unwrap().name, "first");
     }
 
     #[test]
-    fn without_a_generation_before_or_for_another_calibration_nothing_is_undone() {
+    fn without_a_generation_before_nothing_is_undone() {
         let place = Place::with(&["first"]);
-        let refused = place.store.undo(7).unwrap_err();
+        let refused = place.store.undo(7, None).unwrap_err();
         assert!(matches!(refused, ChangeError::Nothing(7)), "{refused}");
-        place
-            .store
-            .save(7, &packed(7, "second", "another"))
-            .unwrap();
-        let refused = place.store.undo(7).unwrap_err();
+        assert_eq!(place.newest(), "first");
+    }
+
+    #[test]
+    fn what_this_head_can_use_is_brought_back_over_a_recipe_of_another_head_and_stays_there() {
+        let place = Place::with(&["own"]);
+        let foreign = packed(7, "foreign", "another");
+        place.store.save(7, &foreign).unwrap();
+        assert_eq!(place.store.undo(7, Some("c")).unwrap().name, "own");
+        let refused = place.store.undo(7, Some("c")).unwrap_err();
+        assert!(refused.to_string().contains("another head"), "{refused}");
+        assert_eq!(place.newest(), "own");
+        // Without a head it is not known which of them can be used.
+        assert_eq!(place.store.undo(7, None).unwrap().name, "foreign");
+    }
+
+    #[test]
+    fn a_deleted_recipe_does_not_come_back_with_the_part_number_of_another_one() {
+        let place = Place::with(&[]);
+        let named = |number| {
+            let (mut file, recipe) =
+                Recipe::read_to_edit(Cursor::new(packed(number, "x", "c")), u64::MAX).unwrap();
+            file.part_number = "A-1".into();
+            archive::pack(&file, &recipe.arrays).unwrap().0
+        };
+        place.store.save(7, &named(7)).unwrap();
+        place.store.delete(7).unwrap();
+        place.store.save(8, &named(8)).unwrap();
+        let refused = place.store.undo(7, None).unwrap_err().to_string();
         assert!(
-            refused.to_string().contains("another calibration"),
+            refused.contains("recipe 8 has the part number"),
             "{refused}"
         );
-        assert_eq!(place.newest(), "second");
+        place.store.delete(8).unwrap();
+        assert_eq!(place.store.undo(7, None).unwrap().part_number, "A-1");
     }
 
     #[test]

@@ -208,6 +208,7 @@ impl GoldenPart<'_> {
             calibration_sigma: calibration.sigma,
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,
+            judges_nothing: false,
             guard_k: GUARD_K,
             regions,
             gauges,

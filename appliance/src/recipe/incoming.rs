@@ -2,7 +2,7 @@
 //!
 //! Dropping it removes the file; files that a kill leaves behind are removed at the next start.
 
-use super::{Recipe, Store};
+use super::{Recipe, RecipeFile, Store};
 use crate::station::FULL_STORAGE_MIB;
 use crate::storage::folder::rename_whole;
 use rustix::fs::fstatvfs;
@@ -49,16 +49,8 @@ impl Store {
         }
     }
 
-    /// Stores a received file under a number; the old recipe stays as the previous generation.
-    ///
-    /// # Errors
-    /// Errors of the file system; the stored recipe is then unchanged.
-    pub fn take(&self, incoming: Incoming, number: u16) -> io::Result<()> {
-        let _alone = self.lock()?;
-        self.take_locked(incoming, number)
-    }
-
-    pub(super) fn take_locked(&self, incoming: Incoming, number: u16) -> io::Result<()> {
+    /// Stores a received file under a number; the old recipe stays as the previous generation. The caller holds the lock.
+    pub(super) fn put_received(&self, incoming: Incoming, number: u16) -> io::Result<()> {
         incoming.file.sync_all()?;
         self.keep_previous(number)?;
         rename_whole(&incoming.path, &self.path(number))
@@ -96,6 +88,12 @@ impl Incoming {
         Recipe::read(BufReader::new(file), self.bytes)
     }
 
+    /// The recipe with its manifest, once it was checked.
+    pub(super) fn read(&self) -> Result<(RecipeFile, Recipe), String> {
+        let file = File::open(&self.path).map_err(|error| error.to_string())?;
+        Recipe::read_to_edit(BufReader::new(file), self.bytes)
+    }
+
     /// Checks that `more` bytes leave as much free storage as the station needs.
     fn check_room(&self, more: u64) -> io::Result<()> {
         let storage = fstatvfs(&self.file)?;
@@ -128,7 +126,7 @@ impl Write for Incoming {
 
 impl Drop for Incoming {
     fn drop(&mut self) {
-        // After `take` there is nothing to remove; what cannot be removed now is removed at the next start.
+        // Once it is stored there is nothing to remove; what cannot be removed now is removed at the next start.
         let _ = fs::remove_file(&self.path);
     }
 }
@@ -154,7 +152,7 @@ mod tests {
         store.remove_left_behind().unwrap();
         let mut incoming = store.receive(4).unwrap();
         incoming.write_all(b"some").unwrap();
-        store.take(incoming, 7).unwrap();
+        store.put_received(incoming, 7).unwrap();
         assert_eq!(store.numbers(), [7]);
         // The lock's file beside it.
         assert_eq!(fs::read(store.path(7)).unwrap(), b"some");

@@ -1,6 +1,5 @@
 //! Teaching under a number that is taken: what the new recipe keeps of the one that it replaces.
 
-use super::gauge::check_limits;
 use super::golden::{Naming, TaughtRecipe};
 use super::{RecipeFile, Store};
 
@@ -29,11 +28,16 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
     }
 }
 
-/// Refuses a number that is taken, naming the recipe, how to `replace` it, and a number that is free.
+/// Refuses to `attempt` something under a number that is taken, naming the recipe, how to `replace` it, and a number that is free, after
+/// `instead`.
 ///
 /// # Errors
 /// In words: the number is taken.
-pub fn refuse_taken(recipes: &Store, number: u16, replace: &str) -> Result<(), String> {
+pub fn refuse_taken(
+    recipes: &Store,
+    number: u16,
+    (attempt, replace, instead): (&str, &str, &str),
+) -> Result<(), String> {
     if !recipes.numbers().contains(&number) {
         return Ok(());
     }
@@ -51,9 +55,9 @@ pub fn refuse_taken(recipes: &Store, number: u16, replace: &str) -> Result<(), S
         None => "a file that cannot be read".into(),
     };
     let free = recipes.free();
-    let free = free.map(|free| format!(", or teach number {free}, which is free"));
+    let free = free.map(|free| format!(", or {instead} {free}, which is free"));
     Err(format!(
-        "teach: recipe {number} has {has}: {replace}{}",
+        "{attempt}: recipe {number} has {has}: {replace}{}",
         free.unwrap_or_default()
     ))
 }
@@ -66,11 +70,11 @@ pub fn no_gauges(number: u16) -> String {
 /// Checks that the gauges of a recipe can be kept on a head with frames of (width, height).
 ///
 /// # Errors
-/// In words: the frames have another size (regions are polygons in camera pixels), or a limit is refused.
+/// In words: the frames have another size (regions are polygons in camera pixels), or it cannot judge.
 pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<(), String> {
     let camera = &replaced.camera;
     if (camera.width, camera.height) == (width, height) {
-        return check_limits(&replaced.gauges);
+        return replaced.check_judging();
     }
     Err(format!(
         "the regions of recipe {} are in pixels of frames of {}×{}, this camera has {width}×{height}: teach without its gauges",
@@ -92,6 +96,7 @@ pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<Taught
     check_kept(replaced, (manifest.camera.width, manifest.camera.height))?;
     manifest.regions.clone_from(&replaced.regions);
     manifest.gauges.clone_from(&replaced.gauges);
+    manifest.judges_nothing = replaced.judges_nothing;
     manifest.min_coverage = replaced.min_coverage;
     manifest.guard_k = replaced.guard_k;
     manifest.two_frames = replaced.two_frames;

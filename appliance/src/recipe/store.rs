@@ -1,6 +1,5 @@
 //! The stored recipes of a station: a folder with a file `NNNN.recipe` for each, and its previous generation.
 
-use super::gauge::check_limits;
 use super::{Recipe, RecipeFile, archive};
 use crate::error::{Exit, Failure};
 use crate::storage::folder::write_whole;
@@ -21,13 +20,31 @@ pub enum LoadError {
     /// There is no such recipe.
     #[error("there is no recipe {0}: teach or import it")]
     Unknown(String),
-    /// No generation can be used.
+    /// No generation can be used, and the newer one is damaged.
     #[error("recipe file {path}: {reason}", path = path.display())]
     Corrupt {
         /// The newer file.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
+    },
+    /// The newer generation is not damaged, and cannot be used.
+    #[error("recipe file {path}: {reason}", path = path.display())]
+    Unfit {
+        /// The newer file.
+        path: PathBuf,
+        /// Why, with the remedy.
+        reason: String,
+    },
+    /// Several recipes have the part number, so it selects none of them.
+    #[error(
+        "recipes {numbers:?} have the part number {part_number:?}: give each its own on the page (Recipes, Edit)"
+    )]
+    Shared {
+        /// The part number.
+        part_number: String,
+        /// Their numbers.
+        numbers: Vec<u16>,
     },
 }
 
@@ -42,6 +59,14 @@ pub enum ChangeError {
         "undo recipe {0}: no previous generation of it is stored, and it was not deleted: teach or import it"
     )]
     Nothing(u16),
+    /// The number has a recipe, which is not to be replaced without being asked for: in words, with the remedy.
+    #[error("{words}")]
+    Taken {
+        /// The number.
+        number: u16,
+        /// What it has, how to replace it, and a number that is free.
+        words: String,
+    },
     /// Another change was stored since the recipe that is edited was read.
     #[error(
         "recipe {0} was changed or deleted by somebody else: load it again and repeat the change"
@@ -172,7 +197,7 @@ impl Store {
         Ok(stored)
     }
 
-    fn put(&self, number: u16, bytes: &[u8]) -> io::Result<()> {
+    pub(super) fn put(&self, number: u16, bytes: &[u8]) -> io::Result<()> {
         self.keep_previous(number)?;
         write_whole(&self.path(number), bytes)
     }
@@ -196,15 +221,15 @@ impl Store {
     /// why.
     ///
     /// # Errors
-    /// If there is none, no generation can be used, or a gauge has limits that it cannot have. The previous generation is not used
-    /// in the last case: it may judge by other limits.
+    /// If there is none, no generation can be used, or the recipe cannot judge. The previous generation is not used in the last case:
+    /// it may judge by other limits.
     pub fn load(&self, number: u16) -> Result<LoadedRecipe, LoadError> {
         let loaded = self.load_to_edit(number)?;
-        refuse_limits(&self.path(number), &loaded.file)?;
+        refuse_judging(&self.path(number), &loaded.file)?;
         Ok(loaded)
     }
 
-    /// As [`Self::load`] without checking the limits of gauges: an edit may be about to correct them.
+    /// As [`Self::load`] without checking whether the recipe can judge: an edit may be about to correct it.
     ///
     /// # Errors
     /// If there is none, or no generation can be used.
@@ -231,6 +256,7 @@ impl Store {
             }),
             _ => match reason {
                 None => Err(LoadError::Unknown(number.to_string())),
+                Some(reason) if is_undamaged(&path) => Err(LoadError::Unfit { path, reason }),
                 Some(reason) => Err(LoadError::Corrupt { path, reason }),
             },
         }
@@ -250,7 +276,7 @@ impl Store {
             let digits = fingerprint.get(..8).unwrap_or(fingerprint);
             LoadError::Unknown(format!("{number} with fingerprint {digits}"))
         })?;
-        refuse_limits(path, &file)?;
+        refuse_judging(path, &file)?;
         Ok(recipe)
     }
 
@@ -304,18 +330,53 @@ impl Store {
     /// The number of the recipe taught for a part number.
     ///
     /// # Errors
-    /// If no recipe has it.
+    /// If no recipe has it, or several have.
     pub fn find(&self, part_number: &str) -> Result<u16, LoadError> {
-        let unknown = || LoadError::Unknown(format!("for part number {part_number:?}"));
-        if part_number.is_empty() {
-            return Err(unknown());
+        let numbers = self.holders(part_number);
+        let part_number = part_number.to_owned();
+        match *numbers {
+            [number] => Ok(number),
+            [] => Err(LoadError::Unknown(format!(
+                "for part number {part_number:?}"
+            ))),
+            _ => Err(LoadError::Shared {
+                part_number,
+                numbers,
+            }),
         }
-        self.numbers()
-            .into_iter()
-            .find(|&number| {
-                manifest_at(&self.path(number)).is_some_and(|file| file.part_number == part_number)
-            })
-            .ok_or_else(unknown)
+    }
+
+    /// The numbers of the recipes that have this part number, in order; none have an empty one.
+    fn holders(&self, part_number: &str) -> Vec<u16> {
+        let mut numbers = self.numbers();
+        numbers.retain(|&number| {
+            let file = manifest_at(&self.path(number)).filter(|_| !part_number.is_empty());
+            file.is_some_and(|file| file.part_number == part_number)
+        });
+        numbers
+    }
+
+    /// Refuses to give a recipe a part number that another one has: a PLC selects by it. A recipe may keep the one that it has.
+    ///
+    /// # Errors
+    /// In words: which recipe has it, with the remedy.
+    pub fn refuse_shared(&self, number: u16, part_number: &str) -> Result<(), String> {
+        match self.other_holder(number, part_number) {
+            None => Ok(()),
+            Some(other) => Err(format!(
+                "recipe {other} has the part number {part_number:?}, by which a PLC selects: give one of them another part number, or \
+                 delete recipe {other}"
+            )),
+        }
+    }
+
+    /// The recipe that has a part number which recipe `number` does not have; `None` if it may have it.
+    pub(super) fn other_holder(&self, number: u16, part_number: &str) -> Option<u16> {
+        let holders = self.holders(part_number);
+        match holders.contains(&number) {
+            true => None,
+            false => holders.first().copied(),
+        }
     }
 
     /// The numbers of all stored recipes, in order.
@@ -350,10 +411,15 @@ pub(super) fn is_sound(path: &Path) -> bool {
     fs::File::open(path).is_ok_and(|file| archive::is_sound(io::BufReader::new(file)))
 }
 
-/// Refuses a stored recipe whose gauges have limits that they cannot have.
-fn refuse_limits(path: &Path, file: &RecipeFile) -> Result<(), LoadError> {
-    check_limits(&file.gauges).map_err(|reason| LoadError::Corrupt {
+/// Whether the content of a recipe's file agrees with the fingerprint that it states, even if it cannot be used.
+fn is_undamaged(path: &Path) -> bool {
+    fs::File::open(path).is_ok_and(|file| archive::is_undamaged(io::BufReader::new(file)))
+}
+
+/// Refuses a stored recipe that cannot judge.
+fn refuse_judging(path: &Path, file: &RecipeFile) -> Result<(), LoadError> {
+    file.check_judging().map_err(|reason| LoadError::Unfit {
         path: path.to_path_buf(),
-        reason: format!("{reason}: edit its limits on the page (Recipes, Edit)"),
+        reason: format!("{reason}; edit it on the page (Recipes, Edit)"),
     })
 }

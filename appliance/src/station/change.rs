@@ -171,7 +171,7 @@ impl Station {
         if self.ends(self.is_loading(), job, "a failed load", effects) {
             self.recipes.fail(result);
             log(effects, words.clone());
-            if result == RecipeResult::Corrupt {
+            if matches!(result, RecipeResult::Corrupt | RecipeResult::Unfit) {
                 let code = error_code::RECIPE_UNUSABLE;
                 self.failure = Some(Failure { code, words });
             }

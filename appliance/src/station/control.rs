@@ -4,6 +4,8 @@ use std::ops::{BitAnd, BitOr, Not};
 
 use thiserror::Error;
 
+use super::turns::Client;
+
 /// CONTROL bit 0: the PLC asks for the station to be online.
 pub const ONLINE: u16 = 1 << 0;
 /// CONTROL bit 1 ↑: measure.
@@ -179,11 +181,25 @@ impl ControlWrite {
 /// A connection's first write of a bit only sets the reference level: a 1 that an old session left behind does not fire.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ConnectionEdges {
+    client: Client,
     known: u16,
     level: u16,
 }
 
 impl ConnectionEdges {
+    /// A connection of this client.
+    pub fn of(client: Client) -> Self {
+        Self {
+            client,
+            ..Self::default()
+        }
+    }
+
+    /// Whose connection it is.
+    pub fn client(&self) -> Client {
+        self.client
+    }
+
     /// Takes the write's CONTROL bits and answers with those that rose against this connection's own last level.
     pub fn rise(&mut self, control: Masked<u16>) -> u16 {
         let rising = control.value & control.mask & self.known & !self.level & EDGES;

@@ -7,6 +7,7 @@ use super::control::ControlWrite;
 use super::health::{Drift, Pace, ProjectorHealth, System};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
+use super::turns::Client;
 
 /// The number of one order to the worker. Each answer carries it, so that a late answer is recognised.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -51,6 +52,8 @@ pub enum Event {
         write: ControlWrite,
         /// The edges, see [`super::ConnectionEdges`].
         rising: u16,
+        /// Who wrote.
+        client: Client,
     },
     /// A request that does not come from the PLC.
     Request(Request),

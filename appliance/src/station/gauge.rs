@@ -211,7 +211,8 @@ pub struct GaugeValue {
 }
 
 impl GaugeValue {
-    /// A gauge with the decision that follows from its value and limits.
+    /// A gauge with the decision that follows from its value and limits. A σ of 0 says that nothing is known of it: a share of which no
+    /// pixel is near the threshold would have none.
     pub fn judged(
         name: impl Into<Arc<str>>,
         unit: Unit,
@@ -219,6 +220,10 @@ impl GaugeValue {
         limits: impl Into<GaugeLimits>,
     ) -> Self {
         let limits = limits.into();
+        let measured = Measured {
+            sigma: measured.sigma.filter(|sigma| *sigma > 0.0),
+            ..measured
+        };
         let Measured {
             value,
             sigma,
@@ -244,6 +249,21 @@ impl GaugeValue {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sigma_of_zero_is_not_known_and_neither_is_the_uncertainty() {
+        let of = |sigma| {
+            let measured = Measured {
+                systematic: 0.01,
+                ..Measured::new(Some(1.0), Some(sigma))
+            };
+            GaugeValue::judged("coverage", Unit::Share, measured, (Some(0.9), None))
+        };
+        let (unknown, known) = (of(0.0), of(0.001));
+        assert_eq!((unknown.sigma, unknown.uncertainty), (None, None));
+        assert!(unknown.decision.pass && unknown.value == Some(1.0));
+        assert!(known.sigma == Some(0.001) && known.uncertainty.is_some());
+    }
 
     #[test]
     fn a_limit_within_two_sigma_makes_a_decision_doubtful() {

@@ -66,7 +66,12 @@ impl StationHandle {
     ) -> Result<Arc<Snapshot>, RefusedWrite> {
         write.check()?;
         let rising = edges.rise(write.control);
-        Ok(self.event(Event::Write { write, rising }))
+        let client = edges.client();
+        Ok(self.event(Event::Write {
+            write,
+            rising,
+            client,
+        }))
     }
 
     /// The latest snapshot.

@@ -13,6 +13,7 @@ use super::requests::Requests;
 use super::results::Results;
 use super::snapshot::Identity;
 use super::state::State;
+use super::turns::Turns;
 use super::worker::Worker;
 
 /// The deadline of every wait.
@@ -74,6 +75,7 @@ pub struct Station {
     pub(super) state: State,
     pub(super) plc: Plc,
     pub(super) requests: Requests,
+    pub(super) turns: Turns,
     pub(super) recipes: Recipes,
     pub(super) worker: Worker,
     pub(super) results: Results,
@@ -96,6 +98,7 @@ impl Station {
             },
             plc: Plc::default(),
             requests: Requests::default(),
+            turns: Turns::default(),
             recipes: Recipes::default(),
             worker: Worker::new(now),
             results: Results::new(settings.next_seq),

@@ -36,6 +36,8 @@
 //!   holds. A load or teach that the loss interrupted counts as a load that failed.
 //! - Full storage is a fault only between two jobs: the cycle in flight still gets its result. A result whose SEQ could not be
 //!   stored is shown, but no further trigger is accepted until that SEQ is stored.
+//! - Of clients that trigger without a pause each is granted in turn; until then the one that was granted last is rejected as not ready,
+//!   although READY is 1.
 //! - REJECT_REASON stays until the next rejected request.
 
 pub mod clock;
@@ -55,6 +57,7 @@ pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;
+pub mod turns;
 
 mod change;
 mod cycle;
@@ -87,3 +90,4 @@ pub use snapshot::{Identity, Snapshot, TeachProgress};
 pub use stages::{Stage, StageTime, Stages};
 pub use state::{Cycle, State};
 pub use step::step;
+pub use turns::Client;

@@ -4,7 +4,9 @@ use super::clock::Micros;
 use super::control::{self, ControlRegisters, ControlWrite};
 use super::event::{Effect, Effects};
 use super::machine::{Station, push};
+use super::refusal::reject;
 use super::state::State;
+use super::turns::Client;
 
 /// What the PLC last wrote, and when its heartbeat last changed.
 #[derive(Debug, Clone, Default)]
@@ -37,7 +39,13 @@ impl Plc {
 
 impl Station {
     /// Takes a write; `rising` are the CONTROL bits that rose on its connection.
-    pub(super) fn written(&mut self, write: &ControlWrite, rising: u16, effects: &mut Effects) {
+    pub(super) fn written(
+        &mut self,
+        write: &ControlWrite,
+        rising: u16,
+        client: Client,
+        effects: &mut Effects,
+    ) {
         self.plc.write(write, self.clock.now());
         let rose = |bit: u16| rising & bit != 0;
         if rose(control::ERROR_RESET) {
@@ -60,9 +68,24 @@ impl Station {
         }
         let token = self.requests.new_token(write.token);
         if rose(control::TRIGGER) || token.is_some() {
-            match self.refusal() {
-                None => self.begin(token.unwrap_or(0), effects),
-                Some(reason) => self.requests.miss(reason),
+            self.triggered(token.unwrap_or(0), client, effects);
+        }
+    }
+
+    /// Takes a trigger, or counts it as missed.
+    fn triggered(&mut self, token: u16, client: Client, effects: &mut Effects) {
+        let now = self.clock.now();
+        match self.refusal() {
+            None if self.turns.may(client, now) => {
+                self.turns.granted(client);
+                self.begin(token, effects);
+            }
+            None => self.requests.miss(reject::NOT_READY),
+            Some(reason) => {
+                if reason == reject::NOT_READY {
+                    self.turns.rejected(client, now);
+                }
+                self.requests.miss(reason);
             }
         }
     }

@@ -21,12 +21,14 @@ pub enum RecipeResult {
     Ok,
     /// 1: no such recipe.
     Unknown,
-    /// 2: it failed its checksum.
+    /// 2: it is damaged.
     Corrupt,
-    /// 3: it was made for another calibration.
+    /// 3: it was made for another head or calibration.
     OtherCalibration,
     /// 4: the station could not load now.
     Busy,
+    /// 5: it is whole, and cannot be used as it is.
+    Unfit,
 }
 
 impl RecipeResult {
@@ -40,9 +42,10 @@ impl RecipeResult {
         match self {
             Self::Ok => "it was loaded",
             Self::Unknown => "there is no such recipe",
-            Self::Corrupt => "it is damaged or does not fit this head",
-            Self::OtherCalibration => "it was made for another calibration, exposure or gain",
+            Self::Corrupt => "it is damaged",
+            Self::OtherCalibration => "it was made for another head, calibration, exposure or gain",
             Self::Busy => "a load or teach was refused or interrupted",
+            Self::Unfit => "it cannot be used as it is stored",
         }
     }
 }

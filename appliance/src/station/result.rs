@@ -74,8 +74,10 @@ pub mod flag {
     pub const WARM_UP: u16 = 1 << 6;
     /// At least one decision is doubtful; the station sets it from the gauges.
     pub const DOUBTFUL: u16 = 1 << 7;
-    /// The words for bits 0–7, in order.
-    pub const WORDS: [&str; 8] = [
+    /// The recipe has no limit that a part can miss: PASS says only that the part was measured.
+    pub const JUDGES_NOTHING: u16 = 1 << 8;
+    /// The words for bits 0–8, in order.
+    pub const WORDS: [&str; 9] = [
         "a pattern was taken again",
         "a single level was used",
         "two levels were used",
@@ -84,6 +86,7 @@ pub mod flag {
         "the head is simulated",
         "measured while warming up",
         "a decision is close to a limit",
+        "the recipe judges nothing: no gauge has a limit that a part can miss",
     ];
 }
 

@@ -23,7 +23,11 @@ pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effect
 impl Station {
     fn take(&mut self, event: Event, effects: &mut Effects) {
         match event {
-            Event::Write { write, rising } => self.written(&write, rising, effects),
+            Event::Write {
+                write,
+                rising,
+                client,
+            } => self.written(&write, rising, client, effects),
             Event::Request(Request::Load(key)) => {
                 self.load(key, effects);
             }

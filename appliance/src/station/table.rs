@@ -99,6 +99,7 @@ fn events(job: JobId) -> Vec<(Event, [u16; 13])> {
             ..Default::default()
         },
         rising,
+        client: Client::default(),
     };
     let other_recipe = |rising: u16, token: u16| Event::Write {
         write: ControlWrite {
@@ -107,6 +108,7 @@ fn events(job: JobId) -> Vec<(Event, [u16; 13])> {
             ..Default::default()
         },
         rising,
+        client: Client::default(),
     };
     let stay = STATES;
     let mut alive = STATES;

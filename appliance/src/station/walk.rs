@@ -51,7 +51,11 @@ fn plc_write(random: &mut Random, edges: &mut ConnectionEdges) -> Event {
         .check()
         .expect("the walk writes only what may be written");
     let rising = edges.rise(write.control);
-    Event::Write { write, rising }
+    Event::Write {
+        write,
+        rising,
+        client: edges.client(),
+    }
 }
 
 fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> Event {

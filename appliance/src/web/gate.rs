@@ -27,6 +27,10 @@ pub struct Peer(pub IpAddr);
 #[derive(Clone, Copy, Debug)]
 pub struct Action(pub &'static str);
 
+/// What a change has changed, in words: an extension of the answer, for the record.
+#[derive(Clone, Debug)]
+pub struct Changed(pub String);
+
 /// The session token of a request, if it has one.
 pub fn token(headers: &HeaderMap) -> Option<&str> {
     let cookies = headers.get_all(header::COOKIE).into_iter();
@@ -81,19 +85,24 @@ pub async fn signed_in_only(
         let words = "sign in first: POST the device's secret to /api/session";
         Problem::new(StatusCode::UNAUTHORIZED, words).into_response()
     };
-    let outcome = response.extensions().get::<Outcome>();
-    let outcome = outcome.map(|Outcome(words)| words.clone());
+    let refused = response.extensions().get::<Outcome>();
+    let changed = response.extensions().get::<Changed>();
+    let outcome = match refused {
+        Some(Outcome(words)) => Err(words.clone()),
+        None => Ok(changed.map(|Changed(words)| words.clone())),
+    };
     record(&site, from, action, subject, outcome).await;
     response
 }
 
-/// Adds a line to the record of changes, with why the change was refused, or that it was done; if that fails, the log says so.
+/// Adds a line to the record of changes, with why the change was refused, or that it was done and perhaps what was changed; if that fails,
+/// the log says so.
 pub async fn record(
     site: &Site,
     from: IpAddr,
     action: &'static str,
     subject: String,
-    refused: Option<String>,
+    outcome: Result<Option<String>, String>,
 ) {
     let written = site
         .change(move |site| {
@@ -105,7 +114,8 @@ pub async fn record(
                 from,
                 action,
                 subject: &subject,
-                outcome: refused.as_deref().unwrap_or("done"),
+                outcome: outcome.as_ref().map_or_else(String::as_str, |_| "done"),
+                changed: outcome.as_ref().ok().and_then(Option::as_deref),
             };
             let stored = site.access.changes().add(&change);
             stored.map_err(|error| Problem::broken(error.to_string()))

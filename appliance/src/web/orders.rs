@@ -1,20 +1,23 @@
 //! Orders to the station: trigger, reset, load and teach.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::{Path, Request as Asked, State};
-use axum::http::StatusCode;
+use axum::http::{HeaderMap, StatusCode};
 use axum::response::Json;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::body;
+use super::gate;
 use super::problem::Problem;
 use super::site::Site;
 use crate::recipe::replace;
 use crate::station::control::{ERROR_RESET, TRIGGER};
-use crate::station::{ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
+use crate::station::{Client, ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
 
 /// The answer to an accepted order; its progress comes with the events.
 pub(super) type Accepted = (StatusCode, Json<Value>);
@@ -33,26 +36,35 @@ pub(super) fn not_now(what: &str, snapshot: &Snapshot) -> Problem {
 /// Why a trigger was rejected, from the snapshot after it.
 fn rejected(snapshot: &Snapshot) -> Problem {
     let words = snapshot.refusal_words();
-    Problem::busy(format!("trigger: {}", words.unwrap_or_default()))
+    let words = words.unwrap_or_else(|| "another client waits for its turn: try again".into());
+    Problem::busy(format!("trigger: {words}"))
 }
 
 /// A rising edge without a write, so the PLC's registers stay as it wrote them.
-fn edge(site: &Site, rising: u16) -> std::sync::Arc<Snapshot> {
-    let write = ControlWrite::default();
-    site.station.event(Event::Write { write, rising })
+fn edge(site: &Site, rising: u16, headers: &HeaderMap) -> Arc<Snapshot> {
+    let mut session = DefaultHasher::new();
+    gate::token(headers).hash(&mut session);
+    site.station.event(Event::Write {
+        write: ControlWrite::default(),
+        rising,
+        client: Client::Page(session.finish()),
+    })
 }
 
-pub(super) async fn trigger(State(site): State<Site>) -> Result<Accepted, Problem> {
+pub(super) async fn trigger(
+    State(site): State<Site>,
+    headers: HeaderMap,
+) -> Result<Accepted, Problem> {
     let before = site.station.snapshot().triggers;
-    let after = edge(&site, TRIGGER);
+    let after = edge(&site, TRIGGER, &headers);
     if after.triggers == before {
         return Err(rejected(&after));
     }
     Ok(accepted())
 }
 
-pub(super) async fn reset(State(site): State<Site>) -> Accepted {
-    edge(&site, ERROR_RESET);
+pub(super) async fn reset(State(site): State<Site>, headers: HeaderMap) -> Accepted {
+    edge(&site, ERROR_RESET, &headers);
     accepted()
 }
 
@@ -155,18 +167,30 @@ pub(super) async fn teach(
         replace: may_replace,
         keep_gauges,
     } = body::json_if_any(request.into_body()).await?;
-    site.change(move |site| match (may_replace, keep_gauges) {
-        (false, true) => Err(Problem::unfit(
-            "teach: keep_gauges needs replace: the gauges of the recipe that is replaced stay",
-        )),
-        (false, false) => {
-            let instead = "send {\"replace\": true} to replace it";
-            replace::refuse_taken(&site.recipes, number, instead).map_err(Problem::busy)
+    site.change(move |site| {
+        let replaced = site.recipes.present(number);
+        match (may_replace, keep_gauges) {
+            (false, true) => {
+                return Err(Problem::unfit(
+                    "teach: keep_gauges needs replace: the gauges of the recipe that is replaced stay",
+                ));
+            }
+            (false, false) => {
+                let words = (
+                    "teach",
+                    "send {\"replace\": true} to replace it",
+                    "teach number",
+                );
+                replace::refuse_taken(&site.recipes, number, words).map_err(Problem::busy)?;
+            }
+            (true, true) if replaced.is_none() => {
+                return Err(Problem::missing(replace::no_gauges(number)));
+            }
+            (true, _) => {}
         }
-        (true, _) if keep_gauges && site.recipes.present(number).is_none() => {
-            Err(Problem::missing(replace::no_gauges(number)))
-        }
-        (true, _) => Ok(()),
+        let part_number = replace::naming(number, replaced.as_ref()).part_number;
+        let shared = site.recipes.refuse_shared(number, &part_number);
+        shared.map_err(|words| Problem::busy(format!("teach: {words}")))
     })
     .await?;
     let order = Request::Teach {

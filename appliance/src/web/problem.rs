@@ -15,13 +15,18 @@ pub struct Problem {
     pub status: StatusCode,
     /// What was attempted, and the remedy.
     pub words: String,
+    /// The number of the recipe that must be replaced for it.
+    pub taken: Option<u16>,
 }
 
 impl Problem {
     /// A problem with any status.
     pub fn new(status: StatusCode, words: impl Into<String>) -> Self {
-        let words = words.into();
-        Self { status, words }
+        Self {
+            status,
+            words: words.into(),
+            taken: None,
+        }
     }
 
     /// 400: the request cannot be understood.
@@ -67,7 +72,11 @@ impl Problem {
 
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
-        let mut response = (self.status, Json(json!({ "error": self.words }))).into_response();
+        let mut body = json!({ "error": self.words });
+        if let Some(number) = self.taken {
+            body["taken"] = number.into();
+        }
+        let mut response = (self.status, Json(body)).into_response();
         if self.status == StatusCode::SERVICE_UNAVAILABLE {
             let soon = HeaderValue::from_static(RETRY_AFTER_S);
             response.headers_mut().insert(header::RETRY_AFTER, soon);

@@ -1,27 +1,30 @@
 //! Recipes: list, show, export, import, edit, delete, and undo.
 
+use axum::Extension;
 use axum::body::Body;
-use axum::extract::{Path, Request, State};
+use axum::extract::{Path, Query, Request, State};
 use axum::http::StatusCode;
 use axum::response::{Json, Response};
 use serde_json::{Value, json};
 
 use super::body;
 use super::downloads::{Content, send};
+use super::gate::Changed;
 use super::map::{Drawn, Map, map};
 use super::orders::{self, Reload};
 use super::problem::Problem;
 use super::site::Site;
-use crate::recipe::edit::{self, Edit};
+use crate::recipe::edit::{self, Edit, Edited};
+use crate::recipe::exchange::Destination;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
-use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, RecipeId, Store};
+use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, Store};
 
 impl From<LoadError> for Problem {
     fn from(error: LoadError) -> Self {
         match &error {
             LoadError::Unknown(_) => Self::missing(error.to_string()),
-            LoadError::Corrupt { .. } => Self::unfit(error.to_string()),
+            _ => Self::unfit(error.to_string()),
         }
     }
 }
@@ -33,6 +36,10 @@ impl From<ChangeError> for Problem {
             ChangeError::Load(error) => error.into(),
             ChangeError::Nothing(_) | ChangeError::Missing { .. } => Self::missing(words),
             ChangeError::Outdated(_) => Self::busy(words),
+            ChangeError::Taken { number, .. } => Self {
+                taken: Some(number),
+                ..Self::busy(words)
+            },
             ChangeError::Unfit(_) => Self::unfit(words),
             ChangeError::Store(error) | ChangeError::Write { source: error, .. } => {
                 Self::unstored(words, &error)
@@ -66,7 +73,7 @@ fn summary(file: &RecipeFile) -> Value {
     json!({
         "number": file.number, "name": file.name, "part_number": file.part_number,
         "fingerprint": file.fingerprint, "taught_at_unix_s": file.taught_at_unix_s,
-        "regions": file.regions.len(), "gauges": file.gauges.len(),
+        "regions": file.regions.len(), "gauges": file.gauges.len(), "judges_nothing": file.judges_nothing,
         "frames": file.sequences.get(file.production).map(|sequence| sequence.frames.len()),
     })
 }
@@ -127,7 +134,7 @@ pub(super) async fn edit(
     State(site): State<Site>,
     Path(number): Path<u16>,
     request: Request<Body>,
-) -> Result<Json<Value>, Problem> {
+) -> Result<(Extension<Changed>, Json<Value>), Problem> {
     let wanted: Edit = body::json(request.into_body()).await?;
     let edited = site.change(move |site| {
         let mut note = None;
@@ -135,29 +142,50 @@ pub(super) async fn edit(
             note = tried(site, recipe)?;
             Ok(())
         };
-        let fingerprint = edit::edit(&site.recipes, number, wanted, fits)?;
-        Ok((fingerprint, note))
+        let edited = edit::edit(&site.recipes, number, wanted, fits)?;
+        Ok((edited, note))
     });
-    let (fingerprint, note) = edited.await?;
+    let (edited, note) = edited.await?;
+    let Edited {
+        fingerprint,
+        changed,
+        other_slots,
+    } = edited;
+    let slots = other_slots.map(|slots| format!("the PLC finds gauges elsewhere, {slots}"));
+    let note = slots.into_iter().chain(note);
+    let note = note.reduce(|all, note| format!("{all}; {note}"));
     let Reload { active, loading } = orders::reload(&site, number).await;
-    Ok(Json(
-        json!({ "fingerprint": fingerprint, "active": active, "loading": loading, "note": note }),
-    ))
+    let answer = json!({
+        "fingerprint": fingerprint, "active": active, "loading": loading, "note": note,
+    });
+    Ok((Extension(Changed(changed)), Json(answer)))
 }
 
 /// Brings back the previous generation, or a deleted recipe.
 pub(super) async fn undo(
     State(site): State<Site>,
     Path(number): Path<u16>,
-) -> Result<Json<Value>, Problem> {
+) -> Result<(Extension<Changed>, Json<Value>), Problem> {
     orders::recipes_unused(&site, "undo a recipe")?;
-    let file = site
-        .change(move |site| Ok(site.recipes.undo(number)?))
+    let (file, before) = site
+        .change(move |site| {
+            let calibration = site.calibration.get();
+            let calibration = calibration.map(|calibration| calibration.fingerprint());
+            let before = site.recipes.present(number);
+            let file = site.recipes.undo(number, calibration.as_deref())?;
+            Ok((file, before))
+        })
         .await?;
     let Reload { active, loading } = orders::reload(&site, number).await;
-    Ok(Json(json!({
+    let changed = match before {
+        Some(before) => file.differences(&before),
+        None => "brought back".into(),
+    };
+    let changed = format!("fingerprint {:.8}: {changed}", file.fingerprint);
+    let answer = json!({
         "number": number, "name": file.name, "fingerprint": file.fingerprint, "active": active, "loading": loading,
-    })))
+    });
+    Ok((Extension(Changed(changed)), Json(answer)))
 }
 
 /// Deletes a recipe that is not the active one; undo brings it back.
@@ -193,26 +221,33 @@ fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
     }
 }
 
+/// Takes a recipe from a file: under the number in the file or another one, and in place of a stored recipe only on request.
 pub(super) async fn import(
     State(site): State<Site>,
+    Query(to): Query<Destination>,
     request: Request<Body>,
-) -> Result<(StatusCode, Json<Value>), Problem> {
+) -> Result<(StatusCode, Extension<Changed>, Json<Value>), Problem> {
+    if let Some(number) = to.number.filter(|number| !(1..=9999).contains(number)) {
+        return Err(Problem::unfit(format!(
+            "import as recipe {number}: numbers are 1 to 9999"
+        )));
+    }
     let upload = body::file(&site, request.into_body()).await?;
     let stored = site.change(move |site| {
         let recipe = upload.file.recipe().map_err(Problem::unfit)?;
-        let RecipeId {
-            number,
-            name,
-            fingerprint,
-            ..
-        } = recipe.id.clone();
-        let note = tried(site, recipe).map_err(Problem::unfit)?;
-        let saved = site.recipes.take(upload.file, number);
-        saved.map_err(|error| {
-            let words = format!("store recipe {number}: {error}: free space");
-            Problem::unstored(words, &error)
-        })?;
-        Ok(json!({ "number": number, "name": name, "fingerprint": fingerprint, "note": note }))
+        let id = recipe.id.clone();
+        let tried = tried(site, recipe).map_err(Problem::unfit)?;
+        let replace = "add ?replace=true to replace it";
+        let imported = site.recipes.take(upload.file, id, to, replace)?;
+        let notes = imported.note().into_iter().chain(tried);
+        let note = notes.reduce(|all, note| format!("{all}; {note}"));
+        Ok((imported, note))
     });
-    Ok((StatusCode::CREATED, Json(stored.await?)))
+    let (imported, note) = stored.await?;
+    let changed = Extension(Changed(imported.changed()));
+    let id = imported.id;
+    let answer = json!({
+        "number": id.number, "name": id.name, "fingerprint": id.fingerprint, "note": note,
+    });
+    Ok((StatusCode::CREATED, changed, Json(answer)))
 }

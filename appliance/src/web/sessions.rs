@@ -42,7 +42,10 @@ pub(super) async fn begin(
     let token = guess.await?;
     // A guess that has to wait is not recorded, so that guessing cannot fill the record.
     if !matches!(token, Err(Refused::Wait(_))) {
-        let outcome = token.as_ref().err().map(ToString::to_string);
+        let outcome = match &token {
+            Ok(_) => Ok(None),
+            Err(refused) => Err(refused.to_string()),
+        };
         gate::record(&site, from, "sign in", "session".into(), outcome).await;
     }
     match token {

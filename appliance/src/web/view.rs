@@ -105,6 +105,7 @@ fn result(record: &ResultRecord) -> Value {
         "fitness_permille": found.fitness_permille,
         "simulated": record.flags() & flag::SIMULATED != 0,
         "doubtful": record.flags() & flag::DOUBTFUL != 0,
+        "judges_nothing": record.flags() & flag::JUDGES_NOTHING != 0,
         "skipped": {
             "outside": found.skipped.outside,
             "unexpected": found.skipped.unexpected,

@@ -111,12 +111,13 @@ impl Calibrate {
         let made = pool.install(|| make(&mut opened.head, basis, &on_progress));
         progress.clear();
         let mut made = made?;
+        let place = self.poses.out.as_deref().map_or(place, Place::at);
         place.save(&made.bytes, &made.maps).map_err(|error| {
             let what = format!("write {}", place.path().display());
             Failure::because(
                 Exit::CannotCreate,
                 what,
-                format!("{error}: free space, or name another file with head.calibration"),
+                format!("{error}: free space, or name another file with --out"),
             )
         })?;
         notes.append(&mut made.notes);

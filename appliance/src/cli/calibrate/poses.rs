@@ -34,7 +34,7 @@ pub struct Poses {
     poses: Vec<PathBuf>,
     /// Write the calibration to this file instead of the station's.
     #[arg(long, value_name = "FILE", value_parser = names::file("json"))]
-    out: Option<PathBuf>,
+    pub out: Option<PathBuf>,
     /// Write pictures to this folder: the residuals of camera and projector as arrows × 200, and where in the frame corners were seen.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     pictures: Option<PathBuf>,
@@ -50,8 +50,7 @@ impl Poses {
     /// Whether the models are to come from a board.
     pub fn given(&self) -> bool {
         let beside = [self.board_sigma_ppm, self.check_length];
-        let named = self.board.is_some() || self.out.is_some() || !self.poses.is_empty();
-        let named = named || self.pictures.is_some();
+        let named = self.board.is_some() || !self.poses.is_empty() || self.pictures.is_some();
         named || beside.iter().any(Option::is_some)
     }
 
@@ -62,7 +61,7 @@ impl Poses {
     /// calibration before is then unchanged.
     pub fn run(&self, options: &Measuring) -> Result<(), Failure> {
         let Some(board) = self.board.as_ref().filter(|_| !self.poses.is_empty()) else {
-            let words = "calibrate: models are made of a board in several poses: name both with --board and --poses";
+            let words = "calibrate: models are made of a board in several poses: name both with --board and --poses, or leave out --pictures, --check-length and --board-sigma-ppm";
             return Err(Failure::new(Exit::Usage, words));
         };
         let config = options.files.configuration()?;

@@ -1,19 +1,19 @@
 //! A recipe joined with the head's calibration. Planning can fail; judging a part with the plan always ends in an inspection.
 
 mod arriving;
-mod error;
 mod golden;
 mod judge;
 mod layers;
 mod patterns;
+mod refused;
 mod rendered;
 mod run;
 mod trial;
 mod window;
 
 pub use arriving::Arriving;
-pub use error::PlanError;
 pub use layers::{Layers, Shown, ShownGauge};
+pub use refused::PlanError;
 
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
@@ -21,7 +21,9 @@ use crate::head::seam;
 use crate::recipe::light::{GoldenLight, Light};
 use crate::recipe::{Conditions, Demands, Recipe, RecipeId, RecipeSequence, SequenceKind};
 use crate::station::error_code::WRONG_FRAMES;
-use crate::station::result::flag::{FULL_SEQUENCE, SIMULATED, SINGLE_LEVEL, TWO_LEVELS};
+use crate::station::result::flag::{
+    FULL_SEQUENCE, JUDGES_NOTHING, SIMULATED, SINGLE_LEVEL, TWO_LEVELS,
+};
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::HeightRange;
@@ -104,6 +106,8 @@ impl Plan {
         simulated: bool,
     ) -> Result<Self, PlanError> {
         let number = recipe.id.number;
+        refused::same_devices(&recipe.conditions, calibration)
+            .map_err(|reason| PlanError::OtherHead { number, reason })?;
         Self::join(recipe, calibration, simulated)
             .map_err(|reason| PlanError::Unfit { number, reason })
     }
@@ -128,20 +132,7 @@ impl Plan {
             amplitude: std::mem::take(&mut arrays.amplitude),
         };
         arrays.height_curvature = Vec::new();
-        let camera = conditions.camera;
-        if camera != calibration.frames() {
-            return Err(format!(
-                "it is for a camera of {camera:?}, the head's has {:?}: teach it again",
-                calibration.frames()
-            ));
-        }
-        let raster = conditions.raster;
-        if raster != calibration.raster() {
-            return Err(format!(
-                "it is for a projector of {raster:?}, the head's has {:?}: teach it again",
-                calibration.raster()
-            ));
-        }
+        let (camera, raster) = (conditions.camera, conditions.raster);
         let size = (camera.0 as usize, camera.1 as usize);
         let [low, high] = conditions.range_mm;
         let triangulator = calibration.triangulator(function, Some(HeightRange { low, high }));
@@ -312,9 +303,13 @@ impl Plan {
         laps: &mut Laps,
     ) -> Inspection {
         let simulated = if self.simulated { SIMULATED } else { 0 };
+        let nothing = match self.demands.judges_nothing {
+            true => JUDGES_NOTHING,
+            false => 0,
+        };
         let kind = self.runs.get(sequence).map(|run| run.kind);
         let mut inspection = Inspection {
-            flags: kind.map_or(0, sequence_flag) | simulated,
+            flags: kind.map_or(0, sequence_flag) | simulated | nothing,
             ..Inspection::default()
         };
         match found {

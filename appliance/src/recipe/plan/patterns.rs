@@ -3,9 +3,14 @@
 use super::Plan;
 use super::run::Run;
 use crate::head::calibration::Calibration;
+use crate::head::seam;
+use crate::recipe::PatternFile;
 use algo::pattern::Shot;
+use hal::frame::Frame;
 use hal::head::Head;
 use hal::projector::Raster;
+use hal::replay::Recording;
+use hal::replay::recording::{PatternSpec, RecipeReference};
 
 impl Plan {
     /// Keeps only the longest sequence whose frames are all among those that show these shots of its own pattern (`None` for frames of another
@@ -48,6 +53,47 @@ impl Plan {
         let function = self.production().triangulator().function();
         self.illumination
             .load(head, function, &self.shots, calibration)
+    }
+
+    /// A recording of the frames of a sequence, with this recipe's pattern and number.
+    pub fn recording(
+        &self,
+        sequence: usize,
+        frames: &[Frame],
+        calibration: &Calibration,
+    ) -> Recording {
+        let shown = self.shots(sequence).zip(frames);
+        Recording {
+            patterns: vec![self.pattern()],
+            frames: shown
+                .map(|(shot, frame)| seam::recorded(shot, frame.clone()))
+                .collect(),
+            range_mm: Some(self.conditions.range_mm),
+            exposure_us: self
+                .conditions
+                .exposing
+                .map(|set| f64::from(set.exposure_us) * f64::from(self.conditions.exposures)),
+            recipe: Some(RecipeReference {
+                number: u32::from(self.id.number),
+                fingerprint: self.id.fingerprint.clone(),
+            }),
+            ..calibration.recording()
+        }
+    }
+
+    fn pattern(&self) -> PatternSpec {
+        match self.conditions.pattern {
+            PatternFile::Vertical { fringes } => PatternSpec::Vertical { fringes },
+            PatternFile::Horizontal { fringes } => PatternSpec::Horizontal { fringes },
+            PatternFile::File => {
+                let function = self.production().triangulator().function();
+                PatternSpec::File {
+                    rows: function.rows(),
+                    columns: function.columns(),
+                    turns: function.turns(),
+                }
+            }
+        }
     }
 
     /// How many rasters [`Self::rasters`] makes.

@@ -101,7 +101,12 @@ impl Bench {
 
     pub(super) fn write(&mut self, write: ControlWrite) -> Snapshot {
         let rising = self.edges.rise(write.control);
-        self.event(Event::Write { write, rising })
+        let client = self.edges.client();
+        self.event(Event::Write {
+            write,
+            rising,
+            client,
+        })
     }
 
     fn control(&mut self, bits: u16) -> Snapshot {

@@ -14,6 +14,7 @@ fn no_trigger_is_accepted(bench: &mut Bench) {
     let after = bench.event(Event::Write {
         write: ControlWrite::default(),
         rising: control::TRIGGER,
+        client: Client::default(),
     });
     assert_eq!(
         (after.missed, after.reject_reason, after.triggers),

@@ -29,6 +29,8 @@ pub struct Change<'a> {
     pub subject: &'a str,
     /// `"done"`, or why it was refused.
     pub outcome: &'a str,
+    /// What was changed, in words, where that is known.
+    pub changed: Option<&'a str>,
 }
 
 /// The file with the record.
@@ -54,7 +56,7 @@ impl Changes {
     pub fn add(&self, change: &Change<'_>) -> std::io::Result<()> {
         let line = json!({
             "utc_us": change.utc_us, "uptime_s": change.uptime_s, "boot_id": format!("{:08x}", change.boot_id),
-            "from": change.from, "action": change.action, "subject": change.subject, "outcome": change.outcome,
+            "from": change.from, "action": change.action, "subject": change.subject, "outcome": change.outcome, "changed": change.changed,
         });
         let _one = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if fs::metadata(&self.path).is_ok_and(|file| file.len() >= FULL_BYTES) {
@@ -116,6 +118,7 @@ mod tests {
             action: "edit recipe",
             subject,
             outcome: "done",
+            changed: None,
         }
     }
 

@@ -5,6 +5,7 @@ async function failure(response) {
   const content = await response.json().catch(() => null);
   const error = new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
   error.status = response.status;
+  error.taken = content && content.taken;
   return error;
 }
 

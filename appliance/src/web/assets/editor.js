@@ -3,6 +3,7 @@ import { $, draw, fill, make, show, text } from "./element.js";
 import { ask, map } from "./api.js";
 import { paint } from "./colour.js";
 import { change, notice } from "./session.js";
+import { choose } from "./question.js";
 
 const state = { recipe: null, map: null, chosen: [0, 0], drag: null, wide: 1 };
 
@@ -218,11 +219,16 @@ function save(event) {
   const { recipe } = state;
   const body = { fingerprint: recipe.fingerprint, name: $("editor-name").value, part_number: $("editor-part").value, guard_k: Number($("editor-guard").value), regions: recipe.regions, gauges: recipe.gauges };
   change(async () => {
+    if (recipe.gauges.every((gauge) => gauge.low === undefined && gauge.high === undefined)) {
+      const words = "No gauge has a limit. Every part that can be measured passes, whatever its shape; each result says so.";
+      body.judges_nothing = await choose("Store a recipe that judges nothing?", words, [["Store it, it judges nothing", true]]);
+      if (!body.judges_nothing) return;
+    }
     const stored = await ask("PUT", `/api/recipes/${recipe.number}`, body);
     recipe.fingerprint = stored.fingerprint;
     show("editor", false);
     if (stored.active && !stored.loading) notice(`recipe ${recipe.number} is stored, but the station still uses the previous version: load recipe ${recipe.number}`, true);
-    else notice(`recipe ${recipe.number} is stored${stored.loading ? " and is being loaded" : ""}`);
+    else notice(`recipe ${recipe.number} is stored${stored.loading ? " and is being loaded" : ""}${stored.note ? `: ${stored.note}` : ""}`);
     if (!stored.loading) window.dispatchEvent(new Event("recipes"));
   });
 }

@@ -81,7 +81,7 @@ async function refresh() {
     fill($("log-lines"), ...log.lines.map((entry) => line(moment(entry, boot), entry.words, "", about(entry))));
     if (!log.lines.length) fill($("log-lines"), line("", "nothing happened yet"));
     fill($("change-lines"), ...changes.changes.map((entry) =>
-      line(moment(entry, boot), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}`, entry.outcome === "done" ? "" : "refused", about(entry))));
+      line(moment(entry, boot), `${entry.action} (${entry.subject}) from ${entry.from}: ${entry.outcome}${entry.changed ? `: ${entry.changed}` : ""}`, entry.outcome === "done" ? "" : "refused", about(entry))));
     if (!changes.changes.length) fill($("change-lines"), line("", "nothing was changed yet"));
   } catch (error) { notice(error.message, true); }
 }

@@ -1,7 +1,7 @@
 // The page: follows the snapshots, and shows each in the view that is open.
 import { $, show, text } from "./element.js";
 import { follow } from "./stale.js";
-import { isOfOtherRecipe, showVerdict } from "./verdict.js";
+import { isHeld, isOfOtherRecipe, showVerdict } from "./verdict.js";
 import { showGauges } from "./gauges.js";
 import { showTimes } from "./times.js";
 import { showPicture, start as startPicture } from "./picture.js";
@@ -76,7 +76,7 @@ function showSnapshot(now) {
   showPicture(now.result, view === "live");
   text("identity", `${now.identity.product} · ${now.identity.serial} · ${now.identity.version}`);
   text("uptime", `up ${duration(now.uptime_s)} · heartbeat ${now.heartbeat}`);
-  const live = now.result && now.ready && !isOfOtherRecipe(now);
+  const live = now.result && (isHeld(now) || (now.ready && !isOfOtherRecipe(now)));
   document.title = `${live ? now.result.verdict : words} · fringed`;
 }
 

@@ -33,7 +33,7 @@ function row(recipe) {
   take.setAttribute("download", "");
   take.setAttribute("aria-label", `Export recipe ${recipe.number}`);
   const own = recipe.number === active;
-  const line = make("tr", own ? "active" : "", make("td", "", String(recipe.number)), make("td", "", recipe.name + (own ? " (active)" : "")),
+  const line = make("tr", own ? "active" : "", make("td", "", String(recipe.number)), make("td", "", recipe.name + (own ? " (active)" : "") + (recipe.judges_nothing ? " (judges nothing)" : "")),
     make("td", "", recipe.part_number), make("td", "", make("code", "", recipe.fingerprint.slice(0, 8))), make("td", "", String(recipe.frames)),
     make("td", "", String(recipe.gauges)), make("td", "", day(recipe.taught_at_unix_s)), make("td", "actions", use, alter, gain, take, remover(recipe)));
   return line;
@@ -91,6 +91,7 @@ function gone(recipe) {
   return undoer(recipe.number, { deleted: true }, `Undo: bring back ${recipe.name}, which was deleted: ${version(recipe)}`);
 }
 
+// Shows the list of recipes; answers with the lowest number that is free, null if there is none.
 export async function list() {
   try {
     const { recipes, deleted, free } = await ask("GET", "/api/recipes");
@@ -102,7 +103,26 @@ export async function list() {
     // A number that somebody typed stays.
     const typed = $("teach-as").value;
     if (typed === "" || typed === proposed) $("teach-as").value = proposed = free === null ? "" : String(free);
-  } catch (error) { notice(error.message, true); }
+    return free;
+  } catch (error) { notice(error.message, true); return null; }
+}
+
+// Where a recipe file goes whose number is taken; null if nothing is to be imported.
+async function destination(number) {
+  const free = await list();
+  const taken = stored.find((recipe) => recipe.number === number) || { error: true };
+  const words = `Recipe ${number} is ${content(taken)}. If it is replaced, Undo in the list of recipes brings it back.`;
+  const other = free === null ? [] : [[`Import as recipe ${free}`, `?number=${free}`]];
+  return choose(`Recipe ${number} is there already`, words, other.concat([[`Replace recipe ${number}`, "?replace=true"]]));
+}
+
+// Stores a recipe file; asks if its number is taken.
+async function take(file) {
+  try { return await ask("POST", "/api/recipes", file); } catch (error) {
+    if (!error.taken) throw error;
+    const to = await destination(error.taken);
+    return to && ask("POST", `/api/recipes${to}`, file);
+  }
 }
 
 // The body of a request to teach a number; none if a recipe has the number and is to stay.
@@ -197,8 +217,9 @@ export function start() {
     event.preventDefault();
     const file = $("import-file").files[0];
     change(async () => {
-      const stored = await ask("POST", "/api/recipes", file);
-      notice(`recipe ${stored.number} · ${stored.name} is stored${stored.note ? `: ${stored.note}` : ""}`);
+      const imported = await take(file);
+      if (!imported) return;
+      notice(`recipe ${imported.number} · ${imported.name} is stored${imported.note ? `: ${imported.note}` : ""}`);
       list();
     });
   });

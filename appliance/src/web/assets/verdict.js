@@ -15,11 +15,12 @@ export function decided({ decision }) {
 }
 
 // "± 0.012 mm" and "good parts 0.026 mm", a line each: the expanded uncertainty U, and what is expected where noise alone moves the value away from 0.
-// Results of older programs have σ only.
+// "± –" if no σ is known. Results of older programs have σ only.
 export function uncertainty({ uncertainty: expanded, sigma, expected, unit }) {
   const words = [];
   if (typeof expanded === "number") words.push(`± ${quantity(expanded, unit, 1)}`);
   else if (typeof sigma === "number") words.push(`σ ${quantity(sigma, unit, 1)}`);
+  else words.push("± –");
   if (typeof expected === "number") words.push(`good parts ${quantity(expected, unit, 1)}`);
   return words.map((line) => make("small", "", line));
 }
@@ -53,12 +54,14 @@ const recipeName = (recipe) => (recipe ? `recipe ${recipe.number} · ${recipe.na
 // The recipe that a result was measured with, as it was at its trigger.
 const recipeOf = (result) => ({ number: result.recipe, name: result.recipe_name, fingerprint: result.fingerprint });
 
+const isMeasuring = ({ state }) => state === "acquiring" || state === "processing";
+const isOfActive = ({ recipe, result }) => Boolean(recipe) && recipe.number === result.recipe && recipe.fingerprint === result.fingerprint;
+
 // Whether the verdict is of another recipe than the active one, or of an earlier version of it.
-export function isOfOtherRecipe(now) {
-  const { recipe, result, state } = now;
-  if (!result || state === "acquiring" || state === "processing") return false;
-  return !recipe || recipe.number !== result.recipe || recipe.fingerprint !== result.fingerprint;
-}
+export function isOfOtherRecipe(now) { return Boolean(now.result) && !isMeasuring(now) && !isOfActive(now); }
+
+// Whether the last verdict stays while the next part is measured: at full speed it could not be read otherwise.
+export function isHeld(now) { return isMeasuring(now) && Boolean(now.result) && isOfActive(now); }
 
 // Covers the verdict of another recipe: the part under the head is to be measured with the active one.
 function coverOther(now, other) {
@@ -74,16 +77,18 @@ function coverOther(now, other) {
 export function showVerdict(now) {
   const panel = $("verdict");
   const result = now.result;
-  const measuring = now.state === "acquiring" || now.state === "processing";
+  const held = isHeld(now);
+  const measuring = isMeasuring(now) && !held;
   const other = isOfOtherRecipe(now);
   // A verdict that is not about the part under the head keeps its words but loses its colour.
-  const past = Boolean(result) && !measuring && (!now.ready || other);
+  const past = Boolean(result) && !measuring && !held && (!now.ready || other);
   // The recipe beside a verdict is the one that measured it.
   const recipe = result && !measuring ? recipeOf(result) : now.recipe;
   text("recipe-name", recipeName(recipe));
   text("fingerprint", recipe ? recipe.fingerprint : "");
   coverOther(now, other);
   panel.classList.toggle("past", past);
+  panel.classList.toggle("held", held);
   document.body.classList.toggle("past", past || measuring);
   panel.dataset.verdict = measuring ? "MEASURING" : result ? result.verdict : "NONE";
   if (measuring) {
@@ -93,7 +98,8 @@ export function showVerdict(now) {
   } else if (result) {
     const found = result.verdict === "FAIL" ? outside(result) : "";
     text("word", past ? `last: ${result.verdict}` : result.verdict);
-    text("sentence", result.reason || found || SENTENCES[result.verdict] || "");
+    const sentence = result.verdict === "PASS" && result.judges_nothing ? "measured, not judged: the recipe has no limits" : SENTENCES[result.verdict];
+    text("sentence", result.reason || found || sentence || "");
     text("part", partWords(result));
   } else {
     text("word", "NO RESULT");

@@ -1,6 +1,8 @@
 //! Why a recipe cannot be run on a head.
 
+use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
+use crate::recipe::Conditions;
 
 /// A recipe that cannot be run on this head.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -17,6 +19,14 @@ pub enum PlanError {
         made_for: String,
         /// First digits of the head's.
         present: String,
+    },
+    /// It was made on a head with another camera or projector.
+    #[error("recipe {number} was made on another head: {reason}: teach it again on this head")]
+    OtherHead {
+        /// The recipe's number.
+        number: u16,
+        /// In words.
+        reason: String,
     },
     /// It was taught with another exposure or gain.
     #[error(
@@ -39,4 +49,27 @@ pub enum PlanError {
         /// In words, with the remedy.
         reason: String,
     },
+}
+
+/// Checks that camera and projector have the size that the recipe was made for.
+///
+/// # Errors
+/// In words: which of them has not.
+pub(super) fn same_devices(
+    conditions: &Conditions,
+    calibration: &Calibration,
+) -> Result<(), String> {
+    let (camera, here) = (conditions.camera, calibration.frames());
+    if camera != here {
+        return Err(format!(
+            "it is for a camera of {camera:?}, this head's has {here:?}"
+        ));
+    }
+    let (raster, here) = (conditions.raster, calibration.raster());
+    match raster == here {
+        true => Ok(()),
+        false => Err(format!(
+            "it is for a projector of {raster:?}, this head's has {here:?}"
+        )),
+    }
 }

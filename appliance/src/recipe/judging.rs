@@ -1,0 +1,76 @@
+//! Whether a recipe can judge: limits that a part can keep and miss, names that are unique, steps between two regions.
+//!
+//! Without this a part of any shape passes, and nobody sees why. It is checked whenever a recipe is taught, imported, edited or loaded.
+
+use super::file::{GaugeFile, GaugeKind, RecipeFile};
+use std::collections::HashSet;
+
+impl RecipeFile {
+    /// Refuses a recipe whose verdict does not depend on the part as its gauges say, and one without any limit that does not state
+    /// `judges_nothing`.
+    ///
+    /// # Errors
+    /// In words, with the name of the first such gauge and the remedy.
+    pub(super) fn check_judging(&self) -> Result<(), String> {
+        for gauge in &self.gauges {
+            let refused = gauge.check_limits();
+            refused.map_err(|error| format!("{error}: change the limits"))?;
+            self.check_step(gauge)?;
+        }
+        check_unique("region", self.regions.iter().map(|region| &region.name))?;
+        check_unique("gauge", self.gauges.iter().map(|gauge| &gauge.name))?;
+        let limited = self.gauges.iter().find(|gauge| gauge.can_fail());
+        match (limited, self.judges_nothing) {
+            (None, false) => Err(
+                "it judges nothing: no gauge has a limit that a part can miss, so every part that is measured would pass: give a gauge \
+                 limits, or state \"judges_nothing\": true to measure only"
+                    .into(),
+            ),
+            (Some(GaugeFile { name, .. }), true) => Err(format!(
+                "it states \"judges_nothing\": true, but gauge {name:?} has limits: take one of them away"
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether no gauge has a limit that a part can miss.
+    pub(super) fn is_without_limits(&self) -> bool {
+        !self.gauges.iter().any(GaugeFile::can_fail)
+    }
+
+    /// Refuses a step between a region and itself, under whatever name: it is 0 for every part.
+    fn check_step(&self, gauge: &GaugeFile) -> Result<(), String> {
+        let GaugeKind::Step { from } = &gauge.measures else {
+            return Ok(());
+        };
+        let polygon = |name: &str| {
+            let mut regions = self.regions.iter();
+            Some(&regions.find(|region| region.name == name)?.polygon)
+        };
+        let same = *from == gauge.region
+            || polygon(from).is_some_and(|here| polygon(&gauge.region) == Some(here));
+        match same {
+            true => Err(format!(
+                "gauge {:?} measures the step of region {:?} from itself, which is 0 whatever the part: name another region",
+                gauge.name, gauge.region
+            )),
+            false => Ok(()),
+        }
+    }
+}
+
+/// Refuses a name that two regions or two gauges have: limits and references would belong to either.
+pub(super) fn check_unique<'a>(
+    what: &str,
+    names: impl Iterator<Item = &'a String>,
+) -> Result<(), String> {
+    let mut seen = HashSet::new();
+    for name in names {
+        if !seen.insert(name) {
+            return Err(format!(
+                "two of them are called {name:?}: give each {what} its own name"
+            ));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,132 @@
+//! Whose turn it is, where several clients trigger without a pause: each is granted in turn, else the fastest would starve the others.
+//!
+//! A client that was rejected several times within a second, because the station was busy, waits for its turn. Until it has had it, the
+//! client that was granted last is rejected, if both are of one kind: a PLC never waits for the page, and a start line, which cannot
+//! ask again, never for anybody.
+
+use super::clock::Micros;
+
+/// Who triggers.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Client {
+    /// The start line, or somebody of whom nothing is known.
+    #[default]
+    Line,
+    /// A session of the page.
+    Page(u64),
+    /// A connection of Modbus.
+    Plc(u64),
+}
+
+impl Client {
+    fn competes(self, other: Self) -> bool {
+        match (self, other) {
+            (Self::Page(one), Self::Page(two)) | (Self::Plc(one), Self::Plc(two)) => one != two,
+            _ => false,
+        }
+    }
+}
+
+/// Rejected triggers after which a client waits for its turn: one that asks less often does not compete.
+const INSISTENT: u32 = 3;
+/// A client that has not asked again for so long does not wait any more.
+const PAUSE: Micros = Micros::from_millis(1000);
+
+/// Who was granted last, and who waits.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Turns {
+    last: Client,
+    waiting: Option<Waiting>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Waiting {
+    client: Client,
+    rejected: u32,
+    /// When it asked last.
+    at: Micros,
+}
+
+impl Turns {
+    /// Whether a trigger of this client may be granted now.
+    pub(super) fn may(&self, client: Client, now: Micros) -> bool {
+        !self.waiting.is_some_and(|other| {
+            client == self.last
+                && client.competes(other.client)
+                && other.rejected >= INSISTENT
+                && now.since(other.at) <= PAUSE
+        })
+    }
+
+    /// A trigger was granted.
+    pub(super) fn granted(&mut self, client: Client) {
+        self.last = client;
+        self.waiting.take_if(|waiting| waiting.client == client);
+    }
+
+    /// A trigger was rejected because the station was busy.
+    pub(super) fn rejected(&mut self, client: Client, now: Micros) {
+        if !client.competes(self.last) {
+            return;
+        }
+        let before = self
+            .waiting
+            .filter(|waiting| now.since(waiting.at) <= PAUSE);
+        if before.is_some_and(|waiting| waiting.client != client) {
+            return;
+        }
+        self.waiting = Some(Waiting {
+            client,
+            rejected: before.map_or(0, |waiting| waiting.rejected) + 1,
+            at: now,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FAST: Client = Client::Plc(1);
+    const SLOW: Client = Client::Plc(2);
+
+    fn at(ms: u64) -> Micros {
+        Micros::from_millis(ms)
+    }
+
+    #[test]
+    fn a_client_that_was_rejected_again_and_again_has_the_next_turn_and_then_the_other_one() {
+        let mut turns = Turns::default();
+        turns.granted(FAST);
+        for ms in 1..=3 {
+            assert!(turns.may(FAST, at(ms)));
+            turns.rejected(SLOW, at(ms));
+        }
+        assert!(!turns.may(FAST, at(4)) && turns.may(SLOW, at(4)));
+        turns.granted(SLOW);
+        assert!(turns.may(FAST, at(5)));
+    }
+
+    #[test]
+    fn a_client_that_gave_up_and_one_that_asked_once_hold_nobody_up() {
+        let mut turns = Turns::default();
+        turns.granted(FAST);
+        turns.rejected(SLOW, at(1));
+        assert!(turns.may(FAST, at(2)));
+        turns.rejected(SLOW, at(2));
+        turns.rejected(SLOW, at(3));
+        assert!(!turns.may(FAST, at(1003)) && turns.may(FAST, at(1004)));
+    }
+
+    #[test]
+    fn neither_the_page_nor_a_line_takes_a_turn_from_a_plc() {
+        for other in [Client::Page(2), Client::Line] {
+            let mut turns = Turns::default();
+            turns.granted(FAST);
+            for ms in 1..9 {
+                turns.rejected(other, at(ms));
+            }
+            assert!(turns.may(FAST, at(9)) && turns.may(Client::Line, at(9)));
+        }
+    }
+}
