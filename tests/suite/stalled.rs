@@ -62,7 +62,7 @@ fn fill(writer: &impl AsRawFd) {
         .custom_flags(rustix::fs::OFlags::NONBLOCK.bits() as i32)
         .open(format!("/proc/self/fd/{}", writer.as_raw_fd()))
         .unwrap();
-    for bytes in [&[b'x'; 4096][..], &[b'x'], b"\n"] {
+    for bytes in [&[b'x'; 4096][..], b"x", b"\n"] {
         while again.write(bytes).is_ok() {}
     }
 }
