@@ -1,6 +1,7 @@
 //! Shiny parts in front of the simulated head, compared with the textbook's own rendering of some of them.
 
 use crate::every_part::{Line, stock};
+use crate::placement::{bed, taught_within};
 use appliance::station::Verdict;
 use hal::frame::Samples;
 use hal::projector::Raster;
@@ -190,6 +191,21 @@ fn a_matte_part_has_the_light_that_a_part_without_a_material_has_by_default() {
     assert_eq!(samples(&other), samples(&matte));
     other.light.ambient = 0.1;
     assert_ne!(samples(&other), samples(&matte));
+}
+
+#[test]
+fn a_highlight_is_not_taught_as_an_opening_of_the_part() {
+    let gauges = |material| {
+        let mut bed = bed(&Scenario {
+            sub_rays: 2,
+            material: Some(material),
+            ..Scenario::default()
+        });
+        let taught = taught_within(&mut bed, 1.0).unwrap();
+        let gauges = taught.manifest.gauges.into_iter();
+        gauges.map(|gauge| gauge.name).collect::<Vec<_>>()
+    };
+    assert_eq!(gauges(Material::RolledSteel), gauges(Material::Matte));
 }
 
 /// Parts of a material that shines, taught and measured wherever they lie: no verdict is wrong, and hardly a pixel is.

@@ -149,13 +149,10 @@ impl GoldenPart<'_> {
     /// # Errors
     /// In words, if the recipe could not be packed, or not be loaded again.
     pub fn recipe(&self, naming: &Naming) -> Result<TaughtRecipe, String> {
-        let resolved: Vec<bool> = self
-            .phases
-            .trust
-            .iter()
-            .map(|trust| *trust == Trust::Resolved)
-            .collect();
-        let (regions, gauges) = gauges(&resolved, self.phases.width);
+        // A highlight is not resolved either, but it is no opening: it moves over the part.
+        let seen = |trust: &Trust| matches!(trust, Trust::Resolved | Trust::Saturated);
+        let seen: Vec<bool> = self.phases.trust.iter().map(seen).collect();
+        let (regions, gauges) = gauges(&seen, self.phases.width);
         let surface = KnownSurface {
             width: self.phases.width,
             phase: self.phases.phase.clone(),
@@ -299,9 +296,9 @@ fn mean(offsets: &Offsets) -> impl Iterator<Item = i16> + '_ {
     first.iter().zip(second).map(|(a, b)| a.midpoint(*b))
 }
 
-/// The regions and gauges of a part with these resolved pixels: those of the whole frame, and those of its openings.
-fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
-    let rows = resolved.len() / width.max(1);
+/// The regions and gauges of a part that is seen by these pixels: those of the whole frame, and those of its openings.
+fn gauges(seen: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
+    let rows = seen.len() / width.max(1);
     let (right, bottom) = (width as f64 - 0.5, rows as f64 - 0.5);
     let mut regions = vec![RegionFile {
         name: "frame".into(),
@@ -325,7 +322,7 @@ fn gauges(resolved: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) 
             high: None,
         },
     ];
-    let found = openings(resolved, width, OPENING_PIXELS);
+    let found = openings(seen, width, OPENING_PIXELS);
     let usable = found
         .iter()
         .filter(|opening| opening.reach >= OPENING_REACH);

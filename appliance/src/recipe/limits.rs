@@ -60,6 +60,7 @@ impl GoldenPart<'_> {
             judged.retain(|of| value(of).is_none_or(|value| !magnitudes.is_wrong(value)));
         }
         let mut words = good_parts.words();
+        words.extend(proof::leave_out_covered(manifest, &mut judged));
         manifest.good_parts = Some(good_parts);
         words.extend(proof::hold(manifest, &judged));
         manifest.tried = proof::tried(manifest, &judged);

@@ -29,6 +29,8 @@ const STILL: usize = 5;
 const PLACEMENTS: usize = 16;
 /// Placements reach this share of the tolerance: what is worked out has the error of the motion, too.
 const REACH: f64 = 0.98;
+/// At most this share of an opening is covered by good parts that lie elsewhere.
+const MOST_COVERED: f64 = 0.5;
 /// Limits are this many times as far from the expected value as the farthest of the cycles.
 const FARTHER: f64 = 1.2;
 
@@ -155,6 +157,37 @@ pub(super) fn as_it_lies(
         }
     }
     Ok(judged)
+}
+
+/// Leaves out the openings that good parts cover for the most part when they lie elsewhere, such as a place that is only too dark as the part lies;
+/// says which.
+pub(super) fn leave_out_covered(
+    manifest: &mut RecipeFile,
+    judged: &mut [Inspection],
+) -> Vec<String> {
+    let mut words = Vec::new();
+    for at in (0..manifest.gauges.len()).rev() {
+        let gauge = &manifest.gauges[at];
+        let values = judged.iter().filter_map(|of| of.gauges.get(at)?.value);
+        let most = values.fold(0.0, f64::max);
+        let is_opening = gauge.measures == GaugeKind::Coverage && gauge.low.is_none();
+        if !is_opening || most <= MOST_COVERED {
+            continue;
+        }
+        words.push(format!(
+            "{} is left out: {:.0} % of it is covered by good parts that lie elsewhere, so it is no opening",
+            gauge.name,
+            most * 100.0
+        ));
+        let removed = manifest.gauges.remove(at);
+        manifest
+            .regions
+            .retain(|region| region.name != removed.region);
+        for inspection in &mut *judged {
+            inspection.gauges.remove(at);
+        }
+    }
+    words
 }
 
 /// Moves the limits that some of these cycles of good parts do not keep, so that all do; says which.
