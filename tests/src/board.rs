@@ -123,34 +123,12 @@ pub fn write(pose: &Pose, seed: u64, folder: &Path) {
     let mut entries = Vec::new();
     for pattern in 0..2 {
         let shift = if pattern == 0 { 0.0 } else { pose.moved };
-        let mut frames = vec![Vec::new(); 6];
-        for at in 0..FRAME.0 * FRAME.1 {
-            let mut sums = [0.0; 6];
-            for ray in 0..SUB * SUB {
-                let off = |at: usize| pose.blur * ((at as f64 + 0.5) / SUB as f64 - 0.5);
-                let place = |at: usize, size: usize, ray: usize| {
-                    (at as f64 + off(ray) - (size as f64 - 1.0) / 2.0) / FOCAL.0
-                };
-                let x = place(at % FRAME.0, FRAME.0, ray % SUB);
-                let y = place(at / FRAME.0, FRAME.1, ray / SUB);
-                let Some((albedo, xi, eta)) = met(pose, (x, y), shift) else {
-                    continue;
-                };
-                if xi < pose.dark {
-                    continue;
-                }
-                let phase = [xi / RASTER.0 as f64, eta / RASTER.1 as f64][pattern] * FRINGES;
-                for (frame, sum) in sums.iter_mut().enumerate() {
-                    let ratio = [1.0 / FRINGES, 1.0][frame / 3];
-                    let turns = ratio * phase + (frame % 3) as f64 / 3.0;
-                    *sum += albedo * (0.5 + 0.5 * (TAU * turns).sin());
-                }
-            }
-            for (frame, sum) in frames.iter_mut().zip(sums) {
-                let counts = 12.0 + 210.0 * sum / (SUB * SUB) as f64 + 2.0 * (random.share() - 0.5);
-                frame.push(counts.round() as u8);
-            }
-        }
+        let frames = seen(pose, shift, 6, &mut random, |frame, xi, eta| {
+            let phase = [xi / RASTER.0 as f64, eta / RASTER.1 as f64][pattern] * FRINGES;
+            let ratio = [1.0 / FRINGES, 1.0][frame / 3];
+            let turns = ratio * phase + (frame % 3) as f64 / 3.0;
+            0.5 + 0.5 * (TAU * turns).sin()
+        });
         for (at, counts) in frames.iter().enumerate() {
             let file = format!("frames/{pattern}-{at}.png");
             png(&folder.join(&file), counts);
@@ -168,6 +146,67 @@ pub fn write(pose: &Pose, seed: u64, folder: &Path) {
         "frames": entries,
     });
     fs::write(folder.join("recording.json"), manifest.to_string()).expect("it can be written");
+}
+
+/// Writes the pictures of a pose under a Gray code of the columns, 9 bits of cells of so many pixels, and of the rows, 8 bits, into a new
+/// folder: each bit followed by its inverse, then white and black.
+pub fn write_codes(pose: &Pose, seed: u64, cell: f64, folder: &Path) {
+    fs::create_dir_all(folder).expect("the folder can be made");
+    let mut random = Random::new(seed);
+    let bits = [9_usize, 8];
+    let codes = 2 * (bits[0] + bits[1]);
+    let frames = seen(pose, 0.0, codes + 2, &mut random, |frame, xi, eta| {
+        if frame >= codes {
+            return if frame == codes { 1.0 } else { 0.0 };
+        }
+        let (along, count, first) = match frame < 2 * bits[0] {
+            true => (xi, bits[0], 0),
+            false => (eta, bits[1], 2 * bits[0]),
+        };
+        let cell = ((along + 0.5) / cell).max(0.0) as u32;
+        let bit = count - 1 - (frame - first) / 2;
+        let set = (cell ^ cell >> 1) >> bit & 1 == 1;
+        f64::from(u8::from(set == (frame % 2 == 0)))
+    });
+    for (at, counts) in frames.iter().enumerate() {
+        png(&folder.join(format!("{at:02}.png")), counts);
+    }
+}
+
+/// So many frames of a pose, moved along x by `shift` mm, under light that is a function of the frame and the projector pixel.
+fn seen(
+    pose: &Pose,
+    shift: f64,
+    count: usize,
+    random: &mut Random,
+    light: impl Fn(usize, f64, f64) -> f64,
+) -> Vec<Vec<u8>> {
+    let mut frames = vec![Vec::new(); count];
+    for at in 0..FRAME.0 * FRAME.1 {
+        let mut sums = vec![0.0; count];
+        for ray in 0..SUB * SUB {
+            let off = |at: usize| pose.blur * ((at as f64 + 0.5) / SUB as f64 - 0.5);
+            let place = |at: usize, size: usize, ray: usize| {
+                (at as f64 + off(ray) - (size as f64 - 1.0) / 2.0) / FOCAL.0
+            };
+            let x = place(at % FRAME.0, FRAME.0, ray % SUB);
+            let y = place(at / FRAME.0, FRAME.1, ray / SUB);
+            let Some((albedo, xi, eta)) = met(pose, (x, y), shift) else {
+                continue;
+            };
+            if xi < pose.dark {
+                continue;
+            }
+            for (frame, sum) in sums.iter_mut().enumerate() {
+                *sum += albedo * light(frame, xi, eta);
+            }
+        }
+        for (frame, sum) in frames.iter_mut().zip(sums) {
+            let counts = 12.0 + 210.0 * sum / (SUB * SUB) as f64 + 2.0 * (random.share() - 0.5);
+            frame.push(counts.round() as u8);
+        }
+    }
+    frames
 }
 
 fn png(path: &Path, counts: &[u8]) {

@@ -1,6 +1,7 @@
 //! The geometry of a head from recordings of a checkerboard: one pose at a time, then all together.
 
 use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
+use super::code::CodeAlone;
 use super::scan::Scan;
 use super::seam;
 use algo::calibration::{
@@ -8,6 +9,7 @@ use algo::calibration::{
     Residuals, View, calibrate, look,
 };
 use algo::geometry::Pinhole;
+use algo::phase::LeastModulation;
 use algo::pipeline::PhaseMap;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
@@ -29,7 +31,7 @@ pub struct SeenPose {
 }
 
 impl SeenPose {
-    /// Finds the board in a recording with vertical and horizontal fringes.
+    /// Finds the board in a recording with vertical and horizontal fringes, or Gray codes alone.
     ///
     /// # Errors
     /// In words: what the recording lacks, or why the pose cannot be used.
@@ -71,12 +73,16 @@ impl SeenPose {
     }
 }
 
-/// The phases of one pattern of a recording, and the offset of each of its levels.
+/// The phases of one pattern of a recording, and the offset of each of its levels, or of its code.
 fn decoded(
     recording: &Recording,
     pattern: usize,
     levels: &mut Vec<Picture>,
 ) -> Result<PhaseMap, String> {
+    if let Some(code) = CodeAlone::of(recording, pattern)? {
+        levels.push(Picture::mean(&code.even()));
+        return code.phases(LeastModulation::default());
+    }
     let projector = &recording.projector;
     let (columns, rows) = (projector.width as usize, projector.height as usize);
     let function = seam::phase_function(&recording.patterns[pattern], columns, rows)

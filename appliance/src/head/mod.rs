@@ -5,6 +5,7 @@ pub mod calibrate;
 pub mod calibrated;
 pub mod calibration;
 pub mod capture;
+pub mod code;
 pub mod commission;
 pub mod doctor;
 pub mod examine;
