@@ -76,6 +76,9 @@ pub fn adapt(
     let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
     let crossed = crossed(recording, options.method).map_err(|error| wrong(&error))?;
     let measurement = measure(recording, folder)?;
+    let decoder = measurement.decoder.as_ref().ok_or_else(|| {
+        wrong(&"a Gray code alone has no modulation of fringes to go by: record fringes with fringed record")
+    })?;
     let surface = measurement.heights.as_ref().map_err(|missing| {
         wrong(&format!(
             "{missing}: calibrate the head and add both models, or record with fringed record"
@@ -96,10 +99,7 @@ pub fn adapt(
         Method::Fringed => {
             let slopes = map.slopes(noise::MAX_SLOPE);
             let light = Light::of(
-                (
-                    &measurement.phases[measurement.primary],
-                    &measurement.decoder,
-                ),
+                (&measurement.phases[measurement.primary], decoder),
                 &slopes,
                 1.0 / before.pitches()[0],
                 &options.optics.blur,
