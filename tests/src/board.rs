@@ -179,36 +179,10 @@ pub fn write_as(pose: &Pose, projected: Projected, seed: u64, folder: &Path) {
     let dark = projected.light(0.0).len();
     for pattern in 0..2 {
         let shift = if pattern == 0 { 0.0 } else { pose.moved };
-        let mut frames = vec![Vec::new(); dark];
-        for at in 0..FRAME.0 * FRAME.1 {
-            let mut sums = vec![0.0; dark];
-            for ray in 0..SUB * SUB {
-                let off = |at: usize| pose.blur * ((at as f64 + 0.5) / SUB as f64 - 0.5);
-                let place = |at: usize, size: usize, ray: usize| {
-                    (at as f64 + off(ray) - (size as f64 - 1.0) / 2.0) / FOCAL.0
-                };
-                let x = place(at % FRAME.0, FRAME.0, ray % SUB);
-                let y = place(at / FRAME.0, FRAME.1, ray / SUB);
-                let Some((albedo, xi, eta)) = met(pose, (x, y), shift) else {
-                    continue;
-                };
-                if xi < pose.dark {
-                    continue;
-                }
-                let xi = match pose.mirrored {
-                    true => RASTER.0 as f64 - 1.0 - xi,
-                    false => xi,
-                };
-                let phase = [xi / RASTER.0 as f64, eta / RASTER.1 as f64][pattern] * FRINGES;
-                for (sum, light) in sums.iter_mut().zip(projected.light(phase)) {
-                    *sum += albedo * light;
-                }
-            }
-            for (frame, sum) in frames.iter_mut().zip(sums) {
-                let counts = 12.0 + 210.0 * sum / (SUB * SUB) as f64 + 2.0 * (random.share() - 0.5);
-                frame.push(counts.round() as u8);
-            }
-        }
+        let frames = seen(pose, shift, dark, &mut random, |xi, eta| {
+            let phase = [xi / RASTER.0 as f64, eta / RASTER.1 as f64][pattern] * FRINGES;
+            projected.light(phase)
+        });
         let files: Vec<String> = (0..dark)
             .map(|at| format!("frames/{pattern}-{at}.png"))
             .collect();
@@ -240,6 +214,75 @@ pub fn write_as(pose: &Pose, projected: Projected, seed: u64, folder: &Path) {
         (manifest["version"], manifest["codes"]) = (json!(2), json!(codes));
     }
     fs::write(folder.join("recording.json"), manifest.to_string()).expect("it can be written");
+}
+
+/// Writes the pictures of a pose under a Gray code of the columns, 9 bits of cells of so many pixels, and of the rows, 8 bits, into a new
+/// folder: each bit followed by its inverse, then white and black.
+pub fn write_codes(pose: &Pose, seed: u64, cell: f64, folder: &Path) {
+    fs::create_dir_all(folder).expect("the folder can be made");
+    let mut random = Random::new(seed);
+    let bits = [9_usize, 8];
+    let codes = 2 * (bits[0] + bits[1]);
+    let light = |frame: usize, xi: f64, eta: f64| {
+        if frame >= codes {
+            return if frame == codes { 1.0 } else { 0.0 };
+        }
+        let (along, count, first) = match frame < 2 * bits[0] {
+            true => (xi, bits[0], 0),
+            false => (eta, bits[1], 2 * bits[0]),
+        };
+        let cell = ((along + 0.5) / cell).max(0.0) as u32;
+        let bit = count - 1 - (frame - first) / 2;
+        let set = (cell ^ cell >> 1) >> bit & 1 == 1;
+        f64::from(u8::from(set == (frame % 2 == 0)))
+    };
+    let count = codes + 2;
+    let frames = seen(pose, 0.0, count, &mut random, |xi, eta| {
+        (0..count).map(|frame| light(frame, xi, eta)).collect()
+    });
+    for (at, counts) in frames.iter().enumerate() {
+        png(&folder.join(format!("{at:02}.png")), counts);
+    }
+}
+
+/// So many frames of a pose, moved along x by `shift` mm, under the light that each of them has at a projector pixel.
+fn seen(
+    pose: &Pose,
+    shift: f64,
+    count: usize,
+    random: &mut Random,
+    light: impl Fn(f64, f64) -> Vec<f64>,
+) -> Vec<Vec<u8>> {
+    let mut frames = vec![Vec::new(); count];
+    for at in 0..FRAME.0 * FRAME.1 {
+        let mut sums = vec![0.0; count];
+        for ray in 0..SUB * SUB {
+            let off = |at: usize| pose.blur * ((at as f64 + 0.5) / SUB as f64 - 0.5);
+            let place = |at: usize, size: usize, ray: usize| {
+                (at as f64 + off(ray) - (size as f64 - 1.0) / 2.0) / FOCAL.0
+            };
+            let x = place(at % FRAME.0, FRAME.0, ray % SUB);
+            let y = place(at / FRAME.0, FRAME.1, ray / SUB);
+            let Some((albedo, xi, eta)) = met(pose, (x, y), shift) else {
+                continue;
+            };
+            if xi < pose.dark {
+                continue;
+            }
+            let xi = match pose.mirrored {
+                true => RASTER.0 as f64 - 1.0 - xi,
+                false => xi,
+            };
+            for (sum, light) in sums.iter_mut().zip(light(xi, eta)) {
+                *sum += albedo * light;
+            }
+        }
+        for (frame, sum) in frames.iter_mut().zip(sums) {
+            let counts = 12.0 + 210.0 * sum / (SUB * SUB) as f64 + 2.0 * (random.share() - 0.5);
+            frame.push(counts.round() as u8);
+        }
+    }
+    frames
 }
 
 fn png(path: &Path, counts: &[u8]) {

@@ -154,6 +154,17 @@ pub fn triangulate(
     noise: Option<SampleNoise>,
     phases: &mut PhaseMap,
 ) -> HeightMap {
+    triangulate_with(triangulator, phases, |modulation| {
+        noise.map(|noise| decoder.phase_noise(modulation, noise))
+    })
+}
+
+/// As [`triangulate`], of phases whose σ in turns follows in another way from the modulation, or is not known.
+pub fn triangulate_with(
+    triangulator: &Triangulator,
+    phases: &mut PhaseMap,
+    sigma: impl Fn(Modulation) -> Option<f64> + Sync + Send,
+) -> HeightMap {
     let width = phases.width;
     let mut map = HeightMap {
         width,
@@ -174,8 +185,7 @@ pub fn triangulate(
                 None => phases.trust[u] = Trust::OutOfRange,
                 Some(solution) => {
                     heights[u] = Height::from_mm(solution.point.z);
-                    if let Some(noise) = noise {
-                        let turns = decoder.phase_noise(phases.modulation[u], noise);
+                    if let Some(turns) = sigma(phases.modulation[u]) {
                         sigmas[u] = (turns / libm::fabs(solution.slope)) as f32;
                     }
                 }

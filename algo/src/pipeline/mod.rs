@@ -14,7 +14,9 @@ pub(crate) use cubic::{
 };
 pub use cubic::{HeightCubics, KnownSurface};
 pub use epipolar::Epipolar;
-pub use measure::{HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate};
+pub use measure::{
+    HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate, triangulate_with,
+};
 pub use noise::{sample_noise, signal_by_modulation};
 pub use plate::{Plate, PlateError};
 pub use rows::for_each_row;

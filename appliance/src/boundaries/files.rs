@@ -185,8 +185,9 @@ unit: mm
             camera: size,
             projector: size,
         };
-        let (camera, projector) = from_two(&camera, &projector, sizes, Declared::default())?;
-        Calibration::new((size.0, size.1, 8), size, (&camera, &projector), 1.0).map(drop)
+        let models = from_two(&camera, &projector, sizes, Declared::default())?;
+        let models = (&models.camera, &models.projector);
+        Calibration::new((size.0, size.1, 8), size, models, 1.0).map(drop)
     };
     read(YAML).unwrap();
     let mut tally = Tally::default();

@@ -208,7 +208,7 @@ fn raster_of(path: &Path, (columns, rows): (u32, u32)) -> Result<Raster, Failure
         return Err(Failure::new(Exit::Missing, words));
     }
     let wrong = |problem: String| Failure::because(Exit::Content, format!("show {name}"), problem);
-    let picture = Picture::read(path).map_err(wrong)?;
+    let picture = Picture::single(path).map_err(wrong)?;
     let (width, height) = picture.size;
     if picture.size != (columns, rows) || picture.bits != 8 {
         return Err(wrong(format!(

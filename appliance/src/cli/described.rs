@@ -1,9 +1,9 @@
 //! Options that describe projected pictures, for `fringed import` and `fringed patterns`.
 
-use super::numbers::{Series, Size, number, series, size};
+use super::numbers::{Series, Size, directions, number, series, size};
 use crate::error::{Exit, Failure};
 use crate::measure::layout::{
-    Convention, Description, Direction, Fringes, Gray, Section, ShiftSign, Shifts,
+    Convention, Description, Direction, Fringes, Gray, PerDirection, Section, ShiftSign, Shifts,
 };
 use hal::bounds::{MAX_FRINGES, MAX_SHIFT_TURNS, MAX_SIDE};
 
@@ -16,15 +16,16 @@ pub struct Described {
     /// Columns and rows of the projector.
     #[arg(long, value_name = "WxH", value_parser = size)]
     projector: Size,
-    /// Fringes over the projector of each level, in the order of projection; need not be whole numbers.
-    #[arg(long, value_name = "F,...", conflicts_with = "pitch", value_parser = series(1e-3, MAX_FRINGES, MAX_LEVELS))]
-    fringes: Option<Series<f64>>,
+    /// Fringes over the projector of each level, in the order of projection; need not be whole numbers. 1,8,32/1,8,16: vertical ones,
+    /// then horizontal ones. Without fringes there is a Gray code alone.
+    #[arg(long, value_name = "F,...", conflicts_with = "pitch", value_parser = directions(1e-3, MAX_FRINGES, MAX_LEVELS))]
+    fringes: Option<PerDirection<f64>>,
     /// Projector pixels per fringe of each level, instead of --fringes.
-    #[arg(long, value_name = "PX,...", value_parser = series(2.0, 1e6, MAX_LEVELS))]
-    pitch: Option<Series<f64>>,
+    #[arg(long, value_name = "PX,...", value_parser = directions(2.0, 1e6, MAX_LEVELS))]
+    pitch: Option<PerDirection<f64>>,
     /// Shifts of all levels, or of each.
-    #[arg(long, value_name = "N,...", default_value = "4", value_parser = series(3u8, 64, MAX_LEVELS))]
-    steps: Series<u8>,
+    #[arg(long, value_name = "N,...", default_value = "4", value_parser = directions(3u8, 64, MAX_LEVELS))]
+    steps: PerDirection<u8>,
     /// Whether the phase is that of a sine or of a cosine.
     #[arg(long, default_value = "sin")]
     convention: Convention,
@@ -34,13 +35,13 @@ pub struct Described {
     /// Shift of each level's first frame, turns.
     #[arg(long, value_name = "TURNS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(-MAX_SHIFT_TURNS, MAX_SHIFT_TURNS))]
     first_shift: f64,
-    /// Direction of the fringes; both: all vertical ones, then all horizontal ones.
+    /// Direction of the fringes; both: all vertical ones, then all horizontal ones; horizontal-first: the other way round.
     #[arg(long, default_value = "vertical")]
     direction: Direction,
     /// Bits of a Gray code beside the fringes; two numbers for the vertical and the horizontal one.
     #[arg(long, value_name = "BITS", value_parser = series(1u8, 13, 2))]
     gray: Option<Series<u8>>,
-    /// Width of the Gray code's cells, projector pixels; without it one cell per fringe of the finest level.
+    /// Width of the Gray code's cells, projector pixels; without it one cell per fringe of the finest level, or per pixel without fringes.
     #[arg(long, value_name = "PX", value_parser = number(1.0, f64::from(MAX_SIDE)))]
     gray_cell: Option<f64>,
     /// Each picture of the Gray code is followed by its inverse.
@@ -61,12 +62,17 @@ impl Described {
     /// The description, with a phase function instead of straight fringes if one is given.
     ///
     /// # Errors
-    /// If neither fringes nor pitches are given, or a Gray code is described that there is not (64).
+    /// If neither fringes, pitches nor a Gray code are given, or a Gray code is described that there is not (64).
     pub fn description(&self, function: Option<Vec<f64>>) -> Result<Description, Failure> {
         let fringes = match (&self.fringes, &self.pitch) {
-            (Some(Series(fringes)), _) => Fringes::Count(fringes.clone()),
-            (None, Some(Series(pitch))) => Fringes::Pitch(pitch.clone()),
-            (None, None) => return Err(Failure::new(Exit::Usage, "give --fringes or --pitch")),
+            (Some(fringes), _) => Fringes::Count(fringes.clone()),
+            (None, Some(pitch)) => Fringes::Pitch(pitch.clone()),
+            (None, None) if self.gray.is_some() && function.is_none() => Fringes::None,
+            (None, None) => {
+                let words =
+                    "give --fringes or --pitch, or the bits of a Gray code alone with --gray";
+                return Err(Failure::new(Exit::Usage, words));
+            }
         };
         if self.gray.is_none() && (self.gray_cell.is_some() || self.gray_inverse) {
             let words =
@@ -78,14 +84,15 @@ impl Described {
             cell_px: self.gray_cell,
             inverse: self.gray_inverse,
         });
-        let usual = match gray {
-            Some(_) => vec![Section::Sine, Section::Gray],
-            None => vec![Section::Sine],
+        let usual = match (&fringes, &gray) {
+            (Fringes::None, _) => vec![Section::Gray],
+            (_, Some(_)) => vec![Section::Sine, Section::Gray],
+            (_, None) => vec![Section::Sine],
         };
         Ok(Description {
             projector: self.projector(),
             fringes,
-            steps: self.steps.0.clone(),
+            steps: self.steps.clone(),
             shifts: Shifts {
                 convention: self.convention,
                 sign: self.shift,

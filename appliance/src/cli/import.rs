@@ -3,11 +3,12 @@
 use super::calibrate::model_files;
 use super::described::Described;
 use super::names;
-use super::numbers::number;
+use super::numbers::{number, range};
 use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
 use crate::measure::import::{Channel, Imported, Taken, import};
+use hal::bounds::{MAX_NOISE_COUNTS, MAX_RANGE_MM, MIN_NOISE_COUNTS};
 use hal::replay::recorder;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,14 +17,14 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("imported").args(["camera_model", "projector_model", "models"]).multiple(true))]
 pub struct Import {
-    /// Folder of PNG, BMP or TIFF pictures, named in the order of projection.
+    /// Folder of PNG, BMP, TIFF or JPEG pictures, named in the order of projection; each page of a TIFF is a picture.
     folder: PathBuf,
     /// Folder for the recording; must not exist yet.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: PathBuf,
     #[command(flatten)]
     described: Described,
-    /// Take only pictures whose names begin with this.
+    /// Take only pictures whose names begin with this, or fit a pattern of * and ?, such as *-left.
     #[arg(
         long,
         value_name = "TEXT",
@@ -37,13 +38,19 @@ pub struct Import {
     /// Significant bits of a sample, 9 to 16, where 16-bit pictures hold fewer.
     #[arg(long, value_name = "BITS", value_parser = number(9u8, 16))]
     bit_depth: Option<u8>,
+    /// σ of one sample in counts; without it fringes need 16 of 255 counts of modulation.
+    #[arg(long, value_name = "COUNTS", value_parser = number(MIN_NOISE_COUNTS, MAX_NOISE_COUNTS))]
+    noise: Option<f64>,
+    /// Working range of z about the plane z = 0, mm; without it a fifth of the camera's distance to both sides.
+    #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true, value_parser = range(MAX_RANGE_MM))]
+    range: Option<[f64; 2]>,
     /// The camera's model, written by OpenCV (YAML, XML, JSON). Without models there are phases but no heights.
     #[arg(long, value_name = "FILE", requires = "projector_model")]
     camera_model: Option<PathBuf>,
     /// The projector's model.
     #[arg(long, value_name = "FILE", requires = "camera_model")]
     projector_model: Option<PathBuf>,
-    /// Both models in one file, as for calibrate.
+    /// Both models in one file, as for calibrate; without the pose of a plate, see --plane-at.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["camera_model", "projector_model"])]
     models: Option<PathBuf>,
     /// Unit of lengths in the models' files, where they do not say it.
@@ -52,6 +59,10 @@ pub struct Import {
     /// The world's z in the models' files points away from the head, as on OpenCV's boards.
     #[arg(long, requires = "imported")]
     z_away: bool,
+    /// The plane z = 0 stands across the camera's axis at this distance: for models without the pose of a plate. Without it z = 0 is
+    /// the plane that fits the measured points best.
+    #[arg(long, value_name = "MM", requires = "imported", value_parser = number(1.0, MAX_RANGE_MM))]
+    plane_at: Option<f64>,
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
@@ -86,6 +97,8 @@ impl Import {
             channel: self.channel,
             bit_depth: self.bit_depth,
             name: self.name.clone(),
+            noise_counts: self.noise,
+            range_mm: self.range,
         };
         let pool = self.threads.pool(0)?;
         let models = |frames| self.models(frames);
@@ -131,6 +144,7 @@ impl Import {
         let declared = Declared {
             unit: self.unit,
             z_away: self.z_away,
+            plane_at: self.plane_at,
         };
         let both = match (&self.camera_model, &self.projector_model, &self.models) {
             (Some(camera), Some(projector), _) => {

@@ -5,6 +5,7 @@ use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::history::kept;
 use crate::measure::{Measurement, measure_about_map, measure_with, models};
+use crate::output::cloud::Axes;
 use crate::output::{canvas, picture};
 use crate::storage::folder::OutputFolder;
 use crate::storage::unpack::Unpacked;
@@ -30,6 +31,9 @@ pub struct Measure {
     /// Measure with the models of this calibration.json instead of the recording's.
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
+    /// Frame of the points in cloud.ply.
+    #[arg(long, default_value = "world")]
+    axes: Axes,
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
@@ -58,7 +62,7 @@ impl Measure {
         let mut measurement = pool.install(measured)?;
         measurement.report.add_models(models);
         let folder = OutputFolder::create(&self.out)?;
-        pool.install(|| write(&folder, &measurement))?;
+        pool.install(|| write(&folder, &measurement, self.axes))?;
         let json = serde_json::to_string_pretty(&measurement.report)
             .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
         folder.write("report.json", format!("{json}\n").as_bytes())?;
@@ -92,10 +96,13 @@ fn expected_phase(path: &Path) -> Result<npy::Array<f64>, Failure> {
 /// Files that are written only if there are heights.
 const SURFACE: [&str; 4] = ["height.npy", "sigma.npy", "height.png", "cloud.ply"];
 
+/// Files of Gray codes alone, by the beginning of their names.
+const PLACES: [&str; 2] = ["column", "row"];
+
 /// Files of each pattern, by the beginning of their names.
 const OF_PATTERN: [&str; 4] = ["phase", "wrapped", "modulation", "mask"];
 
-fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure> {
+fn write(folder: &OutputFolder, measurement: &Measurement, axes: Axes) -> Result<(), Failure> {
     let array = |name: &str, width, values: &[f32]| folder.write(name, &npy::write(width, values));
     let patterns = measurement.phases.len();
     write_pattern(folder, measurement, measurement.primary, "")?;
@@ -111,6 +118,14 @@ fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure
         }
     }
     let width = measurement.phases[measurement.primary].width;
+    for name in PLACES {
+        folder.remove(&format!("{name}.npy"))?;
+    }
+    for ((name, pitch), map) in measurement.places.iter().zip(&measurement.phases) {
+        let places = turns(map).into_iter();
+        let places: Vec<f32> = places.map(|turns| turns * *pitch as f32).collect();
+        array(&format!("{name}.npy"), width, &places)?;
+    }
     let picture = canvas::grey_png(width, &measurement.intensity);
     folder.write("picture.png", &picture)?;
     if measurement.heights.is_err() {
@@ -127,7 +142,7 @@ fn write(folder: &OutputFolder, measurement: &Measurement) -> Result<(), Failure
         let rows = mm.len() / map.width.max(1);
         let png = picture::height_png(map.width as u32, rows as u32, &mm);
         folder.write(picture_of, &png)?;
-        folder.write(points, &surface.ply(&measurement.intensity))?;
+        folder.write(points, &surface.ply(axes, &measurement.intensity))?;
     }
     Ok(())
 }
@@ -154,7 +169,7 @@ fn write_pattern(
         }
     };
     folder.write(wrapped_file, &npy::write(width, &turns(wrapped)))?;
-    let full_scale = measurement.decoder.full_scale();
+    let full_scale = measurement.full_scale;
     let counts = wrapped.modulation.iter();
     let counts: Vec<f32> = counts
         .map(|modulation| modulation.counts(full_scale) as f32)

@@ -1,5 +1,5 @@
 //! `fringed replay RECORDING`: judges a part that did not pass again, from its recorded frames, and compares the result with the one in
-//! the history, bit by bit.
+//! the history, bit by bit. With `--recipe FILE` it judges any frames of the recipe's sequences.
 
 use super::options::Measuring;
 use crate::error::{Exit, Failure};
@@ -14,10 +14,10 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-/// Judge a part that did not pass again, from its recorded frames.
+/// Judge a part that did not pass again, from its recorded frames, or any recording by a recipe.
 #[derive(Debug, clap::Args)]
 pub struct Replay {
-    /// The folder of its frames, which `fringed history` names, or their ZIP from the page.
+    /// The folder of its frames, which `fringed history` names, or their ZIP from the page; with a recipe also imported frames.
     recording: PathBuf,
     /// Another recipe than the one that it was judged by: a file, or `stored` for the station's recipe of the same number.
     #[arg(long, value_name = "FILE|stored")]
@@ -45,12 +45,13 @@ impl Replay {
         let options = &self.measuring;
         let unpacked = Unpacked::of(&self.recording)?;
         let state = self.state()?;
-        let kept = Kept::open(unpacked.folder())?;
+        let store = Store::at(&state.join("recipes"));
+        let (kept, chosen) = self.choose(unpacked.folder(), &store)?;
         let Chosen {
             recipe,
             from,
             original,
-        } = self.choose(&kept, &Store::at(&state.join("recipes")))?;
+        } = chosen;
         let (number, fingerprint) = (recipe.id.number, recipe.id.fingerprint.clone());
         let before = result_of(&state, unpacked.name(), &kept)?;
         let flags = before.as_ref().map_or(0, |entry| entry.flags);
@@ -127,29 +128,38 @@ impl Replay {
         }
     }
 
-    fn choose(&self, kept: &Kept, store: &Store) -> Result<Chosen, Failure> {
-        let (recipe, from) = match &self.recipe {
+    fn choose(&self, folder: &Path, store: &Store) -> Result<(Kept, Chosen), Failure> {
+        let (kept, recipe, from) = match &self.recipe {
             None => {
+                let kept = Kept::open(folder)?;
                 let (recipe, own) = kept.recipe(store)?;
                 let from = match own {
                     true => "the recording's own recipe",
                     false => "the station's recipe: the recording has none of its own",
                 };
-                (recipe, from.to_owned())
+                (kept, recipe, from.to_owned())
             }
             Some(named) if named == Path::new("stored") => {
-                let number = u16::try_from(kept.reference().number).unwrap_or(0);
+                let kept = Kept::open(folder)?;
+                let number = kept.reference().map_or(0, |recipe| recipe.number);
+                let number = u16::try_from(number).unwrap_or(0);
                 let loaded = store.load(number).map_err(|error| missing(&error))?;
-                (loaded.recipe, "the station's recipe as it is now".into())
+                let from = "the station's recipe as it is now";
+                (kept, loaded.recipe, from.into())
             }
-            Some(path) => (kept::read(path)?, path.display().to_string()),
+            Some(path) => {
+                let recipe = kept::read(path)?;
+                let kept = Kept::judged_by(folder, &recipe)?;
+                (kept, recipe, path.display().to_string())
+            }
         };
-        let original = recipe.id.fingerprint == kept.reference().fingerprint;
-        Ok(Chosen {
+        let original = kept.was_judged_by(&recipe);
+        let chosen = Chosen {
             recipe,
             from,
             original,
-        })
+        };
+        Ok((kept, chosen))
     }
 }
 
@@ -166,7 +176,8 @@ fn result_of(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Ent
     }
     let part = kept.part_id();
     let of_this_part = |entry: &Entry| {
-        kept.reference().fingerprint.starts_with(&entry.fingerprint)
+        let judge = kept.reference();
+        judge.is_some_and(|judge| judge.fingerprint.starts_with(&entry.fingerprint))
             && part.is_none_or(|part| part == entry.part_id.to_string())
     };
     Ok(found.filter(of_this_part))

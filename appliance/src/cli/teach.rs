@@ -284,6 +284,9 @@ impl Teach {
         })?;
         let calibration = Calibration::of(&recording, noise)
             .map_err(|lacks| wrong(&format!("it {lacks}: add both models")))?;
+        let decoder = measured.decoder.as_ref();
+        let decoder =
+            decoder.ok_or_else(|| wrong(&"it has no fringes, which a recipe projects"))?;
         let phases = &measured.phases[measured.primary];
         crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
         let at = measured.primary;
@@ -294,7 +297,7 @@ impl Teach {
             // Recordings cannot be exposed anew.
             illumination: Illumination::default(),
             full,
-            decoder: &measured.decoder,
+            decoder,
             triangulator: &surface.triangulator,
             phases,
             heights: &surface.map,

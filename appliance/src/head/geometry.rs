@@ -2,6 +2,7 @@
 
 use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use super::channel::Channel;
+use super::code::CodeAlone;
 use super::standing::Ground;
 use algo::calibration::{
     Adjusted, Arrow, Board, CalibrationError, FoundBoard, Fringes, MeasuredBoard, Picture,
@@ -33,7 +34,7 @@ pub struct SeenPose {
 }
 
 impl SeenPose {
-    /// Finds the board in a recording with vertical and horizontal fringes.
+    /// Finds the board in a recording with vertical and horizontal fringes, or Gray codes alone.
     ///
     /// # Errors
     /// In words: what the recording lacks, or why the pose cannot be used.
@@ -87,12 +88,16 @@ pub fn same_place(other: &str) -> String {
     format!("the board lies where it lies in {other}")
 }
 
-/// The absolute phases of one pattern of a recording, and the offset of each of its levels.
+/// The absolute phases of one pattern of a recording, and the offset of each of its levels, or of its code.
 fn decoded(
     recording: &Recording,
     pattern: usize,
     levels: &mut Vec<Picture>,
 ) -> Result<PhaseMap, String> {
+    if let Some(code) = CodeAlone::of(recording, pattern)? {
+        levels.push(Picture::mean(&code.even()));
+        return code.phases(LeastModulation::default());
+    }
     // Not the least of the camera's noise: in black squares the light of bright ones around them would have a phase, which is not the place's.
     let channel = Channel::new(recording, pattern, LeastModulation::default())?;
     let unwrapping = channel.unwrapping(None, &Err("the models are to be made".into()))?;

@@ -6,6 +6,7 @@ pub mod calibrated;
 pub mod calibration;
 pub mod capture;
 pub mod channel;
+pub mod code;
 pub mod commission;
 pub mod direction;
 pub mod doctor;

@@ -14,11 +14,11 @@ use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
-/// A recording that a station made of a part that it had judged.
+/// A recording that a station made of a part that it had judged, or another one that a recipe is to judge.
 #[derive(Debug)]
 pub struct Kept {
     recording: Recording,
-    reference: RecipeReference,
+    reference: Option<RecipeReference>,
     calibration: Calibration,
     /// The recording's own recipe; recordings of older programs have none.
     own: Option<PathBuf>,
@@ -30,34 +30,49 @@ impl Kept {
     /// # Errors
     /// If it is not there (66), damaged, or not one that a station kept (65).
     pub fn open(folder: &Path) -> Result<Self, Failure> {
-        let mut recording = Recording::open(folder)?;
-        let wrong = |lacks: &str| {
-            let place = folder.join("recording.json");
-            let words = format!(
-                "replay {}: it {lacks}: replay one that the station kept",
-                place.display()
-            );
-            Failure::new(Exit::Content, words)
-        };
-        let reference = recording
-            .recipe
-            .take()
-            .ok_or_else(|| wrong("has no recipe"))?;
-        let noise = recording.noise_counts;
-        let noise = noise.ok_or_else(|| wrong("has no camera.noise_counts"))?;
-        let calibration = Calibration::of(&recording, noise).map_err(|lacks| wrong(&lacks))?;
+        let recording = Recording::open(folder)?;
+        if recording.recipe.is_none() {
+            let remedy = "replay one that the station kept, or name the recipe with --recipe";
+            return Err(wrong(folder, "has no recipe", remedy));
+        }
+        Self::of(folder, recording, None)
+    }
+
+    /// Opens a recording that is to be judged by this recipe, which need not have judged it before: frames that were imported, for
+    /// example. The noise of a sample is the recipe's where the recording states none.
+    ///
+    /// # Errors
+    /// If it is not there (66), damaged, or without models (65).
+    pub fn judged_by(folder: &Path, recipe: &Recipe) -> Result<Self, Failure> {
+        let recording = Recording::open(folder)?;
+        let noise = recipe.conditions.noise_counts;
+        Self::of(folder, recording, Some(noise))
+    }
+
+    fn of(folder: &Path, mut recording: Recording, noise: Option<f64>) -> Result<Self, Failure> {
+        let remedy = "replay one that the station kept, or add what is missing";
+        let noise = recording.noise_counts.or(noise);
+        let noise = noise.ok_or_else(|| wrong(folder, "has no camera.noise_counts", remedy))?;
+        let calibration =
+            Calibration::of(&recording, noise).map_err(|lacks| wrong(folder, &lacks, remedy))?;
         let own = folder.join(RECIPE);
         Ok(Self {
+            reference: recording.recipe.take(),
             recording,
-            reference,
             calibration,
             own: own.exists().then_some(own),
         })
     }
 
-    /// The recipe that judged the part.
-    pub fn reference(&self) -> &RecipeReference {
-        &self.reference
+    /// The recipe that judged the part, if one did.
+    pub fn reference(&self) -> Option<&RecipeReference> {
+        self.reference.as_ref()
+    }
+
+    /// Whether the part was judged by this recipe.
+    pub fn was_judged_by(&self, recipe: &Recipe) -> bool {
+        let judge = self.reference.as_ref();
+        judge.is_some_and(|judge| judge.fingerprint == recipe.id.fingerprint)
     }
 
     /// PART_ID, as far as the recording says.
@@ -82,10 +97,14 @@ impl Kept {
     /// # Errors
     /// If neither the recording nor the store has it (66), or the recording's is damaged or another one (65).
     pub fn recipe(&self, stored: &Store) -> Result<(Recipe, bool), Failure> {
-        let RecipeReference {
+        let Some(RecipeReference {
             number,
             fingerprint,
-        } = &self.reference;
+        }) = &self.reference
+        else {
+            let words = "replay: the recording has no recipe: name one with --recipe";
+            return Err(Failure::new(Exit::Content, words));
+        };
         let Some(own) = &self.own else {
             let number = u16::try_from(*number).unwrap_or(0);
             return match stored.load_fingerprint(number, fingerprint) {
@@ -111,8 +130,9 @@ impl Kept {
     /// # Errors
     /// If it was made for another head or does not fit the frames.
     pub fn plan(&self, recipe: Recipe, simulated: bool) -> Result<Plan, PlanError> {
-        let judged = recipe.id.fingerprint == self.reference.fingerprint;
-        if judged || self.calibration_then().as_ref() == Some(&recipe.id.calibration) {
+        if self.was_judged_by(&recipe)
+            || self.calibration_then().as_ref() == Some(&recipe.id.calibration)
+        {
             return Plan::again(recipe, &self.calibration, simulated);
         }
         Plan::new(recipe, &self.calibration, simulated)
@@ -123,6 +143,12 @@ impl Kept {
         let file = File::open(self.own.as_ref()?).ok()?;
         Some(archive::manifest(file).ok()?.calibration)
     }
+}
+
+fn wrong(folder: &Path, lacks: &str, remedy: &str) -> Failure {
+    let place = folder.join("recording.json");
+    let words = format!("replay {}: it {lacks}: {remedy}", place.display());
+    Failure::new(Exit::Content, words)
 }
 
 /// The failure of a command that needs a recipe which the station does not have.

@@ -81,6 +81,9 @@ pub fn adapt(
             &"patterns are adapted along the rows of the projector, and its fringes along the columns hardly depend on the height here: stand the projector beside the camera",
         ));
     }
+    let decoder = measurement.decoder.as_ref().ok_or_else(|| {
+        wrong(&"a Gray code alone has no modulation of fringes to go by: record fringes with fringed record")
+    })?;
     let surface = measurement.heights.as_ref().map_err(|missing| {
         wrong(&format!(
             "{missing}: calibrate the head and add both models, or record with fringed record"
@@ -101,10 +104,7 @@ pub fn adapt(
         Method::Fringed => {
             let slopes = map.slopes(noise::MAX_SLOPE);
             let light = Light::of(
-                (
-                    &measurement.phases[measurement.primary],
-                    &measurement.decoder,
-                ),
+                (&measurement.phases[measurement.primary], decoder),
                 &slopes,
                 1.0 / before.pitches()[0],
                 &options.optics.blur,

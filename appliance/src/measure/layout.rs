@@ -2,9 +2,8 @@
 //! `fringed import` takes pictures for it.
 
 use algo::chain::{GrayCode, MAX_CODE_BITS};
-use hal::frame::{Frame, FrameFormat};
-use hal::replay::Recording;
-use hal::replay::recording::{PatternSpec, RecordedCode, RecordedFrame, RecordedProjector};
+use hal::bounds::MAX_FRINGES;
+use hal::replay::recording::PatternSpec;
 
 /// How the sine of a level is written down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -35,6 +34,8 @@ pub enum Direction {
     Horizontal,
     /// Vertical ones, then horizontal ones.
     Both,
+    /// Horizontal ones, then vertical ones.
+    HorizontalFirst,
 }
 
 /// A part of the order of projection.
@@ -66,19 +67,25 @@ pub struct Shifts {
 pub struct Gray {
     /// Bits of the vertical code and of the horizontal one, or of both.
     pub bits: Vec<u8>,
-    /// Width of a cell in projector pixels; without it a fringe of the finest level.
+    /// Width of a cell in projector pixels; without it a fringe of the finest level, or of a code alone a pixel.
     pub cell_px: Option<f64>,
     /// Whether each picture is followed by its inverse.
     pub inverse: bool,
 }
 
+/// A list for vertical fringes and one for horizontal ones, or one for both.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PerDirection<T>(pub Vec<Vec<T>>);
+
 /// The fringes of each level, in the order of projection.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Fringes {
     /// Numbers of fringes over the projector.
-    Count(Vec<f64>),
+    Count(PerDirection<f64>),
     /// Projector pixels per fringe.
-    Pitch(Vec<f64>),
+    Pitch(PerDirection<f64>),
+    /// None: a Gray code alone.
+    None,
 }
 
 /// What the user says about the projected pictures.
@@ -89,7 +96,7 @@ pub struct Description {
     /// The fringes of each level.
     pub fringes: Fringes,
     /// Shifts of each level, or of all.
-    pub steps: Vec<u8>,
+    pub steps: PerDirection<u8>,
     /// The convention of shifts.
     pub shifts: Shifts,
     /// The direction of fringes.
@@ -162,15 +169,36 @@ impl Shifts {
     }
 }
 
-impl Fringes {
-    /// Numbers of fringes over `length` projector pixels.
-    fn over(&self, length: u32) -> Vec<f64> {
+impl Direction {
+    /// Which fringes are vertical, in the order of projection.
+    fn vertical(self) -> &'static [bool] {
         match self {
-            Self::Count(count) => count.clone(),
-            Self::Pitch(pitch) => pitch
-                .iter()
-                .map(|pitch| f64::from(length) / pitch)
-                .collect(),
+            Self::Vertical => &[true],
+            Self::Horizontal => &[false],
+            Self::Both => &[true, false],
+            Self::HorizontalFirst => &[false, true],
+        }
+    }
+}
+
+impl<T> PerDirection<T> {
+    /// The list of this direction.
+    fn of(&self, vertical: bool) -> &[T] {
+        let own = self.0.get(usize::from(!vertical)).or(self.0.last());
+        own.map_or(&[], Vec::as_slice)
+    }
+}
+
+impl Fringes {
+    /// Numbers of vertical or horizontal fringes over `length` projector pixels.
+    fn over(&self, vertical: bool, length: u32) -> Vec<f64> {
+        match self {
+            Self::Count(count) => count.of(vertical).to_vec(),
+            Self::Pitch(pitch) => {
+                let pitch = pitch.of(vertical).iter();
+                pitch.map(|pitch| f64::from(length) / pitch).collect()
+            }
+            Self::None => Vec::new(),
         }
     }
 }
@@ -182,17 +210,28 @@ impl Layout {
     /// In words that name the option: numbers of steps, bits or cells that do not fit the levels.
     pub fn of(description: &Description) -> Result<Self, String> {
         let (columns, rows) = description.projector;
-        let directions: &[bool] = match (&description.function, description.direction) {
-            (Some(_), _) | (None, Direction::Vertical) => &[true],
-            (None, Direction::Horizontal) => &[false],
-            (None, Direction::Both) => &[true, false],
+        let directions: &[bool] = match &description.function {
+            Some(_) => &[true],
+            None => description.direction.vertical(),
         };
         let (mut patterns, mut codes) = (Vec::new(), Vec::new());
         let (mut sines, mut bits) = (Vec::new(), Vec::new());
         for (pattern, &vertical) in directions.iter().enumerate() {
             let length = if vertical { columns } else { rows };
-            let fringes = description.fringes.over(length);
-            let finest = fringes.iter().copied().fold(0.0, f64::max);
+            let fringes = description.fringes.over(vertical, length);
+            let mut finest = fringes.iter().copied().fold(0.0, f64::max);
+            let code = description.gray.as_ref().map(|gray| {
+                let curved = description.function.is_some();
+                gray.code(vertical, finest, length, curved)
+            });
+            let code = code.transpose()?;
+            if let (true, Some(code)) = (fringes.is_empty(), &code) {
+                // A turn of a code alone is a cell, or two or four of very many.
+                finest = f64::from(length) / code.cell;
+                while finest > MAX_FRINGES {
+                    finest /= 2.0;
+                }
+            }
             patterns.push(match (&description.function, vertical) {
                 (Some(turns), _) => PatternSpec::File {
                     rows: rows as usize,
@@ -202,15 +241,14 @@ impl Layout {
                 (None, true) => PatternSpec::Vertical { fringes: finest },
                 (None, false) => PatternSpec::Horizontal { fringes: finest },
             });
-            for (ratio, shift) in description.levels(&fringes, finest)? {
+            for (ratio, shift) in description.levels(&fringes, finest, vertical)? {
                 sines.push(Shown::Sine {
                     pattern,
                     ratio,
                     shift,
                 });
             }
-            if let Some(gray) = &description.gray {
-                let code = gray.code(pattern, finest, length, description.function.is_some())?;
+            if let (Some(gray), Some(code)) = (&description.gray, code) {
                 for bit in 0..code.bits {
                     let inverses: &[bool] = if gray.inverse {
                         &[false, true]
@@ -237,12 +275,22 @@ impl Layout {
             count.count()
         };
         let gray = usize::from(description.gray.is_some());
-        if once(Section::Sine) != 1
+        let sine = usize::from(description.fringes != Fringes::None);
+        if once(Section::Sine) != sine
             || once(Section::Gray) != gray
             || once(Section::White).max(once(Section::Black)) > 1
         {
             return Err(
-                "--order must name sine once, gray once if there is --gray and else not, white and black at most once"
+                "--order must name sine once if there are --fringes or --pitch and else not, gray once if there is --gray and else \
+                 not, white and black at most once"
+                    .into(),
+            );
+        }
+        let against = description.gray.as_ref().is_some_and(|gray| gray.inverse)
+            || once(Section::White) + once(Section::Black) == 2;
+        if sine == 0 && !against {
+            return Err(
+                "a Gray code alone has nothing to compare its pictures with: give --gray-inverse, or white and black in --order"
                     .into(),
             );
         }
@@ -255,76 +303,6 @@ impl Layout {
 }
 
 impl Layout {
-    /// The recording of frames of these pictures, in their order, without models.
-    pub fn recording(
-        &self,
-        (width, height): (u32, u32),
-        format: FrameFormat,
-        frames: impl IntoIterator<Item = Frame>,
-    ) -> Recording {
-        let codes = self.codes.iter().enumerate();
-        let codes = codes.map(|(pattern, code)| RecordedCode {
-            pattern,
-            cell_px: code.cell,
-            bits: Vec::new(),
-            inverse: Vec::new(),
-        });
-        let mut recording = Recording {
-            width: format.width,
-            height: format.height,
-            bit_depth: format.bit_depth,
-            description: String::new(),
-            source: String::new(),
-            camera_model: None,
-            noise_counts: None,
-            projector: RecordedProjector {
-                width,
-                height,
-                model: None,
-                plane: None,
-            },
-            patterns: self.patterns.clone(),
-            frames: Vec::new(),
-            codes: codes.collect(),
-            white: None,
-            black: None,
-            range_mm: None,
-            exposure_us: None,
-            part_id: None,
-            recipe: None,
-            truth_height: None,
-            truth_class: None,
-        };
-        for (shown, frame) in self.shown.iter().zip(frames) {
-            match *shown {
-                Shown::Sine {
-                    pattern,
-                    ratio,
-                    shift,
-                } => recording.frames.push(RecordedFrame {
-                    ratio,
-                    shift_turns: shift,
-                    harmonics: Vec::new(),
-                    pattern,
-                    timestamp_ns: None,
-                    frame,
-                }),
-                Shown::Bit {
-                    pattern, inverse, ..
-                } => {
-                    let code = &mut recording.codes[pattern];
-                    match inverse {
-                        true => code.inverse.push(frame),
-                        false => code.bits.push(frame),
-                    }
-                }
-                Shown::White => recording.white = Some(frame),
-                Shown::Black => recording.black = Some(frame),
-            }
-        }
-        recording
-    }
-
     /// Whether a pattern's code numbers columns.
     pub fn is_vertical(&self, pattern: usize) -> bool {
         matches!(self.patterns[pattern], PatternSpec::Vertical { .. })
@@ -333,12 +311,17 @@ impl Layout {
 
 impl Description {
     /// Ratio and shift of each frame of the levels, in the order of projection.
-    fn levels(&self, fringes: &[f64], finest: f64) -> Result<Vec<(f64, f64)>, String> {
-        let steps = match self.steps[..] {
+    fn levels(
+        &self,
+        fringes: &[f64],
+        finest: f64,
+        vertical: bool,
+    ) -> Result<Vec<(f64, f64)>, String> {
+        let steps = match *self.steps.of(vertical) {
             [all] => vec![all; fringes.len()],
-            _ => self.steps.clone(),
+            ref each => each.to_vec(),
         };
-        if steps.len() != fringes.len() {
+        if steps.len() != fringes.len() && !fringes.is_empty() {
             return Err(format!(
                 "--steps has {} numbers for {} levels: give one for all, or one for each",
                 steps.len(),
@@ -361,10 +344,10 @@ impl Description {
 }
 
 impl Gray {
-    /// The code beside the fringes of a pattern over `length` projector pixels.
+    /// The code beside `finest` fringes, or alone beside 0, over `length` projector pixels.
     fn code(
         &self,
-        pattern: usize,
+        vertical: bool,
         finest: f64,
         length: u32,
         curved: bool,
@@ -372,11 +355,12 @@ impl Gray {
         if curved {
             return Err("--gray numbers straight fringes: leave out --pattern".into());
         }
-        let bits = self.bits.get(pattern).or(self.bits.last());
+        let bits = self.bits.get(usize::from(!vertical)).or(self.bits.last());
         let bits = bits.copied().unwrap_or(1).min(MAX_CODE_BITS);
         let length = f64::from(length);
         let cell = match self.cell_px {
             Some(cell) => cell,
+            None if finest == 0.0 => 1.0,
             None if (finest - 1e-9).log2().ceil().max(1.0) == f64::from(bits) => length / finest,
             None => {
                 return Err(format!(

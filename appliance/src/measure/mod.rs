@@ -1,10 +1,12 @@
 //! Measures a recording: phase, height and report (`fringed measure`).
 
 pub mod adapt;
+mod coded;
 pub mod import;
 mod known;
 pub mod layout;
 pub mod models;
+mod outline;
 pub mod projected;
 mod report;
 mod score;
@@ -14,7 +16,8 @@ pub use score::{GROSS_MM, Score, Truth};
 
 use crate::error::{Exit, Failure};
 use crate::head::channel::{Channel, Expected};
-use crate::head::direction::{self, Sensitivity};
+use crate::head::code::CodeAlone;
+use crate::head::direction::Sensitivity;
 use crate::head::scan::Scan;
 use crate::head::seam;
 use crate::output::cloud::Surface;
@@ -46,10 +49,14 @@ pub struct Measurement {
     pub primary: usize,
     /// Height and σ_z, or why there is none.
     pub heights: Result<Surface, String>,
-    /// How the primary pattern was decoded.
-    pub decoder: Decoder,
+    /// How the primary pattern was decoded; none of a Gray code alone.
+    pub decoder: Option<Decoder>,
     /// What those of its frames show that this decoder takes.
     pub shots: Vec<Shot>,
+    /// Largest sample.
+    pub full_scale: u16,
+    /// Of Gray codes alone, for each pattern what it numbers, "column" or "row", and projector pixels per turn.
+    pub places: Vec<(&'static str, f64)>,
     /// The summary.
     pub report: Report,
     /// Mean of the finest level's frames of the primary pattern, scaled to 8 bits.
@@ -120,6 +127,14 @@ fn measure_about(
     known: Option<Known>,
 ) -> Result<Measurement, Failure> {
     let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
+    if recording.frames.is_empty() {
+        return match known {
+            None => coded::measure(recording).map_err(|error| wrong(&error)),
+            Some(_) => Err(wrong(
+                &"it has a Gray code without fringes, which needs no expected phase: measure without one",
+            )),
+        };
+    }
     let devices = Geometry::of(recording, recipe).map_err(|error| wrong(&error))?;
     let mut stage_us = BTreeMap::new();
     let mut stage_ended = |stage, started: Instant| {
@@ -150,12 +165,9 @@ fn measure_about(
     }
     let sensitivities: Vec<Option<Sensitivity>> = channels
         .iter()
-        .map(|(_, geometry, unwrapping)| {
-            let triangulator = geometry.as_ref().ok()?;
-            unwrapping
-                .missing()
-                .is_none()
-                .then(|| Sensitivity::of(triangulator))?
+        .map(|(_, geometry, unwrapping)| match unwrapping.missing() {
+            None => Sensitivity::of(geometry.as_ref().ok()?),
+            Some(_) => None,
         })
         .collect();
     let primary = match &known {
@@ -212,12 +224,7 @@ fn measure_about(
     );
     let report = Report {
         no_phase: no_phase.cloned(),
-        heights_by: (heights.is_ok() && recording.patterns.len() > 1)
-            .then(|| direction::word(&recording.patterns[primary])),
-        poor_heights: sensitivities[primary]
-            .and_then(|of| of.poor())
-            .map(|poor| format!("{poor}: project fringes of the other direction")),
-        ..report
+        ..report.by(recording, primary, sensitivities[primary])
     };
     Ok(Measurement {
         intensity: channel.intensity(),
@@ -226,8 +233,10 @@ fn measure_about(
         wrapped_only,
         primary,
         heights,
-        decoder: channel.scan.decoder,
+        full_scale: channel.scan.decoder.full_scale(),
+        decoder: Some(channel.scan.decoder),
         shots: channel.shots,
+        places: Vec::new(),
         report,
     })
 }
@@ -236,6 +245,36 @@ fn measure_about(
 fn least_modulation(recording: &Recording) -> LeastModulation {
     let of_noise = |noise| LeastModulation::of_noise(noise, recording.bit_depth);
     recording.noise_counts.map(of_noise).unwrap_or_default()
+}
+
+/// The absolute phase of a pattern by its own levels or code.
+///
+/// # Errors
+/// In words: it has none, and what to add.
+fn absolute(recording: &Recording, pattern: usize) -> Result<PhaseMap, String> {
+    let least = least_modulation(recording);
+    if let Some(code) = CodeAlone::of(recording, pattern)? {
+        return code.phases(least);
+    }
+    let channel = Channel::new(recording, pattern, least)?;
+    let by_itself = channel.unwrapping(None, &Err("there is no known map".into()))?;
+    match by_itself.missing() {
+        None => Ok(channel.decode(&by_itself)?.absolute),
+        Some(missing) => Err(missing.to_owned()),
+    }
+}
+
+/// The wrapped phase of a pattern's coarsest level, or the absolute one of a Gray code alone.
+///
+/// # Errors
+/// In words: the frames make no levels.
+fn coarsest(recording: &Recording, pattern: usize) -> Result<PhaseMap, String> {
+    let least = least_modulation(recording);
+    if let Some(code) = CodeAlone::of(recording, pattern)? {
+        return code.phases(least);
+    }
+    let channel = Channel::new(recording, pattern, least)?;
+    Ok(channel.wrapped_levels()?.swap_remove(0))
 }
 
 /// The pattern that gives the height: that whose phase changes most with it, else the first vertical one, else the first.

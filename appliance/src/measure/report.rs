@@ -1,10 +1,12 @@
 //! The summary of a measurement, as JSON and as a table.
 
 use super::{Score, Truth};
+use crate::head::direction::{self, Sensitivity};
 use crate::output::cloud::Surface;
 use crate::station::COVERAGE_FACTOR;
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
+use hal::replay::Recording;
 use hal::replay::recording::RecipeReference;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -13,7 +15,7 @@ use std::fmt::Write as _;
 /// How the levels were unwrapped.
 #[derive(Clone, Debug, Serialize)]
 pub struct Manner {
-    /// Geometric, dense, single, heterodyne, gray code, or wrapped where nothing is known.
+    /// Geometric, dense, single, heterodyne, gray code, gray code alone, or wrapped where nothing is known.
     pub kind: &'static str,
     /// The levels' ratios from coarse to fine.
     pub ratios: Vec<f64>,
@@ -69,6 +71,9 @@ pub struct Report {
     /// U = 2 √(`sigma_mm`² + σ²), σ that of a height by the uncertainty of the calibration that was named, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty_mm: Option<f64>,
+    /// What could be done about pixels that are not resolved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub advice: Option<String>,
     /// Errors against the recording's truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<Score>,
@@ -106,8 +111,11 @@ impl Report {
             let known = || map.height.iter().filter(|height| height.is_known());
             Some([known().min()?.mm(), known().max()?.mm()])
         });
+        let lit = resolved + unresolved.values().sum::<usize>();
+        let beyond = phases.count(Trust::OutOfRange);
         Self {
-            lit: resolved + unresolved.values().sum::<usize>(),
+            advice: advice(phases.trust.len(), lit, beyond, heights, noise_counts),
+            lit,
             resolved,
             unresolved,
             skipped: phases.count(Trust::Unexpected),
@@ -119,12 +127,24 @@ impl Report {
             poor_heights: None,
             no_height: heights.as_ref().err().cloned(),
             no_sigma: noise_counts.is_none().then_some(
-                "the recording has no camera.noise_counts and no level of 4 shifts to estimate it",
+                "the recording has no camera.noise_counts and no resolved pixels under 4 or more shifts to estimate it from",
             ),
             height_mm,
             sigma_mm,
             uncertainty_mm: None,
             score: map.and_then(|map| truth.score(phases, map)),
+        }
+    }
+
+    /// With the fringes that heights are by, of several, and what these tell of them.
+    pub(super) fn by(self, recording: &Recording, primary: usize, of: Option<Sensitivity>) -> Self {
+        let several = self.no_height.is_none() && recording.patterns.len() > 1;
+        Self {
+            heights_by: several.then(|| direction::word(&recording.patterns[primary])),
+            poor_heights: of
+                .and_then(|of| of.poor())
+                .map(|poor| format!("{poor}: project fringes of the other direction")),
+            ..self
         }
     }
 
@@ -149,7 +169,10 @@ impl Report {
             recipe,
         } = &self.manner;
         let ratios: Vec<String> = ratios.iter().map(|ratio| format!("{ratio:.6}")).collect();
-        line("levels", format!("{kind}, ratios {}", ratios.join(" ")));
+        match ratios.is_empty() {
+            true => line("levels", (*kind).into()),
+            false => line("levels", format!("{kind}, ratios {}", ratios.join(" "))),
+        }
         if let Some(chain) = chain {
             line("unwrapped by", chain.join(", "));
         }
@@ -167,6 +190,9 @@ impl Report {
         line("resolved", format!("{} px", self.resolved));
         for (reason, count) in self.unresolved.iter().filter(|(_, count)| **count > 0) {
             line(&format!("  unresolved: {reason}"), format!("{count} px"));
+        }
+        if let Some(advice) = &self.advice {
+            line("  to resolve more", advice.clone());
         }
         if let Some(reason) = &self.no_phase {
             line("absolute phase", format!("none: {reason}"));
@@ -214,4 +240,31 @@ impl Report {
         }
         table
     }
+}
+
+/// What could be done about `beyond` of the lit pixels that are out of range, or where next to none is lit.
+fn advice(
+    pixels: usize,
+    lit: usize,
+    beyond: usize,
+    heights: &Result<Surface, String>,
+    noise_counts: Option<f64>,
+) -> Option<String> {
+    if let Ok(surface) = heights
+        && 2 * beyond > lit
+    {
+        let range = surface.triangulator.range();
+        return Some(format!(
+            "{:.0} % of the lit pixels lie beyond the working range of {:.0} to {:.0} mm: state another one with import --range, or \
+             range_mm in recording.json",
+            100.0 * beyond as f64 / lit as f64,
+            range.low,
+            range.high
+        ));
+    }
+    (100 * lit < pixels && noise_counts.is_none()).then(|| {
+        "next to no pixel has the 16 of 255 counts of modulation that a camera of unknown noise needs: if the pictures are only dim, \
+         state its noise with import --noise, or camera.noise_counts in recording.json"
+            .into()
+    })
 }

@@ -1,6 +1,6 @@
 //! Point clouds as binary PLY, as CloudCompare, MeshLab and Open3D open them.
 
-use algo::geometry::Triangulator;
+use algo::geometry::{Pinhole, Triangulator, Vector};
 use algo::pipeline::HeightMap;
 use algo::units::Height;
 
@@ -13,12 +13,48 @@ pub struct Surface {
     pub triangulator: Triangulator,
 }
 
+/// The frame of coordinates in which a cloud is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Axes {
+    /// The world: z up from the plane z = 0.
+    #[default]
+    World,
+    /// The camera: x right, y down, z forward, as OpenCV has it.
+    Camera,
+}
+
+impl Axes {
+    /// A point of the world in this frame.
+    fn place(self, camera: &Pinhole, point: Vector) -> [f64; 3] {
+        match self {
+            Self::World => [point.x, point.y, point.z],
+            Self::Camera => {
+                let model = camera.model();
+                let Vector { x, y, z } = point;
+                std::array::from_fn(|row| {
+                    let [a, b, c] = std::array::from_fn(|at| model.rotation[3 * row + at]);
+                    a * x + b * y + c * z + model.translation[row]
+                })
+            }
+        }
+    }
+
+    /// What the file says of its coordinates.
+    fn comment(self) -> &'static str {
+        match self {
+            Self::World => "heights above the plane z = 0, units mm",
+            Self::Camera => "in the camera's frame: x right, y down, z forward, units mm",
+        }
+    }
+}
+
 /// A binary little-endian PLY: one vertex per known height with float x, y, z in mm, uchar intensity and float sigma (σ_z in mm, NaN
 /// where not known).
 ///
 /// `heights` are row-major in rows of `width` pixels; `shade` gives intensity and σ_z of the pixel of an index.
 pub fn ply(
     triangulator: &Triangulator,
+    axes: Axes,
     width: usize,
     heights: impl Iterator<Item = Height>,
     shade: impl Fn(usize) -> (u8, f32),
@@ -29,14 +65,15 @@ pub fn ply(
         .collect();
     let count = points.len();
     let mut ply = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment heights above the plane z = 0, units mm\n\
+        "ply\nformat binary_little_endian 1.0\ncomment {}\n\
          element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
-         property uchar intensity\nproperty float sigma\nend_header\n"
+         property uchar intensity\nproperty float sigma\nend_header\n",
+        axes.comment()
     )
     .into_bytes();
     ply.reserve(count * VERTEX_BYTES);
     for (at, point) in points {
-        for coordinate in [point.x, point.y, point.z] {
+        for coordinate in axes.place(triangulator.camera(), point) {
             ply.extend_from_slice(&(coordinate as f32).to_le_bytes());
         }
         let (intensity, sigma) = shade(at);
@@ -48,10 +85,10 @@ pub fn ply(
 
 impl Surface {
     /// The heights as a [`ply`]; `intensity` is one value per pixel, row-major like the heights.
-    pub fn ply(&self, intensity: &[u8]) -> Vec<u8> {
+    pub fn ply(&self, axes: Axes, intensity: &[u8]) -> Vec<u8> {
         let Self { map, triangulator } = self;
         let heights = map.height.iter().copied();
-        ply(triangulator, map.width, heights, |at| {
+        ply(triangulator, axes, map.width, heights, |at| {
             (intensity.get(at).copied().unwrap_or(0), map.sigma[at])
         })
     }

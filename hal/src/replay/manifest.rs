@@ -178,6 +178,8 @@ impl<'de> Deserialize<'de> for PatternEntries {
 /// Format and version are checked first, so that a newer version is reported as such and not as
 /// unknown keys.
 pub(crate) fn parse(text: &str) -> Result<Manifest, Wrong> {
+    // Editors on Windows put a byte order mark in front.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let value: serde_json::Value = serde_json::from_str(text)
         .map_err(|error| Wrong::new(format!("not valid JSON: {error}"), "mend the file"))?;
     match value.get("format").and_then(|name| name.as_str()) {

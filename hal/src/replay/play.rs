@@ -30,6 +30,12 @@ pub fn head(recordings: Vec<Recording>) -> Result<Head, Error> {
             "name at least one",
         ));
     };
+    if first.frames.is_empty() {
+        return Err(Error::unsupported(
+            "replaying a recording of a Gray code without fringes",
+            "name one with fringes",
+        ));
+    }
     let describe = |r: &Recording| {
         format!(
             "{} frames of {} under a {}×{} projector",

@@ -102,7 +102,7 @@ pub struct Recording {
     pub projector: RecordedProjector,
     /// One or two patterns, for example vertical and horizontal fringes. Heights are from the one whose phase changes most with them.
     pub patterns: Vec<PatternSpec>,
-    /// The frames in the order of the manifest.
+    /// The frames in the order of the manifest; none of a recording of Gray codes alone.
     pub frames: Vec<RecordedFrame>,
     /// Gray codes, at most one per pattern.
     pub codes: Vec<RecordedCode>,

@@ -1,6 +1,10 @@
 //! Other people's frames: imported, projected from our patterns, and taken with a head that is not calibrated.
 
+mod alone;
+mod folders;
+mod models;
 mod own;
+mod ranges;
 mod scene;
 
 use crate::written::{Written, geometric, program};

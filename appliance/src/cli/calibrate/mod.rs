@@ -17,6 +17,7 @@ use crate::production::backend::{self, Opened};
 use crate::storage::state::StateFolder;
 use algo::geometry::RigError;
 use algo::pattern::PhaseFunction;
+use hal::bounds::MAX_RANGE_MM;
 use poses::Poses;
 use sim::{Part, Stage};
 use std::path::{Path, PathBuf};
@@ -43,6 +44,9 @@ pub struct Calibrate {
     /// The world's z in the models' files points away from the head, as on OpenCV's boards.
     #[arg(long, requires = "imported")]
     z_away: bool,
+    /// The plane z = 0 stands across the camera's axis at this distance: for models without the pose of a plate.
+    #[arg(long, value_name = "MM", requires = "imported", value_parser = number(1.0, MAX_RANGE_MM))]
+    plane_at: Option<f64>,
     /// No flat plate lies in the plane z = 0: leave the reference plane to the models.
     #[arg(long, conflicts_with = "board")]
     no_plate: bool,
@@ -102,7 +106,7 @@ impl Calibrate {
             ..head
         };
         let mut opened = pool.install(|| backend::open(&bare, &on_progress))?;
-        let basis = self.basis(&opened, before.as_ref())?;
+        let basis = self.basis(&opened, before.as_ref(), &mut notes)?;
         if basis.plate {
             let stage = opened.stage.clone();
             pool.install(|| lay_plate(stage.as_ref(), &mut notes))?;
@@ -131,7 +135,12 @@ impl Calibrate {
     }
 
     /// What the calibration starts from.
-    fn basis(&self, opened: &Opened, before: Option<&CalibrationFile>) -> Result<Basis, Failure> {
+    fn basis(
+        &self,
+        opened: &Opened,
+        before: Option<&CalibrationFile>,
+        notes: &mut Vec<String>,
+    ) -> Result<Basis, Failure> {
         let mut calibration = opened.calibration.clone();
         let content = |error: String| Failure::new(Exit::Content, error);
         let stored = before
@@ -144,8 +153,10 @@ impl Calibrate {
             });
         let mut models_from = OF_SCENARIO.to_owned();
         let mut geometry = None;
-        if let Some((from, (camera, projector))) = self.imported(&calibration)? {
+        if let Some((from, models)) = self.imported(&calibration)? {
             models_from = from;
+            notes.extend(models.notes);
+            let (camera, projector) = (models.camera, models.projector);
             let (frames, raster) = (calibration.frames(), calibration.raster());
             let noise = calibration.noise_counts;
             let exposing = calibration.exposing;
@@ -195,23 +206,28 @@ impl Calibrate {
         let declared = Declared {
             unit: self.unit,
             z_away: self.z_away,
+            plane_at: self.plane_at,
         };
         let name = |path: &Path| path.display().to_string();
         let named = [&self.camera, &self.projector, &self.models];
         model_files(named.into_iter().flatten())?;
         let content = |error| Failure::new(Exit::Content, error);
-        Ok(match (&self.camera, &self.projector, &self.models) {
+        let (names, models) = match (&self.camera, &self.projector, &self.models) {
             (Some(camera), Some(projector), _) => {
                 let models = opencv::from_two(camera, projector, sizes, declared);
-                let names = format!("{}, {}", name(camera), name(projector));
-                Some((names, models.map_err(content)?))
+                (format!("{}, {}", name(camera), name(projector)), models)
             }
-            (_, _, Some(models)) => {
-                let both = opencv::from_one(models, sizes, declared);
-                Some((name(models), both.map_err(content)?))
-            }
-            _ => None,
-        })
+            (_, _, Some(models)) => (name(models), opencv::from_one(models, sizes, declared)),
+            _ => return Ok(None),
+        };
+        let models = models.map_err(content)?;
+        match models.has_plane {
+            true => Ok(Some((names, models))),
+            false => Err(content(format!(
+                "import {names}: it states no plane z = 0: add plate_R and plate_T (the pose of the plate that lies in the reference \
+                 plane, as cv2.solvePnP gives it), or give the plane's distance with --plane-at"
+            ))),
+        }
     }
 }
 

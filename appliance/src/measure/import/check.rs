@@ -41,7 +41,8 @@ pub(super) fn notes(recording: &Recording, stated: Shifts) -> Result<Vec<String>
     let mut notes = Vec::new();
     same_pictures(recording, &mut notes);
     unused_bits(recording, &mut notes);
-    for (pattern, spec) in recording.patterns.iter().enumerate() {
+    let fringed = recording.patterns.iter().enumerate();
+    for (pattern, spec) in fringed.filter(|_| !recording.frames.is_empty()) {
         let channel = Channel::new(recording, pattern, least_modulation(recording))?;
         let levels = channel.wrapped_levels()?;
         let direction = match spec {
@@ -116,8 +117,8 @@ fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(Strin
     let lit = (resolved + saturated) as f64;
     if lit < LIT * pixels {
         note(format!(
-            "only {:.1} % of the pixels are modulated at the finest level by {:.0} of 255 counts or more: check the order of the \
-             pictures, --fringes and --steps",
+            "only {:.1} % of the pixels are modulated at the finest level by {:.0} of 255 counts or more: if the pictures are only \
+             dim, give the camera's noise with --noise; else check the order of the pictures, --fringes and --steps",
             100.0 * lit / pixels,
             channel.scan.decoder.least_modulation().eight_bit()
         ));

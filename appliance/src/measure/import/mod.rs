@@ -1,21 +1,25 @@
 //! Makes a recording of other people's pictures (`fringed import`), and says what looks wrong.
 
+mod alone;
 mod check;
+mod direction;
+mod folder;
+mod geometry;
 mod picture;
+mod plane;
 
 pub use picture::{Channel, Picture};
 
 use super::layout::{Description, Layout};
+use super::measure;
 use crate::error::{Exit, Failure};
+use crate::head::calibration::opencv::Models;
+use folder::Place;
 use hal::frame::{Frame, FrameFormat, Pixels};
-use hal::model::DeviceModel;
 use hal::replay::Recording;
 use hal::units::Timestamp;
-use picture::ENDINGS;
 use rayon::prelude::*;
-use std::cmp::Ordering;
-use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 /// What the user says about the pictures.
@@ -27,8 +31,12 @@ pub struct Taken {
     pub channel: Channel,
     /// Significant bits of a sample; without it those of the files.
     pub bit_depth: Option<u8>,
-    /// Beginning of the names of the pictures that are taken.
+    /// Beginning of the names of the pictures that are taken, or a pattern of them with * and ?.
     pub name: String,
+    /// σ of a sample in counts, if it is known.
+    pub noise_counts: Option<f64>,
+    /// Lowest and highest z of the working range, mm.
+    pub range_mm: Option<[f64; 2]>,
 }
 
 /// A recording, and what looks wrong with it.
@@ -47,24 +55,15 @@ pub struct Imported {
 pub fn import(
     folder: &Path,
     taken: &Taken,
-    models: impl FnOnce((u32, u32)) -> Result<Option<(DeviceModel, DeviceModel)>, Failure>,
+    models: impl FnOnce((u32, u32)) -> Result<Option<Models>, Failure>,
 ) -> Result<Imported, Failure> {
     let layout = Layout::of(&taken.description);
     let layout = layout.map_err(|problem| Failure::because(Exit::Usage, "import", problem))?;
-    let files = pictures(folder, &taken.name)?;
-    let (expected, found) = (layout.shown.len(), files.len());
-    if expected != found {
-        let ends = match &files[..] {
-            [first, .., last] => format!(" ({} to {})", name(first), name(last)),
-            _ => String::new(),
-        };
-        let words = format!(
-            "{found} pictures{ends}, but the options describe {expected}: correct the options, or choose pictures with --name"
-        );
-        return Err(content(folder, words));
-    }
-    let read = |file: &PathBuf| Picture::read(file).map_err(|problem| content(file, problem));
-    let pictures: Vec<Picture> = files.par_iter().map(read).collect::<Result<_, _>>()?;
+    let places = folder::pictures(folder, &taken.name, layout.shown.len())?;
+    let read = |place: &Place| {
+        Picture::read(&place.file, place.page.unwrap_or(0)).map_err(|problem| place.wrong(problem))
+    };
+    let pictures: Vec<Picture> = places.par_iter().map(read).collect::<Result<_, _>>()?;
     let mut notes = Vec::new();
     let first = &pictures[0];
     let unlike = pictures
@@ -74,12 +73,19 @@ pub fn import(
         let describe =
             |of: &Picture| format!("{}×{} pixels of {} bits", of.size.0, of.size.1, of.bits);
         let words = format!(
-            "{} where {} has {}: all must come from one camera",
+            "{} where {} has {}: all must come from one camera, choose its pictures with --name",
             describe(&pictures[at]),
-            name(&files[0]),
+            places[0].name(),
             describe(first)
         );
-        return Err(content(&files[at], words));
+        return Err(places[at].wrong(words));
+    }
+    if pictures.iter().any(|picture| picture.lossy) {
+        notes.push(
+            "the pictures are JPEG, which alters samples in blocks of 8×8 pixels, by some counts at fine fringes and edges, and no \
+             number of shifts averages that out: save the pictures as PNG or TIFF"
+                .into(),
+        );
     }
     if taken.channel == Channel::Luminance && pictures.iter().any(Picture::is_colour) {
         notes.push(
@@ -92,7 +98,7 @@ pub fn import(
     let format = FrameFormat::packed(first.size.0, first.size.1, bit_depth);
     let frame = |(at, picture): (usize, &Picture)| {
         let samples = picture.grey(taken.channel);
-        frame(format, samples, at).map_err(|problem| content(&files[at], problem))
+        frame(format, samples, at).map_err(|problem| places[at].wrong(problem))
     };
     let frames: Vec<Frame> = pictures
         .par_iter()
@@ -101,15 +107,24 @@ pub fn import(
         .collect::<Result<_, _>>()?;
     drop(pictures);
     let models = models((format.width, format.height))?;
-    let (camera_model, projector_model) = models.unzip();
     let mut recording = layout.recording(taken.description.projector, format, frames);
     recording.description = format!("imported from {}", name(folder));
-    recording.camera_model = camera_model;
-    recording.projector.model = projector_model;
+    recording.noise_counts = taken.noise_counts;
+    recording.range_mm = taken.range_mm;
+    if let Some(models) = models {
+        notes.extend(geometry::add(&mut recording, models, folder)?);
+    }
     notes.extend(
         check::notes(&recording, taken.description.shifts)
             .map_err(|problem| content(folder, problem))?,
     );
+    notes.extend(alone::notes(&recording).map_err(|problem| content(folder, problem))?);
+    notes.extend(direction::notes(&recording));
+    if recording.camera_model.is_some() {
+        // Levels that cannot be measured were named above.
+        let measured = measure(&recording, folder).ok();
+        notes.extend(measured.and_then(|measured| measured.report.advice));
+    }
     Ok(Imported { recording, notes })
 }
 
@@ -130,71 +145,6 @@ fn frame(format: FrameFormat, samples: Vec<u16>, at: usize) -> Result<Frame, Str
     Frame::new(format, Arc::new(pixels), Timestamp(0), at as u64).map_err(|error| error.to_string())
 }
 
-/// The pictures of a folder whose names begin with `beginning`, in the order of the numbers in their names.
-fn pictures(folder: &Path, beginning: &str) -> Result<Vec<PathBuf>, Failure> {
-    let entries = fs::read_dir(folder).map_err(|error| {
-        let what = format!("import {}", folder.display());
-        Failure::because(
-            Exit::Missing,
-            what,
-            format!("{error}: name a folder of pictures"),
-        )
-    })?;
-    let is_picture = |path: &PathBuf| {
-        let ending = path.extension().and_then(|ending| ending.to_str());
-        ending.is_some_and(|ending| {
-            ENDINGS
-                .iter()
-                .any(|known| known.eq_ignore_ascii_case(ending))
-        }) && name(path).starts_with(beginning)
-            && path.is_file()
-    };
-    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut found: Vec<PathBuf> = paths.filter(is_picture).collect();
-    found.sort_by(|a, b| by_numbers(&name(a), &name(b)));
-    match found.is_empty() {
-        false => Ok(found),
-        true => Err(content(
-            folder,
-            format!("no picture whose name begins with {beginning:?}: PNG, BMP and TIFF are read"),
-        )),
-    }
-}
-
-/// Compares names so that pat2 comes before pat10.
-fn by_numbers(a: &str, b: &str) -> Ordering {
-    let (mut a, mut b) = (a, b);
-    loop {
-        let (text_a, text_b) = (until_digit(a), until_digit(b));
-        let order = text_a.cmp(text_b);
-        (a, b) = (&a[text_a.len()..], &b[text_b.len()..]);
-        if order != Ordering::Equal || a.is_empty() || b.is_empty() {
-            return order.then(a.len().cmp(&b.len()));
-        }
-        let (number_a, number_b) = (digits(a), digits(b));
-        let plain = |number: &str| number.trim_start_matches('0').to_owned();
-        let (plain_a, plain_b) = (plain(number_a), plain(number_b));
-        let order = plain_a
-            .len()
-            .cmp(&plain_b.len())
-            .then(plain_a.cmp(&plain_b));
-        (a, b) = (&a[number_a.len()..], &b[number_b.len()..]);
-        if order != Ordering::Equal {
-            return order;
-        }
-    }
-}
-
-fn until_digit(text: &str) -> &str {
-    let end = text.find(|letter: char| letter.is_ascii_digit());
-    &text[..end.unwrap_or(text.len())]
-}
-
-fn digits(text: &str) -> &str {
-    let end = text.find(|letter: char| !letter.is_ascii_digit());
-    &text[..end.unwrap_or(text.len())]
-}
-
 fn name(path: &Path) -> String {
     let name = path.file_name().unwrap_or(path.as_os_str());
     name.to_string_lossy().into_owned()
@@ -202,33 +152,4 @@ fn name(path: &Path) -> String {
 
 fn content(path: &Path, problem: impl std::fmt::Display) -> Failure {
     Failure::because(Exit::Content, format!("import {}", path.display()), problem)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn pictures_are_taken_in_the_order_of_the_numbers_in_their_names() {
-        let mut names = [
-            "p10.png",
-            "p2.png",
-            "p1.png",
-            "a3_20.png",
-            "a3_3.png",
-            "p02b.png",
-        ];
-        names.sort_by(|a, b| by_numbers(a, b));
-        assert_eq!(
-            names,
-            [
-                "a3_3.png",
-                "a3_20.png",
-                "p1.png",
-                "p2.png",
-                "p02b.png",
-                "p10.png"
-            ]
-        );
-    }
 }

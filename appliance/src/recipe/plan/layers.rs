@@ -2,7 +2,7 @@
 
 use super::{Laps, Plan};
 use crate::head::seam;
-use crate::output::cloud::ply;
+use crate::output::cloud::{Axes, ply};
 use crate::station::Square;
 use algo::inspect::{Findings, Maps, Measure};
 use algo::pipeline;
@@ -173,6 +173,7 @@ impl Plan {
         let triangulator = production.triangulator();
         Some(ply(
             triangulator,
+            Axes::World,
             production.cubics().surface().width,
             heights,
             shade,

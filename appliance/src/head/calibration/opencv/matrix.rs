@@ -10,7 +10,7 @@ const MAX_ELEMENTS: usize = 64;
 pub struct Matrix {
     /// Rows and columns; a plain list is one row.
     pub shape: (usize, usize),
-    /// The numbers, all finite.
+    /// The numbers, row by row, all finite.
     pub numbers: Vec<f64>,
 }
 
@@ -46,6 +46,18 @@ impl Matrix {
                     (whole("rows")?, whole("cols")?),
                     words(data).ok_or_else(no_matrix)?,
                 )
+            }
+            // Rows in a list, as Python's yaml.dump and json.dump write an array.
+            Node::List(rows) if rows.iter().any(|row| matches!(row, Node::List(_))) => {
+                let rows: Option<Vec<_>> = rows.iter().map(words).collect();
+                let rows = rows.ok_or_else(no_matrix)?;
+                let columns = rows[0].len();
+                if rows.iter().any(|row| row.len() != columns) {
+                    return Err(format!(
+                        "{name} has rows of different lengths: write it anew"
+                    ));
+                }
+                ((rows.len(), columns), rows.concat())
             }
             list => {
                 let elements = words(list).ok_or_else(no_matrix)?;

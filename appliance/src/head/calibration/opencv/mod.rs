@@ -1,10 +1,11 @@
 //! Imports camera and projector models that were made with OpenCV.
 //!
 //! Two layouts are read. Either each device has a file of its own with its pose in the world (X_device = R·X_world + t); or
-//! one file has both, with R and T from the camera to the projector as `stereoCalibrate` gives them, and the pose of the plate that
-//! lies in the reference plane as `solvePnP` gives it. docs/calibration.md lists the names.
+//! one file has both, with R and T from the camera to the projector as `stereoCalibrate` gives them, and perhaps the pose of the plate
+//! that lies in the reference plane as `solvePnP` gives it. docs/calibration.md lists the names.
 
 mod matrix;
+mod names;
 mod pose;
 mod tree;
 
@@ -12,46 +13,11 @@ use clap::ValueEnum as _;
 use hal::bounds::shortened;
 use hal::model::DeviceModel;
 use matrix::Matrix;
+use names::{ALONE, CAMERA, Device, PLATE, POSE, PROJECTOR, Row};
 use pose::Pose;
 use std::fs;
 use std::path::Path;
 use tree::Node;
-
-/// Names of a device's nodes: the first one of each list that is there is read.
-struct Names {
-    device: &'static str,
-    matrix: &'static [&'static str],
-    distortion: &'static [&'static str],
-}
-
-/// The nodes in a file of one device.
-const ALONE: Names = Names {
-    device: "device",
-    matrix: &["camera_matrix", "cameraMatrix", "K", "projector_matrix"],
-    distortion: &[
-        "distortion_coefficients",
-        "dist_coeffs",
-        "distCoeffs",
-        "D",
-        "projector_distortion",
-    ],
-};
-/// The camera's nodes in a file of both devices.
-const CAMERA: Names = Names {
-    device: "camera",
-    matrix: &["cam_K", "camInt", "camera_matrix", "M1", "K1"],
-    distortion: &["cam_kc", "camDist", "distortion_coefficients", "D1"],
-};
-/// The projector's nodes in a file of both devices.
-const PROJECTOR: Names = Names {
-    device: "projector",
-    matrix: &["proj_K", "projInt", "projector_matrix", "M2", "K2"],
-    distortion: &["proj_kc", "projDist", "projector_distortion", "D2"],
-};
-const ROTATION: &[&str] = &["R", "rotation", "rotation_matrix", "rvec"];
-const TRANSLATION: &[&str] = &["T", "t", "translation", "tvec"];
-const PLATE_ROTATION: &[&str] = &["plate_R", "plate_rvec"];
-const PLATE_TRANSLATION: &[&str] = &["plate_T", "plate_tvec"];
 
 /// What the user says about the files.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,6 +26,8 @@ pub struct Declared {
     pub unit: Option<Unit>,
     /// Whether the world's z points away from the head, as on OpenCV's boards: then it is turned round.
     pub z_away: bool,
+    /// Distance of the plane z = 0 from the camera along its axis, mm, where the files state no plane.
+    pub plane_at: Option<f64>,
 }
 
 /// A unit of length.
@@ -96,7 +64,17 @@ pub struct Sizes {
 }
 
 /// The models of camera and projector.
-pub type Models = (DeviceModel, DeviceModel);
+#[derive(Clone, Debug, PartialEq)]
+pub struct Models {
+    /// The camera.
+    pub camera: DeviceModel,
+    /// The projector.
+    pub projector: DeviceModel,
+    /// Whether the plane z = 0 is known. If not, the camera stands at the origin and looks along −z.
+    pub has_plane: bool,
+    /// What was corrected, in words.
+    pub notes: Vec<String>,
+}
 
 /// Reads the models from a file of each device.
 ///
@@ -108,19 +86,34 @@ pub fn from_two(
     sizes: Sizes,
     declared: Declared,
 ) -> Result<Models, String> {
-    let one = |path: &Path, device: &'static str, size| {
+    let mut notes = Vec::new();
+    let mut one = |path: &Path, device: &Device, size, pose_needed: bool| {
         read(path, |tree| {
-            let names = Names { device, ..ALONE };
-            right_size(tree, size)?;
+            let own = names::nested(tree, device).unwrap_or(tree);
+            right_size(own, size)?;
+            let lens = lens(own, device.name, ALONE)?;
+            if !pose_needed && !names::has(own, POSE) {
+                return Ok((lens, None));
+            }
             let mm_per_unit = millimetres(tree, declared)?;
-            let pose = Pose::read(tree, (ROTATION, TRANSLATION), mm_per_unit)?;
-            model(tree, &names, turned(pose, declared))
+            Ok((lens, Some(Pose::read(own, POSE, mm_per_unit, &mut notes)?)))
         })
     };
-    Ok((
-        one(camera, "camera", sizes.camera)?,
-        one(projector, "projector", sizes.projector)?,
-    ))
+    // A camera without a pose is the world that the projector's is in.
+    let (camera_lens, own_pose) = one(camera, &CAMERA, sizes.camera, false)?;
+    let (projector_lens, pose) = one(projector, &PROJECTOR, sizes.projector, true)?;
+    let pose = pose.unwrap_or_else(Pose::identity);
+    let world = World::of(own_pose, declared).map_err(|error| failed(camera, &error))?;
+    let projector_pose = match world.is_stated {
+        true => turned(pose, declared),
+        false => pose.after(&world.camera),
+    };
+    Ok(Models {
+        camera: at(camera_lens, &world.camera),
+        projector: at(projector_lens, &projector_pose),
+        has_plane: world.has_plane,
+        notes,
+    })
 }
 
 /// Reads both models from one file.
@@ -129,26 +122,94 @@ pub fn from_two(
 /// In words, with the file, the node and the remedy.
 pub fn from_one(path: &Path, sizes: Sizes, declared: Declared) -> Result<Models, String> {
     read(path, |tree| {
+        let mut notes = Vec::new();
         right_size(tree, sizes.camera)?;
+        let nested = (
+            names::nested(tree, &CAMERA),
+            names::nested(tree, &PROJECTOR),
+        );
+        let (camera, projector) = match nested {
+            (Some(camera), Some(projector)) => {
+                right_size(camera, sizes.camera)?;
+                right_size(projector, sizes.projector)?;
+                (
+                    lens(camera, CAMERA.name, ALONE)?,
+                    lens(projector, PROJECTOR.name, ALONE)?,
+                )
+            }
+            _ => (
+                lens(tree, CAMERA.name, CAMERA.rows)?,
+                lens(tree, PROJECTOR.name, PROJECTOR.rows)?,
+            ),
+        };
         let mm_per_unit = millimetres(tree, declared)?;
-        let between = Pose::read(tree, (ROTATION, TRANSLATION), mm_per_unit)?;
-        let plate = Pose::read(tree, (PLATE_ROTATION, PLATE_TRANSLATION), mm_per_unit).map_err(|error| {
-            format!(
-                "{error} (the pose of the plate that lies in the reference plane, as cv2.solvePnP gives it)"
-            )
-        })?;
-        let camera = turned(plate, declared);
-        let projector = between.after(&camera);
-        Ok((
-            model(tree, &CAMERA, camera)?,
-            model(tree, &PROJECTOR, projector)?,
-        ))
+        let between = match nested.1 {
+            Some(projector) if !names::has(tree, POSE) => projector,
+            _ => tree,
+        };
+        let between = Pose::read(between, POSE, mm_per_unit, &mut notes)?;
+        let plate = names::has(tree, PLATE)
+            .then(|| Pose::read(tree, PLATE, mm_per_unit, &mut notes))
+            .transpose()
+            .map_err(|error| {
+                format!(
+                    "{error} (the pose of the plate that lies in the reference plane, as cv2.solvePnP gives it)"
+                )
+            })?;
+        let world = World::of(plate, declared)?;
+        Ok(Models {
+            camera: at(camera, &world.camera),
+            projector: at(projector, &between.after(&world.camera)),
+            has_plane: world.has_plane,
+            notes,
+        })
     })
 }
 
-fn read<T>(path: &Path, find: impl Fn(&Node) -> Result<T, String>) -> Result<T, String> {
-    let place = path.display();
-    let failed = |error: String| format!("import {place}: {}", shortened(&error));
+/// The world of the models.
+struct World {
+    /// The camera's pose in it.
+    camera: Pose,
+    /// Whether the plane z = 0 is known.
+    has_plane: bool,
+    /// Whether the files state it.
+    is_stated: bool,
+}
+
+impl World {
+    /// That of the stated pose of the camera; else the plane stands across the camera's axis, at the declared distance or nowhere yet.
+    fn of(stated: Option<Pose>, declared: Declared) -> Result<Self, String> {
+        let across = |distance| Pose {
+            translation_mm: [0.0, 0.0, distance],
+            ..Pose::identity().about_x()
+        };
+        match (stated, declared.plane_at) {
+            (Some(_), Some(_)) => {
+                Err("it states the pose of the plane z = 0: leave out --plane-at".into())
+            }
+            (Some(pose), None) => Ok(Self {
+                camera: turned(pose, declared),
+                has_plane: true,
+                is_stated: true,
+            }),
+            (None, _) if declared.z_away => {
+                Err("it states no plane whose z could be turned: leave out --z-away".into())
+            }
+            (None, distance) => Ok(Self {
+                camera: across(distance.unwrap_or(0.0)),
+                has_plane: distance.is_some(),
+                is_stated: false,
+            }),
+        }
+    }
+}
+
+fn failed(path: &Path, error: &str) -> String {
+    format!("import {}: {}", path.display(), shortened(error))
+}
+
+fn read<T>(path: &Path, find: impl FnOnce(&Node) -> Result<T, String>) -> Result<T, String> {
+    let failed = |error: String| failed(path, &error);
     let bytes = fs::metadata(path)
         .map_err(|error| failed(error.to_string()))?
         .len();
@@ -161,12 +222,6 @@ fn read<T>(path: &Path, find: impl Fn(&Node) -> Result<T, String>) -> Result<T, 
     tree::read(&bytes)
         .and_then(|tree| find(&tree))
         .map_err(failed)
-}
-
-/// The first of the names that the tree has.
-fn node<'a>(tree: &'a Node, names: &[&'static str]) -> Result<(&'static str, &'a Node), String> {
-    let found = names.iter().find_map(|name| Some((*name, tree.get(name)?)));
-    found.ok_or_else(|| format!("it has no node {}", names.join(" or ")))
 }
 
 fn millimetres(tree: &Node, declared: Declared) -> Result<f64, String> {
@@ -213,9 +268,10 @@ fn turned(pose: Pose, declared: Declared) -> Pose {
     }
 }
 
-fn model(tree: &Node, names: &Names, pose: Pose) -> Result<DeviceModel, String> {
-    let (name, found) = node(tree, names.matrix)
-        .map_err(|error| format!("{error}: the {}'s matrix, 3×3", names.device))?;
+/// A device that stands at the origin.
+fn lens(tree: &Node, device: &str, rows: &[Row]) -> Result<DeviceModel, String> {
+    let (name, found, distortions) =
+        names::first(tree, rows).map_err(|error| format!("{error}: the {device}'s matrix, 3×3"))?;
     let k: [f64; 9] = Matrix::read(name, found)?.expect(name, (3, 3))?;
     let [fx, skew, cx, below, fy, cy, ..] = k;
     if below != 0.0 || k[6..] != [0.0, 0.0, 1.0] {
@@ -228,8 +284,8 @@ fn model(tree: &Node, names: &Names, pose: Pose) -> Result<DeviceModel, String> 
             "{name} has a skew of {skew}, which no device has: calibrate without it"
         ));
     }
-    let (name, found) = node(tree, names.distortion)
-        .map_err(|error| format!("{error}: the {}'s distortion, k1 k2 p1 p2 k3", names.device))?;
+    let (name, found) = names::one(tree, distortions)
+        .map_err(|error| format!("{error}: the {device}'s distortion, k1 k2 p1 p2 k3"))?;
     let all = Matrix::read(name, found)?;
     let mut distortion = [0.0; 5];
     if !all.is_vector() || ![4, 5, 8, 12, 14].contains(&all.numbers.len()) {
@@ -248,15 +304,28 @@ fn model(tree: &Node, names: &Names, pose: Pose) -> Result<DeviceModel, String> 
     for (to, from) in distortion.iter_mut().zip(&all.numbers) {
         *to = *from;
     }
+    let Pose {
+        rotation,
+        translation_mm,
+    } = Pose::identity();
     Ok(DeviceModel {
         fx,
         fy,
         cx,
         cy,
         distortion,
+        rotation,
+        translation_mm,
+    })
+}
+
+/// The same device in this pose.
+fn at(device: DeviceModel, pose: &Pose) -> DeviceModel {
+    DeviceModel {
         rotation: pose.rotation,
         translation_mm: pose.translation_mm,
-    })
+        ..device
+    }
 }
 
 #[cfg(test)]

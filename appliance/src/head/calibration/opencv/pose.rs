@@ -1,11 +1,13 @@
 //! A pose: translation, and rotation as a matrix or a rotation vector, checked to be a rotation.
 
 use super::matrix::Matrix;
-use super::node;
+use super::names::{self, Row};
 use super::tree::Node;
 
 /// Largest element of R·Rᵀ − 1: a rotation matrix that was rounded to six digits has less.
 const TOLERANCE: f64 = 1e-4;
+/// Largest element of R less the nearest rotation, for R to be taken as that: rounding to three digits leaves half of it.
+const ROUNDED: f64 = 1e-3;
 
 /// X_to = R · X_from + t.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,17 +19,26 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Reads a pose; `names` are the accepted names of the node of the rotation and of that of the translation. A unit of length in the
-    /// file is `mm_per_unit` millimetres.
+    /// That of a device in its own frame.
+    pub fn identity() -> Self {
+        Self {
+            rotation: UNIT,
+            translation_mm: [0.0; 3],
+        }
+    }
+
+    /// Reads a pose; `rows` are the accepted names of the nodes of the rotation, each with those of the translation. A unit of length
+    /// in the file is `mm_per_unit` millimetres. `notes` gets what was corrected.
     ///
     /// # Errors
     /// In words: a node is missing or has another shape, R is not a rotation, or it mirrors.
     pub fn read(
         tree: &Node,
-        names: (&[&'static str], &[&'static str]),
+        rows: &[Row],
         mm_per_unit: f64,
+        notes: &mut Vec<String>,
     ) -> Result<Self, String> {
-        let (name, found) = node(tree, names.0)
+        let (name, found, translations) = names::first(tree, rows)
             .map_err(|error| format!("{error}: a rotation, 3×3 or a vector of 3"))?;
         let matrix = Matrix::read(name, found)?;
         let rotation = if matrix.is_vector() && matrix.numbers.len() == 3 {
@@ -35,9 +46,9 @@ impl Pose {
         } else {
             matrix.expect(name, (3, 3))?
         };
-        is_rotation(name, &rotation)?;
-        let (name, found) =
-            node(tree, names.1).map_err(|error| format!("{error}: a translation, 3×1"))?;
+        let rotation = checked(name, rotation, notes)?;
+        let (name, found) = names::one(tree, translations)
+            .map_err(|error| format!("{error}: a translation, 3×1"))?;
         let translation: [f64; 3] = Matrix::read(name, found)?.expect(name, (3, 1))?;
         Ok(Self {
             rotation,
@@ -80,15 +91,26 @@ fn product(a: &[f64; 9], b: &[f64; 9]) -> [f64; 9] {
     })
 }
 
-fn is_rotation(name: &str, r: &[f64; 9]) -> Result<(), String> {
+const UNIT: [f64; 9] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+
+/// Largest element by which two matrices differ.
+fn apart(a: &[f64; 9], b: &[f64; 9]) -> f64 {
+    let apart = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    // A NaN stays one, so that it is refused.
+    apart.fold(0.0, |most, apart| if most > apart { most } else { apart })
+}
+
+/// The rotation that a file states: as it is, or the nearest one where it was rounded to few digits.
+fn checked(name: &str, r: [f64; 9], notes: &mut Vec<String>) -> Result<[f64; 9], String> {
     let transposed = std::array::from_fn(|at| r[at % 3 * 3 + at / 3]);
-    let square = product(r, &transposed);
-    let off = (0..9)
-        .map(|at| (square[at] - if at % 4 == 0 { 1.0 } else { 0.0 }).abs())
-        .fold(0.0, f64::max);
-    let determinant = r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6])
-        + r[2] * (r[3] * r[7] - r[4] * r[6]);
-    if !(off <= TOLERANCE) {
+    let off = apart(&product(&r, &transposed), &UNIT);
+    let determinant = determinant(&r);
+    let nearest = match off <= TOLERANCE {
+        true => r,
+        false => nearest(r),
+    };
+    let rounded = apart(&nearest, &r);
+    if !(rounded <= ROUNDED) {
         return Err(format!(
             "{name} is not a rotation matrix: R·Rᵀ differs from the unit matrix by {off:.1e}; write R as OpenCV gives it, with all its digits"
         ));
@@ -99,7 +121,33 @@ fn is_rotation(name: &str, r: &[f64; 9]) -> Result<(), String> {
              right-handed coordinates, and turn a plate's z with --z-away"
         ));
     }
-    Ok(())
+    if rounded > 0.0 {
+        notes.push(format!(
+            "{name} is a rotation to few digits only (R·Rᵀ differs from the unit matrix by {off:.1e}), and the nearest rotation was \
+             taken: points are off by up to {rounded:.0e} of their distance, write R with all its digits"
+        ));
+    }
+    Ok(nearest)
+}
+
+fn determinant(r: &[f64; 9]) -> f64 {
+    r[0] * (r[4] * r[8] - r[5] * r[7]) - r[1] * (r[3] * r[8] - r[5] * r[6])
+        + r[2] * (r[3] * r[7] - r[4] * r[6])
+}
+
+/// The orthogonal matrix nearest to `r`: the mean of a matrix and its transposed inverse converges to it (Higham 1986).
+fn nearest(mut r: [f64; 9]) -> [f64; 9] {
+    for _ in 0..20 {
+        let determinant = determinant(&r);
+        // The cofactors over the determinant are the transposed inverse.
+        let inverse: [f64; 9] = std::array::from_fn(|at| {
+            let (row, column) = (at / 3, at % 3);
+            let of = |down: usize, right: usize| r[(row + down) % 3 * 3 + (column + right) % 3];
+            (of(1, 1) * of(2, 2) - of(1, 2) * of(2, 1)) / determinant
+        });
+        r = std::array::from_fn(|at| 0.5 * (r[at] + inverse[at]));
+    }
+    r
 }
 
 /// The rotation about a vector by its length in radians (Rodrigues 1840), as OpenCV's `rvec`.

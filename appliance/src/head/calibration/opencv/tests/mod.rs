@@ -1,6 +1,8 @@
 //! Imports of models: what FileStorage writes is read, what is broken is refused with its remedy.
 
-use super::{Declared, Sizes, Unit, from_one, from_two};
+mod other_programs;
+
+use super::{Declared, Models, Sizes, Unit, from_one, from_two};
 use hal::model::DeviceModel;
 use sim::Scenario;
 use std::fmt::Write as _;
@@ -147,8 +149,14 @@ fn written(folder: &Path, text: impl AsRef<[u8]>) -> PathBuf {
 fn read(text: impl AsRef<[u8]>, declared: Declared) -> Result<DeviceModel, String> {
     let folder = tempfile::tempdir().unwrap();
     let path = written(folder.path(), text);
-    let (camera, projector) = from_two(&path, &path, SIZES, declared)?;
+    let Models {
+        camera,
+        projector,
+        has_plane,
+        notes,
+    } = from_two(&path, &path, SIZES, declared)?;
     assert_eq!(camera, projector);
+    assert!(has_plane && notes.is_empty(), "{notes:?}");
     Ok(camera)
 }
 
@@ -165,7 +173,7 @@ fn lengths_are_in_the_unit_that_is_declared() {
     let bare = YAML.replace("unit: mm\n", "").replace("600.", "60.");
     let declared = |unit| Declared {
         unit,
-        z_away: false,
+        ..Declared::default()
     };
     let read_in = |unit| read(&bare, declared(Some(unit))).map(|model| model.translation_mm[2]);
     assert_eq!(read_in(Unit::Cm), Ok(600.0));
@@ -201,7 +209,7 @@ fn a_rotation_vector_is_its_matrix_and_a_board_s_z_can_be_turned() {
     }
     let away = Declared {
         z_away: true,
-        unit: None,
+        ..Declared::default()
     };
     let turned = read(YAML, away).unwrap().rotation;
     let expected = [0.939_692_620_785_908_4, 0.0, 0.342_020_143_325_668_7];
@@ -263,12 +271,12 @@ fn a_stereo_calibration_with_the_pose_of_the_plate_gives_both_devices() {
     };
     let path = written(folder.path(), &text);
     let found = from_one(&path, sizes, Declared::default()).unwrap();
-    assert_eq!(found.0, camera);
+    assert_eq!(found.camera, camera);
     let numbers = |model: &DeviceModel| {
         let pose = model.rotation.into_iter().chain(model.translation_mm);
         pose.chain(k(model)).collect::<Vec<f64>>()
     };
-    for (found, expected) in numbers(&found.1).iter().zip(numbers(&projector)) {
+    for (found, expected) in numbers(&found.projector).iter().zip(numbers(&projector)) {
         assert!((found - expected).abs() < 1e-9, "{found} {expected}");
     }
     let without = text.replace("plate_T", "else");

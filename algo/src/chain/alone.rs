@@ -1,0 +1,346 @@
+//! A Gray code without fringes: the projector's coordinate of each pixel from the cells alone.
+//!
+//! A pixel's cell gives its coordinate within half a cell. Where the picture crosses from one cell into the next, the one bit that
+//! changes there passes through the middle between bright and dark, and that place lies between two pixels as the zero of the bit's
+//! contrast does (linear interpolation; Trobina 1995 compares it with other ways). Between the two borders of a cell that are found in
+//! this way the coordinate runs linearly; where neighbouring pixels are cells apart, there are no borders, and half a cell is small.
+
+use super::{Cells, CodeError, CodePictures, MAX_CODE_BITS};
+use crate::frame::{FrameView, Samples};
+use crate::pipeline::{PhaseMap, for_each_row};
+use crate::trust::{LeastModulation, Trust};
+use crate::units::{AbsolutePhase, Modulation};
+use alloc::vec;
+use alloc::vec::Vec;
+
+/// A bit whose contrast is below this share of the clearest bit's is undecided.
+const UNDECIDED: f64 = 0.25;
+/// σ of a coordinate that is known within a cell, in cells: that of a uniform distribution.
+pub const SIGMA_CELLS: f64 = 0.288_675_134_594_812_9;
+
+/// What a pixel sees of a code.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pixel {
+    /// Its cell.
+    cell: u16,
+    /// Coordinate in cells, counted from the beginning of the first one.
+    place: f64,
+    /// Half the difference of bright and dark, counts.
+    modulation: f64,
+    /// Whether it can be trusted, or why not.
+    trust: Trust,
+}
+
+impl CodePictures<'_> {
+    /// The phase of every pixel of a code of these cells, which lie along the projector's rows (`vertical` fringes) or columns. Pixels
+    /// are trusted from a modulation of `least` on; samples have this full scale. A pixel is a `Residual` where two bits are
+    /// undecided, or the cell is none of the projector's.
+    ///
+    /// # Errors
+    /// If the pictures do not form a code.
+    pub fn phases(
+        &self,
+        cells: &Cells,
+        vertical: bool,
+        least: LeastModulation,
+        full_scale: u16,
+    ) -> Result<PhaseMap, CodeError> {
+        let count = self.bits.len();
+        let first = self.bits.first();
+        let first = first.filter(|_| count <= usize::from(MAX_CODE_BITS));
+        let first = first.ok_or(CodeError::Bits(count))?;
+        let (width, height) = (first.width(), first.height());
+        let mut all = self.bits.iter().chain(self.against.iter().flatten());
+        let lists = [1, count].contains(&self.against.len());
+        if !lists
+            || self.against.iter().any(Vec::is_empty)
+            || all.any(|frame| (frame.width(), frame.height()) != (width, height))
+        {
+            return Err(CodeError::Pictures);
+        }
+        let least = least.counts(full_scale);
+        let mut pixels = vec![Pixel::default(); width * height];
+        for_each_row(&mut pixels, width, |v, row| {
+            let mut contrasts = vec![0.0; count];
+            for (u, pixel) in row.iter_mut().enumerate() {
+                for (bit, contrast) in contrasts.iter_mut().enumerate() {
+                    *contrast = self.contrast(bit, u, v);
+                }
+                *pixel = Pixel::of(&contrasts, cells.count, least);
+            }
+        });
+        let refined = self.refined(&pixels, (width, height), vertical);
+        let mut map = PhaseMap::new(width, height);
+        for (at, pixel) in pixels.iter().enumerate() {
+            map.trust[at] = pixel.trust;
+            if pixel.trust == Trust::Resolved {
+                let turns = cells.origin + refined[at] * cells.width;
+                map.phase[at] = AbsolutePhase::from_turns(turns);
+                let share = pixel.modulation / f64::from(full_scale);
+                map.modulation[at] = Modulation::from_bits(libm::rint(share * 65_535.0) as u16);
+            }
+        }
+        Ok(map)
+    }
+
+    /// How far the sample of a bit's picture is above the middle between bright and dark, counts.
+    fn contrast(&self, bit: usize, u: usize, v: usize) -> f64 {
+        let against = self.against.get(bit).unwrap_or(&self.against[0]);
+        let sum: f64 = against.iter().map(|frame| sample(frame, u, v)).sum();
+        let own = sample(&self.bits[bit], u, v);
+        // An inverse picture is as far below the middle as the bit's own is above it.
+        match against.len() {
+            1 => (own - sum) / 2.0,
+            count => own - sum / count as f64,
+        }
+    }
+
+    /// The places of all pixels, between the borders of their cells where both are seen.
+    fn refined(
+        &self,
+        pixels: &[Pixel],
+        (width, height): (usize, usize),
+        vertical: bool,
+    ) -> Vec<f64> {
+        let mut places: Vec<f64> = pixels.iter().map(|pixel| pixel.place).collect();
+        let (lines, length) = if vertical {
+            (height, width)
+        } else {
+            (width, height)
+        };
+        for line in 0..lines {
+            let at = |along: usize| match vertical {
+                true => line * width + along,
+                false => along * width + line,
+            };
+            // The border behind, if the pixels since it are all of one cell: where it is, in pixels and in cells.
+            let mut behind: Option<(f64, f64)> = None;
+            for along in 0..length.saturating_sub(1) {
+                let (here, next) = (&pixels[at(along)], &pixels[at(along + 1)]);
+                let resolved = [here, next]
+                    .iter()
+                    .all(|pixel| pixel.trust == Trust::Resolved);
+                if resolved && here.cell == next.cell {
+                    continue;
+                }
+                let (u, v) = if vertical {
+                    (along, line)
+                } else {
+                    (line, along)
+                };
+                let border = resolved
+                    .then(|| self.border(here.cell, next.cell, (u, v), vertical))
+                    .flatten();
+                let border = border.map(|(share, place)| (along as f64 + share, place));
+                if let (Some(from), Some(to)) = (behind, border)
+                    && libm::fabs(to.1 - from.1) == 1.0
+                {
+                    let slope = (to.1 - from.1) / (to.0 - from.0);
+                    for inside in libm::ceil(from.0) as usize..=along {
+                        places[at(inside)] = from.1 + (inside as f64 - from.0) * slope;
+                    }
+                }
+                behind = border;
+            }
+        }
+        places
+    }
+
+    /// Where between a pixel and the next one along the cells the border of their cells lies, as a share of the way, and its place in
+    /// cells; `None` if they are not neighbours.
+    fn border(
+        &self,
+        here: u16,
+        next: u16,
+        (u, v): (usize, usize),
+        vertical: bool,
+    ) -> Option<(f64, f64)> {
+        if here.abs_diff(next) != 1 {
+            return None;
+        }
+        let changed = word(here) ^ word(next);
+        let bit = self.bits.len() - 1 - changed.trailing_zeros() as usize;
+        let (to_u, to_v) = if vertical { (u + 1, v) } else { (u, v + 1) };
+        let (from, to) = (self.contrast(bit, u, v), self.contrast(bit, to_u, to_v));
+        let share = from / (from - to);
+        (0.0..=1.0)
+            .contains(&share)
+            .then(|| (share, f64::from(here.max(next))))
+    }
+}
+
+impl Pixel {
+    /// From the contrast of each bit, the most significant first, of a code of so many cells.
+    fn of(contrasts: &[f64], cells: u32, least: f64) -> Self {
+        let most = contrasts.iter().copied().map(libm::fabs);
+        let modulation = most.fold(0.0, f64::max);
+        if modulation < least {
+            return Self::default();
+        }
+        let (mut seen, mut undecided, mut count) = (0_u16, 0_u16, 0);
+        for &contrast in contrasts {
+            let doubt = libm::fabs(contrast) < UNDECIDED * modulation;
+            seen = seen << 1 | u16::from(contrast > 0.0);
+            undecided = undecided << 1 | u16::from(doubt);
+            count += usize::from(doubt);
+        }
+        let own = cell(seen);
+        // With one bit in doubt the pixel lies on the border of two cells.
+        let other = cell(seen ^ undecided);
+        let known = count == 0 || count == 1 && own.abs_diff(other) == 1;
+        let trust = match known && u32::from(own) < cells {
+            true => Trust::Resolved,
+            false => Trust::Residual,
+        };
+        Self {
+            cell: own,
+            place: (f64::from(own) + f64::from(other) + 1.0) / 2.0,
+            modulation,
+            trust,
+        }
+    }
+}
+
+/// The bits that a cell shows.
+fn word(cell: u16) -> u16 {
+    cell ^ (cell >> 1)
+}
+
+/// The cell that shows these bits.
+fn cell(mut word: u16) -> u16 {
+    for shift in [1, 2, 4, 8] {
+        word ^= word >> shift;
+    }
+    word
+}
+
+fn sample(frame: &FrameView<'_>, u: usize, v: usize) -> f64 {
+    match frame.row(v) {
+        Samples::Eight(row) => f64::from(row[u]),
+        Samples::Sixteen(row) => f64::from(row[u]),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDTH: usize = 90;
+    const HEIGHT: usize = 7;
+    const CELLS: u32 = 20;
+
+    /// The coordinate that a pixel sees, in cells: between 4 and 5 pixels a cell.
+    fn seen(along: usize) -> f64 {
+        let along = along as f64;
+        0.4 + along / 4.6 + 0.0004 * along * along / 4.6
+    }
+
+    /// The share of light of a bit at a coordinate: a border is blurred over half a cell.
+    fn light(bit: u32, place: f64) -> f64 {
+        let shares = (0..16).map(|part| {
+            let at = place + (f64::from(part) - 7.5) / 32.0;
+            let cell = libm::floor(at.clamp(0.0, 31.0)) as u16;
+            f64::from(word(cell) >> (4 - bit) & 1)
+        });
+        shares.sum::<f64>() / 16.0
+    }
+
+    /// Pictures of a code of 5 bits, each with its inverse, along rows or columns.
+    fn pictures(vertical: bool) -> Vec<[Vec<u8>; 2]> {
+        let (width, height) = size(vertical);
+        let picture = |bit, inverse: bool| {
+            let pixels = (0..width * height).map(|at| {
+                let along = if vertical { at % width } else { at / width };
+                let lit = light(bit, seen(along));
+                let lit = if inverse { 1.0 - lit } else { lit };
+                // The last line is dark.
+                let across = if vertical { at / width } else { at % width };
+                let bright = if across + 1 == HEIGHT { 6.0 } else { 180.0 };
+                (20.0 + bright * lit) as u8
+            });
+            pixels.collect()
+        };
+        (0..5)
+            .map(|bit| [picture(bit, false), picture(bit, true)])
+            .collect()
+    }
+
+    fn size(vertical: bool) -> (usize, usize) {
+        if vertical {
+            (WIDTH, HEIGHT)
+        } else {
+            (HEIGHT, WIDTH)
+        }
+    }
+
+    #[test]
+    fn a_code_alone_gives_the_coordinate_within_a_tenth_of_a_cell_where_both_borders_are_seen() {
+        let cells = Cells {
+            origin: -0.25,
+            width: 0.5,
+            count: CELLS,
+        };
+        for vertical in [true, false] {
+            let pictures = pictures(vertical);
+            let (width, height) = size(vertical);
+            let frame =
+                |samples| FrameView::new(Samples::Eight(samples), width, height, width).unwrap();
+            let code = CodePictures {
+                bits: pictures.iter().map(|[own, _]| frame(own)).collect(),
+                against: pictures
+                    .iter()
+                    .map(|[_, inverse]| vec![frame(inverse)])
+                    .collect(),
+            };
+            let map = code
+                .phases(&cells, vertical, LeastModulation::default(), 255)
+                .unwrap();
+            let (mut refined, mut resolved) = (0, 0);
+            for at in 0..width * height {
+                let (along, across) = match vertical {
+                    true => (at % width, at / width),
+                    false => (at / width, at % width),
+                };
+                if across + 1 == HEIGHT {
+                    assert_eq!(map.trust[at], Trust::Dark);
+                    continue;
+                }
+                let place = seen(along);
+                if place > f64::from(CELLS) + 0.5 {
+                    assert_eq!(map.trust[at], Trust::Residual, "{along}");
+                    continue;
+                }
+                if map.trust[at] == Trust::Resolved {
+                    let found = (map.phase[at].turns() + 0.25) / 0.5;
+                    let error = libm::fabs(found - place);
+                    assert!(error < 0.51, "{along}: {found} for {place}");
+                    refined += usize::from(error < 0.1);
+                    resolved += 1;
+                }
+            }
+            let lit = (HEIGHT - 1)
+                * (0..WIDTH)
+                    .filter(|&along| seen(along) < f64::from(CELLS))
+                    .count();
+            assert!(resolved >= lit * 97 / 100, "{resolved} of {lit}");
+            assert!(refined >= lit * 85 / 100, "{refined} of {lit}");
+        }
+    }
+
+    #[test]
+    fn a_pixel_on_a_border_lies_there_and_one_with_two_bits_in_doubt_nowhere() {
+        // Cells 5 and 6 of 8 show 111 and 101.
+        let border = Pixel::of(&[100.0, 3.0, 90.0], 8, 16.0);
+        assert_eq!((border.trust, border.place), (Trust::Resolved, 6.0));
+        // Without the highest bit it may be one of the cells 2 and 5.
+        let far = Pixel::of(&[3.0, 100.0, 90.0], 8, 16.0);
+        assert_eq!(far.trust, Trust::Residual);
+        let two = Pixel::of(&[100.0, 3.0, 3.0], 8, 16.0);
+        assert_eq!(two.trust, Trust::Residual);
+        assert_eq!(Pixel::of(&[9.0, -9.0, 9.0], 8, 16.0).trust, Trust::Dark);
+        assert_eq!(
+            Pixel::of(&[100.0, 90.0, 90.0], 5, 16.0).trust,
+            Trust::Residual
+        );
+    }
+}

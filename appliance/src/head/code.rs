@@ -1,0 +1,99 @@
+//! A recording's Gray code without fringes, ready to be decoded.
+
+use super::seam;
+use algo::chain::{Cells, CodePictures, GrayCode};
+use algo::frame::FrameView;
+use algo::phase::LeastModulation;
+use algo::pipeline::PhaseMap;
+use hal::frame::Frame;
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
+
+/// The code of a pattern that has no fringes.
+#[derive(Clone, Debug)]
+pub struct CodeAlone<'a> {
+    pictures: CodePictures<'a>,
+    /// Its cells, in turns of the pattern.
+    pub cells: Cells,
+    /// Whether it numbers columns.
+    pub vertical: bool,
+    /// Projector pixels per turn.
+    pub pitch: f64,
+    full_scale: u16,
+}
+
+impl<'a> CodeAlone<'a> {
+    /// The code of a pattern of a recording, if it has one and no frames of fringes.
+    ///
+    /// # Errors
+    /// In words: the code has nothing to be compared with, or a frame is not one of its format.
+    pub fn of(recording: &'a Recording, pattern: usize) -> Result<Option<Self>, String> {
+        let has_fringes = recording
+            .frames
+            .iter()
+            .any(|frame| frame.pattern == pattern);
+        let code = recording.codes.iter().find(|code| code.pattern == pattern);
+        let Some(code) = code.filter(|_| !has_fringes) else {
+            return Ok(None);
+        };
+        let raster = &recording.projector;
+        let (vertical, fringes, length) = match &recording.patterns[pattern] {
+            PatternSpec::Vertical { fringes } => (true, *fringes, raster.width),
+            PatternSpec::Horizontal { fringes } => (false, *fringes, raster.height),
+            PatternSpec::File { .. } => return Err("a Gray code numbers straight fringes".into()),
+        };
+        let view = |frame: &'a Frame| seam::view(frame).map_err(|error| error.to_string());
+        let views = |frames: &'a [Frame]| frames.iter().map(view).collect::<Result<Vec<_>, _>>();
+        let against = match (&recording.white, &recording.black) {
+            _ if !code.inverse.is_empty() => {
+                let inverse = views(&code.inverse)?.into_iter();
+                inverse.map(|inverse| vec![inverse]).collect()
+            }
+            (Some(white), Some(black)) => vec![vec![view(white)?, view(black)?]],
+            _ => {
+                return Err(
+                    "a Gray code alone has nothing to be compared with: add its inverse pictures, or white and black".into(),
+                );
+            }
+        };
+        let pixel = fringes / f64::from(length);
+        let gray = GrayCode {
+            bits: code.bits.len() as u8,
+            cell: code.cell_px,
+        };
+        Ok(Some(Self {
+            pictures: CodePictures {
+                bits: views(&code.bits)?,
+                against,
+            },
+            // The first cell begins at the edge of pixel 0, whose centre has phase 0.
+            cells: Cells {
+                origin: -0.5 * pixel,
+                width: gray.cell * pixel,
+                count: gray.cells(length),
+            },
+            vertical,
+            pitch: 1.0 / pixel,
+            full_scale: recording.format().full_scale(),
+        }))
+    }
+
+    /// The absolute phase of every pixel, trusted from a modulation of `least` on.
+    ///
+    /// # Errors
+    /// In words: its pictures form no code.
+    pub fn phases(&self, least: LeastModulation) -> Result<PhaseMap, String> {
+        let phases = self
+            .pictures
+            .phases(&self.cells, self.vertical, least, self.full_scale);
+        phases.map_err(|error| error.to_string())
+    }
+
+    /// Pictures whose mean is what the camera sees under even light: each bit with its inverse, or white and black.
+    pub fn even(&self) -> Vec<FrameView<'a>> {
+        let CodePictures { bits, against } = &self.pictures;
+        let is_inverse = against.iter().all(|frames| frames.len() == 1);
+        let bits = bits.iter().filter(|_| is_inverse);
+        against.iter().flatten().chain(bits).copied().collect()
+    }
+}

@@ -1,0 +1,106 @@
+//! Measures a recording of Gray codes without fringes.
+
+use super::{Geometry, Manner, Measurement, Report, Truth, least_modulation, primary_of};
+use crate::head::code::CodeAlone;
+use crate::head::direction::Sensitivity;
+use crate::head::seam;
+use crate::output::cloud::Surface;
+use algo::chain::SIGMA_CELLS;
+use algo::pipeline::{PhaseMap, triangulate_with};
+use algo::units::{AbsolutePhase, WrappedPhase};
+use hal::replay::Recording;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// Measures every code; the one whose place changes most with the height gives it.
+///
+/// # Errors
+/// In words: a code cannot be decoded, or a model is absurd.
+pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
+    let least = least_modulation(recording);
+    let mut stage_us = BTreeMap::new();
+    let mut stage_ended = |stage, started: Instant| {
+        let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
+        stage_us.insert(stage, us);
+    };
+    let started = Instant::now();
+    let mut codes = Vec::new();
+    for pattern in 0..recording.patterns.len() {
+        let code = CodeAlone::of(recording, pattern)?;
+        codes.push(code.ok_or("it has neither fringes nor a Gray code: record one of both")?);
+    }
+    let phases = codes.iter().map(|code| code.phases(least));
+    let mut phases: Vec<PhaseMap> = phases.collect::<Result<_, _>>()?;
+    stage_ended("phase", started);
+    let started = Instant::now();
+    let devices = Geometry::of(recording, None)?;
+    let raster = &recording.projector;
+    let (columns, rows) = (raster.width as usize, raster.height as usize);
+    let geometries = recording.patterns.iter().map(|spec| {
+        let function = seam::phase_function(spec, columns, rows);
+        let function = function.map_err(|error| error.to_string())?;
+        let geometry = devices.triangulator(&function);
+        geometry.map_err(|error| error.to_string())
+    });
+    let mut geometries: Vec<_> = geometries.collect::<Result<_, String>>()?;
+    let sensitivities: Vec<_> = geometries
+        .iter()
+        .map(|geometry| Sensitivity::of(geometry.as_ref().ok()?))
+        .collect();
+    let primary = primary_of(recording, &sensitivities);
+    let code = codes.get(primary).ok_or("the recording has no pattern")?;
+    let geometry = geometries.swap_remove(primary);
+    let sigma = SIGMA_CELLS * code.cells.width;
+    let heights = geometry.map(|triangulator| Surface {
+        map: triangulate_with(&triangulator, &mut phases[primary], |_| Some(sigma)),
+        triangulator,
+    });
+    stage_ended("height", started);
+    let report = Report::new(
+        &phases[primary],
+        &heights,
+        Manner {
+            kind: "gray code alone",
+            ratios: Vec::new(),
+            chain: Some(vec![format!("{} cells", code.cells.count)]),
+            map: None,
+            recipe: None,
+        },
+        recording.noise_counts,
+        &Truth::of(recording),
+        stage_us,
+    );
+    let full_scale = recording.format().full_scale();
+    Ok(Measurement {
+        wrapped: phases.iter().map(wrapped).collect(),
+        wrapped_only: vec![None; phases.len()],
+        phases,
+        primary,
+        heights,
+        decoder: None,
+        shots: Vec::new(),
+        full_scale,
+        places: codes
+            .iter()
+            .map(|code| (if code.vertical { "column" } else { "row" }, code.pitch))
+            .collect(),
+        // σ follows from the cells, not from the noise.
+        report: Report {
+            no_sigma: None,
+            ..report.by(recording, primary, sensitivities[primary])
+        },
+        intensity: algo::frame::mean(&code.even(), full_scale),
+    })
+}
+
+/// The phases without their fringe orders.
+fn wrapped(map: &PhaseMap) -> PhaseMap {
+    let phase = map.phase.iter().map(|phase| match phase.is_known() {
+        true => AbsolutePhase::from_turns(WrappedPhase::from_turns(phase.turns()).turns()),
+        false => *phase,
+    });
+    PhaseMap {
+        phase: phase.collect(),
+        ..map.clone()
+    }
+}

@@ -1,0 +1,80 @@
+//! What looks wrong with an imported Gray code without fringes.
+
+use crate::head::code::CodeAlone;
+use crate::measure::least_modulation;
+use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
+use hal::replay::Recording;
+
+/// Share of the pixels that must be lit.
+const LIT: f64 = 0.01;
+/// Share of the lit pixels that may be in doubt.
+const DOUBT: f64 = 0.4;
+/// Distance of the pixels that are compared, as a share of the frame.
+const APART: usize = 16;
+/// Least excess of pairs whose cells rise over those whose cells fall, or the other way round, as a share of both: a code that is read
+/// in another order or form has at most 0.4, a right one nearly 1, but for the edges of parts.
+const ONE_WAY: f64 = 0.7;
+
+/// What looks wrong, in words with remedies.
+///
+/// # Errors
+/// In words: the pictures form no code.
+pub(super) fn notes(recording: &Recording) -> Result<Vec<String>, String> {
+    let mut notes = Vec::new();
+    for pattern in 0..recording.patterns.len() {
+        let Some(code) = CodeAlone::of(recording, pattern)? else {
+            continue;
+        };
+        let map = code.phases(least_modulation(recording))?;
+        let number = if code.vertical { "columns" } else { "rows" };
+        let words = problem(&map);
+        notes.extend(words.map(|words| format!("Gray code of {number}: {words}")));
+    }
+    Ok(notes)
+}
+
+fn problem(map: &PhaseMap) -> Option<String> {
+    let pixels = map.trust.len() as f64;
+    let (resolved, doubt) = (map.count(Trust::Resolved), map.count(Trust::Residual));
+    let lit = (resolved + doubt) as f64;
+    let remedy = "check the order of the pictures, --gray, --gray-cell and --order";
+    if lit < LIT * pixels {
+        return Some(format!(
+            "only {:.1} % of the pixels are lit: if the pictures are only dim, give the camera's noise with --noise; else {remedy}",
+            100.0 * lit / pixels
+        ));
+    }
+    if doubt as f64 > DOUBT * lit {
+        return Some(format!(
+            "{:.0} % of the lit pixels have two bits in doubt, or a cell beyond the projector's edge: {remedy}",
+            100.0 * doubt as f64 / lit
+        ));
+    }
+    let [right, down] = one_way(map);
+    (right.max(down) < ONE_WAY).then(|| {
+        format!("the cells rise and fall by turns along the rows and the columns of the picture: {remedy}")
+    })
+}
+
+/// The excess of pairs whose phase changes in one way, along rows and along columns.
+fn one_way(map: &PhaseMap) -> [f64; 2] {
+    let width = map.width.max(1);
+    let height = map.phase.len() / width;
+    [(width, 1), (height, width)].map(|(length, step)| {
+        let apart = (length / APART).max(1);
+        let (mut rising, mut falling) = (0_usize, 0_usize);
+        for (at, here) in map.phase.iter().enumerate() {
+            if (at / step) % length + apart >= length {
+                continue;
+            }
+            let next = map.phase[at + apart * step];
+            if here.is_known() && next.is_known() {
+                let turns = (next - *here).turns();
+                rising += usize::from(turns > 0.0);
+                falling += usize::from(turns < 0.0);
+            }
+        }
+        rising.abs_diff(falling) as f64 / (rising + falling).max(1) as f64
+    })
+}

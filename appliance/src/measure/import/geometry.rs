@@ -1,0 +1,256 @@
+//! The models of an imported recording: whether heights can be measured with them, and whether they fit what was measured.
+
+use super::{content, plane};
+use crate::error::Failure;
+use crate::head::calibration::opencv::Models;
+use crate::head::seam;
+use crate::measure::{Geometry, absolute};
+use algo::geometry::{Pinhole, RigError};
+use algo::pipeline::{Epipolar, PhaseMap};
+use hal::model::DeviceModel;
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
+use std::path::Path;
+
+/// Largest RMS distance of projector points from their epipolar lines that nothing is said about, projector pixels.
+const OFF: f64 = 1.0;
+/// Another reading of the models is named if it leaves less than this share of the distance.
+const BETTER: f64 = 0.3;
+/// Where a camera's principal point lies, as shares of its frame.
+const MIDDLE: std::ops::Range<f64> = 0.3..0.7;
+
+/// Adds models to a recording; returns what looks wrong with them, in words with remedies.
+///
+/// # Errors
+/// If heights could not be measured with them.
+pub(super) fn add(
+    recording: &mut Recording,
+    models: Models,
+    folder: &Path,
+) -> Result<Vec<String>, Failure> {
+    let wrong = |words: String| content(folder, words);
+    let mut notes = models.notes;
+    recording.camera_model = Some(models.camera);
+    recording.projector.model = Some(models.projector);
+    if !models.has_plane {
+        notes.push(plane::fit(recording).map_err(wrong)?);
+    }
+    works(recording).map_err(wrong)?;
+    notes.extend(aside(recording));
+    notes.extend(epipolar(recording).map_err(wrong)?);
+    Ok(notes)
+}
+
+/// Checks that `measure` can use the models.
+fn works(recording: &Recording) -> Result<(), String> {
+    let error = match rig(recording)? {
+        Ok(()) => return Ok(()),
+        Err(error) => error,
+    };
+    let mut turned = recording.clone();
+    let models = [&mut turned.camera_model, &mut turned.projector.model];
+    for model in models.into_iter().flatten() {
+        // Half a turn about x: y and z point the other way.
+        for row in model.rotation.chunks_mut(3) {
+            row[1..].iter_mut().for_each(|element| *element *= -1.0);
+        }
+    }
+    Err(match (&error, rig(&turned)?) {
+        (RigError::NotAbove(_), Ok(())) => format!(
+            "{error}: the plate's z points away, add --z-away (or leave it out if it is given)"
+        ),
+        _ => error.to_string(),
+    })
+}
+
+/// The outer error says that a model is absurd.
+fn rig(recording: &Recording) -> Result<Result<(), RigError>, String> {
+    let projector = &recording.projector;
+    let (columns, rows) = (projector.width as usize, projector.height as usize);
+    let geometry = Geometry::of(recording, None)?;
+    for pattern in &recording.patterns {
+        let function = seam::phase_function(pattern, columns, rows);
+        let function = function.map_err(|error| error.to_string())?;
+        if let Err(error) = geometry.triangulator(&function) {
+            return Ok(Err(error));
+        }
+    }
+    Ok(Ok(()))
+}
+
+/// Whether the camera's principal point lies far from the middle of its frames.
+fn aside(recording: &Recording) -> Option<String> {
+    let model = recording.camera_model.as_ref()?;
+    let shares = [
+        model.cx / f64::from(recording.width),
+        model.cy / f64::from(recording.height),
+    ];
+    (!shares.iter().all(|share| MIDDLE.contains(share))).then(|| {
+        format!(
+            "the camera's principal point ({:.0}, {:.0}) lies far from the middle of its frames of {}×{} pixels: the model is of \
+             another resolution or section of the sensor",
+            model.cx, model.cy, recording.width, recording.height
+        )
+    })
+}
+
+/// Camera and projector.
+type Pair = (DeviceModel, DeviceModel);
+
+/// Compares ξ and η with the models, where fringes of both directions have absolute phases.
+fn epipolar(recording: &Recording) -> Result<Option<String>, String> {
+    let [Some(vertical), Some(horizontal)] = [true, false].map(|vertical| {
+        let mut patterns = recording.patterns.iter().enumerate();
+        patterns.find_map(|(at, spec)| match spec {
+            PatternSpec::Vertical { fringes } if vertical => Some((at, *fringes)),
+            PatternSpec::Horizontal { fringes } if !vertical => Some((at, *fringes)),
+            _ => None,
+        })
+    }) else {
+        return Ok(None);
+    };
+    // Levels without an absolute phase are named elsewhere.
+    let maps = (
+        absolute(recording, vertical.0),
+        absolute(recording, horizontal.0),
+    );
+    let (Ok(xi), Ok(eta)) = maps else {
+        return Ok(None);
+    };
+    let Some(models) = recording
+        .camera_model
+        .clone()
+        .zip(recording.projector.model.clone())
+    else {
+        return Ok(None);
+    };
+    let raster = [recording.projector.width, recording.projector.height].map(f64::from);
+    let off = |pair: &Pair, exchanged: bool| {
+        let (maps, fringes) = match exchanged {
+            false => ([&xi, &eta], [vertical.1, horizontal.1]),
+            true => ([&eta, &xi], [horizontal.1, vertical.1]),
+        };
+        distance(
+            recording,
+            pair,
+            maps,
+            [0, 1].map(|at| raster[at] / fringes[at]),
+        )
+    };
+    let Some(own) = off(&models, false).filter(|own| *own > OFF) else {
+        return Ok(None);
+    };
+    let mut others: Vec<(f64, String)> = readings(&models)
+        .into_iter()
+        .filter_map(|(words, pair)| Some((off(&pair, false)?, words)))
+        .collect();
+    let exchanged = "vertical and horizontal fringes are exchanged: see --direction";
+    others.extend(off(&models, true).map(|off| (off, exchanged.to_owned())));
+    let best = others.into_iter().min_by(|a, b| a.0.total_cmp(&b.0));
+    let remedy = match best {
+        Some((off, words)) if off < BETTER * own => format!("{words} (then {off:.2})"),
+        _ => "they are of another head, another resolution, or their R and T of another direction: check them".into(),
+    };
+    Ok(Some(format!(
+        "the models contradict the fringes: measured projector points lie {own:.1} projector pixels RMS off their epipolar lines: {remedy}"
+    )))
+}
+
+/// RMS distance of the measured points from their epipolar lines.
+fn distance(
+    recording: &Recording,
+    (camera, projector): &Pair,
+    maps: [&PhaseMap; 2],
+    pitch: [f64; 2],
+) -> Option<f64> {
+    let raster = (recording.projector.width, recording.projector.height);
+    let camera: Pinhole =
+        seam::pinhole("camera", camera, (recording.width, recording.height)).ok()?;
+    let projector = seam::pinhole("projector", projector, raster).ok()?;
+    let found = Epipolar::of((&camera, &projector), maps, pitch)?;
+    let rms = found.rms.hypot(found.noise);
+    rms.is_finite().then_some(rms)
+}
+
+/// The same models as they would be if they had been written down in another way, with the words that say how to mend that.
+fn readings((camera, projector): &Pair) -> Vec<(String, Pair)> {
+    let mut readings = vec![(
+        "R and T are from the projector to the camera: give the inverse, R transposed and −Rᵀ T"
+            .to_owned(),
+        (camera.clone(), inverse(camera, projector)),
+    )];
+    for (factor, words) in [(2.0, "half"), (0.5, "twice")] {
+        for (device, pair) in [
+            ("camera", (scaled(camera, factor), projector.clone())),
+            ("projector", (camera.clone(), scaled(projector, factor))),
+        ] {
+            readings.push((
+                format!("the {device}'s model is of {words} the resolution: calibrate with that of the pictures"),
+                pair,
+            ));
+        }
+    }
+    let (from_one, to_one) = (moved(camera, -1.0), moved(projector, -1.0));
+    let words =
+        |of: &str| format!("{of} from 1: take 1 off cx and cy, the first pixel's middle is 0");
+    readings.push((
+        words("the camera's pixels are counted"),
+        (from_one.clone(), projector.clone()),
+    ));
+    readings.push((
+        words("the projector's pixels are counted"),
+        (camera.clone(), to_one.clone()),
+    ));
+    readings.push((
+        words("the pixels of camera and projector are counted"),
+        (from_one, to_one),
+    ));
+    readings
+}
+
+/// The projector, if the pose between the devices is the inverse of what it should be.
+fn inverse(camera: &DeviceModel, projector: &DeviceModel) -> DeviceModel {
+    let (c, p) = (&camera.rotation, &projector.rotation);
+    // R = P Cᵀ and T = t_p − R t_c lead from the camera to the projector.
+    let between: [f64; 9] = std::array::from_fn(|at| {
+        let (row, column) = (at / 3 * 3, at % 3 * 3);
+        (0..3).map(|k| p[row + k] * c[column + k]).sum()
+    });
+    let shift: [f64; 3] = std::array::from_fn(|row| {
+        let moved: f64 = (0..3)
+            .map(|k| between[3 * row + k] * camera.translation_mm[k])
+            .sum();
+        projector.translation_mm[row] - moved
+    });
+    // Rᵀ C and Rᵀ (t_c − T).
+    let transposed = |row: usize, of: &dyn Fn(usize) -> f64| -> f64 {
+        (0..3).map(|k| between[3 * k + row] * of(k)).sum()
+    };
+    DeviceModel {
+        rotation: std::array::from_fn(|at| transposed(at / 3, &|k| c[3 * k + at % 3])),
+        translation_mm: std::array::from_fn(|row| {
+            transposed(row, &|k| camera.translation_mm[k] - shift[k])
+        }),
+        ..projector.clone()
+    }
+}
+
+/// The model for pictures with `factor` times the pixels each way.
+fn scaled(model: &DeviceModel, factor: f64) -> DeviceModel {
+    DeviceModel {
+        fx: model.fx * factor,
+        fy: model.fy * factor,
+        cx: (model.cx + 0.5) * factor - 0.5,
+        cy: (model.cy + 0.5) * factor - 0.5,
+        ..model.clone()
+    }
+}
+
+/// The model with its principal point moved by `by` pixels each way.
+fn moved(model: &DeviceModel, by: f64) -> DeviceModel {
+    DeviceModel {
+        cx: model.cx + by,
+        cy: model.cy + by,
+        ..model.clone()
+    }
+}

@@ -1,0 +1,312 @@
+//! Pictures of other people's cameras: PNG, BMP, TIFF and JPEG, grey or colour, 8 or 16 bits.
+
+use embedded_graphics::pixelcolor::{Rgb888, RgbColor as _};
+use hal::bounds::{MAX_SIDE, shortened};
+use std::fs::File;
+use std::io::{BufReader, Cursor, Read, Seek};
+use std::path::Path;
+use tiff::decoder::{Decoder, DecodingResult};
+use tiff::tags::Tag;
+use tinybmp::Bmp;
+use zune_jpeg::JpegDecoder;
+use zune_jpeg::zune_core::options::DecoderOptions;
+
+/// Endings of the names of pictures.
+pub const ENDINGS: [&str; 6] = ["png", "bmp", "tif", "tiff", "jpg", "jpeg"];
+/// Longest file that is read.
+const MAX_BYTES: u64 = 1 << 30;
+/// Bytes that a decoder may allocate in addition to the samples.
+const DECODER_BYTES: usize = 64 << 20;
+/// Most pages of a file: as many as a recording has frames.
+const MAX_PAGES: usize = 1024;
+
+/// What of a colour picture is taken. A grey picture is taken as it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Channel {
+    /// 0.299 R + 0.587 G + 0.114 B (ITU-R BT.601).
+    Luminance,
+    /// The red samples.
+    Red,
+    /// The green samples.
+    Green,
+    /// The blue samples.
+    Blue,
+}
+
+/// A decoded picture.
+pub struct Picture {
+    /// Columns and rows.
+    pub size: (u32, u32),
+    /// Bits that its file has per sample: 8 or 16.
+    pub bits: u8,
+    /// Whether its file was compressed with loss.
+    pub lossy: bool,
+    /// Samples per pixel: 1, 3, or one more for opacity.
+    channels: usize,
+    samples: Vec<u16>,
+}
+
+impl Picture {
+    /// How many pictures a file holds: the pages of a TIFF, of any other format one.
+    ///
+    /// # Errors
+    /// In words, with the remedy.
+    pub fn pages(path: &Path) -> Result<usize, String> {
+        let mut file = open(path)?;
+        match is_tiff(&mut file)? {
+            true => Ok(pages(&mut tiff(file)?)?.len()),
+            false => Ok(1),
+        }
+    }
+
+    /// Reads a page (from 0) of a file; the format is told by its first bytes.
+    ///
+    /// # Errors
+    /// In words, with the remedy.
+    pub fn read(path: &Path, page: usize) -> Result<Self, String> {
+        let mut file = open(path)?;
+        let picture = match is_tiff(&mut file)? {
+            true => Self::tiff(file, page),
+            false => {
+                let mut bytes = Vec::new();
+                let read = file.take(MAX_BYTES).read_to_end(&mut bytes);
+                read.map_err(|error| error.to_string())?;
+                Self::decode(&bytes)
+            }
+        };
+        picture
+            .and_then(Self::complete)
+            .map_err(|problem| shortened(&problem))
+    }
+
+    /// Reads the only picture of a file.
+    ///
+    /// # Errors
+    /// In words, with the remedy.
+    pub fn single(path: &Path) -> Result<Self, String> {
+        match Self::pages(path)? {
+            1 => Self::read(path, 0),
+            pages => Err(format!("it has {pages} pages: save the one that is meant")),
+        }
+    }
+
+    /// Everything but TIFF.
+    fn decode(bytes: &[u8]) -> Result<Self, String> {
+        match bytes {
+            [0x89, b'P', b'N', b'G', ..] => Self::png(bytes),
+            [b'B', b'M', ..] => Self::bmp(bytes),
+            [0xFF, 0xD8, ..] => Self::jpeg(bytes),
+            _ => Err("neither PNG, BMP, TIFF nor JPEG: convert it to one of them".into()),
+        }
+    }
+
+    /// The same, if it has the samples of its size.
+    fn complete(self) -> Result<Self, String> {
+        let (width, height) = self.size;
+        let expected = width as usize * height as usize * self.channels;
+        match self.samples.len() == expected && expected > 0 {
+            true => Ok(self),
+            false => Err(format!(
+                "it has {} samples of {expected}: it is cut off, or its colours are in separate planes: save it again",
+                self.samples.len()
+            )),
+        }
+    }
+
+    fn png(bytes: &[u8]) -> Result<Self, String> {
+        let limits = png::Limits {
+            bytes: DECODER_BYTES,
+        };
+        let mut decoder = png::Decoder::new_with_limits(Cursor::new(bytes), limits);
+        decoder.set_transformations(png::Transformations::EXPAND);
+        let mut reader = decoder.read_info().map_err(broken)?;
+        let size = bounded(reader.info().size())?;
+        if reader.info().is_animated() {
+            return Err("it is animated: save each of its pictures as a file".into());
+        }
+        let (colour, depth) = reader.output_color_type();
+        let length = reader.output_buffer_size().ok_or("it is too large")?;
+        let mut raw = vec![0; length];
+        reader.next_frame(&mut raw).map_err(broken)?;
+        let wide = depth == png::BitDepth::Sixteen;
+        Ok(Self {
+            size,
+            bits: if wide { 16 } else { 8 },
+            lossy: false,
+            channels: colour.samples(),
+            samples: match wide {
+                true => {
+                    let (pairs, _) = raw.as_chunks::<2>();
+                    pairs.iter().map(|pair| u16::from_be_bytes(*pair)).collect()
+                }
+                false => raw.into_iter().map(u16::from).collect(),
+            },
+        })
+    }
+
+    fn bmp(bytes: &[u8]) -> Result<Self, String> {
+        let wrong = |error| broken(format!("{error:?}"));
+        let bmp = Bmp::<Rgb888>::from_slice(bytes).map_err(wrong)?;
+        let size = bmp.as_raw().header().image_size;
+        let size = bounded((size.width, size.height))?;
+        let colours = bmp.pixels().map(|pixel| pixel.1);
+        let samples =
+            colours.flat_map(|colour| [colour.r(), colour.g(), colour.b()].map(u16::from));
+        Ok(Self {
+            size,
+            bits: 8,
+            lossy: false,
+            channels: 3,
+            samples: samples.collect(),
+        })
+    }
+
+    fn jpeg(bytes: &[u8]) -> Result<Self, String> {
+        let side = MAX_SIDE as usize;
+        // A file that is cut off is refused, not filled with grey.
+        let options = DecoderOptions::new_safe()
+            .set_strict_mode(true)
+            .set_max_width(side)
+            .set_max_height(side);
+        let mut decoder = JpegDecoder::new_with_options(Cursor::new(bytes), options);
+        let samples = decoder.decode().map_err(broken)?;
+        let (width, height) = decoder
+            .dimensions()
+            .ok_or("it has no size: save it again")?;
+        let colours = decoder
+            .output_colorspace()
+            .map_or(0, |space| space.num_components());
+        Ok(Self {
+            size: bounded((width as u32, height as u32))?,
+            bits: 8,
+            lossy: true,
+            channels: colours,
+            samples: samples.into_iter().map(u16::from).collect(),
+        })
+    }
+
+    fn tiff(file: impl Read + Seek, page: usize) -> Result<Self, String> {
+        let mut decoder = tiff(file)?;
+        let directory = *pages(&mut decoder)?
+            .get(page)
+            .ok_or("it has no such page")?;
+        decoder.seek_to_image(directory).map_err(broken)?;
+        let size = bounded(decoder.dimensions().map_err(broken)?)?;
+        let colour = decoder.colortype().map_err(broken)?;
+        let channels = match colour {
+            tiff::ColorType::Gray(_) => 1,
+            tiff::ColorType::GrayA(_) => 2,
+            tiff::ColorType::RGB(_) => 3,
+            tiff::ColorType::RGBA(_) => 4,
+            other => return Err(format!("its colours are {other:?}: save it as grey or RGB")),
+        };
+        let (bits, samples) = match decoder.read_image().map_err(broken)? {
+            DecodingResult::U8(samples) => (8, samples.into_iter().map(u16::from).collect()),
+            DecodingResult::U16(samples) => (16, samples),
+            _ => return Err("its samples are not of 8 or 16 bits: save it with those".into()),
+        };
+        Ok(Self {
+            size,
+            bits,
+            lossy: false,
+            channels,
+            samples,
+        })
+    }
+
+    /// Whether any pixel has a colour other than grey.
+    pub fn is_colour(&self) -> bool {
+        self.channels >= 3
+            && self
+                .samples
+                .chunks(self.channels)
+                .any(|pixel| pixel[0] != pixel[1] || pixel[1] != pixel[2])
+    }
+
+    /// The samples of a channel, row-major; a grey picture has only one.
+    pub fn grey(&self, channel: Channel) -> Vec<u16> {
+        let pixels = self.samples.chunks(self.channels);
+        if self.channels < 3 {
+            return pixels.map(|pixel| pixel[0]).collect();
+        }
+        let at = match channel {
+            Channel::Red => 0,
+            Channel::Green => 1,
+            Channel::Blue => 2,
+            Channel::Luminance => {
+                let luminance = |pixel: &[u16]| {
+                    let [red, green, blue] = [pixel[0], pixel[1], pixel[2]].map(u32::from);
+                    ((299 * red + 587 * green + 114 * blue + 500) / 1000) as u16
+                };
+                return pixels.map(luminance).collect();
+            }
+        };
+        pixels.map(|pixel| pixel[at]).collect()
+    }
+}
+
+fn open(path: &Path) -> Result<BufReader<File>, String> {
+    let file = File::open(path).map_err(|error| error.to_string())?;
+    let length = file.metadata().map_err(|error| error.to_string())?.len();
+    match length <= MAX_BYTES {
+        true => Ok(BufReader::new(file)),
+        false => Err(format!(
+            "{length} bytes: name a picture of at most {MAX_BYTES}"
+        )),
+    }
+}
+
+/// Whether a file begins as a TIFF does; it is at its beginning afterwards.
+fn is_tiff(file: &mut (impl Read + Seek)) -> Result<bool, String> {
+    let mut first = Vec::new();
+    let read = file.by_ref().take(2).read_to_end(&mut first);
+    read.and_then(|_| file.rewind())
+        .map_err(|error| error.to_string())?;
+    Ok(first == b"II" || first == b"MM")
+}
+
+fn tiff<R: Read + Seek>(file: R) -> Result<Decoder<R>, String> {
+    let mut limits = tiff::decoder::Limits::default();
+    limits.intermediate_buffer_size = DECODER_BYTES;
+    Ok(Decoder::new(file).map_err(broken)?.with_limits(limits))
+}
+
+/// The directories of a TIFF that are pages, without thumbnails and masks of other pages.
+fn pages<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Vec<usize>, String> {
+    /// Bits of the tag NewSubfileType: a smaller copy of another page, and a mask of one.
+    const OF_ANOTHER: u32 = 1 | 4;
+    let mut pages = Vec::new();
+    for directory in 0.. {
+        let kind = decoder.find_tag_unsigned(Tag::NewSubfileType);
+        let kind: u32 = kind.map_err(broken)?.unwrap_or(0);
+        if kind & OF_ANOTHER == 0 {
+            pages.push(directory);
+        }
+        if !decoder.more_images() {
+            break;
+        }
+        if directory >= MAX_PAGES {
+            return Err(format!(
+                "it has more than {MAX_PAGES} pages: save one file for each part"
+            ));
+        }
+        decoder.next_image().map_err(broken)?;
+    }
+    Ok(pages)
+}
+
+fn broken(error: impl std::fmt::Display) -> String {
+    format!("the picture cannot be decoded ({error}): save it again, uncompressed if it is a BMP")
+}
+
+fn bounded((width, height): (u32, u32)) -> Result<(u32, u32), String> {
+    match width.max(height) <= MAX_SIDE {
+        true => Ok((width, height)),
+        false => Err(format!(
+            "{width}×{height} pixels: frames have at most {MAX_SIDE} each way"
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests;

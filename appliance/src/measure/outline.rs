@@ -1,0 +1,78 @@
+//! The recording that the pictures of a layout make.
+
+use super::layout::{Layout, Shown};
+use hal::frame::{Frame, FrameFormat};
+use hal::replay::Recording;
+use hal::replay::recording::{RecordedCode, RecordedFrame, RecordedProjector};
+
+impl Layout {
+    /// The recording of frames of these pictures, in their order, without models.
+    pub fn recording(
+        &self,
+        (width, height): (u32, u32),
+        format: FrameFormat,
+        frames: impl IntoIterator<Item = Frame>,
+    ) -> Recording {
+        let codes = self.codes.iter().enumerate();
+        let codes = codes.map(|(pattern, code)| RecordedCode {
+            pattern,
+            cell_px: code.cell,
+            bits: Vec::new(),
+            inverse: Vec::new(),
+        });
+        let mut recording = Recording {
+            width: format.width,
+            height: format.height,
+            bit_depth: format.bit_depth,
+            description: String::new(),
+            source: String::new(),
+            camera_model: None,
+            noise_counts: None,
+            projector: RecordedProjector {
+                width,
+                height,
+                model: None,
+                plane: None,
+            },
+            patterns: self.patterns.clone(),
+            frames: Vec::new(),
+            codes: codes.collect(),
+            white: None,
+            black: None,
+            range_mm: None,
+            exposure_us: None,
+            part_id: None,
+            recipe: None,
+            truth_height: None,
+            truth_class: None,
+        };
+        for (shown, frame) in self.shown.iter().zip(frames) {
+            match *shown {
+                Shown::Sine {
+                    pattern,
+                    ratio,
+                    shift,
+                } => recording.frames.push(RecordedFrame {
+                    ratio,
+                    shift_turns: shift,
+                    harmonics: Vec::new(),
+                    pattern,
+                    timestamp_ns: None,
+                    frame,
+                }),
+                Shown::Bit {
+                    pattern, inverse, ..
+                } => {
+                    let code = &mut recording.codes[pattern];
+                    match inverse {
+                        true => code.inverse.push(frame),
+                        false => code.bits.push(frame),
+                    }
+                }
+                Shown::White => recording.white = Some(frame),
+                Shown::Black => recording.black = Some(frame),
+            }
+        }
+        recording
+    }
+}
