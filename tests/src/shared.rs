@@ -19,8 +19,18 @@ pub fn recordings() -> PathBuf {
 
 /// The folder of a shared recording. If it is absent, returns none and marks the calling test as skipped.
 pub fn folder(name: &str) -> Option<PathBuf> {
-    let folder = recordings().join(name);
-    if folder.join("recording.json").is_file() {
+    with(recordings().join(name), "recording.json")
+}
+
+/// The folder of a shared case of pictures that another program took. If it is absent, returns none and marks the calling test as
+/// skipped.
+pub fn case(name: &str) -> Option<PathBuf> {
+    with(root().join("../shared/cases").join(name), "README.md")
+}
+
+/// The folder, if it has this file.
+fn with(folder: PathBuf, file: &str) -> Option<PathBuf> {
+    if folder.join(file).is_file() {
         return Some(folder);
     }
     let marks = marks();

@@ -2,9 +2,9 @@
 //! file.
 
 use crate::head::seam;
-use crate::recipe::{Recipe, SequenceKind, safe};
+use crate::recipe::{Recipe, safe};
 use algo::adaptive::ProjectorMap;
-use algo::pattern::{PhaseFunction, Unwrapping};
+use algo::pattern::PhaseFunction;
 use algo::units::AbsolutePhase;
 use hal::npy::Array;
 use hal::replay::Recording;
@@ -28,15 +28,10 @@ pub(super) struct Known {
 }
 
 impl Known {
-    /// The map for levels that are unwrapped in this way; for those of limited reach it is unknown outside of their safe mask.
-    pub fn map(&self, unwrapping: Unwrapping) -> Vec<AbsolutePhase> {
-        let limit = match unwrapping {
-            Unwrapping::Single => SequenceKind::SingleLevel.reach(),
-            Unwrapping::DenseTwo { .. } => SequenceKind::TwoLevels.reach(),
-            Unwrapping::Geometric | Unwrapping::DenseThree { .. } => None,
-        };
+    /// The map for levels that are right within so many turns of it; unknown outside of their safe mask if that is limited.
+    pub fn map(&self, limit: Option<f64>) -> Vec<AbsolutePhase> {
         match (limit, &self.reach) {
-            (Some(limit), Some(reach)) => safe(&self.phase, reach, limit),
+            (Some(limit), Some(reach)) => safe(&self.phase, reach, limit as f32),
             _ => self.phase.clone(),
         }
     }

@@ -1,7 +1,7 @@
 //! What is projected, in which order: levels of fringes, Gray codes, white and black. `fringed patterns` makes pictures of it, and
 //! `fringed import` takes pictures for it.
 
-use algo::chain::{GrayCode, MAX_CODE_BITS};
+use algo::chain::{Coding, GrayCode, MAX_CODE_BITS};
 use hal::frame::{Frame, FrameFormat};
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedCode, RecordedFrame, RecordedProjector};
@@ -61,13 +61,28 @@ pub struct Shifts {
     pub first: f64,
 }
 
-/// Gray codes.
+/// The order in which the bits of a Gray code are projected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum BitOrder {
+    /// The most significant bit first.
+    Msb,
+    /// The least significant bit first.
+    Lsb,
+}
+
+/// Gray codes. Lists have one element for both codes, or one for the vertical and one for the horizontal one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gray {
-    /// Bits of the vertical code and of the horizontal one, or of both.
+    /// Numbers of bits.
     pub bits: Vec<u8>,
-    /// Width of a cell in projector pixels; without it a fringe of the finest level.
-    pub cell_px: Option<f64>,
+    /// Widths of cells in projector pixels; empty where a cell is a fringe of the finest level.
+    pub cell_px: Vec<f64>,
+    /// How far before the raster's edge the first cell begins, projector pixels; empty where it begins there.
+    pub offset_px: Vec<f64>,
+    /// The order of the bits.
+    pub order: BitOrder,
+    /// How the numbers of cells are written in them.
+    pub coding: Coding,
     /// Whether each picture is followed by its inverse.
     pub inverse: bool,
 }
@@ -211,7 +226,11 @@ impl Layout {
             }
             if let Some(gray) = &description.gray {
                 let code = gray.code(pattern, finest, length, description.function.is_some())?;
-                for bit in 0..code.bits {
+                for at in 0..code.bits {
+                    let bit = match gray.order {
+                        BitOrder::Msb => at,
+                        BitOrder::Lsb => code.bits - 1 - at,
+                    };
                     let inverses: &[bool] = if gray.inverse {
                         &[false, true]
                     } else {
@@ -266,6 +285,9 @@ impl Layout {
         let codes = codes.map(|(pattern, code)| RecordedCode {
             pattern,
             cell_px: code.cell,
+            offset_px: code.offset,
+            binary: code.coding.binary,
+            inverted: code.coding.inverted,
             bits: Vec::new(),
             inverse: Vec::new(),
         });
@@ -274,6 +296,7 @@ impl Layout {
             height: format.height,
             bit_depth: format.bit_depth,
             description: String::new(),
+            notes: Vec::new(),
             source: String::new(),
             camera_model: None,
             noise_counts: None,
@@ -295,7 +318,13 @@ impl Layout {
             truth_height: None,
             truth_class: None,
         };
-        for (shown, frame) in self.shown.iter().zip(frames) {
+        let mut shown: Vec<_> = self.shown.iter().zip(frames).collect();
+        // Bits come with the most or the least significant first.
+        shown.sort_by_key(|(shown, _)| match shown {
+            Shown::Bit { bit, .. } => *bit,
+            _ => 0,
+        });
+        for (shown, frame) in shown {
             match *shown {
                 Shown::Sine {
                     pattern,
@@ -372,10 +401,11 @@ impl Gray {
         if curved {
             return Err("--gray numbers straight fringes: leave out --pattern".into());
         }
-        let bits = self.bits.get(pattern).or(self.bits.last());
-        let bits = bits.copied().unwrap_or(1).min(MAX_CODE_BITS);
+        let bits = of_pattern(&self.bits, pattern)
+            .unwrap_or(1)
+            .min(MAX_CODE_BITS);
         let length = f64::from(length);
-        let cell = match self.cell_px {
+        let cell = match of_pattern(&self.cell_px, pattern) {
             Some(cell) => cell,
             None if (finest - 1e-9).log2().ceil().max(1.0) == f64::from(bits) => length / finest,
             None => {
@@ -385,14 +415,28 @@ impl Gray {
                 ));
             }
         };
-        let cells = (length / cell - 1e-9).ceil();
-        match cells <= f64::from(1_u32 << bits) {
-            true => Ok(GrayCode { bits, cell }),
+        let offset = of_pattern(&self.offset_px, pattern).unwrap_or(0.0);
+        let coding = self.coding;
+        let cells = ((length + offset) / cell - 1e-9).ceil();
+        // A Gray code of one more cell shows the last two alike, and those alone are lost.
+        let doubled = u32::from(offset > 0.0 && !coding.binary);
+        match cells <= f64::from((1_u32 << bits) + doubled) {
+            true => Ok(GrayCode {
+                bits,
+                cell,
+                offset,
+                coding,
+            }),
             false => Err(format!(
                 "{bits} bits of --gray number {} cells, but {cells} cells of {cell:.3} px are on the projector: correct \
-                 --gray or --gray-cell",
+                 --gray, --gray-cell or --gray-offset",
                 1_u32 << bits
             )),
         }
     }
+}
+
+/// The element for a pattern of a list that has one for both, or one for each.
+pub fn of_pattern<T: Copy>(list: &[T], pattern: usize) -> Option<T> {
+    list.get(pattern).or(list.last()).copied()
 }

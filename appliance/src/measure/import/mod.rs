@@ -1,7 +1,10 @@
 //! Makes a recording of other people's pictures (`fringed import`), and says what looks wrong.
 
 mod check;
+mod code;
 mod picture;
+mod samples;
+mod shifts;
 
 pub use picture::{Channel, Picture};
 
@@ -31,16 +34,8 @@ pub struct Taken {
     pub name: String,
 }
 
-/// A recording, and what looks wrong with it.
-#[derive(Debug)]
-pub struct Imported {
-    /// The recording.
-    pub recording: Recording,
-    /// In words, with remedies.
-    pub notes: Vec<String>,
-}
-
-/// Reads the pictures of a folder in the order of the numbers in their names. `models` gives the models for frames of this size.
+/// Reads the pictures of a folder in the order of the numbers in their names. `models` gives the models for frames of this size. The
+/// recording's notes say what looks wrong with it, in words with remedies.
 ///
 /// # Errors
 /// If the folder is missing (66), the description contradicts itself (64), or a picture is missing or wrong (65).
@@ -48,7 +43,7 @@ pub fn import(
     folder: &Path,
     taken: &Taken,
     models: impl FnOnce((u32, u32)) -> Result<Option<(DeviceModel, DeviceModel)>, Failure>,
-) -> Result<Imported, Failure> {
+) -> Result<Recording, Failure> {
     let layout = Layout::of(&taken.description);
     let layout = layout.map_err(|problem| Failure::because(Exit::Usage, "import", problem))?;
     let files = pictures(folder, &taken.name)?;
@@ -88,18 +83,22 @@ pub fn import(
                 .into(),
         );
     }
-    let bit_depth = taken.bit_depth.unwrap_or(first.bits);
-    let format = FrameFormat::packed(first.size.0, first.size.1, bit_depth);
-    let frame = |(at, picture): (usize, &Picture)| {
-        let samples = picture.grey(taken.channel);
-        frame(format, samples, at).map_err(|problem| content(&files[at], problem))
-    };
-    let frames: Vec<Frame> = pictures
+    let ((width, height), file_bits) = (first.size, first.bits);
+    let grey = pictures
         .par_iter()
+        .map(|picture| picture.grey(taken.channel));
+    let mut samples: Vec<Vec<u16>> = grey.collect();
+    drop(pictures);
+    let bit_depth = samples::right_justify(&mut samples, taken.bit_depth, file_bits);
+    let format = FrameFormat::packed(width, height, bit_depth);
+    notes.extend(samples::mark_clipped(&mut samples, &layout.shown, format));
+    let frame =
+        |(at, samples)| frame(format, samples, at).map_err(|problem| content(&files[at], problem));
+    let frames: Vec<Frame> = samples
+        .into_par_iter()
         .enumerate()
         .map(frame)
         .collect::<Result<_, _>>()?;
-    drop(pictures);
     let models = models((format.width, format.height))?;
     let (camera_model, projector_model) = models.unzip();
     let mut recording = layout.recording(taken.description.projector, format, frames);
@@ -107,10 +106,10 @@ pub fn import(
     recording.camera_model = camera_model;
     recording.projector.model = projector_model;
     notes.extend(
-        check::notes(&recording, taken.description.shifts)
-            .map_err(|problem| content(folder, problem))?,
+        check::notes(&recording, &taken.description).map_err(|problem| content(folder, problem))?,
     );
-    Ok(Imported { recording, notes })
+    recording.notes = notes;
+    Ok(recording)
 }
 
 /// A frame of samples that must lie within its bits.
