@@ -9,8 +9,8 @@ use core::f64::consts::TAU;
 
 /// Largest misalignment of cells and fringes that is not a matter of conventions, in turns: these differ by quarters of a turn.
 pub const EXPECTED_TURNS: f64 = 0.125;
-/// Fewest edges that tell anything.
-const FEWEST: usize = 64;
+/// Fewest edges that tell anything: any phases of so many are concentrated by chance once in 25 000 times.
+const FEWEST: usize = 24;
 /// Concentration of phases at edges that belong together: 0 for any phases, 1 for equal ones, and 0.65 if they are spread evenly over
 /// half a turn.
 const CONCENTRATED: f64 = 0.65;

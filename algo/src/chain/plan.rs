@@ -21,8 +21,9 @@ const NOISE: f64 = 0.02;
 const LEAST_RATIO: f64 = 1e-6;
 /// Rounding of a code's half cell beside half a turn.
 const ROUNDING: f64 = 1e-6;
-/// Least safety of the steps of a chain that starts about a map: wrong orders at 3 σ.
-const SAFE: f64 = 3.0;
+/// Least safety of the steps of a chain that starts about a map: 50 times the ratio in one step, with 4 shifts. [`NOISE`] is that of
+/// faint fringes, and wrong orders at its σ leave large residuals.
+const SAFE: f64 = 1.0;
 
 /// The cells of a Gray code in turns of the phase function.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -285,7 +285,7 @@ fn a_cell_as_wide_as_a_fringe_loses_only_pixels_whose_bit_is_not_decisive() {
         let map = single.decode(2.0, Some((stated, &seen))).unwrap();
         let (resolved, wrong) = single.orders(&map);
         assert!(
-            resolved > 1280 * 95 / 100 && wrong == 0,
+            resolved > 1280 * 92 / 100 && wrong == 0,
             "{late}: {resolved} {wrong}"
         );
     }
@@ -300,14 +300,6 @@ fn the_edges_of_cells_tell_their_offset_and_width_within_the_fringes() {
     let sequence = Sequence::from_frames(&single.shots()).unwrap();
     let level = &sequence.levels()[0];
     let map = wrapped(level, &frames, 8, LeastModulation::default()).unwrap();
-    // One row has too few edges, so it is taken three times.
-    let thrice = |map: &PhaseMap| PhaseMap {
-        width: map.width,
-        phase: map.phase.repeat(3),
-        modulation: map.modulation.repeat(3),
-        trust: map.trust.repeat(3),
-    };
-    let map = thrice(&map);
     for (cell, offset) in [
         (20.0, 0.0),
         (40.0, 0.0),
@@ -320,7 +312,7 @@ fn the_edges_of_cells_tell_their_offset_and_width_within_the_fringes() {
             ..gray(7, cell)
         };
         let stated = gray(7, 40.0);
-        let seen = blurred(&code, 2.0).repeat(3);
+        let seen = blurred(&code, 2.0);
         let edges = Edges::of(&map, &seen, &cells_of(&stated, turns), 1.0);
         assert!(edges.are_many() && edges.smoothness() > 0.99);
         let fitted = edges.fitted();

@@ -119,17 +119,18 @@ impl<'a> Channel<'a> {
         if !self.scan.needs_map() {
             return Ok(Unwrapping::Planned(None));
         }
+        // What is absolute by itself cannot be ambiguous about the reference map.
+        if let (None, Ok(chain)) = (known, self.chain()) {
+            return Ok(Unwrapping::Chain(chain));
+        }
         Ok(match map(known, reach(self.scan.decoder.unwrapping())) {
             Ok(map) => Unwrapping::Planned(Some(map)),
-            Err(missing) => match self.chain() {
-                Ok(chain) => Unwrapping::Chain(chain),
-                Err(_) => Unwrapping::Missing(format!(
-                    "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or give a \
-                     recipe with a golden map",
-                    self.scan.decoder.unwrapping().kind(),
-                    self.ratios(),
-                )),
-            },
+            Err(missing) => Unwrapping::Missing(format!(
+                "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or give a recipe with a \
+                 golden map",
+                self.scan.decoder.unwrapping().kind(),
+                self.ratios(),
+            )),
         })
     }
 
@@ -307,7 +308,7 @@ impl Unwrapping {
     pub fn map(&self) -> Option<&'static str> {
         match self {
             Self::Planned(map) => map.as_ref().map(|(name, _)| *name),
-            Self::About(_, (name, _)) => Some(name),
+            Self::About(_, (name, _)) => Some(*name),
             _ => None,
         }
     }

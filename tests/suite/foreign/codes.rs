@@ -48,14 +48,14 @@ fn scene(fringes: f64, first: f64, code: Code) -> Scene {
 
 /// What an import says with these options, beside those of the levels.
 fn said(scene: &Scene, options: &[&str]) -> Vec<String> {
-    let run = scene.import(&[&["--json"], options].concat()).succeeded();
+    let run = scene.import(&[options, &["--json"]].concat()).succeeded();
     fs::remove_dir_all(scene.path("recording")).unwrap();
     notes(&run)
 }
 
 /// Imports without a finding, and checks that all but a few pixels of the picture have the right phase; none has a wrong one.
 fn is_right(scene: &Scene, options: &[&str], pitch: f64) {
-    let run = scene.import(&[&["--json"], options].concat()).succeeded();
+    let run = scene.import(&[options, &["--json"]].concat()).succeeded();
     assert_eq!(notes(&run), [""; 0], "{options:?}");
     let out = scene.measure();
     let count = check_phase(&out.join("phase.npy"), pitch, |u, v| lit_by(u, v).0, 0.6);
@@ -123,7 +123,7 @@ fn a_code_that_was_projected_otherwise_than_described_is_named_and_read_as_named
             "--gray-cell" => stated[..6].to_vec(),
             _ => stated.to_vec(),
         };
-        is_right(&scene, &[&stated, named].concat(), 50.0);
+        is_right(&scene, &[&stated[..], named].concat(), 50.0);
     }
     // The code of half fringes as described, and of whole fringes.
     is_right(&scene(8.0, 0.0, HALF), &half, 50.0);
