@@ -135,7 +135,7 @@ fn coding(
             binary: cells.coding.binary != (changes & 2 != 0),
             inverted: cells.coding.inverted != (changes & 4 != 0),
         };
-        let read = if reversed { &backwards } else { seen };
+        let read = if reversed { &backwards[..] } else { seen };
         let edges = Edges::of(finest, read, &Cells { coding, ..cells }, ratio);
         let known = best.as_ref().map_or(stated, |best| &best.edges);
         if edges.smoothness() > known.smoothness() + BETTER && edges.smoothness() > MEANT {
