@@ -234,7 +234,7 @@ pub fn write_codes(pose: &Pose, seed: u64, cell: f64, folder: &Path) {
         let cell = ((along + 0.5) / cell).max(0.0) as u32;
         let bit = count - 1 - (frame - first) / 2;
         let set = (cell ^ cell >> 1) >> bit & 1 == 1;
-        f64::from(u8::from(set == (frame % 2 == 0)))
+        f64::from(u8::from(set == frame.is_multiple_of(2)))
     };
     let count = codes + 2;
     let frames = seen(pose, 0.0, count, &mut random, |xi, eta| {

@@ -71,6 +71,7 @@ impl Scene {
             height: self.size,
             bit_depth: self.bit_depth,
             description: "a tilted plane with a bump".to_owned(),
+            notes: Vec::new(),
             source: "rendered by the integration suite".to_owned(),
             camera_model: Some(camera),
             noise_counts: None,

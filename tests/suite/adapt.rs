@@ -323,6 +323,7 @@ fn record(
     let truth = stage.truth();
     Recording {
         description: "a sphere".into(),
+        notes: Vec::new(),
         source: "the simulated head".into(),
         noise_counts: None,
         patterns: vec![PatternSpec::File {

@@ -67,9 +67,61 @@ fn levels_with_a_chain_of_beats_give_absolute_phase_without_models_and_heights_w
 }
 
 #[test]
+fn numbers_of_fringes_without_a_common_factor_give_absolute_phase() {
+    let mut recording = scene(13.0, &[1.0, 7.0 / 13.0], 4);
+    recording.camera_model = None;
+    let written = Written::new(&recording);
+    written.measure(&[]).succeeded();
+    let report = files::report(&written.out());
+    assert_eq!(report["kind"], "heterodyne", "{report}");
+    recording = scene(13.0, &[1.0, 7.0 / 13.0], 4);
+    let phase = files::array(&written.out().join("phase.npy")).values;
+    let (compared, wrong) = orders(&recording, &phase);
+    assert!(compared > 8000 && wrong == 0, "{compared} {wrong}");
+}
+
+#[test]
+fn levels_whose_coarsest_has_some_fringes_are_unwrapped_about_the_reference_or_a_given_map() {
+    let recording = scene(64.0, &[1.0, 0.0625], 4);
+    let written = Written::new(&recording);
+    written.measure(&[]).succeeded();
+    let report = files::report(&written.out());
+    assert_eq!(report["map"], "reference");
+    assert_eq!(report["kind"], "geometric");
+    assert_eq!(report["score"]["gross"], 0, "{report}");
+    assert!(report["ambiguous"].is_null(), "{report}");
+    // About its own phase without models.
+    let map = written.out().join("phase.npy");
+    let known = files::array(&map).values;
+    let mut bare = recording;
+    (bare.camera_model, bare.projector.model) = (None, None);
+    let bare = Written::new(&bare);
+    bare.measure(&["--about", map.to_str().unwrap()])
+        .succeeded();
+    assert_eq!(files::report(&bare.out())["map"], "given");
+    let again = files::array(&bare.out().join("phase.npy")).values;
+    let pairs = known
+        .iter()
+        .zip(&again)
+        .filter(|(known, _)| !known.is_nan());
+    assert!(pairs.clone().count() > 8000);
+    assert!(pairs.clone().all(|(known, again)| known == again));
+}
+
+#[test]
+fn heights_that_are_ambiguous_about_the_reference_map_are_said() {
+    let written = Written::new(&scene(64.0, &[1.0], 4));
+    let run = written.measure(&[]).succeeded();
+    let report = files::report(&written.out());
+    let words = report["ambiguous"].as_str().expect("an ambiguity");
+    assert!(words.contains("a coarser level"), "{words}");
+    assert!(run.stdout.contains(words), "{}", run.stdout);
+}
+
+#[test]
 fn levels_without_a_chain_give_the_wrapped_phase_and_say_what_to_add() {
     let mut recording = scene(64.0, &[1.0, 60.0 / 64.0, 0.5], 4);
-    // With models heights are expected, so it would be refused.
+    // With models it would be unwrapped about the reference map.
     recording.projector.model = None;
     let written = Written::new(&recording);
     let run = written.measure(&[]).succeeded();

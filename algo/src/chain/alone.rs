@@ -66,10 +66,10 @@ impl CodePictures<'_> {
                 for (bit, contrast) in contrasts.iter_mut().enumerate() {
                     *contrast = self.contrast(bit, u, v);
                 }
-                *pixel = Pixel::of(&contrasts, cells.count, least);
+                *pixel = Pixel::of(&contrasts, cells, least);
             }
         });
-        let refined = self.refined(&pixels, (width, height), vertical);
+        let refined = self.refined(&pixels, cells, (width, height), vertical);
         let mut map = PhaseMap::new(width, height);
         for (at, pixel) in pixels.iter().enumerate() {
             map.trust[at] = pixel.trust;
@@ -99,6 +99,7 @@ impl CodePictures<'_> {
     fn refined(
         &self,
         pixels: &[Pixel],
+        cells: &Cells,
         (width, height): (usize, usize),
         vertical: bool,
     ) -> Vec<f64> {
@@ -129,7 +130,7 @@ impl CodePictures<'_> {
                     (line, along)
                 };
                 let border = resolved
-                    .then(|| self.border(here.cell, next.cell, (u, v), vertical))
+                    .then(|| self.border(cells, [here.cell, next.cell], (u, v), vertical))
                     .flatten();
                 let border = border.map(|(share, place)| (along as f64 + share, place));
                 if let (Some(from), Some(to)) = (behind, border)
@@ -150,15 +151,16 @@ impl CodePictures<'_> {
     /// cells; `None` if they are not neighbours.
     fn border(
         &self,
-        here: u16,
-        next: u16,
+        cells: &Cells,
+        [here, next]: [u16; 2],
         (u, v): (usize, usize),
         vertical: bool,
     ) -> Option<(f64, f64)> {
         if here.abs_diff(next) != 1 {
             return None;
         }
-        let changed = word(here) ^ word(next);
+        // In plain binary several bits change in one place, the lowest always.
+        let changed = cells.word(here) ^ cells.word(next);
         let bit = self.bits.len() - 1 - changed.trailing_zeros() as usize;
         let (to_u, to_v) = if vertical { (u + 1, v) } else { (u, v + 1) };
         let (from, to) = (self.contrast(bit, u, v), self.contrast(bit, to_u, to_v));
@@ -170,25 +172,23 @@ impl CodePictures<'_> {
 }
 
 impl Pixel {
-    /// From the contrast of each bit, the most significant first, of a code of so many cells.
-    fn of(contrasts: &[f64], cells: u32, least: f64) -> Self {
+    /// From the contrast of each bit, the most significant first, of a code of these cells.
+    fn of(contrasts: &[f64], cells: &Cells, least: f64) -> Self {
         let most = contrasts.iter().copied().map(libm::fabs);
         let modulation = most.fold(0.0, f64::max);
         if modulation < least {
             return Self::default();
         }
-        let (mut seen, mut undecided, mut count) = (0_u16, 0_u16, 0);
+        let (mut seen, mut undecided) = (0_u16, 0_u16);
         for &contrast in contrasts {
             let doubt = libm::fabs(contrast) < UNDECIDED * modulation;
             seen = seen << 1 | u16::from(contrast > 0.0);
             undecided = undecided << 1 | u16::from(doubt);
-            count += usize::from(doubt);
         }
-        let own = cell(seen);
-        // With one bit in doubt the pixel lies on the border of two cells.
-        let other = cell(seen ^ undecided);
-        let known = count == 0 || count == 1 && own.abs_diff(other) == 1;
-        let trust = match known && u32::from(own) < cells {
+        let (own, other) = cells.around(seen, undecided);
+        // With bits in doubt the pixel lies on the border of two cells, if these are all that changes there.
+        let known = undecided == 0 || own.abs_diff(other) == 1;
+        let trust = match known && u32::from(own) < cells.count {
             true => Trust::Resolved,
             false => Trust::Residual,
         };
@@ -201,17 +201,27 @@ impl Pixel {
     }
 }
 
-/// The bits that a cell shows.
-fn word(cell: u16) -> u16 {
-    cell ^ (cell >> 1)
-}
-
-/// The cell that shows these bits.
-fn cell(mut word: u16) -> u16 {
-    for shift in [1, 2, 4, 8] {
-        word ^= word >> shift;
+impl Cells {
+    /// The bits that a cell shows.
+    fn word(&self, cell: u16) -> u16 {
+        self.coding.word(u32::from(cell), self.bits)
     }
-    word
+
+    /// The cell that shows these bits, and that in which the undecided ones are the other way round.
+    fn around(&self, seen: u16, undecided: u16) -> (u16, u16) {
+        let mut own = seen;
+        if self.coding.binary {
+            // On the border of two cells the lowest bits are 0111 and 1000; what the lowest of them is tells the own ones.
+            let low = undecided >> 1 & undecided;
+            let settled = match (low ^ seen) & 1 {
+                0 => low,
+                _ => low ^ undecided,
+            };
+            own = seen & !undecided | settled;
+        }
+        let cell = |word| self.coding.cell(word, self.bits);
+        (cell(own), cell(own ^ undecided))
+    }
 }
 
 fn sample(frame: &FrameView<'_>, u: usize, v: usize) -> f64 {
@@ -223,11 +233,26 @@ fn sample(frame: &FrameView<'_>, u: usize, v: usize) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::Coding;
     use super::*;
 
     const WIDTH: usize = 90;
     const HEIGHT: usize = 7;
     const CELLS: u32 = 20;
+    const CODINGS: [Coding; 3] = [
+        Coding {
+            binary: false,
+            inverted: false,
+        },
+        Coding {
+            binary: false,
+            inverted: true,
+        },
+        Coding {
+            binary: true,
+            inverted: true,
+        },
+    ];
 
     /// The coordinate that a pixel sees, in cells: between 4 and 5 pixels a cell.
     fn seen(along: usize) -> f64 {
@@ -236,22 +261,22 @@ mod tests {
     }
 
     /// The share of light of a bit at a coordinate: a border is blurred over half a cell.
-    fn light(bit: u32, place: f64) -> f64 {
+    fn light(coding: Coding, bit: u32, place: f64) -> f64 {
         let shares = (0..16).map(|part| {
             let at = place + (f64::from(part) - 7.5) / 32.0;
-            let cell = libm::floor(at.clamp(0.0, 31.0)) as u16;
-            f64::from(word(cell) >> (4 - bit) & 1)
+            let cell = libm::floor(at.clamp(0.0, 31.0)) as u32;
+            f64::from(coding.word(cell, 5) >> (4 - bit) & 1)
         });
         shares.sum::<f64>() / 16.0
     }
 
     /// Pictures of a code of 5 bits, each with its inverse, along rows or columns.
-    fn pictures(vertical: bool) -> Vec<[Vec<u8>; 2]> {
+    fn pictures(coding: Coding, vertical: bool) -> Vec<[Vec<u8>; 2]> {
         let (width, height) = size(vertical);
         let picture = |bit, inverse: bool| {
             let pixels = (0..width * height).map(|at| {
                 let along = if vertical { at % width } else { at / width };
-                let lit = light(bit, seen(along));
+                let lit = light(coding, bit, seen(along));
                 let lit = if inverse { 1.0 - lit } else { lit };
                 // The last line is dark.
                 let across = if vertical { at / width } else { at % width };
@@ -275,13 +300,16 @@ mod tests {
 
     #[test]
     fn a_code_alone_gives_the_coordinate_within_a_tenth_of_a_cell_where_both_borders_are_seen() {
-        let cells = Cells {
-            origin: -0.25,
-            width: 0.5,
-            count: CELLS,
-        };
-        for vertical in [true, false] {
-            let pictures = pictures(vertical);
+        let directions = CODINGS.map(|coding| [true, false].map(|vertical| (coding, vertical)));
+        for (coding, vertical) in directions.into_iter().flatten() {
+            let cells = Cells {
+                origin: -0.25,
+                width: 0.5,
+                count: CELLS,
+                bits: 5,
+                coding,
+            };
+            let pictures = pictures(coding, vertical);
             let (width, height) = size(vertical);
             let frame =
                 |samples| FrameView::new(Samples::Eight(samples), width, height, width).unwrap();
@@ -329,18 +357,35 @@ mod tests {
 
     #[test]
     fn a_pixel_on_a_border_lies_there_and_one_with_two_bits_in_doubt_nowhere() {
+        let cells = |count, binary| Cells {
+            origin: 0.0,
+            width: 1.0,
+            count,
+            bits: 3,
+            coding: Coding {
+                binary,
+                inverted: false,
+            },
+        };
+        let gray = cells(8, false);
         // Cells 5 and 6 of 8 show 111 and 101.
-        let border = Pixel::of(&[100.0, 3.0, 90.0], 8, 16.0);
+        let border = Pixel::of(&[100.0, 3.0, 90.0], &gray, 16.0);
         assert_eq!((border.trust, border.place), (Trust::Resolved, 6.0));
         // Without the highest bit it may be one of the cells 2 and 5.
-        let far = Pixel::of(&[3.0, 100.0, 90.0], 8, 16.0);
+        let far = Pixel::of(&[3.0, 100.0, 90.0], &gray, 16.0);
         assert_eq!(far.trust, Trust::Residual);
-        let two = Pixel::of(&[100.0, 3.0, 3.0], 8, 16.0);
+        let two = Pixel::of(&[100.0, 3.0, 3.0], &gray, 16.0);
         assert_eq!(two.trust, Trust::Residual);
-        assert_eq!(Pixel::of(&[9.0, -9.0, 9.0], 8, 16.0).trust, Trust::Dark);
+        assert_eq!(Pixel::of(&[9.0, -9.0, 9.0], &gray, 16.0).trust, Trust::Dark);
+        let beside = Pixel::of(&[100.0, 90.0, 90.0], &cells(5, false), 16.0);
+        assert_eq!(beside.trust, Trust::Residual);
+        // In plain binary two bits change from cell 5 to cell 6, and the middle one never alone.
+        let border = Pixel::of(&[100.0, -3.0, 4.0], &cells(8, true), 16.0);
         assert_eq!(
-            Pixel::of(&[100.0, 90.0, 90.0], 5, 16.0).trust,
-            Trust::Residual
+            (border.trust, border.place, border.cell),
+            (Trust::Resolved, 6.0, 5)
         );
+        let middle = Pixel::of(&[100.0, 3.0, 90.0], &cells(8, true), 16.0);
+        assert_eq!(middle.trust, Trust::Residual);
     }
 }

@@ -14,8 +14,30 @@ pub const MAX_CODE_BITS: u8 = 13;
 pub struct GrayCode {
     /// Number of bits, and of pictures.
     pub bits: u8,
-    /// Width of a cell in projector pixels; the first cell begins at the raster's edge.
+    /// Width of a cell in projector pixels.
     pub cell: f64,
+    /// How far before the raster's edge the first cell begins, projector pixels.
+    pub offset: f64,
+    /// How the numbers of cells are written.
+    pub coding: Coding,
+}
+
+/// How the number of a cell is written in its bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Coding {
+    /// Cell c shows the bits of c itself instead of those of its Gray code.
+    pub binary: bool,
+    /// Bits that are set are dark instead of bright.
+    pub inverted: bool,
+}
+
+/// What a pixel sees of a code.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Seen {
+    /// A bit for each picture, the last one's lowest: whether the pixel is bright in it.
+    pub word: u16,
+    /// The bits of `word` that noise cannot change: their contrast is at least half of that of the clearest bit.
+    pub decisive: u16,
 }
 
 /// Pictures that do not form a code.
@@ -40,26 +62,57 @@ pub struct CodePictures<'a> {
 }
 
 impl GrayCode {
-    /// Number of cells on a raster of `length` pixels across them.
+    /// Number of cells on a raster of `length` pixels across them that can be told apart. Where the bits number one cell less than
+    /// there are, as where a code of as many cells as fringes was moved by half a cell, the last two show the same Gray code, and
+    /// neither counts.
     pub fn cells(&self, length: u32) -> u32 {
-        let cells = libm::ceil(f64::from(length) / self.cell - 1e-9).max(1.0);
-        cells.min(f64::from(1_u32 << self.bits)) as u32
+        let most = 1_u32 << self.bits;
+        let cells = libm::ceil((f64::from(length) + self.offset) / self.cell - 1e-9).max(1.0);
+        match cells <= f64::from(most) {
+            true => cells as u32,
+            false => most - 1,
+        }
     }
 
     /// Whether the picture of `bit` (0 is the most significant) lights the projector pixel `at`.
     pub fn lights(&self, bit: u8, at: u32) -> bool {
-        let cell = libm::floor((f64::from(at) + 0.5) / self.cell) as u32;
-        let code = cell ^ (cell >> 1);
-        code >> (self.bits - 1 - bit) & 1 == 1
+        let cell = libm::floor((f64::from(at) + 0.5 + self.offset) / self.cell) as u32;
+        self.coding.word(cell, self.bits) >> (self.bits - 1 - bit) & 1 == 1
+    }
+}
+
+impl Coding {
+    /// The word of a cell in so many bits.
+    pub fn word(self, cell: u32, bits: u8) -> u16 {
+        let code = if self.binary {
+            cell
+        } else {
+            cell ^ (cell >> 1)
+        };
+        let dark = if self.inverted { u32::MAX } else { 0 };
+        ((code ^ dark) & ((1_u32 << bits) - 1)) as u16
+    }
+
+    /// The cell of a word of so many bits.
+    pub fn cell(self, word: u16, bits: u8) -> u16 {
+        let dark = if self.inverted { u16::MAX } else { 0 };
+        let mut cell = (word ^ dark) & ((1_u32 << bits) - 1) as u16;
+        if !self.binary {
+            // Gray to binary: each bit is the one before it, changed where the Gray bit is set.
+            for shift in [1, 2, 4, 8] {
+                cell ^= cell >> shift;
+            }
+        }
+        cell
     }
 }
 
 impl CodePictures<'_> {
-    /// The cell that each pixel sees, row-major.
+    /// What each pixel sees of the code, row-major.
     ///
     /// # Errors
     /// If the pictures do not form a code.
-    pub fn cells(&self) -> Result<Vec<u16>, CodeError> {
+    pub fn read(&self) -> Result<Vec<Seen>, CodeError> {
         let count = self.bits.len();
         let Some(first) = self
             .bits
@@ -77,25 +130,35 @@ impl CodePictures<'_> {
         {
             return Err(CodeError::Pictures);
         }
-        let mut cells = vec![0_u16; width * height];
-        crate::pipeline::for_each_row(&mut cells, width, |v, row| {
-            let mut mean = vec![0_u32; width];
-            for (bit, picture) in self.bits.iter().enumerate() {
-                let against = self.against.get(bit).unwrap_or(&self.against[0]);
-                mean.fill(0);
-                for frame in against {
-                    add(&mut mean, frame, v);
-                }
-                let mut own = vec![0_u32; width];
-                add(&mut own, picture, v);
-                for ((cell, own), mean) in row.iter_mut().zip(&own).zip(&mean) {
-                    let set = own * against.len() as u32 > *mean;
-                    // Gray to binary: each bit is the one before it, changed where the Gray bit is set.
-                    *cell = *cell << 1 | (*cell & 1 ^ u16::from(set));
+        let mut seen = vec![Seen::default(); width * height];
+        crate::pipeline::for_each_row(&mut seen, width, |v, row| {
+            let contrasts: Vec<Vec<i64>> = (0..count).map(|bit| self.contrasts(bit, v)).collect();
+            for (u, seen) in row.iter_mut().enumerate() {
+                let most = contrasts.iter().map(|bit| bit[u].abs()).max().unwrap_or(0);
+                for contrast in contrasts.iter().map(|bit| bit[u]) {
+                    let decisive = most > 0 && 2 * contrast.abs() >= most;
+                    seen.word = seen.word << 1 | u16::from(contrast > 0);
+                    seen.decisive = seen.decisive << 1 | u16::from(decisive);
                 }
             }
         });
-        Ok(cells)
+        Ok(seen)
+    }
+
+    /// By how much the samples of a row of a bit's picture are above what they are compared with, the same multiple for all bits.
+    fn contrasts(&self, bit: usize, v: usize) -> Vec<i64> {
+        let against = self.against.get(bit).unwrap_or(&self.against[0]);
+        let width = self.bits[bit].width();
+        let (mut own, mut sum) = (vec![0_u32; width], vec![0_u32; width]);
+        add(&mut own, &self.bits[bit], v);
+        for frame in against {
+            add(&mut sum, frame, v);
+        }
+        let count = against.len() as i64;
+        let pairs = own.iter().zip(&sum);
+        pairs
+            .map(|(&own, &sum)| i64::from(own) * count - i64::from(sum))
+            .collect()
     }
 }
 

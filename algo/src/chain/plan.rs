@@ -2,11 +2,12 @@
 //!
 //! A beat of two levels a, b has phase φ_a − φ_b, ratio r_a − r_b and the noise of both (Cheng & Wyant 1985, for wavelengths; Reich,
 //! Ritter & Thesing 1997 and Towers, Towers & Jones 2003, for fringes); a beat of beats likewise. A beat, or a level, that spans
-//! at most one turn of the pattern is absolute by itself; a Gray code is absolute within half a cell. From an absolute phase of
+//! at most one turn of the pattern is absolute by itself, as 2 φ_b − φ_a of 13 and 7 fringes; a Gray code is absolute within half a cell. From an absolute phase of
 //! ratio r_a the next level b gets its fringe order k = round(r_b Φ − φ_b). With a = Σ m_i φ_i and b = Σ n_i φ_i its argument has the
 //! error Σ (m_i r_b / r_a − n_i) e_i, where e_i is the noise of φ_i, which falls with √N_i. Of all chains of levels, beats and beats of beats the one is taken whose least safe step is the
 //! safest: (½ turn − what is uncertain by the code's cell) / noise.
 
+use super::Coding;
 use crate::pattern::{Level, MAX_LEVELS, PhaseRange};
 use alloc::vec::Vec;
 
@@ -20,6 +21,9 @@ const NOISE: f64 = 0.02;
 const LEAST_RATIO: f64 = 1e-6;
 /// Rounding of a code's half cell beside half a turn.
 const ROUNDING: f64 = 1e-6;
+/// Least safety of the steps of a chain that starts about a map: 50 times the ratio in one step, with 4 shifts. [`NOISE`] is that of
+/// faint fringes, and wrong orders at its σ leave large residuals.
+const SAFE: f64 = 1.0;
 
 /// The cells of a Gray code in turns of the phase function.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +34,10 @@ pub struct Cells {
     pub width: f64,
     /// Number of cells on the projector.
     pub count: u32,
+    /// Number of bits of the code.
+    pub bits: u8,
+    /// How the numbers of cells are written in them.
+    pub coding: Coding,
 }
 
 /// Levels, and perhaps a code, that give no absolute phase.
@@ -93,15 +101,23 @@ impl Way {
     }
 }
 
+/// What the first link of a chain is unwrapped by.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Start {
+    /// It is absolute by itself, from this lowest phase in its turns on.
+    Itself(f64),
+    /// The cells of a code.
+    Code(Cells),
+    /// A known map of the phase.
+    Map,
+}
+
 /// How levels are unwrapped one after the other.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Chain {
     /// Levels and beats from coarse to fine; the last is the finest level.
     pub(super) links: Vec<Link>,
-    /// Lowest phase of the first link in its turns, where that is absolute by itself.
-    pub(super) lowest: f64,
-    /// The code that it starts from instead.
-    pub(super) cells: Option<Cells>,
+    pub(super) start: Start,
     ratios: Vec<f64>,
     magnification: f64,
 }
@@ -116,90 +132,75 @@ impl Chain {
         range: PhaseRange,
         cells: Option<Cells>,
     ) -> Result<Self, ChainError> {
-        let ratios: Vec<f64> = levels.iter().map(|level| level.ratio).collect();
-        let candidates = candidates(levels);
-        // The finest level is the last candidate that is a level; finer beats are not among them.
-        let target = candidates.len() - 1;
         let half_cell = cells.map_or(0.0, |cells| cells.width / 2.0);
-        let mut best: Vec<Option<Way>> = alloc::vec![None; candidates.len()];
-        for (at, to) in candidates.iter().enumerate() {
-            let first = match cells {
-                None => (to.ratio * range.span() <= ONE_TURN).then_some(f64::INFINITY),
-                Some(_) => {
-                    let left = 0.5 * (1.0 + ROUNDING) - to.ratio * half_cell;
-                    (left >= 0.0).then(|| left / to.noise)
-                }
-            };
-            let mut found = first.map(|safety| Way {
-                safety,
-                steps: 0,
-                before: None,
-            });
-            for (before, from) in candidates[..at].iter().enumerate() {
-                let Some(known) = &best[before] else {
-                    continue;
-                };
-                let step = 0.5 / step_noise(from, to, levels);
-                let way = Way {
-                    safety: step.min(known.safety),
-                    steps: known.steps + 1,
-                    before: Some(before),
-                };
-                if to.ratio > from.ratio && found.as_ref().is_none_or(|found| way.betters(found)) {
-                    found = Some(way);
-                }
+        let candidates = candidates(levels);
+        let best = best(levels, &candidates, |_, to| match cells {
+            None => (to.ratio * range.span() <= ONE_TURN).then_some(f64::INFINITY),
+            Some(_) => {
+                let left = 0.5 * (1.0 + ROUNDING) - to.ratio * half_cell;
+                (left >= 0.0).then(|| left / to.noise)
             }
-            best[at] = found;
-        }
-        if best[target].is_none() {
-            let finest = ratios[ratios.len() - 1];
+        });
+        let Some((_, links)) = best else {
             return Err(match cells {
                 Some(cells) => ChainError::WideCells {
-                    turns: cells.width * finest,
+                    turns: cells.width * levels[levels.len() - 1].ratio,
                 },
-                None => ChainError::NoStart(ratios),
+                None => ChainError::NoStart(levels.iter().map(|level| level.ratio).collect()),
             });
-        }
-        let mut path = alloc::vec![target];
-        while let Some(before) = best[path[path.len() - 1]]
-            .as_ref()
-            .and_then(|way| way.before)
-        {
-            path.push(before);
-        }
-        let links: Vec<Link> = path
-            .iter()
-            .rev()
-            .map(|&at| candidates[at].clone())
-            .collect();
-        let finest = links[links.len() - 1].noise;
-        let steps = links.windows(2);
-        let noise = steps.map(|pair| step_noise(&pair[0], &pair[1], levels));
-        let magnification = noise.fold(1.0, |most: f64, noise| most.max(noise / finest));
-        if magnification > MAX_MAGNIFICATION {
-            return Err(ChainError::TooFar {
-                ratios,
-                magnification,
-            });
-        }
+        };
         let first = links[0].ratio;
         // The part of a turn that the first link does not use is margin for noise, half on each side.
         let margin = (1.0 - first * range.span()).max(0.0) / 2.0;
-        Ok(Self {
-            lowest: first * range.min - margin,
+        let itself = Start::Itself(first * range.min - margin);
+        let chain = Self::of(levels, links, cells.map_or(itself, Start::Code));
+        match chain.magnification > MAX_MAGNIFICATION {
+            true => Err(ChainError::TooFar {
+                ratios: chain.ratios,
+                magnification: chain.magnification,
+            }),
+            false => Ok(chain),
+        }
+    }
+
+    /// The chain of levels whose phase is known to within some turns: from the coarsest level or beat from which all steps are safe.
+    pub fn about_map(levels: &[Level]) -> Self {
+        let candidates = candidates(levels);
+        let from = |start| {
+            let best = best(levels, &candidates, |at, _| {
+                (at == start).then_some(f64::INFINITY)
+            });
+            best.filter(|(safety, _)| *safety >= SAFE)
+        };
+        let found = (0..candidates.len()).find_map(from);
+        let finest = || alloc::vec![candidates[candidates.len() - 1].clone()];
+        let links = found.map_or_else(finest, |(_, links)| links);
+        Self::of(levels, links, Start::Map)
+    }
+
+    fn of(levels: &[Level], links: Vec<Link>, start: Start) -> Self {
+        let finest = links[links.len() - 1].noise;
+        let steps = links.windows(2);
+        let noise = steps.map(|pair| step_noise(&pair[0], &pair[1], levels));
+        Self {
+            magnification: noise.fold(1.0, |most: f64, noise| most.max(noise / finest)),
+            ratios: levels.iter().map(|level| level.ratio).collect(),
             links,
-            cells,
-            ratios,
-            magnification,
-        })
+            start,
+        }
+    }
+
+    /// By how much the map that a chain starts about may be off, in turns of the phase function.
+    pub fn reach(&self) -> f64 {
+        0.5 / self.links[0].ratio
     }
 
     /// The word for reports.
     pub fn kind(&self) -> &'static str {
-        match self.cells {
-            Some(_) => "gray code",
-            None if self.links.iter().all(Link::is_level) => "geometric",
-            None => "heterodyne",
+        match self.start {
+            Start::Code(_) => "gray code",
+            _ if self.links.iter().all(Link::is_level) => "geometric",
+            _ => "heterodyne",
         }
     }
 
@@ -214,9 +215,10 @@ impl Chain {
             true => alloc::format!("{:.6}", link.ratio),
             false => alloc::format!("({:.6})", link.ratio),
         };
-        let code = self
-            .cells
-            .map(|cells| alloc::format!("{} cells", cells.count));
+        let code = match &self.start {
+            Start::Code(cells) => Some(alloc::format!("{} cells", cells.count)),
+            _ => None,
+        };
         code.into_iter()
             .chain(self.links.iter().map(words))
             .collect()
@@ -253,6 +255,48 @@ impl Link {
     }
 }
 
+/// The safest way to the finest level, the last candidate, with its safety, from candidates that are known with the safety of `first`.
+fn best(
+    levels: &[Level],
+    candidates: &[Link],
+    first: impl Fn(usize, &Link) -> Option<f64>,
+) -> Option<(f64, Vec<Link>)> {
+    let mut best: Vec<Option<Way>> = alloc::vec![None; candidates.len()];
+    for (at, to) in candidates.iter().enumerate() {
+        let mut found = first(at, to).map(|safety| Way {
+            safety,
+            steps: 0,
+            before: None,
+        });
+        for (before, from) in candidates[..at].iter().enumerate() {
+            let Some(known) = &best[before] else {
+                continue;
+            };
+            let step = 0.5 / step_noise(from, to, levels);
+            let way = Way {
+                safety: step.min(known.safety),
+                steps: known.steps + 1,
+                before: Some(before),
+            };
+            if to.ratio > from.ratio && found.as_ref().is_none_or(|found| way.betters(found)) {
+                found = Some(way);
+            }
+        }
+        best[at] = found;
+    }
+    let target = candidates.len() - 1;
+    let safety = best[target].as_ref()?.safety;
+    let mut path = alloc::vec![target];
+    while let Some(before) = best[path[path.len() - 1]]
+        .as_ref()
+        .and_then(|way| way.before)
+    {
+        path.push(before);
+    }
+    let links = path.iter().rev().map(|&at| candidates[at].clone());
+    Some((safety, links.collect()))
+}
+
 /// Noise of Σ c_i φ_i in turns: the levels' are independent and fall with √N.
 fn noise(weights: impl Iterator<Item = f64>, levels: &[Level]) -> f64 {
     let variances = weights
@@ -271,7 +315,7 @@ fn step_noise(from: &Link, to: &Link, levels: &[Level]) -> f64 {
     )
 }
 
-/// The levels, their beats, and the beats of these, from coarse to fine; the finest level is the last.
+/// The levels, their beats, and the beats of these with each other and with levels, from coarse to fine; the finest level is the last.
 fn candidates(levels: &[Level]) -> Vec<Link> {
     let own = |at: usize| {
         let mut weights = [0; MAX_LEVELS];
@@ -287,14 +331,13 @@ fn candidates(levels: &[Level]) -> Vec<Link> {
     for _ in 0..2 {
         let end = all.len();
         for high in begin..end {
-            for low in begin..high {
+            for low in 0..high {
                 let beat = all[high].beat(&all[low], levels);
                 all.extend(
                     beat.filter(|beat| all.iter().all(|known| known.weights != beat.weights)),
                 );
             }
         }
-        // Beats of beats, and not of beats with levels.
         begin = end;
     }
     let finest = all[levels.len() - 1].clone();

@@ -1,6 +1,7 @@
 //! Applies a chain to the wrapped phases of its levels.
 
-use super::Chain;
+use super::plan::{Link, Start};
+use super::{Cells, Chain, Edges, Seen};
 use crate::phase::Trust;
 use crate::pipeline::{PhaseMap, for_each_row};
 use crate::units::AbsolutePhase;
@@ -10,14 +11,30 @@ use alloc::vec;
 const MAX_RESIDUAL: f64 = 0.40;
 
 impl Chain {
+    /// The chain with the cells of its code moved to where they end within the fringes of the finest level, if that is near to where
+    /// they should: half a pixel of the projector, or an edge that is seen brighter than in its middle, is then no wrong order.
+    #[must_use]
+    pub fn aligned(mut self, edges: &Edges) -> Self {
+        let finest = self.links[self.links.len() - 1].ratio;
+        if let Start::Code(cells) = &mut self.start {
+            cells.origin += edges.misalignment(cells, finest).unwrap_or(0.0) / finest;
+        }
+        self
+    }
+
     /// The absolute phase of every pixel, from the wrapped phases of all levels (coarse to fine, of one size) and, where the chain
-    /// starts from a code, the cell that each pixel sees (row-major).
+    /// starts from a code, what each pixel sees of it (row-major).
     ///
     /// The modulation is the finest level's. A pixel is `Dark` or of `LowModulation` where a level that takes part is, the former if
     /// it is the coarsest of them; its phase is a `Residual` where a fringe order would be a guess or the cell is none of the
     /// projector's.
-    pub fn unwrap(&self, wrapped: &[PhaseMap], cells: Option<&[u16]>) -> PhaseMap {
-        self.unwrap_within(MAX_RESIDUAL, wrapped, cells)
+    pub fn unwrap(&self, wrapped: &[PhaseMap], code: Option<&[Seen]>) -> PhaseMap {
+        self.unwrap_within(MAX_RESIDUAL, wrapped, code)
+    }
+
+    /// As [`Self::unwrap`] for a chain that starts about a map: Φ in turns, row-major. A pixel is `Unexpected` where that is unknown.
+    pub fn unwrap_about(&self, wrapped: &[PhaseMap], map: &[AbsolutePhase]) -> PhaseMap {
+        self.unwrap_from(MAX_RESIDUAL, wrapped, &Given::Map(map))
     }
 
     /// As [`Self::unwrap`], with another largest residual of the steps between levels, in turns: of phases that have nothing to do with
@@ -26,8 +43,12 @@ impl Chain {
         &self,
         residual: f64,
         wrapped: &[PhaseMap],
-        cells: Option<&[u16]>,
+        code: Option<&[Seen]>,
     ) -> PhaseMap {
+        self.unwrap_from(residual, wrapped, &code.map_or(Given::Nothing, Given::Code))
+    }
+
+    fn unwrap_from(&self, residual: f64, wrapped: &[PhaseMap], given: &Given<'_>) -> PhaseMap {
         let finest = &wrapped[wrapped.len() - 1];
         let width = finest.width;
         let uses = self.uses();
@@ -46,9 +67,9 @@ impl Chain {
                         Trust::LowModulation
                     }
                     Some(refusal) => refusal,
-                    None => match self.phase(residual, wrapped, cells, at) {
-                        None => Trust::Residual,
-                        Some(turns) => {
+                    None => match self.phase(residual, wrapped, given, at) {
+                        Err(refusal) => refusal,
+                        Ok(turns) => {
                             pixel.0 = AbsolutePhase::from_turns(turns);
                             Trust::Resolved
                         }
@@ -66,44 +87,38 @@ impl Chain {
         map
     }
 
-    /// Φ of a pixel in turns; `None` if a residual is too large.
+    /// Φ of a pixel in turns.
+    ///
+    /// # Errors
+    /// If a residual is too large, or nothing is known to start from.
     fn phase(
         &self,
         residual: f64,
         wrapped: &[PhaseMap],
-        cells: Option<&[u16]>,
+        given: &Given<'_>,
         at: usize,
-    ) -> Option<f64> {
-        let mut estimate = match (self.cells, cells) {
-            (Some(code), Some(cells)) => {
-                let cell = cells[at];
-                if u32::from(cell) >= code.count {
-                    return None;
-                }
-                Some(code.origin + (f64::from(cell) + 0.5) * code.width)
+    ) -> Result<f64, Trust> {
+        let (mut estimate, mut limit) = match (&self.start, given) {
+            (Start::Code(cells), Given::Code(code)) => {
+                let (turns, limit) = self.first(cells, code[at], wrapped, at)?;
+                (Some(turns), limit)
             }
-            _ => None,
-        };
-        let mut limit = if estimate.is_some() {
-            MAX_RESIDUAL
-        } else {
-            residual
+            (_, Given::Map(map)) if map[at].is_known() => (Some(map[at].turns()), 0.5),
+            (Start::Itself(_), Given::Nothing) => (None, residual),
+            _ => return Err(Trust::Unexpected),
         };
         for link in &self.links {
-            let terms = wrapped.iter().zip(&link.weights);
-            let phase: f64 = terms
-                .map(|(level, &weight)| level.phase[at].turns() * f64::from(weight))
-                .sum();
-            let absolute = match estimate {
-                None => {
-                    let above = phase - self.lowest;
-                    self.lowest + (above - libm::floor(above))
+            let phase = link.phase(wrapped, at);
+            let absolute = match (estimate, &self.start) {
+                (None, Start::Itself(lowest)) => {
+                    let above = phase - lowest;
+                    lowest + (above - libm::floor(above))
                 }
-                Some(turns) => {
-                    let order = link.ratio * turns - phase;
+                (known, _) => {
+                    let order = link.ratio * known.unwrap_or(0.0) - phase;
                     let whole = libm::rint(order);
                     if libm::fabs(order - whole) > limit {
-                        return None;
+                        return Err(Trust::Residual);
                     }
                     limit = residual;
                     phase + whole
@@ -111,6 +126,67 @@ impl Chain {
             };
             estimate = Some(absolute / link.ratio);
         }
-        estimate
+        estimate.ok_or(Trust::Unexpected)
+    }
+
+    /// Φ in the middle of the cell that a pixel sees, and the largest residual of the first link there.
+    ///
+    /// # Errors
+    /// If the cell is none of the projector's.
+    fn first(
+        &self,
+        cells: &Cells,
+        seen: Seen,
+        wrapped: &[PhaseMap],
+        at: usize,
+    ) -> Result<(f64, f64), Trust> {
+        let cell = u32::from(cells.coding.cell(seen.word, cells.bits));
+        if cell >= cells.count {
+            return Err(Trust::Residual);
+        }
+        let middle = cells.origin + (f64::from(cell) + 0.5) * cells.width;
+        let first = &self.links[0];
+        let wide = first.ratio * cells.width > 2.0 * MAX_RESIDUAL;
+        let aside = first.ratio * middle - first.phase(wrapped, at);
+        let decided = wide && cells.decides(cell, aside - libm::rint(aside), seen);
+        let limit = if decided {
+            0.5 - first.noise
+        } else {
+            MAX_RESIDUAL
+        };
+        Ok((middle, limit))
+    }
+}
+
+/// What is known of each pixel beside its wrapped phases.
+enum Given<'a> {
+    Nothing,
+    Code(&'a [Seen]),
+    Map(&'a [AbsolutePhase]),
+}
+
+impl Link {
+    /// Σ m_i φ_i of a pixel, turns.
+    fn phase(&self, wrapped: &[PhaseMap], at: usize) -> f64 {
+        let terms = wrapped.iter().zip(&self.weights);
+        terms
+            .map(|(level, &weight)| level.phase[at].turns() * f64::from(weight))
+            .sum()
+    }
+}
+
+impl Cells {
+    /// Whether a pixel is surely in this cell and not in the neighbour at whose far side it would have the same phase: the bits in
+    /// which both differ are decisive. `aside` is how far the pixel lies before the middle of the cell, in turns.
+    fn decides(&self, cell: u32, aside: f64, seen: Seen) -> bool {
+        let other = match aside > 0.0 {
+            true => Some(cell + 1).filter(|&other| other < self.count),
+            false => cell.checked_sub(1),
+        };
+        other.is_none_or(|other| {
+            let word = |cell| self.coding.word(cell, self.bits);
+            let differ = word(cell) ^ word(other);
+            seen.decisive & differ == differ
+        })
     }
 }

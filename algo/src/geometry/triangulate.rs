@@ -221,6 +221,18 @@ impl Triangulator {
         }
     }
 
+    /// The largest |Φ − Φ_R| of pixel (u, v) in turns over the working range, and z in mm of the end of the range that
+    /// has it.
+    pub fn phase_reach(&self, u: f64, v: f64) -> Option<(f64, f64)> {
+        let (ray, reference) = (self.falling_ray(u, v)?, self.reference_phase(u, v)?);
+        let ends = [self.range.low, self.range.high].into_iter();
+        let apart = ends.filter_map(|z| {
+            let phase = self.phase_at(self.on_ray(ray, z))?;
+            Some((libm::fabs(phase - reference), z))
+        });
+        apart.max_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
     /// The surface point that pixel (u, v) sees if its phase is `phase` (turns), or `None` where no
     /// height in the working range has that phase, several have, or the phase hardly depends on the
     /// height. Several are noticed only where they lie in different sixteenths of the range, and only for a

@@ -232,6 +232,7 @@ fn recording() -> Recording {
     });
     Recording {
         description: "a test".into(),
+        notes: Vec::new(),
         source: "computed".into(),
         noise_counts: Some(3.7),
         patterns: vec![PatternSpec::Vertical { fringes: 30.0 }],
@@ -239,6 +240,9 @@ fn recording() -> Recording {
         codes: vec![RecordedCode {
             pattern: 0,
             cell_px: 8.0,
+            offset_px: 0.0,
+            binary: false,
+            inverted: false,
             bits: (0..2).map(|_| picture()).collect(),
             inverse: (0..2).map(|_| picture()).collect(),
         }],

@@ -3,8 +3,10 @@
 use super::numbers::{Series, Size, directions, number, series, size};
 use crate::error::{Exit, Failure};
 use crate::measure::layout::{
-    Convention, Description, Direction, Fringes, Gray, PerDirection, Section, ShiftSign, Shifts,
+    BitOrder, Convention, Description, Direction, Fringes, Gray, PerDirection, Section, ShiftSign,
+    Shifts,
 };
+use algo::chain::Coding;
 use hal::bounds::{MAX_FRINGES, MAX_SHIFT_TURNS, MAX_SIDE};
 
 /// Most levels of a recording that can be decoded.
@@ -42,14 +44,32 @@ pub struct Described {
     #[arg(long, value_name = "BITS", value_parser = series(1u8, 13, 2))]
     gray: Option<Series<u8>>,
     /// Width of the Gray code's cells, projector pixels; without it one cell per fringe of the finest level, or per pixel without fringes.
-    #[arg(long, value_name = "PX", value_parser = number(1.0, f64::from(MAX_SIDE)))]
-    gray_cell: Option<f64>,
+    /// Two numbers for the vertical and the horizontal code.
+    #[arg(long, value_name = "PX", value_parser = series(1.0, f64::from(MAX_SIDE), 2))]
+    gray_cell: Option<Series<f64>>,
+    /// How far before the raster's edge the first cell begins, projector pixels: half a cell where edges lie in the middle of fringes.
+    #[arg(long, value_name = "PX", value_parser = series(0.0, f64::from(MAX_SIDE), 2))]
+    gray_offset: Option<Series<f64>>,
+    /// Order of the Gray code's bits: most or least significant first.
+    #[arg(long, default_value = "msb")]
+    gray_order: BitOrder,
+    /// The cells are numbered in plain binary instead of a Gray code.
+    #[arg(long)]
+    gray_binary: bool,
+    /// Bits that are set are dark.
+    #[arg(long)]
+    gray_invert: bool,
     /// Each picture of the Gray code is followed by its inverse.
     #[arg(long)]
     gray_inverse: bool,
     /// Order of projection; without it sine, then gray if there is one.
     #[arg(long, value_name = "PART,...", value_delimiter = ',')]
     order: Vec<Section>,
+}
+
+/// The numbers of an option; none without it.
+fn listed(option: &Option<Series<f64>>) -> Vec<f64> {
+    option.as_ref().map_or_else(Vec::new, |list| list.0.clone())
 }
 
 impl Described {
@@ -74,14 +94,26 @@ impl Described {
                 return Err(Failure::new(Exit::Usage, words));
             }
         };
-        if self.gray.is_none() && (self.gray_cell.is_some() || self.gray_inverse) {
+        let described = self.gray_cell.is_some()
+            || self.gray_offset.is_some()
+            || self.gray_order != BitOrder::Msb
+            || self.gray_binary
+            || self.gray_invert
+            || self.gray_inverse;
+        if self.gray.is_none() && described {
             let words =
-                "--gray-cell and --gray-inverse describe a Gray code: give its bits with --gray";
+                "options that begin with --gray- describe a Gray code: give its bits with --gray";
             return Err(Failure::new(Exit::Usage, words));
         }
         let gray = self.gray.as_ref().map(|Series(bits)| Gray {
             bits: bits.clone(),
-            cell_px: self.gray_cell,
+            cell_px: listed(&self.gray_cell),
+            offset_px: listed(&self.gray_offset),
+            order: self.gray_order,
+            coding: Coding {
+                binary: self.gray_binary,
+                inverted: self.gray_invert,
+            },
             inverse: self.gray_inverse,
         });
         let usual = match (&fringes, &gray) {

@@ -7,7 +7,7 @@ use super::numbers::{number, range};
 use super::options::{Output, Threads};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
-use crate::measure::import::{Channel, Imported, Taken, import};
+use crate::measure::import::{Channel, Taken, import};
 use hal::bounds::{MAX_NOISE_COUNTS, MAX_RANGE_MM, MIN_NOISE_COUNTS};
 use hal::replay::recorder;
 use serde::Serialize;
@@ -103,8 +103,7 @@ impl Import {
         let pool = self.threads.pool(0)?;
         let models = |frames| self.models(frames);
         // The models are read on this thread: only pictures are worth others.
-        let Imported { recording, notes } =
-            pool.install(|| import(&self.folder, &taken, models))?;
+        let recording = pool.install(|| import(&self.folder, &taken, models))?;
         recorder::write(&recording, &self.out)
             .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))?;
         let codes = recording.codes.iter();
@@ -115,7 +114,7 @@ impl Import {
             code_pictures: codes.map(|code| code.bits.len() + code.inverse.len()).sum(),
             uniform: recording.white.iter().chain(&recording.black).count(),
             models: recording.camera_model.is_some(),
-            notes,
+            notes: recording.notes.clone(),
         };
         self.output.answer(&summary, || {
             let (width, height, bits) = summary.camera;

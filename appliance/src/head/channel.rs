@@ -1,17 +1,16 @@
 //! The frames of one pattern of a recording: how its levels can be unwrapped, and its phases.
 
+use super::code::Code;
 use super::scan::Scan;
 use super::seam;
-use algo::chain::{Cells, Chain, CodePictures, GrayCode};
+use algo::chain::{Cells, Chain, Edges, Seen};
 use algo::frame::FrameView;
 use algo::geometry::Triangulator;
 use algo::pattern::{self, Level, PhaseFunction, Shot};
 use algo::phase::LeastModulation;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::AbsolutePhase;
-use hal::frame::Frame;
 use hal::replay::Recording;
-use hal::replay::recording::{PatternSpec, RecordedCode};
 
 /// The frames of one pattern of a recording, with its phase function.
 pub struct Channel<'a> {
@@ -28,12 +27,6 @@ pub struct Channel<'a> {
     bit_depth: u8,
 }
 
-/// A Gray code beside the levels.
-struct Code<'a> {
-    pictures: CodePictures<'a>,
-    cells: Cells,
-}
-
 /// A phase that is expected of a part, for levels that are unwrapped about a known map.
 pub trait Expected {
     /// Its name for reports.
@@ -41,6 +34,9 @@ pub trait Expected {
 
     /// Φ of each pixel, row-major, for levels that are unwrapped in this way; unknown where it is not safe for them.
     fn map(&self, unwrapping: pattern::Unwrapping) -> Vec<AbsolutePhase>;
+
+    /// The same for levels that are right within so many turns of it.
+    fn within(&self, turns: f64) -> Vec<AbsolutePhase>;
 }
 
 /// How the levels of a pattern become an absolute phase.
@@ -49,6 +45,8 @@ pub enum Unwrapping {
     Planned(Option<(&'static str, Vec<AbsolutePhase>)>),
     /// By a chain of beats, or from a Gray code.
     Chain(Chain),
+    /// By a chain about a map with this name.
+    About(Chain, (&'static str, Vec<AbsolutePhase>)),
     /// Not at all, and what is missing.
     Missing(String),
 }
@@ -93,7 +91,7 @@ impl<'a> Channel<'a> {
             .filter(|shot| recognised || Some(shot.ratio) == finest)
             .collect();
         let code = recording.codes.iter().find(|code| code.pattern == pattern);
-        let code = code.map(|code| Code::new(code, recording, spec, &scan));
+        let code = code.map(|code| Code::new(code, recording, finest_frames(&scan)));
         Ok(Self {
             function,
             scan,
@@ -104,12 +102,11 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// How the levels can be unwrapped: from a code if there is one, else as the production kernels do, about `known` or the
-    /// reference map where they need a map, else by beats.
+    /// How the levels can be unwrapped: from a code if there is one, else as the production kernels do, else by beats; about `known` or
+    /// the reference map where they need a map.
     ///
     /// # Errors
-    /// In words: there is a code, and levels and code do not fit each other; or there are models, so that heights are expected, and
-    /// the levels have no absolute phase.
+    /// In words: there is a code, and levels and code do not fit each other.
     pub fn unwrapping(
         &self,
         known: Option<&dyn Expected>,
@@ -118,33 +115,38 @@ impl<'a> Channel<'a> {
         if self.code.is_some() {
             return self.chain().map(Unwrapping::Chain);
         }
+        let about = |map: &dyn Fn(&dyn Expected) -> Vec<AbsolutePhase>| match (known, geometry) {
+            (Some(known), _) => Ok((known.name(), map(known))),
+            (None, Ok(triangulator)) => Ok(("reference", triangulator.reference_map())),
+            (None, Err(missing)) => Err(missing),
+        };
         if !self.recognised {
-            return match (self.chain(), geometry) {
-                (Ok(chain), _) => Ok(Unwrapping::Chain(chain)),
-                (Err(missing), Err(_)) => Ok(Unwrapping::Missing(missing)),
-                (Err(wrong), Ok(_)) => Err(wrong),
-            };
+            let levels = Chain::about_map(self.scan.sequence.levels());
+            return Ok(match self.chain() {
+                Ok(chain) => Unwrapping::Chain(chain),
+                Err(alone) => match about(&|known| known.within(MARGIN * levels.reach())) {
+                    Ok(map) => Unwrapping::About(levels, map),
+                    Err(_) => Unwrapping::Missing(alone),
+                },
+            });
         }
         if !self.scan.needs_map() {
             return Ok(Unwrapping::Planned(None));
         }
-        let map = match (known, geometry) {
-            (Some(known), _) => (known.name(), known.map(self.scan.decoder.unwrapping())),
-            (None, Ok(triangulator)) => ("reference", triangulator.reference_map()),
-            (None, Err(missing)) => {
-                let missing = || {
-                    format!(
-                        "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or give a \
-                     recipe with a golden map",
-                        self.scan.decoder.unwrapping().kind(),
-                        self.ratios(),
-                    )
-                };
-                let chain = self.chain().map(Unwrapping::Chain);
-                return Ok(chain.unwrap_or_else(|_| Unwrapping::Missing(missing())));
-            }
-        };
-        Ok(Unwrapping::Planned(Some(map)))
+        // What is absolute by itself cannot be ambiguous about the reference map.
+        if let (None, Ok(chain)) = (known, self.chain()) {
+            return Ok(Unwrapping::Chain(chain));
+        }
+        let planned = self.scan.decoder.unwrapping();
+        Ok(match about(&|known| known.map(planned)) {
+            Ok(map) => Unwrapping::Planned(Some(map)),
+            Err(missing) => Unwrapping::Missing(format!(
+                "{} levels {:?} are unwrapped about a known map, and {missing}: add both models, or give a recipe with a \
+                 golden map",
+                planned.kind(),
+                self.ratios(),
+            )),
+        })
     }
 
     /// The chain of the levels, from the code if there is one.
@@ -162,8 +164,21 @@ impl<'a> Channel<'a> {
     /// In words: frames and map, or frames and code, do not fit each other.
     pub fn decode(&self, unwrapping: &Unwrapping) -> Result<Phases, String> {
         if let Unwrapping::Chain(chain) = unwrapping {
-            let (mut maps, cells) = (self.wrapped_levels()?, self.cells()?);
-            let absolute = chain.unwrap(&maps, cells.as_deref());
+            let (mut maps, seen) = (self.wrapped_levels()?, self.seen()?);
+            let chain = match (&self.code, &seen, maps.last()) {
+                (Some(code), Some(seen), Some(finest)) => {
+                    let edges = Edges::of(finest, seen, &code.cells, self.finest());
+                    chain.clone().aligned(&edges)
+                }
+                _ => chain.clone(),
+            };
+            let absolute = chain.unwrap(&maps, seen.as_deref());
+            let wrapped = maps.swap_remove(maps.len() - 1);
+            return Ok(Phases { absolute, wrapped });
+        }
+        if let Unwrapping::About(chain, (_, map)) = unwrapping {
+            let mut maps = self.wrapped_levels()?;
+            let absolute = chain.unwrap_about(&maps, map);
             let wrapped = maps.swap_remove(maps.len() - 1);
             return Ok(Phases { absolute, wrapped });
         }
@@ -196,13 +211,18 @@ impl<'a> Channel<'a> {
         levels.map(|level| self.wrapped(level)).collect()
     }
 
-    /// The cell of the code that each pixel sees, if there is a code.
+    /// What each pixel sees of the code, if there is one.
     ///
     /// # Errors
     /// In words: its pictures do not form a code.
-    pub fn cells(&self) -> Result<Option<Vec<u16>>, String> {
-        let cells = self.code.as_ref().map(|code| code.pictures.cells());
-        cells.transpose().map_err(words)
+    pub fn seen(&self) -> Result<Option<Vec<Seen>>, String> {
+        let seen = self.code.as_ref().map(|code| code.pictures.read());
+        seen.transpose().map_err(words)
+    }
+
+    /// The cells of the code, if there is one.
+    pub fn cells(&self) -> Option<Cells> {
+        self.code.as_ref().map(|code| code.cells)
     }
 
     /// The ratios from coarse to fine.
@@ -211,55 +231,20 @@ impl<'a> Channel<'a> {
         levels.map(|level| level.ratio).collect()
     }
 
+    /// Columns and rows of the frames.
+    fn size(&self) -> (usize, usize) {
+        let first = self.scan.frames.first();
+        first.map_or((1, 1), |frame| (frame.width(), frame.height()))
+    }
+
+    /// The ratio of the finest level.
+    pub fn finest(&self) -> f64 {
+        self.ratios().last().copied().unwrap_or(1.0)
+    }
+
     /// The offset of the finest level as 8 bits.
     pub fn intensity(&self) -> Vec<u8> {
-        algo::frame::mean(&finest(&self.scan), self.scan.decoder.full_scale())
-    }
-}
-
-impl<'a> Code<'a> {
-    fn new(
-        code: &'a RecordedCode,
-        recording: &'a Recording,
-        spec: &PatternSpec,
-        scan: &Scan<'a>,
-    ) -> Result<Self, String> {
-        let projector = &recording.projector;
-        let (fringes, length) = match spec {
-            PatternSpec::Vertical { fringes } => (*fringes, projector.width),
-            PatternSpec::Horizontal { fringes } => (*fringes, projector.height),
-            PatternSpec::File { .. } => return Err("a Gray code numbers straight fringes".into()),
-        };
-        let view = |frame: &'a Frame| seam::view(frame).map_err(words);
-        let views = |frames: &'a [Frame]| -> Result<Vec<FrameView<'a>>, String> {
-            let frames = frames.iter();
-            frames.map(view).collect()
-        };
-        let against = match (&recording.white, &recording.black) {
-            _ if !code.inverse.is_empty() => {
-                let inverse = views(&code.inverse)?.into_iter();
-                inverse.map(|inverse| vec![inverse]).collect()
-            }
-            (Some(white), Some(black)) => vec![vec![view(white)?, view(black)?]],
-            _ => vec![finest(scan)],
-        };
-        let pixel = fringes / f64::from(length);
-        let gray = GrayCode {
-            bits: code.bits.len() as u8,
-            cell: code.cell_px,
-        };
-        Ok(Self {
-            pictures: CodePictures {
-                bits: views(&code.bits)?,
-                against,
-            },
-            // The first cell begins at the edge of pixel 0, whose centre has phase 0.
-            cells: Cells {
-                origin: -0.5 * pixel,
-                width: gray.cell * pixel,
-                count: gray.cells(length),
-            },
-        })
+        algo::frame::mean(&finest_frames(&self.scan), self.scan.decoder.full_scale())
     }
 }
 
@@ -267,7 +252,7 @@ impl Unwrapping {
     /// The word for reports.
     pub fn kind(&self, channel: &Channel<'_>) -> &'static str {
         match self {
-            Self::Chain(chain) => chain.kind(),
+            Self::Chain(chain) | Self::About(chain, _) => chain.kind(),
             Self::Missing(_) if !channel.recognised => "wrapped",
             _ => channel.scan.decoder.unwrapping().kind(),
         }
@@ -276,7 +261,7 @@ impl Unwrapping {
     /// The steps of a chain.
     pub fn steps(&self) -> Option<Vec<String>> {
         match self {
-            Self::Chain(chain) => Some(chain.steps()),
+            Self::Chain(chain) | Self::About(chain, _) => Some(chain.steps()),
             _ => None,
         }
     }
@@ -285,8 +270,45 @@ impl Unwrapping {
     pub fn map(&self) -> Option<&'static str> {
         match self {
             Self::Planned(map) => map.as_ref().map(|(name, _)| *name),
+            Self::About(_, (name, _)) => Some(*name),
             _ => None,
         }
+    }
+
+    /// What is ambiguous about levels that are unwrapped about the reference map, in words: the working range holds more turns than
+    /// they tell apart.
+    pub fn ambiguity(
+        &self,
+        channel: &Channel<'_>,
+        geometry: &Result<Triangulator, String>,
+    ) -> Option<String> {
+        let triangulator = geometry.as_ref().ok()?;
+        let reach = match self {
+            Self::About(chain, _) => chain.reach(),
+            Self::Planned(_) => {
+                let finest = channel.finest();
+                half_beat(channel.scan.decoder.unwrapping())? / finest
+            }
+            _ => return None,
+        };
+        if self.map() != Some("reference") {
+            return None;
+        }
+        let (width, height) = channel.size();
+        let along = |length: usize| {
+            (0..=PLACES).map(move |at| at as f64 / PLACES as f64 * (length - 1) as f64)
+        };
+        let places = along(height).flat_map(|v| along(width).map(move |u| (u, v)));
+        let apart = places.filter_map(|(u, v)| triangulator.phase_reach(u, v));
+        let (turns, z) = apart.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (turns > reach).then(|| {
+            format!(
+                "heights that are more than about {:.1} mm off the plane are wrong by whole fringes: levels are told apart within \
+                 {reach:.1} turns of the reference map, and the working range has up to {turns:.1}: add a coarser level, give a \
+                 recipe or --about, or narrow the working range (range_mm)",
+                z.abs() * reach / turns
+            )
+        })
     }
 
     /// Why there is no absolute phase, if there is none.
@@ -298,8 +320,23 @@ impl Unwrapping {
     }
 }
 
+/// Part of the reach of levels about a map that a recipe's placements may use.
+const MARGIN: f64 = 0.8;
+/// Parts of the frame's width and height at whose ends the working range is looked at.
+const PLACES: usize = 16;
+
+/// Half of the coarsest beat of levels that are unwrapped about a map, in turns of the finest.
+fn half_beat(unwrapping: pattern::Unwrapping) -> Option<f64> {
+    match unwrapping {
+        pattern::Unwrapping::Geometric => None,
+        pattern::Unwrapping::Single => Some(0.5),
+        pattern::Unwrapping::DenseTwo { n } => Some(n / 2.0),
+        pattern::Unwrapping::DenseThree { n } => Some(n * n / 2.0),
+    }
+}
+
 /// The frames of the finest level.
-fn finest<'a>(scan: &Scan<'a>) -> Vec<FrameView<'a>> {
+fn finest_frames<'a>(scan: &Scan<'a>) -> Vec<FrameView<'a>> {
     let levels = scan.sequence.levels();
     let finest = levels[levels.len() - 1].frames.iter();
     finest.map(|&at| scan.frames[usize::from(at)]).collect()

@@ -1,13 +1,87 @@
-//! A recording's Gray code without fringes, ready to be decoded.
+//! A recording's Gray code, ready to be decoded: beside the fringes that it numbers, or without any.
 
 use super::seam;
-use algo::chain::{Cells, CodePictures, GrayCode};
+use algo::chain::{Cells, CodePictures, Coding, GrayCode};
 use algo::frame::FrameView;
 use algo::phase::LeastModulation;
 use algo::pipeline::PhaseMap;
 use hal::frame::Frame;
 use hal::replay::Recording;
-use hal::replay::recording::PatternSpec;
+use hal::replay::recording::{PatternSpec, RecordedCode};
+
+/// A Gray code.
+#[derive(Clone, Debug)]
+pub struct Code<'a> {
+    /// Its pictures, and what they are compared with.
+    pub pictures: CodePictures<'a>,
+    /// Its cells, in turns of the pattern.
+    pub cells: Cells,
+    /// Whether it numbers columns.
+    vertical: bool,
+    /// Turns of the pattern per projector pixel.
+    pixel: f64,
+}
+
+impl<'a> Code<'a> {
+    /// A code of a recording. Its pictures are compared with their inverse, else with white and black, else with the mean of these
+    /// frames `beside` it.
+    ///
+    /// # Errors
+    /// In words: the code has nothing to be compared with, numbers no straight fringes, or a frame is not one of its format.
+    pub fn new(
+        code: &'a RecordedCode,
+        recording: &'a Recording,
+        beside: Vec<FrameView<'a>>,
+    ) -> Result<Self, String> {
+        let raster = &recording.projector;
+        let (vertical, fringes, length) = match &recording.patterns[code.pattern] {
+            PatternSpec::Vertical { fringes } => (true, *fringes, raster.width),
+            PatternSpec::Horizontal { fringes } => (false, *fringes, raster.height),
+            PatternSpec::File { .. } => return Err("a Gray code numbers straight fringes".into()),
+        };
+        let view = |frame: &'a Frame| seam::view(frame).map_err(|error| error.to_string());
+        let views = |frames: &'a [Frame]| frames.iter().map(view).collect::<Result<Vec<_>, _>>();
+        let against = match (&recording.white, &recording.black) {
+            _ if !code.inverse.is_empty() => {
+                let inverse = views(&code.inverse)?.into_iter();
+                inverse.map(|inverse| vec![inverse]).collect()
+            }
+            (Some(white), Some(black)) => vec![vec![view(white)?, view(black)?]],
+            _ if beside.is_empty() => {
+                return Err(
+                    "a Gray code alone has nothing to be compared with: add its inverse pictures, or white and black".into(),
+                );
+            }
+            _ => vec![beside],
+        };
+        let pixel = fringes / f64::from(length);
+        let gray = GrayCode {
+            bits: code.bits.len() as u8,
+            cell: code.cell_px,
+            offset: code.offset_px,
+            coding: Coding {
+                binary: code.binary,
+                inverted: code.inverted,
+            },
+        };
+        Ok(Self {
+            pictures: CodePictures {
+                bits: views(&code.bits)?,
+                against,
+            },
+            // The edge of pixel 0, whose centre has phase 0, is half a pixel before it.
+            cells: Cells {
+                origin: (-0.5 - gray.offset) * pixel,
+                width: gray.cell * pixel,
+                count: gray.cells(length),
+                bits: gray.bits,
+                coding: gray.coding,
+            },
+            vertical,
+            pixel,
+        })
+    }
+}
 
 /// The code of a pattern that has no fringes.
 #[derive(Clone, Debug)]
@@ -26,7 +100,7 @@ impl<'a> CodeAlone<'a> {
     /// The code of a pattern of a recording, if it has one and no frames of fringes.
     ///
     /// # Errors
-    /// In words: the code has nothing to be compared with, or a frame is not one of its format.
+    /// As for [`Code::new`].
     pub fn of(recording: &'a Recording, pattern: usize) -> Result<Option<Self>, String> {
         let has_fringes = recording
             .frames
@@ -36,42 +110,15 @@ impl<'a> CodeAlone<'a> {
         let Some(code) = code.filter(|_| !has_fringes) else {
             return Ok(None);
         };
-        let raster = &recording.projector;
-        let (vertical, fringes, length) = match &recording.patterns[pattern] {
-            PatternSpec::Vertical { fringes } => (true, *fringes, raster.width),
-            PatternSpec::Horizontal { fringes } => (false, *fringes, raster.height),
-            PatternSpec::File { .. } => return Err("a Gray code numbers straight fringes".into()),
-        };
-        let view = |frame: &'a Frame| seam::view(frame).map_err(|error| error.to_string());
-        let views = |frames: &'a [Frame]| frames.iter().map(view).collect::<Result<Vec<_>, _>>();
-        let against = match (&recording.white, &recording.black) {
-            _ if !code.inverse.is_empty() => {
-                let inverse = views(&code.inverse)?.into_iter();
-                inverse.map(|inverse| vec![inverse]).collect()
-            }
-            (Some(white), Some(black)) => vec![vec![view(white)?, view(black)?]],
-            _ => {
-                return Err(
-                    "a Gray code alone has nothing to be compared with: add its inverse pictures, or white and black".into(),
-                );
-            }
-        };
-        let pixel = fringes / f64::from(length);
-        let gray = GrayCode {
-            bits: code.bits.len() as u8,
-            cell: code.cell_px,
-        };
+        let Code {
+            pictures,
+            cells,
+            vertical,
+            pixel,
+        } = Code::new(code, recording, Vec::new())?;
         Ok(Some(Self {
-            pictures: CodePictures {
-                bits: views(&code.bits)?,
-                against,
-            },
-            // The first cell begins at the edge of pixel 0, whose centre has phase 0.
-            cells: Cells {
-                origin: -0.5 * pixel,
-                width: gray.cell * pixel,
-                count: gray.cells(length),
-            },
+            pictures,
+            cells,
             vertical,
             pitch: 1.0 / pixel,
             full_scale: recording.format().full_scale(),

@@ -87,6 +87,7 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
         // σ follows from the cells, not from the noise.
         report: Report {
             no_sigma: None,
+            notes: recording.notes.clone(),
             ..report.by(recording, primary, sensitivities[primary])
         },
         intensity: algo::frame::mean(&code.even(), full_scale),

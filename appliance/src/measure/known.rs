@@ -40,9 +40,16 @@ impl Expected for Known {
             Unwrapping::DenseTwo { .. } => SequenceKind::TwoLevels.reach(),
             Unwrapping::Geometric | Unwrapping::DenseThree { .. } => None,
         };
-        match (limit, &self.reach) {
-            (Some(limit), Some(reach)) => safe(&self.phase, reach, limit),
-            _ => self.phase.clone(),
+        match limit {
+            Some(turns) => self.within(f64::from(turns)),
+            None => self.phase.clone(),
+        }
+    }
+
+    fn within(&self, turns: f64) -> Vec<AbsolutePhase> {
+        match &self.reach {
+            Some(reach) => safe(&self.phase, reach, turns as f32),
+            None => self.phase.clone(),
         }
     }
 }

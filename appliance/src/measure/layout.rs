@@ -1,7 +1,7 @@
 //! What is projected, in which order: levels of fringes, Gray codes, white and black. `fringed patterns` makes pictures of it, and
 //! `fringed import` takes pictures for it.
 
-use algo::chain::{GrayCode, MAX_CODE_BITS};
+use algo::chain::{Coding, GrayCode, MAX_CODE_BITS};
 use hal::bounds::MAX_FRINGES;
 use hal::replay::recording::PatternSpec;
 
@@ -62,13 +62,28 @@ pub struct Shifts {
     pub first: f64,
 }
 
-/// Gray codes.
+/// The order in which the bits of a Gray code are projected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum BitOrder {
+    /// The most significant bit first.
+    Msb,
+    /// The least significant bit first.
+    Lsb,
+}
+
+/// Gray codes. Lists have one element for both codes, or one for the vertical and one for the horizontal one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gray {
-    /// Bits of the vertical code and of the horizontal one, or of both.
+    /// Numbers of bits.
     pub bits: Vec<u8>,
-    /// Width of a cell in projector pixels; without it a fringe of the finest level, or of a code alone a pixel.
-    pub cell_px: Option<f64>,
+    /// Widths of cells in projector pixels; empty where a cell is a fringe of the finest level, or of a code alone a pixel.
+    pub cell_px: Vec<f64>,
+    /// How far before the raster's edge the first cell begins, projector pixels; empty where it begins there.
+    pub offset_px: Vec<f64>,
+    /// The order of the bits.
+    pub order: BitOrder,
+    /// How the numbers of cells are written in them.
+    pub coding: Coding,
     /// Whether each picture is followed by its inverse.
     pub inverse: bool,
 }
@@ -249,7 +264,11 @@ impl Layout {
                 });
             }
             if let (Some(gray), Some(code)) = (&description.gray, code) {
-                for bit in 0..code.bits {
+                for at in 0..code.bits {
+                    let bit = match gray.order {
+                        BitOrder::Msb => at,
+                        BitOrder::Lsb => code.bits - 1 - at,
+                    };
                     let inverses: &[bool] = if gray.inverse {
                         &[false, true]
                     } else {
@@ -355,10 +374,11 @@ impl Gray {
         if curved {
             return Err("--gray numbers straight fringes: leave out --pattern".into());
         }
-        let bits = self.bits.get(usize::from(!vertical)).or(self.bits.last());
-        let bits = bits.copied().unwrap_or(1).min(MAX_CODE_BITS);
+        let bits = of_direction(&self.bits, vertical)
+            .unwrap_or(1)
+            .min(MAX_CODE_BITS);
         let length = f64::from(length);
-        let cell = match self.cell_px {
+        let cell = match of_direction(&self.cell_px, vertical) {
             Some(cell) => cell,
             None if finest == 0.0 => 1.0,
             None if (finest - 1e-9).log2().ceil().max(1.0) == f64::from(bits) => length / finest,
@@ -369,14 +389,28 @@ impl Gray {
                 ));
             }
         };
-        let cells = (length / cell - 1e-9).ceil();
-        match cells <= f64::from(1_u32 << bits) {
-            true => Ok(GrayCode { bits, cell }),
+        let offset = of_direction(&self.offset_px, vertical).unwrap_or(0.0);
+        let coding = self.coding;
+        let cells = ((length + offset) / cell - 1e-9).ceil();
+        // A Gray code of one more cell shows the last two alike, and those alone are lost.
+        let doubled = u32::from(offset > 0.0 && !coding.binary);
+        match cells <= f64::from((1_u32 << bits) + doubled) {
+            true => Ok(GrayCode {
+                bits,
+                cell,
+                offset,
+                coding,
+            }),
             false => Err(format!(
                 "{bits} bits of --gray number {} cells, but {cells} cells of {cell:.3} px are on the projector: correct \
-                 --gray or --gray-cell",
+                 --gray, --gray-cell or --gray-offset",
                 1_u32 << bits
             )),
         }
     }
+}
+
+/// The element for vertical or horizontal fringes of a list that has one for both, or one for each.
+pub fn of_direction<T: Copy>(list: &[T], vertical: bool) -> Option<T> {
+    list.get(usize::from(!vertical)).or(list.last()).copied()
 }

@@ -194,6 +194,7 @@ fn measure_about(
     stage_ended("noise", started);
     let started = Instant::now();
     let no_phase = wrapped_only[primary].as_ref();
+    let ambiguous = unwrapping.ambiguity(&channel, &geometry);
     let geometry = match (geometry, no_phase) {
         (Ok(_), Some(_)) => Err("there is no absolute phase".into()),
         (geometry, _) => geometry,
@@ -224,6 +225,8 @@ fn measure_about(
     );
     let report = Report {
         no_phase: no_phase.cloned(),
+        notes: recording.notes.clone(),
+        ambiguous,
         ..report.by(recording, primary, sensitivities[primary])
     };
     Ok(Measurement {

@@ -17,6 +17,9 @@ impl Layout {
         let codes = codes.map(|(pattern, code)| RecordedCode {
             pattern,
             cell_px: code.cell,
+            offset_px: code.offset,
+            binary: code.coding.binary,
+            inverted: code.coding.inverted,
             bits: Vec::new(),
             inverse: Vec::new(),
         });
@@ -25,6 +28,7 @@ impl Layout {
             height: format.height,
             bit_depth: format.bit_depth,
             description: String::new(),
+            notes: Vec::new(),
             source: String::new(),
             camera_model: None,
             noise_counts: None,
@@ -46,7 +50,13 @@ impl Layout {
             truth_height: None,
             truth_class: None,
         };
-        for (shown, frame) in self.shown.iter().zip(frames) {
+        let mut shown: Vec<_> = self.shown.iter().zip(frames).collect();
+        // Bits come with the most or the least significant first.
+        shown.sort_by_key(|(shown, _)| match shown {
+            Shown::Bit { bit, .. } => *bit,
+            _ => 0,
+        });
+        for (shown, frame) in shown {
             match *shown {
                 Shown::Sine {
                     pattern,

@@ -74,6 +74,12 @@ pub struct Report {
     /// What could be done about pixels that are not resolved.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub advice: Option<String>,
+    /// What looked wrong when the recording was imported.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
+    /// What is ambiguous about the heights, if anything is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ambiguous: Option<String>,
     /// Errors against the recording's truth.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub score: Option<Score>,
@@ -132,6 +138,8 @@ impl Report {
             height_mm,
             sigma_mm,
             uncertainty_mm: None,
+            notes: Vec::new(),
+            ambiguous: None,
             score: map.and_then(|map| truth.score(phases, map)),
         }
     }
@@ -209,6 +217,9 @@ impl Report {
         if let Some(reason) = &self.no_height {
             line("height", format!("none: {reason}"));
         }
+        if let Some(words) = &self.ambiguous {
+            line("ambiguous", words.clone());
+        }
         match (self.noise_counts, self.no_sigma) {
             (Some(noise), _) => line("noise of a sample", format!("{noise:.2} counts")),
             (None, Some(reason)) => line("noise of a sample", format!("not known: {reason}")),
@@ -231,6 +242,9 @@ impl Report {
                 format!("{:.4} mm, {:.4} mm", score.median_mm, score.p99_mm),
             );
             line("  gross (over 1 mm)", format!("{} px", score.gross));
+        }
+        if !self.notes.is_empty() {
+            line("looks wrong", self.notes.join("; "));
         }
         for (stage, us) in &self.stage_us {
             line(

@@ -10,8 +10,10 @@ use crate::bounds::{
 };
 use crate::model::DeviceModel;
 
-/// Longest description, characters.
+/// Longest description and note, characters.
 const MAX_TEXT: usize = 4096;
+/// Most notes: a few per pattern.
+const MAX_NOTES: usize = 64;
 /// Longest part id and file name, characters.
 const MAX_NAME: usize = 255;
 /// Most frames in a recording; two patterns of a hundred frames each would be many.
@@ -75,6 +77,10 @@ fn values(manifest: &Manifest) -> Result<(), String> {
     }
     text("description", &manifest.description, MAX_TEXT)?;
     text("source", &manifest.source, MAX_TEXT)?;
+    within("the number of notes", manifest.notes.len(), 0, MAX_NOTES)?;
+    for note in &manifest.notes {
+        text("notes", note, MAX_TEXT)?;
+    }
     text(
         "part_id",
         manifest.part_id.as_deref().unwrap_or(""),
@@ -199,8 +205,11 @@ fn codes(manifest: &Manifest) -> Result<(), Wrong> {
         let CodeEntry {
             pattern,
             cell_px,
+            offset_px,
+            binary,
             bits,
             inverse,
+            ..
         } = code;
         let length = match manifest.pattern.0.get(*pattern) {
             Some(PatternEntry::Vertical { .. }) => manifest.projector.width,
@@ -223,6 +232,8 @@ fn codes(manifest: &Manifest) -> Result<(), Wrong> {
         }
         within("cell_px", *cell_px, MIN_CELL_PX, f64::from(MAX_SIDE))
             .map_err(|problem| Wrong::new(problem, "the width of a cell in projector pixels"))?;
+        within("offset_px", *offset_px, 0.0, f64::from(MAX_SIDE))
+            .map_err(|problem| Wrong::new(problem, "how far before the raster the code begins"))?;
         let count = bits.len();
         if !(1..=MAX_BITS).contains(&count) || ![0, count].contains(&inverse.len()) {
             return wrong(
@@ -234,8 +245,10 @@ fn codes(manifest: &Manifest) -> Result<(), Wrong> {
                 "name one picture per bit, the most significant first",
             );
         }
-        let cells = (f64::from(length) / cell_px - 1e-9).ceil();
-        if cells > f64::from(1_u32 << count) {
+        let cells = ((f64::from(length) + offset_px) / cell_px - 1e-9).ceil();
+        // One more Gray cell than the bits number: the last two show the same.
+        let doubled = u32::from(*offset_px > 0.0 && !binary);
+        if cells > f64::from((1_u32 << count) + doubled) {
             return wrong(
                 format!(
                     "{count} bits number {} cells, but cells of cell_px {cell_px} are {cells} on {length} projector pixels",

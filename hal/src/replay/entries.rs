@@ -115,18 +115,17 @@ pub(super) fn manifest_of(recording: &Recording, names: Names) -> Manifest {
     let codes = recording.codes.iter().map(|code| CodeEntry {
         pattern: code.pattern,
         cell_px: code.cell_px,
+        offset_px: code.offset_px,
+        binary: code.binary,
+        inverted: code.inverted,
         bits: files(names.bits(code)),
         inverse: files(names.inverse(code)),
     });
-    // Version 1 has neither, and older programs read it.
-    let plain = [&recording.white, &recording.black]
-        .iter()
-        .all(|uniform| uniform.is_none())
-        && recording.codes.is_empty();
-    Manifest {
+    let manifest = Manifest {
         format: FORMAT.to_owned(),
-        version: if plain { 1 } else { VERSION },
+        version: VERSION,
         description: recording.description.clone(),
+        notes: recording.notes.clone(),
         source: recording.source.clone(),
         camera: CameraEntry {
             width: recording.width,
@@ -145,5 +144,9 @@ pub(super) fn manifest_of(recording: &Recording, names: Names) -> Manifest {
         exposure_us: recording.exposure_us,
         part_id: recording.part_id.clone(),
         recipe: recording.recipe.clone(),
+    };
+    Manifest {
+        version: manifest.least_version(),
+        ..manifest
     }
 }

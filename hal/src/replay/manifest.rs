@@ -1,4 +1,4 @@
-//! The file form of `recording.json`, versions 1 and 2: its keys and types, before any value is checked.
+//! The file form of `recording.json`, versions 1 to 3: its keys and types, before any value is checked.
 
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
@@ -9,9 +9,9 @@ use crate::model::{DeviceModel, PlaneModel};
 
 /// The name of the format, in every manifest.
 pub const FORMAT: &str = "fringed-recording";
-/// The newest version that this program reads: with codes, white and black. A recording without these is written as version 1, which
-/// older programs read.
-pub const VERSION: u64 = 2;
+/// The newest version that this program reads. Version 2 has codes, white and black; version 3 notes, and codes with an offset or
+/// another coding. A recording is written as the first version that has what it holds, so that older programs read it.
+pub const VERSION: u64 = 3;
 
 /// The whole of `recording.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -23,6 +23,8 @@ pub(crate) struct Manifest {
     pub description: String,
     #[serde(default)]
     pub source: String,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub notes: Vec<String>,
     pub camera: CameraEntry,
     pub projector: RecordedProjector,
     pub pattern: PatternEntries,
@@ -99,12 +101,35 @@ pub(crate) struct CodeEntry {
     #[serde(default, skip_serializing_if = "is_first")]
     pub pattern: usize,
     pub cell_px: f64,
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub offset_px: f64,
+    #[serde(default, skip_serializing_if = "is_not")]
+    pub binary: bool,
+    #[serde(default, skip_serializing_if = "is_not")]
+    pub inverted: bool,
     pub bits: Vec<String>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inverse: Vec<String>,
 }
 
+impl CodeEntry {
+    /// Whether it is a Gray code from the raster's edge on, bright where a bit is set, as version 2 knows it.
+    pub fn is_plain(&self) -> bool {
+        is_zero(&self.offset_px) && !self.binary && !self.inverted
+    }
+}
+
 impl Manifest {
+    /// The first version that has what it holds.
+    pub fn least_version(&self) -> u64 {
+        let later = !self.notes.is_empty() || !self.codes.iter().all(CodeEntry::is_plain);
+        match (later, self.pictures().next()) {
+            (true, _) => VERSION,
+            (false, Some(_)) => 2,
+            (false, None) => 1,
+        }
+    }
+
     /// The files of all pictures that are not frames of levels, each with its key.
     pub fn pictures(&self) -> impl Iterator<Item = (&'static str, &String)> {
         let coded = self.codes.iter().flat_map(|code| {
@@ -133,6 +158,22 @@ pub struct RecipeReference {
 )]
 fn is_first(pattern: &usize) -> bool {
     *pattern == 0
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_not(flag: &bool) -> bool {
+    !*flag
+}
+
+#[expect(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_zero(px: &f64) -> bool {
+    *px == 0.0
 }
 
 /// One pattern, or a list of them.

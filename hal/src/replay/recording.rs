@@ -68,20 +68,26 @@ pub struct RecordedFrame {
     pub frame: Frame,
 }
 
-/// The pictures of a Gray code: cell c of the projector shows the bits of c ^ (c >> 1).
+/// The pictures of a Gray code: cell c of the projector shows the bits of c ^ (c >> 1), or of c if it is `binary`.
 #[derive(Clone, Debug)]
 pub struct RecordedCode {
     /// Index of the pattern whose fringes it numbers: cells lie along ξ for a vertical one, along η for a horizontal one.
     pub pattern: usize,
-    /// Width of a cell in projector pixels; the first begins at the raster's edge.
+    /// Width of a cell in projector pixels.
     pub cell_px: f64,
+    /// How far before the raster's edge the first cell begins, projector pixels.
+    pub offset_px: f64,
+    /// Whether the cells' numbers are written in plain binary instead of a Gray code.
+    pub binary: bool,
+    /// Whether bits that are set are dark.
+    pub inverted: bool,
     /// One picture per bit, the most significant first.
     pub bits: Vec<Frame>,
     /// The inverse of each, or none.
     pub inverse: Vec<Frame>,
 }
 
-/// A recording of version 1 or 2, checked.
+/// A recording of version 1 to 3, checked.
 #[derive(Clone, Debug)]
 pub struct Recording {
     /// Camera columns.
@@ -92,6 +98,8 @@ pub struct Recording {
     pub bit_depth: u8,
     /// One line about what was recorded.
     pub description: String,
+    /// What looked wrong when it was imported, each in a sentence.
+    pub notes: Vec<String>,
     /// Where it came from, and its licence.
     pub source: String,
     /// The camera's geometry, if it is known.
@@ -173,6 +181,7 @@ impl Recording {
             height: camera.height,
             bit_depth: camera.bit_depth,
             description: manifest.description,
+            notes: manifest.notes,
             source: manifest.source,
             camera_model: camera.model,
             noise_counts: camera.noise_counts,
@@ -263,6 +272,9 @@ fn codes(
         Ok(RecordedCode {
             pattern: entry.pattern,
             cell_px: entry.cell_px,
+            offset_px: entry.offset_px,
+            binary: entry.binary,
+            inverted: entry.inverted,
             bits: pictures("bits", &entry.bits)?,
             inverse: pictures("inverse", &entry.inverse)?,
         })

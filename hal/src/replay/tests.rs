@@ -60,6 +60,7 @@ fn small(bit_depth: u8, seed: u64) -> Recording {
         height: 6,
         bit_depth,
         description: "seeded noise".into(),
+        notes: Vec::new(),
         source: "this test".into(),
         camera_model: Some(model()),
         noise_counts: Some(3.7),
@@ -111,6 +112,9 @@ fn coded(bit_depth: u8, inverse: bool) -> Recording {
     recording.codes = vec![RecordedCode {
         pattern: 0,
         cell_px: 1.0,
+        offset_px: 0.0,
+        binary: false,
+        inverted: false,
         bits: (0..3).map(frame).collect(),
         inverse: (3..if inverse { 6 } else { 3 }).map(frame).collect(),
     }];
@@ -128,8 +132,17 @@ fn written(folder: &Path, recording: &Recording) -> std::path::PathBuf {
 #[test]
 fn a_recording_that_was_written_opens_as_the_same() {
     let plain = [8, 10, 12, 16].map(|bit_depth| (small(bit_depth, 1), 1));
-    let coded = [(coded(8, true), 2), (coded(12, false), 2)];
-    for (before, version) in plain.into_iter().chain(coded) {
+    let mut moved = coded(8, false);
+    (moved.codes[0].offset_px, moved.codes[0].inverted) = (2.5, true);
+    let mut noted = small(8, 1);
+    noted.notes = vec!["the light was off".into()];
+    let later = [
+        (coded(8, true), 2),
+        (coded(12, false), 2),
+        (moved, 3),
+        (noted, 3),
+    ];
+    for (before, version) in plain.into_iter().chain(later) {
         let folder = tempfile::tempdir().unwrap();
         let path = written(folder.path(), &before);
         let after = Recording::open(&path).unwrap();
@@ -197,8 +210,8 @@ fn every_wrong_manifest_is_refused_with_a_message_that_names_the_fault() {
     for (from, to, expected) in [
         (
             "\"version\": 1",
-            "\"version\": 3, \"new\": 1",
-            "version 3 is newer than this program reads (2): update fringed",
+            "\"version\": 4, \"new\": 1",
+            "version 4 is newer than this program reads (3): update fringed",
         ),
         ("\"version\": 1", "\"version\": \"1\"", "version"),
         ("fringed-recording", "other", "format is \"other\""),

@@ -34,7 +34,7 @@ thread_local! {
     static MODELS: TempDir = tempfile::tempdir().expect("a folder");
 }
 
-/// OpenCV models: the first byte selects unit and axis. Every number of an accepted model is finite.
+/// OpenCV models: the first byte selects unit, axis and plane. Every number of an accepted model is finite.
 pub fn opencv(data: &[u8]) {
     let Some((declared, text)) = data.split_first() else {
         return;
@@ -48,13 +48,14 @@ pub fn opencv(data: &[u8]) {
     let declared = Declared {
         unit: (declared & 1 == 1).then_some(Unit::Mm),
         z_away: declared & 2 == 2,
+        plane_at: (declared & 4 == 4).then_some(400.0),
     };
     bounded(of_text(text), || {
         let one = opencv::from_one(&path, sizes, declared);
         let two = opencv::from_two(&path, &path, sizes, declared);
-        for (camera, projector) in [one, two].into_iter().flatten() {
-            finite(&camera);
-            finite(&projector);
+        for models in [one, two].into_iter().flatten() {
+            finite(&models.camera);
+            finite(&models.projector);
         }
     });
 }

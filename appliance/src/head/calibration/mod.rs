@@ -192,6 +192,7 @@ impl Calibration {
             height,
             bit_depth,
             description: String::new(),
+            notes: Vec::new(),
             source: String::new(),
             camera_model: Some(seam::device_model(&self.camera)),
             noise_counts: Some(self.noise_counts),

@@ -38,7 +38,7 @@ fn problem(map: &PhaseMap) -> Option<String> {
     let pixels = map.trust.len() as f64;
     let (resolved, doubt) = (map.count(Trust::Resolved), map.count(Trust::Residual));
     let lit = (resolved + doubt) as f64;
-    let remedy = "check the order of the pictures, --gray, --gray-cell and --order";
+    let remedy = "check the order of the pictures, --gray, --gray-cell, --gray-order, --gray-binary, --gray-invert and --order";
     if lit < LIT * pixels {
         return Some(format!(
             "only {:.1} % of the pixels are lit: if the pictures are only dim, give the camera's noise with --noise; else {remedy}",

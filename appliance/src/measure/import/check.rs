@@ -1,10 +1,11 @@
 //! What looks wrong with an imported recording: its levels are unwrapped as stated and under the other conventions, and the
 //! frames of each level are compared with a sine.
 
+use super::{code, shifts};
 use crate::head::channel::Channel;
-use crate::measure::layout::{Convention, ShiftSign, Shifts};
+use crate::measure::layout::{Convention, Description, Shifts};
 use crate::measure::least_modulation;
-use algo::chain::Chain;
+use algo::chain::{Chain, Seen};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, WrappedPhase};
@@ -20,6 +21,8 @@ const CLOSE: f64 = 0.2;
 const AGREE: f64 = 0.6;
 /// By how much another convention must agree better.
 const BETTER: f64 = 0.3;
+/// Half the height of a ripple of two levels' difference that is named, turns: most of what may be between levels that agree.
+const RIPPLE: f64 = 0.1;
 /// Share of the rows in which a convention may jump by most of a turn of its coarsest level.
 const JUMPS: f64 = 0.5;
 /// Share of the pattern that is a jump.
@@ -37,7 +40,10 @@ const SATURATED: f64 = 0.05;
 ///
 /// # Errors
 /// In words: the frames do not form levels.
-pub(super) fn notes(recording: &Recording, stated: Shifts) -> Result<Vec<String>, String> {
+pub(super) fn notes(
+    recording: &Recording,
+    description: &Description,
+) -> Result<Vec<String>, String> {
     let mut notes = Vec::new();
     same_pictures(recording, &mut notes);
     unused_bits(recording, &mut notes);
@@ -52,12 +58,27 @@ pub(super) fn notes(recording: &Recording, stated: Shifts) -> Result<Vec<String>
         let mut note = |words: String| notes.push(format!("{direction} fringes: {words}"));
         light(&channel, &levels, &mut note);
         match channel.chain() {
+            // With models, levels are unwrapped about the reference map.
+            Err(_) if recording.camera_model.is_some() => {}
             Err(missing) => note(missing),
             Ok(chain) => {
-                let cells = channel.cells()?;
-                let rows = Rows::of(&levels, cells.as_deref());
+                let seen = channel.seen()?;
+                let rows = Rows::of(&levels, seen.as_deref());
                 let along_rows = direction == "vertical";
-                let named = conventions(&channel, &chain, &rows, along_rows, stated, &mut note);
+                let finest = &levels[levels.len() - 1];
+                let of_code = code::notes(recording, (pattern, &channel), finest, description)?;
+                let named = match of_code {
+                    // The code tells what a single level can.
+                    Some(said) if !said.is_empty() || levels.len() == 1 => {
+                        let named = !said.is_empty();
+                        said.into_iter().for_each(&mut note);
+                        named
+                    }
+                    _ => {
+                        let stated = description.shifts;
+                        conventions(&channel, &chain, &rows, along_rows, stated, &mut note)
+                    }
+                };
                 let may_fall = named || recording.camera_model.is_some();
                 if !may_fall && rows.falls(&rows.unwrap(&chain), along_rows) {
                     let along = if along_rows {
@@ -148,7 +169,7 @@ fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(Strin
 /// Every so many rows of the wrapped phases.
 struct Rows {
     levels: Vec<PhaseMap>,
-    cells: Option<Vec<u16>>,
+    code: Option<Vec<Seen>>,
 }
 
 /// How well the levels agree under a convention.
@@ -176,7 +197,7 @@ impl Agreement {
 }
 
 impl Rows {
-    fn of(levels: &[PhaseMap], cells: Option<&[u16]>) -> Self {
+    fn of(levels: &[PhaseMap], code: Option<&[Seen]>) -> Self {
         let width = levels[0].width.max(1);
         let height = levels[0].phase.len() / width;
         let step = height.div_ceil(ROWS).max(1);
@@ -192,12 +213,12 @@ impl Rows {
         };
         Self {
             levels: levels.iter().map(thin).collect(),
-            cells: cells.map(|cells| every(step, width, cells)),
+            code: code.map(|code| every(step, width, code)),
         }
     }
 
     fn unwrap(&self, chain: &Chain) -> PhaseMap {
-        chain.unwrap(&self.levels, self.cells.as_deref())
+        chain.unwrap(&self.levels, self.code.as_deref())
     }
 
     /// The rows as they would be decoded under another convention: each phase φ becomes ± φ + `offset`.
@@ -218,12 +239,12 @@ impl Rows {
         };
         Self {
             levels: self.levels.iter().map(turn).collect(),
-            cells: self.cells.clone(),
+            code: self.code.clone(),
         }
     }
 
     fn agreement(&self, chain: &Chain, span: f64, along_rows: bool) -> Agreement {
-        let map = chain.unwrap_within(CLOSE, &self.levels, self.cells.as_deref());
+        let map = chain.unwrap_within(CLOSE, &self.levels, self.code.as_deref());
         let resolved = map.count(Trust::Resolved);
         let modulated = resolved + map.count(Trust::Residual);
         let rows = map.phase.len() / map.width.max(1);
@@ -260,10 +281,11 @@ impl Rows {
     }
 }
 
-/// Compares the stated convention of shifts with the three others; returns whether another one is named.
+/// Compares the stated convention of shifts with the others, of a sine or a cosine, rising or falling, from the stated first shift or
+/// half a turn more; returns whether another one is named.
 ///
-/// Frames with the shifts s_k = ± k/N + s₀ + c (c = 0 for a sine, ¼ for a cosine) that are decoded with the shifts of another
-/// convention give, instead of φ, the phase φ + c − c' where the sign is the same, and ½ − φ − 2 s₀ − c − c' where it is reversed.
+/// Frames with the shifts s_k = ± k/N + t (t the first shift, and ¼ for a cosine) that are decoded with the shifts of another
+/// convention, t', give, instead of φ, the phase φ + t − t' where the sign is the same, and ½ − φ − t − t' where it is reversed.
 fn conventions(
     channel: &Channel<'_>,
     chain: &Chain,
@@ -274,29 +296,49 @@ fn conventions(
 ) -> bool {
     let span = channel.function.range().span();
     let own = rows.agreement(chain, span, along_rows);
-    let mut best: Option<(Agreement, String)> = None;
-    for convention in [Convention::Sin, Convention::Cos] {
-        for reversed in [false, true] {
-            if convention == stated.convention && !reversed {
-                continue;
-            }
-            let (here, there) = (stated.convention.turns(), convention.turns());
-            let offset = match reversed {
-                false => here - there,
-                true => 0.5 - 2.0 * stated.first - here - there,
-            };
-            let found = rows.under(reversed, offset);
-            let found = found.agreement(chain, span, along_rows);
-            let better = best.as_ref().is_none_or(|(known, _)| found.betters(*known));
-            if better {
-                best = Some((found, named(convention, reversed, stated.sign)));
+    let percent = |share: f64| 100.0 * share;
+    if own.share < AGREE
+        && let Some((ripple, shifts)) = response(channel, rows)
+    {
+        note(format!(
+            "levels agree in only {:.0} % of the modulated pixels: they are up to {ripple:.2} turns off each other, {shifts} times \
+             per fringe, so the response of projector or camera is not linear (gamma): linearise it, or project more shifts",
+            percent(own.share)
+        ));
+        return false;
+    }
+    let mut best: Option<(Agreement, Shifts)> = None;
+    for half in [0.0, 0.5] {
+        for convention in [Convention::Sin, Convention::Cos] {
+            for reversed in [false, true] {
+                let first = stated.first + half;
+                let other = Shifts {
+                    convention,
+                    sign: match reversed {
+                        false => stated.sign,
+                        true => stated.sign.reversed(),
+                    },
+                    first: first - if first > 0.5 { 1.0 } else { 0.0 },
+                };
+                if other == stated {
+                    continue;
+                }
+                let offset = match reversed {
+                    false => stated.total() - other.total(),
+                    true => 0.5 - stated.total() - other.total(),
+                };
+                let found = rows.under(reversed, offset);
+                let found = found.agreement(chain, span, along_rows);
+                if best.as_ref().is_none_or(|(known, _)| found.betters(*known)) {
+                    best = Some((found, other));
+                }
             }
         }
     }
     let Some((best, words)) = best else {
         return false;
     };
-    let percent = |share: f64| 100.0 * share;
+    let words = words.options(stated);
     if best.share > own.share + BETTER {
         note(format!(
             "levels agree in {:.0} % of the modulated pixels, with {words} in {:.0} %: give {words}",
@@ -322,15 +364,18 @@ fn conventions(
     true
 }
 
-/// The options of a convention.
-fn named(convention: Convention, reversed: bool, stated: ShiftSign) -> String {
-    let convention = match convention {
-        Convention::Sin => "--convention sin",
-        Convention::Cos => "--convention cos",
-    };
-    let sign = match (stated, reversed) {
-        (ShiftSign::Rising, false) | (ShiftSign::Falling, true) => "+",
-        _ => "-",
-    };
-    format!("{convention} --shift {sign}")
+/// Half the height in turns of the ripple that a response which is not linear makes between two levels, and their number of shifts.
+fn response(channel: &Channel<'_>, rows: &Rows) -> Option<(f64, usize)> {
+    let levels = channel.scan.sequence.levels();
+    let span = channel.function.range().span();
+    let ripples = levels.windows(2).zip(rows.levels.windows(2));
+    let ripples = ripples.filter_map(|(pair, maps)| {
+        let factor = pair[1].ratio / pair[0].ratio;
+        // Else the difference depends on the fringe's order.
+        let alone = pair[0].ratio * span <= 1.0 || (factor - factor.round()).abs() < 1e-6;
+        let shifts = pair[0].shifts();
+        let height = shifts::ripple(&maps[0], &maps[1], factor, shifts)?;
+        (alone && height > RIPPLE).then_some((height, shifts))
+    });
+    ripples.max_by(|a, b| a.0.total_cmp(&b.0))
 }

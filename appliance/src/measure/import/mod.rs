@@ -2,11 +2,14 @@
 
 mod alone;
 mod check;
+mod code;
 mod direction;
 mod folder;
 mod geometry;
 mod picture;
 mod plane;
+mod samples;
+mod shifts;
 
 pub use picture::{Channel, Picture};
 
@@ -39,16 +42,8 @@ pub struct Taken {
     pub range_mm: Option<[f64; 2]>,
 }
 
-/// A recording, and what looks wrong with it.
-#[derive(Debug)]
-pub struct Imported {
-    /// The recording.
-    pub recording: Recording,
-    /// In words, with remedies.
-    pub notes: Vec<String>,
-}
-
-/// Reads the pictures of a folder in the order of the numbers in their names. `models` gives the models for frames of this size.
+/// Reads the pictures of a folder in the order of the numbers in their names. `models` gives the models for frames of this size. The
+/// recording's notes say what looks wrong with it, in words with remedies.
 ///
 /// # Errors
 /// If the folder is missing (66), the description contradicts itself (64), or a picture is missing or wrong (65).
@@ -56,7 +51,7 @@ pub fn import(
     folder: &Path,
     taken: &Taken,
     models: impl FnOnce((u32, u32)) -> Result<Option<Models>, Failure>,
-) -> Result<Imported, Failure> {
+) -> Result<Recording, Failure> {
     let layout = Layout::of(&taken.description);
     let layout = layout.map_err(|problem| Failure::because(Exit::Usage, "import", problem))?;
     let places = folder::pictures(folder, &taken.name, layout.shown.len())?;
@@ -94,18 +89,22 @@ pub fn import(
                 .into(),
         );
     }
-    let bit_depth = taken.bit_depth.unwrap_or(first.bits);
-    let format = FrameFormat::packed(first.size.0, first.size.1, bit_depth);
-    let frame = |(at, picture): (usize, &Picture)| {
-        let samples = picture.grey(taken.channel);
-        frame(format, samples, at).map_err(|problem| places[at].wrong(problem))
-    };
-    let frames: Vec<Frame> = pictures
+    let ((width, height), file_bits) = (first.size, first.bits);
+    let grey = pictures
         .par_iter()
+        .map(|picture| picture.grey(taken.channel));
+    let mut samples: Vec<Vec<u16>> = grey.collect();
+    drop(pictures);
+    let bit_depth = samples::right_justify(&mut samples, taken.bit_depth, file_bits);
+    let format = FrameFormat::packed(width, height, bit_depth);
+    notes.extend(samples::mark_clipped(&mut samples, &layout.shown, format));
+    let frame =
+        |(at, samples)| frame(format, samples, at).map_err(|problem| places[at].wrong(problem));
+    let frames: Vec<Frame> = samples
+        .into_par_iter()
         .enumerate()
         .map(frame)
         .collect::<Result<_, _>>()?;
-    drop(pictures);
     let models = models((format.width, format.height))?;
     let mut recording = layout.recording(taken.description.projector, format, frames);
     recording.description = format!("imported from {}", name(folder));
@@ -115,8 +114,7 @@ pub fn import(
         notes.extend(geometry::add(&mut recording, models, folder)?);
     }
     notes.extend(
-        check::notes(&recording, taken.description.shifts)
-            .map_err(|problem| content(folder, problem))?,
+        check::notes(&recording, &taken.description).map_err(|problem| content(folder, problem))?,
     );
     notes.extend(alone::notes(&recording).map_err(|problem| content(folder, problem))?);
     notes.extend(direction::notes(&recording));
@@ -125,7 +123,8 @@ pub fn import(
         let measured = measure(&recording, folder).ok();
         notes.extend(measured.and_then(|measured| measured.report.advice));
     }
-    Ok(Imported { recording, notes })
+    recording.notes = notes;
+    Ok(recording)
 }
 
 /// A frame of samples that must lie within its bits.

@@ -1,0 +1,302 @@
+//! What looks wrong with a Gray code: its cells end within the fringes where the options say, or an option is named with which they do.
+
+use super::shifts::usual;
+use crate::head::channel::Channel;
+use crate::measure::layout::{BitOrder, Description, Direction, Gray, of_direction};
+use algo::chain::{Cells, Coding, EXPECTED_TURNS, Edges, Seen};
+use algo::pipeline::PhaseMap;
+use hal::replay::Recording;
+use hal::replay::recording::PatternSpec;
+
+/// Share of the neighbouring cells that every coding but the right one brings together at most.
+const DOUBTFUL: f64 = 0.9;
+/// By how much larger a share of the neighbouring cells another coding must bring together.
+const BETTER: f64 = 0.2;
+/// Share of the neighbouring cells that a coding brings together that is meant.
+const MEANT: f64 = 0.6;
+/// How far cells of another width must be off at one end of what is seen, turns.
+const APART: f64 = 0.15;
+/// How near a number must be to a whole one to be meant by it, as a share of it.
+const WHOLE: f64 = 0.004;
+/// How near an offset must be to quarters of a cell to be meant by them, cells.
+const NEAR_QUARTER: f64 = 0.0625;
+/// Share of a cell by which a code may begin before the raster, so that it is not a matter of the shifts.
+const WITHIN_CELL: std::ops::Range<f64> = 0.1..0.9;
+
+/// What is wrong with the code beside the finest level of a pattern, in words with remedies; `None` where there is too little to tell.
+///
+/// # Errors
+/// In words: the pictures do not form a code.
+pub(super) fn notes(
+    recording: &Recording,
+    (pattern, channel): (usize, &Channel<'_>),
+    finest: &PhaseMap,
+    description: &Description,
+) -> Result<Option<Vec<String>>, String> {
+    let code = recording.codes.iter().find(|code| code.pattern == pattern);
+    let (Some(code), Some(cells), Some(seen), Some(gray)) =
+        (code, channel.cells(), channel.seen()?, &description.gray)
+    else {
+        return Ok(None);
+    };
+    let ratio = channel.finest();
+    let mut notes = Vec::new();
+    let mut edges = Edges::of(finest, &seen, &cells, ratio);
+    if edges.smoothness() < DOUBTFUL
+        && let Some(better) = coding(finest, &seen, cells, ratio, &edges)
+    {
+        notes.push(format!(
+            "cells of the Gray code that are neighbours follow each other in {:.0} %, with {} in {:.0} %: give {}",
+            100.0 * edges.smoothness(),
+            better.options(gray),
+            100.0 * better.edges.smoothness(),
+            better.options(gray)
+        ));
+        edges = better.edges;
+    }
+    if !edges.are_many() {
+        return Ok(None);
+    }
+    let projector = &recording.projector;
+    let vertical = !matches!(recording.patterns[pattern], PatternSpec::Horizontal { .. });
+    let beside = Beside {
+        edges: &edges,
+        origin: cells.origin * ratio,
+        turns: cells.width * ratio,
+        binary: cells.coding.binary,
+        cell_px: code.cell_px,
+        length: f64::from(match vertical {
+            true => projector.width,
+            false => projector.height,
+        }),
+        description,
+        gray,
+        vertical,
+    };
+    notes.extend(beside.width());
+    notes.extend(beside.offset());
+    Ok(Some(notes))
+}
+
+/// Another way to read a code's pictures.
+struct Reading {
+    edges: Edges,
+    reversed: bool,
+    coding: Coding,
+}
+
+impl Reading {
+    /// The options that say so.
+    fn options(&self, gray: &Gray) -> String {
+        let mut options = Vec::new();
+        if self.reversed {
+            options.push(match gray.order {
+                BitOrder::Msb => "--gray-order lsb",
+                BitOrder::Lsb => "--gray-order msb",
+            });
+        }
+        if self.coding.binary != gray.coding.binary {
+            options.push(match self.coding.binary {
+                true => "--gray-binary",
+                false => "no --gray-binary",
+            });
+        }
+        if self.coding.inverted != gray.coding.inverted {
+            options.push(match self.coding.inverted {
+                true => "--gray-invert",
+                false => "no --gray-invert",
+            });
+        }
+        options.join(" ")
+    }
+}
+
+/// The reading with the fewest changes that brings clearly more cells together than the stated one, if there is one.
+fn coding(
+    finest: &PhaseMap,
+    seen: &[Seen],
+    cells: Cells,
+    ratio: f64,
+    stated: &Edges,
+) -> Option<Reading> {
+    let unused = u16::BITS - u32::from(cells.bits);
+    let back = |word: u16| word.reverse_bits() >> unused;
+    let backwards: Vec<Seen> = seen
+        .iter()
+        .map(|seen| Seen {
+            word: back(seen.word),
+            decisive: back(seen.decisive),
+        })
+        .collect();
+    let mut best: Option<Reading> = None;
+    // One change, then two, then all three.
+    for changes in [1_u8, 2, 4, 3, 5, 6, 7] {
+        let reversed = changes & 1 != 0;
+        let coding = Coding {
+            binary: cells.coding.binary != (changes & 2 != 0),
+            inverted: cells.coding.inverted != (changes & 4 != 0),
+        };
+        let read = if reversed { &backwards[..] } else { seen };
+        let edges = Edges::of(finest, read, &Cells { coding, ..cells }, ratio);
+        let known = best.as_ref().map_or(stated, |best| &best.edges);
+        if edges.smoothness() > known.smoothness() + BETTER && edges.smoothness() > MEANT {
+            best = Some(Reading {
+                edges,
+                reversed,
+                coding,
+            });
+        }
+    }
+    best
+}
+
+/// A code beside the fringes of a pattern, and where its cells end within them.
+struct Beside<'a> {
+    edges: &'a Edges,
+    /// Phase of the finest level at the beginning of the first cell, and width of a cell in its turns, as stated.
+    origin: f64,
+    turns: f64,
+    binary: bool,
+    cell_px: f64,
+    /// Projector pixels across the fringes.
+    length: f64,
+    description: &'a Description,
+    gray: &'a Gray,
+    /// Whether it numbers columns.
+    vertical: bool,
+}
+
+impl Beside<'_> {
+    /// Projector pixels per fringe of the finest level.
+    fn pitch(&self) -> f64 {
+        self.cell_px / self.turns
+    }
+
+    /// Whether the phase falls where the code rises.
+    fn falls(&self) -> bool {
+        self.edges.turns_per_cell() < 0.0
+    }
+
+    /// The width of cells in turns that their edges have, which is negative where the phase falls.
+    fn fitted(&self) -> f64 {
+        let sign = if self.falls() { -1.0 } else { 1.0 };
+        let (stated, fitted) = (sign * self.turns, self.edges.fitted());
+        let apart = (fitted - stated).abs() * self.edges.span() > APART;
+        match apart && self.edges.agree(fitted) {
+            true => fitted,
+            false => stated,
+        }
+    }
+
+    /// Whether the cells have another width than stated, or none.
+    fn width(&self) -> Option<String> {
+        let (stated, fitted) = (self.turns, self.fitted().abs());
+        if fitted == stated {
+            return (!self.edges.agree(self.fitted())).then(|| {
+                "the cells of the Gray code end anywhere within the fringes: check --fringes, --gray-cell and the order of the \
+                 pictures"
+                    .into()
+            });
+        }
+        let cell = fitted * self.pitch();
+        let fringes = self.length / self.pitch() * fitted / stated;
+        let rounded = |value: f64, per: f64| {
+            let whole = (value * per).round() / per;
+            let is_whole = (value - whole).abs() <= WHOLE * value;
+            (
+                is_whole,
+                if is_whole {
+                    whole
+                } else {
+                    (value * 100.0).round() / 100.0
+                },
+            )
+        };
+        let ((whole_cell, cell), (whole_fringes, fringes)) =
+            (rounded(cell, 2.0), rounded(fringes, 1.0));
+        let by_cell = format!("--gray-cell {}", self.of_both(&self.gray.cell_px, cell));
+        let by_fringes = format!("--fringes {fringes} for the finest level");
+        // Cells of this width would lie beside the raster.
+        let beside = self.edges.last() * cell > self.length + cell;
+        let options = match (beside, whole_cell, whole_fringes) {
+            (true, _, _) => by_fringes,
+            (false, true, true) => format!("{by_cell}, or {by_fringes}"),
+            (false, _, _) => by_cell,
+        };
+        Some(format!(
+            "a cell of the Gray code is {fitted:.3} fringes wide, by the options {stated:.3}: give {options}"
+        ))
+    }
+
+    /// Whether cells and fringes begin elsewhere than stated.
+    fn offset(&self) -> Option<String> {
+        let turns = self.fitted();
+        if !self.edges.agree(turns) {
+            return None;
+        }
+        let (origin, _) = self.edges.origin(turns);
+        let expected = self.origin;
+        let stated = self.description.shifts;
+        if self.falls() {
+            // φ = ½ − Φ − both shifts.
+            let total = 0.5 - stated.total() - origin - expected;
+            let options = stated.with_total(stated.sign.reversed(), total);
+            let other = match self.binary {
+                true => ", or --gray-invert",
+                false => "",
+            };
+            return Some(format!(
+                "the phase falls where the Gray code rises: give {}{other}",
+                options.options(stated)
+            ));
+        }
+        let off = origin - expected;
+        let off = off - off.round();
+        if off.abs() <= EXPECTED_TURNS {
+            return None;
+        }
+        let by_shifts = stated.with_total(stated.sign, stated.total() + off);
+        let by_shifts = by_shifts.options(stated);
+        let options = match (usual(off), self.by_offset(off, turns)) {
+            (Some(_), Some(by_offset)) => format!("{by_shifts}, or {by_offset}"),
+            (None, Some(by_offset)) => by_offset,
+            (_, None) => by_shifts,
+        };
+        Some(format!(
+            "the cells of the Gray code end {:.2} fringes from where the fringes begin: give {options}",
+            off.abs()
+        ))
+    }
+
+    /// The offset with which cells and fringes begin together, if it is not one of whole cells.
+    fn by_offset(&self, off: f64, turns: f64) -> Option<String> {
+        let cell = turns * self.pitch();
+        let stated = of_direction(&self.gray.offset_px, self.vertical).unwrap_or(0.0);
+        let offset = (stated - off * self.pitch()).rem_euclid(cell);
+        let share = offset / cell;
+        let quarters = (4.0 * share).round() / 4.0;
+        let offset = match (quarters - share).abs() < NEAR_QUARTER {
+            true => quarters * cell,
+            false => (offset * 2.0).round() / 2.0,
+        };
+        WITHIN_CELL.contains(&share).then(|| {
+            format!(
+                "--gray-offset {} if the code and not the fringes begin elsewhere",
+                self.of_both(&self.gray.offset_px, offset)
+            )
+        })
+    }
+
+    /// A number for this code, beside that of the other one if there is another: that of the columns first.
+    fn of_both(&self, stated: &[f64], own: f64) -> String {
+        let both = matches!(
+            self.description.direction,
+            Direction::Both | Direction::HorizontalFirst
+        );
+        match of_direction(stated, !self.vertical).filter(|_| both) {
+            Some(other) if self.vertical => format!("{own},{other}"),
+            Some(other) => format!("{other},{own}"),
+            None => own.to_string(),
+        }
+    }
+}
