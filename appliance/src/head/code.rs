@@ -125,6 +125,21 @@ impl<'a> CodeAlone<'a> {
         }))
     }
 
+    /// The same pictures, read with their bits in the other order if `reversed`, and as another coding.
+    #[must_use]
+    pub fn read_as(&self, reversed: bool, coding: Coding) -> Self {
+        let mut other = self.clone();
+        other.cells.coding = coding;
+        let CodePictures { bits, against } = &mut other.pictures;
+        if reversed {
+            if against.len() == bits.len() {
+                against.reverse();
+            }
+            bits.reverse();
+        }
+        other
+    }
+
     /// The absolute phase of every pixel, trusted from a modulation of `least` on.
     ///
     /// # Errors

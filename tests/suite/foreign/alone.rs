@@ -1,5 +1,6 @@
 //! Gray codes without fringes: imported, measured, and made into models.
 
+use super::codes::{Code, HALF};
 use super::gray;
 use super::scene::{HEIGHT, Scene, WIDTH, import, lit_by, notes};
 use crate::written::program;
@@ -103,9 +104,57 @@ fn a_gray_code_alone_gives_column_and_row_within_half_a_cell_and_better_between_
     assert!(
         wrong
             .iter()
-            .any(|note| note.contains("Gray code of columns") && note.contains("order")),
+            .any(|note| note.contains("Gray code of columns") && note.contains("--gray-invert")),
         "{wrong:?}"
     );
+}
+
+#[test]
+fn a_gray_code_alone_that_was_projected_otherwise_than_described_is_named_and_read_as_named() {
+    let plain = Code {
+        bits: 5,
+        cell: 16.0,
+        ..HALF
+    };
+    let lsb = Code { lsb: true, ..plain };
+    let inverted = Code {
+        inverted: true,
+        ..plain
+    };
+    let binary = Code {
+        binary: true,
+        ..plain
+    };
+    // Where a code begins cannot be told from it alone.
+    let moved = Code {
+        offset: 8.0,
+        ..plain
+    };
+    let stated = ["--gray", "5", "--gray-cell", "16", "--json"];
+    let stated = [&stated[..], &["--order", "gray,white,black"]].concat();
+    for (code, named, is_seen) in [
+        (lsb, &["--gray-order", "lsb"][..], true),
+        (inverted, &["--gray-invert"], true),
+        (binary, &["--gray-binary"], true),
+        (moved, &["--gray-offset", "8"], false),
+    ] {
+        let mut scene = Scene::new();
+        code.show(&mut scene);
+        scene.show(|_, _| 1.0);
+        scene.show(|_, _| 0.0);
+        let said = notes(&scene.import(&stated).succeeded());
+        fs::remove_dir_all(scene.path("recording")).unwrap();
+        let remedy = format!("give {}", named.join(" "));
+        let is_named = said.iter().any(|note| note.ends_with(&remedy));
+        assert_eq!(is_named, is_seen, "{remedy}: {said:?}");
+        let options = [&stated[..], named].concat();
+        assert_eq!(notes(&scene.import(&options).succeeded()), [""; 0]);
+        let (mean, most, count) = off(&scene.measure().join("column.npy"), 0);
+        assert!(
+            mean < 1.5 && most < 8.6 && count == WIDTH * HEIGHT,
+            "{remedy}: {mean} {most} {count}"
+        );
+    }
 }
 
 #[test]

@@ -6,16 +6,16 @@ use tests::files;
 
 /// How a code of vertical fringes is projected.
 #[derive(Clone, Copy)]
-struct Code {
-    bits: u32,
-    cell: f64,
-    offset: f64,
-    lsb: bool,
-    binary: bool,
-    inverted: bool,
+pub struct Code {
+    pub bits: u32,
+    pub cell: f64,
+    pub offset: f64,
+    pub lsb: bool,
+    pub binary: bool,
+    pub inverted: bool,
 }
 
-const HALF: Code = Code {
+pub const HALF: Code = Code {
     bits: 4,
     cell: 25.0,
     offset: 0.0,
@@ -25,7 +25,7 @@ const HALF: Code = Code {
 };
 
 impl Code {
-    fn show(self, scene: &mut Scene) {
+    pub fn show(self, scene: &mut Scene) {
         for at in 0..self.bits {
             let bit = if self.lsb { at } else { self.bits - 1 - at };
             scene.show(|xi, _| {

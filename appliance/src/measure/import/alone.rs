@@ -1,6 +1,8 @@
 //! What looks wrong with an imported Gray code without fringes.
 
+use super::code::{options, otherwise};
 use crate::head::code::CodeAlone;
+use crate::measure::layout::Description;
 use crate::measure::least_modulation;
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
@@ -16,44 +18,61 @@ const APART: usize = 16;
 /// in another order or form has at most 0.4, a right one nearly 1, but for the edges of parts.
 const ONE_WAY: f64 = 0.7;
 
-/// What looks wrong, in words with remedies.
+/// The remedy where no other reading of the pictures fits.
+const REMEDY: &str = "check the order of the pictures, --gray, --gray-cell, --gray-order, --gray-binary, --gray-invert and --order";
+
+/// What looks wrong, in words with remedies: the options of another reading of the pictures, if one fits.
 ///
 /// # Errors
 /// In words: the pictures form no code.
-pub(super) fn notes(recording: &Recording) -> Result<Vec<String>, String> {
+pub(super) fn notes(
+    recording: &Recording,
+    description: &Description,
+) -> Result<Vec<String>, String> {
     let mut notes = Vec::new();
+    let least = least_modulation(recording);
     for pattern in 0..recording.patterns.len() {
-        let Some(code) = CodeAlone::of(recording, pattern)? else {
+        let (Some(code), Some(gray)) = (CodeAlone::of(recording, pattern)?, &description.gray)
+        else {
             continue;
         };
-        let map = code.phases(least_modulation(recording))?;
+        let Some(words) = problem(&code.phases(least)?) else {
+            continue;
+        };
         let number = if code.vertical { "columns" } else { "rows" };
-        let words = problem(&map);
-        notes.extend(words.map(|words| format!("Gray code of {number}: {words}")));
+        let fits = otherwise(code.cells.coding).find(|&(reversed, coding)| {
+            let read = code.read_as(reversed, coding).phases(least);
+            read.is_ok_and(|map| problem(&map).is_none())
+        });
+        let remedy = match fits {
+            Some((reversed, coding)) => format!("give {}", options(reversed, coding, gray)),
+            None => REMEDY.to_owned(),
+        };
+        notes.push(format!("Gray code of {number}: {words}{remedy}"));
     }
     Ok(notes)
 }
 
+/// What is wrong with the phases of a code, up to the remedy.
 fn problem(map: &PhaseMap) -> Option<String> {
     let pixels = map.trust.len() as f64;
     let (resolved, doubt) = (map.count(Trust::Resolved), map.count(Trust::Residual));
     let lit = (resolved + doubt) as f64;
-    let remedy = "check the order of the pictures, --gray, --gray-cell, --gray-order, --gray-binary, --gray-invert and --order";
     if lit < LIT * pixels {
         return Some(format!(
-            "only {:.1} % of the pixels are lit: if the pictures are only dim, give the camera's noise with --noise; else {remedy}",
+            "only {:.1} % of the pixels are lit: if the pictures are only dim, give the camera's noise with --noise; else ",
             100.0 * lit / pixels
         ));
     }
     if doubt as f64 > DOUBT * lit {
         return Some(format!(
-            "{:.0} % of the lit pixels have two bits in doubt, or a cell beyond the projector's edge: {remedy}",
+            "{:.0} % of the lit pixels have two bits in doubt, or a cell beyond the projector's edge: ",
             100.0 * doubt as f64 / lit
         ));
     }
     let [right, down] = one_way(map);
     (right.max(down) < ONE_WAY).then(|| {
-        format!("the cells rise and fall by turns along the rows and the columns of the picture: {remedy}")
+        "the cells rise and fall by turns along the rows and the columns of the picture: ".into()
     })
 }
 

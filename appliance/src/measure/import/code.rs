@@ -45,12 +45,13 @@ pub(super) fn notes(
     if edges.smoothness() < DOUBTFUL
         && let Some(better) = coding(finest, &seen, cells, ratio, &edges)
     {
+        let options = options(better.reversed, better.coding, gray);
         notes.push(format!(
             "cells of the Gray code that are neighbours follow each other in {:.0} %, with {} in {:.0} %: give {}",
             100.0 * edges.smoothness(),
-            better.options(gray),
+            options,
             100.0 * better.edges.smoothness(),
-            better.options(gray)
+            options
         ));
         edges = better.edges;
     }
@@ -85,30 +86,40 @@ struct Reading {
     coding: Coding,
 }
 
-impl Reading {
-    /// The options that say so.
-    fn options(&self, gray: &Gray) -> String {
-        let mut options = Vec::new();
-        if self.reversed {
-            options.push(match gray.order {
-                BitOrder::Msb => "--gray-order lsb",
-                BitOrder::Lsb => "--gray-order msb",
-            });
-        }
-        if self.coding.binary != gray.coding.binary {
-            options.push(match self.coding.binary {
-                true => "--gray-binary",
-                false => "no --gray-binary",
-            });
-        }
-        if self.coding.inverted != gray.coding.inverted {
-            options.push(match self.coding.inverted {
-                true => "--gray-invert",
-                false => "no --gray-invert",
-            });
-        }
-        options.join(" ")
+/// The other ways to read the pictures of a code: whether the order of its bits is reversed, and its coding. One change, then two,
+/// then all three.
+pub(super) fn otherwise(stated: Coding) -> impl Iterator<Item = (bool, Coding)> {
+    [1_u8, 2, 4, 3, 5, 6, 7].into_iter().map(move |changes| {
+        let coding = Coding {
+            binary: stated.binary != (changes & 2 != 0),
+            inverted: stated.inverted != (changes & 4 != 0),
+        };
+        (changes & 1 != 0, coding)
+    })
+}
+
+/// The options that say so.
+pub(super) fn options(reversed: bool, coding: Coding, gray: &Gray) -> String {
+    let mut options = Vec::new();
+    if reversed {
+        options.push(match gray.order {
+            BitOrder::Msb => "--gray-order lsb",
+            BitOrder::Lsb => "--gray-order msb",
+        });
     }
+    if coding.binary != gray.coding.binary {
+        options.push(match coding.binary {
+            true => "--gray-binary",
+            false => "no --gray-binary",
+        });
+    }
+    if coding.inverted != gray.coding.inverted {
+        options.push(match coding.inverted {
+            true => "--gray-invert",
+            false => "no --gray-invert",
+        });
+    }
+    options.join(" ")
 }
 
 /// The reading with the fewest changes that brings clearly more cells together than the stated one, if there is one.
@@ -129,13 +140,7 @@ fn coding(
         })
         .collect();
     let mut best: Option<Reading> = None;
-    // One change, then two, then all three.
-    for changes in [1_u8, 2, 4, 3, 5, 6, 7] {
-        let reversed = changes & 1 != 0;
-        let coding = Coding {
-            binary: cells.coding.binary != (changes & 2 != 0),
-            inverted: cells.coding.inverted != (changes & 4 != 0),
-        };
+    for (reversed, coding) in otherwise(cells.coding) {
         let read = if reversed { &backwards[..] } else { seen };
         let edges = Edges::of(finest, read, &Cells { coding, ..cells }, ratio);
         let known = best.as_ref().map_or(stated, |best| &best.edges);

@@ -116,7 +116,9 @@ pub fn import(
     notes.extend(
         check::notes(&recording, &taken.description).map_err(|problem| content(folder, problem))?,
     );
-    notes.extend(alone::notes(&recording).map_err(|problem| content(folder, problem))?);
+    notes.extend(
+        alone::notes(&recording, &taken.description).map_err(|problem| content(folder, problem))?,
+    );
     notes.extend(direction::notes(&recording));
     if recording.camera_model.is_some() {
         // Levels that cannot be measured were named above.
