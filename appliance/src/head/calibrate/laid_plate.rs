@@ -56,7 +56,7 @@ impl LaidPlate {
                 "z = 0 is the board as it lay in {0}: lay the plate like that, or, if the board did not lie flat in {0}, take this pose again as the last one, with the board where the plate lies now, and make the models anew",
                 pose.recording
             ),
-            None => "lay it into z = 0 of the models, or import models with the pose of this plate"
+            None => "lay it into z = 0 of the models; if it lies there, the imported models are off the measured plate: import those of this camera and this projector, with the pose of this plate"
                 .into(),
         };
         let side = if *height_mm < 0.0 { "below" } else { "above" };
