@@ -139,13 +139,24 @@ fn unequal_too_few_or_repeated_shifts_are_refused() {
 }
 
 #[test]
-fn ratios_that_cannot_be_unwrapped_are_refused_naming_them() {
-    let damage = |m: &mut Value| {
+fn ratios_that_have_no_absolute_phase_are_named_with_what_to_add() {
+    let written = Written::new(&tiny());
+    written.edit(|m| {
         for frame in &mut m["frames"].as_array_mut().unwrap()[..4] {
             frame["ratio"] = json!(0.043);
         }
-    };
-    refused_manifest(damage, &["0.043", "0.138"]);
+        // With models they are unwrapped about the reference map.
+        for device in ["camera", "projector"] {
+            m[device].as_object_mut().unwrap().remove("model");
+        }
+    });
+    written.measure(&[]).succeeded();
+    let report = fs::read_to_string(written.out().join("report.json")).unwrap();
+    let report: Value = serde_json::from_str(&report).unwrap();
+    let words = report["no_phase"].as_str().unwrap();
+    for word in ["0.043", "0.138", "add a coarser level"] {
+        assert!(words.contains(word), "{words}");
+    }
 }
 
 #[test]
@@ -190,10 +201,10 @@ fn missing_keys_and_wrong_types_are_refused_by_name() {
 fn a_newer_version_is_called_that() {
     refused_manifest(
         |m| {
-            m["version"] = json!(3);
+            m["version"] = json!(4);
             m["something_new"] = json!(true);
         },
-        &["version 3", "newer", "update"],
+        &["version 4", "newer", "update"],
     );
     refused_manifest(
         |m| m["format"] = json!("fringed-recipe"),

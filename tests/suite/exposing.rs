@@ -128,7 +128,7 @@ fn a_recipe_is_not_used_at_another_gain_and_one_that_is_taught_there_has_the_noi
     plc.wait("refusal", |status| {
         status.recipe_result() == OTHER_CALIBRATION
     });
-    let said = browser.get("/api/snapshot")["error"].to_string();
+    let said = browser.get("/api/log").to_string();
     assert!(said.contains("gain 1, and the camera is set to"), "{said}");
     teach(&mut browser);
     let taught = browser.get("/api/recipes/1");

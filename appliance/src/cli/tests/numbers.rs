@@ -8,6 +8,7 @@ use crate::error::Exit;
 use crate::head::calibration::bounds::{COLDEST_C, HOTTEST_C};
 use crate::measure::layout::PerDirection;
 use algo::calibration::Board;
+use clap::error::ErrorKind;
 use clap::{ArgMatches, FromArgMatches as _};
 use std::any::TypeId;
 use std::collections::BTreeSet;
@@ -283,6 +284,8 @@ fn check(
         .map_or(id.to_uppercase(), |long| format!("--{long}"));
     let matches = match matches {
         Ok(matches) => matches,
+        // The value itself was accepted.
+        Err(error) if error.kind() == ErrorKind::MissingRequiredArgument => return true,
         Err(error) => {
             // The program ends with 64.
             assert!(error.use_stderr(), "{case}");

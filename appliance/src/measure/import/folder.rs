@@ -4,7 +4,7 @@ use super::picture::{ENDINGS, Picture};
 use super::{content, name};
 use crate::error::{Exit, Failure};
 use std::cmp::Ordering;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -169,7 +169,14 @@ fn cameras(names: &[String], expected: usize) -> Option<Vec<String>> {
             groups.entry(words[at]).or_default().push(words);
         }
         let even = groups.len() == count && groups.values().all(|group| group.len() == expected);
-        even.then(|| groups.values().map(|group| common(group)).collect())
+        // Each camera has a picture of each shot.
+        let mut shots = groups.values().map(|group| {
+            let others = |words: &&[&str]| [&words[..at], &words[at + 1..]].concat().concat();
+            group.iter().map(others).collect::<BTreeSet<String>>()
+        });
+        let first = shots.next();
+        let alike = shots.all(|others| Some(&others) == first.as_ref());
+        (even && alike).then(|| groups.values().map(|group| common(group)).collect())
     })
 }
 

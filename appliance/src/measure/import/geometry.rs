@@ -6,6 +6,7 @@ use crate::head::calibration::opencv::Models;
 use crate::head::seam;
 use crate::measure::{Geometry, absolute};
 use algo::geometry::{Pinhole, RigError};
+use algo::phase::Trust;
 use algo::pipeline::{Epipolar, PhaseMap};
 use hal::model::DeviceModel;
 use hal::replay::Recording;
@@ -16,6 +17,9 @@ use std::path::Path;
 const OFF: f64 = 1.0;
 /// Another reading of the models is named if it leaves less than this share of the distance.
 const BETTER: f64 = 0.3;
+/// Shares of the projector's columns and rows at each end that are not compared: the phase of what is lit from beyond the raster, as in
+/// rendered pictures, is that of its other end.
+const EDGE: f64 = 0.125;
 /// Where a camera's principal point lies, as shares of its frame.
 const MIDDLE: std::ops::Range<f64> = 0.3..0.7;
 
@@ -114,9 +118,11 @@ fn epipolar(recording: &Recording) -> Result<Option<String>, String> {
         absolute(recording, vertical.0),
         absolute(recording, horizontal.0),
     );
-    let (Ok(xi), Ok(eta)) = maps else {
+    let (Ok(mut xi), Ok(mut eta)) = maps else {
         return Ok(None);
     };
+    leave_out_edges(&mut xi, vertical.1);
+    leave_out_edges(&mut eta, horizontal.1);
     let Some(models) = recording
         .camera_model
         .clone()
@@ -154,6 +160,16 @@ fn epipolar(recording: &Recording) -> Result<Option<String>, String> {
     Ok(Some(format!(
         "the models contradict the fringes: measured projector points lie {own:.1} projector pixels RMS off their epipolar lines: {remedy}"
     )))
+}
+
+/// Marks what lies near the ends of the raster, of so many fringes, as out of range.
+fn leave_out_edges(map: &mut PhaseMap, fringes: f64) {
+    for (phase, trust) in map.phase.iter().zip(&mut map.trust) {
+        let share = phase.turns() / fringes;
+        if *trust == Trust::Resolved && !(EDGE..=1.0 - EDGE).contains(&share) {
+            *trust = Trust::OutOfRange;
+        }
+    }
 }
 
 /// RMS distance of the measured points from their epipolar lines.
@@ -252,5 +268,35 @@ fn moved(model: &DeviceModel, by: f64) -> DeviceModel {
         cx: model.cx + by,
         cy: model.cy + by,
         ..model.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use algo::units::AbsolutePhase;
+
+    #[test]
+    fn places_at_the_ends_of_the_raster_are_not_compared_with_the_models() {
+        let turns = [-0.3, 4.0, 8.5, 32.0, 55.5, 60.0, 63.9, 32.0];
+        let mut map = PhaseMap::new(turns.len(), 1);
+        map.phase = turns.map(AbsolutePhase::from_turns).to_vec();
+        map.trust = vec![Trust::Resolved; turns.len()];
+        map.trust[7] = Trust::Residual;
+        leave_out_edges(&mut map, 64.0);
+        let (inside, beyond) = (Trust::Resolved, Trust::OutOfRange);
+        assert_eq!(
+            map.trust,
+            [
+                beyond,
+                beyond,
+                inside,
+                inside,
+                inside,
+                beyond,
+                beyond,
+                Trust::Residual
+            ]
+        );
     }
 }

@@ -337,7 +337,7 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
             change("distortion_coefficients:", "d:"),
             &["distortion_coefficients", "k1 k2 p1 p2 k3"],
         ),
-        (change("\nR:", "\nQ:"), &["node R or", "rotation"]),
+        (change("\nR:", "\nQ:"), &["no node Rlp or R or", "rotation"]),
         (change("\nT:", "\nQ:"), &["node T or", "translation"]),
         (
             change("0., -1., 0.", "0., 1., 0."),
