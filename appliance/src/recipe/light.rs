@@ -156,8 +156,13 @@ impl Light {
             saturated,
         } = self;
         let foreign = offset.is_some_and(|offset| offset > modulation.max(1.0) + FOREIGN);
-        // Foreign light raises the offset, so contrast is that of no more light than golden's.
+        // Foreign light raises the offset, so contrast is that of no more light than golden's; where the pattern's light has fallen, what is left
+        // of the offset is foreign to a larger part.
         let contrast = offset.map_or(1.0, |offset| modulation / offset.min(1.0));
+        let least = match offset.is_some_and(|offset| offset < LOW) {
+            true => LOW * LOW,
+            false => LOW,
+        };
         if saturated > MOST_SATURATED {
             let share = saturated;
             Some(Illness::Saturated { share, foreign })
@@ -165,7 +170,7 @@ impl Light {
             None
         } else if modulation < NONE && offset.is_none_or(|offset| offset < LOW) {
             Some(Illness::Nothing)
-        } else if contrast < LOW {
+        } else if contrast < least {
             Some(Illness::Blurred(contrast))
         } else {
             Some(Illness::Dark(modulation))
@@ -215,8 +220,11 @@ mod tests {
     #[test]
     fn light_that_is_low_blurred_or_too_bright_is_told_apart() {
         assert_eq!(illness(0.9, Some(0.9), 0.0), None);
-        // A lamp at 15 %.
-        assert_eq!(illness(0.15, Some(0.2), 0.0), Some(Illness::Dark(0.15)));
+        // A lamp at 15 %, and the same with some foreign light.
+        for offset in [0.2, 0.25, 0.35] {
+            let dark = illness(0.15, Some(offset), 0.0);
+            assert_eq!(dark, Some(Illness::Dark(0.15)), "{offset}");
+        }
         // Without the mean of golden's samples nothing but the light is known.
         assert_eq!(illness(0.15, None, 0.0), Some(Illness::Dark(0.15)));
         assert_eq!(illness(0.2, Some(1.0), 0.0), Some(Illness::Blurred(0.2)));
