@@ -1,7 +1,7 @@
 //! The thread that writes on stderr: the lines of the log and the bar, from whichever thread they come.
 //!
 //! stderr can be a pipe that nobody reads, a terminal that was stopped, or a journal that hangs: a write then waits for as long as
-//! that lasts. Only the thread `stderr` waits. Lines are handed over in a buffer of [`ROOM`] bytes; those that find no room there, and
+//! that lasts. Only the thread `stderr` waits. Lines are handed over in a buffer of `ROOM` bytes; those that find no room there, and
 //! those that stderr refuses (a full disk, a closed pipe), are counted, and the count is written once lines can be written again.
 //!
 //! A command waits until its lines are written, so that they stand in order with what it prints. A daemon does not, after [`detach`].
