@@ -171,7 +171,7 @@ pub fn write(pose: &Pose, seed: u64, folder: &Path) {
     write_as(pose, Projected::Geometric, seed, folder);
 }
 
-/// As [`write`], under something else.
+/// As [`write()`], under something else.
 pub fn write_as(pose: &Pose, projected: Projected, seed: u64, folder: &Path) {
     fs::create_dir_all(folder.join("frames")).expect("the folder can be made");
     let mut random = Random::new(seed);
