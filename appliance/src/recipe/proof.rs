@@ -29,7 +29,7 @@ const STILL: usize = 5;
 const PLACEMENTS: usize = 16;
 /// Placements reach this share of the tolerance: what is worked out has the error of the motion, too.
 const REACH: f64 = 0.98;
-/// At most this share of an opening is covered by good parts that lie elsewhere.
+/// At most this share of an opening is covered by good parts.
 const MOST_COVERED: f64 = 0.5;
 /// Limits are this many times as far from the expected value as the farthest of the cycles.
 const FARTHER: f64 = 1.2;
@@ -159,8 +159,7 @@ pub(super) fn as_it_lies(
     Ok(judged)
 }
 
-/// Leaves out the openings that good parts cover for the most part when they lie elsewhere, such as a place that is only too dark as the part lies;
-/// says which.
+/// Leaves out the openings that these cycles of good parts cover for the most part, such as a place that is just too dark to be resolved; says which.
 pub(super) fn leave_out_covered(
     manifest: &mut RecipeFile,
     judged: &mut [Inspection],
@@ -175,7 +174,7 @@ pub(super) fn leave_out_covered(
             continue;
         }
         words.push(format!(
-            "{} is left out: {:.0} % of it is covered by good parts that lie elsewhere, so it is no opening",
+            "{} is left out: good parts cover up to {:.0} % of it, so it is no opening",
             gauge.name,
             most * 100.0
         ));

@@ -191,12 +191,13 @@ pub fn teach_while(
     let plan = computing.on(|| Plan::new(taught.recipe.clone(), calibration, false));
     let plan = plan.map_err(|error| TeachError::Rig(error.to_string()))?;
     let trying = |share: f64| progress(0.9 + 0.1 * share, "trying the recipe on the part");
-    let judged = proof::as_it_lies(&plan, head.head, calibration, timeout, &trying)?;
+    let mut judged = proof::as_it_lies(&plan, head.head, calibration, timeout, &trying)?;
     drop(plan);
     if let Some(words) = proof::not_judged(&judged) {
         return Err(TeachError::Scene(words));
     }
-    let words = proof::hold(&mut taught.manifest, &judged);
+    let mut words = proof::leave_out_covered(&mut taught.manifest, &mut judged);
+    words.extend(proof::hold(&mut taught.manifest, &judged));
     if !words.is_empty() {
         let reasons = taught.choice.reasons;
         let again = computing.on(|| TaughtRecipe::of(taught.manifest, taught.recipe.arrays));
