@@ -66,32 +66,19 @@ impl Scene {
             models = models.map(rig::above);
         }
         let [camera, projector] = models;
+        let projector = RecordedProjector {
+            width: columns,
+            height: rows,
+            model: Some(projector),
+            plane: None,
+        };
         let mut recording = Recording {
-            width: self.size,
-            height: self.size,
-            bit_depth: self.bit_depth,
             description: "a tilted plane with a bump".to_owned(),
-            notes: Vec::new(),
             source: "rendered by the integration suite".to_owned(),
             camera_model: Some(camera),
-            noise_counts: None,
-            projector: RecordedProjector {
-                width: columns,
-                height: rows,
-                model: Some(projector),
-                plane: None,
-            },
             patterns: self.patterns.clone(),
-            frames: Vec::new(),
-            codes: Vec::new(),
-            white: None,
-            black: None,
             range_mm: Some([-60.0, 60.0]),
-            exposure_us: None,
-            part_id: None,
-            recipe: None,
-            truth_height: None,
-            truth_class: None,
+            ..Recording::new(format, projector)
         };
         let geometry = Rig::of(&recording).expect("both models are there");
         let pixels = (self.size * self.size) as usize;

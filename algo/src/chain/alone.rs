@@ -5,7 +5,7 @@
 //! contrast does (linear interpolation; Trobina 1995 compares it with other ways). Between the two borders of a cell that are found in
 //! this way the coordinate runs linearly; where neighbouring pixels are cells apart, there are no borders, and half a cell is small.
 
-use super::{Cells, CodeError, CodePictures, MAX_CODE_BITS};
+use super::{Cells, CodeError, CodePictures};
 use crate::frame::{FrameView, Samples};
 use crate::pipeline::{PhaseMap, for_each_row};
 use crate::trust::{LeastModulation, Trust};
@@ -46,18 +46,7 @@ impl CodePictures<'_> {
         full_scale: u16,
     ) -> Result<PhaseMap, CodeError> {
         let count = self.bits.len();
-        let first = self.bits.first();
-        let first = first.filter(|_| count <= usize::from(MAX_CODE_BITS));
-        let first = first.ok_or(CodeError::Bits(count))?;
-        let (width, height) = (first.width(), first.height());
-        let mut all = self.bits.iter().chain(self.against.iter().flatten());
-        let lists = [1, count].contains(&self.against.len());
-        if !lists
-            || self.against.iter().any(Vec::is_empty)
-            || all.any(|frame| (frame.width(), frame.height()) != (width, height))
-        {
-            return Err(CodeError::Pictures);
-        }
+        let (width, height) = self.size()?;
         let least = least.counts(full_scale);
         let mut pixels = vec![Pixel::default(); width * height];
         for_each_row(&mut pixels, width, |v, row| {

@@ -108,28 +108,34 @@ impl Coding {
 }
 
 impl CodePictures<'_> {
+    /// Columns and rows of its pictures.
+    ///
+    /// # Errors
+    /// If the pictures do not form a code.
+    pub(super) fn size(&self) -> Result<(usize, usize), CodeError> {
+        let count = self.bits.len();
+        let first = self.bits.first();
+        let first = first.filter(|_| count <= usize::from(MAX_CODE_BITS));
+        let first = first.ok_or(CodeError::Bits(count))?;
+        let size = (first.width(), first.height());
+        let mut all = self.bits.iter().chain(self.against.iter().flatten());
+        let lists = [1, count].contains(&self.against.len());
+        if !lists
+            || self.against.iter().any(Vec::is_empty)
+            || all.any(|frame| (frame.width(), frame.height()) != size)
+        {
+            return Err(CodeError::Pictures);
+        }
+        Ok(size)
+    }
+
     /// What each pixel sees of the code, row-major.
     ///
     /// # Errors
     /// If the pictures do not form a code.
     pub fn read(&self) -> Result<Vec<Seen>, CodeError> {
         let count = self.bits.len();
-        let Some(first) = self
-            .bits
-            .first()
-            .filter(|_| count <= usize::from(MAX_CODE_BITS))
-        else {
-            return Err(CodeError::Bits(count));
-        };
-        let (width, height) = (first.width(), first.height());
-        let mut all = self.bits.iter().chain(self.against.iter().flatten());
-        let lists = [1, count].contains(&self.against.len());
-        if !lists
-            || self.against.iter().any(Vec::is_empty)
-            || all.any(|frame| (frame.width(), frame.height()) != (width, height))
-        {
-            return Err(CodeError::Pictures);
-        }
+        let (width, height) = self.size()?;
         let mut seen = vec![Seen::default(); width * height];
         crate::pipeline::for_each_row(&mut seen, width, |v, row| {
             let contrasts: Vec<Vec<i64>> = (0..count).map(|bit| self.contrasts(bit, v)).collect();

@@ -23,32 +23,16 @@ impl Layout {
             bits: Vec::new(),
             inverse: Vec::new(),
         });
+        let projector = RecordedProjector {
+            width,
+            height,
+            model: None,
+            plane: None,
+        };
         let mut recording = Recording {
-            width: format.width,
-            height: format.height,
-            bit_depth: format.bit_depth,
-            description: String::new(),
-            notes: Vec::new(),
-            source: String::new(),
-            camera_model: None,
-            noise_counts: None,
-            projector: RecordedProjector {
-                width,
-                height,
-                model: None,
-                plane: None,
-            },
             patterns: self.patterns.clone(),
-            frames: Vec::new(),
             codes: codes.collect(),
-            white: None,
-            black: None,
-            range_mm: None,
-            exposure_us: None,
-            part_id: None,
-            recipe: None,
-            truth_height: None,
-            truth_class: None,
+            ..Recording::new(format, projector)
         };
         let mut shown: Vec<_> = self.shown.iter().zip(frames).collect();
         // Bits come with the most or the least significant first.

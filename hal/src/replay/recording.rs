@@ -133,6 +133,32 @@ pub struct Recording {
 }
 
 impl Recording {
+    /// One of frames of this format in front of this projector, of which nothing else is known yet.
+    pub fn new(format: FrameFormat, projector: RecordedProjector) -> Self {
+        Self {
+            width: format.width,
+            height: format.height,
+            bit_depth: format.bit_depth,
+            description: String::new(),
+            notes: Vec::new(),
+            source: String::new(),
+            camera_model: None,
+            noise_counts: None,
+            projector,
+            patterns: Vec::new(),
+            frames: Vec::new(),
+            codes: Vec::new(),
+            white: None,
+            black: None,
+            range_mm: None,
+            exposure_us: None,
+            part_id: None,
+            recipe: None,
+            truth_height: None,
+            truth_class: None,
+        }
+    }
+
     /// Loads and checks the recording in `folder`.
     ///
     /// # Errors

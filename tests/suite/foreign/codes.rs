@@ -15,6 +15,18 @@ pub struct Code {
     pub inverted: bool,
 }
 
+/// The options that describe [`HALF`] beside eight fringes.
+const HALF_OPTIONS: [&str; 8] = [
+    "--fringes",
+    "8",
+    "--convention",
+    "cos",
+    "--gray",
+    "4",
+    "--gray-cell",
+    "25",
+];
+
 pub const HALF: Code = Code {
     bits: 4,
     cell: 25.0,
@@ -84,16 +96,7 @@ fn a_code_that_was_projected_otherwise_than_described_is_named_and_read_as_named
         ..inverted
     };
     let wide = Code { cell: 26.0, ..HALF };
-    let half = [
-        "--fringes",
-        "8",
-        "--convention",
-        "cos",
-        "--gray",
-        "4",
-        "--gray-cell",
-        "25",
-    ];
+    let half = HALF_OPTIONS;
     let whole = [
         "--fringes",
         "8",
@@ -227,16 +230,7 @@ fn a_measurement_repeats_what_the_import_found() {
         ..HALF
     };
     let scene = scene(8.0, 0.0, inverted);
-    let code = [
-        "--fringes",
-        "8",
-        "--convention",
-        "cos",
-        "--gray",
-        "4",
-        "--gray-cell",
-        "25",
-    ];
+    let code = HALF_OPTIONS;
     scene.import(&code).succeeded();
     let (recording, out) = (scene.path("recording"), scene.path("out"));
     let run = crate::written::program().measure(&recording, &out, &[]);

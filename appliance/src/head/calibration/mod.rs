@@ -18,6 +18,7 @@ use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
 use algo::pattern::{GreyResponse, PhaseFunction, Waveform, Waveforms};
 use algo::phase::LeastModulation;
+use hal::frame::FrameFormat;
 use hal::model::{DeviceModel, PlaneModel};
 use hal::replay::Recording;
 use hal::replay::recording::RecordedProjector;
@@ -187,32 +188,16 @@ impl Calibration {
     pub fn recording(&self) -> Recording {
         let (width, height, bit_depth) = self.frames();
         let (columns, rows) = self.raster();
+        let projector = RecordedProjector {
+            width: columns,
+            height: rows,
+            model: Some(seam::device_model(&self.projector)),
+            plane: self.plane_by().cloned(),
+        };
         Recording {
-            width,
-            height,
-            bit_depth,
-            description: String::new(),
-            notes: Vec::new(),
-            source: String::new(),
             camera_model: Some(seam::device_model(&self.camera)),
             noise_counts: Some(self.noise_counts),
-            projector: RecordedProjector {
-                width: columns,
-                height: rows,
-                model: Some(seam::device_model(&self.projector)),
-                plane: self.plane_by().cloned(),
-            },
-            patterns: Vec::new(),
-            frames: Vec::new(),
-            codes: Vec::new(),
-            white: None,
-            black: None,
-            range_mm: None,
-            exposure_us: None,
-            part_id: None,
-            recipe: None,
-            truth_height: None,
-            truth_class: None,
+            ..Recording::new(FrameFormat::packed(width, height, bit_depth), projector)
         }
     }
 
