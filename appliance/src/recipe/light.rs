@@ -1,4 +1,4 @@
-//! How much of golden's light comes back from a part, so that one that cannot be judged is told from a head that is ill.
+//! How much of golden's light comes back from a part, so that a head that is out of focus, too dark or too bright is told from a wrong part.
 //!
 //! The pattern's contrast falls where something blurs it, the mean of a pixel's samples does not; both fall with the light; foreign light
 //! raises the mean alone. Medians over pixels of golden's compared surface, so that a part that lies elsewhere changes little.
@@ -43,9 +43,9 @@ pub(super) struct Light {
     saturated: f64,
 }
 
-/// What is the matter with the light.
+/// What is wrong with the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Illness {
+pub(super) enum Cause {
     /// Nothing of the pattern comes back.
     Nothing,
     /// So little of golden's light.
@@ -61,7 +61,7 @@ pub(super) enum Illness {
     },
 }
 
-impl Illness {
+impl Cause {
     /// ERROR_CODE.
     pub fn code(self) -> u16 {
         match self {
@@ -148,8 +148,8 @@ impl Light {
         })
     }
 
-    /// The likeliest reason why a part cannot be measured in this light; none if the light is well.
-    pub fn illness(self) -> Option<Illness> {
+    /// The likeliest reason why a part cannot be measured in this light; none if the light is as it was.
+    pub fn cause(self) -> Option<Cause> {
         let Self {
             modulation,
             offset,
@@ -165,15 +165,15 @@ impl Light {
         };
         if saturated > MOST_SATURATED {
             let share = saturated;
-            Some(Illness::Saturated { share, foreign })
+            Some(Cause::Saturated { share, foreign })
         } else if modulation >= LOW {
             None
         } else if modulation < NONE && offset.is_none_or(|offset| offset < LOW) {
-            Some(Illness::Nothing)
+            Some(Cause::Nothing)
         } else if contrast < least {
-            Some(Illness::Blurred(contrast))
+            Some(Cause::Blurred(contrast))
         } else {
-            Some(Illness::Dark(modulation))
+            Some(Cause::Dark(modulation))
         }
     }
 }
@@ -208,34 +208,34 @@ fn samples(views: &[FrameView<'_>], at: usize) -> (f64, u16) {
 mod tests {
     use super::*;
 
-    fn illness(modulation: f64, offset: Option<f64>, saturated: f64) -> Option<Illness> {
+    fn cause(modulation: f64, offset: Option<f64>, saturated: f64) -> Option<Cause> {
         let light = Light {
             modulation,
             offset,
             saturated,
         };
-        light.illness()
+        light.cause()
     }
 
     #[test]
     fn light_that_is_low_blurred_or_too_bright_is_told_apart() {
-        assert_eq!(illness(0.9, Some(0.9), 0.0), None);
+        assert_eq!(cause(0.9, Some(0.9), 0.0), None);
         // A lamp at 15 %, and the same with some foreign light.
         for offset in [0.2, 0.25, 0.35] {
-            let dark = illness(0.15, Some(offset), 0.0);
-            assert_eq!(dark, Some(Illness::Dark(0.15)), "{offset}");
+            let dark = cause(0.15, Some(offset), 0.0);
+            assert_eq!(dark, Some(Cause::Dark(0.15)), "{offset}");
         }
         // Without the mean of golden's samples nothing but the light is known.
-        assert_eq!(illness(0.15, None, 0.0), Some(Illness::Dark(0.15)));
-        assert_eq!(illness(0.2, Some(1.0), 0.0), Some(Illness::Blurred(0.2)));
+        assert_eq!(cause(0.15, None, 0.0), Some(Cause::Dark(0.15)));
+        assert_eq!(cause(0.2, Some(1.0), 0.0), Some(Cause::Blurred(0.2)));
         // Foreign light on a blurred pattern.
-        assert_eq!(illness(0.2, Some(1.6), 0.0), Some(Illness::Blurred(0.2)));
-        assert_eq!(illness(0.01, Some(0.05), 0.0), Some(Illness::Nothing));
+        assert_eq!(cause(0.2, Some(1.6), 0.0), Some(Cause::Blurred(0.2)));
+        assert_eq!(cause(0.01, Some(0.05), 0.0), Some(Cause::Nothing));
         let of = |foreign| {
             let share = 0.3;
-            Some(Illness::Saturated { share, foreign })
+            Some(Cause::Saturated { share, foreign })
         };
-        assert_eq!(illness(0.7, Some(1.8), 0.3), of(true));
-        assert_eq!(illness(1.9, Some(1.9), 0.3), of(false));
+        assert_eq!(cause(0.7, Some(1.8), 0.3), of(true));
+        assert_eq!(cause(1.9, Some(1.9), 0.3), of(false));
     }
 }

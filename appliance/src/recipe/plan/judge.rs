@@ -1,7 +1,7 @@
 //! From findings to a verdict, or to the reason why a longer sequence should be tried.
 
 use crate::recipe::Demands;
-use crate::recipe::light::{Illness, Light};
+use crate::recipe::light::{Cause, Light};
 use crate::station::error_code::{BLURRED, GUARD_BAND, NOT_MEASURED, NOT_THE_PART, OUT_OF_PLACE};
 use crate::station::{
     COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Unit, Verdict,
@@ -19,8 +19,8 @@ const OUTLIERS: f64 = 0.2;
 /// place by that.
 const SURE: f64 = 2.0;
 const PULLED: f64 = 0.02;
-/// A part that fails with less fitness is not judged: its limits were set for a quarter of the noise.
-const ILL: f64 = 0.25;
+/// A part that fails with less fitness than this is INVALID: its limits were set for a quarter of the noise.
+const LEAST_FITNESS: f64 = 0.25;
 /// What lies farther off than so many times what is allowed is another part.
 const FAR: f64 = 10.0;
 /// Turns below this are not told, degrees.
@@ -171,27 +171,28 @@ impl Demands {
         inspection.error_code == NOT_THE_PART || fitness(inspection) < UNFIT
     }
 
-    /// Says what is the matter with the light of a part that was measured badly. One that fails in light as bad as that is not judged.
+    /// Names in the reason what is wrong with the light, where a part was measured badly because of it; a part that fails with less than
+    /// [`LEAST_FITNESS`] becomes INVALID.
     pub(super) fn explain(&self, light: Option<Light>, inspection: &mut Inspection) {
-        let illness = light.and_then(Light::illness);
-        inspection.warnings |= illness.map_or(0, Illness::warning);
+        let cause = light.and_then(Light::cause);
+        inspection.warnings |= cause.map_or(0, Cause::warning);
         let coverage = f64::from(inspection.coverage_permille) / 1000.0;
         let found = match (inspection.error_code, inspection.judged) {
-            (NOT_THE_PART, _) if illness.is_some() && coverage < self.min_coverage => {
+            (NOT_THE_PART, _) if cause.is_some() && coverage < self.min_coverage => {
                 self.unresolved(coverage)
             }
-            (0, Verdict::Fail) if fitness(inspection) < ILL => {
+            (0, Verdict::Fail) if fitness(inspection) < LEAST_FITNESS => {
                 let noisier = 1.0 / fitness(inspection).max(1e-3);
                 format!("its heights are {noisier:.1} times as noisy as when it was taught")
             }
             _ => return,
         };
-        let cause = illness.map_or_else(
+        let words = cause.map_or_else(
             || "check light, focus and exposure of the head".into(),
-            Illness::words,
+            Cause::words,
         );
-        inspection.reason = Some(format!("{found}: {cause}").into());
-        inspection.error_code = illness.map_or(BLURRED, Illness::code);
+        inspection.reason = Some(format!("{found}: {words}").into());
+        inspection.error_code = cause.map_or(BLURRED, Cause::code);
         inspection.judged = Verdict::Invalid;
     }
 
