@@ -182,6 +182,7 @@ pub(super) fn leave_out_covered(
         manifest
             .regions
             .retain(|region| region.name != removed.region);
+        manifest.tried.retain(|tried| tried.gauge != removed.name);
         for inspection in &mut *judged {
             inspection.gauges.remove(at);
         }
