@@ -2,7 +2,12 @@
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+
+/// A run that takes longer is killed: a program that should have refused its input may serve for ever instead.
+pub const LONGEST: Duration = Duration::from_secs(600);
 
 /// The program under test.
 #[derive(Clone, Debug)]
@@ -27,12 +32,25 @@ impl Program {
         Self { path: path.into() }
     }
 
-    /// Runs it with arguments until it ends; fails if it panicked.
+    /// Runs it with arguments until it ends, at most [`LONGEST`]; fails if it panicked.
     pub fn run<A: AsRef<OsStr>>(&self, arguments: &[A]) -> Run {
-        let output = Command::new(&self.path)
+        let child = Command::new(&self.path)
             .args(arguments)
-            .output()
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
             .expect("the program can be started");
+        let pid = child.id().to_string();
+        let (ended, wait) = mpsc::channel::<()>();
+        std::thread::spawn(move || {
+            if wait.recv_timeout(LONGEST) == Err(mpsc::RecvTimeoutError::Timeout) {
+                // It is killed, so its exit code is −1.
+                let _ = Command::new("kill").args(["-KILL", &pid]).status();
+            }
+        });
+        let output = child.wait_with_output().expect("its output can be read");
+        drop(ended);
         let run = Run {
             code: output.status.code().unwrap_or(-1),
             stdout: String::from_utf8_lossy(&output.stdout).into_owned(),

@@ -1,7 +1,7 @@
 //! Exposure and gain on the page's API: what a step leaves behind that did not succeed, and which noise a recipe is judged by.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, SMALL_HEAD};
+use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, SMALL_HEAD, pause};
 use crate::written::program;
 use serde_json::{Value, json};
 use std::fs;
@@ -19,6 +19,16 @@ fn place() -> Place {
     let long = format!("refresh_hz = 240.0\n{SMALL_HEAD}[timing]\nexposure_refreshes = 8.0\n");
     fs::write(place.path("small.toml"), long).unwrap();
     place
+}
+
+/// A station there, with its users.
+fn station() -> (Place, Daemon, Browser, Plc) {
+    let place = place();
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    browser.sign_in(&daemon);
+    let plc = Plc::connect(&daemon);
+    (place, daemon, browser, plc)
 }
 
 fn camera(browser: &mut Browser) -> Value {
@@ -43,7 +53,7 @@ fn ended(browser: &mut Browser, name: &str) -> Value {
             return found.unwrap().clone();
         }
         assert!(began.elapsed() < 8 * PATIENCE, "{name}: {head}");
-        std::thread::yield_now();
+        pause();
     }
 }
 
@@ -66,11 +76,7 @@ fn shorter(camera: &Value) -> Value {
 
 #[test]
 fn a_step_exposure_that_is_stopped_refused_or_failed_takes_its_settings_back() {
-    let place = place();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
-    let mut plc = Plc::connect(&daemon);
+    let (place, daemon, mut browser, mut plc) = station();
     assert_eq!(plc.measure(1)[8], PASS);
     let before = camera(&mut browser);
     let path = "/api/head/steps/exposure";
@@ -109,11 +115,7 @@ fn a_step_exposure_that_is_stopped_refused_or_failed_takes_its_settings_back() {
 
 #[test]
 fn a_recipe_is_not_used_at_another_gain_and_one_that_is_taught_there_has_the_noise_of_it() {
-    let place = place();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
-    let mut plc = Plc::connect(&daemon);
+    let (_place, _daemon, mut browser, mut plc) = station();
     let noise = plc.measure(1)[HEIGHT_NOISE];
     let recipe = browser.get("/api/recipes/1");
     let before = camera(&mut browser);

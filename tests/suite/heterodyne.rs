@@ -1,7 +1,7 @@
 //! A recipe from a golden recording whose levels are unwrapped by beats: it is imported, and judges recordings.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, PATIENCE, Place};
+use crate::station_plc::{Daemon, PATIENCE, Place, pause};
 use crate::written::program;
 use hal::replay::recorder;
 use serde_json::{Value, json};
@@ -17,6 +17,7 @@ fn judged(daemon: &Daemon) -> Value {
     let began = Instant::now();
     while browser.get("/api/snapshot")["ready"] != true {
         assert!(began.elapsed() < PATIENCE);
+        pause();
     }
     let before = browser.get("/api/snapshot")["counters"]["sequence"].clone();
     let (status, answer) = browser.json("POST", "/api/trigger", &json!({}));
@@ -27,6 +28,7 @@ fn judged(daemon: &Daemon) -> Value {
             return snapshot["result"].clone();
         }
         assert!(began.elapsed() < PATIENCE, "{snapshot}");
+        pause();
     }
 }
 

@@ -1,7 +1,7 @@
 //! The history: what it shows, and that it survives kill -9.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, Place, Plc, READY, long, trigger};
+use crate::station_plc::{Daemon, Place, Plc, READY, long, pause, trigger};
 use crate::written::program;
 use appliance::history::{Entry, Filter, Reader, Writer};
 use appliance::station::Verdict;
@@ -120,7 +120,7 @@ pub(crate) fn recording(place: &Place, seq: u32) -> PathBuf {
             return folder;
         }
         assert!(started.elapsed() < WRITTEN, "no recording of result {seq}");
-        std::thread::yield_now();
+        pause();
     }
 }
 

@@ -1,7 +1,7 @@
 //! The page's API on the real program: the PLC sees what a technician changes there.
 
 use super::written::program;
-use crate::station_plc::{Daemon, PATIENCE, Place, Plc, long};
+use crate::station_plc::{Daemon, PATIENCE, Place, Plc, long, pause};
 use appliance::recipe::{Store, archive};
 use serde_json::{Value, json};
 use std::io::{Read as _, Write as _};
@@ -99,6 +99,7 @@ impl Browser {
                 return now.to_owned();
             }
             assert!(started.elapsed() < PATIENCE, "{snapshot}");
+            pause();
         }
     }
 }
@@ -299,6 +300,7 @@ fn pictures_and_files_of_the_last_part_belong_to_its_result() {
             started.elapsed() < PATIENCE,
             "the result is not in the history"
         );
+        pause();
     }
     assert_eq!(browser.get("/api/history")["counts"]["pass"], 1);
     assert_eq!(

@@ -1,6 +1,6 @@
 //! Losses of power: after every file operation of a run the files are opened as a power loss may leave them, with the unsynced data complete, missing, or partly there.
 
-use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long};
+use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long, pause};
 use crate::written::FRINGED;
 use appliance::history::{self, Bounds, Filter, Numbering, Reader};
 use appliance::recipe::Store;
@@ -174,7 +174,7 @@ fn whole(path: &Path) -> String {
             return log;
         }
         assert!(started.elapsed() < STOPPING, "the trace has no end");
-        std::thread::yield_now();
+        pause();
     }
 }
 

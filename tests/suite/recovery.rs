@@ -3,7 +3,7 @@
 use crate::page::Browser;
 use crate::station_plc::{
     Daemon as Program, ONLINE, PATIENCE, Place, Plc, READY, RECIPE_OK, SMALL_HEAD, Status, long,
-    trigger,
+    pause, trigger,
 };
 use appliance::config::Config;
 use appliance::head::calibration::Calibration;
@@ -207,11 +207,7 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
     let daemon = Program::start(&place);
     let mut plc = Plc::connect(&daemon);
     plc.measure(1);
-    let counter = place.path("state/result-seq");
-    // A pipe in place of the file: a write waits until somebody reads, as on a busy disk.
-    fs::remove_file(&counter).unwrap();
-    let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
-    rustix::fs::mknodat(rustix::fs::CWD, &counter, kind, mode, 0).unwrap();
+    let counter = place.counter_that_hangs();
     let mut last = 1;
     while state(&plc.status()) != FAULT {
         last += 1;
@@ -234,6 +230,7 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
     // Until enough are reserved that no more are requested.
     while reserved() <= Some(u32::from(last) + AHEAD / 4 * 3) {
         assert!(began.elapsed() < PATIENCE, "{:?}", reserved());
+        pause();
     }
     // A folder in place of the counter's file: no write can replace it.
     fs::remove_file(&counter).unwrap();

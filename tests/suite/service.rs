@@ -1,7 +1,7 @@
 //! The daemon under a service manager: its `sd_notify` messages, its journal entries, and how it ends.
 
 use crate::station_plc::{
-    Daemon, ONLINE, PATIENCE, Place, Plc, READY, SMALL_HEAD, STOPPING, command,
+    Daemon, ONLINE, PATIENCE, Place, Plc, READY, SMALL_HEAD, STOPPING, command, pause,
 };
 use crate::written::{FRINGED, program};
 use std::fs::{self, File};
@@ -89,7 +89,7 @@ fn end_by(signal: &str, mut silent: Silent) -> ExitStatus {
             return status;
         }
         assert!(began.elapsed() < STOPPING, "{signal} did not end it");
-        std::thread::yield_now();
+        pause();
     }
 }
 
@@ -185,7 +185,7 @@ fn interrupted(place: &Place, reached: &dyn Fn(&str, SocketAddr) -> bool) -> Str
     let began = Instant::now();
     while !reached(&fs::read_to_string(&said).unwrap(), page) {
         assert!(began.elapsed() < PATIENCE, "it is not reached");
-        std::thread::yield_now();
+        pause();
     }
     assert_eq!(end_by("-INT", child).code(), Some(0));
     fs::read_to_string(&said).unwrap()

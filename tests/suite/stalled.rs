@@ -2,7 +2,7 @@
 
 use crate::station_plc::{Daemon, ONLINE, Place, Plc, READY, RECIPE_OK, long};
 use rusqlite::Connection;
-use std::fs::{self, OpenOptions};
+use std::fs::OpenOptions;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
 use std::net::TcpStream;
 use std::os::fd::AsRawFd;
@@ -129,11 +129,7 @@ fn a_card_that_hangs_stops_no_request_and_no_stop() {
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     plc.measure(1);
-    let counter = place.path("state/result-seq");
-    // A pipe in place of the file: a write waits for a reader, who never comes.
-    fs::remove_file(&counter).unwrap();
-    let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
-    rustix::fs::mknodat(rustix::fs::CWD, &counter, kind, mode, 0).unwrap();
+    place.counter_that_hangs();
     works(&daemon, &mut plc, 2..40);
     let measured = long(&plc.status().0, 12);
     assert_eq!(measured, 39);

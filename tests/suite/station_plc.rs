@@ -30,6 +30,11 @@ pub const PATIENCE: Duration = Duration::from_secs(30);
 /// SIGTERM ends the daemon within this time.
 pub const STOPPING: Duration = Duration::from_secs(5);
 
+/// Passes the time between two questions of somebody who waits: asked without a pause, they would take the processor from what is waited for.
+pub fn pause() {
+    std::thread::sleep(Duration::from_millis(2));
+}
+
 /// A head with few pixels, for tests in which resolution does not matter: its light takes little time to compute.
 pub const SMALL_HEAD: &str = "sub_rays = 2\n\n[rig.camera]\nwidth = 160\nheight = 160\n";
 
@@ -49,6 +54,15 @@ impl Place {
 
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
+    }
+
+    /// Puts a pipe in place of the result counter's file: a write waits until somebody reads, as on a busy disk. Returns the file.
+    pub fn counter_that_hangs(&self) -> PathBuf {
+        let counter = self.path("state/result-seq");
+        fs::remove_file(&counter).unwrap();
+        let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
+        rustix::fs::mknodat(rustix::fs::CWD, &counter, kind, mode, 0).unwrap();
+        counter
     }
 
     pub fn recipe(&self) -> PathBuf {
@@ -149,7 +163,7 @@ impl Daemon {
         let began = Instant::now();
         let early = || {
             assert!(began.elapsed() < 4 * PATIENCE, "it is not ready");
-            std::thread::yield_now();
+            pause();
         };
         while TcpStream::connect(modbus).is_err() {
             early();
@@ -175,7 +189,7 @@ impl Daemon {
                 return status;
             }
             assert!(started.elapsed() < STOPPING, "SIGTERM did not end it");
-            std::thread::yield_now();
+            pause();
         }
     }
 
@@ -294,6 +308,7 @@ impl Plc {
                 return status;
             }
             assert!(started.elapsed() < PATIENCE, "no {what}: {status:?}");
+            pause();
         }
     }
 
@@ -308,6 +323,7 @@ impl Plc {
                 return words;
             }
             assert!(started.elapsed() < PATIENCE, "no result");
+            pause();
         }
     }
 }

@@ -1,7 +1,7 @@
 //! A technician who commissions a head over the page's API.
 
 use crate::page::Browser;
-use crate::station_plc::Daemon;
+use crate::station_plc::{Daemon, pause};
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
 
@@ -49,7 +49,7 @@ impl Technician {
                 return Self::step_of(&head, name);
             }
             assert!(began.elapsed() < STEP, "{name}: {head}");
-            std::thread::yield_now();
+            pause();
         }
     }
 
@@ -97,7 +97,7 @@ impl Technician {
                 working.contains(&snapshot["state"]) && began.elapsed() < STEP,
                 "{snapshot}"
             );
-            std::thread::yield_now();
+            pause();
         }
     }
 
@@ -113,7 +113,7 @@ impl Technician {
                 return snapshot["result"].clone();
             }
             assert!(began.elapsed() < STEP, "{snapshot}");
-            std::thread::yield_now();
+            pause();
         }
     }
 }
