@@ -220,6 +220,7 @@ fn a_highlight_is_not_taught_as_an_opening_of_the_part() {
 fn good_parts_that_shine_get_no_wrong_verdict_and_hardly_a_wrong_pixel() {
     const PLACEMENTS: usize = 50;
     const WRONG_MM: f32 = 0.3;
+    let mut too_many = Vec::new();
     for material in [Material::RolledSteel, Material::Oiled] {
         let (mut resolved, mut wrong, mut whole, mut invalid) = (0, 0, 0, 0);
         for (kind, part) in stock() {
@@ -266,9 +267,13 @@ fn good_parts_that_shine_get_no_wrong_verdict_and_hardly_a_wrong_pixel() {
             println!("{material:?} {kind}: {refused} of {PLACEMENTS} INVALID");
             invalid += refused;
         }
-        println!(
+        let words = format!(
             "{material:?}: {invalid} INVALID, {wrong} of {resolved} pixels off by more than {WRONG_MM} mm, {whole} of these are wholly lit and see no edge"
         );
-        assert!(wrong <= resolved / 100_000, "{wrong} of {resolved}");
+        println!("{words}");
+        if wrong > resolved / 100_000 {
+            too_many.push(words);
+        }
     }
+    assert!(too_many.is_empty(), "{too_many:?}");
 }
