@@ -353,14 +353,16 @@ fn a_damaged_calibration_gives_way_to_the_one_before_and_is_never_guessed() {
         Place::at(&json).load()
     };
     let digit = text.replacen("\"counts\": ", "\"counts\": 1", 1);
-    let newer = text.replacen("\"version\": 2", "\"version\": 3", 1);
+    let [older, newer] =
+        [1, 3].map(|other| text.replacen("\"version\": 2", &format!("\"version\": {other}"), 1));
     let unknown = text.replacen("\"version\"", "\"vesion\": 1, \"version\"", 1);
     for (damaged, words) in [
         (&text[..text.len() / 2], "damaged"),
         ("", "damaged"),
         ("[]", "damaged"),
         (&*digit, "checksum"),
-        (&*newer, "version 3"),
+        (&*older, "version 1, this program reads 2: calibrate anew"),
+        (&*newer, "version 3, this program reads 2: calibrate anew"),
         (&*unknown, "vesion"),
     ] {
         assert_ne!(damaged, text);

@@ -153,7 +153,7 @@ fn no_two_recipes_get_the_same_part_number_and_a_plc_is_told_if_two_have_it() {
     browser.wait_for_another(first["fingerprint"].as_str().unwrap());
     taken(browser.json("POST", "/api/recipes/3/teach", &json!({})));
 
-    // As an older program may have stored them: neither is selected.
+    // As somebody may have stored them in the folder: neither is selected.
     let store = Store::at(&place.path("state/recipes"));
     store.save(4, &named(4, "SECOND")).unwrap();
     let mut plc = Plc::connect(&daemon);

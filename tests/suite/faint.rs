@@ -2,7 +2,7 @@
 
 use super::gauges::{frames, plan};
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
-use algo::phase::{LeastModulation, Trust};
+use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::head::calibrated::{CalibratedHead, Measured};
 use appliance::head::scan::Scan;
@@ -33,14 +33,6 @@ fn dark() -> (Bed, TaughtRecipe) {
     (bed, taught)
 }
 
-/// The recipe as an older program would have written it, which trusted from 16 counts on.
-fn older(taught: &TaughtRecipe) -> RecipeFile {
-    RecipeFile {
-        least_modulation: None,
-        ..taught.manifest.clone()
-    }
-}
-
 fn full(taught: &TaughtRecipe) -> &[algo::pattern::Shot] {
     &taught.manifest.sequences.last().unwrap().frames
 }
@@ -64,7 +56,7 @@ fn measured(bed: &mut Bed, taught: &TaughtRecipe) -> (Measured, Vec<AbsolutePhas
 #[test]
 fn a_dark_part_is_measured_by_a_quiet_camera_within_its_stated_noise() {
     let (mut bed, taught) = dark();
-    let least = taught.manifest.least_modulation.unwrap();
+    let least = taught.manifest.least_modulation;
     assert!((4.9..5.6).contains(&least), "{least}");
     let (measured, golden) = measured(&mut bed, &taught);
     let truth = bed.stage.truth();
@@ -118,7 +110,7 @@ fn judged(bed: &Bed, taught: &TaughtRecipe, file: &RecipeFile, frames: &[Frame])
 }
 
 #[test]
-fn a_recipe_of_an_older_program_goes_by_sixteen_counts_and_a_new_one_by_its_noise() {
+fn a_recipe_that_states_sixteen_counts_goes_by_them_and_a_taught_one_by_its_noise() {
     let (mut bed, taught) = dark();
     let loaded = plan(&bed, &taught.manifest, &taught.recipe.arrays);
     let rasters = loaded.rasters(&bed.calibration).unwrap();
@@ -126,18 +118,13 @@ fn a_recipe_of_an_older_program_goes_by_sixteen_counts_and_a_new_one_by_its_nois
     let frames = frames(&mut bed, &loaded, 0);
     let new = judged(&bed, &taught, &taught.manifest, &frames);
     assert_eq!(new.verdict(), Verdict::Pass, "{new:?}");
-    let old = judged(&bed, &taught, &older(&taught), &frames);
-    assert_eq!(old.verdict(), Verdict::Invalid, "{old:?}");
-    assert!(old.valid_points * 100 < new.valid_points);
-    // The key's absence means 16, to the bit; and it is not written where it is absent.
     let sixteen = RecipeFile {
-        least_modulation: Some(LeastModulation::default().eight_bit()),
+        least_modulation: 16.0,
         ..taught.manifest.clone()
     };
     let sixteen = judged(&bed, &taught, &sixteen, &frames);
-    assert_eq!(format!("{old:?}"), format!("{sixteen:?}"));
-    let written = serde_json::to_value(older(&taught)).unwrap();
-    assert_eq!(written.get("least_modulation"), None);
+    assert_eq!(sixteen.verdict(), Verdict::Invalid, "{sixteen:?}");
+    assert!(sixteen.valid_points * 100 < new.valid_points);
 }
 
 #[test]
@@ -145,7 +132,7 @@ fn a_least_modulation_out_of_its_bounds_is_refused() {
     let (_, taught) = dark();
     for counts in [3.9, 128.0] {
         let file = RecipeFile {
-            least_modulation: Some(counts),
+            least_modulation: counts,
             ..taught.manifest.clone()
         };
         let error = file.check_bounds().unwrap_err();

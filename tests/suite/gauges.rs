@@ -349,14 +349,14 @@ fn a_component_that_the_shape_does_not_determine_is_invalid_and_is_named() {
 }
 
 #[test]
-fn a_recipe_without_the_key_is_not_aligned() {
+fn a_recipe_without_alignment_is_not_aligned() {
     let mut bed = bed(&scenario(Part::SheetMetal(SheetMetal::default())));
     let taught = taught(&mut bed).unwrap();
-    let mut manifest = serde_json::to_value(&taught.manifest).unwrap();
-    assert_eq!(manifest["alignment"], "rigid");
-    manifest.as_object_mut().unwrap().remove("alignment");
-    let file: RecipeFile = serde_json::from_value(manifest).unwrap();
-    assert_eq!(file.alignment, AlignmentKind::None);
+    assert_eq!(taught.manifest.alignment, AlignmentKind::Rigid);
+    let file = RecipeFile {
+        alignment: AlignmentKind::None,
+        ..taught.manifest.clone()
+    };
     let plan = plan(&bed, &file, &taught.recipe.arrays);
     let found = inspect(&mut bed, &plan, 0);
     assert_eq!(found.verdict(), Verdict::Pass);

@@ -303,8 +303,8 @@ fn a_list_by_time_says_how_many_results_it_leaves_out_because_their_time_is_not_
         .map(|seq| Entry {
             seq,
             time_utc_us: (seq == 3).then_some(1_790_000_000_000_000),
-            uptime_s: Some(3600),
-            boot_id: Some("0000b007".into()),
+            uptime_s: 3600,
+            boot_id: "0000b007".into(),
             verdict: Verdict::Pass,
             ..Entry::default()
         })

@@ -164,7 +164,7 @@ fn a_recipe_without_limits_is_stored_if_that_is_asked_for_and_each_result_says_t
     assert!(file.judges_nothing);
     assert_eq!(edit(&mut browser, json!({ "gauges": limits })), 200);
     assert_eq!(plc.measure(2)[FLAGS] & JUDGES_NOTHING, 0);
-    assert!(browser.get("/api/recipes/1")["judges_nothing"].is_null());
+    assert_eq!(browser.get("/api/recipes/1")["judges_nothing"], false);
 }
 
 #[test]

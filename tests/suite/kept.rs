@@ -139,7 +139,7 @@ fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_delete
     program().measure(&file, &out, &[]).succeeded();
     assert!(out.join("height.npy").exists());
     assert_eq!(replay(&folder, &["--recipe", "stored"]).code, 66);
-    // A recording of an older program has no recipe in it, so the recipe file is given.
+    // A recording for whose recipe there was no room has none in it, so the recipe file is given.
     let named = place.path("named.recipe");
     fs::rename(folder.join("recipe.recipe"), &named).unwrap();
     assert_eq!(replay(&folder, &[]).code, 66);

@@ -98,10 +98,10 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
         reference: Some(ReferenceFile {
             pitch_px: 16.0,
             models_off_px: 0.01,
-            plane: Some(PlaneModel {
+            plane: PlaneModel {
                 xi: [0.5; 28],
                 eta: [0.5; 28],
-            }),
+            },
             vertical: map("reference_vertical"),
             horizontal: map("reference_horizontal"),
         }),

@@ -2,6 +2,7 @@
 
 use super::Tally;
 use crate::head::calibration::Calibration;
+use crate::head::exposing::Exposing;
 use crate::recipe::archive::{members, pack, parse, seal};
 use crate::recipe::exchange::Destination;
 use crate::recipe::golden::Naming;
@@ -86,7 +87,10 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
     let (file, arrays) = (&bed.file, &bed.recipe.arrays);
     let mut full = file.clone();
     full.fingerprint = "0".repeat(64);
-    (full.exposure_us, full.gain) = (Some(5000.0), Some(2.0));
+    full.exposing = Some(Exposing {
+        exposure_us: 5000,
+        gain: 2.0,
+    });
     let kinds = [
         r#"{ "kind": "out_of_tolerance", "smoothing_px": 3, "tolerance_mm": 0.1 }"#,
         r#"{ "kind": "volume", "above_mm": 8.0 }"#,
@@ -192,7 +196,7 @@ fn a_recipe_for_a_projector_of_four_billion_columns_is_refused_and_does_not_repl
         words.contains("projector.width is 4294967295: write 1 to 8192"),
         "{words}"
     );
-    // As if an older program had stored it: it is listed with its problem, and the previous generation is used. Storing it again over a
+    // As if somebody had stored it in the folder: it is listed with its problem, and the previous generation is used. Storing it again over a
     // good recipe does not displace the last good generation either.
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();

@@ -29,7 +29,7 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
                 [head]\nscenario = \"head.toml\"\n";
     fs::write(&path, text).unwrap();
     let store = Store::open(&folder.path().join("state/recipes")).unwrap();
-    // As an older program may have stored it: every value is within its bounds, but no head can measure 9 m above the plane.
+    // As somebody may have stored it in the folder: every value is within its bounds, but no head can measure 9 m above the plane.
     let (mut file, arrays) = (bed.file.clone(), &bed.recipe.arrays);
     file.range_mm = [-10.0, 9000.0];
     store.save(1, &pack(&file, arrays).unwrap().0).unwrap();

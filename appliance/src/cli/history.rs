@@ -50,7 +50,7 @@ impl History {
     /// Prints the results.
     ///
     /// # Errors
-    /// If there is no history (66), or it is damaged (65).
+    /// If there is no history (66), or it is damaged or of another version (65).
     pub fn run(&self) -> Result<(), Failure> {
         let state = self.files.state_folder()?;
         let reader = Reader::of(&state);
@@ -116,7 +116,7 @@ impl History {
 
 impl From<HistoryError> for Failure {
     fn from(error: HistoryError) -> Self {
-        let exit = match (error.path.exists(), error.damaged) {
+        let exit = match (error.path.exists(), error.aside.is_some()) {
             (false, _) => Exit::Missing,
             (true, true) => Exit::Content,
             (true, false) => Exit::Unavailable,
@@ -128,13 +128,13 @@ impl From<HistoryError> for Failure {
 /// The time of a result, to the second: by the clock, else by a browser's clock, else since the start of the daemon.
 fn moment(entry: &Entry) -> String {
     let second = |us| format!("{:.19}", time::utc(us));
-    match (entry.time_utc_us, entry.browser_utc_us, entry.uptime_s) {
-        (Some(us), ..) => second(us),
-        (None, Some(us), _) => format!("≈{}", second(us)),
-        (None, None, Some(s)) => {
+    match (entry.time_utc_us, entry.browser_utc_us) {
+        (Some(us), _) => second(us),
+        (None, Some(us)) => format!("≈{}", second(us)),
+        (None, None) => {
+            let s = entry.uptime_s;
             format!("{}:{:02}:{:02} after start", s / 3600, s / 60 % 60, s % 60)
         }
-        (None, None, None) => String::new(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Exposure and gain of the camera. The noise of a sample belongs to both: what was measured or taught at one setting is not true of
 //! another.
 
-use hal::bounds::within;
+use hal::bounds::{MAX_EXPOSURE_US, within};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::time::Duration;
@@ -11,7 +11,7 @@ pub const LEAST_GAIN: f64 = 0.01;
 /// Largest gain of any camera.
 pub const MOST_GAIN: f64 = 64.0;
 /// Largest gain in files: that of a scenario.
-pub const MAX_GAIN: f64 = 100.0;
+const MAX_GAIN: f64 = 100.0;
 /// Longest exposure, µs.
 pub const MOST_US: u32 = 1_000_000;
 /// Exposures are the same up to the rounding of a refresh to whole µs, µs.
@@ -40,6 +40,21 @@ impl Exposing {
     pub fn check(&self, least_gain: f64) -> Result<(), String> {
         within("exposure_us", self.exposure_us, 1, MOST_US)?;
         within("gain", self.gain, least_gain, MOST_GAIN)
+    }
+
+    /// Checks the values in a file under a key.
+    ///
+    /// # Errors
+    /// In words that name the key, the value and the bounds.
+    pub fn check_bounds(&self, key: &str) -> Result<(), String> {
+        let exposure = f64::from(self.exposure_us);
+        within(
+            &format!("{key}.exposure_us"),
+            exposure,
+            0.0,
+            MAX_EXPOSURE_US,
+        )?;
+        within(&format!("{key}.gain"), self.gain, 0.0, MAX_GAIN)
     }
 
     /// Checks that the exposure is a whole number of refreshes of the projector, to a hundredth of one.

@@ -6,16 +6,14 @@ use crate::station::{Placement, Square, Verdict};
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 use rusqlite::{Connection, Row, Transaction};
 
-/// Declares the columns of a table: those whose values are given beside the fields, the fields, and the fields whose columns a
-/// database of an older program lacks. A column has the name of its field.
+/// Declares the columns of a table: those whose values are given beside the fields, and the fields. A column has the name of its field.
 macro_rules! columns {
-    ($of:ident in $table:literal; $($beside:ident)*; $($field:ident)*; $($later:ident)*) => {
+    ($of:ident in $table:literal; $($beside:ident)*; $($field:ident)*) => {
         impl $of {
             fn insert(&self, transaction: &Transaction<'_>, $($beside: &dyn ToSql),*) -> rusqlite::Result<()> {
                 let columns = [
                     $((stringify!($beside), $beside),)*
                     $((stringify!($field), &self.$field as &dyn ToSql),)*
-                    $((stringify!($later), &self.$later),)*
                 ];
                 let (names, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
                 let marks = vec!["?"; names.len()].join(", ");
@@ -26,7 +24,6 @@ macro_rules! columns {
 
             fn read(&mut self, row: &Row<'_>) -> rusqlite::Result<()> {
                 $(self.$field = row.get(stringify!($field))?;)*
-                $(self.$later = row.get(stringify!($later)).unwrap_or_default();)*
                 Ok(())
             }
         }
@@ -35,9 +32,9 @@ macro_rules! columns {
 
 columns!(Entry in "result"; stages;
     seq time_utc_us recipe fingerprint part_id press_stroke token verdict error_code reason flags valid_points coverage_permille
-    temperature_c height_noise_mm fitness_permille exposure_us total_us recording;
+    temperature_c height_noise_mm fitness_permille exposure_us total_us recording
     uptime_s boot_id unkept placement);
-columns!(GaugeEntry in "gauge"; result place; name unit value sigma low high decision; uncertainty expected square);
+columns!(GaugeEntry in "gauge"; result place; name unit value sigma low high decision uncertainty expected square);
 
 /// Stores a result with its gauges.
 pub(super) fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {

@@ -47,7 +47,7 @@ impl Reader {
                 .map_err(|error| HistoryError {
                     path: self.path().to_path_buf(),
                     reason: format!("write as CSV: {error}"),
-                    damaged: false,
+                    aside: None,
                 })
         };
         write(out, &head)?;

@@ -11,10 +11,10 @@ pub struct Entry {
     pub seq: u32,
     /// Trigger time in µs since 1970 UTC; `None` if the clock was not synchronised.
     pub time_utc_us: Option<u64>,
-    /// Trigger time since the start of the daemon, s; `None` in results of older programs.
-    pub uptime_s: Option<u32>,
+    /// Trigger time since the start of the daemon, s.
+    pub uptime_s: u32,
     /// Which start that was: BOOT_ID as 8 hexadecimal digits.
-    pub boot_id: Option<String>,
+    pub boot_id: String,
     /// Where the clock was not synchronised: the trigger time in µs since 1970 UTC by the clock of a browser whose user
     /// signed in during the same start.
     pub browser_utc_us: Option<u64>,
@@ -54,7 +54,7 @@ pub struct Entry {
     pub stages: Vec<StageEntry>,
     /// The gauges, in the recipe's order.
     pub gauges: Vec<GaugeEntry>,
-    /// How the part lay; `None` where it was not aligned, and in results of older programs.
+    /// How the part lay; `None` where it was not aligned.
     pub placement: Option<Placement>,
     /// The folder in `recordings/` that holds the frames, if they were kept.
     pub recording: Option<String>,
@@ -82,11 +82,11 @@ pub struct GaugeEntry {
     pub value: Option<f64>,
     /// 1 σ, as far as predicted.
     pub sigma: Option<f64>,
-    /// U = 2 u, with the systematic part of the error; `None` in results of older programs.
+    /// U = 2 u, with the systematic part of the error.
     pub uncertainty: Option<f64>,
-    /// The magnitude that is expected on a good part, where noise moves the value away from 0; `None` in results of older programs.
+    /// The magnitude that is expected on a good part, where noise moves the value away from 0.
     pub expected: Option<f64>,
-    /// The square that the value is of, where it is a deviation; `None` in results of older programs.
+    /// The square that the value is of, where it is a deviation.
     pub square: Option<Square>,
     /// Lower limit.
     pub low: Option<f64>,
@@ -136,8 +136,8 @@ impl Entry {
         Self {
             seq: record.seq,
             time_utc_us: Some(record.time_utc_us).filter(|&time| time != 0),
-            uptime_s: Some(record.uptime_s),
-            boot_id: Some(format!("{:08x}", record.boot_id)),
+            uptime_s: record.uptime_s,
+            boot_id: format!("{:08x}", record.boot_id),
             browser_utc_us: None,
             recipe: record.recipe,
             fingerprint: format!("{:08x}", record.recipe_crc),
@@ -202,62 +202,22 @@ fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
 /// Flags that say how a cycle went, not what its frames show.
 const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
 
-/// The bit of a decision that follows from σ.
-const DOUBTFUL: u16 = 1 << 4;
-
-/// A replayed gauge as far as it can be compared with the stored one: older programs have stored no square, and 0 for a σ that is not
-/// known; still older ones no uncertainty, and their σ of extremes was another one.
-fn comparable(stored: &GaugeEntry, replayed: &GaugeEntry) -> GaugeEntry {
-    let mut replayed = GaugeEntry {
-        square: stored.square.and(replayed.square),
-        ..replayed.clone()
-    };
-    if stored.sigma == Some(0.0) && replayed.sigma.is_none() {
-        (replayed.sigma, replayed.uncertainty) = (stored.sigma, stored.uncertainty);
-    }
-    if !is_older(stored) {
-        return replayed;
-    }
-    GaugeEntry {
-        sigma: stored.sigma,
-        uncertainty: None,
-        expected: None,
-        decision: (replayed.decision & !DOUBTFUL) | (stored.decision & DOUBTFUL),
-        ..replayed
-    }
-}
-
-/// Whether an older program stored it.
-fn is_older(stored: &GaugeEntry) -> bool {
-    stored.sigma.is_some() && stored.uncertainty.is_none()
-}
-
 /// How a replayed result differs from the stored one, in words; `None` if it is the same bit by bit. What belongs to the cycle
 /// and not to its frames is not compared: numbers, times, temperature, the flags of its course.
 pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
-    let gauges = replayed.gauges.iter().enumerate();
-    let gauges = gauges.map(|(at, gauge)| match stored.gauges.get(at) {
-        Some(before) => comparable(before, gauge),
-        None => gauge.clone(),
-    });
-    let own = match stored.gauges.iter().any(is_older) {
-        true => COURSE | flag::DOUBTFUL,
-        false => COURSE,
-    };
     let same = Entry {
         recipe: replayed.recipe,
         fingerprint: replayed.fingerprint.clone(),
         verdict: replayed.verdict,
         error_code: replayed.error_code,
         reason: replayed.reason.clone(),
-        flags: (stored.flags & own) | (replayed.flags & !own),
+        flags: (stored.flags & COURSE) | (replayed.flags & !COURSE),
         valid_points: replayed.valid_points,
         coverage_permille: replayed.coverage_permille,
         height_noise_mm: replayed.height_noise_mm,
         fitness_permille: replayed.fitness_permille,
-        gauges: gauges.collect(),
-        // Older programs have not stored it.
-        placement: stored.placement.and(replayed.placement),
+        gauges: replayed.gauges.clone(),
+        placement: replayed.placement,
         ..stored.clone()
     };
     if same == *stored {

@@ -47,7 +47,7 @@ pub fn open(
     let failed = |what: &str, error: std::io::Error| HistoryError {
         path: state.join(what),
         reason: format!("{error}: free space"),
-        damaged: false,
+        aside: None,
     };
     let (mut writer, complaint) = Writer::open(&state.join(DATABASE), bounds.results)?;
     let owner = std::fs::metadata(state).map_err(|error| failed("", error))?;

@@ -20,7 +20,7 @@ pub struct Kept {
     recording: Recording,
     reference: Option<RecipeReference>,
     calibration: Calibration,
-    /// The recording's own recipe; recordings of older programs have none.
+    /// The recording's own recipe; none where there was no room for it.
     own: Option<PathBuf>,
 }
 

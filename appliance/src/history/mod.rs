@@ -68,8 +68,9 @@ pub struct HistoryError {
     pub path: std::path::PathBuf,
     /// What is wrong.
     pub reason: String,
-    /// Whether the file is damaged or no history at all.
-    pub damaged: bool,
+    /// What the file is called when it is set aside, between its stem and its extension, where it is damaged, of another version or no
+    /// history at all.
+    pub aside: Option<String>,
 }
 
 impl HistoryError {
@@ -77,7 +78,7 @@ impl HistoryError {
         Self {
             path: path.to_path_buf(),
             reason: error.to_string(),
-            damaged: schema::means_damage(error),
+            aside: schema::means_damage(error).then(|| schema::DAMAGED.into()),
         }
     }
 }

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const BATCH: usize = 256;
 
 /// Reads one history. Cheap to clone; each call opens the database, so that it also sees a new one that was begun in place of
-/// a damaged one. Every call blocks.
+/// one that cannot be used. Every call blocks.
 #[derive(Clone, Debug)]
 pub struct Reader {
     path: PathBuf,
@@ -75,7 +75,7 @@ impl Reader {
             return Err(HistoryError {
                 path: self.path.clone(),
                 reason: "it does not exist: the station begins it at its first start".into(),
-                damaged: false,
+                aside: None,
             });
         }
         schema::open_read_only(&self.path)
@@ -89,10 +89,19 @@ impl Reader {
         work(&self.open()?).map_err(|error| HistoryError::of(&self.path, &error))
     }
 
+    /// Which history it is: 32 hexadecimal digits, random for each database.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn id(&self) -> Result<String, HistoryError> {
+        let query = "SELECT id FROM history";
+        self.read(|connection| connection.query_row(query, (), |row| row.get(0)))
+    }
+
     /// The results that pass the filter, newest first.
     ///
     /// # Errors
-    /// [`HistoryError`] if the database is missing, busy for seconds, or damaged.
+    /// [`HistoryError`] if the database is missing, busy for seconds, damaged, or of another version.
     pub fn results(&self, filter: &Filter) -> Result<Vec<Entry>, HistoryError> {
         let mut all = Vec::new();
         self.each(filter, |entry| {
@@ -217,7 +226,7 @@ impl Reader {
     /// When starts of the daemon were, in µs since 1970 UTC by the clock of a signed-in user's browser, by BOOT_ID.
     ///
     /// # Errors
-    /// As [`Self::results`], and in a database of an older program.
+    /// As [`Self::results`].
     pub fn starts(&self) -> Result<BTreeMap<String, u64>, HistoryError> {
         let query = "SELECT boot_id, browser_utc_us FROM start";
         self.read(|connection| rows(connection, query, (), |row| Ok((row.get(0)?, row.get(1)?))))

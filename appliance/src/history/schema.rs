@@ -1,4 +1,4 @@
-//! The database's tables, how it is opened, and how a damaged one is set aside.
+//! The database's tables, how it is opened, and how one that cannot be used is set aside.
 
 use super::HistoryError;
 use rusqlite::{Connection, ErrorCode, OpenFlags};
@@ -8,23 +8,29 @@ use std::time::Duration;
 
 /// SQLite's `application_id` of a history: "FRNG".
 const APPLICATION: i64 = 0x4652_4E47;
-/// The schema that this program writes, as SQLite's `user_version`.
-pub const VERSION: i64 = 1;
+/// The schema that this program writes and reads, as SQLite's `user_version`.
+pub const VERSION: i64 = 2;
 /// Longest wait for another process that holds the database, the command line's for instance.
 const BUSY: Duration = Duration::from_secs(2);
 
 /// Longest wait for readers while nothing is stored: most queries take some milliseconds, and a sixth of a fast line's queue is
 /// filled by then.
 const READING: Duration = Duration::from_secs(1);
+/// What a damaged database is called when it is set aside, between its stem and its extension.
+pub(super) const DAMAGED: &str = "damaged";
 /// The log's file is not made shorter than this many bytes.
 const LOG_KEPT: u64 = 1 << 20;
 
 /// `docs/formats.md` has the columns in words.
 const TABLES: &str = "
+CREATE TABLE history (id TEXT NOT NULL);
+INSERT INTO history VALUES (lower(hex(randomblob(16))));
 CREATE TABLE result (
     id INTEGER PRIMARY KEY,
     seq INTEGER NOT NULL,
     time_utc_us INTEGER,
+    uptime_s INTEGER NOT NULL,
+    boot_id TEXT NOT NULL,
     recipe INTEGER NOT NULL,
     fingerprint TEXT NOT NULL,
     part_id INTEGER NOT NULL,
@@ -42,7 +48,9 @@ CREATE TABLE result (
     exposure_us INTEGER NOT NULL,
     total_us INTEGER NOT NULL,
     stages TEXT NOT NULL,
-    recording TEXT
+    placement TEXT,
+    recording TEXT,
+    unkept TEXT
 );
 CREATE INDEX result_seq ON result (seq);
 CREATE INDEX result_recipe ON result (recipe, id);
@@ -55,70 +63,43 @@ CREATE TABLE gauge (
     unit TEXT NOT NULL,
     value REAL,
     sigma REAL,
+    uncertainty REAL,
+    expected REAL,
+    square TEXT,
     low REAL,
     high REAL,
     decision INTEGER NOT NULL,
     PRIMARY KEY (result, place)
 ) WITHOUT ROWID;
+CREATE TABLE start (boot_id TEXT PRIMARY KEY, browser_utc_us INTEGER NOT NULL);
 ";
 
-/// Columns that came later, with their tables; older databases get them when they are opened for writing.
-const ADDED: [(&str, &str, &str); 7] = [
-    ("result", "uptime_s", "INTEGER"),
-    ("result", "boot_id", "TEXT"),
-    ("result", "unkept", "TEXT"),
-    ("result", "placement", "TEXT"),
-    ("gauge", "uncertainty", "REAL"),
-    ("gauge", "expected", "REAL"),
-    ("gauge", "square", "TEXT"),
-];
-/// A table that came later: when a start of the daemon was, by the clock of a signed-in user's browser.
-const STARTS: &str =
-    "CREATE TABLE IF NOT EXISTS start (boot_id TEXT PRIMARY KEY, browser_utc_us INTEGER NOT NULL)";
-/// What readers see of a result: where the clock was not synchronised, also the time of its trigger by that browser's clock.
-const DATED: &str = "CREATE TEMP VIEW dated AS SELECT result.*, CASE WHEN time_utc_us IS NULL THEN
+/// Prepares a connection that reads only. Readers see of a result, where the clock was not synchronised, also the time of its
+/// trigger by the clock of a signed-in user's browser.
+const DATED: &str = "
+PRAGMA temp_store = memory;
+CREATE TEMP VIEW dated AS SELECT result.*, CASE WHEN time_utc_us IS NULL THEN
     (SELECT browser_utc_us FROM start WHERE start.boot_id = result.boot_id) + uptime_s * 1000000 END
-    AS browser_utc_us FROM result";
-/// The same for a database of an older program, which has no such times.
-const UNDATED: &str =
-    "CREATE TEMP VIEW dated AS SELECT result.*, NULL AS browser_utc_us FROM result";
+    AS browser_utc_us FROM result;
+PRAGMA query_only = true;
+";
 
 /// Opens the database for writing; creates it where the file does not exist.
 ///
 /// # Errors
-/// [`HistoryError`]; `damaged` if the file is there and is not a history of this version.
+/// [`HistoryError`]; `aside` if the file is there and is not a history of this version.
 pub(super) fn open(path: &Path) -> Result<Connection, HistoryError> {
     let failed = |error: rusqlite::Error| HistoryError::of(path, &error);
     let mut connection = Connection::open(path).map_err(failed)?;
     settle(&connection).map_err(failed)?;
-    let found = version(&connection).map_err(failed)?;
-    match found {
+    match version(&connection).map_err(failed)? {
         (APPLICATION, VERSION) => {}
         (0, 0) if is_empty(&connection).map_err(failed)? => {
             create(&mut connection).map_err(failed)?;
         }
         found => return Err(strange(path, found)),
     }
-    complete(&connection).map_err(failed)?;
     Ok(connection)
-}
-
-fn complete(connection: &Connection) -> rusqlite::Result<()> {
-    for (table, name, kind) in ADDED {
-        let known = "SELECT count(*) > 0 FROM pragma_table_info(?1) WHERE name = ?2";
-        if !connection.query_row(known, [table, name], |row| row.get(0))? {
-            connection.execute_batch(&format!("ALTER TABLE {table} ADD COLUMN {name} {kind}"))?;
-        }
-    }
-    connection.execute_batch(STARTS)
-}
-
-/// Creates the view that readers read.
-fn date(connection: &Connection) -> rusqlite::Result<()> {
-    let known = "SELECT (SELECT count(*) FROM pragma_table_info('result') WHERE name IN ('uptime_s', 'boot_id')) = 2
-        AND EXISTS (SELECT 1 FROM sqlite_schema WHERE name = 'start')";
-    let known = connection.query_row(known, (), |row| row.get(0))?;
-    connection.execute_batch(if known { DATED } else { UNDATED })
 }
 
 /// Opens the database for reading only.
@@ -127,25 +108,17 @@ fn date(connection: &Connection) -> rusqlite::Result<()> {
 /// [`HistoryError`], also where the file does not exist.
 pub(super) fn open_read_only(path: &Path) -> Result<Connection, HistoryError> {
     let failed = |error: rusqlite::Error| HistoryError::of(path, &error);
-    // Read and write for the log's shared index; the pragma below keeps the content as it is.
+    // Read and write for the log's shared index; `query_only` keeps the content as it is.
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let connection = Connection::open_with_flags(path, flags)
         .or_else(|_| Connection::open_with_flags(path, OpenFlags::SQLITE_OPEN_READ_ONLY))
         .map_err(failed)?;
     connection.busy_timeout(BUSY).map_err(failed)?;
-    let readable = || {
-        let found = version(&connection)?;
-        if found == (APPLICATION, VERSION) {
-            connection.pragma_update(None, "temp_store", "memory")?;
-            date(&connection)?;
-        }
-        connection.pragma_update(None, "query_only", true)?;
-        Ok(found)
-    };
-    match readable().map_err(failed)? {
-        (APPLICATION, VERSION) => Ok(connection),
-        found => Err(strange(path, found)),
+    match version(&connection).map_err(failed)? {
+        (APPLICATION, VERSION) => connection.execute_batch(DATED).map_err(failed)?,
+        found => return Err(strange(path, found)),
     }
+    Ok(connection)
 }
 
 fn settle(connection: &Connection) -> rusqlite::Result<()> {
@@ -209,15 +182,23 @@ fn create(connection: &mut Connection) -> rusqlite::Result<()> {
 }
 
 fn strange(path: &Path, (application, version): (i64, i64)) -> HistoryError {
-    let reason = if application == APPLICATION {
-        format!("version {version} is not this program's ({VERSION})")
+    let (reason, aside) = if application == APPLICATION {
+        (
+            format!(
+                "it has version {version}, this program reads {VERSION}: the station sets it aside when it starts"
+            ),
+            format!("version-{version}"),
+        )
     } else {
-        "it is a database, but no history of fringed".into()
+        (
+            "it is a database, but no history of fringed".into(),
+            DAMAGED.into(),
+        )
     };
     HistoryError {
         path: path.to_path_buf(),
         reason,
-        damaged: true,
+        aside: Some(aside),
     }
 }
 
@@ -239,13 +220,18 @@ pub(super) fn complaint(connection: &Connection) -> Option<String> {
     }
 }
 
-/// Renames a damaged database, with its log, so that a new one can be begun; answers with its new name. One that was set aside
-/// before is replaced.
+/// Renames a database that cannot be used, with its log, so that a new one can be begun; answers
+/// with its new name, which is made of `name`. Of damaged ones the last is kept, of others all.
 ///
 /// # Errors
 /// Whatever the file system answers.
-pub(super) fn set_aside(path: &Path) -> std::io::Result<PathBuf> {
-    let aside = path.with_extension("damaged.db");
+pub(super) fn set_aside(path: &Path, name: &str) -> std::io::Result<PathBuf> {
+    let mut aside = path.with_extension(format!("{name}.db"));
+    let mut number = 1;
+    while name != DAMAGED && aside.exists() {
+        number += 1;
+        aside = path.with_extension(format!("{name}-{number}.db"));
+    }
     for suffix in ["-wal", "-shm"] {
         let (from, to) = (with_suffix(path, suffix), with_suffix(&aside, suffix));
         // Without a log of its own the database must not get that of the one that was set aside before.

@@ -76,7 +76,7 @@ impl Spool {
     /// The SEQ behind which a run began, if the content belongs to it.
     fn begun(&self, run: u32) -> Option<u32> {
         let [before, current, last] = self.numbers(0)?;
-        // Run 0 means that the number on the card was written by a person or an older program.
+        // Run 0 means that the number on the card was written by a person.
         (run != 0 && [before, current].contains(&run)).then_some(last)
     }
 

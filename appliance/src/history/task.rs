@@ -199,7 +199,7 @@ impl Task {
         }
         let begun = match self.writer.store(self.waiting.iter()) {
             Ok(()) => return Ok(None),
-            Err(error) if error.damaged => self.writer.begin_anew(&error)?,
+            Err(error) if error.aside.is_some() => self.writer.begin_anew(&error)?,
             Err(error) => {
                 self.history.keeper.make_room();
                 return Err(error);

@@ -219,8 +219,8 @@ fn results_without_a_clock_are_dated_by_a_browser_for_the_whole_of_that_start_an
     let mut writer = open_writer(state.path());
     let of = |seq: u32, boot: &str| Entry {
         time_utc_us: None,
-        uptime_s: Some(10 * seq),
-        boot_id: Some(boot.into()),
+        uptime_s: 10 * seq,
+        boot_id: boot.into(),
         ..entry(seq, 1, Verdict::Pass)
     };
     let clocked = Entry {
@@ -317,22 +317,6 @@ fn a_damaged_database_is_set_aside_with_a_message_and_a_new_one_begun() {
         writer.store(some(2).iter()).unwrap();
         assert_eq!(seqs(&Reader::of(state.path()), &Filter::default()), [2, 1]);
     }
-}
-
-#[test]
-fn a_result_of_an_older_program_is_compared_without_what_it_did_not_store() {
-    let replayed = entry(1, 1, Verdict::Pass);
-    let mut stored = replayed.clone();
-    for gauge in &mut stored.gauges {
-        (gauge.sigma, gauge.uncertainty, gauge.decision) = (Some(0.5), None, 3 | 16);
-    }
-    stored.flags = crate::station::result::flag::DOUBTFUL;
-    assert_eq!(difference(&stored, &replayed), None);
-    stored.gauges[0].value = Some(0.0);
-    assert!(difference(&stored, &replayed).is_some());
-    stored.clone_from(&replayed);
-    stored.gauges[0].uncertainty = Some(9.0);
-    assert!(difference(&stored, &replayed).is_some());
 }
 
 #[test]
@@ -497,21 +481,56 @@ fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_i
 }
 
 #[test]
-fn a_database_of_an_older_program_is_read_as_it_is_and_completed_when_it_is_written() {
+fn a_history_of_another_version_is_set_aside_whole_and_a_new_one_with_an_id_of_its_own_begins() {
     let folder = tempfile::tempdir().unwrap();
-    open_writer(folder.path()).store(some(2).iter()).unwrap();
-    let older = rusqlite::Connection::open(folder.path().join(DATABASE)).unwrap();
-    let columns = "ALTER TABLE result DROP COLUMN uptime_s; ALTER TABLE result DROP COLUMN boot_id;
-        ALTER TABLE result DROP COLUMN unkept; ALTER TABLE result DROP COLUMN placement; DROP TABLE start";
-    older.execute_batch(columns).unwrap();
-    drop(older);
+    let path = folder.path().join(DATABASE);
     let reader = Reader::of(folder.path());
-    let unknown = |entry: &Entry| entry.uptime_s.is_none() && entry.boot_id.is_none();
-    let before = reader.results(&Filter::default()).unwrap();
-    assert!(before.len() == 2 && before.iter().all(unknown));
+    open_writer(folder.path()).store(some(2).iter()).unwrap();
+    let mut ids = vec![reader.id().unwrap()];
+    for (version, name) in [
+        (1, "history.version-1.db"),
+        (1, "history.version-1-2.db"),
+        (3, "history.version-3.db"),
+    ] {
+        let other = rusqlite::Connection::open(&path).unwrap();
+        other.pragma_update(None, "user_version", version).unwrap();
+        drop(other);
+        let words = reader.results(&Filter::default()).unwrap_err().to_string();
+        let expected =
+            format!("version {version}, this program reads 2: the station sets it aside");
+        assert!(words.contains(&expected), "{words}");
+        let (mut writer, complaint) = Writer::open(&path, ENOUGH).unwrap();
+        let complaint = complaint.unwrap();
+        assert!(
+            complaint.contains(&expected) && complaint.contains(name),
+            "{complaint}"
+        );
+        assert_eq!(seqs(&reader, &Filter::default()), [0; 0]);
+        writer.store(some(2).iter()).unwrap();
+        ids.push(reader.id().unwrap());
+        let aside = rusqlite::Connection::open(folder.path().join(name)).unwrap();
+        let count = aside.query_row("SELECT count(*) FROM result", (), |row| row.get(0));
+        assert_eq!(count, Ok(2));
+        let id = aside.query_row("SELECT id FROM history", (), |row| row.get(0));
+        assert_eq!(id.as_ref(), Ok(&ids[ids.len() - 2]));
+    }
+    let digits =
+        |id: &String| id.len() == 32 && id.bytes().all(|b| b"0123456789abcdef".contains(&b));
+    assert!(ids.iter().all(digits), "{ids:?}");
+    // The same at every start, and for no two databases.
+    drop(open_writer(folder.path()));
+    assert_eq!(&reader.id().unwrap(), ids.last().unwrap());
+    ids.sort();
+    ids.dedup();
+    assert_eq!(ids.len(), 4);
+}
+
+#[test]
+fn all_that_may_be_unknown_of_a_result_is_stored_and_read_again() {
+    let folder = tempfile::tempdir().unwrap();
     let new = Entry {
-        uptime_s: Some(61),
-        boot_id: Some("0000b007".into()),
+        uptime_s: 61,
+        boot_id: "0000b007".into(),
         placement: Some(Placement {
             values: [Some(0.1), None, Some(-1.0 / 3.0), None, None, Some(1e-9)],
             reach_mm: 0.1 + 0.2,
@@ -520,15 +539,10 @@ fn a_database_of_an_older_program_is_read_as_it_is_and_completed_when_it_is_writ
         unkept: Some("off".into()),
         ..entry(3, 1, Verdict::Pass)
     };
-    assert!(reader.starts().is_err());
     let mut writer = open_writer(folder.path());
     writer.store(std::iter::once(&new)).unwrap();
-    writer.date("0000b007", 1).unwrap();
-    assert_eq!(reader.starts().unwrap().len(), 1);
-    drop(writer);
-    let after = reader.results(&Filter::default()).unwrap();
-    assert_eq!(after[0], new);
-    assert_eq!(after[1..], before);
+    let reader = Reader::of(folder.path());
+    assert_eq!(reader.results(&Filter::default()).unwrap(), [new]);
 }
 
 #[test]
@@ -540,7 +554,7 @@ fn a_full_card_stores_nothing_by_halves_and_everything_when_there_is_room() {
     let many = some(500);
     let error = writer.store(many.iter()).unwrap_err();
     assert!(
-        error.to_string().contains("full") && !error.damaged,
+        error.to_string().contains("full") && error.aside.is_none(),
         "{error}"
     );
     let reader = Reader::of(folder.path());
@@ -565,7 +579,7 @@ fn a_database_that_is_damaged_while_it_is_used_is_set_aside_and_nothing_stops() 
     let error = HistoryError {
         path: folder.path().join(DATABASE),
         reason: "database disk image is malformed".into(),
-        damaged: true,
+        aside: Some(schema::DAMAGED.into()),
     };
     let said = writer.begin_anew(&error).unwrap();
     assert!(said.contains("history.damaged.db"), "{said}");

@@ -78,8 +78,7 @@ pub fn why_no_frames(entry: &Entry) -> Option<String> {
         None if entry.verdict == Verdict::Pass => "those of a part that passes are not kept",
         None if entry.stages.is_empty() => "nothing was measured",
         None => {
-            "it is not known why: they are still being written, the station ended before that, or an older program \
-             stored the result"
+            "it is not known why: they are still being written, or the station ended before that"
         }
     };
     Some(words.into())

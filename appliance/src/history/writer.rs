@@ -22,16 +22,16 @@ pub struct Writer {
 }
 
 impl Writer {
-    /// Opens the database; a damaged one is set aside and a new one begun: then the answer says so. `limit` is the most results
-    /// that are kept.
+    /// Opens the database; one that is damaged or of another version is set aside and a new one
+    /// begun: then the answer says so. `limit` is the most results that are kept.
     ///
     /// # Errors
     /// If it can be neither opened nor set aside.
     pub fn open(path: &Path, limit: u64) -> Result<(Self, Option<String>), HistoryError> {
         match Self::open_sound(path, limit) {
-            Err(error) if error.damaged => {
-                let aside = set_aside(path, &error.reason)?;
-                Ok((Self::open_sound(path, limit)?, Some(said(&error, &aside))))
+            Err(error) if error.aside.is_some() => {
+                let said = set_aside(&error)?;
+                Ok((Self::open_sound(path, limit)?, Some(said)))
             }
             opened => Ok((opened?, None)),
         }
@@ -43,7 +43,7 @@ impl Writer {
             return Err(HistoryError {
                 path: path.to_path_buf(),
                 reason,
-                damaged: true,
+                aside: Some(schema::DAMAGED.into()),
             });
         }
         let count = connection
@@ -65,10 +65,10 @@ impl Writer {
         let failed = |error| HistoryError::of(&self.path, &error);
         // Closed before it is renamed: a log that is still open would be taken for the new database's.
         self.connection = Connection::open_in_memory().map_err(failed)?;
-        let aside = set_aside(&self.path, &why.reason)?;
+        let said = set_aside(why)?;
         self.connection = schema::open(&self.path)?;
         self.count = 0;
-        Ok(said(why, &aside))
+        Ok(said)
     }
 
     /// The most pages that the database may have.
@@ -204,15 +204,23 @@ impl Writer {
     }
 }
 
-fn set_aside(path: &Path, reason: &str) -> Result<PathBuf, HistoryError> {
-    schema::set_aside(path).map_err(|failed| HistoryError {
-        path: path.to_path_buf(),
-        reason: format!("{reason}; and it cannot be set aside: {failed}"),
-        damaged: false,
-    })
-}
-
-fn said(error: &HistoryError, aside: &Path) -> String {
-    let aside = aside.display();
-    format!("{error}; it is kept as {aside} and a new history begins")
+/// Sets the database of an error aside; answers with a line for the log.
+fn set_aside(error: &HistoryError) -> Result<String, HistoryError> {
+    let HistoryError {
+        path,
+        reason,
+        aside,
+    } = error;
+    let name = aside.as_deref().unwrap_or(schema::DAMAGED);
+    match schema::set_aside(path, name) {
+        Ok(aside) => Ok(format!(
+            "{error}; it is kept as {} and a new history begins",
+            aside.display()
+        )),
+        Err(failed) => Err(HistoryError {
+            path: path.clone(),
+            reason: format!("{reason}; and it cannot be set aside: {failed}"),
+            aside: None,
+        }),
+    }
 }

@@ -140,7 +140,7 @@ pub(crate) fn seal(
 /// arrays read so far.
 ///
 /// # Errors
-/// In words, with the remedy: it is not a recipe, of a newer version, or changed.
+/// In words, with the remedy: it is not a recipe, of another version, or changed.
 pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), String> {
     let mut zip = Members::open(source, MAX_MEMBERS).map_err(broken)?;
     let (file, zeroed) = read_manifest(&mut zip)?;
@@ -226,7 +226,7 @@ fn arrays_of<R: Read + Seek>(zip: &Members<R>) -> Vec<String> {
 /// Reads only the manifest of a recipe, without checking the fingerprint: for lists.
 ///
 /// # Errors
-/// In words, with the remedy: it is not a recipe, or of a newer version.
+/// In words, with the remedy: it is not a recipe, or of another version.
 pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, String> {
     let mut zip = Members::open(file, MAX_MEMBERS).map_err(broken)?;
     Ok(read_manifest(&mut zip)?.0)
@@ -235,9 +235,9 @@ pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, String> {
 /// Reads the text of a manifest and checks the bounds of its values.
 ///
 /// # Errors
-/// In words, with the remedy: it is not a manifest, of a newer version, or a value is out of its bounds.
+/// In words, with the remedy: it is not a manifest, of another version, or a value is out of its bounds.
 pub fn parse(text: &str) -> Result<RecipeFile, String> {
-    /// What every version has, read first: a newer version is reported as such, whatever else it contains.
+    /// What every version has, read first: another version is reported as such, whatever else it contains.
     #[derive(serde::Deserialize)]
     struct Header {
         #[serde(default)]
@@ -252,14 +252,11 @@ pub fn parse(text: &str) -> Result<RecipeFile, String> {
             "recipe.json: format is {format}, not {FORMAT:?}"
         )));
     }
-    match version.as_u64() {
-        Some(version) if version > u64::from(VERSION) => {
-            return Err(format!(
-                "version {version} is newer than this program reads ({VERSION}): update fringed"
-            ));
-        }
-        Some(1) => {}
-        _ => return Err(broken(format!("recipe.json: version is {version}"))),
+    if version != VERSION {
+        let version = shortened(&version.to_string());
+        return Err(format!(
+            "recipe.json: version is {version}, this program reads {VERSION}: teach the part again"
+        ));
     }
     let file: RecipeFile =
         serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;

@@ -8,13 +8,12 @@ use super::file::{
     GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile, UnseenFile,
 };
 use crate::head::calibration::CalibrationSigma;
-use crate::head::exposing::MAX_GAIN;
 use crate::station::MAX_GAUGES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use algo::phase::LeastModulation;
 use hal::bounds::{
-    FINGERPRINT_DIGITS, MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM,
-    MAX_SHIFT_TURNS, MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, length, text, within,
+    FINGERPRINT_DIGITS, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS, MAX_SIDE,
+    MIN_NOISE_COUNTS, RATIOS, length, text, within,
 };
 
 /// The longest name of a recipe, region or gauge, in characters.
@@ -78,30 +77,21 @@ impl RecipeFile {
         let [low, high] = self.range_mm;
         within("range_mm", low, -MAX_RANGE_MM, MAX_RANGE_MM)?;
         within("range_mm", high, low, MAX_RANGE_MM)?;
-        if let Some(exposure) = self.exposure_us {
-            within("exposure_us", exposure, 1.0, MAX_EXPOSURE_US)?;
-        }
-        if let Some(gain) = self.gain {
-            within("gain", gain, 0.0, MAX_GAIN)?;
+        if let Some(exposing) = &self.exposing {
+            exposing.check_bounds("exposing")?;
         }
         within("exposures", self.exposures, 1, MAX_EXPOSURES)?;
         let (least, most) = (MIN_NOISE_COUNTS, MAX_NOISE_COUNTS);
         within("noise_counts", self.noise_counts, least, most)?;
-        if let Some(counts) = self.read_noise_counts {
-            within("read_noise_counts", counts, 0.0, most)?;
-        }
-        if let Some(shot) = self.shot_noise {
-            within("shot_noise", shot, 0.0, most)?;
-        }
+        within("read_noise_counts", self.read_noise_counts, 0.0, most)?;
+        within("shot_noise", self.shot_noise, 0.0, most)?;
         if let Some(counts) = self.golden_offset_counts {
             let full_scale = f64::from((1_u32 << camera.bit_depth) - 1);
             within("golden_offset_counts", counts, 0.0, full_scale)?;
         }
         within("golden_captures", self.golden_captures, 1, MAX_CAPTURES)?;
-        if let Some(counts) = self.least_modulation {
-            let [least, most] = LeastModulation::BOUNDS;
-            within("least_modulation", counts, least, most)?;
-        }
+        let [least, most] = LeastModulation::BOUNDS;
+        within("least_modulation", self.least_modulation, least, most)?;
         if let Some(CalibrationSigma {
             height_mm,
             length_mm,

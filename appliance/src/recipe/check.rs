@@ -115,7 +115,7 @@ impl Recipe {
     /// Reads and checks a recipe file's bytes.
     ///
     /// # Errors
-    /// In words, with the remedy: it is broken, of a newer version, changed, or inconsistent.
+    /// In words, with the remedy: it is broken, of another version, changed, or inconsistent.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
         Self::read(Cursor::new(bytes), bytes.len() as u64)
     }
@@ -294,25 +294,13 @@ impl From<&RecipeFile> for Conditions {
             raster: (projector.width, projector.height),
             pattern: file.pattern.clone(),
             range_mm: file.range_mm,
-            exposing: file
-                .exposure_us
-                .zip(file.gain)
-                .map(|(exposure_us, gain)| Exposing {
-                    exposure_us: exposure_us.round() as u32,
-                    gain,
-                }),
+            exposing: file.exposing,
             exposures: file.exposures,
             noise_counts: file.noise_counts,
-            noise: SampleNoise::new(
-                file.read_noise_counts.unwrap_or(file.noise_counts),
-                file.shot_noise.unwrap_or(0.0),
-            ),
+            noise: SampleNoise::new(file.read_noise_counts, file.shot_noise),
             golden_captures: file.golden_captures,
             golden_offset_counts: file.golden_offset_counts,
-            least_modulation: file
-                .least_modulation
-                .and_then(LeastModulation::new)
-                .unwrap_or_default(),
+            least_modulation: LeastModulation::new(file.least_modulation).unwrap_or_default(),
             calibration: file
                 .calibration_sigma
                 .map_or_else(CalibrationError::default, |sigma| CalibrationError {

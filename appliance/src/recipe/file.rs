@@ -1,8 +1,9 @@
-//! The manifest `recipe.json` of a recipe, version 1. Frozen: see `docs/formats.md`.
+//! The manifest `recipe.json` of a recipe, version 2. Frozen: see `docs/formats.md`.
 
 use super::comparison::ComparisonFile;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::CalibrationSigma;
+use crate::head::exposing::Exposing;
 use algo::pattern::Shot;
 use algo::units::AbsolutePhase;
 use hal::replay::recording::PatternSpec;
@@ -10,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 /// The name of the format.
 pub const FORMAT: &str = "fringed-recipe";
-/// The version that this program writes, and the newest that it reads.
-pub const VERSION: u32 = 1;
+/// The version that this program writes, and the only one that it reads.
+pub const VERSION: u32 = 2;
 
 /// Everything in a recipe that is not an array.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -46,68 +47,54 @@ pub struct RecipeFile {
     /// Which of them is projected first in production, counted from 0; longer ones may follow in the same cycle.
     pub production: usize,
     /// Whether a cycle begins with the fringe and its complement at ratio 1, before the sequence for production.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub two_frames: bool,
     /// How far a part may lie from where it was taught, in any direction, mm.
     pub placement_tolerance_mm: f64,
     /// Whether the part's motion is measured and compensated before it is gauged.
-    #[serde(default, skip_serializing_if = "AlignmentKind::is_none")]
     pub alignment: AlignmentKind,
     /// Working range of z in mm.
     pub range_mm: [f64; 2],
-    /// Exposure in µs that the head was set to; `None` where that is not known: taught from a recording, or by an older program.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub exposure_us: Option<f64>,
-    /// Gain that the camera was set to; `None` as the exposure.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub gain: Option<f64>,
-    /// Each frame is exposed so many times as long as the head is set to, 1 to 4; 1, which is left out, in recipes of older programs.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    /// Exposure and gain that the camera was set to; `None` where it was taught from a recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposing: Option<Exposing>,
+    /// Each frame is exposed so many times as long as the head is set to, 1 to 4.
     pub exposures: u32,
     /// σ of one sample in counts, at half the light of white.
     pub noise_counts: f64,
-    /// σ of one sample without light, counts; `None` in recipes of older programs: σ is `noise_counts` whatever the light.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub read_noise_counts: Option<f64>,
+    /// σ of one sample without light, counts.
+    pub read_noise_counts: f64,
     /// Variance of a sample in counts² that a count of golden's modulation adds.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub shot_noise: Option<f64>,
+    pub shot_noise: f64,
     /// Median of the mean of each pixel's samples over golden's surface, counts: with it a pattern that is blurred is told from one that is too dark.
-    /// `None` where it was taught from a recording and in recipes of older programs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// `None` where it was taught from a recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub golden_offset_counts: Option<f64>,
-    /// Captures that golden is the mean of; 1, which is left out, where it was taught from a recording and in recipes of older programs.
-    #[serde(default = "one", skip_serializing_if = "is_one")]
+    /// Captures that golden is the mean of; 1 where it was taught from a recording.
     pub golden_captures: usize,
-    /// The least modulation that is trusted, in counts of an 8-bit sample; `None` in recipes of older programs: 16.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub least_modulation: Option<f64>,
-    /// σ by the uncertainty of that calibration; `None` where it is not known, and in recipes of older programs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The least modulation that is trusted, in counts of an 8-bit sample.
+    pub least_modulation: f64,
+    /// σ by the uncertainty of that calibration; `None` where it is not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration_sigma: Option<CalibrationSigma>,
     /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and `height_curvature.npy` give the height accurately.
     pub expansion_range_turns: f64,
     /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.
     pub min_coverage: f64,
-    /// A value inside its limits but nearer to one than this many times its uncertainty u is neither PASS nor FAIL; 0, which is left
-    /// out, in recipes of older programs.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    /// A value inside its limits but nearer to one than this many times its uncertainty u is neither PASS nor FAIL.
     pub guard_k: f64,
-    /// Whether it only measures: no gauge has a limit that a part can miss. Left out if it judges.
-    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    /// Whether it only measures: no gauge has a limit that a part can miss.
     pub judges_nothing: bool,
     /// Polygons in camera pixels.
     pub regions: Vec<RegionFile>,
     /// At most 16.
     pub gauges: Vec<GaugeFile>,
     /// Fixed against adaptive pattern, as measured when it was taught; `None` if it was taught from a recording.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub comparison: Option<ComparisonFile>,
-    /// The deviation of good parts, as predicted when it was taught; `None` in recipes of older programs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The deviation of good parts, as predicted when it was taught; `None` where the limits are not those that teaching set.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub good_parts: Option<GoodPartsFile>,
     /// Per gauge that was tried with golden at other places, how many good parts would pass; empty if nothing was tried.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub tried: Vec<TriedFile>,
 }
 
@@ -131,22 +118,6 @@ impl TriedFile {
             self.gauge
         )
     }
-}
-
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde passes a reference"
-)]
-fn is_zero(number: &f64) -> bool {
-    *number == 0.0
-}
-
-fn one<T: From<u8>>() -> T {
-    1.into()
-}
-
-fn is_one<T: From<u8> + PartialEq>(number: &T) -> bool {
-    *number == one()
 }
 
 /// A camera's frames.
@@ -214,12 +185,11 @@ pub struct SequenceFile {
     /// Share of the golden surface whose phase stays within the sequence's reach for every
     /// placement inside the tolerance.
     pub safe_share: f64,
-    /// RMS of the periodic error of the mean height over a square of 9 × 9 pixels by it, where it is largest, mm; `None` where it was taught from a recording
-    /// and in recipes of older programs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// RMS of the periodic error of the mean height over a square of 9 × 9 pixels by it, where it is largest, mm; `None` where it was taught from a recording.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub ripple_mm: Option<f64>,
-    /// How often it gets a fringe order wrong unseen; `None` in recipes of older programs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// How often it gets a fringe order wrong unseen; `None` where it cannot be unwrapped.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub unseen_orders: Option<UnseenFile>,
 }
 
@@ -310,21 +280,13 @@ pub struct GaugeFile {
 }
 
 /// How a part's motion against the taught one is compensated before it is gauged.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AlignmentKind {
     /// Not at all.
-    #[default]
     None,
     /// As a small rigid motion.
     Rigid,
-}
-
-impl AlignmentKind {
-    /// Whether it is [`Self::None`].
-    pub fn is_none(&self) -> bool {
-        *self == Self::None
-    }
 }
 
 /// An axis of the world.

@@ -157,19 +157,22 @@ mod tests {
     use super::*;
     use crate::recipe::Recipe;
     use crate::recipe::archive::{self, Arrays};
+    use crate::recipe::file::{FORMAT, VERSION};
     use serde_json::json;
     use std::io::Cursor;
 
     /// A small whole recipe.
     fn packed(number: u16, name: &str, calibration: &str) -> Vec<u8> {
         let file = json!({
-            "format": "fringed-recipe", "version": 1, "fingerprint": "", "number": number, "part_number": "", "name": name,
+            "format": FORMAT, "version": VERSION, "fingerprint": "", "number": number, "part_number": "", "name": name,
             "taught_by": "a test", "taught_at_unix_s": 0, "calibration": calibration,
             "camera": { "width": 4, "height": 4, "bit_depth": 8 }, "projector": { "width": 8, "height": 8 },
             "pattern": { "kind": "vertical", "fringes": 2.0 },
             "sequences": [{ "kind": "full", "frames": [[1.0, 0.0], [1.0, 0.25], [1.0, 0.5], [1.0, 0.75]], "sigma_mm": 0.01, "safe_share": 1.0 }],
-            "production": 0, "placement_tolerance_mm": 1.0, "range_mm": [0.0, 1.0], "noise_counts": 1.0,
-            "expansion_range_turns": 0.5, "min_coverage": 0.8,
+            "production": 0, "two_frames": false, "placement_tolerance_mm": 1.0, "alignment": "none", "range_mm": [0.0, 1.0],
+            "exposures": 1, "noise_counts": 1.0, "read_noise_counts": 1.0, "shot_noise": 0.0, "golden_captures": 1,
+            "least_modulation": 16.0, "expansion_range_turns": 0.5, "min_coverage": 0.8, "guard_k": 0.0,
+            "judges_nothing": false, "tried": [],
             "regions": [{ "name": "frame", "polygon": [[-0.5, -0.5], [3.5, -0.5], [3.5, 3.5], [-0.5, 3.5]] }],
             "gauges": [{ "name": "coverage", "region": "frame", "measures": { "kind": "coverage" }, "low": 0.5 }],
         });
@@ -354,5 +357,25 @@ mod tests {
         assert_eq!(place.store.free(), Some(3));
         fs::write(place.folder.path().join("0003.recipe"), "damaged").unwrap();
         assert_eq!(place.store.free(), Some(5));
+    }
+
+    #[test]
+    fn a_recipe_of_another_version_is_refused_with_the_remedy_and_stays_as_it_is() {
+        let place = Place::with(&["first"]);
+        let (mut file, recipe) =
+            Recipe::read_to_edit(Cursor::new(packed(7, "first", "c")), u64::MAX).unwrap();
+        for version in [1, VERSION + 1] {
+            file.version = version;
+            let (bytes, _) = archive::pack(&file, &recipe.arrays).unwrap();
+            let expected =
+                format!("version is {version}, this program reads 2: teach the part again");
+            let words = Recipe::from_bytes(&bytes).unwrap_err();
+            assert!(words.contains(&expected), "{words}");
+            fs::write(place.file(""), &bytes).unwrap();
+            let error = place.store.load(7).unwrap_err();
+            assert!(matches!(error, LoadError::Unfit { .. }), "{error}");
+            assert!(error.to_string().contains(&expected), "{error}");
+            assert_eq!(fs::read(place.file("")).unwrap(), bytes);
+        }
     }
 }

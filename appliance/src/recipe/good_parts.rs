@@ -62,39 +62,23 @@ pub struct GoodPartsFile {
     /// Share of the pixels that are too noisy for the limit to be compared at all.
     pub left_out: f64,
     /// Share of the surface, by its area, that is too noisy for the limit, and so counts with less weight.
-    #[serde(default)]
     pub weighed: f64,
     /// The least of these weights; 1 where there are none.
-    #[serde(default = "full")]
     pub least_weight: f64,
     /// The side of the squares that all of this is of, pixels.
-    #[serde(default = "largest_side")]
     pub smoothing_px: usize,
     /// The largest side of the squares about the pixels where that would be too noisy; 0 where there are none.
-    #[serde(default)]
     pub wider_px: usize,
     /// Share of the compared pixels that these are about.
-    #[serde(default)]
     pub wider: f64,
     /// Diameter of a dent that is seen at nine tenths of its depth in squares of `smoothing_px` where the part faces the camera, mm; 0
     /// if not known. U says nothing of narrower ones.
-    #[serde(default)]
     pub dent_mm: f64,
     /// The largest deviation of good parts that lie anywhere within the placement tolerance: median and spread, mm; 0 if it was not
     /// tried.
-    #[serde(default)]
     pub displaced_mm: f64,
     /// See above.
-    #[serde(default)]
     pub displaced_scatter_mm: f64,
-}
-
-const fn full() -> f64 {
-    1.0
-}
-
-const fn largest_side() -> usize {
-    SIDES[SIDES.len() - 1]
 }
 
 /// What is known of the noise of a taught part.

@@ -141,7 +141,7 @@ impl StateFolder {
 pub struct Counted {
     /// The SEQ.
     pub last: u32,
-    /// Random per start; 0 where a person or an older program wrote the number.
+    /// Random per start; 0 where a person wrote the number.
     pub run: u32,
 }
 
@@ -186,7 +186,7 @@ impl Counter {
                 file.write_all(text.as_bytes())?;
                 file.sync_data()
             }
-            // The first time, or a file of an older program or a person.
+            // The first time, or a file that a person wrote.
             _ => write_whole(&self.file, text.as_bytes()),
         }
     }

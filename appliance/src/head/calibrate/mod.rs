@@ -187,7 +187,7 @@ fn reference(
     Ok(ReferenceFile {
         pitch_px: PLATE_PITCH,
         models_off_px,
-        plane: Some(PlaneModel { xi, eta }),
+        plane: PlaneModel { xi, eta },
         vertical: map("reference_vertical", vertical),
         horizontal: map("reference_horizontal", horizontal),
     })

@@ -1,10 +1,8 @@
 //! Bounds of every value of `calibration.json`. Whether the models are usable cameras is checked by the geometry.
 
 use super::file::{CalibrationFile, MapFile};
-use crate::head::exposing::MAX_GAIN;
 use hal::bounds::{
-    MAX_EXPOSURE_US, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS, fingerprint,
-    length, text, within,
+    MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS, fingerprint, length, text, within,
 };
 
 /// Lowest temperature of a head, °C.
@@ -63,9 +61,7 @@ impl CalibrationFile {
             within("noise.shot", noise.shot, 0.0, most)?;
             length("noise.levels", noise.levels.len(), 0, MAX_LEVELS)?;
             if let Some(exposing) = &noise.exposing {
-                let exposure = f64::from(exposing.exposure_us);
-                within("noise.exposing.exposure_us", exposure, 0.0, MAX_EXPOSURE_US)?;
-                within("noise.exposing.gain", exposing.gain, 0.0, MAX_GAIN)?;
+                exposing.check_bounds("noise.exposing")?;
             }
             for level in &noise.levels {
                 within("noise.levels.level", level.level, 0.0, most)?;
@@ -93,9 +89,7 @@ impl CalibrationFile {
         let (pitch, off) = (reference.pitch_px, reference.models_off_px);
         within("reference.pitch_px", pitch, 1.0, f64::from(MAX_SIDE))?;
         within("reference.models_off_px", off, 0.0, f64::from(MAX_SIDE))?;
-        if let Some(plane) = &reference.plane {
-            plane.check_bounds("reference.plane")?;
-        }
+        reference.plane.check_bounds("reference.plane")?;
         reference.vertical.check_bounds("reference.vertical")?;
         reference.horizontal.check_bounds("reference.horizontal")
     }

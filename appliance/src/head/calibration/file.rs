@@ -19,7 +19,7 @@ use std::time::Duration;
 
 /// The name of the format.
 pub const FORMAT: &str = "fringed-calibration";
-/// Its version. In version 1, timing, noise, response and contrast are required.
+/// The version that this program writes, and the only one that it reads.
 pub const VERSION: u32 = 2;
 /// Stands in place of the checksum while it is computed.
 const NO_CHECKSUM: &str = "0000000000000000000000000000000000000000000000000000000000000000";
@@ -43,7 +43,7 @@ pub struct CalibrationFile {
     /// When it was made, 0 if the clock was not synchronised.
     pub made_at_unix_s: u64,
     /// Temperature of the head, if it was given.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub temperature_c: Option<f64>,
     /// Where the models come from.
     pub models_from: String,
@@ -52,25 +52,24 @@ pub struct CalibrationFile {
     /// The projector.
     pub projector: ProjectorFile,
     /// Flips, light and stamps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub timing: Option<TimingFile>,
     /// The camera's noise.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub noise: Option<NoiseFile>,
     /// The light of each of the 256 grey levels, 0 for black, 255 for white.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub response: Option<Vec<f64>>,
     /// Contrast of fringes against their pitch.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub contrast: Option<ContrastFile>,
     /// What heights go by.
-    #[serde(default, skip_serializing_if = "HeightsBy::is_models")]
     pub heights_by: HeightsBy,
     /// The reference phase maps, if a plate was measured.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub reference: Option<ReferenceFile>,
     /// How the models were made, if they come from poses of a board.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub geometry: Option<GeometryFile>,
 }
 
@@ -111,12 +110,12 @@ pub struct TimingFile {
     /// What the camera's stamps mark.
     pub stamp: Stamp,
     /// From the moment that they mark to the stamps; of a triggered camera only.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub stamp_late_ns: Option<u64>,
     /// From the end of an exposure to the end of its readout.
     pub readout_ns: u64,
     /// Refreshes per pattern at which a triggered camera was proven to lose no trigger.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub refreshes: Option<u32>,
 }
 
@@ -146,8 +145,8 @@ pub struct NoiseFile {
     pub shot: f64,
     /// The measured levels.
     pub levels: Vec<LevelFile>,
-    /// The exposure and gain at which it was measured; `None` in files of older programs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    /// The exposure and gain at which it was measured; `None` where they are not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub exposing: Option<Exposing>,
 }
 
@@ -208,8 +207,7 @@ pub struct ReferenceFile {
     /// RMS distance of the models from the measured plane, projector pixels.
     pub models_off_px: f64,
     /// The projector points of the plane, as the maps say.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plane: Option<PlaneModel>,
+    pub plane: PlaneModel,
     /// Under vertical fringes.
     pub vertical: MapFile,
     /// Under horizontal fringes.
@@ -287,16 +285,13 @@ impl CalibrationFile {
                 clipped(&header.format)
             ));
         }
-        if !(1..=VERSION).contains(&header.version) {
+        if header.version != VERSION {
             return Err(format!(
-                "it has version {}, this program reads {VERSION}: update the program, or calibrate anew",
+                "it has version {}, this program reads {VERSION}: calibrate anew",
                 header.version
             ));
         }
         let file: Self = serde_json::from_slice(bytes).map_err(damaged)?;
-        if let (1, [first, ..]) = (file.version, &file.missing()[..]) {
-            return Err(format!("it is damaged: it has no {first}: calibrate anew"));
-        }
         if file.checksum != file.checksummed() {
             return Err(
                 "it does not agree with its checksum: it is damaged, or was edited; calibrate anew"
@@ -309,12 +304,15 @@ impl CalibrationFile {
 
     /// What the measured reference plane is off the models.
     fn plane(&self) -> Option<PlaneModel> {
-        self.reference.as_ref()?.plane.clone()
+        Some(self.reference.as_ref()?.plane.clone())
     }
 
     fn check(&self) -> Result<(), String> {
-        if self.heights_by == HeightsBy::Measured && self.plane().is_none() {
-            return Err("heights_by is \"measured\", and reference.plane is missing: calibrate anew with a plate".into());
+        if self.heights_by == HeightsBy::Measured && self.reference.is_none() {
+            return Err(
+                "heights_by is \"measured\", and reference is missing: calibrate anew with a plate"
+                    .into(),
+            );
         }
         if self.calibration()?.fingerprint() != self.fingerprint {
             return Err("its fingerprint is not that of its content: calibrate anew".into());
@@ -378,18 +376,6 @@ impl CalibrationFile {
     /// # Errors
     /// If a number in it is not finite or the response cannot be inverted.
     pub fn sealed(mut self) -> Result<(Self, Vec<u8>), String> {
-        // The oldest version that can hold it, so that a complete calibration can be read by older programs as well.
-        let newer =
-            |timing: &TimingFile| timing.refreshes.is_some() || timing.stamp_late_ns.is_some();
-        let first = self.missing().is_empty()
-            && self.geometry.is_none()
-            && self.plane().is_none()
-            && !self.timing.as_ref().is_some_and(newer)
-            && self
-                .noise
-                .as_ref()
-                .is_none_or(|noise| noise.exposing.is_none());
-        self.version = if first { 1 } else { VERSION };
         // The bounds ask for a fingerprint's form before there is one.
         self.fingerprint = NO_CHECKSUM.into();
         self.fingerprint = self.calibration()?.fingerprint();

@@ -27,21 +27,13 @@ use sha2::{Digest, Sha256};
 use sim::Scenario;
 
 /// What heights go by.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum HeightsBy {
     /// The models of camera and projector.
-    #[default]
     Models,
     /// The models, corrected by what the measured reference plane is off them (Peng & Gupta 2008, eqs. 10–11).
     Measured,
-}
-
-impl HeightsBy {
-    /// Whether it is what files without the key have.
-    pub fn is_models(&self) -> bool {
-        *self == Self::Models
-    }
 }
 
 /// The calibration of a head. Its models are checked: each pixel has one ray.

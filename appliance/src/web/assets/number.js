@@ -69,7 +69,6 @@ export function about(entry) {
 export function moment(entry, boot) {
   const utc_us = entry.utc_us || entry.time_utc_us || entry.browser_utc_us;
   if (!utc_us) {
-    if (entry.uptime_s === null || entry.uptime_s === undefined) return "time not known";
     const two = (number) => String(Math.floor(number)).padStart(2, "0");
     const since = `${Math.floor(entry.uptime_s / 3600)}:${two(entry.uptime_s / 60 % 60)}:${two(entry.uptime_s % 60)}`;
     return `${since} after ${!entry.boot_id || entry.boot_id === boot ? "the" : "an earlier"} start`;

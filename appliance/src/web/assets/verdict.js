@@ -15,12 +15,10 @@ export function decided({ decision }) {
 }
 
 // "± 0.012 mm" and "good parts 0.026 mm", a line each: the expanded uncertainty U, and what is expected where noise alone moves the value away from 0.
-// "± –" if no σ is known. Results of older programs have σ only.
-export function uncertainty({ uncertainty: expanded, sigma, expected, unit }) {
+// "± –" if no σ is known.
+export function uncertainty({ uncertainty: expanded, expected, unit }) {
   const words = [];
-  if (typeof expanded === "number") words.push(`± ${quantity(expanded, unit, 1)}`);
-  else if (typeof sigma === "number") words.push(`σ ${quantity(sigma, unit, 1)}`);
-  else words.push("± –");
+  words.push(typeof expanded === "number" ? `± ${quantity(expanded, unit, 1)}` : "± –");
   if (typeof expected === "number") words.push(`good parts ${quantity(expected, unit, 1)}`);
   return words.map((line) => make("small", "", line));
 }
