@@ -3,12 +3,13 @@
 
 mod plans;
 
+use algo::inspect::{Basis, Measure};
 use allocation_counter::measure;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::golden::Naming;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::teach;
-use appliance::recipe::{AxisFile, ComponentFile, GaugeFile, GaugeKind, Recipe, archive};
+use appliance::recipe::{GaugeFile, Recipe, archive};
 use appliance::station::{
     ActiveRecipe, Event, Identity, Limits, Micros, Settings, Station, StationHandle,
 };
@@ -105,38 +106,21 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
 
 /// One gauge of every kind, all in one region; the step is from the region "other".
 fn gauges(region: &str) -> Vec<GaugeFile> {
-    let smoothing_px = 5;
-    let kinds = [
-        GaugeKind::Deviation { smoothing_px },
-        GaugeKind::RmsDeviation { smoothing_px },
-        GaugeKind::OutOfTolerance {
-            smoothing_px,
-            tolerance_mm: 0.1,
-        },
-        GaugeKind::Coverage,
-        GaugeKind::MeanHeight,
-        GaugeKind::Step {
-            from: "other".into(),
-        },
-        GaugeKind::Flatness { smoothing_px },
-        GaugeKind::PeakToValley { smoothing_px },
-        GaugeKind::Tilt { about: AxisFile::X },
-        GaugeKind::Volume { above_mm: 1.0 },
-        GaugeKind::Placement {
-            component: ComponentFile::Z,
-        },
-    ];
-    let gauge = |measures: GaugeKind| GaugeFile {
-        name: format!("{measures:?}"),
-        region: match measures {
-            GaugeKind::Placement { .. } => String::new(),
+    let gauge = |(at, measures): (usize, Measure)| GaugeFile {
+        name: format!("gauge {at}"),
+        region: match measures.facts().basis {
+            Basis::Motion(_) => String::new(),
             _ => region.into(),
         },
         measures,
         low: None,
         high: None,
     };
-    kinds.map(gauge).into()
+    Measure::examples()
+        .into_iter()
+        .enumerate()
+        .map(gauge)
+        .collect()
 }
 
 /// The allocations of the station for the measuring task's events of a cycle with twelve frames.

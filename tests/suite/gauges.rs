@@ -2,14 +2,16 @@
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD, long};
-use algo::inspect::{Findings, Production};
+use algo::inspect::kinds::{
+    self, Axis, Component, Coverage, Deviation, Flatness, MeanHeight, OutOfTolerance, PeakToValley,
+    RmsDeviation, Step, Tilt, Volume,
+};
+use algo::inspect::{Findings, Measure, Production};
 use algo::simd::Backend;
 use appliance::head::seam;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
-use appliance::recipe::{
-    AlignmentKind, AxisFile, ComponentFile, GaugeFile, GaugeKind, Recipe, RecipeFile, RegionFile,
-};
+use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile};
 use appliance::station::{Inspection, Unit, Verdict};
 use hal::frame::Frame;
 use sim::parts::{Plane, SheetMetal};
@@ -27,11 +29,11 @@ const ALIGNED_MM: f64 = 0.015;
 const PLATE: [[f64; 2]; 4] = [[82.0, 95.0], [130.0, 95.0], [130.0, 145.0], [82.0, 145.0]];
 const BEAD: [[f64; 2]; 4] = [[90.0, 160.0], [150.0, 160.0], [150.0, 168.0], [90.0, 168.0]];
 
-pub(crate) fn gauge(name: &str, region: &str, measures: GaugeKind) -> GaugeFile {
+pub(crate) fn gauge(name: &str, region: &str, measures: impl Into<Measure>) -> GaugeFile {
     GaugeFile {
         name: name.into(),
         region: region.into(),
-        measures,
+        measures: measures.into(),
         low: None,
         high: None,
     }
@@ -40,38 +42,38 @@ pub(crate) fn gauge(name: &str, region: &str, measures: GaugeKind) -> GaugeFile 
 /// A gauge of every kind except coverage, on the regions `plate` and `bead`.
 pub(crate) fn all_kinds(side: usize, tolerance_mm: f64) -> Vec<GaugeFile> {
     let smoothing_px = side;
-    let component = |component| GaugeKind::Placement { component };
+    let component = |component| kinds::Placement { component };
     vec![
         gauge(
             "deviation",
             "plate",
-            GaugeKind::Deviation {
+            Deviation {
                 smoothing_px: side | 1,
             },
         ),
-        gauge("mean", "plate", GaugeKind::MeanHeight),
+        gauge("mean", "plate", MeanHeight {}),
         gauge(
             "step",
             "bead",
-            GaugeKind::Step {
+            Step {
                 from: "plate".into(),
             },
         ),
-        gauge("tilt x", "plate", GaugeKind::Tilt { about: AxisFile::X }),
-        gauge("tilt y", "plate", GaugeKind::Tilt { about: AxisFile::Y }),
-        gauge("volume", "bead", GaugeKind::Volume { above_mm: 8.0 }),
-        gauge("z", "", component(ComponentFile::Z)),
-        gauge("x", "", component(ComponentFile::X)),
-        gauge("y", "", component(ComponentFile::Y)),
-        gauge("about x", "", component(ComponentFile::AboutX)),
-        gauge("about y", "", component(ComponentFile::AboutY)),
-        gauge("flatness", "plate", GaugeKind::Flatness { smoothing_px }),
-        gauge("range", "bead", GaugeKind::PeakToValley { smoothing_px }),
-        gauge("rms", "plate", GaugeKind::RmsDeviation { smoothing_px }),
+        gauge("tilt x", "plate", Tilt { about: Axis::X }),
+        gauge("tilt y", "plate", Tilt { about: Axis::Y }),
+        gauge("volume", "bead", Volume { above_mm: 8.0 }),
+        gauge("z", "", component(Component::Z)),
+        gauge("x", "", component(Component::X)),
+        gauge("y", "", component(Component::Y)),
+        gauge("about x", "", component(Component::AboutX)),
+        gauge("about y", "", component(Component::AboutY)),
+        gauge("flatness", "plate", Flatness { smoothing_px }),
+        gauge("range", "bead", PeakToValley { smoothing_px }),
+        gauge("rms", "plate", RmsDeviation { smoothing_px }),
         gauge(
             "share",
             "plate",
-            GaugeKind::OutOfTolerance {
+            OutOfTolerance {
                 smoothing_px,
                 tolerance_mm,
             },
@@ -226,7 +228,7 @@ fn findings_of_a_moved_part_depend_neither_on_strips_nor_on_threads_nor_on_the_b
     let mut bed = bed(&scenario(part.clone()));
     let taught = taught(&mut bed).unwrap();
     let mut gauges = all_kinds(5, 0.02);
-    gauges.push(gauge("coverage", "plate", GaugeKind::Coverage));
+    gauges.push(gauge("coverage", "plate", Coverage {}));
     let file = RecipeFile {
         regions: regions(PLATE, BEAD),
         gauges,
@@ -322,15 +324,15 @@ fn a_component_that_the_shape_does_not_determine_is_invalid_and_is_named() {
             gauge(
                 "z",
                 "",
-                GaugeKind::Placement {
-                    component: ComponentFile::Z,
+                kinds::Placement {
+                    component: Component::Z,
                 },
             ),
             gauge(
                 "x",
                 "",
-                GaugeKind::Placement {
-                    component: ComponentFile::X,
+                kinds::Placement {
+                    component: Component::X,
                 },
             ),
         ],

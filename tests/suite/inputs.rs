@@ -1,5 +1,7 @@
 //! Inputs of the fuzz targets: small examples, inputs that once failed, and seeded damage to the examples.
 
+use algo::inspect::Measure;
+use serde_json::json;
 use std::collections::BTreeSet;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -28,7 +30,25 @@ fn inputs(kind: &str, target: &str) -> Vec<(String, Vec<u8>)> {
             fs::read(folder.join(name)).unwrap(),
         )
     };
-    files::names(&folder).iter().map(named).collect()
+    let stored = files::names(&folder).iter().map(named).collect();
+    match (kind, target) {
+        ("corpus", "edit") => [stored, edits()].concat(),
+        _ => stored,
+    }
+}
+
+/// Edits to a gauge of every kind: a new kind needs no example of its own.
+fn edits() -> Vec<(String, Vec<u8>)> {
+    let edit = |measures: &Measure| {
+        let region = |name: &str, right: u32| json!({ "name": name, "polygon": [[0, 0], [right, 0], [right, 17], [0, 17]] });
+        let edit = json!({
+            "fingerprint": "",
+            "regions": [region("frame", 23), region("other", 10)],
+            "gauges": [{ "name": "one", "region": "frame", "measures": measures, "high": 0.5 }],
+        });
+        (format!("{measures:?}"), edit.to_string().into_bytes())
+    };
+    Measure::examples().iter().map(edit).collect()
 }
 
 fn fails(target: Target, bytes: &[u8]) -> bool {

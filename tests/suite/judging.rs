@@ -3,7 +3,9 @@
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc};
 use crate::written::program;
-use appliance::recipe::{GaugeFile, GaugeKind, RecipeFile, Store, archive};
+use algo::inspect::Basis;
+use algo::inspect::kinds::Step;
+use appliance::recipe::{GaugeFile, RecipeFile, Store, archive};
 use serde_json::{Value, json};
 use std::fs;
 use tests::files;
@@ -40,7 +42,8 @@ fn toothless() -> [(Change, &'static str); 6] {
         (
             |file| {
                 without_limits(file);
-                let coverage = |gauge: &&mut GaugeFile| gauge.measures == GaugeKind::Coverage;
+                let coverage =
+                    |gauge: &&mut GaugeFile| gauge.measures.facts().basis == Basis::Pixels;
                 let coverage = file.gauges.iter_mut().find(coverage).unwrap();
                 (coverage.low, coverage.high) = (Some(0.0), Some(1.0));
             },
@@ -50,7 +53,7 @@ fn toothless() -> [(Change, &'static str); 6] {
             |file| {
                 let gauge = &mut file.gauges[0];
                 let from = gauge.region.clone();
-                gauge.measures = GaugeKind::Step { from };
+                gauge.measures = Step { from }.into();
             },
             "from itself",
         ),
@@ -61,7 +64,7 @@ fn toothless() -> [(Change, &'static str); 6] {
                 twin.name = "twin".into();
                 file.gauges[0].region.clone_from(&file.regions[0].name);
                 let from = twin.name.clone();
-                file.gauges[0].measures = GaugeKind::Step { from };
+                file.gauges[0].measures = Step { from }.into();
                 file.regions.push(twin);
             },
             "from itself",

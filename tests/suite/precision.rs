@@ -2,9 +2,10 @@
 
 use super::gauges::{frames, gauge, plan};
 use super::placement::{Bed, bed, taught_within};
+use algo::inspect::kinds::{Coverage, Deviation};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
-use appliance::recipe::{GaugeKind, RecipeFile, SequenceKind};
+use appliance::recipe::{RecipeFile, SequenceKind};
 use appliance::station::{Inspection, Verdict};
 use sim::parts::{Defect, SheetMetal};
 use sim::scenario::Noise;
@@ -69,7 +70,7 @@ fn coverage_in_faint_light() -> Vec<f64> {
     let mut ratios = Vec::new();
     let (bed, taught) = small();
     let mut file = taught.manifest.clone();
-    file.gauges = vec![gauge("coverage", "frame", GaugeKind::Coverage)];
+    file.gauges = vec![gauge("coverage", "frame", Coverage {})];
     for share in FAINT {
         let mut scenario = bed.stage.scenario().clone();
         scenario.optics.gain *= share;
@@ -143,7 +144,7 @@ fn rejects(good: usize, dented: usize) {
     let (mut bed, taught) = small();
     let mut file = taught.manifest.clone();
     let deviation = &mut file.gauges[0];
-    deviation.measures = GaugeKind::Deviation { smoothing_px: SIDE };
+    deviation.measures = Deviation { smoothing_px: SIDE }.into();
     (deviation.low, deviation.high) = (Some(-LIMIT_MM), Some(LIMIT_MM));
     let plan = plan(&bed, &file, &taught.recipe.arrays);
     bed.head

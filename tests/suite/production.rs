@@ -3,7 +3,7 @@
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::whole_maps::{Comparison, Golden, factors};
 use algo::frame::SampleNoise;
-use algo::inspect::{Findings, Measure, Production, Region};
+use algo::inspect::{Basis, Findings, Measure, Production, Region};
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, decode};
 use algo::simd::Backend;
@@ -262,9 +262,9 @@ pub(crate) fn expected(
     measure: &Measure,
     region: &Region,
 ) -> algo::inspect::Reading {
-    match *measure {
-        Measure::Deviation { side } => comparison.deviation(region, side).unwrap(),
-        Measure::Coverage => comparison.coverage(region),
+    match measure.facts().basis {
+        Basis::Squares(side) => comparison.deviation(region, side).unwrap(),
+        Basis::Pixels => comparison.coverage(region),
         _ => panic!("a taught recipe measures no {measure:?}"),
     }
 }

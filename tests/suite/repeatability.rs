@@ -2,10 +2,11 @@
 
 use super::gauges::{all_kinds, frames, gauge, plan, regions};
 use super::placement::{Bed, TIMEOUT, bed, taught_within};
+use algo::inspect::kinds::Deviation;
 use appliance::head::calibrated::CalibratedHead;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
-use appliance::recipe::{GaugeKind, RecipeFile, SequenceFile};
+use appliance::recipe::{RecipeFile, SequenceFile};
 use appliance::station::{GaugeValue, Inspection};
 use sim::parts::{Defect, SheetMetal};
 use sim::scenario::Noise;
@@ -55,7 +56,7 @@ fn shot(_: &mut Scenario) {}
 
 /// A plan with a gauge of every kind, whose cycles begin with two frames if they are asked for.
 fn every_kind(bed: &Bed, taught: &TaughtRecipe, two_frames: bool) -> (RecipeFile, Plan) {
-    let deviation = GaugeKind::Deviation { smoothing_px: SIDE };
+    let deviation = Deviation { smoothing_px: SIDE };
     let mut gauges = all_kinds(CELL, 0.012);
     gauges[0] = gauge("on plate", "plate", deviation.clone());
     gauges.push(gauge("deviation", "frame", deviation));

@@ -14,7 +14,7 @@ mod table;
 mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
-pub use gauge::{Axis, Measure, Reading, Square, TooFine};
+pub use gauge::{Basis, Evidence, Facts, Kind, Measure, Reading, Square, TooFine, Unit, kinds};
 pub use largest::Largest;
 pub(crate) use mask::components;
 pub use mask::eroded;

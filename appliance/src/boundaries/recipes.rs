@@ -9,9 +9,11 @@ use crate::recipe::golden::Naming;
 use crate::recipe::plan::Plan;
 use crate::recipe::teach::teach;
 use crate::recipe::{Recipe, RecipeFile, Store};
+use algo::inspect::Measure;
 use hal::frame::Frame;
 use serde_json::Value;
 use sim::Scenario;
+use std::mem::discriminant;
 use std::time::{Duration, Instant};
 
 const TIMEOUT: Duration = Duration::from_secs(5);
@@ -91,24 +93,22 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
         exposure_us: 5000,
         gain: 2.0,
     });
-    let kinds = [
-        r#"{ "kind": "out_of_tolerance", "smoothing_px": 3, "tolerance_mm": 0.1 }"#,
-        r#"{ "kind": "volume", "above_mm": 8.0 }"#,
-        r#"{ "kind": "flatness", "smoothing_px": 4 }"#,
-        r#"{ "kind": "step", "from": "other" }"#,
-        r#"{ "kind": "tilt", "about": "x" }"#,
-        r#"{ "kind": "placement", "component": "about_z" }"#,
-    ];
     let mut other = full.regions[0].clone();
     other.name = "other".into();
     other.polygon[0][0] += 1.0;
     full.regions.push(other);
+    let mut kinds = Measure::examples();
+    kinds.retain(|kind| {
+        file.gauges
+            .iter()
+            .all(|of| discriminant(&of.measures) != discriminant(kind))
+    });
     for (at, kind) in kinds.into_iter().enumerate() {
         let mut gauge = full.gauges[0].clone();
         gauge.name = format!("kind {at}");
-        gauge.measures = serde_json::from_str(kind).unwrap();
+        gauge.measures = kind;
         (gauge.low, gauge.high) = (Some(-0.5), Some(0.5));
-        if gauge.measures.unit() == crate::station::Unit::Share {
+        if gauge.measures.facts().unit == crate::station::Unit::Share {
             gauge.low = Some(0.0);
         }
         full.gauges.push(gauge);

@@ -4,9 +4,7 @@
 
 use super::check::MAX_REGIONS;
 use super::comparison::QualityFile;
-use super::file::{
-    GaugeFile, GaugeKind, PatternFile, RecipeFile, RegionFile, SequenceFile, UnseenFile,
-};
+use super::file::{PatternFile, RecipeFile, RegionFile, SequenceFile, UnseenFile};
 use crate::head::calibration::CalibrationSigma;
 use crate::station::MAX_GAUGES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
@@ -182,26 +180,6 @@ impl RegionFile {
             within("polygon", *corner, -far, 2.0 * far)?;
         }
         Ok(())
-    }
-}
-
-impl GaugeFile {
-    /// For frames whose longer side has `largest` pixels.
-    fn check_bounds(&self, largest: usize) -> Result<(), String> {
-        text("name", &self.name, LONGEST_NAME)?;
-        text("region", &self.region, LONGEST_NAME)?;
-        if let GaugeKind::Step { from } = &self.measures {
-            text("measures.from", from, LONGEST_NAME)?;
-        }
-        if let Some(side) = self.measures.smoothing_px() {
-            within("measures.smoothing_px", side, 1, largest)?;
-            if matches!(self.measures, GaugeKind::Deviation { .. }) && side % 2 == 0 {
-                return Err(format!(
-                    "measures.smoothing_px is {side}: write an odd number, the square has a middle pixel"
-                ));
-            }
-        }
-        self.measures.check()
     }
 }
 

@@ -34,7 +34,7 @@ impl From<&RecipeFile> for Demands {
     fn from(file: &RecipeFile) -> Self {
         let limits = file.gauges.iter().map(|gauge| GaugeLimits {
             name: Arc::from(&*gauge.name),
-            unit: gauge.measures.unit(),
+            unit: gauge.measures.facts().unit,
             low: gauge.low,
             high: gauge.high,
         });

@@ -88,11 +88,12 @@ fn gauge(before: &GaugeFile, after: &GaugeFile) -> Option<String> {
     if before.measures != after.measures || before.region != after.region {
         words.push("measures something else".to_owned());
     }
-    let limit = |limit: Option<f64>, of: &GaugeFile| match (limit, of.measures.unit().symbol()) {
-        (None, _) => "none".to_owned(),
-        (Some(limit), "") => limit.to_string(),
-        (Some(limit), symbol) => format!("{limit} {symbol}"),
-    };
+    let limit =
+        |limit: Option<f64>, of: &GaugeFile| match (limit, of.measures.facts().unit.symbol()) {
+            (None, _) => "none".to_owned(),
+            (Some(limit), "") => limit.to_string(),
+            (Some(limit), symbol) => format!("{limit} {symbol}"),
+        };
     for (which, from, to) in [
         ("lowest", before.low, after.low),
         ("highest", before.high, after.high),

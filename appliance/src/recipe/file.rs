@@ -4,6 +4,7 @@ use super::comparison::ComparisonFile;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::CalibrationSigma;
 use crate::head::exposing::Exposing;
+use algo::inspect::Measure;
 use algo::pattern::Shot;
 use algo::units::AbsolutePhase;
 use hal::replay::recording::PatternSpec;
@@ -269,8 +270,8 @@ pub struct GaugeFile {
     /// The name of its region; only a placement needs none.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub region: String,
-    /// What it measures.
-    pub measures: GaugeKind,
+    /// What it measures; `docs/formats.md` has the definitions.
+    pub measures: Measure,
     /// Lower limit, inclusive, in mm, degrees, mm³ or as a share from 0 to 1.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
@@ -289,88 +290,4 @@ pub enum AlignmentKind {
     Rigid,
 }
 
-/// An axis of the world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum AxisFile {
-    /// x.
-    X,
-    /// y.
-    Y,
-}
-
-/// A component of a part's motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ComponentFile {
-    /// Translation along x, mm.
-    X,
-    /// Translation along y, mm.
-    Y,
-    /// Translation along z, mm.
-    Z,
-    /// Rotation about x, degrees.
-    AboutX,
-    /// Rotation about y, degrees.
-    AboutY,
-    /// Rotation about z, degrees.
-    AboutZ,
-}
-
-/// What a gauge measures; `docs/formats.md` has the definitions. `smoothing_px` is the side of the squares that are
-/// averaged over, in camera pixels: for a deviation about each pixel, else the cells into which the region is divided.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
-pub enum GaugeKind {
-    /// The deviation from golden of largest magnitude, in mm.
-    Deviation {
-        /// Odd, so that the square has a middle pixel.
-        smoothing_px: usize,
-    },
-    /// The root mean square of the deviation from golden, in mm.
-    RmsDeviation {
-        /// Odd or even.
-        smoothing_px: usize,
-    },
-    /// The share of the region that deviates from golden by more than a tolerance.
-    OutOfTolerance {
-        /// Odd or even.
-        smoothing_px: usize,
-        /// In mm.
-        tolerance_mm: f64,
-    },
-    /// The share of the region's pixels that is resolved.
-    Coverage,
-    /// The mean height, in mm.
-    MeanHeight,
-    /// The mean height less that of another region, in mm.
-    Step {
-        /// The other region's name.
-        from: String,
-    },
-    /// The peak-to-valley flatness about the least-squares plane, in mm.
-    Flatness {
-        /// Odd or even.
-        smoothing_px: usize,
-    },
-    /// The highest less the lowest place, in mm.
-    PeakToValley {
-        /// Odd or even.
-        smoothing_px: usize,
-    },
-    /// The angle of the least-squares plane about an axis, in degrees.
-    Tilt {
-        /// The axis.
-        about: AxisFile,
-    },
-    /// The volume above a plane, in mm³.
-    Volume {
-        /// The plane's z, mm.
-        above_mm: f64,
-    },
-    /// How the part lies, in mm or degrees.
-    Placement {
-        /// Which component of the motion.
-        component: ComponentFile,
-    },
 }

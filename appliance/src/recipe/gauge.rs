@@ -1,11 +1,13 @@
-//! The gauges of a recipe: from the file form to what is computed, their units, and which limits are refused.
+//! The gauges of a recipe: from the file form to what is computed, and which values are refused.
 
-use super::file::{AxisFile, ComponentFile, GaugeFile, GaugeKind, RegionFile};
+use super::bounds::LONGEST_NAME;
+use super::file::{GaugeFile, RegionFile};
 use crate::station::Unit;
-use algo::inspect::{Axis, Gauge, Measure, Region};
-use hal::bounds::clipped;
+use algo::inspect::{Basis, Facts, Gauge, Measure, Region};
+use hal::bounds::{clipped, text, within};
 use serde::Deserialize;
 use serde_json::value::RawValue;
+use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::fmt::Display;
 
@@ -17,7 +19,7 @@ pub(super) struct GaugeText {
     name: String,
     #[serde(default)]
     region: String,
-    measures: GaugeKind,
+    measures: Measure,
     #[serde(default)]
     low: Option<Box<RawValue>>,
     #[serde(default)]
@@ -40,7 +42,7 @@ impl TryFrom<GaugeText> for GaugeFile {
             serde_json::from_str(limit.get()).map(Some).map_err(|_| {
                 let words = no_limit(
                     &clipped(&name),
-                    measures.unit(),
+                    measures.facts().unit,
                     which,
                     clipped(limit.get()),
                 );
@@ -55,6 +57,27 @@ impl TryFrom<GaugeText> for GaugeFile {
             measures,
         })
     }
+}
+
+/// All kinds, for programs that show or edit recipes: an example of each, or one for each value of the field that its unit depends on.
+pub fn kinds() -> Value {
+    let row = |measures: Measure| {
+        let Facts {
+            unit,
+            words,
+            compares,
+            ..
+        } = measures.facts();
+        let [low, high] = unit.range();
+        json!({
+            "measures": measures, "words": words, "unit": unit.symbol(), "low": low, "high": high, "compares": compares,
+        })
+    };
+    let all = |example: Measure| {
+        let others = example.kind().others();
+        std::iter::once(example).chain(others).map(row)
+    };
+    Measure::examples().into_iter().flat_map(all).collect()
 }
 
 /// Refuses a limit that the unit of its gauge cannot have.
@@ -73,96 +96,30 @@ fn spaced(unit: Unit) -> String {
     }
 }
 
-impl GaugeKind {
-    /// The unit of its value and limits.
-    pub fn unit(&self) -> Unit {
-        match self {
-            Self::Deviation { .. }
-            | Self::RmsDeviation { .. }
-            | Self::MeanHeight
-            | Self::Step { .. }
-            | Self::Flatness { .. }
-            | Self::PeakToValley { .. } => Unit::Length,
-            Self::Coverage | Self::OutOfTolerance { .. } => Unit::Share,
-            Self::Tilt { .. } => Unit::Angle,
-            Self::Volume { .. } => Unit::Volume,
-            Self::Placement { component } => match component {
-                ComponentFile::X | ComponentFile::Y | ComponentFile::Z => Unit::Length,
-                ComponentFile::AboutX | ComponentFile::AboutY | ComponentFile::AboutZ => {
-                    Unit::Angle
-                }
-            },
-        }
-    }
-
-    /// The measure that is computed.
-    pub fn measure(&self) -> Measure {
-        match *self {
-            Self::Deviation { smoothing_px } => Measure::Deviation { side: smoothing_px },
-            Self::RmsDeviation { smoothing_px } => Measure::RmsDeviation { side: smoothing_px },
-            Self::OutOfTolerance {
-                smoothing_px,
-                tolerance_mm,
-            } => Measure::OutOfTolerance {
-                side: smoothing_px,
-                tolerance: tolerance_mm,
-            },
-            Self::Coverage => Measure::Coverage,
-            Self::MeanHeight => Measure::MeanHeight,
-            Self::Step { .. } => Measure::Step,
-            Self::Flatness { smoothing_px } => Measure::Flatness { side: smoothing_px },
-            Self::PeakToValley { smoothing_px } => Measure::PeakToValley { side: smoothing_px },
-            Self::Tilt { about } => Measure::Tilt(match about {
-                AxisFile::X => Axis::X,
-                AxisFile::Y => Axis::Y,
-            }),
-            Self::Volume { above_mm } => Measure::Volume { above: above_mm },
-            Self::Placement { component } => Measure::Placement(component as usize),
-        }
-    }
-
-    /// Side of the square that is averaged over, pixels.
-    pub fn smoothing_px(&self) -> Option<usize> {
-        match *self {
-            Self::Deviation { smoothing_px }
-            | Self::RmsDeviation { smoothing_px }
-            | Self::OutOfTolerance { smoothing_px, .. }
-            | Self::Flatness { smoothing_px }
-            | Self::PeakToValley { smoothing_px } => Some(smoothing_px),
-            Self::Coverage | Self::MeanHeight | Self::Step { .. } | Self::Tilt { .. } => None,
-            Self::Volume { .. } | Self::Placement { .. } => None,
-        }
-    }
-
-    /// What is wrong with it, in words.
-    pub(super) fn check(&self) -> Result<(), String> {
-        let [_, most] = Unit::Length.range();
-        match self {
-            Self::OutOfTolerance { tolerance_mm, .. }
-                if !(*tolerance_mm > 0.0 && *tolerance_mm <= most) =>
-            {
-                Err(format!(
-                    "has a tolerance_mm of {tolerance_mm:?}: write more than 0, up to {most} mm"
-                ))
-            }
-            Self::Volume { above_mm } if !(-most..=most).contains(above_mm) => Err(format!(
-                "measures a volume with above_mm = {above_mm:?}: write {} to {most} mm",
-                -most
-            )),
-            _ => Ok(()),
-        }
-    }
-
-    /// Whether no part can have a value below 0.
-    fn is_never_negative(&self) -> bool {
-        matches!(
-            self,
-            Self::RmsDeviation { .. } | Self::Flatness { .. } | Self::PeakToValley { .. }
-        )
-    }
-}
-
 impl GaugeFile {
+    /// Checks each value by itself, for frames whose longer side has `largest` pixels.
+    ///
+    /// # Errors
+    /// In words that name the key, the value and the bounds.
+    pub(super) fn check_bounds(&self, largest: usize) -> Result<(), String> {
+        text("name", &self.name, LONGEST_NAME)?;
+        text("region", &self.region, LONGEST_NAME)?;
+        let kind = self.measures.kind();
+        if let Some(from) = kind.from() {
+            text("measures.from", from, LONGEST_NAME)?;
+        }
+        let Facts { basis, .. } = kind.facts();
+        if let Some(side) = basis.side() {
+            within("measures.smoothing_px", side, 1, largest)?;
+            if basis == Basis::Squares(side) && side % 2 == 0 {
+                return Err(format!(
+                    "measures.smoothing_px is {side}: write an odd number, the square has a middle pixel"
+                ));
+            }
+        }
+        kind.check()
+    }
+
     /// Refuses limits that no part can keep, and those that its unit cannot have.
     ///
     /// # Errors
@@ -175,7 +132,7 @@ impl GaugeFile {
             high,
             ..
         } = self;
-        let unit = measures.unit();
+        let unit = measures.facts().unit;
         let [least, most] = unit.range();
         let symbol = spaced(unit);
         for (which, limit) in [("low", low), ("high", high)] {
@@ -187,7 +144,7 @@ impl GaugeFile {
             (Some(low), Some(high)) if low > high => Err(format!(
                 "gauge {name:?} passes no part: its limit low = {low}{symbol} is above high = {high}{symbol}"
             )),
-            (_, Some(high)) if *high < 0.0 && measures.is_never_negative() => Err(format!(
+            (_, Some(high)) if *high < 0.0 && measures.facts().never_negative => Err(format!(
                 "gauge {name:?} passes no part: its value is never below 0, its limit high = {high}{symbol} is"
             )),
             _ => Ok(()),
@@ -196,8 +153,9 @@ impl GaugeFile {
 
     /// Whether a part can miss one of its limits: those at the ends of what its unit can have are kept by every part.
     pub(super) fn can_fail(&self) -> bool {
-        let [least, most] = self.measures.unit().range();
-        let least = match self.measures.is_never_negative() {
+        let facts = self.measures.facts();
+        let [least, most] = facts.unit.range();
+        let least = match facts.never_negative {
             true => 0.0,
             false => least,
         };
@@ -229,17 +187,14 @@ pub(super) fn gauges(
                 format!("gauge {name:?} names a region {region:?} that is not there")
             })
         };
-        let placement = matches!(gauge.measures, GaugeKind::Placement { .. });
+        let placement = matches!(gauge.measures.facts().basis, Basis::Motion(_));
         Ok(Gauge {
             region: match placement && gauge.region.is_empty() {
                 true => Region::default(),
                 false => find(&gauge.region)?,
             },
-            from: match &gauge.measures {
-                GaugeKind::Step { from } => Some(find(from)?),
-                _ => None,
-            },
-            measure: gauge.measures.measure(),
+            from: gauge.measures.kind().from().map(find).transpose()?,
+            measure: gauge.measures.clone(),
         })
     };
     gauges.iter().map(gauge).collect()
@@ -248,8 +203,10 @@ pub(super) fn gauges(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use algo::inspect::Kind;
+    use algo::inspect::kinds::*;
 
-    fn gauge(measures: &GaugeKind, low: Option<f64>, high: Option<f64>) -> GaugeFile {
+    fn gauge(measures: &Measure, low: Option<f64>, high: Option<f64>) -> GaugeFile {
         GaugeFile {
             name: "the gauge".into(),
             region: String::new(),
@@ -262,18 +219,17 @@ mod tests {
     #[test]
     fn limits_that_no_part_can_keep_or_no_unit_has_are_refused_by_the_gauges_name() {
         let smoothing_px = 9;
-        let tilt = GaugeKind::Tilt { about: AxisFile::X };
-        let component = ComponentFile::AboutZ;
-        let kinds = [
-            (GaugeKind::Deviation { smoothing_px }, 214_748.364_7),
-            (GaugeKind::MeanHeight, 214_748.364_7),
-            (GaugeKind::Volume { above_mm: 0.0 }, 21_474_836.47),
-            (tilt, 180.0),
-            (GaugeKind::Placement { component }, 180.0),
-            (GaugeKind::Coverage, 1.0),
+        let component = Component::AboutZ;
+        let kinds: [(Measure, f64); 6] = [
+            (Deviation { smoothing_px }.into(), 214_748.364_7),
+            (MeanHeight {}.into(), 214_748.364_7),
+            (Volume { above_mm: 0.0 }.into(), 21_474_836.47),
+            (Tilt { about: Axis::X }.into(), 180.0),
+            (Placement { component }.into(), 180.0),
+            (Coverage {}.into(), 1.0),
         ];
         for (kind, most) in kinds {
-            let least = if kind.unit() == Unit::Share {
+            let least = if kind.facts().unit == Unit::Share {
                 0.0
             } else {
                 -most
@@ -302,9 +258,9 @@ mod tests {
             }
         }
         for kind in [
-            GaugeKind::RmsDeviation { smoothing_px },
-            GaugeKind::Flatness { smoothing_px },
-            GaugeKind::PeakToValley { smoothing_px },
+            Measure::from(RmsDeviation { smoothing_px }),
+            Flatness { smoothing_px }.into(),
+            PeakToValley { smoothing_px }.into(),
         ] {
             assert!(gauge(&kind, None, Some(-0.1)).check_limits().is_err());
             let both = gauge(&kind, Some(-0.1), Some(0.1));
@@ -313,17 +269,38 @@ mod tests {
     }
 
     #[test]
+    fn every_kind_is_listed_with_its_unit_and_with_words_for_its_fields_alone() {
+        let listed = kinds();
+        let mut units = HashMap::<&str, Vec<&str>>::new();
+        for row in listed.as_array().unwrap() {
+            let (measures, words) = (&row["measures"], row["words"].as_str().unwrap());
+            for field in words.split('{').skip(1) {
+                let (field, _) = field.split_once('}').unwrap();
+                assert!(measures.get(field).is_some(), "{row}");
+            }
+            let of = units.entry(measures["kind"].as_str().unwrap()).or_default();
+            of.push(row["unit"].as_str().unwrap());
+            assert!(row["low"].as_f64() < row["high"].as_f64(), "{row}");
+        }
+        assert_eq!(units.len(), Measure::examples().len());
+        assert_eq!(units["volume"], ["mm³"]);
+        units.get_mut("placement").unwrap().sort_unstable();
+        assert_eq!(units["placement"], ["mm", "mm", "mm", "°", "°", "°"]);
+    }
+
+    #[test]
     fn a_limit_that_every_part_keeps_cannot_fail() {
-        let coverage = GaugeKind::Coverage;
-        let flatness = GaugeKind::Flatness { smoothing_px: 9 };
+        let coverage = Coverage {}.into();
+        let flatness = Flatness { smoothing_px: 9 }.into();
+        let mean = MeanHeight {}.into();
         let can_fail = |kind, low, high| gauge(kind, low, high).can_fail();
-        for kind in [&coverage, &flatness, &GaugeKind::MeanHeight] {
+        for kind in [&coverage, &flatness, &mean] {
             assert!(!can_fail(kind, None, None));
             assert!(can_fail(kind, Some(0.5), None) && can_fail(kind, None, Some(0.5)));
         }
         assert!(!can_fail(&coverage, Some(0.0), Some(1.0)));
         assert!(!can_fail(&flatness, Some(-0.1), None));
-        assert!(can_fail(&GaugeKind::MeanHeight, Some(-0.1), None));
+        assert!(can_fail(&mean, Some(-0.1), None));
     }
 
     #[test]
@@ -352,7 +329,7 @@ mod tests {
 
     #[test]
     fn a_tolerance_and_a_plane_lie_within_what_a_register_holds() {
-        let tolerance = |tolerance_mm| GaugeKind::OutOfTolerance {
+        let tolerance = |tolerance_mm| OutOfTolerance {
             smoothing_px: 9,
             tolerance_mm,
         };
@@ -361,11 +338,8 @@ mod tests {
         }
         assert_eq!(tolerance(0.1).check(), Ok(()));
         for above_mm in [f64::NAN, f64::NEG_INFINITY, 214_748.365, -214_748.365] {
-            assert!(
-                GaugeKind::Volume { above_mm }.check().is_err(),
-                "{above_mm}"
-            );
+            assert!(Volume { above_mm }.check().is_err(), "{above_mm}");
         }
-        assert_eq!(GaugeKind::Volume { above_mm: -8.0 }.check(), Ok(()));
+        assert_eq!(Volume { above_mm: -8.0 }.check(), Ok(()));
     }
 }

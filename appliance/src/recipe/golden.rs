@@ -6,12 +6,13 @@ use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::good_parts::{DEVIATION_MM, SIDES};
 use super::planner::{self, Choice};
-use super::{AlignmentKind, GaugeFile, GaugeKind, PatternFile, Recipe, RecipeFile, RegionFile};
+use super::{AlignmentKind, GaugeFile, PatternFile, Recipe, RecipeFile, RegionFile};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use algo::adaptive::phase_reach;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
+use algo::inspect::kinds::{Coverage, Deviation};
 use algo::inspect::{eroded, openings};
 use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
@@ -305,16 +306,17 @@ fn gauges(seen: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
         GaugeFile {
             name: "deviation".into(),
             region: "frame".into(),
-            measures: GaugeKind::Deviation {
+            measures: Deviation {
                 smoothing_px: SIDES[SIDES.len() - 1],
-            },
+            }
+            .into(),
             low: Some(-DEVIATION_MM),
             high: Some(DEVIATION_MM),
         },
         GaugeFile {
             name: "coverage".into(),
             region: "frame".into(),
-            measures: GaugeKind::Coverage,
+            measures: Coverage {}.into(),
             low: Some(0.0),
             high: None,
         },
@@ -338,7 +340,7 @@ fn gauges(seen: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
         gauges.push(GaugeFile {
             name: name.clone(),
             region: name,
-            measures: GaugeKind::Coverage,
+            measures: Coverage {}.into(),
             low: None,
             high: Some(OPENING_COVERAGE),
         });

@@ -2,7 +2,7 @@
 //!
 //! Without this a part of any shape passes, and nobody sees why. It is checked whenever a recipe is taught, imported, edited or loaded.
 
-use super::file::{GaugeFile, GaugeKind, RecipeFile};
+use super::file::{GaugeFile, RecipeFile};
 use std::collections::HashSet;
 
 impl RecipeFile {
@@ -40,14 +40,14 @@ impl RecipeFile {
 
     /// Refuses a step between a region and itself, under whatever name: it is 0 for every part.
     fn check_step(&self, gauge: &GaugeFile) -> Result<(), String> {
-        let GaugeKind::Step { from } = &gauge.measures else {
+        let Some(from) = gauge.measures.kind().from() else {
             return Ok(());
         };
         let polygon = |name: &str| {
             let mut regions = self.regions.iter();
             Some(&regions.find(|region| region.name == name)?.polygon)
         };
-        let same = *from == gauge.region
+        let same = from == gauge.region
             || polygon(from).is_some_and(|here| polygon(&gauge.region) == Some(here));
         match same {
             true => Err(format!(

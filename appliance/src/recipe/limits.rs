@@ -6,8 +6,10 @@ use super::golden::GoldenPart;
 use super::good_parts::{DENT, DEVIATION_MM, GoodPartsFile, Noise};
 use super::proof::{self, COVERAGE_CHANGE, Magnitudes, Proof};
 use super::sides::Farthest;
-use super::{GaugeFile, GaugeKind, RecipeFile, SequenceFile};
+use super::{GaugeFile, RecipeFile, SequenceFile};
 use crate::station::Inspection;
+use algo::inspect::Basis;
+use algo::inspect::kinds::Deviation;
 use algo::pipeline::KnownSurface;
 
 /// What displaced parts deviate by beside their sharpest creases, and how far that scatters from placement to placement, as multiples of what is
@@ -32,10 +34,10 @@ impl GoldenPart<'_> {
         let mut weighed = noise.weigh(&arrays.valid, DEVIATION_MM);
         arrays.valid = weighed.bits();
         for gauge in &mut manifest.gauges {
-            match gauge.measures {
-                GaugeKind::Deviation { .. } => set_deviation(gauge, &weighed.found),
+            match gauge.measures.facts().basis {
+                Basis::Squares(_) => set_deviation(gauge, &weighed.found),
                 // Of the whole frame; openings have an upper limit.
-                GaugeKind::Coverage => gauge.low = gauge.low.map(|_| coverage.max(0.0)),
+                Basis::Pixels => gauge.low = gauge.low.map(|_| coverage.max(0.0)),
                 _ => {}
             }
         }
@@ -102,7 +104,6 @@ impl GoldenPart<'_> {
 fn set_deviation(gauge: &mut GaugeFile, good_parts: &GoodPartsFile) {
     let limit = good_parts.limit_mm;
     (gauge.low, gauge.high) = (Some(-limit), Some(limit));
-    gauge.measures = GaugeKind::Deviation {
-        smoothing_px: good_parts.smoothing_px,
-    };
+    let smoothing_px = good_parts.smoothing_px;
+    gauge.measures = Deviation { smoothing_px }.into();
 }

@@ -45,7 +45,8 @@ pub use archive::short;
 pub use check::{Conditions, Recipe, RecipeId, RecipeSequence};
 pub use demands::Demands;
 pub use file::{
-    AlignmentKind, AxisFile, ComponentFile, GaugeFile, GaugeKind, PatternFile, RecipeFile,
-    RegionFile, SequenceFile, SequenceKind, UnseenFile, safe,
+    AlignmentKind, GaugeFile, PatternFile, RecipeFile, RegionFile, SequenceFile, SequenceKind,
+    UnseenFile, safe,
 };
+pub use gauge::kinds;
 pub use store::{ChangeError, LoadError, Store};

@@ -1,7 +1,8 @@
 //! Chooses the cheapest sequence whose noise and safe mask are good enough for a part's gauges.
 
 use super::GaugeFile;
-use super::file::{GaugeKind, SequenceFile, SequenceKind, UnseenFile};
+use super::file::{SequenceFile, SequenceKind, UnseenFile};
+use algo::inspect::Basis;
 
 /// A sequence is good enough if its noise, after a gauge's smoothing, stays this many times inside
 /// the gauge's limit: a frame has some thousand independent places, whose extremes reach 4 σ.
@@ -27,13 +28,14 @@ pub struct Choice {
 /// far less noisy and do not count.
 pub fn allowed_sigma(gauges: &[GaugeFile], widest: usize) -> f64 {
     let allowed = gauges.iter().filter_map(|gauge| {
-        let side = match &gauge.measures {
-            GaugeKind::Deviation { smoothing_px } => widest.max(*smoothing_px),
-            other => other.smoothing_px()?,
+        let facts = gauge.measures.facts();
+        let side = match facts.basis {
+            Basis::Squares(side) => widest.max(side),
+            other => other.side()?,
         };
-        let limits = match gauge.measures {
-            GaugeKind::OutOfTolerance { tolerance_mm, .. } => [Some(tolerance_mm), None],
-            _ => [gauge.low, gauge.high],
+        let limits = match facts.noise_limit {
+            None => [gauge.low, gauge.high],
+            limit => [limit, None],
         };
         let limit = limits
             .into_iter()
@@ -53,7 +55,7 @@ pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile], widest: usize) -
     // Only the full sequence resolves material where golden has none.
     let looks_for_more = gauges
         .iter()
-        .any(|gauge| gauge.measures == GaugeKind::Coverage && gauge.high.is_some());
+        .any(|gauge| gauge.measures.facts().basis == Basis::Pixels && gauge.high.is_some());
     let good = |sequence: &SequenceFile| {
         let full = sequence.kind == SequenceKind::Full;
         let safe = full || (!looks_for_more && sequence.safe_share >= SAFE_SHARE);
@@ -101,6 +103,7 @@ fn rate(of: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use algo::inspect::kinds::{Coverage, Deviation};
     use algo::pattern::Shot;
 
     fn sequences(sigmas: [f64; 3], safe: [f64; 3]) -> Vec<SequenceFile> {
@@ -128,7 +131,7 @@ mod tests {
         vec![GaugeFile {
             name: "deviation".into(),
             region: "frame".into(),
-            measures: GaugeKind::Deviation { smoothing_px: 9 },
+            measures: Deviation { smoothing_px: 9 }.into(),
             low: Some(-limit),
             high: Some(2.0 * limit),
         }]
@@ -151,7 +154,7 @@ mod tests {
         gauges.push(GaugeFile {
             name: "opening 1".into(),
             region: "opening 1".into(),
-            measures: GaugeKind::Coverage,
+            measures: Coverage {}.into(),
             low: None,
             high: Some(0.25),
         });

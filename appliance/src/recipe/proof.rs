@@ -10,11 +10,11 @@ use super::median::median;
 use super::plan::Plan;
 use super::sides::Farthest;
 use super::teach::TeachError;
-use super::{GaugeFile, GaugeKind, Recipe, RecipeFile};
+use super::{GaugeFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, Unit, Verdict};
 use algo::geometry::Vector;
-use algo::inspect::{Largest, Motion};
+use algo::inspect::{Basis, Largest, Motion};
 use algo::units::Modulation;
 use hal::head::Head;
 use std::time::{Duration, Instant};
@@ -169,7 +169,7 @@ pub(super) fn leave_out_covered(
         let gauge = &manifest.gauges[at];
         let values = judged.iter().filter_map(|of| of.gauges.get(at)?.value);
         let most = values.fold(0.0, f64::max);
-        let is_opening = gauge.measures == GaugeKind::Coverage && gauge.low.is_none();
+        let is_opening = gauge.measures.facts().basis == Basis::Pixels && gauge.low.is_none();
         if !is_opening || most <= MOST_COVERED {
             continue;
         }
@@ -209,7 +209,7 @@ pub(super) fn hold(manifest: &mut RecipeFile, judged: &[Inspection]) -> Vec<Stri
             least.fold(f64::INFINITY, f64::min),
             most.fold(f64::NEG_INFINITY, f64::max),
         );
-        let is_share = gauge.measures.unit() == Unit::Share;
+        let is_share = gauge.measures.facts().unit == Unit::Share;
         let wider = |limit: f64, value: f64, sign: f64| match is_share {
             true => (value + sign * COVERAGE_CHANGE).clamp(0.0, 1.0),
             // Hundredths print as such.
@@ -224,8 +224,8 @@ pub(super) fn hold(manifest: &mut RecipeFile, judged: &[Inspection]) -> Vec<Stri
             gauge.high = Some(wider(high, most, 1.0));
         }
         // A deviation is as wide to both sides.
-        if let (GaugeKind::Deviation { .. }, Some(low), Some(high)) =
-            (&gauge.measures, gauge.low, gauge.high)
+        if let (Basis::Squares(_), Some(low), Some(high)) =
+            (gauge.measures.facts().basis, gauge.low, gauge.high)
         {
             let limit = high.max(-low);
             (gauge.low, gauge.high) = (Some(-limit), Some(limit));
@@ -257,15 +257,16 @@ pub(super) fn tried(manifest: &RecipeFile, judged: &[Inspection]) -> Vec<TriedFi
         };
         let bands = found.clone().map(band).fold(0.0, f64::max);
         let values: Vec<f64> = found.filter_map(|found| found.value).collect();
-        let parts = match (&gauge.measures, manifest.good_parts) {
-            (GaugeKind::Deviation { .. }, Some(of)) => of.displaced(of.smoothing_px)?,
+        let basis = gauge.measures.facts().basis;
+        let parts = match (basis, manifest.good_parts) {
+            (Basis::Squares(_), Some(of)) => of.displaced(of.smoothing_px)?,
             _ => normal(&values)?,
         };
         let above = gauge
             .high
             .map_or(0.0, |high| 1.0 - parts.below(high - bands));
-        let below = match gauge.measures {
-            GaugeKind::Deviation { .. } => 0.0,
+        let below = match basis {
+            Basis::Squares(_) => 0.0,
             _ => gauge.low.map_or(0.0, |low| parts.below(low + bands)),
         };
         Some(TriedFile {

@@ -18,7 +18,7 @@ use crate::recipe::edit::{self, Edit, Edited};
 use crate::recipe::exchange::Destination;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
-use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, Store};
+use crate::recipe::{self, ChangeError, LoadError, Recipe, RecipeFile, Store};
 
 impl From<LoadError> for Problem {
     fn from(error: LoadError) -> Self {
@@ -51,6 +51,11 @@ impl From<ChangeError> for Problem {
 pub(super) async fn list(State(site): State<Site>) -> Result<Json<Value>, Problem> {
     let listed = site.aside(|site| Ok(listed(&site.recipes))).await?;
     Ok(Json(listed))
+}
+
+/// What gauges can measure.
+pub(super) async fn kinds() -> Json<Value> {
+    Json(json!({ "kinds": recipe::kinds() }))
 }
 
 fn listed(recipes: &Store) -> Value {

@@ -87,6 +87,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/history/{seq}/picture/{layer}", kept::picture),
         look("/api/history/{seq}/recording.zip", history::recording),
         look("/api/diagnostics.zip", downloads::diagnostics),
+        look("/api/kinds", recipes::kinds),
         look("/api/recipes", recipes::list),
         look("/api/recipes/{number}", recipes::one),
         look("/api/recipes/{number}/file", recipes::export),

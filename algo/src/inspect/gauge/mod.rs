@@ -6,15 +6,30 @@
 //! these heights and deviations.
 
 mod cells;
+mod coverage;
+mod deviation;
 mod extreme;
+mod flatness;
+mod kind;
 mod level;
+mod mean_height;
+mod out_of_tolerance;
+mod peak_to_valley;
+mod placement;
+mod rms_deviation;
+mod step;
 mod taught;
+mod tilt;
+mod unit;
+mod volume;
 
 pub use cells::{Cell, Grid, Sum, TooFine, cells};
-pub use extreme::{flatness, peak_to_valley, rms, share_outside};
-pub use level::{Weights, found, mean, step, tilt, volume};
+pub use kind::{Basis, Evidence, Facts, Kind};
 pub use taught::TaughtCell;
 pub(super) use taught::taught_cells;
+pub use unit::Unit;
+
+use alloc::vec::Vec;
 
 /// A mean over a square needs at least this share of its pixels.
 pub(super) const MIN_SUPPORT: f64 = 0.5;
@@ -59,77 +74,67 @@ pub struct Found {
     pub lever: f64,
 }
 
-/// The axes that a plane may be tilted about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Axis {
-    /// x.
-    X,
-    /// y.
-    Y,
-}
-
-/// What a gauge measures. Heights are z of the part after its motion was taken back; `side` is that of the squares that
-/// are averaged over, in camera pixels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Measure {
-    /// The mean weighted deviation from golden along its normal of largest magnitude, positive outwards, of the squares of `side` pixels about
-    /// every pixel, mm (profile of a surface, ISO 1101:2017): single noisy pixels do not decide. Squares of which less than half can be compared do not count.
-    Deviation {
-        /// Odd; 1 = single pixels.
-        side: usize,
-    },
-    /// The root of the mean square of the cells' deviations from golden along its normal, mm.
-    RmsDeviation {
-        /// Of the cells.
-        side: usize,
-    },
-    /// The share of the cells that deviate from golden along its normal by more than a tolerance.
-    OutOfTolerance {
-        /// Of the cells.
-        side: usize,
-        /// In mm.
-        tolerance: f64,
-    },
-    /// The share of the region that has a height.
-    Coverage,
-    /// The mean height, mm.
-    MeanHeight,
-    /// The mean height less that of a second region, mm.
-    Step,
-    /// The distance between the two planes parallel to the least-squares plane that enclose all cells, mm: peak-to-valley
-    /// flatness deviation FLTt about the reference plane LSPL of ISO 12781-1.
-    Flatness {
-        /// Of the cells.
-        side: usize,
-    },
-    /// The highest less the lowest cell, mm.
-    PeakToValley {
-        /// Of the cells.
-        side: usize,
-    },
-    /// The angle of the least-squares plane about an axis, degrees, right-handed; 0 is parallel to the plane z = 0.
-    Tilt(Axis),
-    /// The volume between the surface and the plane z = `above`, mm³, negative below it.
-    Volume {
-        /// In mm.
-        above: f64,
-    },
-    /// A component of the part's motion: 0 to 2 shift along x, y, z, mm; 3 to 5 turn about x, y, z, degrees.
-    Placement(usize),
-}
-
-impl Measure {
-    /// The side of its cells, if it is worked out from cells; 0 if the grid may choose it.
-    pub(super) fn cell_side(&self) -> Option<usize> {
-        match *self {
-            Self::RmsDeviation { side }
-            | Self::OutOfTolerance { side, .. }
-            | Self::Flatness { side }
-            | Self::PeakToValley { side } => Some(side.max(1)),
-            Self::MeanHeight | Self::Step | Self::Tilt(_) | Self::Volume { .. } => Some(0),
-            Self::Deviation { .. } | Self::Coverage | Self::Placement(_) => None,
+/// The table of all kinds. A row is the file of a kind and an example; the struct's name in snake case is that of the kind in recipes.
+macro_rules! kinds {
+    ($($file:ident: $kind:ident { $($field:ident: $value:expr),* },)*) => {
+        /// Every kind of gauge, each in its own file.
+        pub mod kinds {
+            pub use super::placement::Component;
+            pub use super::tilt::Axis;
+            $(pub use super::$file::$kind;)*
         }
-    }
+
+        /// What a gauge measures. Heights are z of the part after its motion was taken back.
+        #[derive(Clone, Debug, PartialEq)]
+        #[cfg_attr(
+            feature = "serde",
+            derive(serde::Serialize, serde::Deserialize),
+            serde(tag = "kind", rename_all = "snake_case")
+        )]
+        pub enum Measure {
+            $(#[doc = concat!("See [`", stringify!($kind), "`](kinds::", stringify!($kind), ").")]
+            $kind(kinds::$kind),)*
+        }
+
+        impl Measure {
+            /// An example of every kind.
+            pub fn examples() -> Vec<Self> {
+                Vec::from([$(kinds::$kind { $($field: $value),* }.into(),)*])
+            }
+
+            /// What it says of itself.
+            pub fn facts(&self) -> Facts {
+                self.kind().facts()
+            }
+
+            /// Its kind.
+            pub fn kind(&self) -> &dyn Kind {
+                match self {
+                    $(Self::$kind(kind) => kind,)*
+                }
+            }
+        }
+
+        $(impl From<kinds::$kind> for Measure {
+            fn from(kind: kinds::$kind) -> Self {
+                Self::$kind(kind)
+            }
+        })*
+    };
+}
+
+kinds! {
+    deviation: Deviation { smoothing_px: 9 },
+    rms_deviation: RmsDeviation { smoothing_px: 9 },
+    out_of_tolerance: OutOfTolerance { smoothing_px: 9, tolerance_mm: 0.1 },
+    coverage: Coverage {},
+    mean_height: MeanHeight {},
+    step: Step { from: "other".into() },
+    flatness: Flatness { smoothing_px: 9 },
+    peak_to_valley: PeakToValley { smoothing_px: 9 },
+    tilt: Tilt { about: kinds::Axis::X },
+    volume: Volume { above_mm: 8.0 },
+    placement: Placement { component: kinds::Component::AboutZ },
 }
 
 #[cfg(test)]

@@ -4,8 +4,8 @@ use super::coordinates::TaughtCoordinates;
 use super::coverage::{add_variances, count_known};
 use super::height::HeightRow;
 use super::pose::PoseField;
-use super::{Measure, Production, common};
-use crate::inspect::gauge::Sum;
+use super::{Production, common};
+use crate::inspect::gauge::{Basis, Sum};
 use crate::phase::Trust;
 use crate::pipeline::{HeightTally, PhaseMap};
 use crate::simd::{Lanes, back_end_entry};
@@ -70,7 +70,7 @@ impl Counts {
         let trusts = &decoded.trust[plan.window[v].clone()];
         count_trusts(backend, trusts, &mut self.trusts);
         for (at, gauge) in plan.gauges.list.iter().enumerate() {
-            if gauge.measure != Measure::Coverage {
+            if gauge.measure.facts().basis != Basis::Pixels {
                 continue;
             }
             for (_, columns) in pose.region(plan, at).row(v) {

@@ -5,13 +5,10 @@ use super::coverage;
 use super::pose::PoseField;
 use super::squares::rivals::rivals;
 use super::uncertainty::Made;
-use super::{CellBuffers, Input, MAX_GAUGES, Measure, Production, Strip, Strips};
+use super::{CellBuffers, Input, MAX_GAUGES, Production, Strip, Strips};
 use crate::inspect::Reading;
 use crate::inspect::align::Placed;
-use crate::inspect::gauge::{
-    Found, Sum, TaughtCell, cells, flatness, found, mean, peak_to_valley, rms, share_outside, step,
-    tilt, volume,
-};
+use crate::inspect::gauge::{Basis, Evidence, Facts, Sum, TaughtCell, cells};
 use crate::phase::Trust;
 use crate::pipeline::VARIANCE_UNIT_NM;
 
@@ -111,8 +108,8 @@ impl Production {
             cells,
             ..
         } = strips;
-        match self.gauges.list[gauge].measure {
-            Measure::Coverage => {
+        match self.gauges.list[gauge].measure.facts().basis {
+            Basis::Pixels => {
                 let pixels = pose.region(self, gauge).len();
                 let (mut covered, mut variance) = (0, 0);
                 for strip in strips {
@@ -127,7 +124,7 @@ impl Production {
                     square: None,
                 })
             }
-            Measure::Deviation { .. } => {
+            Basis::Squares(_) => {
                 let mut largest: Option<Reading> = None;
                 let squares = self.gauges.squares.iter().enumerate();
                 for (at, squares) in squares.filter(|(_, squares)| squares.gauge == gauge) {
@@ -146,8 +143,8 @@ impl Production {
                 }
                 largest
             }
-            Measure::Placement(component) => {
-                let (value, sigma) = pose.placed.as_ref()?.component(component)?;
+            Basis::Motion(component) => {
+                let (value, sigma) = pose.placed.as_ref()?.component(component as usize)?;
                 Some(Reading {
                     value,
                     sigma: Some(sigma),
@@ -159,7 +156,7 @@ impl Production {
                     square: None,
                 })
             }
-            _ => self.of_cells(gauge, noisier, pose, strips, cells),
+            Basis::Cells(_) | Basis::Region => self.of_cells(gauge, noisier, pose, strips, cells),
         }
     }
 
@@ -172,24 +169,24 @@ impl Production {
         strips: &[Strip],
         buffers: &mut CellBuffers,
     ) -> Option<Reading> {
-        let measure = self.gauges.list[gauge].measure;
+        let measure = &self.gauges.list[gauge].measure;
+        let Facts {
+            basis, compares, ..
+        } = measure.facts();
+        let side = basis.cell_side()?;
         let patches = self.gauges.patches_of[gauge].clone();
-        let side = measure.cell_side()?;
+        let [first, last] = [patches.start, patches.end - 1];
         buffers.cells.clear();
         buffers.weights.clear();
-        let taught: &[TaughtCell] = &self.gauges.patches[patches.start].taught;
-        self.gather(patches.start, side, strips, buffers);
+        let taught: &[TaughtCell] = &self.gauges.patches[first].taught;
+        self.gather(first, side, strips, buffers);
         let count = buffers.cells.len();
-        if measure == Measure::Step {
+        if first != last {
             // Both regions' cells behind each other: the motion moves them together.
-            self.gather(patches.end - 1, side, strips, buffers);
+            self.gather(last, side, strips, buffers);
         }
         let CellBuffers { cells, weights, .. } = buffers;
-        let of_deviations = matches!(
-            measure,
-            Measure::RmsDeviation { .. } | Measure::OutOfTolerance { .. }
-        );
-        if of_deviations {
+        if compares {
             for cell in &mut *cells {
                 cell.deviation *= cell.taught.normal;
                 cell.taught = cell.taught.along_normal();
@@ -203,7 +200,7 @@ impl Production {
         });
         let variance = |taught: &[TaughtCell]| {
             let pixels = pixels(taught);
-            let variances = taught.iter().map(|cell| match of_deviations {
+            let variances = taught.iter().map(|cell| match compares {
                 true => cell.along_normal().variance,
                 false => cell.variance,
             });
@@ -211,46 +208,28 @@ impl Production {
             sum / f64::from(pixels.max(1)) * noisier * noisier * smoothed
         };
         let pixel = variance(taught);
-        let cell = libm::sqrt(pixel) / side.max(1) as f64;
+        let from = match first == last {
+            true => pixel,
+            false => variance(&self.gauges.patches[last].taught),
+        };
         let placed = pose.placed.as_ref();
-        let reading = |found, made| self.reading_of(found, made, (noisier, smoothed), placed);
-        let together = |found: Found| Found {
-            pixels: found.pixels * self.cells_together(side),
-            ..found
+        let mut found = measure.kind().find(Evidence {
+            all: cells,
+            count,
+            columns: self.gauges.patches[first].grid.columns(),
+            sigma: libm::sqrt(pixel) / side.max(1) as f64,
+            variances: [pixel, from],
+            placed,
+            room: weights,
+        })?;
+        let made = match compares {
+            true => {
+                found.pixels *= self.cells_together(side);
+                Made::OfDeviations
+            }
+            false => Made::OfHeights,
         };
-        // The value of a gauge that is linear in height; the others return their readings.
-        let value = match measure {
-            Measure::Flatness { .. } => {
-                let found = flatness(cells, cell, placed, weights)?;
-                return Some(reading(found, Made::OfHeights));
-            }
-            Measure::PeakToValley { .. } => {
-                let found = peak_to_valley(cells, cell, placed, weights)?;
-                return Some(reading(found, Made::OfHeights));
-            }
-            Measure::RmsDeviation { .. } => {
-                let found = together(rms(cells, cell, placed)?);
-                return Some(reading(found, Made::OfDeviations));
-            }
-            Measure::OutOfTolerance { tolerance, .. } => {
-                let columns = self.gauges.patches[patches.start].grid.columns();
-                let cells = (&cells[..], columns);
-                let found = share_outside(cells, cell, tolerance, placed, weights)?;
-                return Some(reading(together(found), Made::OfDeviations));
-            }
-            Measure::MeanHeight => mean(cells, weights)?,
-            Measure::Tilt(about) => tilt(cells, about, weights)?,
-            Measure::Volume { above } => volume(cells, above, weights)?,
-            Measure::Step => step(&cells[..count], &cells[count..], weights)?,
-            Measure::Deviation { .. } | Measure::Coverage | Measure::Placement(_) => return None,
-        };
-        let noises = [
-            pixel,
-            variance(&self.gauges.patches[patches.end - 1].taught),
-        ];
-        let noise = |at: usize| noises[usize::from(at >= count)];
-        let found = found(value, weights, cells, noise, placed);
-        Some(reading(found, Made::OfHeights))
+        Some(self.reading_of(found, made, (noisier, smoothed), placed))
     }
 
     /// Appends the cells of a patch.

@@ -124,7 +124,7 @@ impl Gauges {
         }
         let (mut squares, mut sides) = (Vec::new(), Vec::new());
         for (at, gauge) in list.iter().enumerate() {
-            let Measure::Deviation { side: smallest } = gauge.measure else {
+            let Some(smallest) = gauge.measure.facts().basis.square_side() else {
                 continue;
             };
             let all = golden.taught.sides(smallest);
@@ -169,7 +169,7 @@ impl Gauges {
                 places.push(regions.len());
                 regions.push(from.clone());
             }
-            if let Some(side) = gauge.measure.cell_side() {
+            if let Some(side) = gauge.measure.facts().basis.cell_side() {
                 for region in places {
                     let grid = Grid::over(&regions[region], side).map_err(Unmeasurable::TooFine)?;
                     patches.push(Patch {

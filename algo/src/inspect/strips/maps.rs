@@ -1,7 +1,7 @@
 //! Maps of the whole frame, for people: written on request, and what a gauge of deviation makes of them.
 
 use super::squares::extreme::least_support;
-use super::{Measure, Production, Strips};
+use super::{Production, Strips};
 use crate::inspect::table::IntegralTable;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -71,7 +71,7 @@ impl Production {
     fn compared_regions(&self, strips: &Strips, pixels: usize) -> Vec<bool> {
         let gauges = self.gauges.list.iter().enumerate();
         let mut comparing = gauges
-            .filter(|(_, gauge)| compares(&gauge.measure))
+            .filter(|(_, gauge)| gauge.measure.facts().compares)
             .peekable();
         let mut inside = vec![comparing.peek().is_none(); pixels];
         for (at, _) in comparing {
@@ -81,12 +81,4 @@ impl Production {
         }
         inside
     }
-}
-
-/// Whether a gauge goes by deviations from golden.
-fn compares(measure: &Measure) -> bool {
-    matches!(
-        measure,
-        Measure::Deviation { .. } | Measure::RmsDeviation { .. } | Measure::OutOfTolerance { .. }
-    )
 }

@@ -54,7 +54,7 @@ pub use taught::Taught;
 pub use uncertainty::CalibrationError;
 
 use super::align::{FitBuffers, Motion, Placed, Sample};
-use super::gauge::{Cell, Measure, Sum, Weights};
+use super::gauge::{Cell, Sum};
 use crate::frame::FrameView;
 use crate::phase::DecodeError;
 use crate::pipeline::{for_each, for_each_item};
@@ -81,7 +81,7 @@ pub struct Strips {
 struct CellBuffers {
     sums: Vec<Sum>,
     cells: Vec<Cell>,
-    weights: Weights,
+    weights: Vec<f64>,
 }
 
 impl Production {

@@ -4,7 +4,7 @@ use super::{Laps, Plan};
 use crate::head::seam;
 use crate::output::cloud::{Axes, ply};
 use crate::station::Square;
-use algo::inspect::{Findings, Maps, Measure};
+use algo::inspect::{Findings, Maps};
 use algo::pipeline;
 use algo::units::{Height, Modulation};
 use hal::frame::Frame;
@@ -119,9 +119,7 @@ impl Plan {
         let limits = self.demands.limits.iter().zip(&findings.readings);
         let gauges = self.production().gauges().iter().zip(limits);
         let deviations = gauges.filter_map(|(gauge, (limits, reading))| {
-            let Measure::Deviation { side } = gauge.measure else {
-                return None;
-            };
+            let side = gauge.measure.facts().basis.square_side()?;
             let square = reading.and_then(|reading| reading.square);
             let gauge = ShownGauge {
                 name: Arc::clone(&limits.name),

@@ -7,7 +7,7 @@ use crate::recipe::{RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
-    CalibrationError, Gauge, Largest, Measure, PairBuffers, Parts, Picture, Production, Taught,
+    Basis, CalibrationError, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught,
 };
 use algo::pattern::{PhaseRange, Shot};
 use algo::phase::{Arrived, Decoder, LeastModulation};
@@ -131,8 +131,8 @@ impl Prepared {
         captures: usize,
         (gauges, width): (&[Gauge], usize),
     ) -> GoldenNoise {
-        let largest = |gauge: &Gauge| match gauge.measure {
-            Measure::Deviation { side } => Largest::of(&self.taught, width, &gauge.region, side),
+        let largest = |gauge: &Gauge| match gauge.measure.facts().basis {
+            Basis::Squares(side) => Largest::of(&self.taught, width, &gauge.region, side),
             _ => Largest::default(),
         };
         GoldenNoise {
@@ -181,9 +181,9 @@ impl Prepared {
             ripple_mm,
             ..
         } = self;
-        let displaced = |gauge: &Gauge| match gauge.measure {
-            Measure::Deviation { side } => shared.good_parts.and_then(|of| of.displaced(side)),
-            _ => None,
+        let displaced = |gauge: &Gauge| {
+            let side = gauge.measure.facts().basis.square_side()?;
+            shared.good_parts?.displaced(side)
         };
         let bytes = size_of_val(map.as_deref().unwrap_or(&[])) + taught.bytes();
         let production = Production::new(Parts {

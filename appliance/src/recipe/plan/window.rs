@@ -1,7 +1,7 @@
 //! The part of the frame that the gauges need.
 
 use algo::geometry::Triangulator;
-use algo::inspect::{Gauge, Measure};
+use algo::inspect::Gauge;
 use algo::units::Height;
 use std::ops::Range;
 
@@ -14,11 +14,8 @@ pub(super) fn of(
 ) -> Vec<Range<usize>> {
     let mut window = vec![0..0; height];
     for gauge in gauges {
-        let margin = away
-            + match gauge.measure {
-                Measure::Deviation { side } => side.max(widest) / 2,
-                _ => 0,
-            };
+        let side = gauge.measure.facts().basis.square_side();
+        let margin = away + side.map_or(0, |side| side.max(widest) / 2);
         for (row, columns) in [Some(&gauge.region), gauge.from.as_ref()]
             .into_iter()
             .flatten()

@@ -22,6 +22,13 @@ export async function ask(method, path, body) {
   return response.json().catch(() => null);
 }
 
+// What gauges can measure, and the one of these kinds that a gauge is of: that with the same fields, if its unit depends on them.
+export async function loadKinds() { return (await ask("GET", "/api/kinds")).kinds; }
+export function kindOf(kinds, measures) {
+  const own = kinds.filter((one) => one.measures.kind === measures.kind);
+  return own.find((one) => Object.keys(one.measures).every((key) => one.measures[key] === measures[key])) || own[0];
+}
+
 // A picture, to be drawn on a canvas.
 export async function picture(path) {
   const response = await fetch(path, { credentials: "same-origin", cache: "no-store" });

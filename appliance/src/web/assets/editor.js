@@ -1,36 +1,27 @@
 // Edits a recipe: regions by dragging on the picture of the part as taught, limits and names in fields.
 import { $, draw, fill, make, show, text } from "./element.js";
-import { ask, map } from "./api.js";
+import { ask, kindOf, loadKinds, map } from "./api.js";
 import { paint } from "./colour.js";
 import { change, notice } from "./session.js";
 import { choose } from "./question.js";
 
-const state = { recipe: null, map: null, chosen: [0, 0], drag: null, wide: 1 };
+const state = { recipe: null, map: null, kinds: [], chosen: [0, 0], drag: null, wide: 1 };
 
 // Factor and symbol of a gauge's limits as people write them, and the smallest and largest limit that the station accepts.
-function unit(measures) {
-  const kind = measures.kind;
-  if (kind === "coverage" || kind === "out_of_tolerance") return [100, "%", 0, 100];
-  if (kind === "tilt" || (kind === "placement" && measures.component.startsWith("about"))) return [1, "°", -180, 180];
-  return kind === "volume" ? [1, "mm³", -21474836.47, 21474836.47] : [1, "mm", -214748.3647, 214748.3647];
+function unit({ unit: symbol, low, high }) {
+  return symbol ? [1, symbol, low, high] : [100, "%", 100 * low, 100 * high];
 }
 
 // "deviation over 9 px", "step from other region", "tilt about x".
-function words(measures) {
-  const more = [];
-  if (measures.from) more.push(`from ${measures.from}`);
-  if (measures.about) more.push(`about ${measures.about}`);
-  if (measures.component) more.push(measures.component.replace(/_/g, " "));
-  if (measures.above_mm !== undefined) more.push(`above ${measures.above_mm} mm`);
-  if (measures.tolerance_mm !== undefined) more.push(`of ${measures.tolerance_mm} mm`);
-  if (measures.smoothing_px) more.push(`over ${measures.smoothing_px} px`);
-  return [measures.kind.replace(/_/g, " ")].concat(more).join(" ");
+function words(measures, kind) {
+  return `${measures.kind.replace(/_/g, " ")} ${kind.words.replace(/\{(\w+)\}/g, (_, key) => measures[key])}`.trim();
 }
 
 export async function edit(number) {
   try {
     state.recipe = await ask("GET", `/api/recipes/${number}`);
     state.map = await map(`/api/recipes/${number}/picture/height`);
+    state.kinds = await loadKinds();
   } catch (error) { notice(error.message, true); return; }
   const { recipe } = state;
   text("editor-number", String(number));
@@ -155,7 +146,8 @@ function field(value, label, [factor, symbol, least, most], set) {
 function drawGauges() {
   const { recipe } = state;
   const row = (gauge) => {
-    const units = unit(gauge.measures);
+    const kind = kindOf(state.kinds, gauge.measures);
+    const units = unit(kind);
     const limit = (key) => (value) => { if (value === null) delete gauge[key]; else gauge[key] = value; check(); };
     const low = field(gauge.low, `lowest ${gauge.name}`, units, limit("low"));
     const high = field(gauge.high, `highest ${gauge.name}`, units, limit("high"));
@@ -168,7 +160,7 @@ function drawGauges() {
       }
     };
     check();
-    const line = make("tr", "", make("td", "", gauge.name), make("td", "", words(gauge.measures)), make("td", "", gauge.region || "whole part"),
+    const line = make("tr", "", make("td", "", gauge.name), make("td", "", words(gauge.measures, kind)), make("td", "", gauge.region || "whole part"),
       make("td", "", low), make("td", "", high), make("td", "", units[1]));
     line.addEventListener("focusin", () => {
       const at = recipe.regions.findIndex((region) => region.name === gauge.region);

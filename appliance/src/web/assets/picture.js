@@ -1,13 +1,13 @@
 // The maps of the last part, with scale, cursor and the outlines of the recipe's regions.
 import { $, draw, fill, show, text } from "./element.js";
-import { ask, map } from "./api.js";
+import { ask, kindOf, loadKinds, map } from "./api.js";
 import { paint } from "./colour.js";
 import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
 import { signed } from "./number.js";
 
 const UNITS = { mm: 3, counts: 1 };
-const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, recipeKey: "", asked: 0, at: [0, 0] };
+const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, kinds: [], recipeKey: "", asked: 0, at: [0, 0] };
 
 // The recipe's gauges that failed or could not be measured in the result.
 function failing() {
@@ -15,7 +15,7 @@ function failing() {
   if (!recipe || !result) return [];
   return recipe.gauges.flatMap((gauge) => {
     const found = result.gauges.find((value) => value.name === gauge.name);
-    return !found || (found.valid && found.pass) ? [] : [{ gauge, kind: found.valid ? "fail" : "invalid" }];
+    return !found || (found.valid && found.pass) ? [] : [{ gauge, kind: found.valid ? "fail" : "invalid", square: found.square }];
   });
 }
 
@@ -39,12 +39,9 @@ function drawOutlines() {
   over(svg, about, ...quiet, ...loud.map((region) => outline(region, "under")), ...loud.map((region) => outline(region, bad.get(region.name))), ...rings(about, decisive()));
 }
 
-// Measures that compare the part with golden pixel by pixel, so that a place in the picture explains why they fail.
-const COMPARING = ["rms_deviation", "out_of_tolerance"];
-
-// The regions of failed gauges that compare the part with golden and have no square of their own.
+// The regions of failed gauges that compare the part with golden, so that a place in the picture explains why they fail, and have no square of their own.
 function deviating() {
-  const names = failing().filter(({ gauge, kind }) => kind === "fail" && COMPARING.includes(gauge.measures.kind)).map(({ gauge }) => gauge.region);
+  const names = failing().filter(({ gauge, kind, square }) => kind === "fail" && !square && kindOf(state.kinds, gauge.measures).compares).map(({ gauge }) => gauge.region);
   return state.recipe ? state.recipe.regions.filter((region) => names.includes(region.name)) : [];
 }
 
@@ -159,6 +156,7 @@ async function loadRecipe(result) {
     const { recipes } = await ask("GET", "/api/recipes");
     if (!recipes.some((one) => one.number === result.recipe && !one.error && one.fingerprint.startsWith(result.fingerprint))) return;
     recipe = await ask("GET", `/api/recipes/${result.recipe}`);
+    state.kinds = await loadKinds();
   } catch (none) { return; }
   // Meanwhile there may be a result of another recipe.
   if (!state.result || keyOf(state.result) !== key) return;

@@ -1,0 +1,36 @@
+//! Flatness about the least-squares plane.
+
+use super::extreme::range;
+use super::kind::*;
+use super::level::Plane;
+
+kind! {
+    /// The distance between the two planes parallel to the least-squares plane that enclose all cells, mm: peak-to-valley
+    /// flatness deviation FLTt about the reference plane LSPL of ISO 12781-1.
+    Flatness {
+        /// Side of the cells, pixels.
+        smoothing_px: usize,
+    }
+}
+
+impl Kind for Flatness {
+    fn facts(&self) -> Facts {
+        Facts {
+            never_negative: true,
+            ..Facts::new(
+                Unit::Length,
+                Basis::Cells(self.smoothing_px),
+                "over {smoothing_px} px",
+            )
+        }
+    }
+
+    /// The plane's own error is small against a cell's and left out.
+    fn find(&self, of: Evidence<'_>) -> Option<Found> {
+        let plane = Plane::of(of.cells())?;
+        let slope = 1.0 + plane.along * plane.along + plane.down * plane.down;
+        let heights = of.cells().iter().map(|cell| plane.above(cell));
+        of.room.extend(heights);
+        range(of.cells(), of.room, of.sigma / libm::sqrt(slope), of.placed)
+    }
+}

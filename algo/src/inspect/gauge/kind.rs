@@ -1,0 +1,189 @@
+//! What a kind of gauge states of itself, and what it works out its value from.
+
+use super::Measure;
+use super::extreme::motion;
+use super::kinds::Component;
+use crate::inspect::align::Placed;
+
+pub(super) use super::{Cell, Found, Unit};
+pub(super) use alloc::format;
+pub(super) use alloc::string::String;
+pub(super) use alloc::vec::Vec;
+
+/// What a value is worked out from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// The mean deviations of the squares of so many pixels a side about every pixel: odd, so that a square has a middle pixel.
+    Squares(usize),
+    /// Cells of so many pixels a side.
+    Cells(usize),
+    /// Cells whose side the grid chooses: the value hardly depends on it.
+    Region,
+    /// How many pixels have a height.
+    Pixels,
+    /// The part's motion; there is no region.
+    Motion(Component),
+}
+
+impl Basis {
+    /// The side of its squares or cells, if it states one.
+    pub fn side(self) -> Option<usize> {
+        match self {
+            Self::Squares(side) | Self::Cells(side) => Some(side),
+            Self::Region | Self::Pixels | Self::Motion(_) => None,
+        }
+    }
+
+    /// The side of its squares.
+    pub fn square_side(self) -> Option<usize> {
+        match self {
+            Self::Squares(side) => Some(side),
+            _ => None,
+        }
+    }
+
+    /// The side of its cells, if it is worked out from cells; 0 if the grid may choose it.
+    pub(in crate::inspect) fn cell_side(self) -> Option<usize> {
+        match self {
+            Self::Cells(side) => Some(side.max(1)),
+            Self::Region => Some(0),
+            Self::Squares(_) | Self::Pixels | Self::Motion(_) => None,
+        }
+    }
+}
+
+/// What a gauge says of itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facts {
+    /// The unit of its value and limits.
+    pub unit: Unit,
+    /// What its value is worked out from.
+    pub basis: Basis,
+    /// What its fields say, in words behind the kind's name; each name of a field in braces stands for its value.
+    pub words: &'static str,
+    /// Whether its value is made of deviations from golden along its normal, and not of heights.
+    pub compares: bool,
+    /// Whether no part can have a value below 0, which the unit does not say.
+    pub never_negative: bool,
+    /// The deviation or height that the noise of a square or cell must stay below; without it the gauge's limits are.
+    pub noise_limit: Option<f64>,
+}
+
+impl Facts {
+    /// Of a value that is made of heights and may be negative.
+    pub(super) fn new(unit: Unit, basis: Basis, words: &'static str) -> Self {
+        Self {
+            unit,
+            basis,
+            words,
+            compares: false,
+            never_negative: false,
+            noise_limit: None,
+        }
+    }
+}
+
+/// A kind of gauge, with the values of its fields.
+pub trait Kind {
+    /// What it says of itself.
+    fn facts(&self) -> Facts;
+
+    /// The same kind with the other values of the field that its unit depends on.
+    fn others(&self) -> Vec<Measure> {
+        Vec::new()
+    }
+
+    /// The name of the region that it compares its own with.
+    fn from(&self) -> Option<&str> {
+        None
+    }
+
+    /// Refuses values of its fields; sides and names are checked by the recipe.
+    ///
+    /// # Errors
+    /// In words that follow the gauge's name.
+    fn check(&self) -> Result<(), String> {
+        Ok(())
+    }
+
+    /// Its value, of a kind that is worked out from cells; none where there was nothing to measure.
+    fn find(&self, _: Evidence<'_>) -> Option<Found> {
+        None
+    }
+}
+
+/// Declares the struct of a kind, with its fields as recipes have them.
+macro_rules! kind {
+    // What else is written beside the name of such a kind is ignored.
+    ($(#[$doc:meta])* $kind:ident {}) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        pub struct $kind {}
+    };
+    ($(#[$doc:meta])* $kind:ident { $($(#[$about:meta])* $field:ident: $type:ty,)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq)]
+        #[cfg_attr(
+            feature = "serde",
+            derive(serde::Serialize, serde::Deserialize),
+            serde(deny_unknown_fields)
+        )]
+        pub struct $kind {
+            $($(#[$about])* pub $field: $type,)*
+        }
+    };
+}
+pub(super) use kind;
+
+/// The cells of a gauge's regions as they were measured. Those of a kind that compares are along golden's normal.
+pub struct Evidence<'a> {
+    /// The cells of its region, then those of the one that it is compared with.
+    pub all: &'a [Cell],
+    /// How many are of its region.
+    pub count: usize,
+    /// Columns of the grid of its region.
+    pub columns: usize,
+    /// σ of a cell's mean, mm.
+    pub sigma: f64,
+    /// The variance of a single pixel's height in both regions, mm².
+    pub variances: [f64; 2],
+    /// How the part lies.
+    pub placed: Option<&'a Placed>,
+    /// Empty, with room for a value per cell.
+    pub room: &'a mut Vec<f64>,
+}
+
+impl<'a> Evidence<'a> {
+    /// The cells of its region.
+    pub fn cells(&self) -> &'a [Cell] {
+        &self.all[..self.count]
+    }
+
+    /// The cells of the region that it is compared with.
+    pub fn from(&self) -> &'a [Cell] {
+        &self.all[self.count..]
+    }
+
+    /// A value that is linear in height, whose derivatives w over the heights of the cells are in the room: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g.
+    /// n are a cell's pixels, σ_z² is the variance of one of them, g = Σ wᵢ jᵢ is the derivative of the value over the motion, j a cell's
+    /// Jacobian, and C the motion's covariance. The two terms are taken as independent: the pixels that the motion is found from are one
+    /// in some dozens of the gauge's.
+    pub fn linear(&self, value: f64) -> Found {
+        let (mut pixels, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
+        for (at, (w, cell)) in self.room.iter().zip(self.all).enumerate() {
+            let variance = self.variances[usize::from(at >= self.count)];
+            pixels += w * w * variance / cell.pixels;
+            lever += libm::fabs(*w);
+            for (g, j) in g.iter_mut().zip(cell.taught.jacobian) {
+                *g += w * j;
+            }
+        }
+        Found {
+            value,
+            pixels,
+            motion: motion(&g, self.placed),
+            lever,
+        }
+    }
+}

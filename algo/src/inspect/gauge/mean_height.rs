@@ -1,0 +1,20 @@
+//! The mean height of a region.
+
+use super::kind::*;
+use super::level::mean;
+
+kind! {
+    /// The mean height, mm.
+    MeanHeight {}
+}
+
+impl Kind for MeanHeight {
+    fn facts(&self) -> Facts {
+        Facts::new(Unit::Length, Basis::Region, "")
+    }
+
+    fn find(&self, of: Evidence<'_>) -> Option<Found> {
+        let value = mean(of.cells(), of.room)?;
+        Some(of.linear(value))
+    }
+}
