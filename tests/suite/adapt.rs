@@ -1,7 +1,7 @@
-//! `fringed adapt`, and `fringed measure --recipe`.
+//! `fringed-lab adapt`, and `fringed measure --recipe`.
 
 use crate::measured::SPHERE;
-use crate::written::{Written, geometric, program};
+use crate::written::{Written, geometric, laboratory};
 use algo::pattern::Shot;
 use appliance::head::calibrated::CalibratedHead;
 use appliance::head::calibration::Calibration;
@@ -32,7 +32,7 @@ fn adapt(recording: &Path, out: &Path, more: &[&str]) -> Run {
     let out = [OsStr::new("--json"), OsStr::new("--out"), out.as_os_str()];
     let more = more.iter().map(OsStr::new);
     let arguments: Vec<&OsStr> = fixed.into_iter().chain(out).chain(more).collect();
-    program().run(&arguments)
+    laboratory().run(&arguments)
 }
 
 fn json(run: &Run) -> serde_json::Value {

@@ -1,6 +1,6 @@
 //! Heights go by the fringes that tell them, wherever the projector stands.
 
-use crate::written::{Written, program};
+use crate::written::{Written, laboratory, program};
 use hal::model::DeviceModel;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
@@ -95,7 +95,7 @@ fn the_case_of_a_projector_above_the_camera_is_measured_by_its_horizontal_fringe
     ] {
         import.extend([option.to_owned(), text(case.join(file))]);
     }
-    program().run(&import).succeeded();
+    laboratory().run(&import).succeeded();
     program().measure(&recording, &out, &[]).succeeded();
     let found = files::array(&out.join("height.npy")).values;
     let expected = files::array(&case.join("expected_height.npy")).values;

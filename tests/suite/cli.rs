@@ -367,10 +367,30 @@ fn benchmarks_and_experiments_are_commands_of_another_program() {
 }
 
 #[test]
+fn the_workbench_is_of_another_program() {
+    let help = run(&["--help"]).succeeded().stdout;
+    for command in ["adapt", "capture", "import", "patterns"] {
+        let remedy = format!("fringed-lab {command}");
+        for arguments in [
+            &[command][..],
+            &[command, "--help"],
+            &[command, "a", "b", "--no-such-option", "--steps=4"],
+            &["--config", "c.toml", command, "a"],
+            &["help", command],
+        ] {
+            check_refused(&run(arguments), 64, &[&remedy]);
+        }
+        let listed = |line: &str| line.trim_start().starts_with(&format!("{command} "));
+        assert!(!help.lines().any(listed), "{help}");
+        laboratory().run(&[command, "--help"]).succeeded();
+    }
+}
+
+#[test]
 fn a_pattern_is_not_written_under_the_name_of_a_picture() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("x.png");
-    let run = run(&[
+    let run = laboratory().run(&[
         "adapt",
         "a-recording",
         "--method",

@@ -2,7 +2,7 @@
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, PATIENCE, Place, pause};
-use crate::written::program;
+use crate::written::{laboratory, program};
 use hal::replay::recorder;
 use serde_json::{Value, json};
 use std::fs;
@@ -92,7 +92,7 @@ fn the_case_of_a_heterodyne_golden_is_taught_imported_and_judged() {
     ] {
         import.extend([option.to_owned(), text(file)]);
     }
-    program().run(&import).succeeded();
+    laboratory().run(&import).succeeded();
     let manifest = place.path("r/recording.json");
     let mut known: Value = serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap();
     known["camera"]["noise_counts"] = json!(1.0);

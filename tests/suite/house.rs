@@ -347,7 +347,7 @@ fn every_file_that_the_architecture_names_is_there() {
     for file in named {
         // A file in the folder of the previous one needs only its name.
         let by_name = || {
-            let all = ["algo/src", "hal/src", "appliance/src"];
+            let all = ["algo/src", "hal/src", "appliance/src", "appliance/lab/src"];
             all.iter().flat_map(|folder| sources(folder)).any(|source| {
                 Path::new(&source.name)
                     .file_name()

@@ -1,7 +1,7 @@
-//! `fringed adapt --patterns` and `fringed measure --about`: from a preliminary recording to the heights of the adapted pattern.
+//! `fringed-lab adapt --patterns` and `fringed measure --about`: from a preliminary recording to the heights of the adapted pattern.
 
 use crate::adapt::turns;
-use crate::written::{Written, program};
+use crate::written::{Written, laboratory};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use appliance::head::calibrated::CalibratedHead;
 use appliance::head::calibration::Calibration;
@@ -151,7 +151,7 @@ fn adapt(written: &Written, more: &[&str]) -> std::path::PathBuf {
         .chain([&folder_name[..]])
         .chain(more.iter().copied())
         .collect();
-    program().run(&arguments).succeeded();
+    laboratory().run(&arguments).succeeded();
     folder
 }
 
@@ -210,7 +210,7 @@ fn what_cannot_be_projected_or_measured_about_is_refused() {
     let adapt = |more: &[&str]| {
         let fixed = ["adapt", recording, "--out", out];
         let arguments: Vec<&str> = fixed.iter().chain(more).copied().collect();
-        program().run(&arguments)
+        laboratory().run(&arguments)
     };
     for (more, words) in [
         (&["--method", "fringed", "--frames", "12"][..], "--patterns"),

@@ -16,9 +16,12 @@ pub fn program() -> Program {
     Program::at(FRINGED)
 }
 
-/// The program `fringed-lab` of the same build as this suite.
+/// The path of the program `fringed-lab` of the same build as this suite.
+pub const FRINGED_LAB: &str = env!("CARGO_BIN_EXE_fringed-lab-under-test");
+
+/// This program.
 pub fn laboratory() -> Program {
-    Program::at(env!("CARGO_BIN_EXE_fringed-lab-under-test"))
+    Program::at(FRINGED_LAB)
 }
 
 /// A geometric recording of three levels of four shifts.

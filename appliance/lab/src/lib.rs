@@ -1,7 +1,9 @@
-//! The program `fringed-lab`: benchmarks and experiments on what the daemon `fringed` is made of.
+//! The program `fringed-lab`: benchmarks and experiments on what the daemon `fringed` is made of, and the
+//! workbench for recordings of other pictures and patterns for a part.
 
 pub mod accuracy;
 pub mod benchmark;
 pub mod cli;
 pub mod experiment;
 mod plot;
+pub mod workbench;

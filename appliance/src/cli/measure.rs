@@ -81,12 +81,11 @@ const MAX_MAP: u64 = 1 << 30;
 fn expected_phase(path: &Path) -> Result<npy::Array<f64>, Failure> {
     let what = || format!("read {}", path.display());
     let missing = |error| {
-        let words = format!("{error}: name the expected phase that adapt wrote");
+        let words = format!("{error}: name the expected phase that fringed-lab adapt wrote");
         Failure::because(Exit::Missing, what(), words)
     };
     if std::fs::metadata(path).map_err(missing)?.len() > MAX_MAP {
-        let words =
-            "it is larger than a map of any camera: name the expected phase that adapt wrote";
+        let words = "it is larger than a map of any camera: name the expected phase that fringed-lab adapt wrote";
         return Err(Failure::because(Exit::Content, what(), words));
     }
     let bytes = std::fs::read(path).map_err(missing)?;

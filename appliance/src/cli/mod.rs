@@ -8,33 +8,28 @@ macro_rules! say {
     }};
 }
 
-mod adapt;
 mod board;
 mod calibrate;
-mod capture;
 mod completions;
 mod config;
 mod demo;
-mod described;
 mod doctor;
 mod history;
 mod idle;
-mod import;
 mod measure;
 pub mod names;
 pub mod numbers;
 mod options;
 mod part;
-mod patterns;
 mod recipe;
 mod record;
 mod replay;
 mod serve;
 mod teach;
 
-pub use adapt::Form;
+pub use calibrate::model_files;
 pub use completions::Completions;
-pub use options::{Output, Threads};
+pub use options::{Files, Output, Quiet, Threads};
 
 use crate::VERSION;
 use crate::error::{Exit, Failure};
@@ -69,18 +64,10 @@ enum Command {
     Demo(demo::Demo),
     /// Measure a recording: phase, height, picture, point cloud and report.
     Measure(measure::Measure),
-    /// Make a pattern for the part of a preliminary recording.
-    Adapt(adapt::Adapt),
     /// Examine the head step by step.
     Doctor(doctor::Doctor),
     /// Calibrate the head: make models from a board or import them, measure the rest.
     Calibrate(calibrate::Calibrate),
-    /// Write the pictures to project: fringes, adaptive fringes, Gray code.
-    Patterns(patterns::Patterns),
-    /// Make a recording of pictures that other programs took.
-    Import(import::Import),
-    /// Take pictures with a head that need not be calibrated.
-    Capture(capture::Capture),
     /// Draw a checkerboard to print, for `calibrate --board`.
     Board(board::Print),
     /// Record a sequence from the configured head.
@@ -106,7 +93,14 @@ enum Command {
 }
 
 /// Commands of `fringed-lab` that `fringed` once had.
-const LABORATORY: [&str; 2] = ["bench", "experiment"];
+const LABORATORY: [&str; 6] = [
+    "adapt",
+    "bench",
+    "capture",
+    "experiment",
+    "import",
+    "patterns",
+];
 
 /// Runs the program `fringed`.
 pub fn main() -> ExitCode {
@@ -164,12 +158,8 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Some(Command::Serve(command)) => command.run(),
         Some(Command::Demo(command)) => command.run(),
         Some(Command::Measure(command)) => command.run(),
-        Some(Command::Adapt(command)) => command.run(),
         Some(Command::Doctor(command)) => command.run(),
         Some(Command::Calibrate(command)) => command.run(),
-        Some(Command::Patterns(command)) => command.run(),
-        Some(Command::Import(command)) => command.run(),
-        Some(Command::Capture(command)) => command.run(),
         Some(Command::Board(command)) => command.run(),
         Some(Command::Record(command)) => command.run(),
         Some(Command::Teach(command)) => command.run(),

@@ -9,7 +9,7 @@ const ENDINGS: [&str; 9] = [
 ];
 
 /// A file whose name must have the ending of its content, for example `npy`.
-pub(super) fn file(ending: &'static str) -> impl TypedValueParser<Value = PathBuf> {
+pub fn file(ending: &'static str) -> impl TypedValueParser<Value = PathBuf> {
     PathBufValueParser::new().try_map(move |path| match ends_in(&path, ending) {
         true => Ok(path),
         false => Err(format!("name a file that ends in .{ending}")),

@@ -1,13 +1,8 @@
 //! Measures a recording: phase, height and report (`fringed measure`).
 
-pub mod adapt;
 mod coded;
-pub mod import;
 mod known;
-pub mod layout;
 pub mod models;
-mod outline;
-pub mod projected;
 mod report;
 mod score;
 
@@ -16,7 +11,6 @@ pub use score::{GROSS_MM, Score, Truth};
 
 use crate::error::{Exit, Failure};
 use crate::head::channel::{Channel, Expected};
-use crate::head::code::CodeAlone;
 use crate::head::direction::Sensitivity;
 use crate::head::scan::Scan;
 use crate::head::seam;
@@ -114,8 +108,8 @@ pub fn measure_with(
     measure_about(recording, folder, recipe, known)
 }
 
-/// The failure of a recording with wrong content.
-fn wrong(folder: &Path, error: &dyn std::fmt::Display) -> Failure {
+/// The failure of a recording with wrong content, in this folder.
+pub fn wrong(folder: &Path, error: &dyn std::fmt::Display) -> Failure {
     let manifest = folder.join("recording.json");
     Failure::because(Exit::Content, manifest.display(), error)
 }
@@ -245,39 +239,9 @@ fn measure_about(
 }
 
 /// The least modulation that is trusted in a recording: that of its noise where it is stated.
-fn least_modulation(recording: &Recording) -> LeastModulation {
+pub fn least_modulation(recording: &Recording) -> LeastModulation {
     let of_noise = |noise| LeastModulation::of_noise(noise, recording.bit_depth);
     recording.noise_counts.map(of_noise).unwrap_or_default()
-}
-
-/// The absolute phase of a pattern by its own levels or code.
-///
-/// # Errors
-/// In words: it has none, and what to add.
-fn absolute(recording: &Recording, pattern: usize) -> Result<PhaseMap, String> {
-    let least = least_modulation(recording);
-    if let Some(code) = CodeAlone::of(recording, pattern)? {
-        return code.phases(least);
-    }
-    let channel = Channel::new(recording, pattern, least)?;
-    let by_itself = channel.unwrapping(None, &Err("there is no known map".into()))?;
-    match by_itself.missing() {
-        None => Ok(channel.decode(&by_itself)?.absolute),
-        Some(missing) => Err(missing.to_owned()),
-    }
-}
-
-/// The wrapped phase of a pattern's coarsest level, or the absolute one of a Gray code alone.
-///
-/// # Errors
-/// In words: the frames make no levels.
-fn coarsest(recording: &Recording, pattern: usize) -> Result<PhaseMap, String> {
-    let least = least_modulation(recording);
-    if let Some(code) = CodeAlone::of(recording, pattern)? {
-        return code.phases(least);
-    }
-    let channel = Channel::new(recording, pattern, least)?;
-    Ok(channel.wrapped_levels()?.swap_remove(0))
 }
 
 /// The pattern that gives the height: that whose phase changes most with it, else the first vertical one, else the first.
@@ -299,13 +263,17 @@ fn vertical_of(recording: &Recording) -> usize {
 }
 
 /// The devices of a recording, where it has models of them, and its working range.
-struct Geometry {
+pub struct Geometry {
     devices: Result<(Pinhole, Pinhole, Reference), String>,
     range: Option<HeightRange>,
 }
 
 impl Geometry {
-    fn of(recording: &Recording, recipe: Option<&Recipe>) -> Result<Self, String> {
+    /// Of this recording; the working range is the recipe's where the recording has none.
+    ///
+    /// # Errors
+    /// In words: a model is absurd.
+    pub fn of(recording: &Recording, recipe: Option<&Recipe>) -> Result<Self, String> {
         let projector = &recording.projector;
         let frames = (recording.width, recording.height);
         let raster = (projector.width, projector.height);
@@ -329,8 +297,11 @@ impl Geometry {
         })
     }
 
-    /// The inner error says which model is missing, the outer one what is wrong with those that are there.
-    fn triangulator(
+    /// What makes heights of this phase function's phases.
+    ///
+    /// # Errors
+    /// The inner one says which model is missing, the outer one what is wrong with those that are there.
+    pub fn triangulator(
         &self,
         function: &PhaseFunction,
     ) -> Result<Result<Triangulator, String>, algo::geometry::RigError> {

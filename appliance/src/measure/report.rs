@@ -269,7 +269,7 @@ fn advice(
     {
         let range = surface.triangulator.range();
         return Some(format!(
-            "{:.0} % of the lit pixels lie beyond the working range of {:.0} to {:.0} mm: state another one with import --range, or \
+            "{:.0} % of the lit pixels lie beyond the working range of {:.0} to {:.0} mm: state another one with fringed-lab import --range, or \
              range_mm in recording.json",
             100.0 * beyond as f64 / lit as f64,
             range.low,
@@ -278,7 +278,7 @@ fn advice(
     }
     (100 * lit < pixels && noise_counts.is_none()).then(|| {
         "next to no pixel has the 16 of 255 counts of modulation that a camera of unknown noise needs: if the pictures are only dim, \
-         state its noise with import --noise, or camera.noise_counts in recording.json"
+         state its noise with fringed-lab import --noise, or camera.noise_counts in recording.json"
             .into()
     })
 }

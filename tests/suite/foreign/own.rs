@@ -2,7 +2,7 @@
 
 use super::scene::png_of;
 use crate::station_plc::Place;
-use crate::written::{FRINGED, program};
+use crate::written::{FRINGED_LAB, laboratory, program};
 use std::fs;
 use std::io::Write as _;
 use std::path::Path;
@@ -62,7 +62,7 @@ fn written_patterns_make_a_recording_when_their_frames_are_filled_in() {
         let folder = path(&format!("patterns-{at}"));
         let size = ["--projector", "64x48", "--camera", "64x48"];
         let arguments = [&["patterns", folder.to_str().unwrap()][..], &size, options].concat();
-        program().run(&arguments).succeeded();
+        laboratory().run(&arguments).succeeded();
         let shown = files::names(&folder.join("show"));
         assert_eq!(shown.len(), count);
         let unfilled = program().measure(&folder, &path("none"), &[]);
@@ -89,7 +89,7 @@ fn written_patterns_make_a_recording_when_their_frames_are_filled_in() {
                 "case {at}, pixel {pixel}: {turns} {error}"
             );
         }
-        let again = program().run(&arguments);
+        let again = laboratory().run(&arguments);
         assert_eq!(again.code, 73, "{}", again.stderr);
     }
 }
@@ -110,7 +110,7 @@ fn a_head_that_is_not_calibrated_takes_recordings_without_models_of_each_pose() 
     ]);
     assert_eq!(run.code, 65, "{}", run.stderr);
     let taken = place.path("taken");
-    let mut capture = Command::new(FRINGED)
+    let mut capture = Command::new(FRINGED_LAB)
         .args([
             "capture",
             taken.to_str().unwrap(),
@@ -149,7 +149,7 @@ fn pictures_alone_are_taken_and_what_cannot_be_shown_is_refused() {
     let config = place.path("fringed.toml");
     let capture = |folder: &str, patterns: &str| {
         let folder = place.path(folder);
-        program().run(&[
+        laboratory().run(&[
             "capture",
             folder.to_str().unwrap(),
             "--config",

@@ -1,6 +1,6 @@
 //! Pictures of a synthetic surface, as another program would have taken them.
 
-use crate::written::program;
+use crate::written::{laboratory, program};
 use std::f64::consts::TAU;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -94,7 +94,7 @@ pub fn import(pictures: &Path, out: &Path, projector: &str, options: &[&str]) ->
     let (pictures, out) = (pictures.to_str().unwrap(), out.to_str().unwrap());
     let mut all = vec!["import", pictures, "--out", out, "--projector", projector];
     all.extend(options);
-    program().run(&all)
+    laboratory().run(&all)
 }
 
 /// The notes of an import with `--json`.

@@ -1,7 +1,8 @@
 //! `fringed-lab experiment --out DIR`: the paper's experiments as tables, plots and pictures.
 
+use super::adapt::Form;
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, RunRow, Scene, csv, figures, means};
-use appliance::cli::{Form, Output, Threads, names, numbers};
+use appliance::cli::{Output, Threads, names, numbers};
 use appliance::error::{Exit, Failure};
 use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;

@@ -1,8 +1,14 @@
 //! The command line.
 
 mod accuracy;
+mod adapt;
 mod bench;
+mod capture;
+mod described;
 mod experiment;
+mod import;
+mod numbers;
+mod patterns;
 
 use appliance::VERSION;
 use appliance::cli::{Completions, start};
@@ -10,7 +16,7 @@ use appliance::error::Failure;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Benchmarks and experiments on what `fringed` is made of.
+/// Benchmarks and experiments on what `fringed` is made of, recordings of other pictures, patterns for a part.
 #[derive(Debug, Parser)]
 #[command(name = "fringed-lab", version = VERSION)]
 struct Arguments {
@@ -27,6 +33,14 @@ enum Command {
     Bench(bench::Bench),
     /// Divide the error of heights into noise and what remains without it, and find the smallest dents that are seen.
     Accuracy(accuracy::Accuracy),
+    /// Make a pattern for the part of a preliminary recording.
+    Adapt(adapt::Adapt),
+    /// Write the pictures to project: fringes, adaptive fringes, Gray code.
+    Patterns(patterns::Patterns),
+    /// Make a recording of pictures that other programs took.
+    Import(import::Import),
+    /// Take pictures with a head that need not be calibrated.
+    Capture(capture::Capture),
     /// Print what makes a shell complete the command line.
     Completions(Completions),
 }
@@ -41,6 +55,10 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Experiment(command) => command.run(),
         Command::Bench(command) => command.run(),
         Command::Accuracy(command) => command.run(),
+        Command::Adapt(command) => command.run(),
+        Command::Patterns(command) => command.run(),
+        Command::Import(command) => command.run(),
+        Command::Capture(command) => command.run(),
         Command::Completions(command) => {
             command.run(Arguments::command());
             Ok(())

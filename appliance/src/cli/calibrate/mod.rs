@@ -235,7 +235,7 @@ impl Calibrate {
 ///
 /// # Errors
 /// If one does not (66).
-pub(super) fn model_files<'a>(named: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+pub fn model_files<'a>(named: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), Failure> {
     match named.into_iter().find(|path| !path.exists()) {
         None => Ok(()),
         Some(path) => Err(Failure::new(

@@ -28,9 +28,6 @@ const SHARED: &[(&str, &str, &str)] = &[
     ("measure", "threads", "of decoding and triangulating"),
     ("measure", "quiet", "no table"),
     ("measure", "json", "the report"),
-    ("adapt", "threads", "of the measurement"),
-    ("adapt", "quiet", "no table"),
-    ("adapt", "json", "the report"),
     ("doctor", "config", "which head"),
     ("doctor", "state", "where the head's calibration is"),
     (
@@ -49,15 +46,6 @@ const SHARED: &[(&str, &str, &str)] = &[
     ),
     ("calibrate", "quiet", "no progress, no table"),
     ("calibrate", "json", "the report"),
-    ("patterns", "threads", "of the rasters"),
-    ("patterns", "quiet", "no closing line"),
-    ("import", "threads", "of reading the pictures"),
-    ("import", "json", "the summary"),
-    ("import", "quiet", "no summary"),
-    ("capture", "config", "which head"),
-    ("capture", "state", "where the head's calibration is"),
-    ("capture", "threads", "of the simulated light"),
-    ("capture", "quiet", "no progress, no closing line"),
     ("board", "quiet", "no closing line"),
     ("record", "config", "which head"),
     ("record", "state", "where the head's calibration is"),
@@ -268,9 +256,6 @@ fn every_command_option_and_argument_says_in_the_help_what_it_does() {
 #[test]
 fn an_output_is_refused_whose_name_says_another_content() {
     for (line, remedy) in [
-        ("fringed adapt r --method fringed --out x.png", ".npy"),
-        ("fringed adapt r --method fringed --out phase", ".npy"),
-        ("fringed adapt r --method fringed --out .npy", ".npy"),
         ("fringed teach --number 2 --out x.npy", ".recipe"),
         (
             "fringed teach --number 2 --golden r --out x.json",
@@ -286,8 +271,6 @@ fn an_output_is_refused_whose_name_says_another_content() {
         assert!(error.to_string().contains(remedy), "{line}: {error}");
     }
     for line in [
-        "fringed adapt r --method fringed --out a.folder/x.npy",
-        "fringed adapt r --method fringed --out X.NPY",
         "fringed teach --number 2 --out 2.recipe",
         "fringed recipe export 2 2.recipe",
         "fringed measure r --out result",

@@ -1,11 +1,11 @@
 //! What looks wrong with an imported Gray code without fringes.
 
 use super::code::{options, otherwise};
-use crate::head::code::CodeAlone;
-use crate::measure::layout::Description;
-use crate::measure::least_modulation;
+use crate::workbench::layout::Description;
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
+use appliance::head::code::CodeAlone;
+use appliance::measure::least_modulation;
 use hal::replay::Recording;
 
 /// Share of the pixels that must be lit.

@@ -1,11 +1,11 @@
-//! What to project for an adapted pattern, and what to decode the frames with: the folder that `fringed adapt --patterns` writes.
+//! What to project for an adapted pattern, and what to decode the frames with: the folder that `fringed-lab adapt --patterns` writes.
 
 use super::adapt::Adapted;
-use crate::error::{Exit, Failure};
-use crate::output::canvas::grey_png;
-use crate::storage::folder::OutputFolder;
 use algo::pattern::{Encoder, PhaseFunction, Shot, Split, Waveforms};
 use algo::units::AbsolutePhase;
+use appliance::error::{Exit, Failure};
+use appliance::output::canvas::grey_png;
+use appliance::storage::folder::OutputFolder;
 use hal::npy;
 use rayon::prelude::*;
 use serde::Serialize;

@@ -1,13 +1,12 @@
-//! `fringed import DIR --out RECORDING`: a recording of other people's pictures.
+//! `fringed-lab import DIR --out RECORDING`: a recording of other people's pictures.
 
-use super::calibrate::model_files;
 use super::described::Described;
-use super::names;
-use super::numbers::{number, range};
-use super::options::{Output, Threads};
-use crate::error::{Exit, Failure};
-use crate::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
-use crate::measure::import::{Channel, Taken, import};
+use super::numbers::range;
+use crate::workbench::import::{Channel, Taken, import};
+use appliance::cli::numbers::number;
+use appliance::cli::{Output, Threads, model_files, names};
+use appliance::error::{Exit, Failure};
+use appliance::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
 use hal::bounds::{MAX_NOISE_COUNTS, MAX_RANGE_MM, MIN_NOISE_COUNTS};
 use hal::replay::recorder;
 use serde::Serialize;

@@ -2,7 +2,7 @@
 
 use super::picture::{ENDINGS, Picture};
 use super::{content, name};
-use crate::error::{Exit, Failure};
+use appliance::error::{Exit, Failure};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

@@ -1,13 +1,14 @@
 //! The models of an imported recording: whether heights can be measured with them, and whether they fit what was measured.
 
+use super::phases::absolute;
 use super::{content, plane};
-use crate::error::Failure;
-use crate::head::calibration::opencv::Models;
-use crate::head::seam;
-use crate::measure::{Geometry, absolute};
 use algo::geometry::{Pinhole, RigError};
 use algo::phase::Trust;
 use algo::pipeline::{Epipolar, PhaseMap};
+use appliance::error::Failure;
+use appliance::head::calibration::opencv::Models;
+use appliance::head::seam;
+use appliance::measure::Geometry;
 use hal::model::DeviceModel;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;

@@ -1,13 +1,12 @@
-//! `fringed capture DIR`: pictures of white, black, fringes or files, with a head that need not be calibrated.
+//! `fringed-lab capture DIR`: pictures of white, black, fringes or files, with a head that need not be calibrated.
 
-use super::names;
-use super::numbers::number;
-use super::options::{Files, Quiet, Threads};
-use crate::error::{Exit, Failure};
-use crate::head::calibration::Calibration;
-use crate::head::capture::Shown;
-use crate::measure::import::{Channel, Picture};
-use crate::production::backend::{self, Opened};
+use crate::workbench::import::{Channel, Picture};
+use appliance::cli::numbers::number;
+use appliance::cli::{Files, Quiet, Threads, names};
+use appliance::error::{Exit, Failure};
+use appliance::head::calibration::Calibration;
+use appliance::head::capture::Shown;
+use appliance::production::backend::{self, Opened};
 use hal::bounds::MAX_FRINGES;
 use hal::frame::Frame;
 use hal::projector::Raster;

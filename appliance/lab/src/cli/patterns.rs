@@ -1,15 +1,15 @@
-//! `fringed patterns DIR`: the pictures to project, and the manifest of the recording that their frames will make.
+//! `fringed-lab patterns DIR`: the pictures to project, and the manifest of the recording that their frames will make.
 
 use super::described::Described;
-use super::names;
-use super::numbers::{Size, number, size};
-use super::options::{Quiet, Threads};
-use crate::error::{Exit, Failure};
-use crate::head::seam;
-use crate::measure::layout::{Layout, Shown};
-use crate::output::canvas::grey_png;
+use super::numbers::{Size, size};
+use crate::workbench::layout::{Layout, Shown};
 use algo::chain::GrayCode;
 use algo::pattern::{Encoder, PhaseFunction, Shot};
+use appliance::cli::numbers::number;
+use appliance::cli::{Quiet, Threads, names};
+use appliance::error::{Exit, Failure};
+use appliance::head::seam;
+use appliance::output::canvas::grey_png;
 use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::npy;
 use hal::replay::recorder;

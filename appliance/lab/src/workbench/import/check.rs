@@ -2,13 +2,13 @@
 //! frames of each level are compared with a sine.
 
 use super::{code, shifts};
-use crate::head::channel::Channel;
-use crate::measure::layout::{Convention, Description, Shifts};
-use crate::measure::least_modulation;
+use crate::workbench::layout::{Convention, Description, Shifts};
 use algo::chain::{Chain, Seen};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, WrappedPhase};
+use appliance::head::channel::Channel;
+use appliance::measure::least_modulation;
 use hal::frame::Samples;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;

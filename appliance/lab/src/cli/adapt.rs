@@ -1,14 +1,13 @@
-//! `fringed adapt RECORDING --method paper|fringed --out phase.npy [--patterns DIR]`.
+//! `fringed-lab adapt RECORDING --method paper|fringed --out phase.npy [--patterns DIR]`.
 
-use super::names;
-use super::numbers::number;
-use super::options::{Output, Threads};
-use crate::error::{Exit, Failure};
-use crate::measure::adapt::{AdaptOptions, Method, adapt};
-use crate::measure::projected::Projected;
-use crate::storage::folder::OutputFolder;
+use crate::workbench::adapt::{AdaptOptions, Method, adapt};
+use crate::workbench::projected::Projected;
 use algo::adaptive::{Blur, Optics, noise, paper};
 use algo::pattern::{Waveform, Waveforms};
+use appliance::cli::numbers::number;
+use appliance::cli::{Output, Threads, names};
+use appliance::error::{Exit, Failure};
+use appliance::storage::folder::OutputFolder;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hal::npy;
 use hal::replay::Recording;

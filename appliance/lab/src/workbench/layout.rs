@@ -1,5 +1,5 @@
-//! What is projected, in which order: levels of fringes, Gray codes, white and black. `fringed patterns` makes pictures of it, and
-//! `fringed import` takes pictures for it.
+//! What is projected, in which order: levels of fringes, Gray codes, white and black. `fringed-lab patterns` makes pictures of it, and
+//! `fringed-lab import` takes pictures for it.
 
 use algo::chain::{Coding, GrayCode, MAX_CODE_BITS};
 use hal::bounds::MAX_FRINGES;

@@ -1,10 +1,10 @@
 //! What looks wrong with a Gray code: its cells end within the fringes where the options say, or an option is named with which they do.
 
 use super::shifts::usual;
-use crate::head::channel::Channel;
-use crate::measure::layout::{BitOrder, Description, Direction, Gray, of_direction};
+use crate::workbench::layout::{BitOrder, Description, Direction, Gray, of_direction};
 use algo::chain::{Cells, Coding, EXPECTED_TURNS, Edges, Seen};
 use algo::pipeline::PhaseMap;
+use appliance::head::channel::Channel;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 

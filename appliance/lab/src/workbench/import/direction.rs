@@ -1,7 +1,7 @@
 //! Whether fringes run the way that they are said to: pictures whose names begin with H and V lie in the other order than pictures of
 //! columns and rows.
 
-use crate::measure::coarsest;
+use super::phases::coarsest;
 use algo::pipeline::PhaseMap;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;

@@ -1,4 +1,4 @@
-//! Makes a recording of other people's pictures (`fringed import`), and says what looks wrong.
+//! Makes a recording of other people's pictures (`fringed-lab import`), and says what looks wrong.
 
 mod alone;
 mod check;
@@ -6,6 +6,7 @@ mod code;
 mod direction;
 mod folder;
 mod geometry;
+mod phases;
 mod picture;
 mod plane;
 mod samples;
@@ -14,9 +15,9 @@ mod shifts;
 pub use picture::{Channel, Picture};
 
 use super::layout::{Description, Layout};
-use super::measure;
-use crate::error::{Exit, Failure};
-use crate::head::calibration::opencv::Models;
+use appliance::error::{Exit, Failure};
+use appliance::head::calibration::opencv::Models;
+use appliance::measure::measure;
 use folder::Place;
 use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::replay::Recording;

@@ -1,6 +1,6 @@
 //! What the samples of a camera's pictures mean: how many bits they have, and above what they are clipped.
 
-use crate::measure::layout::Shown;
+use crate::workbench::layout::Shown;
 use hal::frame::FrameFormat;
 
 /// How often the largest sample must occur beside any other that is as bright: the crest of a sine alone makes it 2.4 times as

@@ -1,12 +1,12 @@
-//! Makes a phase function for the part of a preliminary recording (`fringed adapt`).
+//! Makes a phase function for the part of a preliminary recording (`fringed-lab adapt`).
 
-use crate::error::Failure;
-use crate::head::{direction, seam};
-use crate::measure::{measure, wrong};
 use algo::adaptive::noise::Light;
 use algo::adaptive::{Optics, ProjectorMap, noise, paper};
 use algo::pattern::PhaseFunction;
 use algo::units::AbsolutePhase;
+use appliance::error::Failure;
+use appliance::head::{direction, seam};
+use appliance::measure::{measure, wrong};
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 use serde::Serialize;

@@ -1,12 +1,13 @@
-//! Options that describe projected pictures, for `fringed import` and `fringed patterns`.
+//! Options that describe projected pictures, for `import` and `patterns`.
 
-use super::numbers::{Series, Size, directions, number, series, size};
-use crate::error::{Exit, Failure};
-use crate::measure::layout::{
+use super::numbers::{Series, Size, directions, series, size};
+use crate::workbench::layout::{
     BitOrder, Convention, Description, Direction, Fringes, Gray, PerDirection, Section, ShiftSign,
     Shifts,
 };
 use algo::chain::Coding;
+use appliance::cli::numbers::number;
+use appliance::error::{Exit, Failure};
 use hal::bounds::{MAX_FRINGES, MAX_SHIFT_TURNS, MAX_SIDE};
 
 /// Most levels of a recording that can be decoded.

@@ -1,9 +1,9 @@
 //! The plane z = 0 of models that state none: the one that fits the measured points best.
 
-use crate::head::seam;
-use crate::measure::absolute;
+use super::phases::absolute;
 use algo::geometry::{Pinhole, Vector};
 use algo::phase::Trust;
+use appliance::head::seam;
 use hal::model::DeviceModel;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
