@@ -3,6 +3,7 @@
 use crate::error::Failure;
 use crate::head::doctor::{Check, Verdict};
 use crate::system::clock;
+use hal::error::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
@@ -34,9 +35,8 @@ impl Outcome {
         }
     }
 
-    /// A step that failed, from words that end in ": " and the remedy.
-    pub fn failed(words: &str) -> Self {
-        let (said, remedy) = words.split_once(": ").unwrap_or((words, words));
+    /// A step that failed.
+    pub fn failed(said: impl Into<String>, remedy: &str) -> Self {
         Self {
             passed: false,
             remedy: Some(remedy.into()),
@@ -63,8 +63,25 @@ impl Outcome {
     }
 }
 
+impl From<Error> for Outcome {
+    fn from(error: Error) -> Self {
+        Self::failed(error.problem(), error.remedy())
+    }
+}
+
 impl From<Failure> for Outcome {
     fn from(failure: Failure) -> Self {
-        Self::failed(&failure.message)
+        match failure.device {
+            Some(error) => error.into(),
+            None => {
+                let (attempt, rest) = parted(&failure.message);
+                Self::failed(attempt, rest)
+            }
+        }
     }
+}
+
+/// What words begin with, and what follows the first colon: what is wrong, or its remedy. Without a colon both are all of them.
+pub(super) fn parted(words: &str) -> (&str, &str) {
+    words.split_once(": ").unwrap_or((words, words))
 }

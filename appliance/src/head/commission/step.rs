@@ -134,14 +134,15 @@ impl Step {
             Self::Exposure => doctor(subject, &["light", "exposure"]),
             Self::Timing => timing(subject, kept),
             Self::Pose(..) if kept.measured.is_none() && !subject.calibrated => Outcome::failed(
-                "a pose needs the head's delay and response: do the step timing first",
+                "a pose needs the head's delay and response",
+                "do the step timing first",
             ),
             Self::Pose(board, number) => match kept.take_pose(subject, board, *number) {
                 Ok((outcome, frame)) => {
                     white = frame;
                     outcome
                 }
-                Err(error) => Outcome::failed(&error.to_string()),
+                Err(error) => error.into(),
             },
             Self::Forget(number) => kept.forget(*number),
             Self::Solve(solving) => {
