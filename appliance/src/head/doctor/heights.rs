@@ -1,10 +1,11 @@
 //! The doctor's check of what heights go by: how far heights by the measured reference plane are from those by the models.
 
-use super::{Check, Verdict};
+use super::{Check, Subject};
 use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::examine::PLATE_PITCH;
 use algo::geometry::Triangulator;
 use algo::pattern::PhaseFunction;
+use hal::error::Error;
 use serde_json::json;
 
 /// Pixels along each side of the frame at which both are compared.
@@ -14,16 +15,12 @@ const SHARES: [f64; 3] = [-0.05, 0.0, 0.05];
 /// Largest RMS difference, mm.
 const MOST_MM: f64 = 0.1;
 
-pub(super) fn heights(calibration: &Calibration) -> Check {
+pub(super) fn heights(subject: &mut Subject<'_>) -> Result<Check, Error> {
+    let calibration = subject.calibration;
     let Some((rms, most)) = difference(calibration) else {
-        return Check {
-            verdict: Verdict::Skipped,
-            ..Check::new(
-                "cannot be compared: no reference plane was measured",
-                None,
-                json!({}),
-            )
-        };
+        return Ok(Check::skipped(
+            "cannot be compared: no reference plane was measured",
+        ));
     };
     let by = match calibration.heights_by {
         HeightsBy::Models => "by the models",
@@ -37,7 +34,7 @@ pub(super) fn heights(calibration: &Calibration) -> Check {
     let measured = json!({
         "heights_by": calibration.heights_by, "difference_rms_mm": rms, "difference_most_mm": most,
     });
-    Check::new(found, off.then_some(remedy), measured)
+    Ok(Check::new(found, off.then_some(remedy), measured))
 }
 
 /// RMS and largest difference of heights in mm, if a reference plane was measured.
