@@ -6,11 +6,9 @@
 use super::pictures::{Lit, median, pictures};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::{ContrastFile, PitchFile};
-use crate::head::rasters::rasters;
-use algo::pattern::{PhaseFunction, Shot};
+use crate::head::rasters::fringes;
 use hal::error::Error;
 use hal::head::Head;
-use hal::projector::Raster;
 
 /// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are relative to it.
 pub const PITCHES: [u32; 6] = [64, 32, 24, 16, 12, 8];
@@ -29,7 +27,7 @@ pub fn contrast(
 ) -> Result<ContrastFile, Error> {
     let mut measured = Vec::with_capacity(PITCHES.len());
     for pitch in PITCHES {
-        let patterns = shifts(head.projector_size(), pitch, calibration)?;
+        let patterns = fringes(head.projector_size(), pitch, SHIFTS, calibration)?;
         let mut shots = Vec::with_capacity(SHIFTS);
         pictures(head, settle, patterns.into_iter().map(Ok), &mut |counts| {
             shots.push(counts);
@@ -48,21 +46,4 @@ pub fn contrast(
         modulation_counts,
         pitches: measured.into_iter().map(relative).collect(),
     })
-}
-
-fn shifts(
-    (columns, rows): (u32, u32),
-    pitch: u32,
-    calibration: &Calibration,
-) -> Result<Vec<Raster>, Error> {
-    let fringes = f64::from(columns) / f64::from(pitch);
-    let function =
-        PhaseFunction::vertical(columns as usize, rows as usize, fringes).map_err(|error| {
-            Error::unsupported(
-                format!("a pitch of {pitch} px: {error}, which"),
-                "use a projector of more pixels",
-            )
-        })?;
-    let shots: Vec<_> = Shot::level(1.0, SHIFTS).collect();
-    rasters(&function, &shots, calibration)
 }
