@@ -1,8 +1,8 @@
 //! The versions of the map, word for word. If this test fails, do not change the test: the map is append-only. A version that
 //! adds something adds a list of its own.
 
-use super::map::{BLOCKS, Register, VERSION, registers};
-use super::render::{registers_csv, registers_json};
+use crate::modbus::map::{BLOCKS, Register, VERSION, registers};
+use crate::modbus::render::{registers_csv, registers_json};
 
 /// Address, name, type and block of every row of version 1.0.
 const VERSION_1: &str = "\
