@@ -154,6 +154,14 @@ pub fn characterise(
     })
 }
 
+/// The largest deviation of a response from proportionality to grey, levels.
+pub fn off_proportion(response: &[f64]) -> f64 {
+    let levels = response.iter().enumerate();
+    levels.fold(0.0, |most, (grey, light)| {
+        (light - grey as f64).abs().max(most)
+    })
+}
+
 /// Refreshes after a flip when its light has come and settled, by the head's timing.
 pub fn settled(head: &Head) -> u32 {
     refreshes(head, head.timing().flip_to_light).saturating_add(BEYOND)

@@ -4,7 +4,7 @@
 mod characteristics;
 mod laid_plate;
 
-pub use characteristics::{Characteristics, characterise, settled};
+pub use characteristics::{Characteristics, characterise, off_proportion, settled};
 
 use super::calibration::file::{CalibrationFile, MapFile, ReferenceFile};
 use super::calibration::geometry::{GeometryFile, PoseFile};

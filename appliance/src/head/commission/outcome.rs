@@ -3,7 +3,6 @@
 use crate::error::Failure;
 use crate::head::doctor::{Check, Verdict};
 use crate::system::clock;
-use hal::error::Error;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
@@ -63,16 +62,10 @@ impl Outcome {
     }
 }
 
-impl From<Error> for Outcome {
-    fn from(error: Error) -> Self {
-        Self::failed(error.problem(), error.remedy())
-    }
-}
-
 impl From<Failure> for Outcome {
     fn from(failure: Failure) -> Self {
         match failure.device {
-            Some(error) => error.into(),
+            Some(error) => Self::failed(error.problem(), error.remedy()),
             None => {
                 let (attempt, rest) = parted(&failure.message);
                 Self::failed(attempt, rest)

@@ -1,9 +1,8 @@
 //! The doctor's check of how long frames need from the camera to this program: reading them from slow memory shows here.
 
 use super::time::ms;
-use super::{Check, Subject};
+use super::{Check, Checked, Subject};
 use crate::head::examine::{PATIENCE, load_black_and_white};
-use hal::error::Error;
 use hal::head::Showing;
 use serde_json::json;
 use std::time::Duration;
@@ -14,7 +13,7 @@ const REFRESHES: u32 = 24;
 const LATE: Duration = Duration::from_millis(5);
 
 /// The median time from the end of an exposure until its frame can be used.
-pub(super) fn delivery(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn delivery(subject: &mut Subject<'_>) -> Checked {
     let head = &mut *subject.head;
     load_black_and_white(head)?;
     let camera = head.camera_timing();

@@ -1,11 +1,10 @@
 //! The doctor's check of the geometry: camera and projector stand to each other as when they were calibrated.
 
-use super::{Check, Subject};
+use super::{Check, Checked, Subject};
 use crate::head::examine::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX, PATIENCE};
-use hal::error::Error;
 use serde_json::json;
 
-pub(super) fn geometry(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn geometry(subject: &mut Subject<'_>) -> Checked {
     let calibration = subject.calibration;
     if !subject.calibrated {
         return Ok(Check::skipped(

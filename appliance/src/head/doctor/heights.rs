@@ -1,12 +1,11 @@
 //! The doctor's check of what heights go by: how far heights by the measured reference plane are from those by the models.
 
-use super::{Check, Subject};
+use super::{Check, Checked, Subject};
 use crate::head::calibrate::grid;
 use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::examine::PLATE_PITCH;
 use crate::head::seam;
 use algo::geometry::Triangulator;
-use hal::error::Error;
 use serde_json::json;
 
 /// Heights at which both are compared, as shares of the camera's distance from the reference plane.
@@ -14,7 +13,7 @@ const SHARES: [f64; 3] = [-0.05, 0.0, 0.05];
 /// Largest RMS difference, mm.
 const MOST_MM: f64 = 0.1;
 
-pub(super) fn heights(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn heights(subject: &mut Subject<'_>) -> Checked {
     let calibration = subject.calibration;
     let Some((rms, most)) = difference(calibration) else {
         return Ok(Check::skipped(

@@ -1,12 +1,11 @@
 //! The doctor's checks of light: there is some, it is exposed well, fringes are sharp, and light is proportional to grey.
 
-use super::{Check, Subject};
+use super::{Check, Checked, Subject};
 use crate::head::examine::{self, SETTLE};
 use crate::head::examine::{
     LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, MOST_BY_CONTENT, MOST_SATURATED, by_content,
 };
-use hal::error::Error;
-use serde_json::{Value, json};
+use serde_json::json;
 
 /// Grey levels whose response is measured, besides black and white.
 const GREYS: [u8; 7] = [32, 64, 96, 128, 160, 192, 224];
@@ -17,7 +16,7 @@ const LEAST_CONTRAST: f64 = 0.5;
 /// Largest deviation of light from proportionality to grey, share of white. A gamma of 1.1 deviates by 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
 
-pub(super) fn light(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn light(subject: &mut Subject<'_>) -> Checked {
     let first = subject.first_light;
     let share = subject.lit()?.1.share();
     let mut measured = json!({ "lit_percent": share * 100.0 });
@@ -48,7 +47,7 @@ pub(super) fn light(subject: &mut Subject<'_>) -> Result<Check, Error> {
 /// The remedy for a projector that adapts to content.
 const ADAPTS: &str = "switch off what adapts the projector to the content of a picture (CAIC, dynamic contrast, eco mode): for TI's DLPC3470, DLPC3478 and DLPC3479 write head.projector.controller = \"dlpc347x\"";
 
-pub(super) fn exposure(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn exposure(subject: &mut Subject<'_>) -> Checked {
     let (_, lit) = subject.lit()?;
     let saturated = lit.saturated();
     let bright = lit.bright() / lit.full_scale();
@@ -69,16 +68,13 @@ pub(super) fn exposure(subject: &mut Subject<'_>) -> Result<Check, Error> {
     Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn contrast(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn contrast(subject: &mut Subject<'_>) -> Checked {
     let calibration = subject.calibration;
     let (head, lit) = subject.lit()?;
     let found = examine::contrast(head, calibration, SETTLE, lit)?;
-    let pitches = found.pitches.iter();
-    let by_pitch: serde_json::Map<String, Value> = pitches
-        .map(|of| (of.pitch_px.to_string(), json!(of.contrast)))
-        .collect();
-    let measured =
-        json!({ "modulation_counts": found.modulation_counts, "contrast_by_pitch": by_pitch });
+    let measured = json!({
+        "modulation_counts": found.modulation_counts, "contrast_by_pitch": examine::by_pitch(&found),
+    });
     let mut pitches = found.pitches.iter();
     let sharp = pitches.find(|of| of.pitch_px == SHARP_PITCH);
     let blurred = sharp.is_none_or(|of| of.contrast < LEAST_CONTRAST);
@@ -93,7 +89,7 @@ pub(super) fn contrast(subject: &mut Subject<'_>) -> Result<Check, Error> {
     Ok(Check::new(found, blurred.then_some(&*remedy), measured))
 }
 
-pub(super) fn content(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn content(subject: &mut Subject<'_>) -> Checked {
     let (head, lit) = subject.lit()?;
     let Some(off) = by_content(head, SETTLE, lit)? else {
         return Ok(Check::new(
@@ -111,7 +107,7 @@ pub(super) fn content(subject: &mut Subject<'_>) -> Result<Check, Error> {
     Ok(Check::new(found, adapts, measured))
 }
 
-pub(super) fn response(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn response(subject: &mut Subject<'_>) -> Checked {
     // Projected as patterns are: through the inverse of the calibrated response.
     let response = subject.calibration.response.as_ref();
     let asked = GREYS.map(|grey| response.map_or(grey, |response| response.level_for(grey)));

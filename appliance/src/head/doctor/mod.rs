@@ -113,11 +113,14 @@ impl Subject<'_> {
     }
 }
 
+/// How a check ended, or the error of the device that ended it.
+type Checked = Result<Check, Error>;
+
 /// A row of [`CHECKS`]: its name, the checks that must have passed before it, and how it measures and judges.
 type Row = (
     &'static str,
     &'static [&'static str],
-    fn(&mut Subject<'_>) -> Result<Check, Error>,
+    fn(&mut Subject<'_>) -> Checked,
 );
 
 /// What the checks of light need.

@@ -1,11 +1,10 @@
 //! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, flip-to-light delay.
 
-use super::{Check, Subject};
+use super::{Check, Checked, Subject};
 use crate::head::examine::{
     Delay, MOST_LATE, PATIENCE, Spaced, Stamps, load_black_and_white, pace,
 };
 use hal::camera::Starts;
-use hal::error::Error;
 use hal::head::{Head, Showing, TOLERANCE, Watched, WatchedFrame};
 use hal::projector::Flip;
 use hal::trigger::Spoiled;
@@ -30,7 +29,7 @@ pub(super) fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-pub(super) fn devices(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn devices(subject: &mut Subject<'_>) -> Checked {
     let head = &*subject.head;
     head.present()?;
     let ((columns, rows), camera) = (head.projector_size(), head.camera_format());
@@ -47,7 +46,7 @@ pub(super) fn devices(subject: &mut Subject<'_>) -> Result<Check, Error> {
     ))
 }
 
-pub(super) fn format(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn format(subject: &mut Subject<'_>) -> Checked {
     let encoding = subject.head.encoding();
     let measured = json!({ "encoding": encoding.name, "exact": encoding.exact });
     if encoding.exact {
@@ -63,7 +62,7 @@ pub(super) fn format(subject: &mut Subject<'_>) -> Result<Check, Error> {
     Ok(Check::new(found, Some(remedy), measured))
 }
 
-pub(super) fn mode(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn mode(subject: &mut Subject<'_>) -> Checked {
     let head = &*subject.head;
     let (camera, refresh) = (head.camera_timing(), head.refresh());
     let refreshes = camera.exposure.as_secs_f64() / refresh.as_secs_f64();
@@ -89,7 +88,7 @@ pub(super) fn mode(subject: &mut Subject<'_>) -> Result<Check, Error> {
 }
 
 /// How long a cycle waits for the camera to start.
-pub(super) fn start(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn start(subject: &mut Subject<'_>) -> Checked {
     let head = &mut *subject.head;
     let (took, stays_on) = (head.start_up()?, head.stays_on());
     let triggered = head.camera_timing().starts == Starts::OnTrigger;
@@ -112,7 +111,7 @@ pub(super) fn start(subject: &mut Subject<'_>) -> Result<Check, Error> {
     Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn cadence(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn cadence(subject: &mut Subject<'_>) -> Checked {
     let head = &mut *subject.head;
     load_black_and_white(head)?;
     let showing = |index: u32| Showing {
@@ -166,7 +165,7 @@ pub(super) fn cadence(subject: &mut Subject<'_>) -> Result<Check, Error> {
     Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn trigger(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn trigger(subject: &mut Subject<'_>) -> Checked {
     let head = &mut *subject.head;
     load_black_and_white(head)?;
     let showing = Showing {
@@ -189,7 +188,7 @@ pub(super) fn trigger(subject: &mut Subject<'_>) -> Result<Check, Error> {
     })
 }
 
-fn triggered(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
+fn triggered(head: &mut Head, seen: &Watched<()>) -> Checked {
     let (pulses, frames) = (seen.triggers.len(), seen.frames.len());
     let after = |frame: &WatchedFrame<()>| {
         let after = |at: &Timestamp| (i128::from(frame.start.0) - i128::from(at.0)) / 1000;
@@ -269,7 +268,7 @@ fn lost(refreshes: u32, tried: &[Spaced], found: String, mut measured: Value) ->
 }
 
 /// A camera that the projector triggers has a frame in every so many refreshes.
-fn by_projector(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
+fn by_projector(head: &mut Head, seen: &Watched<()>) -> Checked {
     let (hold, refresh) = (head.timing().hold, head.refresh());
     let Some(needed) = pace(head)?.pop() else {
         return Ok(Check::new(
@@ -325,7 +324,7 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Check {
 }
 
 /// The time from a flip to its light, from the brightness of the frames around many flips.
-pub(super) fn delay(subject: &mut Subject<'_>) -> Result<Check, Error> {
+pub(super) fn delay(subject: &mut Subject<'_>) -> Checked {
     let (head, lit) = subject.lit()?;
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();

@@ -9,11 +9,20 @@ use crate::head::calibration::file::{ContrastFile, PitchFile};
 use crate::head::rasters::fringes;
 use hal::error::Error;
 use hal::head::Head;
+use serde_json::{Map, Value};
 
 /// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are relative to it.
 pub const PITCHES: [u32; 6] = [64, 32, 24, 16, 12, 8];
 /// Shifts of each pitch, a quarter of a turn each.
 const SHIFTS: usize = 4;
+
+/// Contrasts by the names of their pitches.
+pub fn by_pitch(contrast: &ContrastFile) -> Map<String, Value> {
+    let pitches = contrast.pitches.iter();
+    pitches
+        .map(|of| (of.pitch_px.to_string(), of.contrast.into()))
+        .collect()
+}
 
 /// The contrast of each of [`PITCHES`] by the median modulation over the lit pixels.
 ///

@@ -17,7 +17,7 @@ mod response;
 mod stamps;
 
 pub use content::{MOST_BY_CONTENT, by_content};
-pub use contrast::{PITCHES, contrast};
+pub use contrast::{PITCHES, by_pitch, contrast};
 pub use delay::Delay;
 pub use drift::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX};
 pub use first_light::{LONGEST_DARK, first_light};
