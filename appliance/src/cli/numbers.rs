@@ -20,14 +20,20 @@ where
     }
 }
 
+/// Numbers with commas between them, at most `most`, each from `low` to `high`.
+fn list<T: FromStr + PartialOrd>(text: &str, low: T, high: T, most: usize) -> Option<Vec<T>> {
+    let numbers = text.split(',').map(|number| number.trim().parse().ok());
+    let numbers: Option<Vec<T>> = numbers.collect();
+    numbers.filter(|all| {
+        all.len() <= most && all.iter().all(|number| (&low..=&high).contains(&number))
+    })
+}
+
 /// `N` numbers with commas between them, each from -`most` to `most`.
 pub fn numbers<const N: usize>(most: f64) -> impl TypedValueParser<Value = [f64; N]> {
     move |text: &str| {
-        let numbers = text.split(',').map(|number| number.trim().parse().ok());
-        let numbers: Option<Vec<f64>> = numbers.collect();
-        numbers
+        list(text, -most, most, N)
             .and_then(|numbers| <[f64; N]>::try_from(numbers).ok())
-            .filter(|numbers| numbers.iter().all(|number| number.abs() <= most))
             .ok_or_else(|| {
                 format!("write {N} numbers from -{most} to {most} with commas between them")
             })
@@ -44,16 +50,9 @@ where
     T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static,
 {
     move |text: &str| {
-        let numbers = text.split(',').map(|number| number.trim().parse().ok());
-        let numbers: Option<Vec<T>> = numbers.collect();
-        numbers
-            .filter(|all| {
-                all.len() <= most && all.iter().all(|number| (low..=high).contains(number))
-            })
-            .map(Series)
-            .ok_or_else(|| {
-                format!("write 1 to {most} numbers from {low} to {high} with commas between them")
-            })
+        list(text, low, high, most).map(Series).ok_or_else(|| {
+            format!("write 1 to {most} numbers from {low} to {high} with commas between them")
+        })
     }
 }
 
@@ -63,14 +62,8 @@ where
     T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static,
 {
     move |text: &str| {
-        let list = |text: &str| -> Option<Vec<T>> {
-            let numbers = text.split(',').map(|number| number.trim().parse().ok());
-            let numbers: Option<Vec<T>> = numbers.collect();
-            numbers.filter(|all| {
-                all.len() <= most && all.iter().all(|number| (low..=high).contains(number))
-            })
-        };
-        let lists: Option<Vec<Vec<T>>> = text.split('/').map(list).collect();
+        let lists = text.split('/').map(|text| list(text, low, high, most));
+        let lists: Option<Vec<Vec<T>>> = lists.collect();
         lists
             .filter(|lists| lists.len() <= 2)
             .map(PerDirection)
