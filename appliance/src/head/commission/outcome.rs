@@ -78,3 +78,25 @@ impl From<Failure> for Outcome {
 pub(super) fn parted(words: &str) -> (&str, &str) {
     words.split_once(": ").unwrap_or((words, words))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Exit;
+    use hal::error::Error;
+
+    #[test]
+    fn a_failed_step_says_what_was_attempted_and_what_to_do() {
+        let both = |failure: Failure| {
+            let outcome = Outcome::from(failure);
+            assert!(!outcome.passed);
+            (outcome.said.concat(), outcome.remedy.unwrap())
+        };
+        let device = Error::unsupported("opening a: b", "free it: end c");
+        let (said, remedy) = both(device.into());
+        assert_eq!(said, "opening a: b is not supported");
+        assert_eq!(remedy, "free it: end c");
+        let (said, remedy) = both(Failure::new(Exit::Content, "try a: not b: do c"));
+        assert_eq!((&*said, &*remedy), ("try a", "not b: do c"));
+    }
+}

@@ -205,3 +205,26 @@ pub fn examine_for(
     progress(1.0, "examined");
     checks
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_check_needs_only_checks_that_stand_before_it() {
+        for (at, (name, needs, _)) in CHECKS.iter().enumerate() {
+            let before: Vec<&str> = CHECKS[..at].iter().map(|row| row.0).collect();
+            let missing = needs.iter().find(|need| !before.contains(need));
+            assert_eq!(missing, None, "{name}");
+            assert!(!before.contains(name), "{name} twice");
+        }
+    }
+
+    #[test]
+    fn an_error_of_a_device_is_found_whole_and_keeps_its_whole_remedy() {
+        let check = Check::from(Error::unsupported("opening a: b", "free it: end c"));
+        assert_eq!(check.found, "opening a: b is not supported");
+        assert_eq!(check.remedy, "free it: end c");
+        assert_eq!(check.verdict, Verdict::Fail);
+    }
+}
