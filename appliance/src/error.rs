@@ -34,8 +34,8 @@ pub struct Failure {
     pub exit: Exit,
     /// What was attempted with what, and the remedy.
     pub message: String,
-    /// ERROR_CODE, if a device is at fault.
-    pub code: Option<u16>,
+    /// The error of the device that is at fault, if one is.
+    pub device: Option<Error>,
 }
 
 impl Failure {
@@ -44,7 +44,7 @@ impl Failure {
         Self {
             exit,
             message: message.into(),
-            code: None,
+            device: None,
         }
     }
 
@@ -78,7 +78,7 @@ impl From<Exit> for ExitCode {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         Self {
-            code: Some(code_of(&error)),
+            device: Some(error.clone()),
             ..Self::new(Exit::Unavailable, error.to_string())
         }
     }

@@ -3,9 +3,6 @@
 //! ARCHITECTURE.md describes the modules below, here called rooms, and the order in which they may import each other;
 //! `tests/suite/rooms.rs` checks it.
 
-#[cfg(test)]
-mod boundaries;
-
 pub mod cli;
 pub mod config;
 pub mod error;
@@ -22,6 +19,9 @@ pub mod station;
 pub mod storage;
 pub mod system;
 pub mod web;
+
+#[cfg(test)]
+mod tests;
 
 /// The version of this build with its commit, where that is known.
 pub const VERSION: &str = env!("FRINGED_VERSION");

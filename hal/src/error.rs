@@ -1,5 +1,6 @@
 //! Errors of devices and their kinds.
 
+use std::fmt;
 use std::time::Duration;
 
 /// The kind of a device error: what the caller may do about it.
@@ -41,10 +42,9 @@ impl DeviceKind {
 }
 
 /// A failed call of a device. The message says what was attempted, with what numbers, and the remedy.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
     /// There was no answer within the time given.
-    #[error("{attempt} did not finish within {} ms: {remedy}", timeout.as_secs_f64() * 1e3)]
     Timeout {
         /// What was attempted, with its numbers.
         attempt: String,
@@ -54,7 +54,6 @@ pub enum Error {
         remedy: String,
     },
     /// The device is gone.
-    #[error("{attempt} failed because the {} is gone: {remedy}", device.word())]
     Disconnected {
         /// Which device.
         device: DeviceKind,
@@ -64,7 +63,6 @@ pub enum Error {
         remedy: String,
     },
     /// The device cannot do this.
-    #[error("{attempt} is not supported: {remedy}")]
     Unsupported {
         /// What was attempted, with its numbers.
         attempt: String,
@@ -72,7 +70,6 @@ pub enum Error {
         remedy: String,
     },
     /// The call is out of order, or the device's answer is.
-    #[error("{attempt} is out of order: {remedy}")]
     Protocol {
         /// What was attempted, with its numbers.
         attempt: String,
@@ -80,14 +77,52 @@ pub enum Error {
         remedy: String,
     },
     /// The caller ended it early, which is not a fault of a device.
-    #[error("{attempt} was ended early: begin it again when nothing else is to be done")]
     Ended {
         /// What was attempted.
         attempt: String,
     },
 }
 
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.problem(), self.remedy())
+    }
+}
+
+impl std::error::Error for Error {}
+
 impl Error {
+    /// What was attempted, and how it failed.
+    #[must_use]
+    pub fn problem(&self) -> String {
+        match self {
+            Self::Timeout {
+                attempt, timeout, ..
+            } => {
+                let ms = timeout.as_secs_f64() * 1e3;
+                format!("{attempt} did not finish within {ms} ms")
+            }
+            Self::Disconnected {
+                device, attempt, ..
+            } => format!("{attempt} failed because the {} is gone", device.word()),
+            Self::Unsupported { attempt, .. } => format!("{attempt} is not supported"),
+            Self::Protocol { attempt, .. } => format!("{attempt} is out of order"),
+            Self::Ended { attempt } => format!("{attempt} was ended early"),
+        }
+    }
+
+    /// What to do about it.
+    #[must_use]
+    pub fn remedy(&self) -> &str {
+        match self {
+            Self::Timeout { remedy, .. }
+            | Self::Disconnected { remedy, .. }
+            | Self::Unsupported { remedy, .. }
+            | Self::Protocol { remedy, .. } => remedy,
+            Self::Ended { .. } => "begin it again when nothing else is to be done",
+        }
+    }
+
     /// The kind of this error.
     #[must_use]
     pub fn kind(&self) -> ErrorKind {

@@ -23,4 +23,4 @@ pub mod seam;
 pub mod standing;
 
 #[cfg(test)]
-mod traits;
+mod tests;

@@ -1,7 +1,9 @@
 //! The grey rasters that the projector shows for a phase function, corrected by the inverse of its measured grey response.
 
 use crate::head::calibration::Calibration;
+use crate::head::seam;
 use algo::pattern::{Encoder, GreyRaster, PhaseFunction, Shot};
+use hal::error::Error;
 use hal::head::Head;
 use hal::projector::Raster;
 use rayon::prelude::*;
@@ -36,7 +38,7 @@ impl Illumination {
         function: &PhaseFunction,
         shots: &[Shot],
         calibration: &Calibration,
-    ) -> Result<(), hal::error::Error> {
+    ) -> Result<(), Error> {
         head.load(self.rasters(function, shots, calibration)?)?;
         head.expose(self.exposures)
     }
@@ -50,7 +52,7 @@ impl Illumination {
         function: &PhaseFunction,
         shots: &[Shot],
         calibration: &Calibration,
-    ) -> Result<Vec<Raster>, hal::error::Error> {
+    ) -> Result<Vec<Raster>, Error> {
         let response = calibration.response.as_ref();
         let whole = self.amplitude.is_empty();
         let encoder = Encoder::new(response.filter(|_| whole), shots);
@@ -87,6 +89,26 @@ impl Illumination {
     }
 }
 
+/// Vertical fringes of `pitch` pixels over a projector of this size, at each of so many shifts of a turn.
+///
+/// # Errors
+/// `Unsupported` if the projector is too small for them.
+pub fn fringes(
+    size: (u32, u32),
+    pitch: u32,
+    shifts: usize,
+    calibration: &Calibration,
+) -> Result<Vec<Raster>, Error> {
+    let function = seam::fringes(true, size, f64::from(pitch)).map_err(|error| {
+        Error::unsupported(
+            format!("a pitch of {pitch} px: {error}, which"),
+            "use a projector of more pixels",
+        )
+    })?;
+    let shots: Vec<Shot> = Shot::level(1.0, shifts).collect();
+    rasters(&function, &shots, calibration)
+}
+
 /// The grey raster of each shot of a phase function.
 ///
 /// # Errors
@@ -95,6 +117,6 @@ pub fn rasters(
     function: &PhaseFunction,
     shots: &[Shot],
     calibration: &Calibration,
-) -> Result<Vec<Raster>, hal::error::Error> {
+) -> Result<Vec<Raster>, Error> {
     Illumination::default().rasters(function, shots, calibration)
 }

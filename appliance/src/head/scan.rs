@@ -70,10 +70,7 @@ impl<'a> Scan<'a> {
         shots: &[Shot],
         frames: impl IntoIterator<Item = &'a Frame>,
     ) -> Result<Self, String> {
-        let sequence = Sequence::from_frames(shots).map_err(words)?;
-        let frames: Vec<&Frame> = frames.into_iter().collect();
-        let decoder = Decoder::new(&sequence, range, bit_depth(&frames)).map_err(words)?;
-        Self::with(sequence, decoder, frames)
+        Self::with(range, shots, shots, frames)
     }
 
     /// As [`Self::new`] for levels that the decoder cannot unwrap. Its decoder is that of the finest level alone: it gives the noise
@@ -94,13 +91,20 @@ impl<'a> Scan<'a> {
             .filter(|shot| shot.ratio == finest)
             .copied()
             .collect();
-        let frames: Vec<&Frame> = frames.into_iter().collect();
-        let alone = Sequence::from_frames(&alone).map_err(words)?;
-        let decoder = Decoder::new(&alone, range, bit_depth(&frames)).map_err(words)?;
-        Self::with(sequence, decoder, frames)
+        Self::with(range, shots, &alone, frames)
     }
 
-    fn with(sequence: Sequence, decoder: Decoder, frames: Vec<&'a Frame>) -> Result<Self, String> {
+    /// The frames of `shots`, with a decoder of those that are `decoded`.
+    fn with(
+        range: PhaseRange,
+        shots: &[Shot],
+        decoded: &[Shot],
+        frames: impl IntoIterator<Item = &'a Frame>,
+    ) -> Result<Self, String> {
+        let sequence = Sequence::from_frames(shots).map_err(words)?;
+        let decoded = Sequence::from_frames(decoded).map_err(words)?;
+        let frames: Vec<&Frame> = frames.into_iter().collect();
+        let decoder = Decoder::new(&decoded, range, bit_depth(&frames)).map_err(words)?;
         let frames: Result<_, _> = frames.into_iter().map(seam::view).collect();
         Ok(Self {
             sequence,

@@ -94,6 +94,22 @@ pub fn phase_function(
     }
 }
 
+/// Vertical or else horizontal fringes of `pitch` pixels on a projector of `(columns, rows)`.
+///
+/// # Errors
+/// If the projector is too small for them.
+pub fn fringes(
+    vertical: bool,
+    (columns, rows): (u32, u32),
+    pitch: f64,
+) -> Result<PhaseFunction, PhaseFunctionError> {
+    let (width, height) = (columns as usize, rows as usize);
+    match vertical {
+        true => PhaseFunction::vertical(width, height, f64::from(columns) / pitch),
+        false => PhaseFunction::horizontal(width, height, f64::from(rows) / pitch),
+    }
+}
+
 /// What a recorded frame shows.
 pub fn shot(recorded: &RecordedFrame) -> Shot {
     Shot {

@@ -33,8 +33,6 @@ mod unkept;
 pub mod writer;
 
 #[cfg(test)]
-mod log_tests;
-#[cfg(test)]
 mod tests;
 
 pub use entry::{Entry, Filter, GaugeEntry, StageEntry, difference};

@@ -27,8 +27,6 @@ pub mod server;
 pub mod service;
 
 #[cfg(test)]
-mod frozen;
-#[cfg(test)]
 mod tests;
 
 pub use live::live;

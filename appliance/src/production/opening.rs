@@ -3,7 +3,7 @@
 use super::Order;
 use super::recovery::{Pause, REMEDY};
 use crate::config::{Backend, HeadConfig};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, code_of};
 use crate::production::backend::{self, Opened};
 use crate::station::{Event, StationHandle, error_code};
 use crate::system::computing::Computing;
@@ -90,7 +90,7 @@ impl Opening<'_> {
 
     fn lost(&self, failure: &Failure) {
         self.station.event(Event::Faulted {
-            error_code: failure.code.unwrap_or(error_code::UNNAMED),
+            error_code: failure.device.as_ref().map_or(error_code::UNNAMED, code_of),
             cause: failure.message.as_str().into(),
             remedy: REMEDY.into(),
         });

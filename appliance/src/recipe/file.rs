@@ -289,5 +289,3 @@ pub enum AlignmentKind {
     /// As a small rigid motion.
     Rigid,
 }
-
-}

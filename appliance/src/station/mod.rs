@@ -67,11 +67,7 @@ mod watch;
 mod worker;
 
 #[cfg(test)]
-mod table;
-#[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod walk;
 
 pub use clock::Micros;
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};

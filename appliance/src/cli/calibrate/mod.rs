@@ -65,6 +65,9 @@ pub struct Calibrate {
 /// The origin of models that do not come from a file.
 const OF_SCENARIO: &str = "scenario";
 
+/// What to do if the calibration cannot be written.
+const FULL: &str = "free space, or name another file with --out";
+
 impl Calibrate {
     /// Opens the head, measures it, writes the calibration and prints what was found.
     ///
@@ -91,11 +94,7 @@ impl Calibrate {
         let head = config.head_in(state.path());
         let place = Place::at(head.calibration.as_deref().unwrap_or(Path::new("")));
         let mut notes = Vec::new();
-        let before = place.load().unwrap_or_else(|problem| {
-            notes.push(format!("{problem}; it is left behind"));
-            None
-        });
-        let before = before.map(|loaded| loaded.file);
+        let before = before(&place, &mut notes);
         let progress = options.output.progress();
         let on_progress =
             |share: f64| progress.tell(0.3 * share, "working out the light of the scene");
@@ -116,14 +115,7 @@ impl Calibrate {
         progress.clear();
         let mut made = made?;
         let place = self.poses.out.as_deref().map_or(place, Place::at);
-        place.save(&made.bytes, &made.maps).map_err(|error| {
-            let what = format!("write {}", place.path().display());
-            Failure::because(
-                Exit::CannotCreate,
-                what,
-                format!("{error}: free space, or name another file with --out"),
-            )
-        })?;
+        place.save(&made.bytes, &made.maps, FULL)?;
         notes.append(&mut made.notes);
         let report = report::Report {
             file: &made.file,
@@ -229,6 +221,15 @@ impl Calibrate {
             ))),
         }
     }
+}
+
+/// The calibration that is replaced, if one can be read; else a note says why.
+fn before(place: &Place, notes: &mut Vec<String>) -> Option<CalibrationFile> {
+    let loaded = place.load().unwrap_or_else(|problem| {
+        notes.push(format!("{problem}; it is left behind"));
+        None
+    });
+    loaded.map(|loaded| loaded.file)
 }
 
 /// Checks that the files of models exist.

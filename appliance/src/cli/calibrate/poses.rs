@@ -4,6 +4,7 @@ use super::super::names;
 use super::super::numbers::number;
 use super::super::options::Measuring;
 use super::report::poses::Report;
+use super::{FULL, before};
 use crate::error::{Exit, Failure};
 use crate::head::board;
 use crate::head::calibration::file::CalibrationFile;
@@ -74,11 +75,7 @@ impl Poses {
         let stored = head.as_ref().and_then(|head| head.calibration.as_deref());
         let place = Place::at(self.out.as_deref().or(stored).unwrap_or(Path::new("")));
         let mut notes = Vec::new();
-        let before = place.load().unwrap_or_else(|problem| {
-            notes.push(format!("{problem}; it is left behind"));
-            None
-        });
-        let before = before.map(|loaded| loaded.file);
+        let before = before(&place, &mut notes);
         Scale::check_length(board, self.check_length).map_err(|error| content(&error))?;
         let progress = options.output.progress();
         progress.tell(0.0, "looking for the board");
@@ -101,11 +98,7 @@ impl Poses {
         notes.extend(geometry.ground.remedy());
         let sealed = file(head, &geometry, same).sealed();
         let (file, bytes) = sealed.map_err(|error| content(&error))?;
-        place.save(&bytes, &[]).map_err(|error| {
-            let what = format!("write {}", place.path().display());
-            let words = format!("{error}: free space, or name another file with --out");
-            Failure::because(Exit::CannotCreate, what, words)
-        })?;
+        place.save(&bytes, &[], FULL)?;
         let report = Report {
             file: &file,
             geometry: &geometry,

@@ -7,7 +7,7 @@ use crate::head::calibration::file::{
 };
 use crate::head::examine::{
     Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_BY_CONTENT, MOST_SATURATED, SETTLE, Spaced, Stamps,
-    by_content, contrast, noise, pace, response,
+    by_content, contrast, noise, pace, refreshes, response,
 };
 use algo::frame::SampleNoise;
 use hal::head::{Head, Timing};
@@ -154,11 +154,17 @@ pub fn characterise(
     })
 }
 
+/// The largest deviation of a response from proportionality to grey, levels.
+pub fn off_proportion(response: &[f64]) -> f64 {
+    let levels = response.iter().enumerate();
+    levels.fold(0.0, |most, (grey, light)| {
+        (light - grey as f64).abs().max(most)
+    })
+}
+
 /// Refreshes after a flip when its light has come and settled, by the head's timing.
 pub fn settled(head: &Head) -> u32 {
-    let delay = head.timing().flip_to_light.as_nanos();
-    let refreshes = delay.div_ceil(head.refresh().as_nanos().max(1));
-    u32::try_from(refreshes).unwrap_or(SETTLE) + BEYOND
+    refreshes(head, head.timing().flip_to_light).saturating_add(BEYOND)
 }
 
 /// The refreshes per pattern at which no trigger is lost, if there are any; otherwise patterns are shown as long as before.

@@ -20,9 +20,8 @@ impl LaidPlate {
     /// front of the head.
     pub fn of(calibration: &Calibration, corrections: [&FittedMap; 2]) -> Option<Self> {
         let (camera, projector) = (&calibration.camera, &calibration.projector);
-        let (width, height, _) = calibration.frames();
         let (mut points, mut squares) = (Vec::new(), 0.0);
-        for (u, v) in grid((width, height)) {
+        for (u, v) in grid(calibration) {
             let ray = camera.ray(u, v)?;
             let eye = camera.centre();
             let on_plane = projector.project(eye + ray * (-eye.z / ray.z))?;

@@ -4,7 +4,7 @@
 mod characteristics;
 mod laid_plate;
 
-pub use characteristics::{Characteristics, characterise, settled};
+pub use characteristics::{Characteristics, characterise, off_proportion, settled};
 
 use super::calibration::file::{CalibrationFile, MapFile, ReferenceFile};
 use super::calibration::geometry::{GeometryFile, PoseFile};
@@ -156,7 +156,7 @@ fn reference(
     maps: &mut Vec<(String, Vec<u8>)>,
 ) -> Result<ReferenceFile, Failure> {
     let corrections = [&vertical.plate.correction, &horizontal.plate.correction];
-    let models_off_px = PLATE_PITCH * rms(corrections, calibration.frames());
+    let models_off_px = PLATE_PITCH * rms(corrections, calibration);
     if !(models_off_px <= MOST_OFF_PX) {
         let of_models = || {
             format!(
@@ -194,8 +194,8 @@ fn reference(
 }
 
 /// RMS of the corrections of projector points over the frame, in their unit.
-fn rms(corrections: [&FittedMap; 2], (width, height, _): (u32, u32, u8)) -> f64 {
-    let squares = grid((width, height)).map(|(u, v)| {
+fn rms(corrections: [&FittedMap; 2], calibration: &Calibration) -> f64 {
+    let squares = grid(calibration).map(|(u, v)| {
         let square = |of: &FittedMap| of.at(u, v).powi(2);
         corrections.into_iter().map(square).sum::<f64>()
     });
@@ -205,8 +205,9 @@ fn rms(corrections: [&FittedMap; 2], (width, height, _): (u32, u32, u8)) -> f64 
 /// Places along each side of the frame that are looked at.
 const GRID: u32 = 16;
 
-/// Places all over a frame.
-fn grid((width, height): (u32, u32)) -> impl Iterator<Item = (f64, f64)> {
+/// Places all over the frame of a head.
+pub(super) fn grid(calibration: &Calibration) -> impl Iterator<Item = (f64, f64)> {
+    let (width, height, _) = calibration.frames();
     let place = |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
     (0..GRID * GRID).map(move |at| (place(at % GRID, width), place(at / GRID, height)))
 }

@@ -1,6 +1,7 @@
 //! The files of a calibration: `calibration.json`, its previous generation, and the phase maps beside them.
 
 use super::file::CalibrationFile;
+use crate::error::{Exit, Failure};
 use crate::storage::folder::{name_also, read_whole, sync_folder_of, write_whole};
 use crate::storage::hex;
 use sha2::{Digest, Sha256};
@@ -84,8 +85,20 @@ impl Place {
     /// moment either the old one or the new one is whole: maps have names of their own, and count only once `calibration.json` names them.
     ///
     /// # Errors
-    /// Whatever the file system answers; then the calibration is unchanged.
-    pub fn save(&self, bytes: &[u8], maps: &[(String, Vec<u8>)]) -> io::Result<()> {
+    /// With this remedy, if it cannot be written (73); then the calibration is unchanged.
+    pub fn save(
+        &self,
+        bytes: &[u8],
+        maps: &[(String, Vec<u8>)],
+        remedy: &str,
+    ) -> Result<(), Failure> {
+        self.write(bytes, maps).map_err(|error| {
+            let what = format!("write {}", self.path.display());
+            Failure::because(Exit::CannotCreate, what, format!("{error}: {remedy}"))
+        })
+    }
+
+    fn write(&self, bytes: &[u8], maps: &[(String, Vec<u8>)]) -> io::Result<()> {
         let folder = self.folder();
         fs::create_dir_all(folder)?;
         sync_folder_of(folder)?;

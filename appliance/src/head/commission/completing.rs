@@ -20,11 +20,7 @@ impl Commissioning {
         let before = subject.head.timing();
         subject.head.set_timing(measured.timing.over(before));
         let made = complete(subject.head, &measured, basis, subject.progress)?;
-        let place = Place::at(subject.place);
-        place.save(&made.bytes, &made.maps).map_err(|error| {
-            let what = format!("write {}", place.path().display());
-            Failure::because(Exit::CannotCreate, what, format!("{error}: free space"))
-        })?;
+        Place::at(subject.place).save(&made.bytes, &made.maps, "free space")?;
         Ok(found(&made))
     }
 

@@ -178,7 +178,7 @@ mod tests {
             gain: 2.5,
         };
         let mut kept = Commissioning::of([4, 3, 8, 8, 6], Some(exposing));
-        let outcome = Outcome::failed("measure: too dark: expose more");
+        let outcome = Outcome::failed("measure", "too dark: expose more");
         kept.steps.insert(Name::Exposure, outcome);
         let pose = PoseFile {
             corners: vec![Some([0.1, 1.0 / 3.0, 0.5]), None],

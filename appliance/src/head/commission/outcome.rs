@@ -34,9 +34,8 @@ impl Outcome {
         }
     }
 
-    /// A step that failed, from words that end in ": " and the remedy.
-    pub fn failed(words: &str) -> Self {
-        let (said, remedy) = words.split_once(": ").unwrap_or((words, words));
+    /// A step that failed.
+    pub fn failed(said: impl Into<String>, remedy: &str) -> Self {
         Self {
             passed: false,
             remedy: Some(remedy.into()),
@@ -65,6 +64,39 @@ impl Outcome {
 
 impl From<Failure> for Outcome {
     fn from(failure: Failure) -> Self {
-        Self::failed(&failure.message)
+        match failure.device {
+            Some(error) => Self::failed(error.problem(), error.remedy()),
+            None => {
+                let (attempt, rest) = parted(&failure.message);
+                Self::failed(attempt, rest)
+            }
+        }
+    }
+}
+
+/// What words begin with, and what follows the first colon: what is wrong, or its remedy. Without a colon both are all of them.
+pub(super) fn parted(words: &str) -> (&str, &str) {
+    words.split_once(": ").unwrap_or((words, words))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Exit;
+    use hal::error::Error;
+
+    #[test]
+    fn a_failed_step_says_what_was_attempted_and_what_to_do() {
+        let both = |failure: Failure| {
+            let outcome = Outcome::from(failure);
+            assert!(!outcome.passed);
+            (outcome.said.concat(), outcome.remedy.unwrap())
+        };
+        let device = Error::unsupported("opening a: b", "free it: end c");
+        let (said, remedy) = both(device.into());
+        assert_eq!(said, "opening a: b is not supported");
+        assert_eq!(remedy, "free it: end c");
+        let (said, remedy) = both(Failure::new(Exit::Content, "try a: not b: do c"));
+        assert_eq!((&*said, &*remedy), ("try a", "not b: do c"));
     }
 }

@@ -1,13 +1,14 @@
 //! The step `geometry`: poses of a board, one at a time, and the models made of them.
 
 use super::file::{Commissioning, MAX_POSES, Models};
-use super::outcome::Outcome;
+use super::outcome::{Outcome, parted};
 use super::step::Subject;
 use crate::head::board;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::capture::Shown;
 use crate::head::geometry::{Geometry, SeenPose, same_place};
 use crate::head::scale::Scale;
+use crate::head::scan::take_loaded;
 use crate::head::seam;
 use algo::calibration::{Board, Corner, FoundBoard, Node, Picture, View};
 use hal::bounds::{MAX_SIDE, length, within};
@@ -144,14 +145,10 @@ impl Commissioning {
         let unfit = |words: String| Error::unsupported(words, "use a projector of more pixels");
         let shown = Shown::pose(subject.calibration).map_err(unfit)?;
         let rasters = shown.rasters(subject.calibration)?;
-        let indices: Vec<usize> = (0..rasters.len()).collect();
+        let all = rasters.len();
         subject.head.load(rasters)?;
-        let mut taken = Vec::with_capacity(indices.len());
-        let all = indices.len() as f64;
-        subject.head.acquire(&indices, TIMEOUT, &mut |_, frame| {
-            taken.push(frame);
-            (subject.progress)(0.6 * taken.len() as f64 / all, "taking the frames");
-        })?;
+        let said = |share: f64| (subject.progress)(0.6 * share, "taking the frames");
+        let taken = take_loaded(subject.head, all, TIMEOUT, &said)?;
         (subject.progress)(0.6, "looking for the board");
         let recording = shown.recording(subject.calibration, &mut taken.into_iter());
         let seen = SeenPose::of(&recording, &pose_name(number), board)
@@ -189,8 +186,10 @@ impl Commissioning {
             },
             Err(problem) => Outcome {
                 figures,
-                said: vec![format!("pose {number} cannot be used: {problem}")],
-                ..Outcome::failed(&problem)
+                ..Outcome::failed(
+                    format!("pose {number} cannot be used: {problem}"),
+                    parted(&problem).1,
+                )
             },
         };
         Ok((outcome, recording.white.filter(|_| kept)))
@@ -226,11 +225,7 @@ impl Commissioning {
     /// Makes the models of all poses that can be used.
     pub(super) fn solve(&mut self, before: Option<&CalibrationFile>, solving: Solving) -> Outcome {
         match self.solved(before, solving) {
-            Err(problem) => Outcome {
-                said: vec![problem.clone()],
-                remedy: Some(problem),
-                ..Outcome::failed("")
-            },
+            Err(problem) => Outcome::failed(&problem, &problem),
             Ok(models) => {
                 let outcome = models.found(self.head);
                 self.models = Some(models);

@@ -3,16 +3,18 @@
 use super::file::Commissioning;
 use super::outcome::Outcome;
 use super::poses::Solving;
-use crate::head::calibrate::{Characteristics, characterise};
+use crate::error::Failure;
+use crate::head::calibrate::{Characteristics, characterise, off_proportion};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::doctor::examine_for;
+use crate::head::examine::by_pitch;
 use crate::head::geometry::SeenPose;
 use algo::calibration::Board;
 use hal::frame::Frame;
 use hal::head::Head;
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
+use serde_json::json;
 use std::path::Path;
 
 /// The names of the steps, in their order.
@@ -112,14 +114,11 @@ impl Step {
     /// Carries it out and keeps how it ended in `kept`, which is not written here. Returns the white frame of a pose.
     pub fn run(&self, subject: &mut Subject<'_>, kept: &mut Commissioning) -> Option<Frame> {
         let doctor = |subject: &mut Subject<'_>, names: &[&str]| {
-            let wanted = |name: &str| names.contains(&name);
-            let (head, calibration) = (&mut *subject.head, &*subject.calibration);
-            let calibrated = subject.calibrated;
             Outcome::of(&examine_for(
-                head,
-                calibration,
-                calibrated,
-                &wanted,
+                subject.head,
+                subject.calibration,
+                subject.calibrated,
+                &|name| names.contains(&name),
                 subject.progress,
             ))
         };
@@ -134,14 +133,15 @@ impl Step {
             Self::Exposure => doctor(subject, &["light", "exposure"]),
             Self::Timing => timing(subject, kept),
             Self::Pose(..) if kept.measured.is_none() && !subject.calibrated => Outcome::failed(
-                "a pose needs the head's delay and response: do the step timing first",
+                "a pose needs the head's delay and response",
+                "do the step timing first",
             ),
             Self::Pose(board, number) => match kept.take_pose(subject, board, *number) {
                 Ok((outcome, frame)) => {
                     white = frame;
                     outcome
                 }
-                Err(error) => Outcome::failed(&error.to_string()),
+                Err(error) => Failure::from(error).into(),
             },
             Self::Forget(number) => kept.forget(*number),
             Self::Solve(solving) => {
@@ -207,14 +207,7 @@ fn characterised(measured: &Characteristics, notes: Vec<String>) -> Outcome {
         contrast,
     } = measured;
     let delay_ms = timing.flip_to_light_ns as f64 * 1e-6;
-    let off = response.iter().enumerate();
-    let off = off.map(|(level, light)| (light - level as f64).abs());
-    let off_percent = off.fold(0.0, f64::max) / 2.55;
-    let by_pitch: Map<String, Value> = contrast
-        .pitches
-        .iter()
-        .map(|of| (of.pitch_px.to_string(), json!(of.contrast)))
-        .collect();
+    let off_percent = off_proportion(response) / 2.55;
     let mut said = vec![
         format!("delay: light comes {delay_ms:.3} ms after its flip"),
         format!(
@@ -225,7 +218,7 @@ fn characterised(measured: &Characteristics, notes: Vec<String>) -> Outcome {
     ];
     said.extend(notes);
     let figures = json!({
-        "delay_ms": delay_ms, "stamp": timing.stamp, "nonlinear_percent": off_percent, "noise_counts": noise.counts, "contrast": by_pitch,
+        "delay_ms": delay_ms, "stamp": timing.stamp, "nonlinear_percent": off_percent, "noise_counts": noise.counts, "contrast": by_pitch(contrast),
     });
     Outcome {
         said,

@@ -1,9 +1,9 @@
 //! The doctor's check of how long frames need from the camera to this program: reading them from slow memory shows here.
 
-use super::Check;
+use super::time::ms;
+use super::{Check, Checked, Subject};
 use crate::head::examine::{PATIENCE, load_black_and_white};
-use hal::error::Error;
-use hal::head::{Head, Showing};
+use hal::head::Showing;
 use serde_json::json;
 use std::time::Duration;
 
@@ -12,12 +12,9 @@ const REFRESHES: u32 = 24;
 /// How much later than stated a frame may come: a few turns of the scheduler.
 const LATE: Duration = Duration::from_millis(5);
 
-fn ms(time: Duration) -> f64 {
-    time.as_secs_f64() * 1e3
-}
-
 /// The median time from the end of an exposure until its frame can be used.
-pub(super) fn delivery(head: &mut Head) -> Result<Check, Error> {
+pub(super) fn delivery(subject: &mut Subject<'_>) -> Checked {
+    let head = &mut *subject.head;
     load_black_and_white(head)?;
     let camera = head.camera_timing();
     let showing = Showing {

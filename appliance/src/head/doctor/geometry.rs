@@ -1,27 +1,19 @@
 //! The doctor's check of the geometry: camera and projector stand to each other as when they were calibrated.
 
-use super::{Check, Verdict};
-use crate::head::calibration::Calibration;
+use super::{Check, Checked, Subject};
 use crate::head::examine::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX, PATIENCE};
-use hal::error::Error;
-use hal::head::Head;
 use serde_json::json;
 
-pub(super) fn geometry(
-    head: &mut Head,
-    calibration: &Calibration,
-    calibrated: bool,
-) -> Result<Check, Error> {
-    let skipped = |words: &str| Check {
-        verdict: Verdict::Skipped,
-        ..Check::new(words, None, json!({}))
-    };
-    if !calibrated {
-        return Ok(skipped("cannot be judged before the head is calibrated"));
+pub(super) fn geometry(subject: &mut Subject<'_>) -> Checked {
+    let calibration = subject.calibration;
+    if !subject.calibrated {
+        return Ok(Check::skipped(
+            "cannot be judged before the head is calibrated",
+        ));
     }
-    let fringes = CrossedFringes::take(head, calibration, PATIENCE, &|| ())?;
+    let fringes = CrossedFringes::take(subject.head, calibration, PATIENCE, &|| ())?;
     let Some(seen) = fringes.compare(calibration)? else {
-        return Ok(skipped(
+        return Ok(Check::skipped(
             "cannot be judged: too little of the picture shows fringes; put a larger part into view",
         ));
     };

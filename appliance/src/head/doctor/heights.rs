@@ -1,29 +1,24 @@
 //! The doctor's check of what heights go by: how far heights by the measured reference plane are from those by the models.
 
-use super::{Check, Verdict};
+use super::{Check, Checked, Subject};
+use crate::head::calibrate::grid;
 use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::examine::PLATE_PITCH;
+use crate::head::seam;
 use algo::geometry::Triangulator;
-use algo::pattern::PhaseFunction;
 use serde_json::json;
 
-/// Pixels along each side of the frame at which both are compared.
-const GRID: usize = 16;
 /// Heights at which both are compared, as shares of the camera's distance from the reference plane.
 const SHARES: [f64; 3] = [-0.05, 0.0, 0.05];
 /// Largest RMS difference, mm.
 const MOST_MM: f64 = 0.1;
 
-pub(super) fn heights(calibration: &Calibration) -> Check {
+pub(super) fn heights(subject: &mut Subject<'_>) -> Checked {
+    let calibration = subject.calibration;
     let Some((rms, most)) = difference(calibration) else {
-        return Check {
-            verdict: Verdict::Skipped,
-            ..Check::new(
-                "cannot be compared: no reference plane was measured",
-                None,
-                json!({}),
-            )
-        };
+        return Ok(Check::skipped(
+            "cannot be compared: no reference plane was measured",
+        ));
     };
     let by = match calibration.heights_by {
         HeightsBy::Models => "by the models",
@@ -37,16 +32,14 @@ pub(super) fn heights(calibration: &Calibration) -> Check {
     let measured = json!({
         "heights_by": calibration.heights_by, "difference_rms_mm": rms, "difference_most_mm": most,
     });
-    Check::new(found, off.then_some(remedy), measured)
+    Ok(Check::new(found, off.then_some(remedy), measured))
 }
 
 /// RMS and largest difference of heights in mm, if a reference plane was measured.
 fn difference(calibration: &Calibration) -> Option<(f64, f64)> {
     calibration.plane.as_ref()?;
-    let (columns, rows) = calibration.raster();
-    let (columns, rows) = (columns as usize, rows as usize);
     let by = |heights_by| -> Option<Triangulator> {
-        let function = PhaseFunction::vertical(columns, rows, columns as f64 / PLATE_PITCH);
+        let function = seam::fringes(true, calibration.raster(), PLATE_PITCH);
         let calibration = Calibration {
             heights_by,
             ..calibration.clone()
@@ -56,13 +49,8 @@ fn difference(calibration: &Calibration) -> Option<(f64, f64)> {
     let (models, measured) = (by(HeightsBy::Models)?, by(HeightsBy::Measured)?);
     let camera = &calibration.camera;
     let distance = camera.centre().z / -camera.axis().z;
-    let place = |at: usize, pixels: usize| (at as f64 + 0.5) / GRID as f64 * pixels as f64;
     let (mut squares, mut most, mut points) = (0.0_f64, 0.0_f64, 0_u32);
-    for at in 0..GRID * GRID {
-        let (u, v) = (
-            place(at % GRID, camera.width()),
-            place(at / GRID, camera.height()),
-        );
+    for (u, v) in grid(calibration) {
         let Some(sight) = measured.sight(u, v) else {
             continue;
         };

@@ -1,15 +1,11 @@
 //! The doctor's checks of light: there is some, it is exposed well, fringes are sharp, and light is proportional to grey.
 
-use super::Check;
-use crate::head::calibration::Calibration;
-use crate::head::examine::{self, Lit, SETTLE};
+use super::{Check, Checked, Subject};
+use crate::head::examine::{self, SETTLE};
 use crate::head::examine::{
     LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, MOST_BY_CONTENT, MOST_SATURATED, by_content,
 };
-use hal::error::Error;
-use hal::head::Head;
-use serde_json::{Value, json};
-use std::time::Duration;
+use serde_json::json;
 
 /// Grey levels whose response is measured, besides black and white.
 const GREYS: [u8; 7] = [32, 64, 96, 128, 160, 192, 224];
@@ -20,9 +16,9 @@ const LEAST_CONTRAST: f64 = 0.5;
 /// Largest deviation of light from proportionality to grey, share of white. A gamma of 1.1 deviates by 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
 
-/// `first` is when light first came after the head was opened, where that may take seconds.
-pub(super) fn light(lit: &Lit, first: Option<Option<Duration>>) -> Check {
-    let share = lit.share();
+pub(super) fn light(subject: &mut Subject<'_>) -> Checked {
+    let first = subject.first_light;
+    let share = subject.lit()?.1.share();
     let mut measured = json!({ "lit_percent": share * 100.0 });
     let mut found = format!(
         "{:.1} % of the picture is lit by the projector",
@@ -40,17 +36,19 @@ pub(super) fn light(lit: &Lit, first: Option<Option<Duration>>) -> Check {
         };
         if share >= LEAST_LIT && first.is_none() {
             let remedy = "the projector needs too long to lock on to its signal: let it stay switched on, and give it the mode that its own description prefers";
-            return Check::new(found, Some(remedy), measured);
+            return Ok(Check::new(found, Some(remedy), measured));
         }
     }
     let remedy = "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view";
-    Check::new(found, (share < LEAST_LIT).then_some(remedy), measured)
+    let dark = share < LEAST_LIT;
+    Ok(Check::new(found, dark.then_some(remedy), measured))
 }
 
 /// The remedy for a projector that adapts to content.
 const ADAPTS: &str = "switch off what adapts the projector to the content of a picture (CAIC, dynamic contrast, eco mode): for TI's DLPC3470, DLPC3478 and DLPC3479 write head.projector.controller = \"dlpc347x\"";
 
-pub(super) fn exposure(lit: &Lit) -> Check {
+pub(super) fn exposure(subject: &mut Subject<'_>) -> Checked {
+    let (_, lit) = subject.lit()?;
     let saturated = lit.saturated();
     let bright = lit.bright() / lit.full_scale();
     let measured =
@@ -67,21 +65,16 @@ pub(super) fn exposure(lit: &Lit) -> Check {
     } else {
         None
     };
-    Check::new(found, remedy, measured)
+    Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn contrast(
-    head: &mut Head,
-    calibration: &Calibration,
-    lit: &Lit,
-) -> Result<Check, Error> {
+pub(super) fn contrast(subject: &mut Subject<'_>) -> Checked {
+    let calibration = subject.calibration;
+    let (head, lit) = subject.lit()?;
     let found = examine::contrast(head, calibration, SETTLE, lit)?;
-    let pitches = found.pitches.iter();
-    let by_pitch: serde_json::Map<String, Value> = pitches
-        .map(|of| (of.pitch_px.to_string(), json!(of.contrast)))
-        .collect();
-    let measured =
-        json!({ "modulation_counts": found.modulation_counts, "contrast_by_pitch": by_pitch });
+    let measured = json!({
+        "modulation_counts": found.modulation_counts, "contrast_by_pitch": examine::by_pitch(&found),
+    });
     let mut pitches = found.pitches.iter();
     let sharp = pitches.find(|of| of.pitch_px == SHARP_PITCH);
     let blurred = sharp.is_none_or(|of| of.contrast < LEAST_CONTRAST);
@@ -96,7 +89,8 @@ pub(super) fn contrast(
     Ok(Check::new(found, blurred.then_some(&*remedy), measured))
 }
 
-pub(super) fn content(head: &mut Head, lit: &Lit) -> Result<Check, Error> {
+pub(super) fn content(subject: &mut Subject<'_>) -> Checked {
+    let (head, lit) = subject.lit()?;
     let Some(off) = by_content(head, SETTLE, lit)? else {
         return Ok(Check::new(
             "too little of the part shows one grey stripe alone to tell how its light depends on its surroundings",
@@ -113,16 +107,11 @@ pub(super) fn content(head: &mut Head, lit: &Lit) -> Result<Check, Error> {
     Ok(Check::new(found, adapts, measured))
 }
 
-pub(super) fn response(
-    head: &mut Head,
-    calibration: &Calibration,
-    lit: &Lit,
-) -> Result<Check, Error> {
+pub(super) fn response(subject: &mut Subject<'_>) -> Checked {
     // Projected as patterns are: through the inverse of the calibrated response.
-    let asked = GREYS.map(|grey| {
-        let response = calibration.response.as_ref();
-        response.map_or(grey, |response| response.level_for(grey))
-    });
+    let response = subject.calibration.response.as_ref();
+    let asked = GREYS.map(|grey| response.map_or(grey, |response| response.level_for(grey)));
+    let (head, lit) = subject.lit()?;
     let lights = examine::lights(head, SETTLE, lit, &asked, &|_| ())?;
     let answers: Vec<(f64, f64)> = GREYS
         .iter()

@@ -17,6 +17,7 @@ use hal::error::Error;
 use hal::head::Head;
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::time::Duration;
 
 /// The verdict of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -71,6 +72,20 @@ impl Check {
             measured,
         }
     }
+
+    /// A check that was not made, and why.
+    fn skipped(why: impl Into<String>) -> Self {
+        Self {
+            verdict: Verdict::Skipped,
+            ..Self::new(why, None, json!({}))
+        }
+    }
+}
+
+impl From<Error> for Check {
+    fn from(error: Error) -> Self {
+        Self::new(error.problem(), Some(error.remedy()), json!({}))
+    }
 }
 
 /// A check with its name.
@@ -78,31 +93,70 @@ fn named(name: &'static str, check: Check) -> Check {
     Check { name, ..check }
 }
 
-/// The checks in their order, each with the checks that must have passed before it.
-const CHECKS: [(&str, &[&str]); 15] = [
-    ("devices", &[]),
-    ("format", &["devices"]),
-    ("mode", &["devices"]),
-    ("start", &["devices"]),
-    ("cadence", &["devices"]),
-    ("trigger", &["devices"]),
-    ("delivery", &["devices", "trigger"]),
-    ("light", &["devices", "trigger"]),
-    ("exposure", &["devices", "trigger", "light"]),
-    ("delay", &["devices", "trigger", "light", "exposure"]),
-    ("contrast", &["devices", "trigger", "light", "exposure"]),
-    ("content", &["devices", "trigger", "light", "exposure"]),
+/// What the checks of a head share.
+struct Subject<'a> {
+    head: &'a mut Head,
+    calibration: &'a Calibration,
+    calibrated: bool,
+    /// When light first came after the head was opened, where that may take seconds.
+    first_light: Option<Option<Duration>>,
+    /// Black and white, since a check needed them.
+    lit: Option<Result<Lit, Error>>,
+}
+
+impl Subject<'_> {
+    /// The head, and its pictures of black and white.
+    fn lit(&mut self) -> Result<(&mut Head, &Lit), Error> {
+        let head = &mut *self.head;
+        let lit = self.lit.get_or_insert_with(|| Lit::take(head, SETTLE));
+        Ok((head, lit.as_ref().map_err(Error::clone)?))
+    }
+}
+
+/// How a check ended, or the error of the device that ended it.
+type Checked = Result<Check, Error>;
+
+/// A row of [`CHECKS`]: its name, the checks that must have passed before it, and how it measures and judges.
+type Row = (
+    &'static str,
+    &'static [&'static str],
+    fn(&mut Subject<'_>) -> Checked,
+);
+
+/// What the checks of light need.
+const LIT: &[&str] = &["devices", "trigger", "light", "exposure"];
+
+/// The checks in their order.
+const CHECKS: [Row; 15] = [
+    ("devices", &[], time::devices),
+    ("format", &["devices"], time::format),
+    ("mode", &["devices"], time::mode),
+    ("start", &["devices"], time::start),
+    ("cadence", &["devices"], time::cadence),
+    ("trigger", &["devices"], time::trigger),
+    ("delivery", &["devices", "trigger"], delivery::delivery),
+    ("light", &["devices", "trigger"], light::light),
+    (
+        "exposure",
+        &["devices", "trigger", "light"],
+        light::exposure,
+    ),
+    ("delay", LIT, time::delay),
+    ("contrast", LIT, light::contrast),
+    ("content", LIT, light::content),
     (
         "response",
         &["devices", "trigger", "light", "exposure", "content"],
+        light::response,
     ),
     (
         "geometry",
         &[
             "devices", "format", "mode", "cadence", "trigger", "light", "exposure", "delay",
         ],
+        geometry::geometry,
     ),
-    ("heights", &[]),
+    ("heights", &[], heights::heights),
 ];
 
 /// Checks a head in front of any part, best a flat bright one. `progress` gets the share done and the name of the next check. For a head
@@ -124,60 +178,53 @@ pub fn examine_for(
     wanted: &dyn Fn(&str) -> bool,
     progress: &dyn Fn(f64, &str),
 ) -> Vec<Check> {
-    let all: Vec<_> = CHECKS
-        .into_iter()
-        .filter(|(name, _)| wanted(name))
-        .collect();
-    let mut checks: Vec<Check> = Vec::with_capacity(all.len());
-    let mut lit: Option<Result<Lit, Error>> = None;
     let dark = head.starts_dark();
-    let first = dark.then(|| first_light(head).unwrap_or_default());
-    for (at, (name, needs)) in all.iter().copied().enumerate() {
-        progress(at as f64 / all.len() as f64, name);
-        let missing = needs.iter().find(|need| {
-            checks
-                .iter()
-                .any(|check| check.name == **need && check.verdict != Verdict::Pass)
-        });
-        if let Some(missing) = missing {
-            let words = format!("cannot be judged before the check {missing} passes");
-            checks.push(Check {
-                name,
-                verdict: Verdict::Skipped,
-                ..Check::new(words, None, json!({}))
-            });
-            continue;
-        }
-        let checked = match name {
-            "devices" => time::devices(head),
-            "format" => Ok(time::format(head)),
-            "mode" => Ok(time::mode(head)),
-            "start" => time::start(head),
-            "cadence" => time::cadence(head),
-            "trigger" => time::trigger(head, calibrated),
-            "delivery" => delivery::delivery(head),
-            "geometry" => geometry::geometry(head, calibration, calibrated),
-            "heights" => Ok(heights::heights(calibration)),
-            _ => {
-                let lit = lit.get_or_insert_with(|| Lit::take(head, SETTLE));
-                match (name, lit) {
-                    (_, Err(error)) => Err(error.clone()),
-                    ("light", Ok(lit)) => Ok(light::light(lit, first)),
-                    ("exposure", Ok(lit)) => Ok(light::exposure(lit)),
-                    ("delay", Ok(lit)) => time::delay(head, lit),
-                    ("contrast", Ok(lit)) => light::contrast(head, calibration, lit),
-                    ("content", Ok(lit)) => light::content(head, lit),
-                    (_, Ok(lit)) => light::response(head, calibration, lit),
-                }
-            }
+    let mut subject = Subject {
+        first_light: dark.then(|| first_light(head).unwrap_or_default()),
+        head,
+        calibration,
+        calibrated,
+        lit: None,
+    };
+    let rows: Vec<Row> = CHECKS.into_iter().filter(|row| wanted(row.0)).collect();
+    let mut checks: Vec<Check> = Vec::with_capacity(rows.len());
+    for (at, &(name, needs, check)) in rows.iter().enumerate() {
+        progress(at as f64 / rows.len() as f64, name);
+        let unmet = checks.iter().filter(|check| check.verdict != Verdict::Pass);
+        let missing = needs
+            .iter()
+            .find(|need| unmet.clone().any(|check| check.name == **need));
+        let checked = match missing {
+            Some(missing) => Check::skipped(format!(
+                "cannot be judged before the check {missing} passes"
+            )),
+            None => check(&mut subject).unwrap_or_else(Check::from),
         };
-        let checked = checked.unwrap_or_else(|error| {
-            let text = error.to_string();
-            let (found, remedy) = text.rsplit_once(": ").unwrap_or((&text, ""));
-            Check::new(found, Some(remedy), json!({}))
-        });
         checks.push(named(name, checked));
     }
     progress(1.0, "examined");
     checks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_check_needs_only_checks_that_stand_before_it() {
+        for (at, (name, needs, _)) in CHECKS.iter().enumerate() {
+            let before: Vec<&str> = CHECKS[..at].iter().map(|row| row.0).collect();
+            let missing = needs.iter().find(|need| !before.contains(need));
+            assert_eq!(missing, None, "{name}");
+            assert!(!before.contains(name), "{name} twice");
+        }
+    }
+
+    #[test]
+    fn an_error_of_a_device_is_found_whole_and_keeps_its_whole_remedy() {
+        let check = Check::from(Error::unsupported("opening a: b", "free it: end c"));
+        assert_eq!(check.found, "opening a: b is not supported");
+        assert_eq!(check.remedy, "free it: end c");
+        assert_eq!(check.verdict, Verdict::Fail);
+    }
 }

@@ -1,11 +1,10 @@
 //! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, flip-to-light delay.
 
-use super::Check;
+use super::{Check, Checked, Subject};
 use crate::head::examine::{
-    Delay, Lit, MOST_LATE, PATIENCE, Spaced, Stamps, load_black_and_white, pace,
+    Delay, MOST_LATE, PATIENCE, Spaced, Stamps, load_black_and_white, pace,
 };
 use hal::camera::Starts;
-use hal::error::Error;
 use hal::head::{Head, Showing, TOLERANCE, Watched, WatchedFrame};
 use hal::projector::Flip;
 use hal::trigger::Spoiled;
@@ -26,11 +25,12 @@ const WHITE: usize = 1;
 /// Least uncertainty of the measured delay, ms: that of one round with a camera of few pixels.
 const LEAST_OFF_MS: f64 = 0.05;
 
-fn ms(time: Duration) -> f64 {
+pub(super) fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-pub(super) fn devices(head: &Head) -> Result<Check, Error> {
+pub(super) fn devices(subject: &mut Subject<'_>) -> Checked {
+    let head = &*subject.head;
     head.present()?;
     let ((columns, rows), camera) = (head.projector_size(), head.camera_format());
     Ok(Check::new(
@@ -46,12 +46,12 @@ pub(super) fn devices(head: &Head) -> Result<Check, Error> {
     ))
 }
 
-pub(super) fn format(head: &Head) -> Check {
-    let encoding = head.encoding();
+pub(super) fn format(subject: &mut Subject<'_>) -> Checked {
+    let encoding = subject.head.encoding();
     let measured = json!({ "encoding": encoding.name, "exact": encoding.exact });
     if encoding.exact {
         let found = format!("{}: samples are what the sensor counted", encoding.name);
-        return Check::new(found, None, measured);
+        return Ok(Check::new(found, None, measured));
     }
     let found = format!(
         "the camera grants {} only: its samples are not what the sensor counted, but compressed or processed",
@@ -59,10 +59,11 @@ pub(super) fn format(head: &Head) -> Check {
     );
     let remedy =
         "ask for an uncompressed raw format (R16 on a Raspberry Pi 5, R10_CSI2P on a Pi 4)";
-    Check::new(found, Some(remedy), measured)
+    Ok(Check::new(found, Some(remedy), measured))
 }
 
-pub(super) fn mode(head: &Head) -> Check {
+pub(super) fn mode(subject: &mut Subject<'_>) -> Checked {
+    let head = &*subject.head;
     let (camera, refresh) = (head.camera_timing(), head.refresh());
     let refreshes = camera.exposure.as_secs_f64() / refresh.as_secs_f64();
     let whole = refresh.mul_f64(refreshes.round().max(1.0));
@@ -82,11 +83,13 @@ pub(super) fn mode(head: &Head) -> Check {
         "set the exposure to {:.3} ms: a micromirror device makes grey levels over whole refreshes",
         ms(whole)
     );
-    Check::new(found, (off > TOLERANCE).then_some(&*remedy), measured)
+    let wrong = off > TOLERANCE;
+    Ok(Check::new(found, wrong.then_some(&*remedy), measured))
 }
 
 /// How long a cycle waits for the camera to start.
-pub(super) fn start(head: &mut Head) -> Result<Check, Error> {
+pub(super) fn start(subject: &mut Subject<'_>) -> Checked {
+    let head = &mut *subject.head;
     let (took, stays_on) = (head.start_up()?, head.stays_on());
     let triggered = head.camera_timing().starts == Starts::OnTrigger;
     let measured = json!({ "start_ms": ms(took), "stays_on_s": stays_on.as_secs_f64() });
@@ -108,7 +111,8 @@ pub(super) fn start(head: &mut Head) -> Result<Check, Error> {
     Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn cadence(head: &mut Head) -> Result<Check, Error> {
+pub(super) fn cadence(subject: &mut Subject<'_>) -> Checked {
+    let head = &mut *subject.head;
     load_black_and_white(head)?;
     let showing = |index: u32| Showing {
         index: index as usize % 2,
@@ -161,7 +165,8 @@ pub(super) fn cadence(head: &mut Head) -> Result<Check, Error> {
     Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn trigger(head: &mut Head, calibrated: bool) -> Result<Check, Error> {
+pub(super) fn trigger(subject: &mut Subject<'_>) -> Checked {
+    let head = &mut *subject.head;
     load_black_and_white(head)?;
     let showing = Showing {
         index: WHITE,
@@ -169,7 +174,7 @@ pub(super) fn trigger(head: &mut Head, calibrated: bool) -> Result<Check, Error>
         settle: 0,
     };
     let mut seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
-    if !calibrated && !seen.frames.is_empty() {
+    if !subject.calibrated && !seen.frames.is_empty() {
         // The doctor runs before the head is calibrated, so it measures the stamps as calibrating will.
         let stamps = Stamps::measure(head)?;
         head.set_timing(stamps.timing(head.timing()));
@@ -183,7 +188,7 @@ pub(super) fn trigger(head: &mut Head, calibrated: bool) -> Result<Check, Error>
     })
 }
 
-fn triggered(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
+fn triggered(head: &mut Head, seen: &Watched<()>) -> Checked {
     let (pulses, frames) = (seen.triggers.len(), seen.frames.len());
     let after = |frame: &WatchedFrame<()>| {
         let after = |at: &Timestamp| (i128::from(frame.start.0) - i128::from(at.0)) / 1000;
@@ -263,7 +268,7 @@ fn lost(refreshes: u32, tried: &[Spaced], found: String, mut measured: Value) ->
 }
 
 /// A camera that the projector triggers has a frame in every so many refreshes.
-fn by_projector(head: &mut Head, seen: &Watched<()>) -> Result<Check, Error> {
+fn by_projector(head: &mut Head, seen: &Watched<()>) -> Checked {
     let (hold, refresh) = (head.timing().hold, head.refresh());
     let Some(needed) = pace(head)?.pop() else {
         return Ok(Check::new(
@@ -319,7 +324,8 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Check {
 }
 
 /// The time from a flip to its light, from the brightness of the frames around many flips.
-pub(super) fn delay(head: &mut Head, lit: &Lit) -> Result<Check, Error> {
+pub(super) fn delay(subject: &mut Subject<'_>) -> Checked {
+    let (head, lit) = subject.lit()?;
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();
     let Some(measured) = Delay::measure(head, lit, 1, &|_| ())? else {

@@ -6,16 +6,23 @@
 use super::pictures::{Lit, median, pictures};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::{ContrastFile, PitchFile};
-use crate::head::rasters::rasters;
-use algo::pattern::{PhaseFunction, Shot};
+use crate::head::rasters::fringes;
 use hal::error::Error;
 use hal::head::Head;
-use hal::projector::Raster;
+use serde_json::{Map, Value};
 
 /// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are relative to it.
 pub const PITCHES: [u32; 6] = [64, 32, 24, 16, 12, 8];
 /// Shifts of each pitch, a quarter of a turn each.
 const SHIFTS: usize = 4;
+
+/// Contrasts by the names of their pitches.
+pub fn by_pitch(contrast: &ContrastFile) -> Map<String, Value> {
+    let pitches = contrast.pitches.iter();
+    pitches
+        .map(|of| (of.pitch_px.to_string(), of.contrast.into()))
+        .collect()
+}
 
 /// The contrast of each of [`PITCHES`] by the median modulation over the lit pixels.
 ///
@@ -29,7 +36,7 @@ pub fn contrast(
 ) -> Result<ContrastFile, Error> {
     let mut measured = Vec::with_capacity(PITCHES.len());
     for pitch in PITCHES {
-        let patterns = shifts(head.projector_size(), pitch, calibration)?;
+        let patterns = fringes(head.projector_size(), pitch, SHIFTS, calibration)?;
         let mut shots = Vec::with_capacity(SHIFTS);
         pictures(head, settle, patterns.into_iter().map(Ok), &mut |counts| {
             shots.push(counts);
@@ -48,21 +55,4 @@ pub fn contrast(
         modulation_counts,
         pitches: measured.into_iter().map(relative).collect(),
     })
-}
-
-fn shifts(
-    (columns, rows): (u32, u32),
-    pitch: u32,
-    calibration: &Calibration,
-) -> Result<Vec<Raster>, Error> {
-    let fringes = f64::from(columns) / f64::from(pitch);
-    let function =
-        PhaseFunction::vertical(columns as usize, rows as usize, fringes).map_err(|error| {
-            Error::unsupported(
-                format!("a pitch of {pitch} px: {error}, which"),
-                "use a projector of more pixels",
-            )
-        })?;
-    let shots: Vec<_> = Shot::level(1.0, SHIFTS).collect();
-    rasters(&function, &shots, calibration)
 }

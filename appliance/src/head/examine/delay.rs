@@ -6,8 +6,8 @@
 //! exposure determines d: a relative noise ε of the mean, as a share of white, gives an error of ε·T, which falls with the square
 //! root of the number of such changes.
 
-use super::PATIENCE;
 use super::pictures::{Lit, counts, load_black_and_white};
+use super::{PATIENCE, refreshes};
 use hal::error::Error;
 use hal::head::{Head, Showing};
 use rand_xoshiro::SplitMix64;
@@ -80,9 +80,7 @@ impl Delay {
 
 impl Round {
     fn take(head: &mut Head, lit: &Lit, round: u32) -> Result<Self, Error> {
-        let (exposure, refresh) = (head.camera_timing().exposure, head.refresh());
-        let whole = exposure.as_nanos().div_ceil(refresh.as_nanos().max(1));
-        let whole = u32::try_from(whole).unwrap_or(1).clamp(1, 100);
+        let whole = refreshes(head, head.camera_timing().exposure).clamp(1, 100);
         let mut random = SplitMix64::seed_from_u64(u64::from(round).wrapping_add(1));
         let mut showings: Vec<Showing> = (0..CHANGES)
             .map(|change| Showing {

@@ -2,7 +2,8 @@
 
 use crate::head::calibration::Calibration;
 use crate::head::scan::{self, Scan};
-use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
+use crate::head::seam;
+use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::pipeline::{Epipolar, PhaseMap};
 use hal::error::Error;
 use hal::frame::Frame;
@@ -36,12 +37,7 @@ impl CrossedFringes {
         progress: &dyn Fn(),
     ) -> Result<Self, Error> {
         let mut take = |vertical: bool| {
-            let (columns, rows) = head.projector_size();
-            let (columns, rows) = (columns as usize, rows as usize);
-            let function = match vertical {
-                true => PhaseFunction::vertical(columns, rows, columns as f64 / PITCH),
-                false => PhaseFunction::horizontal(columns, rows, rows as f64 / PITCH),
-            };
+            let function = seam::fringes(vertical, head.projector_size(), PITCH);
             let function = function.map_err(|error| small(&error.to_string()))?;
             let shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
             let said = |_| progress();

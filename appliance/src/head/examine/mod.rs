@@ -17,7 +17,7 @@ mod response;
 mod stamps;
 
 pub use content::{MOST_BY_CONTENT, by_content};
-pub use contrast::{PITCHES, contrast};
+pub use contrast::{PITCHES, by_pitch, contrast};
 pub use delay::Delay;
 pub use drift::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX};
 pub use first_light::{LONGEST_DARK, first_light};
@@ -31,7 +31,14 @@ pub use plate::{PITCH as PLATE_PITCH, ReferencePlane, plate};
 pub use response::{lights, response};
 pub use stamps::{MOST_LATE, Stamps};
 
+use hal::head::Head;
 use std::time::Duration;
 
 /// Longest wait for flips and frames beyond their planned time.
 pub const PATIENCE: Duration = Duration::from_millis(500);
+
+/// How many refreshes of the projector a time takes, rounded up.
+pub fn refreshes(head: &Head, time: Duration) -> u32 {
+    let whole = time.as_nanos().div_ceil(head.refresh().as_nanos().max(1));
+    u32::try_from(whole).unwrap_or(u32::MAX)
+}

@@ -4,7 +4,7 @@
 //! fired at the spacing of a sequence and their frames are counted. They are fired a little closer than the refreshes, because in a
 //! sequence a trigger may come late and the next one on time.
 
-use super::{PATIENCE, load_black_and_white};
+use super::{PATIENCE, load_black_and_white, refreshes};
 use hal::camera::Starts;
 use hal::error::Error;
 use hal::head::{Head, Showing, TOLERANCE};
@@ -61,8 +61,7 @@ pub fn pace(head: &mut Head) -> Result<Vec<Spaced>, Error> {
     if camera.starts == Starts::ByProjector {
         return by_projector(head);
     }
-    let states = camera.period.as_nanos().div_ceil(refresh.as_nanos().max(1));
-    let least = u32::try_from(states).unwrap_or(1).clamp(1, 1000);
+    let least = refreshes(head, camera.period).clamp(1, 1000);
     for refreshes in least..=least + MORE {
         let showing = Showing {
             index: 0,

@@ -1,6 +1,6 @@
 //! Pictures of patterns, each exposed after the light of its flip has settled, and the pixels that the projector lights.
 
-use super::PATIENCE;
+use super::{PATIENCE, refreshes};
 use hal::camera::Starts;
 use hal::error::Error;
 use hal::frame::{Frame, Samples};
@@ -107,14 +107,11 @@ pub fn picture(head: &mut Head, index: usize, settle: u32) -> Result<Option<Fram
 
 /// A pattern, shown long enough for one whole exposure of settled light, whatever the phase of a free-running camera.
 fn showing(head: &Head, index: usize, settle: u32) -> Showing {
-    let (camera, refresh) = (head.camera_timing(), head.refresh());
-    let room = (camera.exposure + camera.period)
-        .as_nanos()
-        .div_ceil(refresh.as_nanos().max(1));
-    let most = u32::MAX / 64;
+    let camera = head.camera_timing();
+    let room = refreshes(head, camera.exposure + camera.period);
     Showing {
         index,
-        refreshes: settle + 1 + u32::try_from(room).unwrap_or(most).min(most),
+        refreshes: settle + 1 + room.min(u32::MAX / 64),
         settle,
     }
 }

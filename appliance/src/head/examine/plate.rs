@@ -3,8 +3,9 @@
 use crate::error::{Exit, Failure};
 use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::scan::{self, Scan};
+use crate::head::seam;
 use algo::geometry::Triangulator;
-use algo::pattern::{PhaseFunction, Sequence, Shot};
+use algo::pattern::{Sequence, Shot};
 use algo::pipeline::Plate;
 use hal::head::Head;
 use std::time::Duration;
@@ -53,14 +54,7 @@ pub fn plate(
     vertical: bool,
     timeout: Duration,
 ) -> Result<ReferencePlane, Failure> {
-    let (columns, rows) = head.projector_size();
-    let (columns, rows) = (columns as usize, rows as usize);
-    let function = if vertical {
-        PhaseFunction::vertical(columns, rows, columns as f64 / PITCH)
-    } else {
-        PhaseFunction::horizontal(columns, rows, rows as f64 / PITCH)
-    };
-    let function = function.map_err(unfit)?;
+    let function = seam::fringes(vertical, head.projector_size(), PITCH).map_err(unfit)?;
     let mut shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
     shots.truncate((LEVELS - 1) * SHIFTS);
     shots.extend(Shot::level(1.0, FINEST_SHIFTS));

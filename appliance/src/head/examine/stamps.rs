@@ -5,7 +5,7 @@
 //! delivery of its frame is known: exposure and readout, the readout, or zero. The length of a readout is then taken as configured,
 //! and a time that fits none of the three is an error.
 
-use super::PATIENCE;
+use super::{PATIENCE, refreshes};
 use hal::camera::{CameraTiming, Starts};
 use hal::error::Error;
 use hal::head::{Head, Showing, Stamp, TOLERANCE, Timing, WatchedFrame};
@@ -57,7 +57,7 @@ impl Stamps {
             ..before
         });
         let camera = head.camera_timing();
-        let seen = head.watch(&showings(&camera, head.refresh()), PATIENCE, &mut |_| ());
+        let seen = head.watch(&showings(head), PATIENCE, &mut |_| ());
         head.set_timing(before);
         let seen = seen?;
         if seen.frames.is_empty() {
@@ -74,9 +74,8 @@ impl Stamps {
 }
 
 /// Showings with one or two triggers each, and then a pause longer than the camera's period, which a free-running camera does not keep.
-fn showings(camera: &CameraTiming, refresh: Duration) -> [Showing; SHOWINGS] {
-    let whole = camera.period.as_nanos().div_ceil(refresh.as_nanos().max(1));
-    let whole = u32::try_from(whole).unwrap_or(1).clamp(1, 1000);
+fn showings(head: &Head) -> [Showing; SHOWINGS] {
+    let whole = refreshes(head, head.camera_timing().period).clamp(1, 1000);
     [Showing {
         index: 0,
         refreshes: 2 * whole + 1,

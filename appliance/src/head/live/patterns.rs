@@ -1,8 +1,7 @@
 //! What the projector shows for a live picture: uniform light, fringes, and charts to aim and focus with.
 
 use crate::head::calibration::Calibration;
-use crate::head::rasters;
-use algo::pattern::{PhaseFunction, Shot};
+use crate::head::rasters::fringes;
 use hal::error::Error;
 use hal::projector::Raster;
 
@@ -94,7 +93,7 @@ pub fn rasters(calibration: &Calibration) -> Result<Vec<Raster>, Error> {
     let mut all = Vec::new();
     for show in Show::ALL {
         match show.pitch() {
-            Some(pitch) => all.extend(fringes(calibration, pitch)?),
+            Some(pitch) => all.extend(fringes((columns, rows), pitch, SHIFTS, calibration)?),
             None => {
                 let grey = |at: u32| grey(show, (at % columns, at / columns), (columns, rows));
                 let pixels = (0..columns * rows).map(|at| if grey(at) { u8::MAX } else { 0 });
@@ -138,20 +137,6 @@ fn grey(show: Show, (x, y): (u32, u32), (columns, rows): (u32, u32)) -> bool {
         }
         Show::Black | Show::Fringes8 | Show::Fringes12 => false,
     }
-}
-
-fn fringes(calibration: &Calibration, pitch: u32) -> Result<Vec<Raster>, Error> {
-    let (columns, rows) = calibration.raster();
-    let fringes = f64::from(columns) / f64::from(pitch);
-    let function = PhaseFunction::vertical(columns as usize, rows as usize, fringes);
-    let function = function.map_err(|error| {
-        Error::unsupported(
-            format!("a pitch of {pitch} px: {error}, which"),
-            "use a projector of more pixels",
-        )
-    })?;
-    let shots: Vec<Shot> = Shot::level(1.0, SHIFTS).collect();
-    rasters::rasters(&function, &shots, calibration)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ mod blocks;
 mod boundaries;
 mod connections;
 mod exceptions;
+mod frozen;
 mod handshakes;
 
 use std::net::SocketAddr;

@@ -2,9 +2,10 @@
 
 use super::{Asked, OpenHead, PICTURES};
 use crate::config::{Backend, HeadConfig};
+use crate::error::Failure;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::place::Place;
-use crate::head::commission::{Commissioning, Name, Outcome, Step, Subject};
+use crate::head::commission::{Commissioning, Name, Step, Subject};
 use crate::head::exposing::Exposing;
 use crate::head::live::{Picture, outlines};
 use crate::production::{SIGN_OF_LIFE, Worker, active};
@@ -60,9 +61,8 @@ impl Worker {
             kept = Commissioning::of(head, kept.exposing);
         }
         let before = (self.config.clone(), self.opened.exposing(&self.config));
-        if let Err(problem) = self.set_exposing(asked) {
-            kept.steps
-                .insert(asked.step.name(), Outcome::failed(&problem));
+        if let Err(failure) = self.set_exposing(asked) {
+            kept.steps.insert(asked.step.name(), failure.into());
             return self.keep(kept);
         }
         let timing = self.opened.head.timing();
@@ -190,15 +190,14 @@ impl Worker {
     }
 
     /// Sets exposure and gain, if the step asks for it.
-    fn set_exposing(&mut self, asked: &Asked) -> Result<(), String> {
+    fn set_exposing(&mut self, asked: &Asked) -> Result<(), Failure> {
         let Some((exposing, _)) = asked.exposing else {
             return Ok(());
         };
         if exposing != self.opened.exposing(&self.config) {
             let mut config = self.config.clone();
             config.expose(exposing);
-            let set = self.opened.expose(&config, exposing);
-            set.map_err(|failure| failure.message)?;
+            self.opened.expose(&config, exposing)?;
             self.config = config;
         }
         Ok(())

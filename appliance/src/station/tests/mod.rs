@@ -4,7 +4,9 @@ mod faults;
 mod other_recipe;
 mod recipes;
 mod results;
+mod table;
 mod triggers;
+mod walk;
 
 use std::sync::Arc;
 

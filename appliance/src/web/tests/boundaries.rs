@@ -1,9 +1,9 @@
 //! Boundary values in every request: each is refused by its key and changes nothing, or what it makes can be used.
 
 use super::*;
-use crate::boundaries::{Bed, Tally, places, values};
 use crate::history::{Bounds, Numbering};
 use crate::storage::state::StateFolder;
+use crate::tests::{Bed, Tally, places, values};
 
 /// What stands in for a number or a word of an address.
 const WORDS: [&str; 14] = [

@@ -2,6 +2,7 @@
 
 pub(super) mod poses;
 
+use crate::head::calibrate::off_proportion;
 use crate::head::calibration::file::{CalibrationFile, MapFile};
 use hal::head::Stamp;
 use serde_json::{Value, json};
@@ -60,13 +61,11 @@ impl Report<'_> {
             );
         }
         if let Some(response) = &file.response {
-            let off = response.iter().enumerate();
-            let off = off.map(|(grey, light)| (light - grey as f64).abs());
             line(
                 "response",
                 format!(
                     "off proportion by {:.1} of 255 levels at most; patterns are corrected for it",
-                    off.fold(0.0, f64::max)
+                    off_proportion(response)
                 ),
             );
         }

@@ -1,5 +1,7 @@
 //! What is stored is read again, bit by bit; filters, bounds, damage.
 
+mod log;
+
 use super::*;
 use crate::station::snapshot::warning;
 use crate::station::{

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::control;
-use super::tests::{Bench, good, recipe, settings};
-use super::*;
+use super::{Bench, good, recipe, settings};
+use crate::station::control;
+use crate::station::*;
 
 /// The states by their numbers in register 104; a fault once for each way in which it is cleared.
 const STATES: [u16; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8, 9];

@@ -1,8 +1,8 @@
 //! The log of the history stays short while results come without a pause and others read.
 
-use super::schema::log_bytes;
-use super::tests::{opened, record, station, wait};
-use super::*;
+use super::{opened, record, station, wait};
+use crate::history::schema::log_bytes;
+use crate::history::*;
 use crate::station::snapshot::warning;
 use crate::storage::state::StateFolder;
 use std::io::Write;

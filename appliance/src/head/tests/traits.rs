@@ -1,9 +1,9 @@
 //! Traits of real devices that data sheets leave out: the doctor names each, calibration measures it, and sequences cope with it.
 
-use super::calibrate::{Basis, Made, make};
-use super::calibration::{Calibration, HeightsBy};
-use super::doctor::{Check, Verdict, examine};
-use super::examine::pace;
+use crate::head::calibrate::{Basis, Made, make};
+use crate::head::calibration::{Calibration, HeightsBy};
+use crate::head::doctor::{Check, Verdict, examine};
+use crate::head::examine::pace;
 use hal::head::{Exposure, Head, Timing};
 use hal::projector::Raster;
 use sim::Scenario;

@@ -5,12 +5,12 @@ use std::sync::Arc;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
-use super::control;
-use super::event::MAX_EFFECTS;
-use super::results::MAX_BUFFERED;
-use super::snapshot::status;
-use super::tests::{good, recipe, settings};
-use super::*;
+use super::{good, recipe, settings};
+use crate::station::control;
+use crate::station::event::MAX_EFFECTS;
+use crate::station::results::MAX_BUFFERED;
+use crate::station::snapshot::status;
+use crate::station::*;
 
 const EVENTS: u32 = 100_000;
 

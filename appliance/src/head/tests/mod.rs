@@ -1,0 +1,3 @@
+//! Tests of the head as a whole.
+
+mod traits;
