@@ -119,7 +119,7 @@ fn a_recipe_is_not_used_at_another_gain_and_one_that_is_taught_there_has_the_noi
     let noise = plc.measure(1)[HEIGHT_NOISE];
     let recipe = browser.get("/api/recipes/1");
     let before = camera(&mut browser);
-    assert_eq!(recipe["gain"], before["gain"], "{recipe}");
+    assert_eq!(recipe["exposing"]["gain"], before["gain"], "{recipe}");
     let done = step(&mut browser, "exposure", &shorter(&before));
     assert_eq!(done["state"], "done", "{done}");
     // No part is judged by the noise that the camera had.
