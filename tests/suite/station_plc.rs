@@ -25,8 +25,8 @@ pub const RECIPE_OK: u16 = 1 << 9;
 pub const ONLINE: u16 = 1;
 pub const TRIGGER: u16 = 1 << 1;
 pub const RESULT_ACK: u16 = 1 << 2;
-/// Longest wait for any event.
-pub const PATIENCE: Duration = Duration::from_secs(30);
+/// Longest wait for any event, such as the end of a teach on a busy machine.
+pub const PATIENCE: Duration = Duration::from_secs(120);
 /// SIGTERM ends the daemon within this time.
 pub const STOPPING: Duration = Duration::from_secs(5);
 
