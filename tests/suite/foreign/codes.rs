@@ -15,17 +15,19 @@ pub struct Code {
     pub inverted: bool,
 }
 
-/// The options that describe [`HALF`] beside eight fringes.
-const HALF_OPTIONS: [&str; 8] = [
-    "--fringes",
-    "8",
-    "--convention",
-    "cos",
-    "--gray",
-    "4",
-    "--gray-cell",
-    "25",
-];
+/// The options that describe a code of four bits with cells of so many pixels beside eight fringes.
+const fn options(cell: &str) -> [&str; 8] {
+    [
+        "--fringes",
+        "8",
+        "--convention",
+        "cos",
+        "--gray",
+        "4",
+        "--gray-cell",
+        cell,
+    ]
+}
 
 pub const HALF: Code = Code {
     bits: 4,
@@ -96,17 +98,7 @@ fn a_code_that_was_projected_otherwise_than_described_is_named_and_read_as_named
         ..inverted
     };
     let wide = Code { cell: 26.0, ..HALF };
-    let half = HALF_OPTIONS;
-    let whole = [
-        "--fringes",
-        "8",
-        "--convention",
-        "cos",
-        "--gray",
-        "4",
-        "--gray-cell",
-        "50",
-    ];
+    let (half, whole) = (options("25"), options("50"));
     for (code, stated, named) in [
         (lsb, half, &["--gray-order", "lsb"][..]),
         (inverted, half, &["--gray-invert"]),
@@ -230,7 +222,7 @@ fn a_measurement_repeats_what_the_import_found() {
         ..HALF
     };
     let scene = scene(8.0, 0.0, inverted);
-    let code = HALF_OPTIONS;
+    let code = options("25");
     scene.import(&code).succeeded();
     let (recording, out) = (scene.path("recording"), scene.path("out"));
     let run = crate::written::program().measure(&recording, &out, &[]);
