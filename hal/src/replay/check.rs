@@ -5,8 +5,8 @@ use std::path::{Component, Path};
 use super::failure::Wrong;
 use super::manifest::{CodeEntry, Manifest, PatternEntry};
 use crate::bounds::{
-    MAX_EXPOSURE_US, MAX_FRINGES, MAX_HARMONIC, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS,
-    MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, clipped, fingerprint, text, within,
+    Bound, Fields, MAX_EXPOSURE_US, MAX_FRINGES, MAX_HARMONIC, MAX_NOISE_COUNTS, MAX_RANGE_MM,
+    MAX_SHIFT_TURNS, MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, clipped, fingerprint, text, within,
 };
 use crate::model::DeviceModel;
 
@@ -57,7 +57,7 @@ fn values(manifest: &Manifest) -> Result<(), String> {
         }
     }
     if let Some(plane) = &projector.plane {
-        plane.check_bounds("projector.plane")?;
+        Fields.check("projector.plane", plane)?;
     }
     if let Some(noise) = camera.noise_counts {
         let key = "camera.noise_counts";
