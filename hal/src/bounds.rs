@@ -44,13 +44,13 @@ const LONGEST_MESSAGE: usize = 600;
 /// Most characters of a value that a message quotes.
 const REPEATED: usize = 48;
 
-/// Defines a struct whose fields have their bounds beside them, as in `pub gain: f64 = 0.0..=100.0`. Each value of an option, an array or
-/// a vector must lie in them; fields without bounds are not checked. [`Fields`] checks such a struct.
+/// Defines structs whose fields have their bounds beside them, as in `pub gain: f64 = 0.0..=100.0`. Each value of an option, an array or
+/// a vector must lie in them; fields without bounds are not checked. [`Fields`](crate::bounds::Fields) checks such a struct.
 #[macro_export]
 macro_rules! bounded {
-    ($(#[$meta:meta])* $vis:vis struct $name:ident {
+    ($($(#[$meta:meta])* $vis:vis struct $name:ident {
         $($(#[$note:meta])* $see:vis $field:ident: $kind:ty $(= $bound:expr)?,)*
-    }) => {
+    })*) => {$(
         $(#[$meta])*
         $vis struct $name {
             $($(#[$note])* $see $field: $kind,)*
@@ -66,7 +66,7 @@ macro_rules! bounded {
                 Ok(())
             }
         }
-    };
+    )*};
 }
 
 /// The bounds of one value: a range of numbers, [`Longest`] or [`Fields`].

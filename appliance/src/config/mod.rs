@@ -71,9 +71,7 @@ bounded! {
         /// The most MiB of recordings of failed parts; 0 = none are kept.
         pub recordings_mib: u32,
     }
-}
 
-bounded! {
     /// The station.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
@@ -87,9 +85,7 @@ bounded! {
         /// Cycles between two checks of the geometry; 0 = never.
         pub geometry_check_cycles: u32 = 0..=1_000_000,
     }
-}
 
-bounded! {
     /// Modbus TCP.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
@@ -145,9 +141,7 @@ bounded! {
         /// Networks of proxies in front of the page.
         pub proxies: Vec<IpNet>,
     }
-}
 
-bounded! {
     /// The devices.
     #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]

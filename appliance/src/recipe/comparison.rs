@@ -17,9 +17,7 @@ bounded! {
         /// With the part's adaptive pattern.
         pub adaptive: QualityFile = Fields,
     }
-}
 
-bounded! {
     /// Noise and coverage of one measurement.
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]

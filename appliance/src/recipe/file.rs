@@ -114,9 +114,7 @@ bounded! {
         /// Per gauge that was tried with golden at other places, how many good parts would pass; empty if nothing was tried.
         pub tried: Vec<TriedFile> = Fields,
     }
-}
 
-bounded! {
     /// How a gauge judges good parts that lie anywhere within the placement tolerance.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -152,9 +150,7 @@ bounded! {
         /// Bits per sample.
         pub bit_depth: u8 = 8..=16,
     }
-}
 
-bounded! {
     /// A projector's raster.
     #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -217,9 +213,7 @@ bounded! {
         #[serde(skip_serializing_if = "Option::is_none")]
         pub unseen_orders: Option<UnseenFile> = Fields,
     }
-}
 
-bounded! {
     /// Shares of pixels that get a wrong fringe order without a residual, for parts anywhere within the placement tolerance
     /// ([`algo::pattern::Slips`]).
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -51,9 +51,7 @@ bounded! {
         /// What goes wrong with flips, triggers and frames.
         pub faults: Faults = Fields,
     }
-}
 
-bounded! {
     /// The two devices. Each looks at the world's origin from the xz plane; its image x runs along +x, its image y along −y.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
@@ -65,9 +63,7 @@ bounded! {
         #[serde(deserialize_with = "projector_from")]
         pub projector: RigDevice = Fields,
     }
-}
 
-bounded! {
     /// One device of the rig.
     #[derive(Clone, Debug, PartialEq, Serialize)]
     pub struct RigDevice {
@@ -86,9 +82,7 @@ bounded! {
         /// By how much it was turned about its own x, y and z since its models were made, degrees.
         pub knocked_deg: [f64; 3] = -10.0..=10.0,
     }
-}
 
-bounded! {
     /// Phong's model: I = ambient + pattern/255 · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess), 1 = full scale. n is the surface's
     /// normal, l the direction to the projector, v that to the camera, and r is l mirrored about n.
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -103,9 +97,7 @@ bounded! {
         /// How narrow the highlight is: the exponent of its cosine, 1…500.
         pub shininess: f64 = 1.0..=500.0,
     }
-}
 
-bounded! {
     /// Noise of the camera. The defaults are what public photon models state of cameras with Sony's IMX296: saturation capacity 10 636 e⁻,
     /// temporal dark noise 4.81 e⁻ (with an ADC of 10 bits). No data sheet says so, and the spread of responses is an assumption: a head's
     /// calibration measures its own noise.
@@ -125,9 +117,7 @@ bounded! {
         /// Seed; frame n of a head has the same noise whenever the seed is the same.
         pub seed: u64,
     }
-}
 
-bounded! {
     /// Blur, response and gain between raster and samples.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
@@ -144,9 +134,7 @@ bounded! {
         /// none, and others in proportion. So do projectors that adapt their LEDs to the content of a picture.
         pub content_gain: f64 = -1.0..=10.0,
     }
-}
 
-bounded! {
     /// How a part lies: rotated about x, then y (tilt), then z (rotation), then shifted.
     #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]

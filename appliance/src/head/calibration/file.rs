@@ -86,9 +86,7 @@ bounded! {
         #[serde(skip_serializing_if = "Option::is_none")]
         pub geometry: Option<GeometryFile>,
     }
-}
 
-bounded! {
     /// Size and geometry of the camera.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -102,9 +100,7 @@ bounded! {
         /// Intrinsic numbers and pose.
         pub model: DeviceModel,
     }
-}
 
-bounded! {
     /// Size and geometry of the projector.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -116,9 +112,7 @@ bounded! {
         /// Intrinsic numbers and pose.
         pub model: DeviceModel,
     }
-}
 
-bounded! {
     /// Timing of flips, light and stamps.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -190,9 +184,7 @@ bounded! {
         /// σ of one sample, counts.
         pub counts: f64 = 0.0..=MAX_NOISE_COUNTS,
     }
-}
 
-bounded! {
     /// Contrast against pitch.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -225,9 +217,7 @@ bounded! {
         /// Modulation relative to that of the coarsest.
         pub contrast: f64 = 0.0..=100.0,
     }
-}
 
-bounded! {
     /// The reference phase maps of the plane z = 0.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -243,9 +233,7 @@ bounded! {
         /// Under horizontal fringes.
         pub horizontal: MapFile,
     }
-}
 
-bounded! {
     /// One reference phase map.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]

@@ -37,9 +37,7 @@ bounded! {
         /// The poses, the last in the plane z = 0.
         pub poses: Vec<PoseFile> = Fields,
     }
-}
 
-bounded! {
     /// A checkerboard.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
@@ -55,9 +53,7 @@ bounded! {
         /// The bow that was found: by how much the board's surface deviates from a plane with x², y² and xy over its corners, mm.
         pub bow_mm: [f64; 3] = -MAX_MM..=MAX_MM,
     }
-}
 
-bounded! {
     /// One pose of the board.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
