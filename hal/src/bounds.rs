@@ -196,6 +196,55 @@ pub fn clipped(value: &str) -> String {
 mod tests {
     use super::*;
 
+    bounded! {
+        struct Level {
+            gain: Option<f64> = 0.0..=1.0,
+            name: String = Longest(3),
+        }
+        struct Whole {
+            count: u32 = 1..=2,
+            sides: [f64; 2] = -1.0..=1.0,
+            levels: Vec<Level> = Fields,
+        }
+    }
+
+    #[test]
+    fn bounds_beside_fields_hold_for_every_value_and_are_refused_by_the_whole_key() {
+        let check = |count, side, gain, name: &str| {
+            let levels = [(None, "a"), (gain, name)];
+            let whole = Whole {
+                count,
+                sides: [0.0, side],
+                levels: levels
+                    .map(|(gain, name)| Level {
+                        gain,
+                        name: name.into(),
+                    })
+                    .into(),
+            };
+            Fields.check("", &whole)
+        };
+        check(2, -1.0, Some(1.0), "abc").unwrap();
+        for (refused, words) in [
+            (check(3, 0.0, None, ""), "count is 3: write 1 to 2"),
+            (check(1, 1.5, None, ""), "sides is 1.5: write -1.0 to 1.0"),
+            (
+                check(1, 0.0, Some(-1.0), ""),
+                "levels.gain is -1.0: write 0.0 to 1.0",
+            ),
+            (
+                check(1, 0.0, None, "abcd"),
+                "levels.name \"abcd\" has 4 characters: write at most 3",
+            ),
+            (
+                check(1, f64::NAN, None, ""),
+                "sides is NaN: write -1.0 to 1.0",
+            ),
+        ] {
+            assert_eq!(refused.unwrap_err(), words);
+        }
+    }
+
     #[test]
     fn a_message_names_key_value_and_bounds_and_stays_short() {
         let words = within("projector.width", u32::MAX, 1, MAX_SIDE).unwrap_err();
