@@ -2,7 +2,10 @@
 //!
 //! A value outside its bounds is refused, naming its key, before anything is allocated or computed from it.
 
+use std::ffi::OsStr;
 use std::fmt::Debug;
+use std::ops::RangeInclusive;
+use std::slice;
 
 /// Largest width or height of a camera's frame or a projector's raster, pixels. The largest devices on sale have 7680.
 pub const MAX_SIDE: u32 = 8192;
@@ -30,10 +33,79 @@ pub const MAX_TILT_DEG: f64 = 80.0;
 pub const MAX_ROTATION_DEG: f64 = 360.0;
 /// Hexadecimal digits of a fingerprint (SHA-256).
 pub const FINGERPRINT_DIGITS: usize = 64;
+/// The last second of the year 9999, in seconds since 1970.
+pub const LAST_SECOND: u64 = 253_402_300_799;
+/// Largest σ of a height or a length, mm: no head is worse.
+pub const MAX_SIGMA_MM: f64 = 1000.0;
+/// Longest path that the system opens.
+pub const MAX_PATH: usize = 4096;
 /// Most characters of a message about a file.
 const LONGEST_MESSAGE: usize = 600;
 /// Most characters of a value that a message quotes.
 const REPEATED: usize = 48;
+
+/// Defines structs whose fields have their bounds beside them, as in `pub gain: f64 = 0.0..=100.0`. Each value of an option, an array or
+/// a vector must lie in them; fields without bounds are not checked. [`Fields`](crate::bounds::Fields) checks such a struct.
+#[macro_export]
+macro_rules! bounded {
+    ($($(#[$meta:meta])* $vis:vis struct $name:ident {
+        $($(#[$note:meta])* $see:vis $field:ident: $kind:ty $(= $bound:expr)?,)*
+    })*) => {$(
+        $(#[$meta])*
+        $vis struct $name {
+            $($(#[$note])* $see $field: $kind,)*
+        }
+
+        impl $crate::bounds::Bound<$name> for $crate::bounds::Fields {
+            fn check(&self, key: &str, of: &$name) -> Result<(), String> {
+                use $crate::bounds::Values as _;
+                $($(for value in of.$field.as_slice() {
+                    let key = [key, ".", stringify!($field)].concat();
+                    $crate::bounds::Bound::check(&$bound, key.trim_start_matches('.'), value)?;
+                })?)*
+                Ok(())
+            }
+        }
+    )*};
+}
+
+/// The bounds of one value: a range of numbers, [`Longest`] or [`Fields`].
+pub trait Bound<T> {
+    /// Checks the value of a key.
+    ///
+    /// # Errors
+    /// A message that names the key.
+    fn check(&self, key: &str, value: &T) -> Result<(), String>;
+}
+
+impl<T: PartialOrd + Debug + Copy> Bound<T> for RangeInclusive<T> {
+    fn check(&self, key: &str, value: &T) -> Result<(), String> {
+        within(key, *value, *self.start(), *self.end())
+    }
+}
+
+/// The bounds of a text or path: so many characters at most, and no control characters.
+pub struct Longest(pub usize);
+
+impl<T: AsRef<OsStr>> Bound<T> for Longest {
+    fn check(&self, key: &str, value: &T) -> Result<(), String> {
+        text(key, &value.as_ref().to_string_lossy(), self.0)
+    }
+}
+
+/// The bounds of a struct that [`bounded!`](crate::bounded) defines: those of its fields. Their keys follow the struct's key and a dot;
+/// the key of a whole file is empty.
+pub struct Fields;
+
+/// Lets a single value be read as a slice, as options, arrays and vectors can be by their own methods.
+pub trait Values: Sized {
+    /// A slice of this value alone.
+    fn as_slice(&self) -> &[Self] {
+        slice::from_ref(self)
+    }
+}
+
+impl<T> Values for T {}
 
 /// Checks that a value lies in `low` to `high`; a NaN does not.
 ///
@@ -123,6 +195,55 @@ pub fn clipped(value: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    bounded! {
+        struct Level {
+            gain: Option<f64> = 0.0..=1.0,
+            name: String = Longest(3),
+        }
+        struct Whole {
+            count: u32 = 1..=2,
+            sides: [f64; 2] = -1.0..=1.0,
+            levels: Vec<Level> = Fields,
+        }
+    }
+
+    #[test]
+    fn bounds_beside_fields_hold_for_every_value_and_are_refused_by_the_whole_key() {
+        let check = |count, side, gain, name: &str| {
+            let levels = [(None, "a"), (gain, name)];
+            let whole = Whole {
+                count,
+                sides: [0.0, side],
+                levels: levels
+                    .map(|(gain, name)| Level {
+                        gain,
+                        name: name.into(),
+                    })
+                    .into(),
+            };
+            Fields.check("", &whole)
+        };
+        check(2, -1.0, Some(1.0), "abc").unwrap();
+        for (refused, words) in [
+            (check(3, 0.0, None, ""), "count is 3: write 1 to 2"),
+            (check(1, 1.5, None, ""), "sides is 1.5: write -1.0 to 1.0"),
+            (
+                check(1, 0.0, Some(-1.0), ""),
+                "levels.gain is -1.0: write 0.0 to 1.0",
+            ),
+            (
+                check(1, 0.0, None, "abcd"),
+                "levels.name \"abcd\" has 4 characters: write at most 3",
+            ),
+            (
+                check(1, f64::NAN, None, ""),
+                "sides is NaN: write -1.0 to 1.0",
+            ),
+        ] {
+            assert_eq!(refused.unwrap_err(), words);
+        }
+    }
 
     #[test]
     fn a_message_names_key_value_and_bounds_and_stays_short() {

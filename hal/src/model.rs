@@ -4,7 +4,7 @@
 //! A projector has the model of a camera; light only goes the other way. Here the numbers are only stored, and refused if
 //! they are not finite; the crate that measures with them checks whether they describe a usable camera.
 
-use crate::bounds::{MAX_SIDE, within};
+use crate::bounds::{Bound, Fields, MAX_SIDE, within};
 use serde::{Deserialize, Serialize};
 
 /// `MODEL` of recording format 1 (docs/formats.md).
@@ -40,14 +40,11 @@ pub struct PlaneModel {
     pub eta: [f64; 28],
 }
 
-impl PlaneModel {
-    /// Checks the coefficients, none of which can be longer than the longest raster.
-    ///
-    /// # Errors
-    /// In words that name the `key`, the value and the bounds.
-    pub fn check_bounds(&self, key: &str) -> Result<(), String> {
+impl Bound<PlaneModel> for Fields {
+    /// None of the coefficients can be longer than the longest raster. A message names the key of the whole plane.
+    fn check(&self, key: &str, plane: &PlaneModel) -> Result<(), String> {
         let most = f64::from(MAX_SIDE);
-        let mut all = self.xi.iter().chain(&self.eta);
+        let mut all = plane.xi.iter().chain(&plane.eta);
         all.try_for_each(|&coefficient| within(key, coefficient, -most, most))
     }
 }

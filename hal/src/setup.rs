@@ -9,28 +9,39 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
+use crate::bounded;
+use crate::bounds::{Longest, MAX_PATH, MAX_SIDE};
 use crate::camera::Starts;
 
-/// Which camera, and how it exposes. Nothing changes while it runs.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct CameraSetup {
-    /// libcamera's id; none = the only camera that is there.
-    pub id: Option<String>,
-    /// Pixels per row of the sensor's picture; none = the sensor's. A frame of a colour sensor has half.
-    pub width: Option<u32>,
-    /// Rows; none = the sensor's.
-    pub height: Option<u32>,
-    /// Exposure, µs: whole refreshes of the projector.
-    pub exposure_us: u32,
-    /// From the start of one exposure to the start of the next, µs: the shortest possible time of a triggered camera, the fixed time of one that runs by itself.
-    pub period_us: u32,
-    /// Gain, 1 = none.
-    pub gain: f64,
-    /// From the end of an exposure until its frame can be fetched, without any delay, µs.
-    pub delivery_us: u32,
-    /// Whether the luminance of a YUV format will do where the camera offers no raw one.
-    pub luma: bool,
+/// Least gain of a real camera: the amplifier of a sensor does not make less of its samples.
+pub const NO_GAIN: f64 = 1.0;
+/// Largest gain of any camera.
+pub const MOST_GAIN: f64 = 64.0;
+/// Longest name of a device or a line, characters.
+const MAX_NAME: usize = 255;
+
+bounded! {
+    /// Which camera, and how it exposes. Nothing changes while it runs.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct CameraSetup {
+        /// libcamera's id; none = the only camera that is there.
+        pub id: Option<String> = Longest(MAX_NAME),
+        /// Pixels per row of the sensor's picture; none = the sensor's. A frame of a colour sensor has half.
+        pub width: Option<u32> = 1..=MAX_SIDE,
+        /// Rows; none = the sensor's.
+        pub height: Option<u32> = 1..=MAX_SIDE,
+        /// Exposure, µs: whole refreshes of the projector.
+        pub exposure_us: u32 = 1..=1_000_000,
+        /// From the start of one exposure to the start of the next, µs: the shortest possible time of a triggered camera, the fixed time of one that runs by itself.
+        pub period_us: u32,
+        /// Gain, 1 = none.
+        pub gain: f64 = NO_GAIN..=MOST_GAIN,
+        /// From the end of an exposure until its frame can be fetched, without any delay, µs.
+        pub delivery_us: u32 = 0..=1_000_000,
+        /// Whether the luminance of a YUV format will do where the camera offers no raw one.
+        pub luma: bool,
+    }
 }
 
 impl Default for CameraSetup {
@@ -72,30 +83,32 @@ pub enum Led {
     Blue,
 }
 
-/// Which projector, and in which mode.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ProjectorSetup {
-    /// The card's device file, such as "/dev/dri/card1"; none = the only one with a connector that fits.
-    pub card: Option<PathBuf>,
-    /// The kernel's name of the connector, such as "HDMI-A-1" or "DPI-1"; none = the only one that is connected.
-    pub connector: Option<String>,
-    /// Columns of the mode; none = the preferred mode's.
-    pub width: Option<u32>,
-    /// Rows of the mode; none = the preferred mode's.
-    pub height: Option<u32>,
-    /// Refreshes per second; none = the preferred mode's.
-    pub refresh_hz: Option<f64>,
-    /// The kind of its controller.
-    pub controller: ControllerKind,
-    /// Device file of the controller's I²C bus.
-    pub controller_bus: PathBuf,
-    /// The controller's address on it, 7 bits.
-    pub controller_address: u8,
-    /// The LED that patterns are shown with.
-    pub led: Led,
-    /// Its current in steps of the LED's driver; none = as the projector's firmware sets it.
-    pub led_current: Option<u16>,
+bounded! {
+    /// Which projector, and in which mode.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct ProjectorSetup {
+        /// The card's device file, such as "/dev/dri/card1"; none = the only one with a connector that fits.
+        pub card: Option<PathBuf> = Longest(MAX_PATH),
+        /// The kernel's name of the connector, such as "HDMI-A-1" or "DPI-1"; none = the only one that is connected.
+        pub connector: Option<String> = Longest(MAX_NAME),
+        /// Columns of the mode; none = the preferred mode's.
+        pub width: Option<u32> = 1..=MAX_SIDE,
+        /// Rows of the mode; none = the preferred mode's.
+        pub height: Option<u32> = 1..=MAX_SIDE,
+        /// Refreshes per second; none = the preferred mode's.
+        pub refresh_hz: Option<f64> = 1.0..=1000.0,
+        /// The kind of its controller.
+        pub controller: ControllerKind,
+        /// Device file of the controller's I²C bus.
+        pub controller_bus: PathBuf = Longest(MAX_PATH),
+        /// The controller's address on it, 7 bits. The others are reserved (I²C-bus specification, UM10204, section 3.1.12).
+        pub controller_address: u8 = 8..=119,
+        /// The LED that patterns are shown with.
+        pub led: Led,
+        /// Its current in steps of the LED's driver; none = as the projector's firmware sets it.
+        pub led_current: Option<u16> = 0..=1023,
+    }
 }
 
 impl Default for ProjectorSetup {
@@ -116,21 +129,23 @@ impl Default for ProjectorSetup {
     }
 }
 
-/// The line that starts an exposure of the camera.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct TriggerSetup {
-    /// Label of the GPIO chip.
-    pub chip: String,
-    /// Name of the line; none = the camera runs by itself, or the projector triggers it.
-    pub line: Option<String>,
-    /// Whether the projector's trigger output is wired to the camera.
-    pub by_projector: bool,
-    /// How long a pulse lasts, µs. Many cameras expose for as long as the pulse lasts; a pulse shorter than half the exposure is
-    /// assumed to start the exposure only.
-    pub pulse_us: u32,
-    /// Whether the line is low during a pulse and high when idle.
-    pub active_low: bool,
+bounded! {
+    /// The line that starts an exposure of the camera.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct TriggerSetup {
+        /// Label of the GPIO chip.
+        pub chip: String = Longest(MAX_NAME),
+        /// Name of the line; none = the camera runs by itself, or the projector triggers it.
+        pub line: Option<String> = Longest(MAX_NAME),
+        /// Whether the projector's trigger output is wired to the camera.
+        pub by_projector: bool,
+        /// How long a pulse lasts, µs. Many cameras expose for as long as the pulse lasts; a pulse shorter than half the exposure is
+        /// assumed to start the exposure only.
+        pub pulse_us: u32 = 1..=1_000_000,
+        /// Whether the line is low during a pulse and high when idle.
+        pub active_low: bool,
+    }
 }
 
 impl Default for TriggerSetup {
@@ -170,26 +185,28 @@ impl TriggerSetup {
     }
 }
 
-/// The lines between the station and a press or another machine that starts it by wire. Each is used only if it is named.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct LinesSetup {
-    /// Label of the GPIO chip.
-    pub chip: String,
-    /// In: starts a cycle.
-    pub start: Option<String>,
-    /// Whether the start line is active when low.
-    pub start_active_low: bool,
-    /// How long the start line must keep its level before a start counts, ms.
-    pub debounce_ms: u32,
-    /// Out: the station is measuring.
-    pub busy: Option<String>,
-    /// Out: the last part passed.
-    pub ok: Option<String>,
-    /// Out: the station cannot measure.
-    pub fault: Option<String>,
-    /// Whether busy, ok and fault are low when they are on.
-    pub outputs_active_low: bool,
+bounded! {
+    /// The lines between the station and a press or another machine that starts it by wire. Each is used only if it is named.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct LinesSetup {
+        /// Label of the GPIO chip.
+        pub chip: String = Longest(MAX_NAME),
+        /// In: starts a cycle.
+        pub start: Option<String> = Longest(MAX_NAME),
+        /// Whether the start line is active when low.
+        pub start_active_low: bool,
+        /// How long the start line must keep its level before a start counts, ms.
+        pub debounce_ms: u32 = 0..=1000,
+        /// Out: the station is measuring.
+        pub busy: Option<String> = Longest(MAX_NAME),
+        /// Out: the last part passed.
+        pub ok: Option<String> = Longest(MAX_NAME),
+        /// Out: the station cannot measure.
+        pub fault: Option<String> = Longest(MAX_NAME),
+        /// Whether busy, ok and fault are low when they are on.
+        pub outputs_active_low: bool,
+    }
 }
 
 impl Default for LinesSetup {

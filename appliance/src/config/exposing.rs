@@ -1,8 +1,8 @@
 //! Exposure and gain that were kept on the page: they take the place of the configured ones.
 
-use super::devices::NO_GAIN;
 use super::{Backend, HeadConfig};
 use crate::head::exposing::{Exposing, LEAST_GAIN};
+use hal::setup::NO_GAIN;
 
 impl HeadConfig {
     /// The least gain that the camera can be set to.

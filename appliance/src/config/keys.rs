@@ -123,6 +123,57 @@ mod tests {
         }
     }
 
+    /// What [`Config::check`] says if one key is `value`; none if it takes it, or the type of the key does not.
+    fn refusal(key: &str, value: f64) -> Option<String> {
+        let (section, name) = key.rsplit_once('.').unwrap_or_default();
+        // A width and a height are written both or neither.
+        let other = match name {
+            "width" => "height = 1",
+            "height" => "width = 1",
+            _ => "",
+        };
+        let name = if name.is_empty() { key } else { name };
+        let header = match section {
+            "" => String::new(),
+            section => format!("[{section}]"),
+        };
+        let file = format!("{header}\n{name} = {value}\n{other}");
+        toml::from_str::<Config>(&file).ok()?.check().err()
+    }
+
+    #[test]
+    fn the_documented_ranges_are_the_code_s() {
+        let mut compared = 0;
+        for key in keys() {
+            let range = key.range.split(',').next().unwrap();
+            let Some((low, high)) = range.split_once(" to ") else {
+                continue;
+            };
+            let [low, high] = [low, high].map(|bound| bound.parse::<f64>().ok());
+            for (bound, beyond) in [(low, -1.0), (high, 1.0)] {
+                let Some(bound) = bound else { continue };
+                let name = key.name;
+                // A value that is written out of its type's range is refused by the parser, so that nothing is compared with it.
+                let Some(words) = refusal(name, bound + beyond) else {
+                    let all = [0.0, f64::from(u8::MAX), f64::from(u32::MAX)];
+                    assert!(all.contains(&bound), "{name} takes {}", bound + beyond);
+                    continue;
+                };
+                let said = words.strip_prefix(name).and_then(|words| {
+                    let (low, high) = words.split_once(": write ")?.1.split_once(" to ")?;
+                    let end = if beyond < 0.0 { low } else { high };
+                    end.parse::<f64>().ok()
+                });
+                assert_eq!(said, Some(bound), "{words}");
+                // No key may be refused for its bound; other keys may not fit it.
+                let refused = refusal(name, bound).unwrap_or_default();
+                assert!(!refused.starts_with(&format!("{name} is ")), "{refused}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 25, "{compared}");
+    }
+
     #[test]
     fn the_documentation_holds_the_table() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/configuration.md");

@@ -11,7 +11,8 @@ use crate::head::calibration::place::IN_STATE;
 use crate::head::commission::Commissioning;
 use crate::head::exposing::Exposing;
 use crate::head::placed::Placed;
-use hal::bounds::{clipped, length, shortened, text, within};
+use hal::bounded;
+use hal::bounds::{Bound, Fields, Longest, MAX_PATH, clipped, length, shortened};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
@@ -33,72 +34,76 @@ const PRIVATE: [&str; 6] = [
     "fe80::/10",
 ];
 
-/// The whole configuration. The defaults need no file: a simulated head on this machine.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Config {
-    /// State folder; none = the platform's.
-    pub state: Option<PathBuf>,
-    /// Computing threads; 0 = one per core.
-    pub threads: usize,
-    /// The station.
-    pub station: StationConfig,
-    /// Modbus TCP, for the PLC.
-    pub modbus: ModbusConfig,
-    /// The page, for the technician.
-    pub http: HttpConfig,
-    /// The devices.
-    pub head: HeadConfig,
-    /// Digital lines: start, busy, ok and fault.
-    pub lines: LinesSetup,
-    /// What is kept of results.
-    pub history: HistoryConfig,
+bounded! {
+    /// The whole configuration. The defaults need no file: a simulated head on this machine.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Config {
+        /// State folder; none = the platform's.
+        pub state: Option<PathBuf> = Longest(MAX_PATH),
+        /// Computing threads; 0 = one per core.
+        pub threads: usize = 0..=256,
+        /// The station.
+        pub station: StationConfig = Fields,
+        /// Modbus TCP, for the PLC.
+        pub modbus: ModbusConfig = Fields,
+        /// The page, for the technician.
+        pub http: HttpConfig = Fields,
+        /// The devices.
+        pub head: HeadConfig = Fields,
+        /// Digital lines: start, busy, ok and fault.
+        pub lines: LinesSetup = Fields,
+        /// What is kept of results.
+        pub history: HistoryConfig = Fields,
+    }
 }
 
 /// The most results that a history can be told to keep.
 pub const MAX_RESULTS: u32 = 10_000_000;
 
-/// What is kept of results; the oldest are deleted first.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct HistoryConfig {
-    /// The most results.
-    pub results: u32,
-    /// The most MiB of recordings of failed parts; 0 = none are kept.
-    pub recordings_mib: u32,
-}
+bounded! {
+    /// What is kept of results; the oldest are deleted first.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct HistoryConfig {
+        /// The most results.
+        pub results: u32 = 1..=MAX_RESULTS,
+        /// The most MiB of recordings of failed parts; 0 = none are kept.
+        pub recordings_mib: u32,
+    }
 
-/// The station.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct StationConfig {
-    /// The recipe that is loaded at the start.
-    pub recipe: u16,
-    /// Whether the PLC may teach.
-    pub teach_allowed: bool,
-    /// PLC_HEARTBEAT may stand still for this long, s.
-    pub plc_timeout_s: u32,
-    /// Cycles between two checks of the geometry; 0 = never.
-    pub geometry_check_cycles: u32,
-}
+    /// The station.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct StationConfig {
+        /// The recipe that is loaded at the start.
+        pub recipe: u16 = 1..=9999,
+        /// Whether the PLC may teach.
+        pub teach_allowed: bool,
+        /// PLC_HEARTBEAT may stand still for this long, s.
+        pub plc_timeout_s: u32 = 1..=3600,
+        /// Cycles between two checks of the geometry; 0 = never.
+        pub geometry_check_cycles: u32 = 0..=1_000_000,
+    }
 
-/// Modbus TCP.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct ModbusConfig {
-    /// Address and port.
-    #[serde(deserialize_with = "listen")]
-    pub listen: SocketAddr,
-    /// Order of the words of 32- and 64-bit values.
-    pub word_order: WordOrder,
-    /// Answer only to this unit id.
-    pub strict_unit_id: Option<u8>,
-    /// The most connections at a time.
-    pub connections: u16,
-    /// Networks whose clients may read.
-    pub readers: Vec<IpNet>,
-    /// Networks whose clients may write.
-    pub writers: Vec<IpNet>,
+    /// Modbus TCP.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct ModbusConfig {
+        /// Address and port.
+        #[serde(deserialize_with = "listen")]
+        pub listen: SocketAddr,
+        /// Order of the words of 32- and 64-bit values.
+        pub word_order: WordOrder,
+        /// Answer only to this unit id.
+        pub strict_unit_id: Option<u8>,
+        /// The most connections at a time.
+        pub connections: u16 = 2..=64,
+        /// Networks whose clients may read.
+        pub readers: Vec<IpNet>,
+        /// Networks whose clients may write.
+        pub writers: Vec<IpNet>,
+    }
 }
 
 /// Order of the words of 32- and 64-bit values; the bytes of a word are always big-endian.
@@ -123,43 +128,45 @@ fn listen<'a, D: serde::Deserializer<'a>>(source: D) -> Result<SocketAddr, D::Er
     })
 }
 
-/// The page.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct HttpConfig {
-    /// Address and port.
-    #[serde(deserialize_with = "listen")]
-    pub listen: SocketAddr,
-    /// Host names of the page, besides IP addresses and localhost.
-    pub hosts: Vec<String>,
-    /// Networks of proxies in front of the page.
-    pub proxies: Vec<IpNet>,
-}
+bounded! {
+    /// The page.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct HttpConfig {
+        /// Address and port.
+        #[serde(deserialize_with = "listen")]
+        pub listen: SocketAddr,
+        /// Host names of the page, besides IP addresses and localhost.
+        pub hosts: Vec<String> = Longest(MAX_HOST),
+        /// Networks of proxies in front of the page.
+        pub proxies: Vec<IpNet>,
+    }
 
-/// The devices.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct HeadConfig {
-    /// Which kind of head.
-    pub backend: Backend,
-    /// Scenario file of the simulated head; none = the default part.
-    pub scenario: Option<PathBuf>,
-    /// Recordings that the replay head plays.
-    pub recordings: Vec<PathBuf>,
-    /// The camera of the head `rpi`.
-    pub camera: CameraSetup,
-    /// The projector of the head `rpi`.
-    pub projector: ProjectorSetup,
-    /// The camera's trigger line of the head `rpi`.
-    pub trigger: TriggerSetup,
-    /// The head's `calibration.json`; none = in the state folder.
-    pub calibration: Option<PathBuf>,
-    /// The part in front of the simulated head instead of the scenario's, from the command line.
-    #[serde(skip)]
-    pub part: Option<Placed>,
-    /// Exposure and gain that were kept on the page.
-    #[serde(skip)]
-    pub exposing: Option<Exposing>,
+    /// The devices.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct HeadConfig {
+        /// Which kind of head.
+        pub backend: Backend,
+        /// Scenario file of the simulated head; none = the default part.
+        pub scenario: Option<PathBuf> = Longest(MAX_PATH),
+        /// Recordings that the replay head plays.
+        pub recordings: Vec<PathBuf> = Longest(MAX_PATH),
+        /// The camera of the head `rpi`.
+        pub camera: CameraSetup = Fields,
+        /// The projector of the head `rpi`.
+        pub projector: ProjectorSetup = Fields,
+        /// The camera's trigger line of the head `rpi`.
+        pub trigger: TriggerSetup = Fields,
+        /// The head's `calibration.json`; none = in the state folder.
+        pub calibration: Option<PathBuf> = Longest(MAX_PATH),
+        /// The part in front of the simulated head instead of the scenario's, from the command line.
+        #[serde(skip)]
+        pub part: Option<Placed>,
+        /// Exposure and gain that were kept on the page.
+        #[serde(skip)]
+        pub exposing: Option<Exposing>,
+    }
 }
 
 /// The kinds of head.
@@ -177,10 +184,8 @@ pub enum Backend {
 
 /// Most networks, hosts or recordings.
 const MAX_LISTED: usize = 1024;
-/// Longest path that the system opens.
-const LONGEST_PATH: usize = 4096;
 /// Longest name of a host (RFC 1035, section 2.3.4).
-const LONGEST_HOST: usize = 255;
+const MAX_HOST: usize = 255;
 
 impl Default for StationConfig {
     fn default() -> Self {
@@ -278,39 +283,12 @@ impl Config {
     /// # Errors
     /// Naming the key and its range.
     pub fn check(&self) -> Result<(), String> {
-        within("threads", self.threads, 0, 256)?;
-        within("station.recipe", self.station.recipe, 1, 9999)?;
-        within("station.plc_timeout_s", self.station.plc_timeout_s, 1, 3600)?;
-        let cycles = self.station.geometry_check_cycles;
-        within("station.geometry_check_cycles", cycles, 0, 1_000_000)?;
+        Fields.check("", self)?;
         let modbus = &self.modbus;
-        within("modbus.connections", modbus.connections, 2, 64)?;
         length("modbus.readers", modbus.readers.len(), 0, MAX_LISTED)?;
         length("modbus.writers", modbus.writers.len(), 0, MAX_LISTED)?;
         length("http.hosts", self.http.hosts.len(), 0, MAX_LISTED)?;
-        for host in &self.http.hosts {
-            text("http.hosts", host, LONGEST_HOST)?;
-        }
-        within("history.results", self.history.results, 1, MAX_RESULTS)?;
         length("head.recordings", self.head.recordings.len(), 0, MAX_LISTED)?;
-        let head = &self.head;
-        let paths = [
-            ("state", &self.state),
-            ("head.scenario", &head.scenario),
-            ("head.calibration", &head.calibration),
-            ("head.projector.card", &head.projector.card),
-        ];
-        let paths = paths
-            .into_iter()
-            .filter_map(|(key, path)| Some((key, path.as_ref()?)));
-        let recordings = head.recordings.iter().map(|path| ("head.recordings", path));
-        let bus = (
-            "head.projector.controller_bus",
-            &head.projector.controller_bus,
-        );
-        for (key, path) in paths.chain(recordings).chain([bus]) {
-            text(key, &path.to_string_lossy(), LONGEST_PATH)?;
-        }
         devices::check(self)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
             return Err(

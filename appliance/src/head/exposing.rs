@@ -1,15 +1,14 @@
 //! Exposure and gain of the camera. The noise of a sample belongs to both: what was measured or taught at one setting is not true of
 //! another.
 
-use hal::bounds::{MAX_EXPOSURE_US, within};
+use hal::bounds::{Bound, Fields, MAX_EXPOSURE_US, within};
+use hal::setup::MOST_GAIN;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::time::Duration;
 
 /// Least gain of any camera: a simulated one may be darker than its light.
 pub const LEAST_GAIN: f64 = 0.01;
-/// Largest gain of any camera.
-pub const MOST_GAIN: f64 = 64.0;
 /// Largest gain in files: that of a scenario.
 const MAX_GAIN: f64 = 100.0;
 /// Longest exposure, µs.
@@ -27,6 +26,19 @@ pub struct Exposing {
     pub gain: f64,
 }
 
+impl Bound<Exposing> for Fields {
+    fn check(&self, key: &str, of: &Exposing) -> Result<(), String> {
+        let exposure = f64::from(of.exposure_us);
+        within(
+            &format!("{key}.exposure_us"),
+            exposure,
+            0.0,
+            MAX_EXPOSURE_US,
+        )?;
+        within(&format!("{key}.gain"), of.gain, 0.0, MAX_GAIN)
+    }
+}
+
 impl Exposing {
     /// The exposure.
     pub fn exposure(&self) -> Duration {
@@ -40,21 +52,6 @@ impl Exposing {
     pub fn check(&self, least_gain: f64) -> Result<(), String> {
         within("exposure_us", self.exposure_us, 1, MOST_US)?;
         within("gain", self.gain, least_gain, MOST_GAIN)
-    }
-
-    /// Checks the values in a file under a key.
-    ///
-    /// # Errors
-    /// In words that name the key, the value and the bounds.
-    pub fn check_bounds(&self, key: &str) -> Result<(), String> {
-        let exposure = f64::from(self.exposure_us);
-        within(
-            &format!("{key}.exposure_us"),
-            exposure,
-            0.0,
-            MAX_EXPOSURE_US,
-        )?;
-        within(&format!("{key}.gain"), self.gain, 0.0, MAX_GAIN)
     }
 
     /// Checks that the exposure is a whole number of refreshes of the projector, to a hundredth of one.

@@ -1,29 +1,34 @@
 //! The fixed pattern against the adaptive one on the taught part, as measured while teaching with equally many frames.
 
+use algo::pattern::MAX_FRAMES;
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, PhaseMap};
+use hal::bounded;
+use hal::bounds::{Fields, MAX_SIGMA_MM};
 use serde::{Deserialize, Serialize};
 
-/// Both measurements.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ComparisonFile {
-    /// With straight, equidistant fringes.
-    pub fixed: QualityFile,
-    /// With the part's adaptive pattern.
-    pub adaptive: QualityFile,
-}
+bounded! {
+    /// Both measurements.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct ComparisonFile {
+        /// With straight, equidistant fringes.
+        pub fixed: QualityFile = Fields,
+        /// With the part's adaptive pattern.
+        pub adaptive: QualityFile = Fields,
+    }
 
-/// Noise and coverage of one measurement.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct QualityFile {
-    /// Frames of the sequence.
-    pub frames: usize,
-    /// Predicted σ_z from the measured modulation, RMS over the pixels that both resolve, mm.
-    pub sigma_mm: f64,
-    /// Share of the frame that is resolved.
-    pub coverage: f64,
+    /// Noise and coverage of one measurement.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct QualityFile {
+        /// Frames of the sequence.
+        pub frames: usize = 1..=MAX_FRAMES,
+        /// Predicted σ_z from the measured modulation, RMS over the pixels that both resolve, mm.
+        pub sigma_mm: f64 = 0.0..=MAX_SIGMA_MM,
+        /// Share of the frame that is resolved.
+        pub coverage: f64 = 0.0..=1.0,
+    }
 }
 
 /// A measurement with so many frames.

@@ -1,112 +1,129 @@
 //! The manifest `recipe.json` of a recipe, version 2. Frozen: see `docs/formats.md`.
 
+use super::bounds::{
+    LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_GUARD_K, MAX_TOLERANCE_MM,
+};
 use super::comparison::ComparisonFile;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::CalibrationSigma;
 use crate::head::exposing::Exposing;
 use algo::inspect::Measure;
 use algo::pattern::Shot;
+use algo::phase::LeastModulation;
 use algo::units::AbsolutePhase;
+use hal::bounded;
+use hal::bounds::{
+    FINGERPRINT_DIGITS, Fields, LAST_SECOND, Longest, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE,
+    MAX_SIGMA_MM, MIN_NOISE_COUNTS,
+};
 use hal::replay::recording::PatternSpec;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// The name of the format.
 pub const FORMAT: &str = "fringed-recipe";
 /// The version that this program writes, and the only one that it reads.
 pub const VERSION: u32 = 2;
+/// Bounds of the least modulation.
+const LEAST_MODULATION: RangeInclusive<f64> =
+    LeastModulation::BOUNDS[0]..=LeastModulation::BOUNDS[1];
+/// Most captures that golden is the mean of.
+const MAX_CAPTURES: usize = 1000;
 
-/// Everything in a recipe that is not an array.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RecipeFile {
-    /// [`FORMAT`].
-    pub format: String,
-    /// [`VERSION`].
-    pub version: u32,
-    /// SHA-256 over all members with this field zeroed, 64 hexadecimal digits.
-    pub fingerprint: String,
-    /// 1–9999.
-    pub number: u16,
-    /// The key that a PLC may select by, at most 32 ASCII characters.
-    pub part_number: String,
-    /// For people.
-    pub name: String,
-    /// Who or what taught it.
-    pub taught_by: String,
-    /// When, in seconds since 1970 UTC; 0 if the clock was not synchronised.
-    pub taught_at_unix_s: u64,
-    /// Fingerprint of the calibration that it was made for.
-    pub calibration: String,
-    /// The camera's frames.
-    pub camera: CameraFile,
-    /// The projector's raster.
-    pub projector: RasterFile,
-    /// The pattern that is projected.
-    pub pattern: PatternFile,
-    /// The sequences that the part can be measured with, from the cheapest to the full one.
-    pub sequences: Vec<SequenceFile>,
-    /// Which of them is projected first in production, counted from 0; longer ones may follow in the same cycle.
-    pub production: usize,
-    /// Whether a cycle begins with the fringe and its complement at ratio 1, before the sequence for production.
-    pub two_frames: bool,
-    /// How far a part may lie from where it was taught, in any direction, mm.
-    pub placement_tolerance_mm: f64,
-    /// Whether the part's motion is measured and compensated before it is gauged.
-    pub alignment: AlignmentKind,
-    /// Working range of z in mm.
-    pub range_mm: [f64; 2],
-    /// Exposure and gain that the camera was set to; `None` where it was taught from a recording.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub exposing: Option<Exposing>,
-    /// Each frame is exposed so many times as long as the head is set to, 1 to 4.
-    pub exposures: u32,
-    /// σ of one sample in counts, at half the light of white.
-    pub noise_counts: f64,
-    /// σ of one sample without light, counts.
-    pub read_noise_counts: f64,
-    /// Variance of a sample in counts² that a count of golden's modulation adds.
-    pub shot_noise: f64,
-    /// Median of the mean of each pixel's samples over golden's surface, counts: with it a pattern that is blurred is told from one that is too dark.
-    /// `None` where it was taught from a recording.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub golden_offset_counts: Option<f64>,
-    /// Captures that golden is the mean of; 1 where it was taught from a recording.
-    pub golden_captures: usize,
-    /// The least modulation that is trusted, in counts of an 8-bit sample.
-    pub least_modulation: f64,
-    /// σ by the uncertainty of that calibration; `None` where it is not known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub calibration_sigma: Option<CalibrationSigma>,
-    /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and `height_curvature.npy` give the height accurately.
-    pub expansion_range_turns: f64,
-    /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.
-    pub min_coverage: f64,
-    /// A value inside its limits but nearer to one than this many times its uncertainty u is neither PASS nor FAIL.
-    pub guard_k: f64,
-    /// Whether it only measures: no gauge has a limit that a part can miss.
-    pub judges_nothing: bool,
-    /// Polygons in camera pixels.
-    pub regions: Vec<RegionFile>,
-    /// At most 16.
-    pub gauges: Vec<GaugeFile>,
-    /// Fixed against adaptive pattern, as measured when it was taught; `None` if it was taught from a recording.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub comparison: Option<ComparisonFile>,
-    /// The deviation of good parts, as predicted when it was taught; `None` where the limits are not those that teaching set.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub good_parts: Option<GoodPartsFile>,
-    /// Per gauge that was tried with golden at other places, how many good parts would pass; empty if nothing was tried.
-    pub tried: Vec<TriedFile>,
-}
+bounded! {
+    /// Everything in a recipe that is not an array.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct RecipeFile {
+        /// [`FORMAT`].
+        pub format: String,
+        /// [`VERSION`].
+        pub version: u32,
+        /// SHA-256 over all members with this field zeroed, 64 hexadecimal digits.
+        pub fingerprint: String,
+        /// 1–9999.
+        pub number: u16 = 1..=9999,
+        /// The key that a PLC may select by, at most 32 ASCII characters.
+        pub part_number: String = Longest(LONGEST_PART_NUMBER),
+        /// For people.
+        pub name: String = Longest(LONGEST_NAME),
+        /// Who or what taught it.
+        pub taught_by: String = Longest(LONGEST_NAME),
+        /// When, in seconds since 1970 UTC; 0 if the clock was not synchronised.
+        pub taught_at_unix_s: u64 = 0..=LAST_SECOND,
+        /// Fingerprint of the calibration that it was made for.
+        pub calibration: String = Longest(FINGERPRINT_DIGITS),
+        /// The camera's frames.
+        pub camera: CameraFile = Fields,
+        /// The projector's raster.
+        pub projector: RasterFile = Fields,
+        /// The pattern that is projected.
+        pub pattern: PatternFile,
+        /// The sequences that the part can be measured with, from the cheapest to the full one.
+        pub sequences: Vec<SequenceFile>,
+        /// Which of them is projected first in production, counted from 0; longer ones may follow in the same cycle.
+        pub production: usize,
+        /// Whether a cycle begins with the fringe and its complement at ratio 1, before the sequence for production.
+        pub two_frames: bool,
+        /// How far a part may lie from where it was taught, in any direction, mm.
+        pub placement_tolerance_mm: f64 = 0.0..=MAX_TOLERANCE_MM,
+        /// Whether the part's motion is measured and compensated before it is gauged.
+        pub alignment: AlignmentKind,
+        /// Working range of z in mm.
+        pub range_mm: [f64; 2],
+        /// Exposure and gain that the camera was set to; `None` where it was taught from a recording.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub exposing: Option<Exposing> = Fields,
+        /// Each frame is exposed so many times as long as the head is set to, 1 to 4.
+        pub exposures: u32 = 1..=MAX_EXPOSURES,
+        /// σ of one sample in counts, at half the light of white.
+        pub noise_counts: f64 = MIN_NOISE_COUNTS..=MAX_NOISE_COUNTS,
+        /// σ of one sample without light, counts.
+        pub read_noise_counts: f64 = 0.0..=MAX_NOISE_COUNTS,
+        /// Variance of a sample in counts² that a count of golden's modulation adds.
+        pub shot_noise: f64 = 0.0..=MAX_NOISE_COUNTS,
+        /// Median of the mean of each pixel's samples over golden's surface, counts: with it a pattern that is blurred is told from one that is too dark.
+        /// `None` where it was taught from a recording.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub golden_offset_counts: Option<f64>,
+        /// Captures that golden is the mean of; 1 where it was taught from a recording.
+        pub golden_captures: usize = 1..=MAX_CAPTURES,
+        /// The least modulation that is trusted, in counts of an 8-bit sample.
+        pub least_modulation: f64 = LEAST_MODULATION,
+        /// σ by the uncertainty of that calibration; `None` where it is not known.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub calibration_sigma: Option<CalibrationSigma> = Fields,
+        /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and `height_curvature.npy` give the height accurately.
+        pub expansion_range_turns: f64 = 1e-3..=MAX_FRINGES,
+        /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.
+        pub min_coverage: f64 = 0.0..=1.0,
+        /// A value inside its limits but nearer to one than this many times its uncertainty u is neither PASS nor FAIL.
+        pub guard_k: f64 = 0.0..=MAX_GUARD_K,
+        /// Whether it only measures: no gauge has a limit that a part can miss.
+        pub judges_nothing: bool,
+        /// Polygons in camera pixels.
+        pub regions: Vec<RegionFile>,
+        /// At most 16.
+        pub gauges: Vec<GaugeFile>,
+        /// Fixed against adaptive pattern, as measured when it was taught; `None` if it was taught from a recording.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub comparison: Option<ComparisonFile> = Fields,
+        /// The deviation of good parts, as predicted when it was taught; `None` where the limits are not those that teaching set.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub good_parts: Option<GoodPartsFile> = Fields,
+        /// Per gauge that was tried with golden at other places, how many good parts would pass; empty if nothing was tried.
+        pub tried: Vec<TriedFile> = Fields,
+    }
 
-/// How a gauge judges good parts that lie anywhere within the placement tolerance.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TriedFile {
-    /// Its name.
-    pub gauge: String,
-    /// The share of such parts that it would let pass, as predicted from those that were tried.
-    pub passes: f64,
+    /// How a gauge judges good parts that lie anywhere within the placement tolerance.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct TriedFile {
+        /// Its name.
+        pub gauge: String,
+        /// The share of such parts that it would let pass, as predicted from those that were tried.
+        pub passes: f64 = 0.0..=1.0,
+    }
 }
 
 impl TriedFile {
@@ -121,26 +138,28 @@ impl TriedFile {
     }
 }
 
-/// A camera's frames.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CameraFile {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Bits per sample.
-    pub bit_depth: u8,
-}
+bounded! {
+    /// A camera's frames.
+    #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct CameraFile {
+        /// Columns.
+        pub width: u32 = 1..=MAX_SIDE,
+        /// Rows.
+        pub height: u32 = 1..=MAX_SIDE,
+        /// Bits per sample.
+        pub bit_depth: u8 = 8..=16,
+    }
 
-/// A projector's raster.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RasterFile {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
+    /// A projector's raster.
+    #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct RasterFile {
+        /// Columns.
+        pub width: u32 = 1..=MAX_SIDE,
+        /// Rows.
+        pub height: u32 = 1..=MAX_SIDE,
+    }
 }
 
 /// A phase function, as in recordings.
@@ -172,37 +191,39 @@ impl PatternFile {
     }
 }
 
-/// A sequence, its predicted noise on this part, and the share of the part that it can unwrap.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SequenceFile {
-    /// What it can unwrap.
-    pub kind: SequenceKind,
-    /// What each frame shows: [ratio, shift in turns], and the harmonics of a waveform that is not a sine.
-    #[serde(with = "super::shots")]
-    pub frames: Vec<Shot>,
-    /// Predicted σ_z, RMS over the golden surface, mm.
-    pub sigma_mm: f64,
-    /// Share of the golden surface whose phase stays within the sequence's reach for every
-    /// placement inside the tolerance.
-    pub safe_share: f64,
-    /// RMS of the periodic error of the mean height over a square of 9 × 9 pixels by it, where it is largest, mm; `None` where it was taught from a recording.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ripple_mm: Option<f64>,
-    /// How often it gets a fringe order wrong unseen; `None` where it cannot be unwrapped.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub unseen_orders: Option<UnseenFile>,
-}
+bounded! {
+    /// A sequence, its predicted noise on this part, and the share of the part that it can unwrap.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct SequenceFile {
+        /// What it can unwrap.
+        pub kind: SequenceKind,
+        /// What each frame shows: [ratio, shift in turns], and the harmonics of a waveform that is not a sine.
+        #[serde(with = "super::shots")]
+        pub frames: Vec<Shot>,
+        /// Predicted σ_z, RMS over the golden surface, mm.
+        pub sigma_mm: f64 = 0.0..=MAX_SIGMA_MM,
+        /// Share of the golden surface whose phase stays within the sequence's reach for every
+        /// placement inside the tolerance.
+        pub safe_share: f64 = 0.0..=1.0,
+        /// RMS of the periodic error of the mean height over a square of 9 × 9 pixels by it, where it is largest, mm; `None` where it was taught from a recording.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub ripple_mm: Option<f64> = 0.0..=MAX_SIGMA_MM,
+        /// How often it gets a fringe order wrong unseen; `None` where it cannot be unwrapped.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub unseen_orders: Option<UnseenFile> = Fields,
+    }
 
-/// Shares of pixels that get a wrong fringe order without a residual, for parts anywhere within the placement tolerance
-/// ([`algo::pattern::Slips`]).
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct UnseenFile {
-    /// Mean over the golden surface where the sequence is safe, by the modulation and the phase reach of each pixel.
-    pub part: f64,
-    /// Of pixels of the least trusted modulation, where the phase reach is largest.
-    pub darkest: f64,
+    /// Shares of pixels that get a wrong fringe order without a residual, for parts anywhere within the placement tolerance
+    /// ([`algo::pattern::Slips`]).
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct UnseenFile {
+        /// Mean over the golden surface where the sequence is safe, by the modulation and the phase reach of each pixel.
+        pub part: f64 = 0.0..=1.0,
+        /// Of pixels of the least trusted modulation, where the phase reach is largest.
+        pub darkest: f64 = 0.0..=1.0,
+    }
 }
 
 /// The kinds of sequence, ordered by how far from the golden map they can unwrap. Dense levels have the ratios 1, 1 − 1/n and perhaps
@@ -251,14 +272,16 @@ pub fn safe(phase: &[AbsolutePhase], changes: &[f32], limit: f32) -> Vec<Absolut
         .collect()
 }
 
-/// A named polygon.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RegionFile {
-    /// Its name.
-    pub name: String,
-    /// Corners [u, v] in camera pixels of the golden measurement.
-    pub polygon: Vec<[f64; 2]>,
+bounded! {
+    /// A named polygon.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct RegionFile {
+        /// Its name.
+        pub name: String = Longest(LONGEST_NAME),
+        /// Corners [u, v] in camera pixels of the golden measurement.
+        pub polygon: Vec<[f64; 2]>,
+    }
 }
 
 /// A gauge and its limits.

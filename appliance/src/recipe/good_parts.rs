@@ -18,8 +18,9 @@ use algo::geometry::Triangulator;
 use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_variance};
 use algo::inspect::{GoldenSurface, Largest, Taught, Weight, normal_shares};
 use algo::pipeline::KnownSurface;
-use hal::bounds::within;
+use hal::bounded;
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 /// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be measured that well, else the limit is
 /// wider.
@@ -41,44 +42,51 @@ const STEP_MM: f64 = 0.01;
 const WIDER: f64 = 1.1;
 const WIDEST: f64 = 20.0;
 
+/// Bounds of a deviation in the file, mm.
+fn length() -> RangeInclusive<f64> {
+    0.0..=Unit::Length.range()[1]
+}
+
 /// Diameter of a dent of which a mean over a square has nine tenths of the depth, over the square's side: of a depth that falls as cos²(πr/D) the
 /// mean over side a is 1 − (π²/6) a²/D².
 pub(super) const DENT: f64 = 4.06;
 
-/// The deviation of good parts, as predicted when the part was taught.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GoodPartsFile {
-    /// The tolerance that was asked for, ± mm.
-    pub tolerance_mm: f64,
-    /// The limit that was set, ± mm.
-    pub limit_mm: f64,
-    /// The largest deviation of a good part that lies as taught: mean and standard deviation over parts and goldens, mm.
-    pub largest_mm: f64,
-    /// See above.
-    pub scatter_mm: f64,
-    /// Share of such parts that exceed the limit.
-    pub beyond: f64,
-    /// Share of the pixels that are too noisy for the limit to be compared at all.
-    pub left_out: f64,
-    /// Share of the surface, by its area, that is too noisy for the limit, and so counts with less weight.
-    pub weighed: f64,
-    /// The least of these weights; 1 where there are none.
-    pub least_weight: f64,
-    /// The side of the squares that all of this is of, pixels.
-    pub smoothing_px: usize,
-    /// The largest side of the squares about the pixels where that would be too noisy; 0 where there are none.
-    pub wider_px: usize,
-    /// Share of the compared pixels that these are about.
-    pub wider: f64,
-    /// Diameter of a dent that is seen at nine tenths of its depth in squares of `smoothing_px` where the part faces the camera, mm; 0
-    /// if not known. U says nothing of narrower ones.
-    pub dent_mm: f64,
-    /// The largest deviation of good parts that lie anywhere within the placement tolerance: median and spread, mm; 0 if it was not
-    /// tried.
-    pub displaced_mm: f64,
-    /// See above.
-    pub displaced_scatter_mm: f64,
+bounded! {
+    /// The deviation of good parts, as predicted when the part was taught.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct GoodPartsFile {
+        /// The tolerance that was asked for, ± mm.
+        pub tolerance_mm: f64 = length(),
+        /// The limit that was set, ± mm.
+        pub limit_mm: f64 = length(),
+        /// The largest deviation of a good part that lies as taught: mean and standard deviation over parts and goldens, mm.
+        pub largest_mm: f64 = length(),
+        /// See above.
+        pub scatter_mm: f64 = length(),
+        /// Share of such parts that exceed the limit.
+        pub beyond: f64 = 0.0..=1.0,
+        /// Share of the pixels that are too noisy for the limit to be compared at all.
+        pub left_out: f64 = 0.0..=1.0,
+        /// Share of the surface, by its area, that is too noisy for the limit, and so counts with less weight.
+        pub weighed: f64 = 0.0..=1.0,
+        /// The least of these weights; 1 where there are none.
+        pub least_weight: f64 = 1.0 / 256.0..=1.0,
+        /// The side of the squares that all of this is of, pixels.
+        pub smoothing_px: usize = 1..=usize::from(u16::MAX),
+        /// The largest side of the squares about the pixels where that would be too noisy; 0 where there are none.
+        pub wider_px: usize = 0..=usize::from(u8::MAX),
+        /// Share of the compared pixels that these are about.
+        pub wider: f64 = 0.0..=1.0,
+        /// Diameter of a dent that is seen at nine tenths of its depth in squares of `smoothing_px` where the part faces the camera, mm; 0
+        /// if not known. U says nothing of narrower ones.
+        pub dent_mm: f64 = length(),
+        /// The largest deviation of good parts that lie anywhere within the placement tolerance: median and spread, mm; 0 if it was not
+        /// tried.
+        pub displaced_mm: f64 = length(),
+        /// See above.
+        pub displaced_scatter_mm: f64 = length(),
+    }
 }
 
 /// What is known of the noise of a taught part.
@@ -276,29 +284,6 @@ fn rounded_up(mm: f64) -> f64 {
 }
 
 impl GoodPartsFile {
-    /// Checks each value by itself.
-    ///
-    /// # Errors
-    /// In words that name the key, the value and the bounds.
-    pub(super) fn check_bounds(&self) -> Result<(), String> {
-        let [_, longest] = Unit::Length.range();
-        within("tolerance_mm", self.tolerance_mm, 0.0, longest)?;
-        within("limit_mm", self.limit_mm, 0.0, longest)?;
-        within("largest_mm", self.largest_mm, 0.0, longest)?;
-        within("scatter_mm", self.scatter_mm, 0.0, longest)?;
-        within("beyond", self.beyond, 0.0, 1.0)?;
-        within("left_out", self.left_out, 0.0, 1.0)?;
-        within("weighed", self.weighed, 0.0, 1.0)?;
-        within("least_weight", self.least_weight, 1.0 / 256.0, 1.0)?;
-        within("smoothing_px", self.smoothing_px, 1, usize::from(u16::MAX))?;
-        within("wider_px", self.wider_px, 0, usize::from(u8::MAX))?;
-        within("wider", self.wider, 0.0, 1.0)?;
-        within("dent_mm", self.dent_mm, 0.0, longest)?;
-        within("displaced_mm", self.displaced_mm, 0.0, longest)?;
-        let scatter = self.displaced_scatter_mm;
-        within("displaced_scatter_mm", scatter, 0.0, longest)
-    }
-
     /// What displaced good parts deviate by in squares of `side` pixels; none if it is not known.
     pub fn displaced(&self, side: usize) -> Option<Largest> {
         let known = side == self.smoothing_px && self.displaced_mm > 0.0;

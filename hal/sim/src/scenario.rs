@@ -8,141 +8,144 @@ use super::material::Material;
 use super::optics::{Lens, turn, turned};
 use super::parts::Part;
 use super::timing::Timing;
-use hal::bounds::shortened;
+use hal::bounded;
+use hal::bounds::{Fields, MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, shortened};
 use hal::model::DeviceModel;
 use hal::virtual_head::Faults;
 
 /// Column and row of the green pixel that is read of each 2×2 pixels of a colour sensor.
 const GREEN: (u32, u32) = (1, 0);
 
-/// A whole simulated head. Keys that are missing in the TOML have their default values.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Scenario {
-    /// Whether the pose and lens of both devices and their times are known from the start; a head without a calibration is commissioned first.
-    pub calibrated: bool,
-    /// Camera bits, 8, 10 or 12.
-    pub bit_depth: u8,
-    /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its frames have half its columns and rows.
-    pub colour: bool,
-    /// Rays per pixel along each side, 1…16.
-    pub sub_rays: u32,
-    /// Refresh rate of the projector, 1…1000 Hz.
-    pub refresh_hz: f64,
-    /// What the part is made of. If it is not given, `light` says how the part reflects.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub material: Option<Material>,
-    /// Camera and projector.
-    pub rig: Rig,
-    /// Ambient light, and how much light the part reflects.
-    pub light: Lighting,
-    /// Noise of the camera.
-    pub noise: Noise,
-    /// Blur, response and exposure.
-    pub optics: Optics,
-    /// What is measured.
-    pub part: Part,
-    /// How the part lies.
-    pub placement: Placement,
-    /// Exposure, readout and delays.
-    pub timing: Timing,
-    /// What goes wrong with flips, triggers and frames.
-    pub faults: Faults,
-}
+bounded! {
+    /// A whole simulated head. Keys that are missing in the TOML have their default values.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Scenario {
+        /// Whether the pose and lens of both devices and their times are known from the start; a head without a calibration is commissioned first.
+        pub calibrated: bool,
+        /// Camera bits, 8, 10 or 12.
+        pub bit_depth: u8,
+        /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its frames have half its columns and rows.
+        pub colour: bool,
+        /// Rays per pixel along each side, 1…16.
+        pub sub_rays: u32 = 1..=16,
+        /// Refresh rate of the projector, 1…1000 Hz.
+        pub refresh_hz: f64 = 1.0..=1000.0,
+        /// What the part is made of. If it is not given, `light` says how the part reflects.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub material: Option<Material>,
+        /// Camera and projector.
+        pub rig: Rig = Fields,
+        /// Ambient light, and how much light the part reflects.
+        pub light: Lighting = Fields,
+        /// Noise of the camera.
+        pub noise: Noise = Fields,
+        /// Blur, response and exposure.
+        pub optics: Optics = Fields,
+        /// What is measured.
+        pub part: Part,
+        /// How the part lies.
+        pub placement: Placement = Fields,
+        /// Exposure, readout and delays.
+        pub timing: Timing = Fields,
+        /// What goes wrong with flips, triggers and frames.
+        pub faults: Faults = Fields,
+    }
 
-/// The two devices. Each looks at the world's origin from the xz plane; its image x runs along +x, its image y along −y.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Rig {
-    /// The camera.
-    #[serde(deserialize_with = "camera_from")]
-    pub camera: RigDevice,
-    /// The projector.
-    #[serde(deserialize_with = "projector_from")]
-    pub projector: RigDevice,
-}
+    /// The two devices. Each looks at the world's origin from the xz plane; its image x runs along +x, its image y along −y.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Rig {
+        /// The camera.
+        #[serde(deserialize_with = "camera_from")]
+        pub camera: RigDevice = Fields,
+        /// The projector.
+        #[serde(deserialize_with = "projector_from")]
+        pub projector: RigDevice = Fields,
+    }
 
-/// One device of the rig.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RigDevice {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Full angles of view, horizontal and vertical, degrees.
-    pub fov_deg: [f64; 2],
-    /// Direction from the origin to the device, degrees from +z towards +x.
-    pub angle_deg: f64,
-    /// Distance from the origin, mm.
-    pub distance_mm: f64,
-    /// Brown distortion k1, k2, p1, p2, k3.
-    pub distortion: [f64; 5],
-    /// By how much it was turned about its own x, y and z since its models were made, degrees.
-    pub knocked_deg: [f64; 3],
-}
+    /// One device of the rig.
+    #[derive(Clone, Debug, PartialEq, Serialize)]
+    pub struct RigDevice {
+        /// Columns.
+        pub width: u32 = 1..=4096,
+        /// Rows.
+        pub height: u32 = 1..=4096,
+        /// Full angles of view, horizontal and vertical, degrees.
+        pub fov_deg: [f64; 2] = 1.0..=120.0,
+        /// Direction from the origin to the device, degrees from +z towards +x.
+        pub angle_deg: f64 = -80.0..=80.0,
+        /// Distance from the origin, mm.
+        pub distance_mm: f64 = 10.0..=100_000.0,
+        /// Brown distortion k1, k2, p1, p2, k3.
+        pub distortion: [f64; 5] = -1.0..=1.0,
+        /// By how much it was turned about its own x, y and z since its models were made, degrees.
+        pub knocked_deg: [f64; 3] = -10.0..=10.0,
+    }
 
-/// Phong's model: I = ambient + pattern/255 · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess), 1 = full scale. n is the surface's
-/// normal, l the direction to the projector, v that to the camera, and r is l mirrored about n.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Lighting {
-    /// Light that does not come from the projector.
-    pub ambient: f64,
-    /// Share of the projector's light that a surface reflects which faces the projector.
-    pub diffuse: f64,
-    /// Share of the projector's light that a surface reflects which mirrors the projector into the camera, 0…4.
-    pub specular: f64,
-    /// How narrow the highlight is: the exponent of its cosine, 1…500.
-    pub shininess: f64,
-}
+    /// Phong's model: I = ambient + pattern/255 · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess), 1 = full scale. n is the surface's
+    /// normal, l the direction to the projector, v that to the camera, and r is l mirrored about n.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Lighting {
+        /// Light that does not come from the projector.
+        pub ambient: f64 = 0.0..=100.0,
+        /// Share of the projector's light that a surface reflects which faces the projector.
+        pub diffuse: f64 = 0.0..=100.0,
+        /// Share of the projector's light that a surface reflects which mirrors the projector into the camera, 0…4.
+        pub specular: f64 = 0.0..=4.0,
+        /// How narrow the highlight is: the exponent of its cosine, 1…500.
+        pub shininess: f64 = 1.0..=500.0,
+    }
 
-/// Noise of the camera. The defaults are what public photon models state of cameras with Sony's IMX296: saturation capacity 10 636 e⁻,
-/// temporal dark noise 4.81 e⁻ (with an ADC of 10 bits). No data sheet says so, and the spread of responses is an assumption: a head's
-/// calibration measures its own noise.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Noise {
-    /// Electrons of a sample at full scale, with gain 1, 100…10 000 000.
-    pub full_well_e: f64,
-    /// σ of the read noise, electrons, 0…1000.
-    pub read_noise_e: f64,
-    /// σ of the pixels' response (photo-response non-uniformity), as a share, 0…0.1.
-    pub prnu: f64,
-    /// If given, the sensor has no other noise than a uniform one of this half-width, in counts of 8 bits; cameras with more bits have
-    /// the same share of full scale.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise_counts: Option<f64>,
-    /// Seed; frame n of a head has the same noise whenever the seed is the same.
-    pub seed: u64,
-}
+    /// Noise of the camera. The defaults are what public photon models state of cameras with Sony's IMX296: saturation capacity 10 636 e⁻,
+    /// temporal dark noise 4.81 e⁻ (with an ADC of 10 bits). No data sheet says so, and the spread of responses is an assumption: a head's
+    /// calibration measures its own noise.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Noise {
+        /// Electrons of a sample at full scale, with gain 1, 100…10 000 000.
+        pub full_well_e: f64 = 100.0..=1e7,
+        /// σ of the read noise, electrons, 0…1000.
+        pub read_noise_e: f64 = 0.0..=1000.0,
+        /// σ of the pixels' response (photo-response non-uniformity), as a share, 0…0.1.
+        pub prnu: f64 = 0.0..=0.1,
+        /// If given, the sensor has no other noise than a uniform one of this half-width, in counts of 8 bits; cameras with more bits have
+        /// the same share of full scale.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub noise_counts: Option<f64> = 0.0..=255.0,
+        /// Seed; frame n of a head has the same noise whenever the seed is the same.
+        pub seed: u64,
+    }
 
-/// Blur, response and gain between raster and samples.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Optics {
-    /// σ of the Gaussian with which the projector's lens blurs its square pixels, projector pixels, 0…20.
-    pub projector_blur_px: f64,
-    /// σ of the camera's Gaussian blur, camera pixels, 0…20.
-    pub camera_blur_px: f64,
-    /// Exponent of the projector's response: light = (grey / 255)^gamma, 0.1…10.
-    pub gamma: f64,
-    /// The camera's gain: counts at full scale for 1 / gain of the light, 0…100.
-    pub gain: f64,
-    /// By how much more light than its grey asks for a picture gets whose mean light is almost 0, as a share, −1…10; one of mean 1 gets
-    /// none, and others in proportion. So do projectors that adapt their LEDs to the content of a picture.
-    pub content_gain: f64,
-}
+    /// Blur, response and gain between raster and samples.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Optics {
+        /// σ of the Gaussian with which the projector's lens blurs its square pixels, projector pixels, 0…20.
+        pub projector_blur_px: f64 = 0.0..=20.0,
+        /// σ of the camera's Gaussian blur, camera pixels, 0…20.
+        pub camera_blur_px: f64 = 0.0..=20.0,
+        /// Exponent of the projector's response: light = (grey / 255)^gamma, 0.1…10.
+        pub gamma: f64 = 0.1..=10.0,
+        /// The camera's gain: counts at full scale for 1 / gain of the light, 0…100.
+        pub gain: f64 = 0.0..=100.0,
+        /// By how much more light than its grey asks for a picture gets whose mean light is almost 0, as a share, −1…10; one of mean 1 gets
+        /// none, and others in proportion. So do projectors that adapt their LEDs to the content of a picture.
+        pub content_gain: f64 = -1.0..=10.0,
+    }
 
-/// How a part lies: rotated about x, then y (tilt), then z (rotation), then shifted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Placement {
-    /// Shift x, y, z in mm.
-    pub shift_mm: [f64; 3],
-    /// Tilt about x and about y, degrees.
-    pub tilt_deg: [f64; 2],
-    /// Rotation about z, degrees.
-    pub rotation_deg: f64,
+    /// How a part lies: rotated about x, then y (tilt), then z (rotation), then shifted.
+    #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Placement {
+        /// Shift x, y, z in mm.
+        pub shift_mm: [f64; 3] = -MAX_PLACEMENT_MM..=MAX_PLACEMENT_MM,
+        /// Tilt about x and about y, degrees.
+        pub tilt_deg: [f64; 2] = -MAX_TILT_DEG..=MAX_TILT_DEG,
+        /// Rotation about z, degrees.
+        pub rotation_deg: f64 = -MAX_ROTATION_DEG..=MAX_ROTATION_DEG,
+    }
 }
 
 impl Default for Scenario {

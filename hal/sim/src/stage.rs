@@ -3,12 +3,12 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::limits::within;
 use super::material::Material;
 use super::parts::Part;
 use super::scenario::{Placement, Scenario};
 use super::scene::SimScene;
 use super::transport::{Transport, Truth};
+use hal::bounds::{Bound, Fields, within};
 use hal::error::{DeviceKind, Error};
 use hal::head::Head;
 use hal::virtual_head::{self, Control, Scene as _};
@@ -147,7 +147,7 @@ impl Stage {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Staged, Error> {
         part.check()
-            .and_then(|()| placement.check())
+            .and_then(|()| Fields.check("placement", placement))
             .map_err(|problem| Error::unsupported("placing this part", problem))?;
         Ok(Staged::new(
             &self.scenario,

@@ -4,51 +4,54 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use super::limits::within;
 use super::scenario::Scenario;
+use hal::bounded;
+use hal::bounds::within;
 use hal::head::Stamp;
 use hal::virtual_head::Mechanics;
 
-/// Times of a simulated head. By default the camera is triggered, exposes for two refreshes and needs no time for its readout, and a
-/// pattern's light comes with its flip.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Timing {
-    /// Exposure, refreshes of the projector, 0.01…100. A micromirror device makes grey levels over whole refreshes.
-    pub exposure_refreshes: f64,
-    /// From the end of an exposure until its frame can be fetched, 0…1 000 000 µs.
-    pub readout_us: u64,
-    /// How long it takes to copy a frame out of the camera's buffer, in a thread of its own, 0…1 000 000 µs.
-    pub copy_us: u64,
-    /// From the camera's start until it can be triggered or runs, 0…10 000 000 µs.
-    pub start_up_us: u64,
-    /// How long a triggered camera may stay on without an exposure, 0…1000 s; 0: it is stopped after each sequence.
-    pub stays_on_s: u64,
-    /// For how long after its readout a triggered camera still loses triggers, which its stated times do not contain, 0…1 000 000 µs.
-    pub dead_us: u64,
-    /// Refreshes per pattern according to the head's calibration, 1…100; if left out, as many as the camera needs.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub calibrated_refreshes: Option<u32>,
-    /// From a flip to its pattern's light, 0…1 000 000 µs.
-    pub flip_to_light_us: u64,
-    /// From opening the head, which sets the projector's mode, to its first light, 0…60 000 000 µs.
-    pub first_light_us: u64,
-    /// The flip-to-light delay according to the head's calibration; if left out, the true one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub calibrated_flip_to_light_us: Option<u64>,
-    /// Whether the projector triggers the camera, with the light of each refresh for which the camera is ready.
-    pub by_projector: bool,
-    /// Period of a camera that runs by itself, at least exposure or readout, up to 10 000 000 µs; 0: the camera is triggered.
-    pub camera_period_us: u64,
-    /// From the start of a camera that runs by itself to its first exposure, 0…10 000 000 µs.
-    pub camera_phase_us: u64,
-    /// What the camera's stamps mark: "exposure_start", "exposure_end" or "readout_end".
-    pub stamp: Stamp,
-    /// From the moment that they mark to the stamps, 0…1 000 000 µs.
-    pub stamp_late_us: u64,
-    /// The same according to the head's calibration; if left out, the true one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub calibrated_stamp_late_us: Option<u64>,
+bounded! {
+    /// Times of a simulated head. By default the camera is triggered, exposes for two refreshes and needs no time for its readout, and a
+    /// pattern's light comes with its flip.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Timing {
+        /// Exposure, refreshes of the projector, 0.01…100. A micromirror device makes grey levels over whole refreshes.
+        pub exposure_refreshes: f64 = 0.01..=100.0,
+        /// From the end of an exposure until its frame can be fetched, 0…1 000 000 µs.
+        pub readout_us: u64,
+        /// How long it takes to copy a frame out of the camera's buffer, in a thread of its own, 0…1 000 000 µs.
+        pub copy_us: u64,
+        /// From the camera's start until it can be triggered or runs, 0…10 000 000 µs.
+        pub start_up_us: u64,
+        /// How long a triggered camera may stay on without an exposure, 0…1000 s; 0: it is stopped after each sequence.
+        pub stays_on_s: u64,
+        /// For how long after its readout a triggered camera still loses triggers, which its stated times do not contain, 0…1 000 000 µs.
+        pub dead_us: u64,
+        /// Refreshes per pattern according to the head's calibration, 1…100; if left out, as many as the camera needs.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub calibrated_refreshes: Option<u32> = 1..=100,
+        /// From a flip to its pattern's light, 0…1 000 000 µs.
+        pub flip_to_light_us: u64,
+        /// From opening the head, which sets the projector's mode, to its first light, 0…60 000 000 µs.
+        pub first_light_us: u64,
+        /// The flip-to-light delay according to the head's calibration; if left out, the true one.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub calibrated_flip_to_light_us: Option<u64>,
+        /// Whether the projector triggers the camera, with the light of each refresh for which the camera is ready.
+        pub by_projector: bool,
+        /// Period of a camera that runs by itself, at least exposure or readout, up to 10 000 000 µs; 0: the camera is triggered.
+        pub camera_period_us: u64,
+        /// From the start of a camera that runs by itself to its first exposure, 0…10 000 000 µs.
+        pub camera_phase_us: u64,
+        /// What the camera's stamps mark: "exposure_start", "exposure_end" or "readout_end".
+        pub stamp: Stamp,
+        /// From the moment that they mark to the stamps, 0…1 000 000 µs.
+        pub stamp_late_us: u64,
+        /// The same according to the head's calibration; if left out, the true one.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub calibrated_stamp_late_us: Option<u64>,
+    }
 }
 
 impl Default for Timing {
@@ -132,12 +135,6 @@ impl Scenario {
     /// Checks the times and faults; the error names the key and its range.
     pub(super) fn check_timing(&self) -> Result<(), String> {
         let (timing, faults) = (&self.timing, &self.faults);
-        within(
-            "timing.exposure_refreshes",
-            timing.exposure_refreshes,
-            0.01,
-            100.0,
-        )?;
         let believed = timing.calibrated_flip_to_light_us.unwrap_or(0);
         let believed_late = timing.calibrated_stamp_late_us.unwrap_or(0);
         for (key, us, most) in [
@@ -163,8 +160,6 @@ impl Scenario {
         ] {
             within(key, us as f64, 0.0, most)?;
         }
-        let refreshes = timing.calibrated_refreshes.unwrap_or(1);
-        within("timing.calibrated_refreshes", refreshes, 1, 100)?;
         if timing.by_projector && timing.camera_period_us > 0 {
             return Err(
                 "timing.camera_period_us: write 0 for a camera that the projector triggers (timing.by_projector)".into(),
@@ -179,20 +174,6 @@ impl Scenario {
                 timing.camera_period_us,
                 busy.as_nanos().div_ceil(1000)
             ));
-        }
-        for (key, chance) in [
-            ("faults.late_flip", faults.late_flip),
-            ("faults.late_news", faults.late_news),
-            ("faults.wrong_stamp", faults.wrong_stamp),
-            ("faults.dropped", faults.dropped),
-            ("faults.duplicated", faults.duplicated),
-            ("faults.swapped", faults.swapped),
-            ("faults.late_frame", faults.late_frame),
-            ("faults.lost_trigger", faults.lost_trigger),
-            ("faults.long_pulse", faults.long_pulse),
-            ("faults.stall", faults.stall),
-        ] {
-            within(key, chance, 0.0, 1.0)?;
         }
         within(
             "faults.late_refreshes",

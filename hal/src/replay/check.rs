@@ -3,19 +3,14 @@
 use std::path::{Component, Path};
 
 use super::failure::Wrong;
-use super::manifest::{CodeEntry, Manifest, PatternEntry};
+use super::manifest::{CodeEntry, MAX_NAME, Manifest, PatternEntry};
 use crate::bounds::{
-    MAX_EXPOSURE_US, MAX_FRINGES, MAX_HARMONIC, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS,
-    MAX_SIDE, MIN_NOISE_COUNTS, RATIOS, clipped, fingerprint, text, within,
+    Bound, Fields, MAX_FRINGES, MAX_HARMONIC, MAX_RANGE_MM, MAX_SIDE, clipped, fingerprint, within,
 };
 use crate::model::DeviceModel;
 
-/// Longest description and note, characters.
-const MAX_TEXT: usize = 4096;
 /// Most notes: a few per pattern.
 const MAX_NOTES: usize = 64;
-/// Longest part id and file name, characters.
-const MAX_NAME: usize = 255;
 /// Most frames in a recording; two patterns of a hundred frames each would be many.
 const MAX_FRAMES: usize = 1024;
 /// Most bytes of decoded samples in a recording.
@@ -41,27 +36,12 @@ pub(crate) fn manifest(manifest: &Manifest) -> Result<(), Wrong> {
 
 /// Checks the values that do not depend on others.
 fn values(manifest: &Manifest) -> Result<(), String> {
+    Fields.check("", manifest)?;
     let (camera, projector) = (&manifest.camera, &manifest.projector);
-    for (key, pixels) in [
-        ("camera.width", camera.width),
-        ("camera.height", camera.height),
-        ("projector.width", projector.width),
-        ("projector.height", projector.height),
-    ] {
-        within(key, pixels, 1, MAX_SIDE)?;
-    }
-    within("camera.bit_depth", camera.bit_depth, 8, 16)?;
     for (device, model) in [("camera", &camera.model), ("projector", &projector.model)] {
         if let Some(name) = model.as_ref().and_then(DeviceModel::first_not_finite) {
             return Err(format!("{device}.model.{name} is not finite"));
         }
-    }
-    if let Some(plane) = &projector.plane {
-        plane.check_bounds("projector.plane")?;
-    }
-    if let Some(noise) = camera.noise_counts {
-        let key = "camera.noise_counts";
-        within(key, noise, MIN_NOISE_COUNTS, MAX_NOISE_COUNTS)?;
     }
     if let Some([lowest, highest]) = manifest.range_mm {
         within("range_mm", lowest, -MAX_RANGE_MM, MAX_RANGE_MM)?;
@@ -72,22 +52,8 @@ fn values(manifest: &Manifest) -> Result<(), String> {
             ));
         }
     }
-    if let Some(exposure) = manifest.exposure_us {
-        within("exposure_us", exposure, 1e-3, MAX_EXPOSURE_US)?;
-    }
-    text("description", &manifest.description, MAX_TEXT)?;
-    text("source", &manifest.source, MAX_TEXT)?;
     within("the number of notes", manifest.notes.len(), 0, MAX_NOTES)?;
-    for note in &manifest.notes {
-        text("notes", note, MAX_TEXT)?;
-    }
-    text(
-        "part_id",
-        manifest.part_id.as_deref().unwrap_or(""),
-        MAX_NAME,
-    )?;
     if let Some(recipe) = &manifest.recipe {
-        within("recipe.number", recipe.number, 1, 9999)?;
         fingerprint("recipe.fingerprint", &recipe.fingerprint)?;
     }
     Ok(())
@@ -144,11 +110,7 @@ fn frames(manifest: &Manifest) -> Result<(), Wrong> {
     }
     for frame in frames {
         inside(&frame.file)?;
-        let [low, high] = RATIOS;
-        let (most, shift) = (MAX_SHIFT_TURNS, frame.shift_turns);
-        let checked = within("ratio", frame.ratio, low, high)
-            .and_then(|()| within("shift_turns", shift, -most, most));
-        if let Err(problem) = checked {
+        if let Err(problem) = Fields.check("", frame) {
             return wrong(
                 format!("frame {:?}: {problem}", frame.file),
                 "the level's share of the full phase function, and the shift in turns",

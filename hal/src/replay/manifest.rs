@@ -5,6 +5,11 @@ use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::failure::Wrong;
+use crate::bounded;
+use crate::bounds::{
+    Fields, Longest, MAX_EXPOSURE_US, MAX_NOISE_COUNTS, MAX_SHIFT_TURNS, MAX_SIDE,
+    MIN_NOISE_COUNTS, RATIOS,
+};
 use crate::model::{DeviceModel, PlaneModel};
 
 /// The name of the format, in every manifest.
@@ -12,65 +17,71 @@ pub const FORMAT: &str = "fringed-recording";
 /// The newest version that this program reads. Version 2 has codes, white and black; version 3 notes, and codes with an offset or
 /// another coding. A recording is written as the first version that has what it holds, so that older programs read it.
 pub const VERSION: u64 = 3;
+/// Longest description and note, characters.
+const MAX_TEXT: usize = 4096;
+/// Longest part id and file name, characters.
+pub(crate) const MAX_NAME: usize = 255;
 
-/// The whole of `recording.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct Manifest {
-    pub format: String,
-    pub version: u64,
-    #[serde(default)]
-    pub description: String,
-    #[serde(default)]
-    pub source: String,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub notes: Vec<String>,
-    pub camera: CameraEntry,
-    pub projector: RecordedProjector,
-    pub pattern: PatternEntries,
-    pub frames: Vec<FrameEntry>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub codes: Vec<CodeEntry>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub white: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub black: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub range_mm: Option<[f64; 2]>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub exposure_us: Option<f64>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub part_id: Option<String>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub recipe: Option<RecipeReference>,
-}
+bounded! {
+    /// The whole of `recording.json`.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub(crate) struct Manifest {
+        pub format: String,
+        pub version: u64,
+        #[serde(default)]
+        pub description: String = Longest(MAX_TEXT),
+        #[serde(default)]
+        pub source: String = Longest(MAX_TEXT),
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub notes: Vec<String> = Longest(MAX_TEXT),
+        pub camera: CameraEntry = Fields,
+        pub projector: RecordedProjector = Fields,
+        pub pattern: PatternEntries,
+        pub frames: Vec<FrameEntry>,
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub codes: Vec<CodeEntry>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub white: Option<String>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub black: Option<String>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub range_mm: Option<[f64; 2]>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub exposure_us: Option<f64> = 1e-3..=MAX_EXPOSURE_US,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub part_id: Option<String> = Longest(MAX_NAME),
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub recipe: Option<RecipeReference> = Fields,
+    }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct CameraEntry {
-    pub width: u32,
-    pub height: u32,
-    pub bit_depth: u8,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub model: Option<DeviceModel>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub noise_counts: Option<f64>,
-}
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub(crate) struct CameraEntry {
+        pub width: u32 = 1..=MAX_SIDE,
+        pub height: u32 = 1..=MAX_SIDE,
+        pub bit_depth: u8 = 8..=16,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub model: Option<DeviceModel>,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub noise_counts: Option<f64> = MIN_NOISE_COUNTS..=MAX_NOISE_COUNTS,
+    }
 
-/// The projector of a recording.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RecordedProjector {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Its geometry, if it is known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub model: Option<DeviceModel>,
-    /// What the projector points of the plane z = 0 are off the models, where heights go by the measured ones.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub plane: Option<PlaneModel>,
+    /// The projector of a recording.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct RecordedProjector {
+        /// Columns.
+        pub width: u32 = 1..=MAX_SIDE,
+        /// Rows.
+        pub height: u32 = 1..=MAX_SIDE,
+        /// Its geometry, if it is known.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub model: Option<DeviceModel>,
+        /// What the projector points of the plane z = 0 are off the models, where heights go by the measured ones.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub plane: Option<PlaneModel> = Fields,
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -81,18 +92,20 @@ pub(crate) enum PatternEntry {
     File { file: String },
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(crate) struct FrameEntry {
-    pub file: String,
-    pub ratio: f64,
-    pub shift_turns: f64,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub timestamp_ns: Option<u64>,
-    #[serde(default, skip_serializing_if = "is_first")]
-    pub pattern: usize,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub harmonics: Vec<(u8, f64)>,
+bounded! {
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub(crate) struct FrameEntry {
+        pub file: String,
+        pub ratio: f64 = RATIOS[0]..=RATIOS[1],
+        pub shift_turns: f64 = -MAX_SHIFT_TURNS..=MAX_SHIFT_TURNS,
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub timestamp_ns: Option<u64>,
+        #[serde(default, skip_serializing_if = "is_first")]
+        pub pattern: usize,
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        pub harmonics: Vec<(u8, f64)>,
+    }
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -142,14 +155,16 @@ impl Manifest {
     }
 }
 
-/// The recipe of a measurement in production.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RecipeReference {
-    /// Recipe number.
-    pub number: u32,
-    /// Fingerprint of the recipe's content, as the recipe states it.
-    pub fingerprint: String,
+bounded! {
+    /// The recipe of a measurement in production.
+    #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct RecipeReference {
+        /// Recipe number.
+        pub number: u32 = 1..=9999,
+        /// Fingerprint of the recipe's content, as the recipe states it.
+        pub fingerprint: String,
+    }
 }
 
 #[expect(

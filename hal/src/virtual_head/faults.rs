@@ -6,59 +6,63 @@ use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use serde::{Deserialize, Serialize};
 
-/// Faults of a simulated head. Chances are 0…1 per event, times are upper limits; all are 0 by default.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Faults {
-    /// Seed of all random faults.
-    pub seed: u64,
-    /// Chance that a flip comes 1…`late_refreshes` refreshes late.
-    pub late_flip: f64,
-    /// Refreshes that a late flip misses, at most.
-    pub late_refreshes: u32,
-    /// Jitter of the flips' stamps, ± µs.
-    pub flip_jitter_us: u64,
-    /// Chance that a flip is reported late, by up to `late_news_us`. Its stamp stays true.
-    pub late_news: f64,
-    /// How late, at most, µs.
-    pub late_news_us: u64,
-    /// Chance that the projector's driver stamps a flip one refresh late; never two in a row, which could not be distinguished
-    /// from a longer flip-to-light delay.
-    pub wrong_stamp: f64,
-    /// Chance that a frame is lost on its way.
-    pub dropped: f64,
-    /// Chance that a frame arrives twice.
-    pub duplicated: f64,
-    /// Chance that a frame arrives after the next one.
-    pub swapped: f64,
-    /// Chance that a frame arrives late, by up to `late_frame_us`.
-    pub late_frame: f64,
-    /// How late, at most, µs.
-    pub late_frame_us: u64,
-    /// Jitter of the frames' stamps, ± µs.
-    pub stamp_jitter_us: u64,
-    /// Chance that a trigger is lost.
-    pub lost_trigger: f64,
-    /// Longest delay of an exposure after its trigger, or after its time by the camera's period, µs.
-    pub trigger_jitter_us: u64,
-    /// Chance that a trigger's pulse, and so the exposure, lasts too long, by up to `long_pulse_us`: the computer was busy.
-    pub long_pulse: f64,
-    /// How much too long, at most, µs.
-    pub long_pulse_us: u64,
-    /// By how much the period of a camera that runs by itself is longer than stated, parts per million.
-    pub drift_ppm: i32,
-    /// Chance that a wait lasts too long, by up to `stall_us`: the computer was busy.
-    pub stall: f64,
-    /// How long, at most, µs.
-    pub stall_us: u64,
-    /// The trigger's wire is open: no pulse arrives.
-    pub wire_open: bool,
-    /// After how many flips the projector stops flipping; 0 = never.
-    pub flips_until_stuck: u64,
-    /// After how many exposures the camera stops exposing; 0 = never.
-    pub frames_until_stuck: u64,
-    /// The camera offers only a compressed format.
-    pub compressed: bool,
+use crate::bounded;
+
+bounded! {
+    /// Faults of a simulated head. Chances are 0…1 per event, times are upper limits; all are 0 by default.
+    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Faults {
+        /// Seed of all random faults.
+        pub seed: u64,
+        /// Chance that a flip comes 1…`late_refreshes` refreshes late.
+        pub late_flip: f64 = 0.0..=1.0,
+        /// Refreshes that a late flip misses, at most.
+        pub late_refreshes: u32,
+        /// Jitter of the flips' stamps, ± µs.
+        pub flip_jitter_us: u64,
+        /// Chance that a flip is reported late, by up to `late_news_us`. Its stamp stays true.
+        pub late_news: f64 = 0.0..=1.0,
+        /// How late, at most, µs.
+        pub late_news_us: u64,
+        /// Chance that the projector's driver stamps a flip one refresh late; never two in a row, which could not be distinguished
+        /// from a longer flip-to-light delay.
+        pub wrong_stamp: f64 = 0.0..=1.0,
+        /// Chance that a frame is lost on its way.
+        pub dropped: f64 = 0.0..=1.0,
+        /// Chance that a frame arrives twice.
+        pub duplicated: f64 = 0.0..=1.0,
+        /// Chance that a frame arrives after the next one.
+        pub swapped: f64 = 0.0..=1.0,
+        /// Chance that a frame arrives late, by up to `late_frame_us`.
+        pub late_frame: f64 = 0.0..=1.0,
+        /// How late, at most, µs.
+        pub late_frame_us: u64,
+        /// Jitter of the frames' stamps, ± µs.
+        pub stamp_jitter_us: u64,
+        /// Chance that a trigger is lost.
+        pub lost_trigger: f64 = 0.0..=1.0,
+        /// Longest delay of an exposure after its trigger, or after its time by the camera's period, µs.
+        pub trigger_jitter_us: u64,
+        /// Chance that a trigger's pulse, and so the exposure, lasts too long, by up to `long_pulse_us`: the computer was busy.
+        pub long_pulse: f64 = 0.0..=1.0,
+        /// How much too long, at most, µs.
+        pub long_pulse_us: u64,
+        /// By how much the period of a camera that runs by itself is longer than stated, parts per million.
+        pub drift_ppm: i32,
+        /// Chance that a wait lasts too long, by up to `stall_us`: the computer was busy.
+        pub stall: f64 = 0.0..=1.0,
+        /// How long, at most, µs.
+        pub stall_us: u64,
+        /// The trigger's wire is open: no pulse arrives.
+        pub wire_open: bool,
+        /// After how many flips the projector stops flipping; 0 = never.
+        pub flips_until_stuck: u64,
+        /// After how many exposures the camera stops exposing; 0 = never.
+        pub frames_until_stuck: u64,
+        /// The camera offers only a compressed format.
+        pub compressed: bool,
+    }
 }
 
 /// A kind of random event; each has random numbers of its own.

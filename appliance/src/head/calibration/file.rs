@@ -1,6 +1,7 @@
 //! `calibration.json`, version 2: its keys, its checks, its fingerprint and its checksum.
 
 use super::CalibrationSigma;
+use super::bounds::{COLDEST_C, HOTTEST_C};
 use super::geometry::GeometryFile;
 use super::{Calibration, HeightsBy, size};
 use crate::head::exposing::Exposing;
@@ -10,7 +11,11 @@ use crate::system::clock;
 use algo::frame::SampleNoise;
 use algo::geometry::Pinhole;
 use algo::pattern::GreyResponse;
-use hal::bounds::{clipped, shortened};
+use hal::bounded;
+use hal::bounds::{
+    Fields, LAST_SECOND, Longest, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS,
+    clipped, shortened,
+};
 use hal::head::{Stamp, Timing};
 use hal::model::{DeviceModel, PlaneModel};
 use serde::{Deserialize, Serialize};
@@ -21,102 +26,112 @@ use std::time::Duration;
 pub const FORMAT: &str = "fringed-calibration";
 /// The version that this program writes, and the only one that it reads.
 pub const VERSION: u32 = 2;
+/// Longest delay, standard deviation of it, and readout, ns.
+const MAX_TIME_NS: u64 = 10_000_000_000;
+/// Most refreshes per pattern.
+const MAX_REFRESHES: u32 = 1000;
+/// Longest name of a program or a file, characters.
+const MAX_NAME: usize = 255;
+/// Longest list of the files that models came from, characters.
+const MAX_SOURCES: usize = 8192;
 /// Stands in place of the checksum while it is computed.
 const NO_CHECKSUM: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 /// σ of a sample in counts where it was not measured. Nothing is measured with such a calibration ([`CalibrationFile::missing`]).
 const NOMINAL_NOISE: f64 = 1.0;
 
-/// The file. docs/formats.md lists the keys.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CalibrationFile {
-    /// [`FORMAT`].
-    pub format: String,
-    /// [`VERSION`].
-    pub version: u32,
-    /// Fingerprint of everything that heights depend on; recipes carry it.
-    pub fingerprint: String,
-    /// SHA-256 of the whole file.
-    pub checksum: String,
-    /// The program that made it.
-    pub made_by: String,
-    /// When it was made, 0 if the clock was not synchronised.
-    pub made_at_unix_s: u64,
-    /// Temperature of the head, if it was given.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub temperature_c: Option<f64>,
-    /// Where the models come from.
-    pub models_from: String,
-    /// The camera.
-    pub camera: CameraFile,
-    /// The projector.
-    pub projector: ProjectorFile,
-    /// Flips, light and stamps.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub timing: Option<TimingFile>,
-    /// The camera's noise.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub noise: Option<NoiseFile>,
-    /// The light of each of the 256 grey levels, 0 for black, 255 for white.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub response: Option<Vec<f64>>,
-    /// Contrast of fringes against their pitch.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub contrast: Option<ContrastFile>,
-    /// What heights go by.
-    pub heights_by: HeightsBy,
-    /// The reference phase maps, if a plate was measured.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub reference: Option<ReferenceFile>,
-    /// How the models were made, if they come from poses of a board.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub geometry: Option<GeometryFile>,
-}
+bounded! {
+    /// The file. docs/formats.md lists the keys.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct CalibrationFile {
+        /// [`FORMAT`].
+        pub format: String,
+        /// [`VERSION`].
+        pub version: u32,
+        /// Fingerprint of everything that heights depend on; recipes carry it.
+        pub fingerprint: String,
+        /// SHA-256 of the whole file.
+        pub checksum: String,
+        /// The program that made it.
+        pub made_by: String = Longest(MAX_NAME),
+        /// When it was made, 0 if the clock was not synchronised.
+        pub made_at_unix_s: u64 = 0..=LAST_SECOND,
+        /// Temperature of the head, if it was given.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub temperature_c: Option<f64> = COLDEST_C..=HOTTEST_C,
+        /// Where the models come from.
+        pub models_from: String = Longest(MAX_SOURCES),
+        /// The camera.
+        pub camera: CameraFile = Fields,
+        /// The projector.
+        pub projector: ProjectorFile = Fields,
+        /// Flips, light and stamps.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub timing: Option<TimingFile> = Fields,
+        /// The camera's noise.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub noise: Option<NoiseFile> = Fields,
+        /// The light of each of the 256 grey levels, 0 for black, 255 for white.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub response: Option<Vec<f64>>,
+        /// Contrast of fringes against their pitch.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub contrast: Option<ContrastFile> = Fields,
+        /// What heights go by.
+        pub heights_by: HeightsBy,
+        /// The reference phase maps, if a plate was measured.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub reference: Option<ReferenceFile> = Fields,
+        /// How the models were made, if they come from poses of a board.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub geometry: Option<GeometryFile>,
+    }
 
-/// Size and geometry of the camera.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CameraFile {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Bits per sample.
-    pub bit_depth: u8,
-    /// Intrinsic numbers and pose.
-    pub model: DeviceModel,
-}
+    /// Size and geometry of the camera.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct CameraFile {
+        /// Columns.
+        pub width: u32 = 1..=MAX_SIDE,
+        /// Rows.
+        pub height: u32 = 1..=MAX_SIDE,
+        /// Bits per sample.
+        pub bit_depth: u8 = 8..=16,
+        /// Intrinsic numbers and pose.
+        pub model: DeviceModel,
+    }
 
-/// Size and geometry of the projector.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ProjectorFile {
-    /// Columns.
-    pub width: u32,
-    /// Rows.
-    pub height: u32,
-    /// Intrinsic numbers and pose.
-    pub model: DeviceModel,
-}
+    /// Size and geometry of the projector.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct ProjectorFile {
+        /// Columns.
+        pub width: u32 = 1..=MAX_SIDE,
+        /// Rows.
+        pub height: u32 = 1..=MAX_SIDE,
+        /// Intrinsic numbers and pose.
+        pub model: DeviceModel,
+    }
 
-/// Timing of flips, light and stamps.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TimingFile {
-    /// From a flip to its light.
-    pub flip_to_light_ns: u64,
-    /// 1 σ of that.
-    pub sigma_ns: u64,
-    /// What the camera's stamps mark.
-    pub stamp: Stamp,
-    /// From the moment that they mark to the stamps; of a triggered camera only.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub stamp_late_ns: Option<u64>,
-    /// From the end of an exposure to the end of its readout.
-    pub readout_ns: u64,
-    /// Refreshes per pattern at which a triggered camera was proven to lose no trigger.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub refreshes: Option<u32>,
+    /// Timing of flips, light and stamps.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct TimingFile {
+        /// From a flip to its light.
+        pub flip_to_light_ns: u64 = 0..=MAX_TIME_NS,
+        /// 1 σ of that.
+        pub sigma_ns: u64 = 0..=MAX_TIME_NS,
+        /// What the camera's stamps mark.
+        pub stamp: Stamp,
+        /// From the moment that they mark to the stamps; of a triggered camera only.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub stamp_late_ns: Option<u64> = 0..=MAX_TIME_NS,
+        /// From the end of an exposure to the end of its readout.
+        pub readout_ns: u64 = 0..=MAX_TIME_NS,
+        /// Refreshes per pattern at which a triggered camera was proven to lose no trigger.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub refreshes: Option<u32> = 1..=MAX_REFRESHES,
+    }
 }
 
 impl TimingFile {
@@ -133,21 +148,23 @@ impl TimingFile {
     }
 }
 
-/// The camera's noise.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct NoiseFile {
-    /// σ of one sample at half the light of white, counts.
-    pub counts: f64,
-    /// σ in the dark, counts.
-    pub read_counts: f64,
-    /// Shot noise: variance that light adds, counts² per count.
-    pub shot: f64,
-    /// The measured levels.
-    pub levels: Vec<LevelFile>,
-    /// The exposure and gain at which it was measured; `None` where they are not known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub exposing: Option<Exposing>,
+bounded! {
+    /// The camera's noise.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct NoiseFile {
+        /// σ of one sample at half the light of white, counts.
+        pub counts: f64 = MIN_NOISE_COUNTS..=MAX_NOISE_COUNTS,
+        /// σ in the dark, counts.
+        pub read_counts: f64 = 0.0..=MAX_NOISE_COUNTS,
+        /// Shot noise: variance that light adds, counts² per count.
+        pub shot: f64 = 0.0..=MAX_NOISE_COUNTS,
+        /// The measured levels.
+        pub levels: Vec<LevelFile> = Fields,
+        /// The exposure and gain at which it was measured; `None` where they are not known.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub exposing: Option<Exposing> = Fields,
+    }
 }
 
 impl NoiseFile {
@@ -157,24 +174,26 @@ impl NoiseFile {
     }
 }
 
-/// Noise at one level.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LevelFile {
-    /// Mean sample, counts.
-    pub level: f64,
-    /// σ of one sample, counts.
-    pub counts: f64,
-}
+bounded! {
+    /// Noise at one level.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct LevelFile {
+        /// Mean sample, counts.
+        pub level: f64 = 0.0..=MAX_NOISE_COUNTS,
+        /// σ of one sample, counts.
+        pub counts: f64 = 0.0..=MAX_NOISE_COUNTS,
+    }
 
-/// Contrast against pitch.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ContrastFile {
-    /// Median modulation of the coarsest pitch, counts.
-    pub modulation_counts: f64,
-    /// Contrast of each pitch, the coarsest first.
-    pub pitches: Vec<PitchFile>,
+    /// Contrast against pitch.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct ContrastFile {
+        /// Median modulation of the coarsest pitch, counts.
+        pub modulation_counts: f64 = 0.0..=MAX_NOISE_COUNTS,
+        /// Contrast of each pitch, the coarsest first.
+        pub pitches: Vec<PitchFile> = Fields,
+    }
 }
 
 impl ContrastFile {
@@ -188,46 +207,48 @@ impl ContrastFile {
     }
 }
 
-/// Contrast of one pitch.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PitchFile {
-    /// Projector pixels per fringe.
-    pub pitch_px: u32,
-    /// Modulation relative to that of the coarsest.
-    pub contrast: f64,
-}
+bounded! {
+    /// Contrast of one pitch.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct PitchFile {
+        /// Projector pixels per fringe.
+        pub pitch_px: u32 = 1..=MAX_SIDE,
+        /// Modulation relative to that of the coarsest.
+        pub contrast: f64 = 0.0..=100.0,
+    }
 
-/// The reference phase maps of the plane z = 0.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ReferenceFile {
-    /// Projector pixels per fringe.
-    pub pitch_px: f64,
-    /// RMS distance of the models from the measured plane, projector pixels.
-    pub models_off_px: f64,
-    /// The projector points of the plane, as the maps say.
-    pub plane: PlaneModel,
-    /// Under vertical fringes.
-    pub vertical: MapFile,
-    /// Under horizontal fringes.
-    pub horizontal: MapFile,
-}
+    /// The reference phase maps of the plane z = 0.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct ReferenceFile {
+        /// Projector pixels per fringe.
+        pub pitch_px: f64 = 1.0..=f64::from(MAX_SIDE),
+        /// RMS distance of the models from the measured plane, projector pixels.
+        pub models_off_px: f64 = 0.0..=f64::from(MAX_SIDE),
+        /// The projector points of the plane, as the maps say.
+        pub plane: PlaneModel = Fields,
+        /// Under vertical fringes.
+        pub vertical: MapFile,
+        /// Under horizontal fringes.
+        pub horizontal: MapFile,
+    }
 
-/// One reference phase map.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MapFile {
-    /// The array beside this file: f64, turns, the smooth fit over the whole frame.
-    pub file: String,
-    /// SHA-256 of that file.
-    pub sha256: String,
-    /// Estimated RMS error of the fit, see [`algo::pipeline::Plate`].
-    pub residual_turns: f64,
-    /// Scatter of the pixels about the fit.
-    pub noise_turns: f64,
-    /// Share of the frame that was fitted.
-    pub filled: f64,
+    /// One reference phase map.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct MapFile {
+        /// The array beside this file: f64, turns, the smooth fit over the whole frame.
+        pub file: String = Longest(MAX_NAME),
+        /// SHA-256 of that file.
+        pub sha256: String,
+        /// Estimated RMS error of the fit, see [`algo::pipeline::Plate`].
+        pub residual_turns: f64 = 0.0..=MAX_FRINGES,
+        /// Scatter of the pixels about the fit.
+        pub noise_turns: f64 = 0.0..=MAX_FRINGES,
+        /// Share of the frame that was fitted.
+        pub filled: f64 = 0.0..=1.0,
+    }
 }
 
 impl CalibrationFile {

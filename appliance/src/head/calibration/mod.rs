@@ -18,6 +18,8 @@ use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
 use algo::pattern::{GreyResponse, PhaseFunction, Waveform, Waveforms};
 use algo::phase::LeastModulation;
+use hal::bounded;
+use hal::bounds::MAX_SIGMA_MM;
 use hal::frame::FrameFormat;
 use hal::model::{DeviceModel, PlaneModel};
 use hal::replay::Recording;
@@ -66,14 +68,16 @@ pub struct Calibration {
     pub sigma: Option<CalibrationSigma>,
 }
 
-/// σ of measurements by the uncertainty of the models.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct CalibrationSigma {
-    /// Of a height, mm.
-    pub height_mm: f64,
-    /// Of a length of 100 mm, mm.
-    pub length_mm: f64,
+bounded! {
+    /// σ of measurements by the uncertainty of the models.
+    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(deny_unknown_fields)]
+    pub struct CalibrationSigma {
+        /// Of a height, mm.
+        pub height_mm: f64 = 0.0..=MAX_SIGMA_MM,
+        /// Of a length of 100 mm, mm.
+        pub length_mm: f64 = 0.0..=MAX_SIGMA_MM,
+    }
 }
 
 impl Calibration {

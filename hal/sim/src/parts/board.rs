@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::Surface;
-use crate::limits::within;
 use crate::optics::Vector;
 use crate::scenario::Placement;
+use hal::bounded;
 
 /// What black squares reflect of the light that white ones do.
 const BLACK: f64 = 0.08;
@@ -15,20 +15,22 @@ const EDGE_MM: f64 = 0.2;
 /// Width of the white margin, in squares.
 const MARGIN: f64 = 1.0;
 
-/// A checkerboard whose middle lies in the origin, its columns along x.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Board {
-    /// Inner corners along x.
-    pub columns: usize,
-    /// Inner corners along y.
-    pub rows: usize,
-    /// Side of a square according to its label, mm.
-    pub square_mm: f64,
-    /// By how much the middle is higher than the outermost inner corners, µm.
-    pub bow_um: f64,
-    /// By how much the squares are larger than their label says, parts per million.
-    pub scale_ppm: f64,
+bounded! {
+    /// A checkerboard whose middle lies in the origin, its columns along x.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Board {
+        /// Inner corners along x.
+        pub columns: usize = 2..=100,
+        /// Inner corners along y.
+        pub rows: usize = 2..=100,
+        /// Side of a square according to its label, mm.
+        pub square_mm: f64 = 0.5..=1000.0,
+        /// By how much the middle is higher than the outermost inner corners, µm.
+        pub bow_um: f64 = -10_000.0..=10_000.0,
+        /// By how much the squares are larger than their label says, parts per million.
+        pub scale_ppm: f64 = -100_000.0..=100_000.0,
+    }
 }
 
 impl Default for Board {
@@ -58,14 +60,6 @@ impl Board {
         pose([-12.0, 14.0], 60.0, [0.0, 0.0, -70.0]),
         pose([0.0, 0.0], 0.0, [0.0, 0.0, 0.0]),
     ];
-
-    pub(super) fn check(&self) -> Result<(), String> {
-        within("part.columns", self.columns, 2, 100)?;
-        within("part.rows", self.rows, 2, 100)?;
-        within("part.square_mm", self.square_mm, 0.5, 1000.0)?;
-        within("part.bow_um", self.bow_um, -10_000.0, 10_000.0)?;
-        within("part.scale_ppm", self.scale_ppm, -100_000.0, 100_000.0)
-    }
 
     /// Side of a square, mm.
     fn side(&self) -> f64 {

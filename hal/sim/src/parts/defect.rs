@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::limits::within;
-use hal::bounds::length;
+use hal::bounds::{length, within};
 
 /// Most defects of a scenario.
 const MAX_DEFECTS: usize = 64;

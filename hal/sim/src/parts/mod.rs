@@ -16,8 +16,8 @@ mod spline;
 
 use serde::{Deserialize, Serialize};
 
-use super::limits::within;
 use super::optics::Vector;
+use hal::bounds::{Bound, Fields, within};
 
 pub use board::Board;
 pub use defect::Defect;
@@ -108,51 +108,30 @@ impl Part {
 
     /// Checks the measures of the part and of its defects; the error names the first key that is out of its range, and the range.
     pub(crate) fn check(&self) -> Result<(), String> {
-        let positive = |key: &str, value: f64| within(&format!("part.{key}"), value, 1e-3, 1000.0);
-        let coordinate =
-            |key: &str, value: f64| within(&format!("part.{key}"), value, -1000.0, 1000.0);
         Defect::check(self.defects())?;
         self.defects()
             .iter()
             .try_for_each(|defect| self.can_have(defect))
             .map_err(|words| format!("part.defects: {words}"))?;
         match self {
-            Self::Cone(part) => {
-                positive("half_size", part.half_size)?;
-                positive("radius", part.radius)?;
-                coordinate("depth", part.depth)?;
-                coordinate("top", part.top)
-            }
-            Self::Sawtooth(part) => {
-                positive("half_size", part.half_size)?;
-                positive("period", part.period)?;
-                within("part.rise", part.rise, 0.01, 0.99)?;
-                coordinate("x0", part.x0)?;
-                coordinate("lo", part.lo)?;
-                coordinate("hi", part.hi)
-            }
+            Self::Cone(part) => Fields.check("part", part),
+            Self::Sawtooth(part) => Fields.check("part", part),
             Self::Sphere(part) => {
-                positive("radius", part.radius)?;
-                coordinate("centre_z", part.centre_z)?;
+                Fields.check("part", part)?;
                 // Lower than a tenth of the radius above the centre, the surface is too steep for a height field.
                 let low = part.centre_z + 0.1 * part.radius;
                 within("part.cut", part.cut, low, part.centre_z + part.radius)
             }
-            Self::Tube(part) => {
-                positive("diameter", part.diameter)?;
-                positive("half_length", part.half_length)?;
-                coordinate("centre_z", part.centre_z)
-            }
+            Self::Tube(part) => Fields.check("part", part),
             Self::Flowerpot(part) => {
-                positive("bottom_diameter", part.bottom_diameter)?;
-                positive("depth", part.depth)?;
+                Fields.check("part", part)?;
                 // The wall leans outwards by at least 0.025 mm per mm of depth: a height field has no upright walls.
                 let least = part.bottom_diameter + 0.05 * part.depth;
                 within("part.rim_diameter", part.rim_diameter, least, 1000.0)
             }
             Self::Spline(part) => part.check(),
-            Self::Plane(part) => positive("half_size", part.half_size),
-            Self::Board(part) => part.check(),
+            Self::Plane(part) => Fields.check("part", part),
+            Self::Board(part) => Fields.check("part", part),
             Self::SheetMetal(part) => part.check(),
             // Their measures are given.
             Self::Face(_) | Self::Handset(_) | Self::Empty {} => Ok(()),

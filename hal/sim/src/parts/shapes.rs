@@ -1,27 +1,35 @@
 //! The study's analytic parts: cone, sawtooth, sphere, tube, flowerpot, and a flat plane.
 
 use serde::{Deserialize, Serialize};
+use std::ops::RangeInclusive;
 
 use super::{Defect, Surface};
 use crate::optics::Vector;
+use hal::bounded;
 
+/// Bounds of a length that is not 0, mm.
+const MEASURE: RangeInclusive<f64> = 1e-3..=1000.0;
+/// Bounds of a coordinate, mm.
+const COORDINATE: RangeInclusive<f64> = -1000.0..=1000.0;
 /// Largest slope of the tube: a lying cylinder is vertical at its sides, so its steeper parts are cut off.
 const TUBE_SLOPE: f64 = 6.0;
 
-/// A square block with a cone-shaped hole: z = top, and within the radius z = top − depth · (1 − r / radius).
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Cone {
-    /// Half the side of the block.
-    pub half_size: f64,
-    /// Radius of the hole at the top.
-    pub radius: f64,
-    /// Depth of the hole.
-    pub depth: f64,
-    /// z of the top.
-    pub top: f64,
-    /// Dents; a good part has none.
-    pub defects: Vec<Defect>,
+bounded! {
+    /// A square block with a cone-shaped hole: z = top, and within the radius z = top − depth · (1 − r / radius).
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Cone {
+        /// Half the side of the block.
+        pub half_size: f64 = MEASURE,
+        /// Radius of the hole at the top.
+        pub radius: f64 = MEASURE,
+        /// Depth of the hole.
+        pub depth: f64 = COORDINATE,
+        /// z of the top.
+        pub top: f64 = COORDINATE,
+        /// Dents; a good part has none.
+        pub defects: Vec<Defect>,
+    }
 }
 
 impl Default for Cone {
@@ -58,24 +66,26 @@ impl Surface for Cone {
     }
 }
 
-/// Ridges along y: with f = frac((x − x0) / period), z rises from lo to hi over f < rise and falls after.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Sawtooth {
-    /// Half the side of the square.
-    pub half_size: f64,
-    /// Distance of the ridges.
-    pub period: f64,
-    /// Share of the period that rises, 0.01…0.99.
-    pub rise: f64,
-    /// x of a valley.
-    pub x0: f64,
-    /// z of the valleys.
-    pub lo: f64,
-    /// z of the ridges.
-    pub hi: f64,
-    /// Dents; a good part has none.
-    pub defects: Vec<Defect>,
+bounded! {
+    /// Ridges along y: with f = frac((x − x0) / period), z rises from lo to hi over f < rise and falls after.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Sawtooth {
+        /// Half the side of the square.
+        pub half_size: f64 = MEASURE,
+        /// Distance of the ridges.
+        pub period: f64 = MEASURE,
+        /// Share of the period that rises, 0.01…0.99.
+        pub rise: f64 = 0.01..=0.99,
+        /// x of a valley.
+        pub x0: f64 = COORDINATE,
+        /// z of the valleys.
+        pub lo: f64 = COORDINATE,
+        /// z of the ridges.
+        pub hi: f64 = COORDINATE,
+        /// Dents; a good part has none.
+        pub defects: Vec<Defect>,
+    }
 }
 
 impl Default for Sawtooth {
@@ -116,18 +126,20 @@ impl Surface for Sawtooth {
     }
 }
 
-/// The part of a sphere above z = cut.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Sphere {
-    /// Radius.
-    pub radius: f64,
-    /// z of the centre.
-    pub centre_z: f64,
-    /// z below which the sphere is cut off.
-    pub cut: f64,
-    /// Dents; a good part has none.
-    pub defects: Vec<Defect>,
+bounded! {
+    /// The part of a sphere above z = cut.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Sphere {
+        /// Radius.
+        pub radius: f64 = MEASURE,
+        /// z of the centre.
+        pub centre_z: f64 = COORDINATE,
+        /// z below which the sphere is cut off.
+        pub cut: f64,
+        /// Dents; a good part has none.
+        pub defects: Vec<Defect>,
+    }
 }
 
 impl Default for Sphere {
@@ -166,18 +178,20 @@ impl Surface for Sphere {
     }
 }
 
-/// The upper side of a cylinder whose axis lies along y.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Tube {
-    /// Diameter.
-    pub diameter: f64,
-    /// Half the length.
-    pub half_length: f64,
-    /// z of the axis.
-    pub centre_z: f64,
-    /// Dents; a good part has none.
-    pub defects: Vec<Defect>,
+bounded! {
+    /// The upper side of a cylinder whose axis lies along y.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Tube {
+        /// Diameter.
+        pub diameter: f64 = MEASURE,
+        /// Half the length.
+        pub half_length: f64 = MEASURE,
+        /// z of the axis.
+        pub centre_z: f64 = COORDINATE,
+        /// Dents; a good part has none.
+        pub defects: Vec<Defect>,
+    }
 }
 
 impl Default for Tube {
@@ -220,18 +234,20 @@ impl Surface for Tube {
     }
 }
 
-/// The wall of an open truncated cone, wider at the rim; its axis is along z, and half its depth lies above z = 0.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Flowerpot {
-    /// Diameter at the top.
-    pub rim_diameter: f64,
-    /// Diameter at the bottom.
-    pub bottom_diameter: f64,
-    /// Height of the wall.
-    pub depth: f64,
-    /// Dents; a good part has none.
-    pub defects: Vec<Defect>,
+bounded! {
+    /// The wall of an open truncated cone, wider at the rim; its axis is along z, and half its depth lies above z = 0.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Flowerpot {
+        /// Diameter at the top.
+        pub rim_diameter: f64,
+        /// Diameter at the bottom.
+        pub bottom_diameter: f64 = MEASURE,
+        /// Height of the wall.
+        pub depth: f64 = MEASURE,
+        /// Dents; a good part has none.
+        pub defects: Vec<Defect>,
+    }
 }
 
 impl Default for Flowerpot {
@@ -263,14 +279,16 @@ impl Surface for Flowerpot {
     }
 }
 
-/// The reference plane z = 0, as a square that covers the study's field of view.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Plane {
-    /// Half the side of the square.
-    pub half_size: f64,
-    /// Dents; a good part has none.
-    pub defects: Vec<Defect>,
+bounded! {
+    /// The reference plane z = 0, as a square that covers the study's field of view.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Plane {
+        /// Half the side of the square.
+        pub half_size: f64 = MEASURE,
+        /// Dents; a good part has none.
+        pub defects: Vec<Defect>,
+    }
 }
 
 impl Default for Plane {

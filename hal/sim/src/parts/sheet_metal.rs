@@ -7,8 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use super::bump::{BUMP_SLOPE, bump};
 use super::{Defect, Surface};
-use crate::limits::within;
 use crate::optics::Vector;
+use hal::bounds::within;
 
 /// z of the plate's upper side.
 const PLATE_Z: f64 = 8.0;

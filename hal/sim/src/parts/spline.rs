@@ -4,23 +4,26 @@ use serde::{Deserialize, Serialize};
 
 use super::shapes::{in_square, square};
 use super::{Defect, Surface};
-use crate::limits::within;
 use crate::optics::Vector;
+use hal::bounded;
+use hal::bounds::{Bound, Fields, within};
 
 /// Control values along each side, for 8 cubic patches.
 const CONTROL: usize = 11;
 const PATCHES: f64 = (CONTROL - 3) as f64;
 
-/// A uniform bicubic B-spline, z = Σ N_i(u_y) N_j(u_x) c_ij with u = (x / half_size + 1) · 4.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Spline {
-    /// Half the side of the square.
-    pub half_size: f64,
-    /// Control values in mm, row = y, column = x.
-    pub control: [[f64; CONTROL]; CONTROL],
-    /// Dents; a good part has none.
-    pub defects: Vec<Defect>,
+bounded! {
+    /// A uniform bicubic B-spline, z = Σ N_i(u_y) N_j(u_x) c_ij with u = (x / half_size + 1) · 4.
+    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Spline {
+        /// Half the side of the square.
+        pub half_size: f64 = 1.0..=1000.0,
+        /// Control values in mm, row = y, column = x.
+        pub control: [[f64; CONTROL]; CONTROL],
+        /// Dents; a good part has none.
+        pub defects: Vec<Defect>,
+    }
 }
 
 impl Default for Spline {
@@ -35,7 +38,7 @@ impl Default for Spline {
 
 impl Spline {
     pub(super) fn check(&self) -> Result<(), String> {
-        within("part.half_size", self.half_size, 1.0, 1000.0)?;
+        Fields.check("part", self)?;
         for value in self.control.as_flattened() {
             within("part.control", *value, -1000.0, 1000.0)?;
         }
