@@ -106,15 +106,10 @@ fn result(record: &ResultRecord) -> Value {
         "simulated": record.flags() & flag::SIMULATED != 0,
         "doubtful": record.flags() & flag::DOUBTFUL != 0,
         "judges_nothing": record.flags() & flag::JUDGES_NOTHING != 0,
-        "skipped": {
-            "outside": found.skipped.outside,
-            "unexpected": found.skipped.unexpected,
-            "dark": found.skipped.dark,
-            "exact": found.skipped.exact,
-        },
+        "skipped": found.skipped,
         "placement": found.placement.as_ref().map(placement),
         "gauges": found.gauges.iter().map(gauge).collect::<Vec<_>>(),
-        "stages": record.stages().iter().map(|time| json!({ "name": time.stage.name(), "us": time.us })).collect::<Vec<_>>(),
+        "stages": record.stages(),
     })
 }
 
@@ -129,22 +124,7 @@ fn placement(placement: &Placement) -> Value {
 }
 
 fn gauge(gauge: &GaugeValue) -> Value {
-    let decision = gauge.decision;
-    json!({
-        "name": &*gauge.name,
-        "kind": gauge.unit,
-        "unit": gauge.unit.symbol(),
-        "value": gauge.value.filter(|_| decision.valid),
-        "sigma": gauge.sigma,
-        "uncertainty": gauge.uncertainty,
-        "expected": gauge.expected,
-        "square": gauge.square,
-        "lowest": gauge.low,
-        "highest": gauge.high,
-        "pass": decision.pass,
-        "valid": decision.valid,
-        "low": decision.low,
-        "high": decision.high,
-        "doubtful": decision.doubtful,
-    })
+    let mut shown = json!(gauge);
+    shown["unit"] = json!(gauge.unit.symbol());
+    shown
 }
