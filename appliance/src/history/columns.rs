@@ -1,20 +1,35 @@
-//! A result as rows of the tables `result` and `gauge`: each column that is a field is named once, for writing and for reading.
+//! Types that are rows of a table: their columns, and how values are written and read.
 
-use super::entry::{Entry, GaugeEntry};
-use super::reader::rows;
-use crate::station::{Placement, Square, Verdict};
+use crate::station::{Placement, Square, Stages, Verdict};
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
-use rusqlite::{Connection, Row, Transaction};
 
-/// Declares the columns of a table: those whose values are given beside the fields, and the fields. A column has the name of its field.
+/// Declares a type that the history keeps: first its columns, each once, with its value and its type in SQL, then the fields that
+/// are no columns. A column and a key in JSON have the name of the field.
 macro_rules! columns {
-    ($of:ident in $table:literal; $($beside:ident)*; $($field:ident)*) => {
-        impl $of {
-            fn insert(&self, transaction: &Transaction<'_>, $($beside: &dyn ToSql),*) -> rusqlite::Result<()> {
-                let columns = [
-                    $((stringify!($beside), $beside),)*
-                    $((stringify!($field), &self.$field as &dyn ToSql),)*
-                ];
+    (
+        $(#[$about:meta])* $name:ident in $table:literal, $from:ident: $source:ty;
+        { $($(#[$doc:meta])* $field:ident: $type:ty = $value:expr, $sql:literal;)* }
+        { $($(#[$also:meta])* $beside:ident: $other:ty = $given:expr;)* }
+    ) => {
+        $(#[$about])*
+        #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
+        pub struct $name {
+            $($(#[$doc])* pub $field: $type,)*
+            $($(#[$also])* pub $beside: $other,)*
+        }
+
+        impl $name {
+            /// The columns as `CREATE TABLE` has them.
+            pub(super) const COLUMNS: &[&str] = &[$(concat!(stringify!($field), " ", $sql)),*];
+
+            /// What the history keeps of it.
+            pub fn of($from: &$source) -> Self {
+                Self { $($field: $value,)* $($beside: $given,)* }
+            }
+
+            pub(super) fn insert(&self, transaction: &rusqlite::Transaction<'_>, keys: &[(&str, &dyn rusqlite::ToSql)]) -> rusqlite::Result<()> {
+                let mut columns = keys.to_vec();
+                columns.extend([$((stringify!($field), &self.$field as &dyn rusqlite::ToSql)),*]);
                 let (names, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
                 let marks = vec!["?"; names.len()].join(", ");
                 let insert = format!("INSERT INTO {} ({}) VALUES ({marks})", $table, names.join(", "));
@@ -22,48 +37,16 @@ macro_rules! columns {
                 Ok(())
             }
 
-            fn read(&mut self, row: &Row<'_>) -> rusqlite::Result<()> {
-                $(self.$field = row.get(stringify!($field))?;)*
-                Ok(())
+            pub(super) fn read(row: &rusqlite::Row<'_>) -> rusqlite::Result<Self> {
+                Ok(Self {
+                    $($field: row.get(stringify!($field))?,)*
+                    $($beside: Default::default(),)*
+                })
             }
         }
     };
 }
-
-columns!(Entry in "result"; stages;
-    seq time_utc_us recipe fingerprint part_id press_stroke token verdict error_code reason flags valid_points coverage_permille
-    temperature_c height_noise_mm fitness_permille exposure_us total_us recording
-    uptime_s boot_id unkept placement);
-columns!(GaugeEntry in "gauge"; result place; name unit value sigma low high decision uncertainty expected square);
-
-/// Stores a result with its gauges.
-pub(super) fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
-    let stages = serde_json::to_string(&entry.stages).unwrap_or_default();
-    entry.insert(transaction, &stages)?;
-    let result = transaction.last_insert_rowid();
-    for (place, gauge) in entry.gauges.iter().enumerate() {
-        gauge.insert(transaction, &result, &place)?;
-    }
-    Ok(())
-}
-
-/// The result of a row of the view `dated`, with its gauges.
-pub(super) fn read(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry> {
-    let id: i64 = row.get("id")?;
-    let stages: String = row.get("stages")?;
-    let of_result = "SELECT * FROM gauge WHERE result = ?1 ORDER BY place";
-    let mut entry = Entry {
-        browser_utc_us: row.get("browser_utc_us")?,
-        // Times are only shown: what cannot be read is left out.
-        stages: serde_json::from_str(&stages).unwrap_or_default(),
-        gauges: rows(connection, of_result, [id], |row| {
-            let mut gauge = GaugeEntry::default();
-            gauge.read(row).map(|()| gauge)
-        })?,
-        ..Entry::default()
-    };
-    entry.read(row).map(|()| entry)
-}
+pub(super) use columns;
 
 impl ToSql for Verdict {
     fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
@@ -78,9 +61,9 @@ impl FromSql for Verdict {
     }
 }
 
-/// Stores a type as JSON.
+/// Stores types as JSON, and says what is read where that is damaged.
 macro_rules! as_json {
-    ($($of:ident)*) => {$(
+    ($($($of:ident)* => $damaged:expr;)*) => {$($(
         impl ToSql for $of {
             fn to_sql(&self) -> rusqlite::Result<ToSqlOutput<'_>> {
                 // Numbers that are finite are always JSON.
@@ -90,11 +73,14 @@ macro_rules! as_json {
 
         impl FromSql for $of {
             fn column_result(value: ValueRef<'_>) -> FromSqlResult<Self> {
-                let read = serde_json::from_str(value.as_str()?);
-                read.map_err(|error| FromSqlError::Other(error.into()))
+                serde_json::from_str(value.as_str()?).or_else($damaged)
             }
         }
-    )*};
+    )*)*};
 }
 
-as_json!(Placement Square);
+as_json! {
+    Placement Square => |error| Err(FromSqlError::Other(error.into()));
+    // Times are only shown: what cannot be read is left out.
+    Stages => |_| Ok(Stages::default());
+}

@@ -86,7 +86,7 @@ fn one(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
     let stages: Vec<_> = entry
         .stages
         .iter()
-        .map(|stage| format!("{} {}", stage.name, stage.us))
+        .map(|time| format!("{} {}", time.stage.name(), time.us))
         .collect();
     let words = [&entry.reason, &entry.recording];
     let [reason, recording] = words.map(|text| quoted(text.as_deref().unwrap_or_default()));

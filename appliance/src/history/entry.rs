@@ -1,99 +1,97 @@
 //! A result as the history keeps it, and a filter of results.
 
+use super::columns::columns;
 use crate::station::result::flag;
-use crate::station::{Placement, ResultRecord, Square, Verdict};
-use serde::{Deserialize, Serialize};
+use crate::station::{GaugeValue, Placement, ResultRecord, Square, Stages, Verdict};
 
-/// One stored result. Lengths in mm, times in µs; as JSON the keys are the fields' names.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
-    /// RESULT_SEQ.
-    pub seq: u32,
-    /// Trigger time in µs since 1970 UTC; `None` if the clock was not synchronised.
-    pub time_utc_us: Option<u64>,
-    /// Trigger time since the start of the daemon, s.
-    pub uptime_s: u32,
-    /// Which start that was: BOOT_ID as 8 hexadecimal digits.
-    pub boot_id: String,
-    /// Where the clock was not synchronised: the trigger time in µs since 1970 UTC by the clock of a browser whose user
-    /// signed in during the same start.
-    pub browser_utc_us: Option<u64>,
-    /// Recipe number.
-    pub recipe: u16,
-    /// The first 8 hexadecimal digits of the recipe's fingerprint.
-    pub fingerprint: String,
-    /// PART_ID.
-    pub part_id: u32,
-    /// PRESS_STROKE.
-    pub press_stroke: u32,
-    /// The token that triggered, 0 for an edge.
-    pub token: u16,
-    /// PASS, FAIL or INVALID.
-    pub verdict: Verdict,
-    /// 0, or why there is no measurement.
-    pub error_code: u16,
-    /// Why it is INVALID, in words.
-    pub reason: Option<String>,
-    /// RESULT flags, register 231.
-    pub flags: u16,
-    /// Resolved pixels.
-    pub valid_points: u32,
-    /// Share of the regions that is resolved, ‰.
-    pub coverage_permille: u16,
-    /// Head temperature, °C.
-    pub temperature_c: Option<f64>,
-    /// Height noise, 1 σ, mm.
-    pub height_noise_mm: Option<f64>,
-    /// Pattern fitness, ‰.
-    pub fitness_permille: u16,
-    /// Trigger → exposure done, µs.
-    pub exposure_us: u32,
-    /// Trigger → result, µs.
-    pub total_us: u32,
-    /// Times of the stages, in their order.
-    pub stages: Vec<StageEntry>,
-    /// The gauges, in the recipe's order.
-    pub gauges: Vec<GaugeEntry>,
-    /// How the part lay; `None` where it was not aligned.
-    pub placement: Option<Placement>,
-    /// The folder in `recordings/` that holds the frames, if they were kept.
-    pub recording: Option<String>,
-    /// Why the frames of a part that did not pass were not kept, as far as known; see [`super::Unkept`].
-    pub unkept: Option<String>,
+columns! {
+    /// One stored result. Lengths in mm, times in µs.
+    Entry in "result", record: ResultRecord;
+    {
+        /// RESULT_SEQ.
+        seq: u32 = record.seq, "INTEGER NOT NULL";
+        /// Trigger time in µs since 1970 UTC; `None` if the clock was not synchronised.
+        time_utc_us: Option<u64> = Some(record.time_utc_us).filter(|&time| time != 0), "INTEGER";
+        /// Trigger time since the start of the daemon, s.
+        uptime_s: u32 = record.uptime_s, "INTEGER NOT NULL";
+        /// Which start that was: BOOT_ID as 8 hexadecimal digits.
+        boot_id: String = format!("{:08x}", record.boot_id), "TEXT NOT NULL";
+        /// Recipe number.
+        recipe: u16 = record.recipe, "INTEGER NOT NULL";
+        /// The first 8 hexadecimal digits of the recipe's fingerprint.
+        fingerprint: String = format!("{:08x}", record.recipe_crc), "TEXT NOT NULL";
+        /// PART_ID.
+        part_id: u32 = record.part_id, "INTEGER NOT NULL";
+        /// PRESS_STROKE.
+        press_stroke: u32 = record.press_stroke, "INTEGER NOT NULL";
+        /// The token that triggered, 0 for an edge.
+        token: u16 = record.token, "INTEGER NOT NULL";
+        /// PASS, FAIL or INVALID.
+        verdict: Verdict = record.verdict, "INTEGER NOT NULL";
+        /// 0, or why there is no measurement.
+        error_code: u16 = record.error_code, "INTEGER NOT NULL";
+        /// Why it is INVALID, in words.
+        reason: Option<String> = record.inspection.reason.as_deref().map(str::to_owned), "TEXT";
+        /// RESULT flags, register 231.
+        flags: u16 = record.flags(), "INTEGER NOT NULL";
+        /// Resolved pixels.
+        valid_points: u32 = record.inspection.valid_points, "INTEGER NOT NULL";
+        /// Share of the regions that is resolved, ‰.
+        coverage_permille: u16 = record.inspection.coverage_permille, "INTEGER NOT NULL";
+        /// Head temperature, °C.
+        temperature_c: Option<f64> = finite(record.inspection.temperature_c), "REAL";
+        /// Height noise, 1 σ, mm.
+        height_noise_mm: Option<f64> = finite(Some(record.inspection.height_noise_mm)), "REAL";
+        /// Pattern fitness, ‰.
+        fitness_permille: u16 = record.inspection.fitness_permille, "INTEGER NOT NULL";
+        /// Trigger → exposure done, µs.
+        exposure_us: u32 = record.exposure_us, "INTEGER NOT NULL";
+        /// Trigger → result, µs.
+        total_us: u32 = record.total_us, "INTEGER NOT NULL";
+        /// Times of the stages, in their order.
+        stages: Stages = record.stages(), "TEXT NOT NULL";
+        /// How the part lay; `None` where it was not aligned.
+        placement: Option<Placement> = record.inspection.placement.filter(is_finite), "TEXT";
+        /// The folder in `recordings/` that holds the frames, if they were kept.
+        recording: Option<String> = None, "TEXT";
+        /// Why the frames of a part that did not pass were not kept, as far as known; see [`super::Unkept`].
+        unkept: Option<String> = None, "TEXT";
+    }
+    {
+        /// Where the clock was not synchronised: the trigger time in µs since 1970 UTC by the clock of a browser whose user
+        /// signed in during the same start.
+        browser_utc_us: Option<u64> = None;
+        /// The gauges, in the recipe's order.
+        gauges: Vec<GaugeEntry> = record.inspection.gauges.iter().map(GaugeEntry::of).collect();
+    }
 }
 
-/// The time of one stage.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct StageEntry {
-    /// The stage's name.
-    pub name: String,
-    /// µs.
-    pub us: u32,
-}
-
-/// One gauge of a stored result, in mm, °, mm³ or as a share.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct GaugeEntry {
-    /// The gauge's name.
-    pub name: String,
-    /// The unit's symbol, empty for shares and bare numbers.
-    pub unit: String,
-    /// None if it could not be measured.
-    pub value: Option<f64>,
-    /// 1 σ, as far as predicted.
-    pub sigma: Option<f64>,
-    /// U = 2 u, with the systematic part of the error.
-    pub uncertainty: Option<f64>,
-    /// The magnitude that is expected on a good part, where noise moves the value away from 0.
-    pub expected: Option<f64>,
-    /// The square that the value is of, where it is a deviation.
-    pub square: Option<Square>,
-    /// Lower limit.
-    pub low: Option<f64>,
-    /// Upper limit.
-    pub high: Option<f64>,
-    /// The bits of registers 296–311: 0 pass, 1 valid, 2 low, 3 high, 4 doubtful.
-    pub decision: u16,
+columns! {
+    /// One gauge of a stored result, in mm, °, mm³ or as a share.
+    GaugeEntry in "gauge", gauge: GaugeValue;
+    {
+        /// The gauge's name.
+        name: String = gauge.name.as_ref().into(), "TEXT NOT NULL";
+        /// The unit's symbol, empty for shares and bare numbers.
+        unit: String = gauge.unit.symbol().into(), "TEXT NOT NULL";
+        /// None if it could not be measured.
+        value: Option<f64> = finite(gauge.value), "REAL";
+        /// 1 σ, as far as predicted.
+        sigma: Option<f64> = finite(gauge.sigma), "REAL";
+        /// U = 2 u, with the systematic part of the error.
+        uncertainty: Option<f64> = finite(gauge.uncertainty), "REAL";
+        /// The magnitude that is expected on a good part, where noise moves the value away from 0.
+        expected: Option<f64> = finite(gauge.expected), "REAL";
+        /// The square that the value is of, where it is a deviation.
+        square: Option<Square> = gauge.square, "TEXT";
+        /// Lower limit.
+        low: Option<f64> = finite(gauge.low), "REAL";
+        /// Upper limit.
+        high: Option<f64> = finite(gauge.high), "REAL";
+        /// The bits of registers 296–311: 0 pass, 1 valid, 2 low, 3 high, 4 doubtful.
+        decision: u16 = gauge.decision.bits(), "INTEGER NOT NULL";
+    }
+    {}
 }
 
 /// Which results: all conditions hold together. The default asks for the newest hundred.
@@ -129,74 +127,14 @@ impl Default for Filter {
     }
 }
 
-impl Entry {
-    /// What the history keeps of a result.
-    pub fn of(record: &ResultRecord) -> Self {
-        let found = &record.inspection;
-        Self {
-            seq: record.seq,
-            time_utc_us: Some(record.time_utc_us).filter(|&time| time != 0),
-            uptime_s: record.uptime_s,
-            boot_id: format!("{:08x}", record.boot_id),
-            browser_utc_us: None,
-            recipe: record.recipe,
-            fingerprint: format!("{:08x}", record.recipe_crc),
-            part_id: record.part_id,
-            press_stroke: record.press_stroke,
-            token: record.token,
-            verdict: record.verdict,
-            error_code: record.error_code,
-            reason: found.reason.as_deref().map(str::to_owned),
-            flags: record.flags(),
-            valid_points: found.valid_points,
-            coverage_permille: found.coverage_permille,
-            temperature_c: found.temperature_c.filter(|c| c.is_finite()),
-            height_noise_mm: Some(found.height_noise_mm).filter(|mm| mm.is_finite()),
-            fitness_permille: found.fitness_permille,
-            exposure_us: record.exposure_us,
-            total_us: record.total_us,
-            stages: stages(record),
-            gauges: gauges(record),
-            placement: found.placement.filter(is_finite),
-            recording: None,
-            unkept: None,
-        }
-    }
+/// A number that JSON can hold.
+fn finite(number: Option<f64>) -> Option<f64> {
+    number.filter(|number| number.is_finite())
 }
 
 /// Whether JSON can hold it; components that are not finite become null.
 fn is_finite(placement: &Placement) -> bool {
     placement.reach_mm.is_finite() && placement.outliers.is_finite()
-}
-
-fn stages(record: &ResultRecord) -> Vec<StageEntry> {
-    let stages = record.stages();
-    stages
-        .iter()
-        .map(|time| StageEntry {
-            name: time.stage.name().into(),
-            us: time.us,
-        })
-        .collect()
-}
-
-fn gauges(record: &ResultRecord) -> Vec<GaugeEntry> {
-    let finite = |number: Option<f64>| number.filter(|number| number.is_finite());
-    let gauges = record.inspection.gauges.iter();
-    gauges
-        .map(|gauge| GaugeEntry {
-            name: gauge.name.as_ref().into(),
-            unit: gauge.unit.symbol().into(),
-            value: finite(gauge.value),
-            sigma: finite(gauge.sigma),
-            uncertainty: finite(gauge.uncertainty),
-            expected: finite(gauge.expected),
-            square: gauge.square,
-            low: finite(gauge.low),
-            high: finite(gauge.high),
-            decision: gauge.decision.bits(),
-        })
-        .collect()
 }
 
 /// Flags that say how a cycle went, not what its frames show.

@@ -35,7 +35,7 @@ pub mod writer;
 #[cfg(test)]
 mod tests;
 
-pub use entry::{Entry, Filter, GaugeEntry, StageEntry, difference};
+pub use entry::{Entry, Filter, GaugeEntry, difference};
 pub use handle::{History, open};
 pub use reader::{Reader, Trend, TrendPoint};
 pub use recordings::{JudgedPart, RECIPE, name_of, seq_of};

@@ -1,7 +1,7 @@
 //! Reads the history for the page and the command line. Nothing here can change it.
 
-use super::entry::{Entry, Filter};
-use super::{HistoryError, columns, schema};
+use super::entry::{Entry, Filter, GaugeEntry};
+use super::{HistoryError, schema};
 use crate::station::{Counts, Verdict};
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension as _, Params, Row, params_from_iter};
@@ -135,7 +135,7 @@ impl Reader {
 
     fn first(&self, query: &str, key: impl rusqlite::ToSql) -> Result<Option<Entry>, HistoryError> {
         self.read(|connection| {
-            let found = connection.query_row(query, [key], |row| columns::read(connection, row));
+            let found = connection.query_row(query, [key], |row| read(connection, row));
             found.optional()
         })
     }
@@ -167,7 +167,7 @@ impl Reader {
             let bounds = [Value::from(below), Value::from(most as i64)];
             let values = params_from_iter(values.iter().cloned().chain(bounds));
             let batch = rows(&connection, &query, values, |row| {
-                Ok((row.get("id")?, columns::read(&connection, row)?))
+                Ok((row.get("id")?, read(&connection, row)?))
             });
             let batch: Vec<(i64, Entry)> =
                 batch.map_err(|error| HistoryError::of(&self.path, &error))?;
@@ -285,6 +285,17 @@ impl Reader {
         points.reverse();
         Ok(points)
     }
+}
+
+/// The result of a row of the view `dated`, with its gauges.
+fn read(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry> {
+    let id: i64 = row.get("id")?;
+    let of_result = "SELECT * FROM gauge WHERE result = ?1 ORDER BY place";
+    Ok(Entry {
+        browser_utc_us: row.get("browser_utc_us")?,
+        gauges: rows(connection, of_result, [id], GaugeEntry::read)?,
+        ..Entry::read(row)?
+    })
 }
 
 /// The rows that a query finds.

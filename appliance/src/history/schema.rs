@@ -1,6 +1,7 @@
 //! The database's tables, how it is opened, and how one that cannot be used is set aside.
 
 use super::HistoryError;
+use super::entry::{Entry, GaugeEntry};
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -21,36 +22,16 @@ pub(super) const DAMAGED: &str = "damaged";
 /// The log's file is not made shorter than this many bytes.
 const LOG_KEPT: u64 = 1 << 20;
 
-/// `docs/formats.md` has the columns in words.
-const TABLES: &str = "
+/// The tables; `docs/formats.md` has the columns in words.
+fn tables() -> String {
+    let of = |columns: &[&str]| columns.join(",\n    ");
+    format!(
+        "
 CREATE TABLE history (id TEXT NOT NULL);
 INSERT INTO history VALUES (lower(hex(randomblob(16))));
 CREATE TABLE result (
     id INTEGER PRIMARY KEY,
-    seq INTEGER NOT NULL,
-    time_utc_us INTEGER,
-    uptime_s INTEGER NOT NULL,
-    boot_id TEXT NOT NULL,
-    recipe INTEGER NOT NULL,
-    fingerprint TEXT NOT NULL,
-    part_id INTEGER NOT NULL,
-    press_stroke INTEGER NOT NULL,
-    token INTEGER NOT NULL,
-    verdict INTEGER NOT NULL,
-    error_code INTEGER NOT NULL,
-    reason TEXT,
-    flags INTEGER NOT NULL,
-    valid_points INTEGER NOT NULL,
-    coverage_permille INTEGER NOT NULL,
-    temperature_c REAL,
-    height_noise_mm REAL,
-    fitness_permille INTEGER NOT NULL,
-    exposure_us INTEGER NOT NULL,
-    total_us INTEGER NOT NULL,
-    stages TEXT NOT NULL,
-    placement TEXT,
-    recording TEXT,
-    unkept TEXT
+    {}
 );
 CREATE INDEX result_seq ON result (seq);
 CREATE INDEX result_recipe ON result (recipe, id);
@@ -59,20 +40,15 @@ CREATE INDEX result_recording ON result (recording) WHERE recording IS NOT NULL;
 CREATE TABLE gauge (
     result INTEGER NOT NULL REFERENCES result (id) ON DELETE CASCADE,
     place INTEGER NOT NULL,
-    name TEXT NOT NULL,
-    unit TEXT NOT NULL,
-    value REAL,
-    sigma REAL,
-    uncertainty REAL,
-    expected REAL,
-    square TEXT,
-    low REAL,
-    high REAL,
-    decision INTEGER NOT NULL,
+    {},
     PRIMARY KEY (result, place)
 ) WITHOUT ROWID;
 CREATE TABLE start (boot_id TEXT PRIMARY KEY, browser_utc_us INTEGER NOT NULL);
-";
+",
+        of(Entry::COLUMNS),
+        of(GaugeEntry::COLUMNS)
+    )
+}
 
 /// Prepares a connection that reads only. Readers see of a result, where the clock was not synchronised, also the time of its
 /// trigger by the clock of a signed-in user's browser.
@@ -175,7 +151,7 @@ fn is_empty(connection: &Connection) -> rusqlite::Result<bool> {
 
 fn create(connection: &mut Connection) -> rusqlite::Result<()> {
     let transaction = connection.transaction()?;
-    transaction.execute_batch(TABLES)?;
+    transaction.execute_batch(&tables())?;
     transaction.pragma_update(None, "application_id", APPLICATION)?;
     transaction.pragma_update(None, "user_version", VERSION)?;
     transaction.commit()

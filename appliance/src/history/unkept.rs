@@ -1,7 +1,7 @@
 //! Why the frames of a part are not kept: as text in the database, and in words for people.
 
 use super::entry::Entry;
-use crate::station::Verdict;
+use crate::station::{Stages, Verdict};
 use hal::replay::recorder::RecorderError;
 use std::io::ErrorKind;
 
@@ -76,7 +76,7 @@ pub fn why_no_frames(entry: &Entry) -> Option<String> {
             return Some(format!("they could not be written: {words}"));
         }
         None if entry.verdict == Verdict::Pass => "those of a part that passes are not kept",
-        None if entry.stages.is_empty() => "nothing was measured",
+        None if entry.stages == Stages::default() => "nothing was measured",
         None => {
             "it is not known why: they are still being written, or the station ended before that"
         }

@@ -1,11 +1,10 @@
 //! Writes results into the database, bounds their number, and links recordings to them.
 
-use super::columns::insert;
 use super::entry::Entry;
 use super::reader::rows;
 use super::unkept::Unkept;
 use super::{HistoryError, schema};
-use rusqlite::{Connection, OptionalExtension as _, params};
+use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 use std::path::{Path, PathBuf};
 
 /// Starts of the daemon whose time is kept: more than there are in a year.
@@ -202,6 +201,16 @@ impl Writer {
     fn failed(&self, error: &rusqlite::Error) -> HistoryError {
         HistoryError::of(&self.path, error)
     }
+}
+
+/// Stores a result with its gauges.
+fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
+    entry.insert(transaction, &[])?;
+    let result = transaction.last_insert_rowid();
+    for (place, gauge) in entry.gauges.iter().enumerate() {
+        gauge.insert(transaction, &[("result", &result), ("place", &place)])?;
+    }
+    Ok(())
 }
 
 /// Sets the database of an error aside; answers with a line for the log.

@@ -28,6 +28,15 @@ impl Words {
     pub(super) fn put(&mut self, address: u16, value: impl Item) {
         value.put(self, address);
     }
+
+    /// Puts the halves of a value, in the order of words that is set.
+    fn put_halves<T: Item>(&mut self, address: u16, high: T, low: T) {
+        let halves = match self.order {
+            WordOrder::Normal => [high, low],
+            WordOrder::Swapped => [low, high],
+        };
+        self.put(address, halves);
+    }
 }
 
 /// A value of one or more registers.
@@ -49,27 +58,13 @@ impl Item for u16 {
 
 impl Item for u32 {
     fn put(self, words: &mut Words, address: u16) {
-        let (high, low) = ((self >> 16) as u16, self as u16);
-        words.put(
-            address,
-            match words.order {
-                WordOrder::Normal => [high, low],
-                WordOrder::Swapped => [low, high],
-            },
-        );
+        words.put_halves(address, (self >> 16) as u16, self as u16);
     }
 }
 
 impl Item for u64 {
     fn put(self, words: &mut Words, address: u16) {
-        let (high, low) = ((self >> 32) as u32, self as u32);
-        words.put(
-            address,
-            match words.order {
-                WordOrder::Normal => [high, low],
-                WordOrder::Swapped => [low, high],
-            },
-        );
+        words.put_halves(address, (self >> 32) as u32, self as u32);
     }
 }
 

@@ -6,22 +6,25 @@ use thiserror::Error;
 
 use super::turns::Client;
 
-/// CONTROL bit 0: the PLC asks for the station to be online.
-pub const ONLINE: u16 = 1 << 0;
-/// CONTROL bit 1 ↑: measure.
-pub const TRIGGER: u16 = 1 << 1;
-/// CONTROL bit 2 ↑: the PLC has taken the result.
-pub const RESULT_ACK: u16 = 1 << 2;
-/// CONTROL bit 3 ↑: load the recipe of RECIPE_SELECT.
-pub const RECIPE_LOAD: u16 = 1 << 3;
-/// CONTROL bit 4 ↑: clear latches, and the fault where possible.
-pub const ERROR_RESET: u16 = 1 << 4;
-/// CONTROL bit 5 ↑: end the cycle, load or teach in flight.
-pub const ABORT: u16 = 1 << 5;
-/// CONTROL bit 6: queue every result until it is acknowledged.
-pub const BUFFERED: u16 = 1 << 6;
-/// CONTROL bit 7 ↑: teach the recipe of RECIPE_SELECT.
-pub const TEACH: u16 = 1 << 7;
+bits! {
+    /// CONTROL bit 0: the PLC asks for the station to be online.
+    ONLINE = 0;
+    /// CONTROL bit 1 ↑: measure.
+    TRIGGER = 1;
+    /// CONTROL bit 2 ↑: the PLC has taken the result.
+    RESULT_ACK = 2;
+    /// CONTROL bit 3 ↑: load the recipe of RECIPE_SELECT.
+    RECIPE_LOAD = 3;
+    /// CONTROL bit 4 ↑: clear latches, and the fault where possible.
+    ERROR_RESET = 4;
+    /// CONTROL bit 5 ↑: end the cycle, load or teach in flight.
+    ABORT = 5;
+    /// CONTROL bit 6: queue every result until it is acknowledged.
+    BUFFERED = 6;
+    /// CONTROL bit 7 ↑: teach the recipe of RECIPE_SELECT.
+    TEACH = 7;
+}
+
 /// CONTROL bits that must be 0.
 pub const RESERVED: u16 = 0xFF00;
 /// The bits that act on their rising edge.

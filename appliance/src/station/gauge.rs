@@ -6,7 +6,7 @@ pub use algo::inspect::Unit;
 use serde::{Deserialize, Serialize};
 
 /// What was decided about one gauge: bits 0–4 of registers 296–311.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Decision {
     /// Measured and within its limits, farther from them than the guard band.
     pub pass: bool,
@@ -133,12 +133,13 @@ impl Measured {
     }
 }
 
-/// One gauge of a result. Values in mm, °, mm³ or as a share 0…1.
-#[derive(Debug, Clone, PartialEq)]
+/// One gauge of a result, as the page has it in JSON. Values in mm, °, mm³ or as a share 0…1.
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GaugeValue {
     /// The gauge's name in the recipe.
     pub name: Arc<str>,
     /// What the value is.
+    #[serde(rename = "kind")]
     pub unit: Unit,
     /// `None` if it could not be measured.
     pub value: Option<f64>,
@@ -151,10 +152,13 @@ pub struct GaugeValue {
     /// Where the value is; `None` where it is that of the whole region.
     pub square: Option<Square>,
     /// The lower limit.
+    #[serde(rename = "lowest")]
     pub low: Option<f64>,
     /// The upper limit.
+    #[serde(rename = "highest")]
     pub high: Option<f64>,
     /// What was decided.
+    #[serde(flatten)]
     pub decision: Decision,
 }
 

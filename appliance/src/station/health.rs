@@ -14,19 +14,21 @@ pub const HOT_PROCESSOR_C: f64 = 80.0;
 /// operating conditions).
 pub const HOT_PROJECTOR_C: f64 = 70.0;
 
+/// Bits of [`Power`].
+mod power {
+    bits! {
+        UNDER_VOLTAGE = 0, "under-voltage";
+        CAPPED = 1, "frequency capped";
+        THROTTLED = 2, "throttled";
+        SOFT_LIMIT = 3, "soft temperature limit";
+    }
+}
+
 /// What the firmware of a Raspberry Pi says of power and throttling.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Power(u16);
 
 impl Power {
-    /// Words for bits 0–3.
-    const WORDS: [&str; 4] = [
-        "under-voltage",
-        "frequency capped",
-        "throttled",
-        "soft temperature limit",
-    ];
-
     /// From the bits of `get_throttled`: 0–3 now, 16–19 the same since the computer's start (Raspberry Pi documentation, *vcgencmd*,
     /// get_throttled). Reading may reset the latter, so those of the reading `before` stay.
     pub fn of(firmware: u32, before: Option<Self>) -> Self {
@@ -42,18 +44,12 @@ impl Power {
 
     /// What is so now.
     pub fn now(self) -> Vec<&'static str> {
-        Self::words(self.0)
+        power::words(self.0).collect()
     }
 
     /// What has been so since the computer's start.
     pub fn since_start(self) -> Vec<&'static str> {
-        Self::words(self.0 >> 4)
-    }
-
-    fn words(bits: u16) -> Vec<&'static str> {
-        let words = Self::WORDS.into_iter().enumerate();
-        let set = words.filter(|(bit, _)| bits >> bit & 1 == 1);
-        set.map(|(_, word)| word).collect()
+        power::words(self.0 >> 4).collect()
     }
 }
 

@@ -40,6 +40,9 @@
 //!   although READY is 1.
 //! - REJECT_REASON stays until the next rejected request.
 
+#[macro_use]
+mod bits;
+
 pub mod clock;
 pub mod control;
 pub mod error_code;

@@ -58,36 +58,26 @@ impl Verdict {
 
 /// RESULT flags, register 231.
 pub mod flag {
-    /// A pattern was retried.
-    pub const RETRIED: u16 = 1 << 0;
-    /// A single level was used.
-    pub const SINGLE_LEVEL: u16 = 1 << 1;
-    /// Two levels were used.
-    pub const TWO_LEVELS: u16 = 1 << 2;
-    /// The full sequence was used.
-    pub const FULL_SEQUENCE: u16 = 1 << 3;
-    /// Stepped up from a shorter sequence.
-    pub const STEPPED_UP: u16 = 1 << 4;
-    /// The head is simulated.
-    pub const SIMULATED: u16 = 1 << 5;
-    /// Measured while warming up.
-    pub const WARM_UP: u16 = 1 << 6;
-    /// At least one decision is doubtful; the station sets it from the gauges.
-    pub const DOUBTFUL: u16 = 1 << 7;
-    /// The recipe has no limit that a part can miss: PASS says only that the part was measured.
-    pub const JUDGES_NOTHING: u16 = 1 << 8;
-    /// The words for bits 0–8, in order.
-    pub const WORDS: [&str; 9] = [
-        "a pattern was taken again",
-        "a single level was used",
-        "two levels were used",
-        "the full sequence was used",
-        "measured again with a longer sequence",
-        "the head is simulated",
-        "measured while warming up",
-        "a decision is close to a limit",
-        "the recipe judges nothing: no gauge has a limit that a part can miss",
-    ];
+    bits! {
+        /// A pattern was retried.
+        RETRIED = 0, "a pattern was taken again";
+        /// A single level was used.
+        SINGLE_LEVEL = 1, "a single level was used";
+        /// Two levels were used.
+        TWO_LEVELS = 2, "two levels were used";
+        /// The full sequence was used.
+        FULL_SEQUENCE = 3, "the full sequence was used";
+        /// Stepped up from a shorter sequence.
+        STEPPED_UP = 4, "measured again with a longer sequence";
+        /// The head is simulated.
+        SIMULATED = 5, "the head is simulated";
+        /// Measured while warming up.
+        WARM_UP = 6, "measured while warming up";
+        /// At least one decision is doubtful; the station sets it from the gauges.
+        DOUBTFUL = 7, "a decision is close to a limit";
+        /// The recipe has no limit that a part can miss: PASS says only that the part was measured.
+        JUDGES_NOTHING = 8, "the recipe judges nothing: no gauge has a limit that a part can miss";
+    }
 }
 
 /// The pose of a part relative to its pose at teaching.
@@ -116,18 +106,22 @@ impl Placement {
     }
 }
 
-/// The worker's report of one cycle.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// The worker's report of one cycle; what the page shows of it as it is, under the fields' names.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Inspection {
     /// The worker's judgement; [`Inspection::verdict`] is what counts.
+    #[serde(skip)]
     pub judged: Verdict,
     /// Why it is INVALID, in words; empty otherwise.
     pub reason: Option<Arc<str>>,
     /// 0, or why it is INVALID as a code.
+    #[serde(skip)]
     pub error_code: u16,
     /// What its frames show of the head: WARNING bits `LOW_LIGHT`, `SATURATION`, `PATTERN_UNFIT`, `FRAME_SLIP`.
+    #[serde(skip)]
     pub warnings: u16,
     /// The recipe's gauges, in its order.
+    #[serde(skip)]
     pub gauges: heapless::Vec<GaugeValue, MAX_GAUGES>,
     /// Resolved pixels.
     pub valid_points: u32,
@@ -140,6 +134,7 @@ pub struct Inspection {
     /// Pattern fitness, ‰; 1000 = as taught.
     pub fitness_permille: u16,
     /// See [`flag`].
+    #[serde(skip)]
     pub flags: u16,
     /// What was not computed.
     pub skipped: Skipped,
@@ -151,6 +146,7 @@ pub struct Inspection {
     /// The part's pose, if it was aligned.
     pub placement: Option<Placement>,
     /// Why the part should be measured again with the next longer sequence, where there is one.
+    #[serde(skip)]
     pub step_up: Option<&'static str>,
 }
 
@@ -173,9 +169,7 @@ impl Inspection {
             judged => judged,
         }
     }
-}
 
-impl Inspection {
     /// The gauges whose values lie in a guard band, if none lies outside its limits.
     pub fn guarded(&self) -> impl Iterator<Item = &GaugeValue> {
         let outside = |gauge: &GaugeValue| gauge.decision.low || gauge.decision.high;
@@ -186,7 +180,7 @@ impl Inspection {
 }
 
 /// A complete result: what registers 200–319 show.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ResultRecord {
     /// RESULT_SEQ of this result.
     pub seq: u32,
@@ -197,6 +191,7 @@ pub struct ResultRecord {
     /// The recipe's name at the trigger.
     pub recipe_name: Arc<str>,
     /// First 32 bits of the recipe's fingerprint.
+    #[serde(skip)]
     pub recipe_crc: u32,
     /// PART_ID at the trigger.
     pub part_id: u32,
@@ -209,14 +204,17 @@ pub struct ResultRecord {
     /// Trigger time in µs since 1970 UTC, 0 if the clock is not synchronised.
     pub time_utc_us: u64,
     /// Trigger time since the start of the daemon, s; also known while the clock is not synchronised.
+    #[serde(skip)]
     pub uptime_s: u32,
     /// BOOT_ID of that start.
+    #[serde(skip)]
     pub boot_id: u32,
     /// Trigger → exposure done, µs.
     pub exposure_us: u32,
     /// Trigger → result, µs.
     pub total_us: u32,
     /// The worker's report. After a failure it is empty but for `reason`.
+    #[serde(flatten)]
     pub inspection: Arc<Inspection>,
 }
 

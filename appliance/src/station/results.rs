@@ -33,7 +33,7 @@ impl Counts {
 }
 
 /// The results since the start.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Results {
     /// RESULT_SEQ of the last result, also of the run before.
     pub(super) last_seq: u32,
@@ -60,14 +60,7 @@ impl Results {
     pub(super) fn new(next_seq: u32) -> Self {
         Self {
             last_seq: next_seq.wrapping_sub(1),
-            unstored: false,
-            counts: Counts::default(),
-            latest: None,
-            valid: false,
-            toggle: false,
-            exposure_done: false,
-            queue: heapless::Deque::new(),
-            overflow_latch: false,
+            ..Self::default()
         }
     }
 

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::clock::Micros;
 use super::control::{self, ControlRegisters};
 use super::fault::Fault;
@@ -14,83 +16,76 @@ use super::state::State;
 
 /// STATUS bits, register 100.
 pub mod status {
-    /// The PLC asks for ONLINE and the station neither boots nor stops.
-    pub const ONLINE: u16 = 1 << 0;
-    /// A trigger would be accepted.
-    pub const READY: u16 = 1 << 1;
-    /// Exposing.
-    pub const BUSY: u16 = 1 << 2;
-    /// Computing.
-    pub const PROCESSING: u16 = 1 << 3;
-    /// The part may move.
-    pub const EXPOSURE_DONE: u16 = 1 << 4;
-    /// RESULT holds an unacknowledged result of the last trigger.
-    pub const RESULT_VALID: u16 = 1 << 5;
-    /// Inverts with every result.
-    pub const RESULT_TOGGLE: u16 = 1 << 6;
-    /// Follows CONTROL.1.
-    pub const TRIGGER_ACK: u16 = 1 << 7;
-    /// A recipe is being loaded.
-    pub const RECIPE_LOADING: u16 = 1 << 8;
-    /// The requested recipe is the active one.
-    pub const RECIPE_OK: u16 = 1 << 9;
-    /// A bit of WARNING is set.
-    pub const WARNING: u16 = 1 << 10;
-    /// ERROR_CODE is not 0.
-    pub const ERROR: u16 = 1 << 11;
-    /// A trigger was rejected; latched.
-    pub const MISSED_TRIGGER: u16 = 1 << 12;
-    /// A result was not queued; latched.
-    pub const BUFFER_OVERFLOW: u16 = 1 << 13;
-    /// The head warms up.
-    pub const WARMING_UP: u16 = 1 << 14;
-    /// The calibration is there and fits.
-    pub const CALIBRATION_VALID: u16 = 1 << 15;
+    bits! {
+        /// The PLC asks for ONLINE and the station neither boots nor stops.
+        ONLINE = 0;
+        /// A trigger would be accepted.
+        READY = 1;
+        /// Exposing.
+        BUSY = 2;
+        /// Computing.
+        PROCESSING = 3;
+        /// The part may move.
+        EXPOSURE_DONE = 4;
+        /// RESULT holds an unacknowledged result of the last trigger.
+        RESULT_VALID = 5;
+        /// Inverts with every result.
+        RESULT_TOGGLE = 6;
+        /// Follows CONTROL.1.
+        TRIGGER_ACK = 7;
+        /// A recipe is being loaded.
+        RECIPE_LOADING = 8;
+        /// The requested recipe is the active one.
+        RECIPE_OK = 9;
+        /// A bit of WARNING is set.
+        WARNING = 10;
+        /// ERROR_CODE is not 0.
+        ERROR = 11;
+        /// A trigger was rejected; latched.
+        MISSED_TRIGGER = 12;
+        /// A result was not queued; latched.
+        BUFFER_OVERFLOW = 13;
+        /// The head warms up.
+        WARMING_UP = 14;
+        /// The calibration is there and fits.
+        CALIBRATION_VALID = 15;
+    }
 }
 
 /// WARNING bits, register 103.
 pub mod warning {
-    /// The head is too warm or too cold.
-    pub const TEMPERATURE: u16 = 1 << 0;
-    /// Storage is nearly full or slow.
-    pub const STORAGE: u16 = 1 << 1;
-    /// PLC_HEARTBEAT stands still.
-    pub const PLC_LOST: u16 = 1 << 2;
-    /// The clock is not synchronised.
-    pub const CLOCK_UNSYNCED: u16 = 1 << 3;
-    /// Too little light comes back.
-    pub const LOW_LIGHT: u16 = 1 << 4;
-    /// Too much light comes back.
-    pub const SATURATION: u16 = 1 << 5;
-    /// The adaptive pattern no longer fits the part.
-    pub const PATTERN_UNFIT: u16 = 1 << 6;
-    /// Camera and projector slipped by a frame.
-    pub const FRAME_SLIP: u16 = 1 << 7;
-    /// The computer's supply is too weak, or the computer slows itself down.
-    pub const POWER: u16 = 1 << 8;
-    /// Camera and projector no longer stand to each other as they were calibrated.
-    pub const GEOMETRY: u16 = 1 << 9;
+    bits! {
+        /// The head is too warm or too cold.
+        TEMPERATURE = 0, "temperature";
+        /// Storage is nearly full or slow.
+        STORAGE = 1, "storage";
+        /// PLC_HEARTBEAT stands still.
+        PLC_LOST = 2, "PLC lost";
+        /// The clock is not synchronised.
+        CLOCK_UNSYNCED = 3, "clock not synchronised";
+        /// Too little light comes back.
+        LOW_LIGHT = 4, "low light";
+        /// Too much light comes back.
+        SATURATION = 5, "saturation";
+        /// The adaptive pattern no longer fits the part.
+        PATTERN_UNFIT = 6, "pattern unfit";
+        /// Camera and projector slipped by a frame.
+        FRAME_SLIP = 7, "frame slip";
+        /// The computer's supply is too weak, or the computer slows itself down.
+        POWER = 8, "power";
+        /// Camera and projector no longer stand to each other as they were calibrated.
+        GEOMETRY = 9, "geometry";
+    }
+
     /// Those that the frames of a part show.
     pub const OF_A_PART: u16 = LOW_LIGHT | SATURATION | PATTERN_UNFIT | FRAME_SLIP;
-    /// The words for bits 0–9, in order.
-    pub const WORDS: [&str; 10] = [
-        "temperature",
-        "storage",
-        "PLC lost",
-        "clock not synchronised",
-        "low light",
-        "saturation",
-        "pattern unfit",
-        "frame slip",
-        "power",
-        "geometry",
-    ];
 }
 
 /// Names of this device.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Identity {
     /// For FC43/14.
+    #[serde(skip)]
     pub vendor: String,
     /// For FC43/14.
     pub product: String,
@@ -101,7 +96,7 @@ pub struct Identity {
 }
 
 /// How far teaching has come.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TeachProgress {
     /// The recipe being taught.
     pub number: u16,

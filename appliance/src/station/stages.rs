@@ -1,7 +1,10 @@
 //! The stages of a cycle, and how much wall time each took.
 
-/// A stage of a cycle, in the order in which they happen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+use serde::{Deserialize, Serialize};
+
+/// A stage of a cycle, in the order in which they happen. In JSON it is its name.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Stage {
     /// From the trigger to the measuring task.
     Waiting,
@@ -40,9 +43,10 @@ impl Stage {
 }
 
 /// How long one stage took.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct StageTime {
     /// Which.
+    #[serde(rename = "name")]
     pub stage: Stage,
     /// µs.
     pub us: u32,
@@ -50,7 +54,7 @@ pub struct StageTime {
 
 /// The times of a cycle's stages, in the order in which they first happened. A stage that happens again, with a longer
 /// sequence, adds to its time.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stages(heapless::Vec<StageTime, { Stage::COUNT }>);
 
 impl Stages {

@@ -8,7 +8,7 @@ const NICE: libc::c_int = 10;
 const PROMPT: libc::c_int = 20;
 
 /// What a thread got that must not be late.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Prompt {
     /// A real-time priority.
     pub real_time: bool,
@@ -65,19 +65,13 @@ pub fn be_prompt(core: Option<usize>) -> Prompt {
 /// Elsewhere all threads have the same priority.
 #[cfg(not(target_os = "linux"))]
 pub fn be_prompt(_: Option<usize>) -> Prompt {
-    Prompt {
-        real_time: false,
-        core: None,
-    }
+    Prompt::default()
 }
 
 /// What the thread that ends the trigger's pulses gets on this computer.
 pub fn prompt(core: Option<usize>) -> Prompt {
     let tried = std::thread::spawn(move || be_prompt(core)).join();
-    tried.unwrap_or(Prompt {
-        real_time: false,
-        core: None,
-    })
+    tried.unwrap_or_default()
 }
 
 #[cfg(test)]

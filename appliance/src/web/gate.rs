@@ -48,6 +48,18 @@ pub fn is_signed_in(site: &Site, headers: &HeaderMap) -> bool {
     token(headers).is_some_and(|token| site.access.is_signed_in(token, Instant::now()))
 }
 
+/// Refuses a request without a session.
+///
+/// # Errors
+/// How to sign in.
+pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Result<(), Problem> {
+    let words = "sign in first: POST the device's secret to /api/session";
+    let refused = || Problem::new(StatusCode::UNAUTHORIZED, words);
+    is_signed_in(site, headers)
+        .then_some(())
+        .ok_or_else(refused)
+}
+
 /// The cookie that holds a session's token, or without one the cookie that deletes it.
 pub fn cookie(token: Option<&Token>) -> Option<HeaderValue> {
     let (value, age) = token.map_or(("", 0), |token| (token.text(), MAX_AGE_S));
@@ -79,11 +91,9 @@ pub async fn signed_in_only(
     next: Next,
 ) -> Response {
     let subject = request.uri().path().trim_start_matches("/api/").to_owned();
-    let response = if is_signed_in(&site, request.headers()) {
-        next.run(request).await
-    } else {
-        let words = "sign in first: POST the device's secret to /api/session";
-        Problem::new(StatusCode::UNAUTHORIZED, words).into_response()
+    let response = match signed_in(&site, request.headers()) {
+        Ok(()) => next.run(request).await,
+        Err(problem) => problem.into_response(),
     };
     let refused = response.extensions().get::<Outcome>();
     let changed = response.extensions().get::<Changed>();

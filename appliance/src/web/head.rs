@@ -2,17 +2,16 @@
 
 use axum::body::Body;
 use axum::extract::{Path, Query, Request, State};
-use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
 use serde_json::Value;
-use tokio::sync::oneshot;
 
 use super::body;
-use super::gate::is_signed_in;
+use super::gate::signed_in;
 use super::orders::{Accepted, accepted, not_now};
 use super::problem::Problem;
-use super::site::Site;
+use super::site::{Site, alone};
 use crate::head::board;
 use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
 use crate::head::commission::{Solving, Step};
@@ -110,26 +109,23 @@ async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked, Problem> {
         "plane" => Some(Step::Plane),
         _ => None,
     };
-    if let Some(step) = plain {
-        let Nothing {} = body::json_if_any(body).await?;
-        return Ok(Asked {
-            step,
-            exposing: None,
-        });
-    }
-    match name {
-        "exposure" => exposure(site, body::json_if_any(body).await?),
-        "geometry" => {
-            let step = geometry(site, body::json(body).await?).map_err(Problem::unfit)?;
-            Ok(Asked {
-                step,
-                exposing: None,
-            })
+    let step = match (name, plain) {
+        (_, Some(step)) => {
+            let Nothing {} = body::json_if_any(body).await?;
+            step
         }
-        _ => Err(Problem::missing(
-            "there are the steps devices, aim, exposure, timing, geometry and plane",
-        )),
-    }
+        ("exposure", _) => return exposure(site, body::json_if_any(body).await?),
+        ("geometry", _) => geometry(site, body::json(body).await?).map_err(Problem::unfit)?,
+        _ => {
+            return Err(Problem::missing(
+                "there are the steps devices, aim, exposure, timing, geometry and plane",
+            ));
+        }
+    };
+    Ok(Asked {
+        step,
+        exposing: None,
+    })
 }
 
 fn exposure(site: &Site, wanted: Exposure) -> Result<Asked, Problem> {
@@ -201,17 +197,6 @@ pub(super) struct Shown {
     show: String,
 }
 
-/// Refuses who is not signed in: a live picture lights the part.
-fn signed_in(site: &Site, headers: &HeaderMap) -> Result<(), Problem> {
-    match is_signed_in(site, headers) {
-        true => Ok(()),
-        false => {
-            let words = "sign in first: POST the device's secret to /api/session";
-            Err(Problem::new(StatusCode::UNAUTHORIZED, words))
-        }
-    }
-}
-
 pub(super) async fn live(
     State(site): State<Site>,
     headers: HeaderMap,
@@ -227,27 +212,19 @@ pub(super) async fn live(
         return Err(not_now("take a picture", &snapshot));
     }
     let live = site.live.clone();
-    let taken = aside(move || live.look(show)).await?;
-    let (number, png) = taken.map_err(|error| Problem::busy(error.to_string()))?;
+    let failed = "taking the picture failed; see the log";
+    let taken = alone("looking", failed, move || {
+        // The measuring task needs the cores.
+        priority::give_way();
+        live.look(show)
+    });
+    let (number, png) = taken
+        .await?
+        .map_err(|error| Problem::busy(error.to_string()))?;
     let mut response = ([(header::CONTENT_TYPE, "image/png")], png).into_response();
     let headers = response.headers_mut();
     headers.insert(NUMBER, HeaderValue::from(number));
     Ok(response)
-}
-
-/// Works on a thread of its own with a low priority: the measuring task needs the cores.
-async fn aside<T: Send + 'static>(work: impl FnOnce() -> T + Send + 'static) -> Result<T, Problem> {
-    let broken = || Problem::broken("taking the picture failed; see the log");
-    let (done, answer) = oneshot::channel();
-    std::thread::Builder::new()
-        .name("looking".into())
-        .spawn(move || {
-            priority::give_way();
-            // The client may have closed its connection.
-            let _ = done.send(work());
-        })
-        .map_err(|_| broken())?;
-    answer.await.map_err(|_| broken())
 }
 
 pub(super) async fn figures(

@@ -11,7 +11,6 @@ use super::look::{map_of, place_of};
 use super::map::Map;
 use super::problem::Problem;
 use super::site::Site;
-use super::view;
 use crate::error::{Exit, Failure};
 use crate::history::kept::Kept;
 use crate::history::why_no_frames;
@@ -28,7 +27,7 @@ pub(super) async fn one(
     let found = site.aside(move |site| {
         let entry = site.history.result(seq)?;
         let entry = entry.ok_or_else(|| unknown(seq))?;
-        let flags = view::set(entry.flags, &flag::WORDS);
+        let flags = flag::words(entry.flags).collect::<Vec<_>>();
         Ok(json!({ "result": entry, "flags": flags, "no_frames": why_no_frames(&entry) }))
     });
     found.await.map(Json)

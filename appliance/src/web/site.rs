@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use ipnet::IpNet;
 use serde_json::Value;
-use tokio::sync::{Mutex, Semaphore};
+use tokio::sync::{Mutex, Semaphore, oneshot};
 
 use super::kept::LastKept;
 use super::problem::Problem;
@@ -156,4 +156,23 @@ impl Site {
         let snapshot = self.station.snapshot();
         snapshot.result.as_ref().map_or(0, |result| result.seq)
     }
+}
+
+/// Does something on a thread of its own: a stop would wait for one of the runtime's.
+///
+/// # Errors
+/// `failed`, where there is no thread or it panics.
+pub(super) async fn alone<T: Send + 'static>(
+    name: &str,
+    failed: &str,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Result<T, Problem> {
+    let (done, answer) = oneshot::channel();
+    let run = move || {
+        // The client may have closed its connection.
+        let _ = done.send(work());
+    };
+    let begun = std::thread::Builder::new().name(name.into()).spawn(run);
+    begun.map_err(|_| Problem::broken(failed))?;
+    answer.await.map_err(|_| Problem::broken(failed))
 }

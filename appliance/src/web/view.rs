@@ -21,15 +21,15 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
         "calibration_valid": snapshot.is(status::CALIBRATION_VALID),
         "missed_trigger": snapshot.is(status::MISSED_TRIGGER),
         "buffer_overflow": snapshot.is(status::BUFFER_OVERFLOW),
-        "warnings": set(snapshot.warnings, &warning::WORDS),
+        "warnings": warning::words(snapshot.warnings).collect::<Vec<_>>(),
         "error": snapshot.error.as_ref().map(|words| json!({
-            "code": snapshot.error_code, "family": error_code::family(snapshot.error_code), "words": &**words,
+            "code": snapshot.error_code, "family": error_code::family(snapshot.error_code), "words": words,
         })),
         "fault": snapshot.fault.as_ref().map(|fault| json!({
-            "code": fault.code, "family": error_code::family(fault.code), "cause": &*fault.cause, "remedy": &*fault.remedy,
+            "code": fault.code, "family": error_code::family(fault.code), "cause": fault.cause, "remedy": fault.remedy,
         })),
         "recipe": snapshot.recipe.as_ref().map(|recipe| json!({
-            "number": recipe.number, "fingerprint": format!("{:08x}", recipe.crc), "name": &*recipe.name,
+            "number": recipe.number, "fingerprint": format!("{:08x}", recipe.crc), "name": recipe.name,
         })),
         "refusal": snapshot.refusal.map(|reason| json!({ "reason": reason, "words": snapshot.refusal_words() })),
         "requested_recipe": snapshot.requested_recipe,
@@ -42,12 +42,8 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
             "buffered": snapshot.buffered,
         },
         "last_token": snapshot.last_token,
-        "teach": snapshot.teach.as_ref().map(|teach| json!({
-            "number": teach.number, "fraction": teach.fraction, "words": &*teach.words,
-        })),
-        "identity": {
-            "product": snapshot.identity.product, "serial": snapshot.identity.serial, "version": snapshot.identity.version,
-        },
+        "teach": snapshot.teach,
+        "identity": snapshot.identity,
         "health": health(&snapshot.health),
         "result": snapshot.result.as_deref().map(result),
     })
@@ -73,49 +69,22 @@ fn health(health: &Health) -> Value {
     shown
 }
 
-/// The words of the bits that are set.
-pub(super) fn set(bits: u16, words: &[&'static str]) -> Vec<&'static str> {
-    let words = words.iter().enumerate();
-    let set = words.filter(|(bit, _)| bits >> bit & 1 == 1);
-    set.map(|(_, word)| *word).collect()
-}
-
 fn result(record: &ResultRecord) -> Value {
     let found = &record.inspection;
-    json!({
-        "seq": record.seq,
-        "token": record.token,
-        "recipe": record.recipe,
-        "recipe_name": &*record.recipe_name,
-        "fingerprint": format!("{:08x}", record.recipe_crc),
-        "part_id": record.part_id,
-        "press_stroke": record.press_stroke,
-        "verdict": record.verdict.word(),
-        "error_code": record.error_code,
-        "reason": found.reason.as_deref(),
-        "time_utc_us": record.time_utc_us,
-        "exposure_us": record.exposure_us,
-        "total_us": record.total_us,
-        "processing_us": record.stages().processing_us(),
-        "cpu_us": found.cpu_us,
-        "valid_points": found.valid_points,
-        "coverage_permille": found.coverage_permille,
-        "temperature_c": found.temperature_c,
-        "height_noise_mm": found.height_noise_mm,
-        "fitness_permille": found.fitness_permille,
-        "simulated": record.flags() & flag::SIMULATED != 0,
-        "doubtful": record.flags() & flag::DOUBTFUL != 0,
-        "judges_nothing": record.flags() & flag::JUDGES_NOTHING != 0,
-        "skipped": {
-            "outside": found.skipped.outside,
-            "unexpected": found.skipped.unexpected,
-            "dark": found.skipped.dark,
-            "exact": found.skipped.exact,
-        },
-        "placement": found.placement.as_ref().map(placement),
-        "gauges": found.gauges.iter().map(gauge).collect::<Vec<_>>(),
-        "stages": record.stages().iter().map(|time| json!({ "name": time.stage.name(), "us": time.us })).collect::<Vec<_>>(),
-    })
+    let mut shown = json!(record);
+    shown["fingerprint"] = json!(format!("{:08x}", record.recipe_crc));
+    for (name, bit) in [
+        ("simulated", flag::SIMULATED),
+        ("doubtful", flag::DOUBTFUL),
+        ("judges_nothing", flag::JUDGES_NOTHING),
+    ] {
+        shown[name] = json!(record.flags() & bit != 0);
+    }
+    shown["gauges"] = found.gauges.iter().map(gauge).collect();
+    shown["placement"] = found.placement.as_ref().map(placement).into();
+    shown["processing_us"] = json!(record.stages().processing_us());
+    shown["stages"] = json!(record.stages());
+    shown
 }
 
 /// Shifts in mm, turns in degrees; null where the part's shape does not determine them.
@@ -129,22 +98,7 @@ fn placement(placement: &Placement) -> Value {
 }
 
 fn gauge(gauge: &GaugeValue) -> Value {
-    let decision = gauge.decision;
-    json!({
-        "name": &*gauge.name,
-        "kind": gauge.unit,
-        "unit": gauge.unit.symbol(),
-        "value": gauge.value.filter(|_| decision.valid),
-        "sigma": gauge.sigma,
-        "uncertainty": gauge.uncertainty,
-        "expected": gauge.expected,
-        "square": gauge.square,
-        "lowest": gauge.low,
-        "highest": gauge.high,
-        "pass": decision.pass,
-        "valid": decision.valid,
-        "low": decision.low,
-        "high": decision.high,
-        "doubtful": decision.doubtful,
-    })
+    let mut shown = json!(gauge);
+    shown["unit"] = json!(gauge.unit.symbol());
+    shown
 }

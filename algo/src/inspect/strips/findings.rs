@@ -35,6 +35,7 @@ pub struct Findings {
 
 /// What was not computed, or not by the fast way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Skipped {
     /// Pixels outside of every gauge's region and smoothing.
     pub outside: u64,

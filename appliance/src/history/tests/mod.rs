@@ -5,8 +5,8 @@ mod log;
 use super::*;
 use crate::station::snapshot::warning;
 use crate::station::{
-    Counts, Effect, Identity, Inspection, Limits, Micros, Placement, ResultRecord, Settings,
-    Station, StationHandle, Verdict,
+    Counts, Effect, Identity, Inspection, Limits, Micros, Placement, ResultRecord, Settings, Stage,
+    Stages, Station, StationHandle, Verdict,
 };
 use crate::storage::state::StateFolder;
 use std::path::Path;
@@ -28,6 +28,8 @@ fn entry(seq: u32, recipe: u16, verdict: Verdict) -> Entry {
         high: Some(0.1 + 0.2),
         decision: 3,
     };
+    let mut stages = Stages::default();
+    stages.add(Stage::Strips, 7);
     Entry {
         seq,
         time_utc_us: Some(1_000_000 * u64::from(seq)),
@@ -37,10 +39,7 @@ fn entry(seq: u32, recipe: u16, verdict: Verdict) -> Entry {
         verdict,
         reason: Some("a, \"b\"".into()),
         height_noise_mm: Some(f64::from(seq) / 3.0),
-        stages: vec![StageEntry {
-            name: "strips".into(),
-            us: 7,
-        }],
+        stages,
         gauges: vec![
             gauge("deviation", f64::from(seq).sqrt()),
             gauge("-step", f64::MIN_POSITIVE),
@@ -205,7 +204,7 @@ fn each_part_without_frames_says_why() {
         assert!(why(1).contains(words), "{}", why(1));
     }
     let nothing = Entry {
-        stages: Vec::new(),
+        stages: Stages::default(),
         ..entry(4, 1, Verdict::Invalid)
     };
     assert!(

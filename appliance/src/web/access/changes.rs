@@ -1,5 +1,6 @@
 //! The record of changes: from which address what was changed and when, as JSON lines, of limited size.
 
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read as _, Seek as _, SeekFrom, Write as _};
@@ -13,7 +14,7 @@ const FULL_BYTES: u64 = 512 << 10;
 const SHOWN_BYTES: u64 = 64 << 10;
 
 /// One change, done or refused.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change<'a> {
     /// When, in µs since 1970 UTC; none if the clock is not synchronised.
     pub utc_us: Option<u64>,
@@ -54,10 +55,8 @@ impl Changes {
     /// # Errors
     /// Whatever the file system answers.
     pub fn add(&self, change: &Change<'_>) -> std::io::Result<()> {
-        let line = json!({
-            "utc_us": change.utc_us, "uptime_s": change.uptime_s, "boot_id": format!("{:08x}", change.boot_id),
-            "from": change.from, "action": change.action, "subject": change.subject, "outcome": change.outcome, "changed": change.changed,
-        });
+        let mut line = json!(change);
+        line["boot_id"] = format!("{:08x}", change.boot_id).into();
         let _one = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         if fs::metadata(&self.path).is_ok_and(|file| file.len() >= FULL_BYTES) {
             fs::rename(&self.path, self.path.with_extension("previous.jsonl"))?;
