@@ -131,6 +131,15 @@ pub(super) struct Problem<'a> {
     pub sigma: [f64; 2],
 }
 
+/// Normal equations scaled to a diagonal of ones.
+struct ScaledNormal {
+    /// The lower triangle, row-major.
+    matrix: Vec<f64>,
+    right: Vec<f64>,
+    /// 1/√ of the diagonal before: the unknowns are the solution times these.
+    scale: Vec<f64>,
+}
+
 impl Problem<'_> {
     /// Steps until the cost stands still.
     fn round(&self, first: Rig) -> Result<Rig, Undetermined> {
@@ -138,9 +147,9 @@ impl Problem<'_> {
         let mut cost = self.cost(&rig).ok_or(Undetermined)?;
         let mut damping = 1e-4;
         for _ in 0..STEPS {
-            let (normal, right) = self.normal(&rig).ok_or(Undetermined)?;
+            let normal = self.normal(&rig).ok_or(Undetermined)?;
             loop {
-                let next = self.step(&normal, &right, damping).map(|by| rig.moved(&by));
+                let next = self.step(&normal, damping).map(|by| rig.moved(&by));
                 let found = next.as_ref().and_then(|next| self.cost(next));
                 if let (Some(next), Some(found)) = (next, found)
                     && found <= cost
@@ -161,21 +170,16 @@ impl Problem<'_> {
         Ok(rig)
     }
 
-    /// Changes of all numbers by one damped step. The normal matrix is scaled to a diagonal of ones before it is solved.
-    fn step(&self, normal: &[f64], right: &[f64], damping: f64) -> Option<Vec<f64>> {
+    /// Changes of all numbers by one damped step.
+    fn step(&self, normal: &ScaledNormal, damping: f64) -> Option<Vec<f64>> {
         let n = self.free.len();
-        let scale = scales(normal, n)?;
-        let mut scaled: Vec<f64> = normal.to_vec();
+        let (mut damped, mut solved) = (normal.matrix.clone(), normal.right.clone());
         for i in 0..n {
-            for j in 0..n {
-                scaled[i * n + j] *= scale[i] * scale[j];
-            }
-            scaled[i * n + i] = 1.0 + damping;
+            damped[i * n + i] = 1.0 + damping;
         }
-        let mut b: Vec<f64> = right.iter().zip(&scale).map(|(b, s)| b * s).collect();
-        let solved = solve_symmetric(&mut scaled, &mut b)?;
+        solve_symmetric(&mut damped, &mut solved)?;
         let mut by = vec![0.0; SHARED + POSE * self.views.len()];
-        for ((&at, x), s) in self.free.iter().zip(&solved).zip(&scale) {
+        for ((&at, x), s) in self.free.iter().zip(&solved).zip(&normal.scale) {
             by[at] = x * s;
         }
         Some(by)
@@ -218,10 +222,10 @@ impl Problem<'_> {
         sum.is_finite().then_some(sum)
     }
 
-    /// Normal matrix and right side over the free numbers.
-    fn normal(&self, rig: &Rig) -> Option<(Vec<f64>, Vec<f64>)> {
+    /// The normal equations over the free numbers.
+    fn normal(&self, rig: &Rig) -> Option<ScaledNormal> {
         let n = self.free.len();
-        let (mut normal, mut right) = (vec![0.0; n * n], vec![0.0; n]);
+        let (mut matrix, mut right) = (vec![0.0; n * n], vec![0.0; n]);
         for at in 0..self.views.len() {
             let residuals = self.view(rig, at)?;
             let own = SHARED + POSE * at..SHARED + POSE * (at + 1);
@@ -239,18 +243,28 @@ impl Problem<'_> {
                     let slope = [slopes[a][k][0] * weight, slopes[a][k][1] * weight];
                     right[i] += slope[0] * residual[0] + slope[1] * residual[1];
                     for (b, &j) in numbers[..=a].iter().enumerate() {
-                        normal[i * n + j] +=
+                        matrix[i * n + j] +=
                             slope[0] * slopes[b][k][0] + slope[1] * slopes[b][k][1];
                     }
                 }
             }
         }
+        let scale = |i: usize| {
+            let diagonal = matrix[i * n + i];
+            (diagonal > 0.0).then(|| 1.0 / libm::sqrt(diagonal))
+        };
+        let scale = (0..n).map(scale).collect::<Option<Vec<f64>>>()?;
         for i in 0..n {
-            for j in i + 1..n {
-                normal[i * n + j] = normal[j * n + i];
+            for j in 0..=i {
+                matrix[i * n + j] *= scale[i] * scale[j];
             }
+            right[i] *= scale[i];
         }
-        Some((normal, right))
+        Some(ScaledNormal {
+            matrix,
+            right,
+            scale,
+        })
     }
 
     /// Derivatives of a view's predictions with one number.
@@ -307,20 +321,13 @@ impl Problem<'_> {
     }
 
     fn covariance(&self, rig: &Rig) -> Option<Vec<f64>> {
-        let (normal, _) = self.normal(rig)?;
+        let ScaledNormal { matrix, scale, .. } = self.normal(rig)?;
         let n = self.free.len();
-        let scale = scales(&normal, n)?;
-        let mut scaled = normal;
-        for i in 0..n {
-            for j in 0..n {
-                scaled[i * n + j] *= scale[i] * scale[j];
-            }
-        }
         let mut inverse = vec![0.0; n * n];
         for i in 0..n {
-            let mut unit = vec![0.0; n];
-            unit[i] = 1.0;
-            let column = solve_symmetric(&mut scaled.clone(), &mut unit)?;
+            let mut column = vec![0.0; n];
+            column[i] = 1.0;
+            solve_symmetric(&mut matrix.clone(), &mut column)?;
             for j in 0..n {
                 inverse[i * n + j] = column[j] * scale[i] * scale[j];
             }
@@ -354,15 +361,6 @@ pub(super) fn places<'a>(
 pub(super) fn weight(residual: [f64; 2], sigma: f64) -> f64 {
     let r = libm::hypot(residual[0], residual[1]) / sigma;
     if r <= HUBER { 1.0 } else { HUBER / r }
-}
-
-/// 1/√ of the diagonal.
-fn scales(normal: &[f64], n: usize) -> Option<Vec<f64>> {
-    let scale = |i: usize| {
-        let diagonal = normal[i * n + i];
-        (diagonal > 0.0).then(|| 1.0 / libm::sqrt(diagonal))
-    };
-    (0..n).map(scale).collect()
 }
 
 /// Step of a number's differences: its effect on a pixel is about 1e-3 px, where the predictions are exact to 1e-10.

@@ -7,7 +7,7 @@
 //! picture is.
 
 use super::picture::Picture;
-use crate::math::solve::solve_symmetric;
+use crate::math::solve::Normal;
 
 /// Unknowns.
 const N: usize = 9;
@@ -55,13 +55,11 @@ pub(super) fn locate(
     window.contrast(&mut fit)?;
     let (mut damping, mut cost) = (1e-3, window.cost(&fit));
     for _ in 0..STEPS {
-        let (normal, right) = window.normal(&fit);
-        let mut damped = normal;
+        let mut normal = window.normal(&fit);
         for i in 0..N {
-            damped[i * N + i] *= 1.0 + damping;
+            normal.matrix[i][i] *= 1.0 + damping;
         }
-        let mut b = right;
-        let step = solve_symmetric(&mut damped, &mut b)?;
+        let step = normal.solve()?;
         let mut next = fit;
         next.iter_mut().zip(&step).for_each(|(x, dx)| *x += dx);
         next[4] = next[4].clamp(SHARPEST, radius / 2.0);
@@ -147,20 +145,12 @@ impl<'a> Window<'a> {
     }
 
     /// Normal equations of a step.
-    fn normal(&self, fit: &[f64; N]) -> ([f64; N * N], [f64; N]) {
-        let (mut normal, mut right) = ([0.0; N * N], [0.0; N]);
+    fn normal(&self, fit: &[f64; N]) -> Normal<N> {
         let model = Model::new(fit);
-        for (u, v, counts) in self.pixels() {
+        Normal::of(self.pixels().map(|(u, v, counts)| {
             let (value, slopes) = model.slopes(u, v);
-            let off = counts - value;
-            for i in 0..N {
-                right[i] += slopes[i] * off;
-                for j in 0..=i {
-                    normal[i * N + j] += slopes[i] * slopes[j];
-                }
-            }
-        }
-        (normal, right)
+            (slopes, counts - value)
+        }))
     }
 
     /// The corner, if the model explains the picture.

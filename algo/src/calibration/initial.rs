@@ -9,38 +9,8 @@
 use super::board::Board;
 use super::pose::Pose;
 use crate::geometry::{Lens, Vector};
-use crate::math::solve::solve_symmetric;
-use alloc::vec;
+use crate::math::solve::Normal;
 use alloc::vec::Vec;
-
-/// Linear least squares: equations a·x = b.
-struct Equations {
-    normal: Vec<f64>,
-    right: Vec<f64>,
-}
-
-impl Equations {
-    fn new(unknowns: usize) -> Self {
-        Self {
-            normal: vec![0.0; unknowns * unknowns],
-            right: vec![0.0; unknowns],
-        }
-    }
-
-    fn add(&mut self, a: &[f64], b: f64) {
-        let n = self.right.len();
-        for i in 0..n {
-            self.right[i] += a[i] * b;
-            for j in 0..=i {
-                self.normal[i * n + j] += a[i] * a[j];
-            }
-        }
-    }
-
-    fn solve(mut self) -> Option<Vec<f64>> {
-        solve_symmetric(&mut self.normal, &mut self.right)
-    }
-}
 
 /// A corner's place on the board and in the picture.
 pub(super) type Pair = ((f64, f64), (f64, f64));
@@ -48,12 +18,13 @@ pub(super) type Pair = ((f64, f64), (f64, f64));
 /// The columns of H from places on the board to places in the picture, both about their centres and of the order of 1: then its last element
 /// is not 0 and is set to 1.
 fn homography(pairs: impl Iterator<Item = Pair>) -> Option<[Vector; 3]> {
-    let mut equations = Equations::new(8);
-    for ((x, y), (u, v)) in pairs {
-        equations.add(&[x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], u);
-        equations.add(&[0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y], v);
-    }
-    let h = equations.solve()?;
+    let equations = pairs.flat_map(|((x, y), (u, v))| {
+        [
+            ([x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], u),
+            ([0.0, 0.0, 0.0, x, y, 1.0, -v * x, -v * y], v),
+        ]
+    });
+    let h = Normal::of(equations).solve()?;
     Some([
         Vector::new(h[0], h[3], h[6]),
         Vector::new(h[1], h[4], h[7]),
@@ -73,7 +44,7 @@ pub(super) fn camera(
         cx.max(cy).max(1.0),
         board.square * board.columns.max(board.rows) as f64,
     );
-    let mut equations = Equations::new(2);
+    let mut equations = Normal::default();
     let mut homographies = Vec::with_capacity(poses.len());
     for pairs in poses {
         let scaled = pairs
@@ -97,9 +68,9 @@ pub(super) fn camera(
         );
         homographies.push(h);
     }
-    let inverse_squares = equations.solve()?;
+    let [x, y] = equations.solve()?;
     let focal = |of: f64| (of > 1e-4 && of < 1e4).then(|| libm::sqrt(1.0 / of));
-    let (fx, fy) = (focal(inverse_squares[0])?, focal(inverse_squares[1])?);
+    let (fx, fy) = (focal(x)?, focal(y)?);
     let poses = homographies.into_iter().map(|h| {
         let [x, y, t] = h.map(|h| Vector::new(h.x / fx, h.y / fy, h.z));
         let length = size * 2.0 / (x.length() + y.length());
@@ -145,21 +116,15 @@ pub(super) fn projector(points: &[(Vector, (f64, f64))]) -> Option<Result<(Lens,
     if !(spread > 0.0 && scale > 0.0) {
         return None;
     }
-    let mut equations = Equations::new(11);
-    for (point, pixel) in points {
+    let equations = points.iter().flat_map(|(point, pixel)| {
         let p = (*point - centre) * (1.0 / spread);
         let (u, v) = ((pixel.0 - pixels.0) / scale, (pixel.1 - pixels.1) / scale);
         let (o, i) = (0.0, 1.0);
-        equations.add(
-            &[p.x, p.y, p.z, i, o, o, o, o, -u * p.x, -u * p.y, -u * p.z],
-            u,
-        );
-        equations.add(
-            &[o, o, o, o, p.x, p.y, p.z, i, -v * p.x, -v * p.y, -v * p.z],
-            v,
-        );
-    }
-    let m = equations.solve()?;
+        let along = [p.x, p.y, p.z, i, o, o, o, o, -u * p.x, -u * p.y, -u * p.z];
+        let down = [o, o, o, o, p.x, p.y, p.z, i, -v * p.x, -v * p.y, -v * p.z];
+        [(along, u), (down, v)]
+    });
+    let m = Normal::of(equations).solve()?;
     let row = |at: usize| Vector::new(m[at], m[at + 1], m[at + 2]);
     let (a, b, c) = (row(0), row(4), row(8));
     // M = λK[R|t] in the scaled coordinates, with λ·depth of the centre = 1: R's last row is c/λ.

@@ -3,7 +3,7 @@
 use super::adjust::{Adjusted, View};
 use super::predict::Target;
 use crate::geometry::Vector;
-use crate::math::solve::solve_symmetric;
+use crate::math::solve::Normal;
 use alloc::vec::Vec;
 
 /// A pose of the board as the calibrated head measures it.
@@ -73,21 +73,11 @@ impl Plane {
 
 /// The plane z = a + bx + cy of least squares.
 fn plane(points: &[Vector]) -> Option<Plane> {
-    let (mut normal, mut right) = ([0.0; 9], [0.0; 3]);
-    for point in points {
-        let terms = [1.0, point.x, point.y];
-        for i in 0..3 {
-            right[i] += terms[i] * point.z;
-            for j in 0..=i {
-                normal[i * 3 + j] += terms[i] * terms[j];
-            }
-        }
-    }
-    let fit = solve_symmetric(&mut normal, &mut right)?;
-    let normal = Vector::new(-fit[1], -fit[2], 1.0);
+    let [a, b, c] = Normal::of(points.iter().map(|p| ([1.0, p.x, p.y], p.z))).solve()?;
+    let normal = Vector::new(-b, -c, 1.0);
     let length = normal.length();
     Some(Plane {
         normal: normal * (1.0 / length),
-        distance: fit[0] / length,
+        distance: a / length,
     })
 }

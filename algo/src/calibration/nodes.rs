@@ -5,7 +5,7 @@
 
 use super::board::{Board, FoundBoard};
 use super::corner::Corner;
-use crate::math::solve::solve_symmetric;
+use crate::math::solve::Normal;
 use crate::pipeline::PhaseMap;
 use alloc::vec::Vec;
 
@@ -133,22 +133,10 @@ fn off(fit: &[[f64; 6]; 2], place: (f64, f64), lit_by: (f64, f64)) -> (f64, f64)
 
 /// Least-squares quadratics of ξ and η, and the RMS distance of the samples from them.
 fn quadratic(samples: &[Sample]) -> Option<([[f64; 6]; 2], f64)> {
-    let mut normal = [0.0; 36];
-    let mut right = [[0.0; 6]; 2];
-    for &(place, (xi, eta)) in samples {
-        let terms = terms(place);
-        for i in 0..6 {
-            right[0][i] += terms[i] * xi;
-            right[1][i] += terms[i] * eta;
-            for j in 0..=i {
-                normal[i * 6 + j] += terms[i] * terms[j];
-            }
-        }
-    }
-    let mut fit = [[0.0; 6]; 2];
-    for (fit, right) in fit.iter_mut().zip(&mut right) {
-        fit.copy_from_slice(&solve_symmetric(&mut normal.clone(), right)?);
-    }
+    let of = |lit_by: fn(&Sample) -> f64| {
+        Normal::of(samples.iter().map(|s| (terms(s.0), lit_by(s)))).solve()
+    };
+    let fit = [of(|(_, (xi, _))| *xi)?, of(|(_, (_, eta))| *eta)?];
     let squares: f64 = samples
         .iter()
         .map(|&(place, lit_by)| {

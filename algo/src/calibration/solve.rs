@@ -6,8 +6,9 @@ use super::initial::{self, Mirrored, Pair};
 use super::pose::Pose;
 use super::rig::{Rig, SHARED};
 use crate::geometry::Vector;
-use crate::math::solve::solve_symmetric;
+use crate::math::solve::Normal;
 use alloc::vec::Vec;
+use core::array::from_fn;
 
 /// Least poses: three give the equations, and no more.
 const LEAST_POSES: usize = 3;
@@ -288,14 +289,9 @@ impl Adjusted {
     /// The squared length of the board's bow in its own standard deviations: χ² of three degrees of freedom if the board is flat.
     fn bow_chi_square(&self) -> f64 {
         let all = self.rig.numbers();
-        let mut covariance = [0.0; 9];
-        for i in 0..3 {
-            for j in 0..3 {
-                covariance[i * 3 + j] = self.covariance[(SHARED - 3 + i) * all + SHARED - 3 + j];
-            }
-        }
-        let solved = solve_symmetric(&mut covariance, &mut self.rig.bow.clone());
-        solved.map_or(0.0, |solved| {
+        let row = |i| from_fn(|j| self.covariance[(SHARED - 3 + i) * all + SHARED - 3 + j]);
+        let (matrix, right) = (from_fn(row), self.rig.bow);
+        Normal { matrix, right }.solve().map_or(0.0, |solved| {
             solved.iter().zip(&self.rig.bow).map(|(a, b)| a * b).sum()
         })
     }

@@ -7,9 +7,7 @@
 //! then leave nothing to fit, and beyond the frame, where nothing was measured, the correction stays
 //! that of the frame's edge.
 
-use crate::math::solve::solve_symmetric;
-use alloc::vec;
-use alloc::vec::Vec;
+use crate::math::solve::Normal;
 
 /// Degree of the fit.
 const DEGREE: usize = 6;
@@ -122,25 +120,17 @@ pub fn fit_map(
     samples: impl Iterator<Item = (f64, f64, f64)> + Clone,
 ) -> Result<FittedMap, ReferenceError> {
     let mut map = FittedMap::new(width, height, [0.0; TERMS]);
-    let mut normal = vec![0.0; TERMS * TERMS];
-    let mut right: Vec<f64> = vec![0.0; TERMS];
+    let mut normal = Normal::default();
     let mut count = 0_usize;
     for (u, v, value) in samples.clone() {
-        let terms = map.terms(u, v);
-        for (i, a) in terms.iter().enumerate() {
-            right[i] += a * value;
-            for (entry, b) in normal[i * TERMS..].iter_mut().zip(&terms[..=i]) {
-                *entry += a * b;
-            }
-        }
+        normal.add(&map.terms(u, v), value);
         count += 1;
     }
     let error = ReferenceError { samples: count };
     if count < 2 * TERMS {
         return Err(error);
     }
-    let solution = solve_symmetric(&mut normal, &mut right).ok_or(error)?;
-    map.coefficients.copy_from_slice(&solution);
+    map.coefficients = normal.solve().ok_or(error)?;
     let squares: f64 = samples
         .map(|(u, v, value)| {
             let off = map.at(u, v) - value;

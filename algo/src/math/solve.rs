@@ -1,12 +1,55 @@
-//! Symmetric linear systems of a few unknowns, as least squares give them.
+//! Least squares for a few unknowns, by their normal equations.
 
-use alloc::vec::Vec;
+/// The normal equations of linear least squares: of observations aᵀx = b with N unknowns x.
+#[derive(Clone, Copy, Debug)]
+pub struct Normal<const N: usize> {
+    /// Σ a aᵀ; only its lower triangle is kept.
+    pub(crate) matrix: [[f64; N]; N],
+    /// Σ a b.
+    pub(crate) right: [f64; N],
+}
 
-/// Solves the symmetric positive definite system `a · x = b` in place by Cholesky's method.
+impl<const N: usize> Default for Normal<N> {
+    fn default() -> Self {
+        Self {
+            matrix: [[0.0; N]; N],
+            right: [0.0; N],
+        }
+    }
+}
+
+impl<const N: usize> Normal<N> {
+    /// Of these observations, added in their order.
+    pub fn of(observations: impl IntoIterator<Item = ([f64; N], f64)>) -> Self {
+        let mut normal = Self::default();
+        for (a, b) in observations {
+            normal.add(&a, b);
+        }
+        normal
+    }
+
+    /// Adds an observation.
+    pub fn add(&mut self, a: &[f64; N], b: f64) {
+        for (i, row) in self.matrix.iter_mut().enumerate() {
+            for (sum, other) in row.iter_mut().zip(&a[..=i]) {
+                *sum += a[i] * other;
+            }
+            self.right[i] += a[i] * b;
+        }
+    }
+
+    /// The unknowns; `None` where the observations do not determine them.
+    pub fn solve(mut self) -> Option<[f64; N]> {
+        solve_symmetric(self.matrix.as_flattened_mut(), &mut self.right)?;
+        Some(self.right)
+    }
+}
+
+/// Solves the symmetric positive definite system `a · x = b` by Cholesky's method and leaves x in `b`.
 ///
-/// `a` is row-major n × n with n = `b.len()`. Returns `None` where the matrix is not positive
-/// definite to working precision, that is, where the observations do not determine the unknowns.
-pub fn solve_symmetric(a: &mut [f64], b: &mut [f64]) -> Option<Vec<f64>> {
+/// `a` is row-major n × n with n = `b.len()`; only its lower triangle is read, and it is overwritten. Returns `None` where the matrix is
+/// not positive definite to working precision, that is, where the observations do not determine the unknowns.
+pub(crate) fn solve_symmetric(a: &mut [f64], b: &mut [f64]) -> Option<()> {
     let n = b.len();
     for j in 0..n {
         let mut diagonal = a[j * n + j];
@@ -27,20 +70,19 @@ pub fn solve_symmetric(a: &mut [f64], b: &mut [f64]) -> Option<Vec<f64>> {
             a[i * n + j] = sum / root;
         }
     }
-    let mut x = b.to_vec();
     for i in 0..n {
         for k in 0..i {
-            x[i] -= a[i * n + k] * x[k];
+            b[i] -= a[i * n + k] * b[k];
         }
-        x[i] /= a[i * n + i];
+        b[i] /= a[i * n + i];
     }
     for i in (0..n).rev() {
         for k in i + 1..n {
-            x[i] -= a[k * n + i] * x[k];
+            b[i] -= a[k * n + i] * b[k];
         }
-        x[i] /= a[i * n + i];
+        b[i] /= a[i * n + i];
     }
-    Some(x)
+    Some(())
 }
 
 #[cfg(test)]
@@ -52,8 +94,8 @@ mod tests {
     fn a_small_system_is_solved_and_a_singular_one_refused() {
         let mut a = vec![4.0, 2.0, 0.6, 2.0, 5.0, 1.0, 0.6, 1.0, 3.0];
         let mut b = vec![4.0 + 4.0 + 1.8, 2.0 + 10.0 + 3.0, 0.6 + 2.0 + 9.0];
-        let x = solve_symmetric(&mut a, &mut b).unwrap();
-        for (found, expected) in x.iter().zip([1.0, 2.0, 3.0]) {
+        solve_symmetric(&mut a, &mut b).unwrap();
+        for (found, expected) in b.iter().zip([1.0, 2.0, 3.0]) {
             assert!((found - expected).abs() < 1e-12);
         }
         assert!(solve_symmetric(&mut [1.0, 1.0, 1.0, 1.0], &mut [1.0, 1.0]).is_none());

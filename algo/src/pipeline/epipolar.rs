@@ -9,7 +9,7 @@
 
 use super::PhaseMap;
 use crate::geometry::{Pinhole, Vector};
-use crate::math::solve::solve_symmetric;
+use crate::math::solve::Normal;
 use crate::trust::Trust;
 use alloc::vec::Vec;
 
@@ -120,18 +120,7 @@ fn fit(samples: &[[f64; 3]]) -> Option<([f64; 3], f64)> {
     if samples.len() < LEAST {
         return None;
     }
-    let (mut normal, mut right) = ([0.0; 9], [0.0; 3]);
-    for &[x, y, off] in samples {
-        let terms = [1.0, x, y];
-        for i in 0..3 {
-            right[i] += terms[i] * off;
-            for j in 0..=i {
-                normal[i * 3 + j] += terms[i] * terms[j];
-            }
-        }
-    }
-    let fit = solve_symmetric(&mut normal, &mut right)?;
-    let found = [fit[0], fit[1], fit[2]];
+    let found = Normal::of(samples.iter().map(|&[x, y, off]| ([1.0, x, y], off))).solve()?;
     let squares = samples.iter().map(|sample| {
         let off = sample[2] - at(&found, sample);
         off * off

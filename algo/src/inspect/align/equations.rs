@@ -5,7 +5,7 @@
 //! for all back-ends.
 
 use super::directions::Matrix6;
-use super::normal::WeightFunction;
+use super::weight::WeightFunction;
 use crate::geometry::Vector;
 use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec::Vec;

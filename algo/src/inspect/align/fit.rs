@@ -23,8 +23,8 @@ use super::Alignment;
 use super::directions::{Directions, Matrix6, form};
 use super::equations::{Equation, Equations};
 use super::motion::Motion;
-use super::normal::{Normal, TUKEY, WeightFunction};
 use super::surface::{Facet, GoldenSurface};
+use super::weight::{TUKEY, WeightFunction};
 use crate::geometry::Vector;
 use crate::simd::Backend;
 
@@ -119,7 +119,10 @@ struct Descended {
 struct Solved {
     further: [f64; 6],
     directions: Directions,
-    normal: Normal,
+    /// σ of the residuals, mm.
+    scale: f64,
+    /// Points with a weight above 0.
+    inside: usize,
 }
 
 impl Fitting<'_> {
@@ -177,7 +180,7 @@ impl Fitting<'_> {
             if found || round == ROUNDS {
                 return Some(Descended {
                     placed: self.placed(motion, &solved, equations),
-                    limit: TUKEY * solved.normal.scale,
+                    limit: TUKEY * solved.scale,
                 });
             }
         }
@@ -193,8 +196,7 @@ impl Fitting<'_> {
     }
 
     fn placed(&self, motion: Motion, solved: &Solved, equations: &mut Equations) -> Placed {
-        let spread = equations.covariance(self.backend, &solved.further, solved.normal.scale);
-        let inside = solved.normal.inside;
+        let spread = equations.covariance(self.backend, &solved.further, solved.scale);
         let covariance = solved.directions.covariance(&spread);
         let (reach, reach_sigma) = self.reach(&motion, solved.directions.free(), &covariance);
         Placed {
@@ -202,8 +204,8 @@ impl Fitting<'_> {
             covariance,
             radius: self.plan.radius,
             left_out: solved.directions.left_out,
-            points: inside,
-            outliers: 1.0 - inside as f64 / equations.len() as f64,
+            points: solved.inside,
+            outliers: 1.0 - solved.inside as f64 / equations.len() as f64,
             reach,
             reach_sigma,
         }
@@ -306,9 +308,10 @@ impl Fitting<'_> {
         let mut further = guess;
         let mut left = REWEIGHTINGS;
         loop {
-            let normal = Normal::of(equations, self.backend, weights, &further, predicted);
-            let directions = Directions::of(&normal.matrix, &normal.noise, predicted);
-            let next = directions.solve(&normal.right_side);
+            let scale = equations.weigh(self.backend, weights, &further, predicted);
+            let sums = equations.sums(self.backend);
+            let directions = Directions::of(&sums.matrix(), &sums.lift_noise(), predicted);
+            let next = directions.solve(&sums.right_side());
             let change: f64 = next
                 .iter()
                 .zip(further)
@@ -320,7 +323,8 @@ impl Fitting<'_> {
                 return Solved {
                     further,
                     directions,
-                    normal,
+                    scale,
+                    inside: equations.inside(),
                 };
             }
         }

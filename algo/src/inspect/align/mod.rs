@@ -4,8 +4,8 @@ mod directions;
 mod equations;
 mod fit;
 mod motion;
-mod normal;
 mod surface;
+mod weight;
 
 pub use directions::form;
 pub use fit::{FitBuffers, Fitting, Placed, Sample};

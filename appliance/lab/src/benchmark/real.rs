@@ -10,13 +10,11 @@ pub trait Real:
     + Sub<Output = Self>
     + Mul<Output = Self>
     + Div<Output = Self>
+    + From<u16>
+    + Into<f64>
 {
     /// The nearest value to a number.
     fn of(x: f64) -> Self;
-    /// The value of a sample, exactly.
-    fn count(sample: u16) -> Self;
-    /// As `f64`.
-    fn wide(self) -> f64;
     /// Square root.
     fn sqrt(self) -> Self;
     /// The angle of (other, self), radians.
@@ -32,12 +30,6 @@ macro_rules! real {
         impl Real for $float {
             fn of(x: f64) -> Self {
                 x as Self
-            }
-            fn count(sample: u16) -> Self {
-                Self::from(sample)
-            }
-            fn wide(self) -> f64 {
-                self.into()
             }
             fn sqrt(self) -> Self {
                 self.sqrt()

@@ -101,7 +101,7 @@ impl<T: Real> Textbook<T> {
                 sums.fill(T::of(0.0));
                 for (&frame, &weight) in level.frames.iter().zip(weights) {
                     for (sum, &sample) in sums.iter_mut().zip(frames[frame]) {
-                        *sum = *sum + T::count(sample.into()) * weight;
+                        *sum = *sum + T::from(sample.into()) * weight;
                     }
                 }
             }
@@ -119,7 +119,7 @@ impl<T: Real> Textbook<T> {
             if level.frames.len() < FULL_TRUST_SHIFTS {
                 for &frame in &level.frames {
                     for (trusted, &sample) in self.trusted.iter_mut().zip(frames[frame]) {
-                        *trusted &= T::count(sample.into()) < self.full_scale;
+                        *trusted &= T::from(sample.into()) < self.full_scale;
                     }
                 }
             }
@@ -222,7 +222,7 @@ impl<T: Real> Kernel for Textbook<T> {
     }
 
     fn turns(&self, _: &FrameSet) -> Vec<f64> {
-        self.phase.iter().map(|phase| phase.wide()).collect()
+        self.phase.iter().map(|&phase| phase.into()).collect()
     }
 }
 

@@ -4,6 +4,7 @@ use crate::workbench::layout::PerDirection;
 use clap::builder::TypedValueParser;
 use hal::bounds::MAX_SIDE;
 use std::fmt::Display;
+use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 /// Numbers in a list of any length.
@@ -16,17 +17,23 @@ where
     T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static,
 {
     move |text: &str| {
-        let numbers = text.split(',').map(|number| number.trim().parse().ok());
-        let numbers: Option<Vec<T>> = numbers.collect();
-        numbers
-            .filter(|all| {
-                all.len() <= most && all.iter().all(|number| (low..=high).contains(number))
-            })
+        listed(text, &(low..=high), most)
             .map(Series)
             .ok_or_else(|| {
                 format!("write 1 to {most} numbers from {low} to {high} with commas between them")
             })
     }
+}
+
+/// At most `most` numbers of a range with commas between them.
+fn listed<T: FromStr + PartialOrd>(
+    text: &str,
+    range: &RangeInclusive<T>,
+    most: usize,
+) -> Option<Vec<T>> {
+    let numbers = text.split(',').map(|number| number.trim().parse().ok());
+    let numbers: Option<Vec<T>> = numbers.collect();
+    numbers.filter(|all| all.len() <= most && all.iter().all(|number| range.contains(number)))
 }
 
 /// A series for vertical fringes and one for horizontal ones with a / between them, or one for both.
@@ -35,14 +42,10 @@ where
     T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static,
 {
     move |text: &str| {
-        let list = |text: &str| -> Option<Vec<T>> {
-            let numbers = text.split(',').map(|number| number.trim().parse().ok());
-            let numbers: Option<Vec<T>> = numbers.collect();
-            numbers.filter(|all| {
-                all.len() <= most && all.iter().all(|number| (low..=high).contains(number))
-            })
-        };
-        let lists: Option<Vec<Vec<T>>> = text.split('/').map(list).collect();
+        let lists = text
+            .split('/')
+            .map(|text| listed(text, &(low..=high), most));
+        let lists: Option<Vec<Vec<T>>> = lists.collect();
         lists
             .filter(|lists| lists.len() <= 2)
             .map(PerDirection)

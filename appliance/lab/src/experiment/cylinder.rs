@@ -3,7 +3,7 @@
 //! Gauss–Newton over the five parameters of a cylinder along y: its axis (x₀ + a y, y, z₀ + c y) and its radius. Outliers are left
 //! out round by round, so that wrong fringe orders do not bias the fit.
 
-use algo::math::solve::solve_symmetric;
+use algo::math::solve::Normal;
 
 /// A fitted cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,21 +67,15 @@ fn distance(point: &[f64; 3], shape: &[f64; UNKNOWNS]) -> (f64, [f64; UNKNOWNS])
 
 /// One Gauss–Newton iteration over the points within `cut` of the surface.
 fn iterate(points: &[[f64; 3]], shape: [f64; UNKNOWNS], cut: f64) -> Option<[f64; UNKNOWNS]> {
-    let mut normal = [0.0; UNKNOWNS * UNKNOWNS];
-    let mut right = [0.0; UNKNOWNS];
+    let mut normal = Normal::default();
     for point in points {
         let (error, slopes) = distance(point, &shape);
         if error.abs() > cut {
             continue;
         }
-        for (at, sum) in normal.iter_mut().enumerate() {
-            *sum += slopes[at / UNKNOWNS] * slopes[at % UNKNOWNS];
-        }
-        for (sum, slope) in right.iter_mut().zip(slopes) {
-            *sum -= slope * error;
-        }
+        normal.add(&slopes, -error);
     }
-    let change = solve_symmetric(&mut normal, &mut right)?;
+    let change = normal.solve()?;
     let mut next = shape;
     for (value, change) in next.iter_mut().zip(change) {
         *value += change;

@@ -1,6 +1,7 @@
 //! The methods that are compared, and the frames of each.
 
-use algo::pattern::{PhaseFunction, Shot, Split, Waveform, Waveforms};
+use crate::workbench::projected::split;
+use algo::pattern::{PhaseFunction, Shot, Waveform, Waveforms};
 
 /// A way to measure a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,7 +20,7 @@ pub enum Method {
     Better(BetterSequence),
 }
 
-/// A sequence of the better method: as many levels and shifts as [`Split`] divides the frames among.
+/// A sequence of the better method: as many levels and shifts as [`split`] divides the frames among.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BetterSequence {
     /// Number of frames: 3 to 27.
@@ -27,10 +28,6 @@ pub struct BetterSequence {
     /// Whether all levels show sines instead of the brightest waveforms.
     pub sines: bool,
 }
-
-/// Reach of sequences that can show a wrong fringe order, turns, and of a single level.
-const REACH: f64 = 2.3;
-const REACH_OF_ONE: f64 = 0.4;
 
 /// The fixed pattern that pictures show.
 pub const SHOWN_FIXED: Method = Method::Fixed { fringes: 100 };
@@ -116,9 +113,7 @@ impl BetterSequence {
             true => Waveform::sine,
             false => Waveform::brightest,
         };
-        let split = Split::best(self.frames, REACH, waveforms);
-        let split = split.or_else(|| Split::best(self.frames, REACH_OF_ONE, waveforms));
-        split
+        split(self.frames, waveforms)
             .map(|split| split.shots(waveforms))
             .ok_or_else(|| format!("{} frames make no sequence", self.frames))
     }

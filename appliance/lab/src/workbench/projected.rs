@@ -23,6 +23,11 @@ const VERSION: u32 = 1;
 const PHASE_FUNCTION: &str = "phase_function.npy";
 const EXPECTED_PHASE: &str = "expected_phase.npy";
 
+/// The most accurate split of so many frames about an expected phase.
+pub fn split(frames: usize, waveforms: Waveforms) -> Option<Split> {
+    Split::best(frames, REACH, waveforms).or_else(|| Split::best(frames, REACH_OF_ONE, waveforms))
+}
+
 /// A sequence of an adapted pattern.
 pub struct Projected<'a> {
     function: &'a PhaseFunction,
@@ -67,9 +72,7 @@ impl<'a> Projected<'a> {
         frames: usize,
         waveforms: Waveforms,
     ) -> Result<Self, String> {
-        let split = Split::best(frames, REACH, waveforms)
-            .or_else(|| Split::best(frames, REACH_OF_ONE, waveforms));
-        let split = split.ok_or_else(|| {
+        let split = split(frames, waveforms).ok_or_else(|| {
             format!("{frames} frames make no sequence about an expected phase: give 3 to 27")
         })?;
         Ok(Self {

@@ -21,7 +21,7 @@ use super::coarse::Coarse;
 use crate::frame::FrameView;
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::align::Motion;
-use crate::math::solve::solve_symmetric;
+use crate::math::solve::Normal;
 use crate::pipeline::KnownSurface;
 use alloc::vec::Vec;
 
@@ -214,8 +214,7 @@ impl Scale {
         motion: &Motion,
         picture: &Coarse,
     ) -> Option<([f64; MOTIONS], f64)> {
-        let mut matrix = [0.0; UNKNOWNS * UNKNOWNS];
-        let mut right = [0.0; UNKNOWNS];
+        let mut normal = Normal::default();
         let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
         for point in &self.points {
             let seen = triangulator.camera().project(motion.apply(point.at));
@@ -224,19 +223,13 @@ impl Scale {
             let Some(value) = seen.and_then(|(u, v)| picture.at(coarse(u), coarse(v))) else {
                 continue;
             };
-            for (i, a) in point.terms.iter().enumerate() {
-                for (j, b) in point.terms.iter().enumerate() {
-                    matrix[i * UNKNOWNS + j] += a * b;
-                }
-                right[i] += a * value;
-            }
+            normal.add(&point.terms, value);
             sum += value;
             squares += value * value;
             count += 1.0;
         }
-        let taken = right;
-        let solution = solve_symmetric(&mut matrix, &mut right)?;
-        let explained: f64 = solution.iter().zip(taken).map(|(x, b)| x * b).sum();
+        let solution = normal.solve()?;
+        let explained: f64 = solution.iter().zip(normal.right).map(|(x, b)| x * b).sum();
         let mean = sum * sum / f64::max(count, 1.0);
         let likeness = (explained - mean) / (squares - mean).max(f64::MIN_POSITIVE);
         let gain = solution[MOTIONS];
