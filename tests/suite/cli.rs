@@ -1,12 +1,12 @@
 //! The command line: what each command prints, and its exit code if it fails.
 
 use crate::station_plc::{Daemon, Place};
-use crate::written::{laboratory, program};
+use crate::written::{FRINGED, laboratory, program};
 use serde_json::Value;
 use std::fs;
 use std::net::TcpListener;
 use std::path::Path;
-use tests::program::Run;
+use tests::program::{Program, Run};
 
 /// A measured error may exceed the prediction by this factor: the prediction includes the noise, but not
 /// that a pixel averages over a slope.
@@ -31,19 +31,16 @@ fn check_refused(run: &Run, code: i32, words: &[&str]) {
 
 #[test]
 fn the_demonstration_finds_exactly_the_defective_parts() {
+    // Its own state folder, where another version of the program has taught the part.
     let folder = tempfile::tempdir().unwrap();
-    let state = folder.path().join("state");
-    let run = run(&[
-        "demo",
-        "--exit",
-        "--json",
-        "--quiet",
-        "--state",
-        text(&state),
-        "--modbus",
-        "127.0.0.1:0",
-        "--http",
-        "127.0.0.1:0",
+    let recipes = folder.path().join("fringed/demo/recipes");
+    fs::create_dir_all(&recipes).unwrap();
+    fs::write(recipes.join("0001.recipe"), "not of this version").unwrap();
+    let home = format!("XDG_STATE_HOME={}", text(folder.path()));
+    let address = "127.0.0.1:0";
+    let run = Program::at("env").run(&[
+        &home, FRINGED, "demo", "--exit", "--json", "--quiet", "--modbus", address, "--http",
+        address,
     ]);
     assert_eq!(run.code, 0, "{}", run.stderr);
     let rows: Value = serde_json::from_str(&run.stdout).unwrap();

@@ -7,6 +7,7 @@ mod table;
 use super::options::{Output, Serving};
 use crate::config::Backend;
 use crate::error::{Exit, Failure};
+use crate::recipe::{LoadError, Store};
 use crate::service::{Caller, Daemon};
 use crate::storage::state::StateFolder;
 use crate::system::runtime;
@@ -53,7 +54,9 @@ impl Demo {
         }
         if config.state.is_none() {
             // Not the state of the real station, whose recipes stay unchanged.
-            config.state = Some(StateFolder::default_path()?.join("demo"));
+            let state = StateFolder::default_path()?.join("demo");
+            forget_unusable(&StateFolder::open(&state)?, config.station.recipe)?;
+            config.state = Some(state);
         }
         let progress = self.output.progress();
         let pool = self.serving.threads.pool(config.threads)?;
@@ -90,6 +93,16 @@ impl MeasuredPart {
     fn is_wrong(&self) -> bool {
         self.placed.defect.is_some() == self.result.passed()
     }
+}
+
+/// Deletes the recipe of the demonstration's own folder if it cannot be used, e.g. because another version of the program taught
+/// it: the station teaches the part again at its start.
+fn forget_unusable(state: &StateFolder, number: u16) -> Result<(), Failure> {
+    let recipes = Store::of_state(state)?;
+    if let Err(LoadError::Unfit { .. } | LoadError::Corrupt { .. }) = recipes.load(number) {
+        recipes.delete(number)?;
+    }
+    Ok(())
 }
 
 /// Places ten parts one after the other and triggers a measurement of each.
