@@ -1,8 +1,8 @@
 //! Tells the program which commit it was built from.
 //!
-//! The first of these that is there: the environment variable `FRINGED_COMMIT`, for packagers; the name that `git archive` wrote
-//! into the file `commit` of a tarball; the answer of git. Only optimised builds ask git, so that a commit costs development and
-//! tests no new compilation.
+//! The first of these that is there: the environment variable `FRINGED_COMMIT`, for packagers; the
+//! name that `git archive` wrote into the file `commit` of a tarball; the answer of git. Only
+//! optimised builds ask git, so that a commit costs development and tests no new compilation.
 
 use std::path::Path;
 use std::process::Command;
@@ -46,7 +46,8 @@ fn from_git() -> Option<String> {
         return None;
     }
     let root = Path::new("..").canonicalize().ok()?;
-    // A tarball that was unpacked inside another project's repository does not belong to its commits.
+    // A tarball that was unpacked inside another project's repository does not belong to its
+    // commits.
     let top = git(&root, &["rev-parse", "--show-toplevel"])?;
     if Path::new(&top).canonicalize().ok()? != root {
         return None;
@@ -54,7 +55,8 @@ fn from_git() -> Option<String> {
     let commit = git(&root, &["rev-parse", "HEAD"])?
         .get(..DIGITS)?
         .to_owned();
-    // Every commit and every checkout adds a line there; a file that is not there would be new each time.
+    // Every commit and every checkout adds a line there; a file that is not there would be new each
+    // time.
     let moves = root.join(git(&root, &["rev-parse", "--git-path", "logs/HEAD"])?);
     if moves.exists() {
         println!("cargo::rerun-if-changed={}", moves.display());

@@ -1,6 +1,7 @@
 //! Single stages, each on 512 × 512 pixels of the study's rig: `cargo bench -p algo [NAME]`.
 //!
-//! For work on one stage. Published figures come from `fringed-lab bench`, which keeps the frames out of the caches.
+//! For work on one stage. Published figures come from `fringed-lab bench`, which keeps the frames
+//! out of the caches.
 
 #![expect(clippy::unwrap_used, reason = "a benchmark may fail loudly")]
 
@@ -47,7 +48,8 @@ fn triangulator() -> Triangulator {
     Triangulator::new(camera, projector, Reference::Models, function(), None).unwrap()
 }
 
-/// A sequence, its frames of the plane z = 0, and the map about which dense and single ones are unwrapped.
+/// A sequence, its frames of the plane z = 0, and the map about which dense and single ones are
+/// unwrapped.
 struct Scene {
     decoder: Decoder,
     frames: Vec<Vec<u8>>,

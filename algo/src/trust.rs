@@ -1,7 +1,8 @@
 //! Whether a pixel is resolved, and if not, the first reason.
 
-/// σ of a sample over the least modulation that is trusted. It decides how rare wrong fringe orders are: uniform noise of ±2.5 % of full
-/// scale (Peng & Gupta 2008), σ = 3.68 of 255 counts, gives 16 counts.
+/// σ of a sample over the least modulation that is trusted. It decides how rare wrong fringe orders
+/// are: uniform noise of ±2.5 % of full scale (Peng & Gupta 2008), σ = 3.68 of 255 counts, gives 16
+/// counts.
 pub const NOISE_OVER_LEAST: f64 = 0.23;
 
 /// The least modulation that is trusted, in counts of an 8-bit sample; scales with full scale.
@@ -9,8 +10,8 @@ pub const NOISE_OVER_LEAST: f64 = 0.23;
 pub struct LeastModulation(f64);
 
 impl LeastModulation {
-    /// Lowest and highest that can be decoded: with less, what rounds to whole counts is no noise any more; no sample has more than
-    /// half of full scale.
+    /// Lowest and highest that can be decoded: with less, what rounds to whole counts is no noise
+    /// any more; no sample has more than half of full scale.
     pub const BOUNDS: [f64; 2] = [4.0, 127.5];
 
     /// That of so many counts of an 8-bit sample; `None` out of [`Self::BOUNDS`].
@@ -19,8 +20,8 @@ impl LeastModulation {
         (low..=high).contains(&counts).then_some(Self(counts))
     }
 
-    /// That of samples of so many bits with σ = `noise` counts: σ / [`NOISE_OVER_LEAST`] = 4.3 σ, within [`Self::BOUNDS`]; the default
-    /// if σ is not a number.
+    /// That of samples of so many bits with σ = `noise` counts: σ / [`NOISE_OVER_LEAST`] = 4.3 σ,
+    /// within [`Self::BOUNDS`]; the default if σ is not a number.
     pub fn of_noise(noise: f64, bit_depth: u8) -> Self {
         let full_scale = (1_u32 << bit_depth.min(16)) - 1;
         let counts = noise * 255.0 / f64::from(full_scale) / NOISE_OVER_LEAST;
@@ -52,7 +53,8 @@ impl Default for LeastModulation {
 pub enum Trust {
     /// Phase (and height) are valid.
     Resolved = 0,
-    /// The coarsest level's modulation is below the least that is trusted ([`LeastModulation`]): the pixel sees none of the pattern.
+    /// The coarsest level's modulation is below the least that is trusted ([`LeastModulation`]):
+    /// the pixel sees none of the pattern.
     #[default]
     Dark = 1,
     /// A finer level's modulation is below the least that is trusted: its fringes are not resolved.

@@ -1,4 +1,5 @@
-//! Quantities as types with their units: phases, modulations, heights. A position and a difference are different types.
+//! Quantities as types with their units: phases, modulations, heights. A position and a difference
+//! are different types.
 //!
 //! ```compile_fail
 //! use algo::units::AbsolutePhase;
@@ -11,8 +12,8 @@ use core::ops::{Add, Sub};
 /// One turn of a [`WrappedPhase`], in its bits.
 const WRAPPED_TURN: f64 = 65_536.0;
 
-/// A phase within its fringe: the full range of `u16` is one turn, so the wrap of the integer is the
-/// wrap of the phase.
+/// A phase within its fringe: the full range of `u16` is one turn, so the wrap of the integer is
+/// the wrap of the phase.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(transparent)]
 pub struct WrappedPhase(u16);

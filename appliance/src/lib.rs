@@ -1,7 +1,7 @@
 //! The daemon `fringed` and its command line: joins devices (`hal`) and computation (`algo`).
 //!
-//! ARCHITECTURE.md describes the modules below, here called rooms, and the order in which they may import each other;
-//! `tests/suite/rooms.rs` checks it.
+//! ARCHITECTURE.md describes the modules below, here called rooms, and the order in which they may
+//! import each other; `tests/suite/rooms.rs` checks it.
 
 pub mod cli;
 pub mod config;

@@ -1,25 +1,29 @@
 //! Bounds of the values in files and requests: ranges of numbers, lengths of texts and lists.
 //!
-//! A value outside its bounds is refused, naming its key, before anything is allocated or computed from it.
+//! A value outside its bounds is refused, naming its key, before anything is allocated or computed
+//! from it.
 
 use std::ffi::OsStr;
 use std::fmt::Debug;
 use std::ops::RangeInclusive;
 use std::slice;
 
-/// Largest width or height of a camera's frame or a projector's raster, pixels. The largest devices on sale have 7680.
+/// Largest width or height of a camera's frame or a projector's raster, pixels. The largest devices
+/// on sale have 7680.
 pub const MAX_SIDE: u32 = 8192;
 /// Largest σ of a sample, counts: full scale of 16 bits.
 pub const MAX_NOISE_COUNTS: f64 = 65_535.0;
 /// Smallest σ of a sample, counts; rounding to whole counts alone gives 0.29.
 pub const MIN_NOISE_COUNTS: f64 = 1e-6;
-/// Farthest z of a working range, mm. More than enough: a head measures up to 2 m from its reference plane.
+/// Farthest z of a working range, mm. More than enough: a head measures up to 2 m from its
+/// reference plane.
 pub const MAX_RANGE_MM: f64 = 10_000.0;
 /// Most fringes over a projector, turns: the largest phase that the fixed-point format holds.
 pub const MAX_FRINGES: f64 = 1000.0;
 /// Longest exposure, µs.
 pub const MAX_EXPOSURE_US: f64 = 10_000_000.0;
-/// Smallest and largest ratio of a level. With up to eight levels, the coarsest spans at most one turn of a pattern of 1000 turns.
+/// Smallest and largest ratio of a level. With up to eight levels, the coarsest spans at most one
+/// turn of a pattern of 1000 turns.
 pub const RATIOS: [f64; 2] = [1e-6, 1000.0];
 /// Largest shift of a frame in either direction, turns; only its fraction matters.
 pub const MAX_SHIFT_TURNS: f64 = 1000.0;
@@ -44,8 +48,9 @@ const LONGEST_MESSAGE: usize = 600;
 /// Most characters of a value that a message quotes.
 const REPEATED: usize = 48;
 
-/// Defines structs whose fields have their bounds beside them, as in `pub gain: f64 = 0.0..=100.0`. Each value of an option, an array or
-/// a vector must lie in them; fields without bounds are not checked. [`Fields`](crate::bounds::Fields) checks such a struct.
+/// Defines structs whose fields have their bounds beside them, as in `pub gain: f64 = 0.0..=100.0`.
+/// Each value of an option, an array or a vector must lie in them; fields without bounds are not
+/// checked. [`Fields`](crate::bounds::Fields) checks such a struct.
 #[macro_export]
 macro_rules! bounded {
     ($($(#[$meta:meta])* $vis:vis struct $name:ident {
@@ -93,11 +98,12 @@ impl<T: AsRef<OsStr>> Bound<T> for Longest {
     }
 }
 
-/// The bounds of a struct that [`bounded!`](crate::bounded) defines: those of its fields. Their keys follow the struct's key and a dot;
-/// the key of a whole file is empty.
+/// The bounds of a struct that [`bounded!`](crate::bounded) defines: those of its fields. Their
+/// keys follow the struct's key and a dot; the key of a whole file is empty.
 pub struct Fields;
 
-/// Lets a single value be read as a slice, as options, arrays and vectors can be by their own methods.
+/// Lets a single value be read as a slice, as options, arrays and vectors can be by their own
+/// methods.
 pub trait Values: Sized {
     /// A slice of this value alone.
     fn as_slice(&self) -> &[Self] {
@@ -170,8 +176,9 @@ pub fn fingerprint(key: &str, value: &str) -> Result<(), String> {
     }
 }
 
-/// Shortens a message that is too long to be read by leaving out its middle: a parser may quote a whole megabyte of a file. The
-/// position in the file is at the beginning or the end of such messages.
+/// Shortens a message that is too long to be read by leaving out its middle: a parser may quote a
+/// whole megabyte of a file. The position in the file is at the beginning or the end of such
+/// messages.
 #[must_use]
 pub fn shortened(words: &str) -> String {
     let length = words.chars().count();

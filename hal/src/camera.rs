@@ -10,8 +10,9 @@ use crate::frame::{Frame, FrameFormat};
 pub enum Starts {
     /// The trigger of the head: one exposure per pulse. A pulse while the camera is busy is lost.
     OnTrigger,
-    /// The trigger output of the projector, by a wire of its own: one exposure with each refresh for which the camera is ready. Its
-    /// length is that of the projector's pulse, on which no program has an influence.
+    /// The trigger output of the projector, by a wire of its own: one exposure with each refresh
+    /// for which the camera is ready. Its length is that of the projector's pulse, on which no
+    /// program has an influence.
     ByProjector,
     /// The camera itself, one exposure per period.
     ByItself,
@@ -24,7 +25,8 @@ pub struct CameraTiming {
     pub starts: Starts,
     /// How long an exposure lasts; all rows are exposed at the same time.
     pub exposure: Duration,
-    /// From the start of one exposure to the start of the next: the shortest possible time of a triggered camera, the fixed time of one that runs by itself.
+    /// From the start of one exposure to the start of the next: the shortest possible time of a
+    /// triggered camera, the fixed time of one that runs by itself.
     pub period: Duration,
     /// From the end of an exposure until its frame can be fetched, without any delay.
     pub delivery: Duration,
@@ -48,15 +50,17 @@ impl CameraTiming {
 pub struct Encoding {
     /// The driver's name of the encoding, such as "R16" or "MONO_PISP_COMP1".
     pub name: String,
-    /// Whether samples are the sensor's counts. Compressed samples are not, and a phase computed from them cannot be trusted.
+    /// Whether samples are the sensor's counts. Compressed samples are not, and a phase computed
+    /// from them cannot be trusted.
     pub exact: bool,
 }
 
 /// A camera that stamps and counts its frames.
 ///
-/// A frame carries the camera's own count (a gap means that a frame was lost) and the sensor's time stamp on the head's
-/// clock. Which moment of the exposure the stamp marks is measured by calibration ([`crate::head::Stamp`]). Frames
-/// may arrive late, twice or in another order; users must not rely on the order of arrival.
+/// A frame carries the camera's own count (a gap means that a frame was lost) and the sensor's time
+/// stamp on the head's clock. Which moment of the exposure the stamp marks is measured by
+/// calibration ([`crate::head::Stamp`]). Frames may arrive late, twice or in another order; users
+/// must not rely on the order of arrival.
 pub trait Camera: Send {
     /// The format that every frame will have.
     fn format(&self) -> FrameFormat;
@@ -67,8 +71,9 @@ pub trait Camera: Send {
     /// How the camera takes its frames.
     fn timing(&self) -> CameraTiming;
 
-    /// Makes each exposure `times` as long as it is set to, from the camera's next start on; [`Camera::timing`] says so at once. The
-    /// device is not asked: what it makes of that, its start or its frames say.
+    /// Makes each exposure `times` as long as it is set to, from the camera's next start on;
+    /// [`Camera::timing`] says so at once. The device is not asked: what it makes of that, its
+    /// start or its frames say.
     ///
     /// # Errors
     /// `Unsupported` if this back-end can only expose as it is set to.
@@ -82,8 +87,8 @@ pub trait Camera: Send {
         }
     }
 
-    /// How long it may stay on without an exposure; zero if it is to be stopped after each sequence. A triggered camera that stays on
-    /// is ready for the next sequence at once.
+    /// How long it may stay on without an exposure; zero if it is to be stopped after each
+    /// sequence. A triggered camera that stays on is ready for the next sequence at once.
     fn stays_on(&self) -> Duration {
         Duration::ZERO
     }
@@ -93,7 +98,8 @@ pub trait Camera: Send {
         None
     }
 
-    /// Checks that the camera is still connected, without disturbing it. A back-end whose driver cannot tell returns `Ok`.
+    /// Checks that the camera is still connected, without disturbing it. A back-end whose driver
+    /// cannot tell returns `Ok`.
     ///
     /// # Errors
     /// `Disconnected` if it is gone.
@@ -113,7 +119,8 @@ pub trait Camera: Send {
     /// `Protocol` if the camera is not running; `Disconnected` if it is gone.
     fn poll_frame(&mut self) -> Result<Option<Frame>, Error>;
 
-    /// Stops the camera and discards frames that were not fetched. Stopping a stopped camera does nothing.
+    /// Stops the camera and discards frames that were not fetched. Stopping a stopped camera does
+    /// nothing.
     ///
     /// # Errors
     /// The device's error.

@@ -13,10 +13,12 @@ pub trait Clock: Send {
     /// Now.
     fn now(&self) -> Timestamp;
 
-    /// Waits until `until`, or until a flip or a frame arrives; it may also return early without a reason.
+    /// Waits until `until`, or until a flip or a frame arrives; it may also return early without a
+    /// reason.
     fn wait(&mut self, until: Timestamp);
 
-    /// Whether time passes only in [`Clock::wait`], as in a simulation. Work between two waits then takes no time on this clock.
+    /// Whether time passes only in [`Clock::wait`], as in a simulation. Work between two waits then
+    /// takes no time on this clock.
     fn stands_still(&self) -> bool {
         false
     }
@@ -24,8 +26,8 @@ pub trait Clock: Send {
 
 /// The clock of real devices: `CLOCK_MONOTONIC`, waiting for any of their descriptors.
 ///
-/// A descriptor must be readable as long as its device has a flip, a frame or an error that was not fetched. It may be a
-/// duplicate (`BorrowedFd::try_clone_to_owned`); the device keeps its own.
+/// A descriptor must be readable as long as its device has a flip, a frame or an error that was not
+/// fetched. It may be a duplicate (`BorrowedFd::try_clone_to_owned`); the device keeps its own.
 #[derive(Debug, Default)]
 pub struct Monotonic {
     devices: Vec<OwnedFd>,
@@ -54,7 +56,8 @@ impl Clock for Monotonic {
             .iter()
             .map(|device| PollFd::new(device, PollFlags::IN))
             .collect();
-        // A signal ends the wait early, which the trait allows; nothing else can fail with descriptors that we own.
+        // A signal ends the wait early, which the trait allows; nothing else can fail with
+        // descriptors that we own.
         let _ = poll(&mut waiting, Timespec::try_from(left).ok().as_ref());
         let hung_up: Vec<bool> = waiting
             .iter()
@@ -63,7 +66,8 @@ impl Clock for Monotonic {
                 !came.is_empty() && !came.contains(PollFlags::IN)
             })
             .collect();
-        // A device that is gone ends one wait, so that its error is noticed. It is removed here, or every later wait would return at once.
+        // A device that is gone ends one wait, so that its error is noticed. It is removed here, or
+        // every later wait would return at once.
         let mut hung_up = hung_up.into_iter();
         self.devices.retain(|_| hung_up.next() != Some(true));
     }
@@ -75,7 +79,8 @@ pub fn monotonic() -> Timestamp {
     read(ClockId::Monotonic)
 }
 
-/// Now, on a clock that starts at 0 when the system boots and never goes back, so the conversion does not fail.
+/// Now, on a clock that starts at 0 when the system boots and never goes back, so the conversion
+/// does not fail.
 pub(crate) fn read(clock: ClockId) -> Timestamp {
     Timestamp(0) + Duration::try_from(clock_gettime(clock)).unwrap_or_default()
 }

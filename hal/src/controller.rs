@@ -5,7 +5,8 @@
 pub struct ControllerState {
     /// Its name.
     pub device: &'static str,
-    /// What it still does to pictures, as bits of [`processing`]; 0 = it shows patterns as they are.
+    /// What it still does to pictures, as bits of [`processing`]; 0 = it shows patterns as they
+    /// are.
     pub processing: u16,
     /// Its faults, as bits of [`fault`].
     pub faults: u16,

@@ -41,7 +41,8 @@ impl DeviceKind {
     }
 }
 
-/// A failed call of a device. The message says what was attempted, with what numbers, and the remedy.
+/// A failed call of a device. The message says what was attempted, with what numbers, and the
+/// remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Error {
     /// There was no answer within the time given.

@@ -102,8 +102,8 @@ impl Frame {
     /// A frame of `format` whose exposure started at `timestamp`, the `count`-th of its camera.
     ///
     /// # Errors
-    /// `Unsupported` if the format has no pixels, a stride below its width or a depth outside 8…16, or if
-    /// `pixels` does not have the format's number and kind of samples.
+    /// `Unsupported` if the format has no pixels, a stride below its width or a depth outside 8…16,
+    /// or if `pixels` does not have the format's number and kind of samples.
     pub fn new(
         format: FrameFormat,
         pixels: Arc<Pixels>,
@@ -192,7 +192,8 @@ impl Pool {
         }
     }
 
-    /// Fills a free buffer with `write` and makes a frame of it. The buffer's content before that is undefined.
+    /// Fills a free buffer with `write` and makes a frame of it. The buffer's content before that
+    /// is undefined.
     ///
     /// # Errors
     /// As [`Frame::new`], if the pool's format is invalid.

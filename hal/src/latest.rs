@@ -1,4 +1,5 @@
-//! Bounded queues that keep the latest items: in a full queue, a new item takes the place of the oldest.
+//! Bounded queues that keep the latest items: in a full queue, a new item takes the place of the
+//! oldest.
 
 use heapless::Deque;
 

@@ -1,7 +1,9 @@
-//! Devices of a measuring head: traits, the acquisition that uses them, real back-ends behind features, and a replay back-end.
+//! Devices of a measuring head: traits, the acquisition that uses them, real back-ends behind
+//! features, and a replay back-end.
 //!
 //! This crate knows cameras, projectors and triggers. It knows nothing of phase: a pattern is a
-//! grey raster and a frame is an array of counts. How the two are related is known to the crate that decodes them.
+//! grey raster and a frame is an array of counts. How the two are related is known to the crate
+//! that decodes them.
 
 pub mod bounds;
 pub mod camera;

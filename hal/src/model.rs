@@ -1,8 +1,9 @@
 //! The geometry of a device as files state it: pinhole and Brown distortion in OpenCV's convention.
 //!
-//! X_device = R · X_world + t in mm, pixel centres at integer coordinates, x right, y down, z forward.
-//! A projector has the model of a camera; light only goes the other way. Here the numbers are only stored, and refused if
-//! they are not finite; the crate that measures with them checks whether they describe a usable camera.
+//! X_device = R · X_world + t in mm, pixel centres at integer coordinates, x right, y down, z
+//! forward. A projector has the model of a camera; light only goes the other way. Here the numbers
+//! are only stored, and refused if they are not finite; the crate that measures with them checks
+//! whether they describe a usable camera.
 
 use crate::bounds::{Bound, Fields, MAX_SIDE, within};
 use serde::{Deserialize, Serialize};
@@ -27,10 +28,11 @@ pub struct DeviceModel {
     pub translation_mm: [f64; 3],
 }
 
-/// What the measured projector points of the plane z = 0 are off those of the models: two polynomials of degree 6 over the camera's frame.
+/// What the measured projector points of the plane z = 0 are off those of the models: two
+/// polynomials of degree 6 over the camera's frame.
 ///
-/// Each has 28 coefficients of T_i(x)·T_j(y), i + j ≤ 6, ordered by i and then by j, where T are Chebyshev polynomials and x, y run from
-/// -1 to 1 over the frame.
+/// Each has 28 coefficients of T_i(x)·T_j(y), i + j ≤ 6, ordered by i and then by j, where T are
+/// Chebyshev polynomials and x, y run from -1 to 1 over the frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PlaneModel {
@@ -41,7 +43,8 @@ pub struct PlaneModel {
 }
 
 impl Bound<PlaneModel> for Fields {
-    /// None of the coefficients can be longer than the longest raster. A message names the key of the whole plane.
+    /// None of the coefficients can be longer than the longest raster. A message names the key of
+    /// the whole plane.
     fn check(&self, key: &str, plane: &PlaneModel) -> Result<(), String> {
         let most = f64::from(MAX_SIDE);
         let mut all = plane.xi.iter().chain(&plane.eta);
@@ -50,7 +53,8 @@ impl Bound<PlaneModel> for Fields {
 }
 
 impl DeviceModel {
-    /// The geometry of a picture of every second column and row, from these on: one plane of a colour sensor.
+    /// The geometry of a picture of every second column and row, from these on: one plane of a
+    /// colour sensor.
     #[must_use]
     pub fn every_second(&self, column: u32, row: u32) -> Self {
         Self {

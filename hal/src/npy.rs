@@ -1,8 +1,9 @@
 //! Reading and writing two-dimensional NumPy arrays in `.npy` files.
 //!
-//! Format: NumPy enhancement proposal 1 (versions 1.0, 2.0 and 3.0 of the header). The parser is written here because
-//! files in a recording or a recipe may be malformed on purpose: the header's length is bounded, it must have
-//! the form that NumPy writes, and nothing is allocated before the file's length is known to fit the shape.
+//! Format: NumPy enhancement proposal 1 (versions 1.0, 2.0 and 3.0 of the header). The parser is
+//! written here because files in a recording or a recipe may be malformed on purpose: the header's
+//! length is bounded, it must have the form that NumPy writes, and nothing is allocated before the
+//! file's length is known to fit the shape.
 
 /// Rows and columns, then the elements row by row.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,7 +126,8 @@ pub fn read<T: Element>(bytes: &[u8]) -> Result<Array<T>, NpyError> {
     })
 }
 
-/// The bytes of a version 1.0 file with rows of `columns` elements; an incomplete last row is left out.
+/// The bytes of a version 1.0 file with rows of `columns` elements; an incomplete last row is left
+/// out.
 pub fn write<T: Element>(columns: usize, elements: &[T]) -> Vec<u8> {
     let rows = elements.len() / columns.max(1);
     let kind = T::KIND;

@@ -67,16 +67,18 @@ impl Raster {
 /// The refresh with which the projector changed to a queued pattern.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Flip {
-    /// When that refresh began. The pattern's light follows after the head's [`crate::head::Timing::flip_to_light`].
+    /// When that refresh began. The pattern's light follows after the head's
+    /// [`crate::head::Timing::flip_to_light`].
     pub timestamp: Timestamp,
-    /// The projector's own count of refreshes; a larger increase than planned means missed refreshes.
+    /// The projector's own count of refreshes; a larger increase than planned means missed
+    /// refreshes.
     pub count: u64,
 }
 
 /// A projector that holds patterns and shows one of them at a time.
 ///
-/// A flip is queued without waiting and happens with the next refresh; its time and count are reported afterwards. At most
-/// one flip can be queued at a time.
+/// A flip is queued without waiting and happens with the next refresh; its time and count are
+/// reported afterwards. At most one flip can be queued at a time.
 pub trait Projector: Send {
     /// Columns and rows.
     fn size(&self) -> (u32, u32);
@@ -84,7 +86,8 @@ pub trait Projector: Send {
     /// Time from one refresh to the next.
     fn refresh(&self) -> Duration;
 
-    /// Checks that the projector is still connected, without disturbing it. A back-end whose driver cannot tell returns `Ok`.
+    /// Checks that the projector is still connected, without disturbing it. A back-end whose driver
+    /// cannot tell returns `Ok`.
     ///
     /// # Errors
     /// `Disconnected` if it is gone.
@@ -92,12 +95,14 @@ pub trait Projector: Send {
         Ok(())
     }
 
-    /// Whether light may come seconds after it was opened: opening sets the mode, and a projector has to lock on to its signal.
+    /// Whether light may come seconds after it was opened: opening sets the mode, and a projector
+    /// has to lock on to its signal.
     fn starts_dark(&self) -> bool {
         false
     }
 
-    /// What the projector's controller said of itself when it was last asked; `None` if there is none to ask.
+    /// What the projector's controller said of itself when it was last asked; `None` if there is
+    /// none to ask.
     fn controller(&self) -> Option<ControllerState> {
         None
     }
@@ -105,8 +110,8 @@ pub trait Projector: Send {
     /// Replaces the patterns behind the first `kept`; nothing is shown until [`Projector::queue`].
     ///
     /// # Errors
-    /// `Unsupported` if a raster does not have the projector's size or the projector shows nothing but what was recorded, `Protocol` if
-    /// fewer than `kept` patterns are loaded.
+    /// `Unsupported` if a raster does not have the projector's size or the projector shows nothing
+    /// but what was recorded, `Protocol` if fewer than `kept` patterns are loaded.
     fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error>;
 
     /// Replaces all patterns.
@@ -123,7 +128,8 @@ pub trait Projector: Send {
     /// `Protocol` if no such pattern is loaded or another one is still queued.
     fn queue(&mut self, index: usize) -> Result<(), Error>;
 
-    /// The flip that has happened since the last call, if any; there is one for each queued pattern. Does not wait.
+    /// The flip that has happened since the last call, if any; there is one for each queued
+    /// pattern. Does not wait.
     ///
     /// # Errors
     /// `Disconnected` if the projector is gone.

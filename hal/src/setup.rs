@@ -1,8 +1,9 @@
 //! Settings of a head of real devices: which camera, which projector, which lines.
 //!
-//! Each back-end opens its device from one of these: `libcamera` from [`CameraSetup`], `kms` from [`ProjectorSetup`], `gpio` from
-//! [`TriggerSetup`] and [`LinesSetup`]. They exist in every build, whatever its features, so that a configuration can be read and
-//! checked on a computer that has none of the devices.
+//! Each back-end opens its device from one of these: `libcamera` from [`CameraSetup`], `kms` from
+//! [`ProjectorSetup`], `gpio` from [`TriggerSetup`] and [`LinesSetup`]. They exist in every build,
+//! whatever its features, so that a configuration can be read and checked on a computer that has
+//! none of the devices.
 
 use std::path::PathBuf;
 use std::time::Duration;
@@ -27,13 +28,15 @@ bounded! {
     pub struct CameraSetup {
         /// libcamera's id; none = the only camera that is there.
         pub id: Option<String> = Longest(MAX_NAME),
-        /// Pixels per row of the sensor's picture; none = the sensor's. A frame of a colour sensor has half.
+        /// Pixels per row of the sensor's picture; none = the sensor's. A frame of a colour sensor
+        /// has half.
         pub width: Option<u32> = 1..=MAX_SIDE,
         /// Rows; none = the sensor's.
         pub height: Option<u32> = 1..=MAX_SIDE,
         /// Exposure, µs: whole refreshes of the projector.
         pub exposure_us: u32 = 1..=1_000_000,
-        /// From the start of one exposure to the start of the next, µs: the shortest possible time of a triggered camera, the fixed time of one that runs by itself.
+        /// From the start of one exposure to the start of the next, µs: the shortest possible time
+        /// of a triggered camera, the fixed time of one that runs by itself.
         pub period_us: u32,
         /// Gain, 1 = none.
         pub gain: f64 = NO_GAIN..=MOST_GAIN,
@@ -45,7 +48,8 @@ bounded! {
 }
 
 impl Default for CameraSetup {
-    /// The reference head: one refresh of 60 Hz is exposed, then 1118 lines of 14.8 µs are read out in 16.56 ms.
+    /// The reference head: one refresh of 60 Hz is exposed, then 1118 lines of 14.8 µs are read out
+    /// in 16.56 ms.
     fn default() -> Self {
         Self {
             id: None,
@@ -88,9 +92,11 @@ bounded! {
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct ProjectorSetup {
-        /// The card's device file, such as "/dev/dri/card1"; none = the only one with a connector that fits.
+        /// The card's device file, such as "/dev/dri/card1"; none = the only one with a connector
+        /// that fits.
         pub card: Option<PathBuf> = Longest(MAX_PATH),
-        /// The kernel's name of the connector, such as "HDMI-A-1" or "DPI-1"; none = the only one that is connected.
+        /// The kernel's name of the connector, such as "HDMI-A-1" or "DPI-1"; none = the only one
+        /// that is connected.
         pub connector: Option<String> = Longest(MAX_NAME),
         /// Columns of the mode; none = the preferred mode's.
         pub width: Option<u32> = 1..=MAX_SIDE,
@@ -102,7 +108,8 @@ bounded! {
         pub controller: ControllerKind,
         /// Device file of the controller's I²C bus.
         pub controller_bus: PathBuf = Longest(MAX_PATH),
-        /// The controller's address on it, 7 bits. The others are reserved (I²C-bus specification, UM10204, section 3.1.12).
+        /// The controller's address on it, 7 bits. The others are reserved (I²C-bus specification,
+        /// UM10204, section 3.1.12).
         pub controller_address: u8 = 8..=119,
         /// The LED that patterns are shown with.
         pub led: Led,
@@ -140,8 +147,8 @@ bounded! {
         pub line: Option<String> = Longest(MAX_NAME),
         /// Whether the projector's trigger output is wired to the camera.
         pub by_projector: bool,
-        /// How long a pulse lasts, µs. Many cameras expose for as long as the pulse lasts; a pulse shorter than half the exposure is
-        /// assumed to start the exposure only.
+        /// How long a pulse lasts, µs. Many cameras expose for as long as the pulse lasts; a pulse
+        /// shorter than half the exposure is assumed to start the exposure only.
         pub pulse_us: u32 = 1..=1_000_000,
         /// Whether the line is low during a pulse and high when idle.
         pub active_low: bool,
@@ -149,7 +156,8 @@ bounded! {
 }
 
 impl Default for TriggerSetup {
-    /// The reference head: a pulse of 16 653 µs exposes for 16 667 µs. A transistor inverts it for the camera.
+    /// The reference head: a pulse of 16 653 µs exposes for 16 667 µs. A transistor inverts it for
+    /// the camera.
     fn default() -> Self {
         Self {
             chip: "pinctrl-rp1".into(),
@@ -186,7 +194,8 @@ impl TriggerSetup {
 }
 
 bounded! {
-    /// The lines between the station and a press or another machine that starts it by wire. Each is used only if it is named.
+    /// The lines between the station and a press or another machine that starts it by wire. Each is
+    /// used only if it is named.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct LinesSetup {

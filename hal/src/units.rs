@@ -6,9 +6,9 @@ use std::time::Duration;
 
 /// A point in time, in nanoseconds of the head's clock.
 ///
-/// The clock is `CLOCK_MONOTONIC` for real devices (back-ends convert theirs to it) and a virtual clock
-/// that starts at zero for the simulated and the replay head. Timestamps of one head may be compared
-/// and subtracted; those of different heads may not.
+/// The clock is `CLOCK_MONOTONIC` for real devices (back-ends convert theirs to it) and a virtual
+/// clock that starts at zero for the simulated and the replay head. Timestamps of one head may be
+/// compared and subtracted; those of different heads may not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Timestamp(pub u64);
 

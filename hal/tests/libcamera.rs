@@ -1,7 +1,9 @@
-//! The camera back-end with virtual cameras of libcamera and of the kernel; runs in the machine of `tests/vm` only.
+//! The camera back-end with virtual cameras of libcamera and of the kernel; runs in the machine of
+//! `tests/vm` only.
 //!
-//! "Replay" delivers four fringe images that are drawn here, each four times, as fast as frames are requested. "vimc" uses a real
-//! driver and takes seconds for a frame. Neither has a raw format or a settable exposure; these are tested without a camera.
+//! "Replay" delivers four fringe images that are drawn here, each four times, as fast as frames are
+//! requested. "vimc" uses a real driver and takes seconds for a frame. Neither has a raw format or
+//! a settable exposure; these are tested without a camera.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::panic)]
 
@@ -28,8 +30,9 @@ const SIZE: (u32, u32) = (640, 400);
 const IMAGES: usize = 4;
 const REPEATS: usize = 4;
 const AMPLITUDE: f64 = 100.0;
-/// Largest mean difference of an image from the one drawn, counts. JPEG and its decoder cause 1.7 (measured). The limit is half of what
-/// a shift by one column causes, 2 sin(π / 40) · 2/π amplitudes; another image differs by 90 counts.
+/// Largest mean difference of an image from the one drawn, counts. JPEG and its decoder cause 1.7
+/// (measured). The limit is half of what a shift by one column causes, 2 sin(π / 40) · 2/π
+/// amplitudes; another image differs by 90 counts.
 const LIKENESS: f64 = 5.0;
 /// Longer than any wait here lasts normally: vimc needs 6 s for its first frame.
 const PATIENT: Duration = Duration::from_secs(30);

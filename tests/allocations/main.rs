@@ -1,5 +1,6 @@
-//! How often a trigger allocates after the first ones (not at all until its result is handed over), and how much memory a plan takes. A binary of its own, because it
-//! counts every allocation of a thread.
+//! How often a trigger allocates after the first ones (not at all until its result is handed over),
+//! and how much memory a plan takes. A binary of its own, because it counts every allocation of a
+//! thread.
 
 mod plans;
 
@@ -26,7 +27,8 @@ const WARM_UP: usize = 4;
 const TAKING: u64 = 0;
 /// Decoding, alignment and gauges of every kind use memory that was allocated with the plan.
 const JUDGING: u64 = 0;
-/// Most allocations of the station: a snapshot per event, and the result. Their readers may keep them, so they cannot be reused.
+/// Most allocations of the station: a snapshot per event, and the result. Their readers may keep
+/// them, so they cannot be reused.
 const PUBLISHING: u64 = 2 * 14;
 
 fn naming() -> Naming {

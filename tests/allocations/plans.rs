@@ -1,4 +1,5 @@
-//! Memory that a plan keeps, and memory while it is made, by counting allocations, so that neither other threads nor the system affect the figures.
+//! Memory that a plan keeps, and memory while it is made, by counting allocations, so that neither
+//! other threads nor the system affect the figures.
 
 use super::{TIMEOUT, naming};
 use allocation_counter::measure;
@@ -11,17 +12,20 @@ use sim::Scenario;
 const PIXELS: usize = 320 * 240;
 /// Samples of the phase function, in f64.
 const FUNCTION: usize = 512 * 384 * 8;
-/// A plan's bytes per pixel: Φ₀ and z₀ 8, the cubic 9, taught values 2, the factor of deviations 1, the side of their squares 1.
+/// A plan's bytes per pixel: Φ₀ and z₀ 8, the cubic 9, taught values 2, the factor of deviations 1,
+/// the side of their squares 1.
 const PLAN: usize = 21;
-/// With two shorter sequences first: each has taught values for its noise, and a map. So has the full one, because the golden surface
-/// is by the first.
+/// With two shorter sequences first: each has taught values for its noise, and a map. So has the
+/// full one, because the golden surface is by the first.
 const LONG_PLAN: usize = PLAN + 2 * (4 + 4) + 4;
-/// Most bytes per pixel while a plan is made: the recipe's file 30 without the curvature's 4, golden's differences by three sequences 6,
-/// the surface 8, the shares along the normal 4, each sequence 3 and 4, and another 4 while a map is made.
+/// Most bytes per pixel while a plan is made: the recipe's file 30 without the curvature's 4,
+/// golden's differences by three sequences 6, the surface 8, the shares along the normal 4, each
+/// sequence 3 and 4, and another 4 while a map is made.
 const MAKING: usize = 26 + 6 + 8 + 4 + 3 * 4 + 3 * 4 + 4;
 /// Copies of the phase function: as it was read, and as it is used.
 const FUNCTIONS: usize = 2;
-/// Memory that does not grow with the frame: strips of rows, cells and spans of regions, the manifest.
+/// Memory that does not grow with the frame: strips of rows, cells and spans of regions, the
+/// manifest.
 const BESIDE: usize = 1 << 20;
 
 #[test]

@@ -1,4 +1,5 @@
-//! Runs a target of the crate `tests` under libFuzzer; `--target=NAME` selects it. The script `run` builds and starts this program.
+//! Runs a target of the crate `tests` under libFuzzer; `--target=NAME` selects it. The script `run`
+//! builds and starts this program.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;

@@ -1,5 +1,6 @@
-//! The last program of `cargo test`: prints how many tests were skipped because the shared recordings are not beside the
-//! project. It has no tests of its own; the suite marks the tests that it skips.
+//! The last program of `cargo test`: prints how many tests were skipped because the shared
+//! recordings are not beside the project. It has no tests of its own; the suite marks the tests
+//! that it skips.
 
 use std::fs;
 use tests::{files, shared};

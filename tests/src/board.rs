@@ -12,7 +12,8 @@ pub const FRAME: (usize, usize) = (420, 360);
 pub const RASTER: (usize, usize) = (640, 480);
 /// Focal lengths of camera and projector, px.
 pub const FOCAL: (f64, f64) = (900.0, 950.0);
-/// Centre of the projector in the camera's coordinates, mm. Its axis meets the camera's 400 mm away.
+/// Centre of the projector in the camera's coordinates, mm. Its axis meets the camera's 400 mm
+/// away.
 pub const PROJECTOR: [f64; 3] = [150.0, 0.0, 20.0];
 /// Inner corners and side of a square, mm.
 pub const BOARD: (usize, usize, f64) = (6, 8, 10.0);
@@ -166,7 +167,8 @@ impl Projected {
     }
 }
 
-/// Writes the recording of a pose into a new folder: three shifts of one and of sixteen fringes, vertical, then horizontal.
+/// Writes the recording of a pose into a new folder: three shifts of one and of sixteen fringes,
+/// vertical, then horizontal.
 pub fn write(pose: &Pose, seed: u64, folder: &Path) {
     write_as(pose, Projected::Geometric, seed, folder);
 }
@@ -216,8 +218,9 @@ pub fn write_as(pose: &Pose, projected: Projected, seed: u64, folder: &Path) {
     fs::write(folder.join("recording.json"), manifest.to_string()).expect("it can be written");
 }
 
-/// Writes the pictures of a pose under a Gray code of the columns, 9 bits of cells of so many pixels, and of the rows, 8 bits, into a new
-/// folder: each bit followed by its inverse, then white and black.
+/// Writes the pictures of a pose under a Gray code of the columns, 9 bits of cells of so many
+/// pixels, and of the rows, 8 bits, into a new folder: each bit followed by its inverse, then white
+/// and black.
 pub fn write_codes(pose: &Pose, seed: u64, cell: f64, folder: &Path) {
     fs::create_dir_all(folder).expect("the folder can be made");
     let mut random = Random::new(seed);
@@ -245,7 +248,8 @@ pub fn write_codes(pose: &Pose, seed: u64, cell: f64, folder: &Path) {
     }
 }
 
-/// So many frames of a pose, moved along x by `shift` mm, under the light that each of them has at a projector pixel.
+/// So many frames of a pose, moved along x by `shift` mm, under the light that each of them has at
+/// a projector pixel.
 fn seen(
     pose: &Pose,
     shift: f64,

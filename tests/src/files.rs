@@ -43,7 +43,8 @@ pub fn flags(path: &Path) -> Vec<u8> {
     file.into_vec().expect("elements of u8")
 }
 
-/// The model of a device as OpenCV writes it (YAML); `unit` is a millimetre in the file's unit of length.
+/// The model of a device as OpenCV writes it (YAML); `unit` is a millimetre in the file's unit of
+/// length.
 pub fn opencv(model: &hal::model::DeviceModel, unit: f64) -> String {
     let matrix = |name: &str, rows: usize, numbers: &[f64]| {
         let columns = numbers.len() / rows;
@@ -113,8 +114,8 @@ pub struct Vertex {
     pub sigma: f32,
 }
 
-/// Reads a cloud in the form that docs/formats.md states: binary little-endian PLY with float x, y, z,
-/// uchar intensity, float sigma.
+/// Reads a cloud in the form that docs/formats.md states: binary little-endian PLY with float x, y,
+/// z, uchar intensity, float sigma.
 pub fn cloud(path: &Path) -> Vec<Vertex> {
     const END: &[u8] = b"end_header\n";
     let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));

@@ -5,7 +5,8 @@
 //! - [`small_head`]: a simulated head that is quick to examine and to calibrate.
 //! - [`shared`]: the shared recordings beside the project, if they are there.
 //! - [`program`]: runs the binary and keeps its output.
-//! - [`files`]: reads its files; [`score`]: compares heights with the truth; [`plane`]: fits planes.
+//! - [`files`]: reads its files; [`score`]: compares heights with the truth; [`plane`]: fits
+//!   planes.
 //! - [`random`]: a seeded generator.
 //! - [`fuzz`]: functions of bytes that must not panic.
 //! - [`power`]: a model of what a loss of power leaves of a folder.

@@ -6,7 +6,8 @@ use std::process::{Command, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 
-/// A run that takes longer is killed: a program that should have refused its input may serve for ever instead.
+/// A run that takes longer is killed: a program that should have refused its input may serve for
+/// ever instead.
 pub const LONGEST: Duration = Duration::from_secs(600);
 
 /// The program under test.

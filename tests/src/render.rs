@@ -1,9 +1,10 @@
-//! Small rendered recordings: the pattern's equation (docs/measurement.md) sampled on an analytic surface, with seeded noise.
+//! Small rendered recordings: the pattern's equation (docs/measurement.md) sampled on an analytic
+//! surface, with seeded noise.
 //!
-//! Each pixel is one point sample on its central ray (no pixel integration, no blur, no shadows), so
-//! the truth is exact and the only errors are those of the noise. Some patches are spoilt on purpose: one is
-//! dark, one over full scale, one has no contrast in its finest level, and in one the modulation fades
-//! through the threshold.
+//! Each pixel is one point sample on its central ray (no pixel integration, no blur, no shadows),
+//! so the truth is exact and the only errors are those of the noise. Some patches are spoilt on
+//! purpose: one is dark, one over full scale, one has no contrast in its finest level, and in one
+//! the modulation fades through the threshold.
 
 use crate::oracle::{Pattern, Rig};
 use crate::random::Random;
@@ -205,8 +206,8 @@ fn frame(format: FrameFormat, samples: Vec<u16>, place: u64) -> Frame {
     Frame::new(format, Arc::new(pixels), timestamp, place).expect("a frame of its own format")
 }
 
-/// The part: a plane tilted about both axes, with a bump in the form of one cosine arch. Its steepest slope is 0.35, so
-/// that camera and projector see all of it.
+/// The part: a plane tilted about both axes, with a bump in the form of one cosine arch. Its
+/// steepest slope is 0.35, so that camera and projector see all of it.
 pub fn surface(x: f64, y: f64) -> f64 {
     let (top, radius) = BUMP;
     let r = ((x - 8.0).powi(2) + (y + 5.0).powi(2)).sqrt();
@@ -218,7 +219,8 @@ pub fn surface(x: f64, y: f64) -> f64 {
     0.03 * x - 0.02 * y + bump - 1.0
 }
 
-/// The height at which the ray of a pixel meets the part, by bisection; the ray is steeper than the part.
+/// The height at which the ray of a pixel meets the part, by bisection; the ray is steeper than the
+/// part.
 fn height_on_ray(geometry: &Rig, (u, v): (f64, f64)) -> f64 {
     let above = |z: f64| {
         let [x, y, z] = geometry.camera.point_at(u, v, z);
@@ -236,7 +238,8 @@ fn height_on_ray(geometry: &Rig, (u, v): (f64, f64)) -> f64 {
     (low + high) / 2.0
 }
 
-/// Ratio and shift of the frames of several levels with `shifts` shifts k/N each, in the order of the ratios.
+/// Ratio and shift of the frames of several levels with `shifts` shifts k/N each, in the order of
+/// the ratios.
 pub fn levels(ratios: &[f64], shifts: usize) -> Vec<(f64, f64)> {
     ratios
         .iter()

@@ -1,4 +1,5 @@
-//! The rig of the study (docs/measurement.md, *The study's head and parts*) with any number of pixels.
+//! The rig of the study (docs/measurement.md, *The study's head and parts*) with any number of
+//! pixels.
 
 use hal::model::DeviceModel;
 

@@ -1,4 +1,5 @@
-//! The shared recordings beside the project, and a mark for each test that is skipped because they are absent.
+//! The shared recordings beside the project, and a mark for each test that is skipped because they
+//! are absent.
 
 use hal::replay::Recording;
 use std::path::{Path, PathBuf};
@@ -17,12 +18,14 @@ pub fn recordings() -> PathBuf {
     root().join("../shared/recordings")
 }
 
-/// The folder of a shared recording. If it is absent, returns none and marks the calling test as skipped.
+/// The folder of a shared recording. If it is absent, returns none and marks the calling test as
+/// skipped.
 pub fn folder(name: &str) -> Option<PathBuf> {
     unless_absent(recordings().join(name), "recording.json")
 }
 
-/// The folder of one of the small inputs as other programs store them. If it is absent, as with [`folder`].
+/// The folder of one of the small inputs as other programs store them. If it is absent, as with
+/// [`folder`].
 pub fn case(name: &str) -> Option<PathBuf> {
     unless_absent(root().join("../shared/cases").join(name), "README.md")
 }

@@ -1,6 +1,8 @@
-//! Small simulated heads: their cameras have fewer pixels and a smaller field of view than the default one, with the same resolution on the part.
+//! Small simulated heads: their cameras have fewer pixels and a smaller field of view than the
+//! default one, with the same resolution on the part.
 
-/// The scenario of a head of `width` × `height` camera pixels, and twice as many projector pixels each way, in front of a plane.
+/// The scenario of a head of `width` × `height` camera pixels, and twice as many projector pixels
+/// each way, in front of a plane.
 pub fn tiny_head(width: u32, height: u32) -> String {
     format!(
         "sub_rays = 1

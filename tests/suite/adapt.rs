@@ -136,8 +136,8 @@ fn adapt_makes_a_pattern_for_the_shared_sphere() {
 
 #[test]
 fn the_adapted_pattern_measures_as_much_better_as_adapt_predicts() {
-    // A pitch of 20 px, as preliminary patterns have, and so little noise that none of 9,216 errors of
-    // σ 0.13 mm is gross.
+    // A pitch of 20 px, as preliminary patterns have, and so little noise that none of 9,216 errors
+    // of σ 0.13 mm is gross.
     let preliminary = Scene {
         patches: false,
         noise: 0.01,
@@ -167,8 +167,8 @@ fn the_adapted_pattern_measures_as_much_better_as_adapt_predicts() {
         "{before} mm, then {after} mm: {}, predicted {predicted}",
         after / before
     );
-    // The renderer samples points, so its pixels do not lose contrast (10 to 15 % here), and no lens blurs them, where `adapt` takes
-    // one of σ 0.5 px if none is given.
+    // The renderer samples points, so its pixels do not lose contrast (10 to 15 % here), and no
+    // lens blurs them, where `adapt` takes one of σ 0.5 px if none is given.
     let lens = |pitch_px: f64| (-2.0 * (PI * 0.5 / pitch_px).powi(2)).exp();
     let pitch_px = report["pitch_px"][0].as_f64().expect("a pitch");
     let share = after / before / predicted / (lens(pitch_px) / lens(20.0));
@@ -301,7 +301,8 @@ impl Taught {
     }
 }
 
-/// Frames of the recipe's phase function as a recording without noise and working range, which the recipe has.
+/// Frames of the recipe's phase function as a recording without noise and working range, which the
+/// recipe has.
 fn record(
     head: &mut Head,
     stage: &Stage,

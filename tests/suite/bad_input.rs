@@ -22,7 +22,8 @@ fn tiny() -> Recording {
     .record()
 }
 
-/// Damages a tiny recording, measures it, and expects exit code 65 and a message that contains `words`.
+/// Damages a tiny recording, measures it, and expects exit code 65 and a message that contains
+/// `words`.
 fn refused(recording: &Recording, damage: impl FnOnce(&Written), words: &[&str]) {
     let written = Written::new(recording);
     damage(&written);

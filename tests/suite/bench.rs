@@ -4,7 +4,8 @@ use crate::written::laboratory;
 use serde_json::Value;
 use std::fs;
 
-/// Share of the pixels that a kernel gets right; at the smallest size a few pixels lie on the edge of the part.
+/// Share of the pixels that a kernel gets right; at the smallest size a few pixels lie on the edge
+/// of the part.
 const RIGHT: f64 = 0.99;
 
 fn json(arguments: &[&str]) -> Value {

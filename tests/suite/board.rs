@@ -1,4 +1,5 @@
-//! `fringed calibrate --board`: models from recordings of a checkerboard, rendered ones, and what is refused.
+//! `fringed calibrate --board`: models from recordings of a checkerboard, rendered ones, and what
+//! is refused.
 
 use crate::written::{FRINGED, program};
 use appliance::head::calibration::place::Place;
@@ -53,7 +54,8 @@ impl Poses {
         self.folder.path().join("calibration.json")
     }
 
-    /// Fails unless the poses are refused, naming `pose` and each of `words`, and nothing is written.
+    /// Fails unless the poses are refused, naming `pose` and each of `words`, and nothing is
+    /// written.
     fn refused(&self, board: &str, more: &[&str], words: &[&str]) {
         let run = self.calibrate(board, more);
         assert_eq!(run.code, 65, "{}", run.stderr);

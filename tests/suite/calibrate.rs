@@ -1,4 +1,5 @@
-//! `fringed calibrate` on simulated heads: it measures the values of the scenario, and its files survive a kill.
+//! `fringed calibrate` on simulated heads: it measures the values of the scenario, and its files
+//! survive a kill.
 
 use crate::written::{FRINGED, program};
 use appliance::head::calibration::place::Place;
@@ -262,7 +263,8 @@ fn models_made_with_opencv_are_imported_and_stay() {
     }
 }
 
-/// Checks that each readable generation is complete, with its maps; returns the file fingerprint of the newest.
+/// Checks that each readable generation is complete, with its maps; returns the file fingerprint of
+/// the newest.
 fn whole(folder: &Path) -> String {
     let json = folder.join("state/calibration/calibration.json");
     let loaded = Place::at(&json).load().unwrap().expect("a calibration");

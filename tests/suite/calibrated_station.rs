@@ -1,4 +1,5 @@
-//! The station uses the stored calibration: CALIBRATION_VALID, recipes of another calibration, no guessed values.
+//! The station uses the stored calibration: CALIBRATION_VALID, recipes of another calibration, no
+//! guessed values.
 
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, trigger};
 use crate::written::program;
@@ -31,7 +32,8 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
             .unwrap()
             .to_owned()
     };
-    // The head's response is not linear, and its configured delay is wrong: only the calibration has the right values.
+    // The head's response is not linear, and its configured delay is wrong: only the calibration
+    // has the right values.
     light(1.8, 1);
     let first = calibrate();
     let passes = |daemon: &Daemon| {
@@ -50,7 +52,8 @@ fn the_station_measures_by_the_stored_calibration_and_by_no_other() {
     light(1.8, 2);
     assert_eq!(calibrate(), first);
     passes(&Daemon::start(&place));
-    // The recording of a failed part is kept. It has no calibration, so it is judged again with that of its recipe.
+    // The recording of a failed part is kept. It has no calibration, so it is judged again with
+    // that of its recipe.
     let good = fs::read_to_string(&scenario).unwrap();
     let dent = "[part]\nkind = \"sheet_metal\"\ndefects = [{ kind = \"dent\", x = 0.0, y = -8.0, depth_mm = 1.5, diameter_mm = 20.0 }]\n";
     fs::write(&scenario, format!("{good}{dent}")).unwrap();

@@ -95,7 +95,8 @@ fn both() -> Recording {
     .record()
 }
 
-/// Fringes along the baseline give almost no information about the height, so only the phase is compared.
+/// Fringes along the baseline give almost no information about the height, so only the phase is
+/// compared.
 fn horizontal() -> Recording {
     let mut recording = Scene {
         patterns: vec![PatternSpec::Horizontal { fringes: 48.0 }],
@@ -108,8 +109,8 @@ fn horizontal() -> Recording {
     recording
 }
 
-/// The camera sees the smallest and the largest phase, so noise moves the coarsest level beyond both ends
-/// of its turn. The pattern is constant beyond them, so only the phase is compared.
+/// The camera sees the smallest and the largest phase, so noise moves the coarsest level beyond
+/// both ends of its turn. The pattern is constant beyond them, so only the phase is compared.
 fn ends_in_view() -> Recording {
     let (columns, rows) = (256_usize, 192_usize);
     let turns = (0..rows * columns).map(|at| {
@@ -132,7 +133,8 @@ fn ends_in_view() -> Recording {
     recording
 }
 
-/// A pattern whose pitch varies along its rows and slightly from row to row; its smallest phase is not 0.
+/// A pattern whose pitch varies along its rows and slightly from row to row; its smallest phase is
+/// not 0.
 fn sampled(ratios: &[f64]) -> Recording {
     let (columns, rows) = (256_usize, 192_usize);
     let turns = (0..rows * columns).map(|at| {

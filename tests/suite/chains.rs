@@ -1,4 +1,5 @@
-//! Levels that are no geometric or dense sequence: two periods with a beat, three with a beat of beats.
+//! Levels that are no geometric or dense sequence: two periods with a beat, three with a beat of
+//! beats.
 
 use crate::written::Written;
 use hal::replay::Recording;
@@ -6,8 +7,8 @@ use tests::files;
 use tests::oracle::{Pattern, Rig};
 use tests::render::{Scene, levels};
 
-/// A scene without spoilt patches, with ± 0.5 % noise: the order of two levels of 32 and 31 fringes has 45 times the noise of one,
-/// σ = 45 · 0.0009 turn with 16 shifts.
+/// A scene without spoilt patches, with ± 0.5 % noise: the order of two levels of 32 and 31 fringes
+/// has 45 times the noise of one, σ = 45 · 0.0009 turn with 16 shifts.
 fn scene(fringes: f64, ratios: &[f64], shifts: usize) -> Recording {
     let scene = Scene {
         patches: false,

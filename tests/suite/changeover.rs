@@ -1,4 +1,5 @@
-//! A production line that changes its part between triggers: the verdict always comes from the selected recipe.
+//! A production line that changes its part between triggers: the verdict always comes from the
+//! selected recipe.
 
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, TRIGGER, long, trigger};
 use crate::written::program;
@@ -31,7 +32,8 @@ const FAIL: u16 = 2;
 /// Longest time to switch recipes at 1456 × 1088 pixels.
 const SWITCHING: Duration = Duration::from_secs(1);
 
-/// The verdict of a recipe on the good part. It follows from the recipe's limits, which are far from the noise of a measurement.
+/// The verdict of a recipe on the good part. It follows from the recipe's limits, which are far
+/// from the noise of a measurement.
 fn expected(number: u16) -> u16 {
     [PASS, FAIL][usize::from(number % 2)]
 }
@@ -160,7 +162,8 @@ fn change_over(cycles: u16) {
     );
 }
 
-/// Checks after a failed load that nothing is measured: triggers by token with the selected recipe, with none, with the active one, and by edge.
+/// Checks after a failed load that nothing is measured: triggers by token with the selected recipe,
+/// with none, with the active one, and by edge.
 fn nothing_is_measured(plc: &mut Plc, token: u16) {
     let before = plc.status();
     assert!(!before.has(READY) && !before.has(RECIPE_OK));
@@ -270,14 +273,15 @@ fn recipes_at_full_resolution_are_switched_within_a_second() {
         "switching at 1456 x 1088, trigger in between: {cold:?} where the recipe is read, {warm:?} where it is ready, \
          {again:?} where it is active"
     );
-    // Other programs use this machine too, so only the shortest time shows the duration of the work.
+    // Other programs use this machine too, so only the shortest time shows the duration of the
+    // work.
     let shortest = |times: &[Duration]| times.iter().min().copied().unwrap();
     assert!(shortest(&warm) < SWITCHING, "{warm:?}");
     assert!(shortest(&again) < shortest(&warm) / 2, "{again:?}");
 }
 
-/// Prints the durations of the parts of a switch, three times. Checks that the processor time of all threads is less than a
-/// second, so an idle machine switches within a second.
+/// Prints the durations of the parts of a switch, three times. Checks that the processor time of
+/// all threads is less than a second, so an idle machine switches within a second.
 fn stages(store: &Store, bytes: usize) {
     let scenario = Scenario::from_toml(FULL_HEAD, "full").unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
@@ -314,7 +318,8 @@ fn stages(store: &Store, bytes: usize) {
 /// The processor time of all threads of this process, in units of 10 ms.
 fn processor_time() -> Duration {
     let stat = fs::read_to_string("/proc/self/stat").unwrap();
-    // After the name, which may contain blanks: the state, ten numbers, then user and system time in hundredths of a second.
+    // After the name, which may contain blanks: the state, ten numbers, then user and system time
+    // in hundredths of a second.
     let (_, fields) = stat.rsplit_once(')').unwrap();
     let fields = fields.split_whitespace().skip(11).take(2);
     let ticks: u64 = fields.map(|ticks| ticks.parse::<u64>().unwrap()).sum();

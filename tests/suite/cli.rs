@@ -8,8 +8,8 @@ use std::net::TcpListener;
 use std::path::Path;
 use tests::program::{Program, Run};
 
-/// A measured error may exceed the prediction by this factor: the prediction includes the noise, but not
-/// that a pixel averages over a slope.
+/// A measured error may exceed the prediction by this factor: the prediction includes the noise,
+/// but not that a pixel averages over a slope.
 const OVER_PREDICTION: f64 = 1.2;
 
 fn run(arguments: &[&str]) -> Run {

@@ -1,4 +1,5 @@
-//! From a bare simulated head to verdicts, over the page's API alone: gamma, blur, delay and geometry are unknown to the station.
+//! From a bare simulated head to verdicts, over the page's API alone: gamma, blur, delay and
+//! geometry are unknown to the station.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place};
@@ -9,7 +10,8 @@ use std::fs;
 use std::io::{Read as _, Write as _};
 use std::time::{Duration, Instant};
 
-/// The head: other angles and lenses than anything that the program knows, and all that is to be measured on it.
+/// The head: other angles and lenses than anything that the program knows, and all that is to be
+/// measured on it.
 const BARE: &str = "calibrated = false
 sub_rays = 3
 part = { kind = \"plane\" }
@@ -37,7 +39,8 @@ flip_to_light_us = 30000
 readout_us = 6000
 stamp = \"exposure_end\"
 ";
-/// Poses of the simulated board that are taken before and after a restart; in the last one it lies in z = 0.
+/// Poses of the simulated board that are taken before and after a restart; in the last one it lies
+/// in z = 0.
 const FIRST: [u32; 3] = [1, 3, 5];
 const SECOND: [u32; 3] = [7, 9, 10];
 /// Largest RMS deviation of heights from the truth, mm.

@@ -1,4 +1,5 @@
-//! Files of the state folder that are damaged, endless or gone, a full disk, and requests that are refused: the station says so, and serves.
+//! Files of the state folder that are damaged, endless or gone, a full disk, and requests that are
+//! refused: the station says so, and serves.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, long};

@@ -1,4 +1,5 @@
-//! `fringed doctor` on the simulated head: a head without faults passes, and of each single fault only that fault is reported.
+//! `fringed doctor` on the simulated head: a head without faults passes, and of each single fault
+//! only that fault is reported.
 
 use crate::written::program;
 use appliance::head::calibration::Calibration;
@@ -147,7 +148,8 @@ fn light_that_comes_late_after_the_mode_was_set_is_named_and_waited_for() {
 
 #[test]
 fn a_head_that_nobody_has_calibrated_fails_in_nothing_but_what_calibration_measures() {
-    // As on a Raspberry Pi, stamps mark the start of the readout. Neither this nor the delay has been measured yet.
+    // As on a Raspberry Pi, stamps mark the start of the readout. Neither this nor the delay has
+    // been measured yet.
     let timing = "[timing]\nflip_to_light_us = 33333\nstamp = \"exposure_end\"\nreadout_us = 16000\nexposure_refreshes = 1.0\n";
     let scenario = Scenario::from_toml(&format!("{HEAD}{timing}"), "here").unwrap();
     for calibrated in [false, true] {

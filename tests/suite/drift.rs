@@ -82,7 +82,8 @@ fn a_knocked_head_is_found_after_its_cycles_and_named_with_the_remedy_and_a_good
     assert!(warnings & GEOMETRY == 0 && thousandths < 100);
     assert!(daemon.terminate().success());
 
-    // Somebody knocks the camera: the recipe still loads, and nothing is known of the knock before the cycles are over.
+    // Somebody knocks the camera: the recipe still loads, and nothing is known of the knock before
+    // the cycles are over.
     fs::write(
         place.path("small.toml"),
         format!("{HEAD}knocked_deg = [0.05, 0.0, 0.0]\n"),

@@ -1,4 +1,5 @@
-//! Every stock part, taught with default settings: good parts that lie anywhere within the placement tolerance pass, and dents do not.
+//! Every stock part, taught with default settings: good parts that lie anywhere within the
+//! placement tolerance pass, and dents do not.
 
 use super::limits::cycle;
 use super::placement::{Bed, bed, taught_exposed, taught_within};
@@ -68,7 +69,8 @@ impl Line {
         }
     }
 
-    /// A placement with all six components uniform, scaled so that no corner moves farther than the tolerance.
+    /// A placement with all six components uniform, scaled so that no corner moves farther than the
+    /// tolerance.
     pub(crate) fn placement(&self, random: &mut Random) -> Placement {
         let mut share = || 2.0 * random.share() - 1.0;
         let reach = self
@@ -176,8 +178,9 @@ impl Read {
     }
 }
 
-/// Teaches each stock part and measures good ones, as they were taught and elsewhere: none fails, hardly one is INVALID, and none comes near
-/// the limit. Returns how the deviations of each kind scatter over their σ.
+/// Teaches each stock part and measures good ones, as they were taught and elsewhere: none fails,
+/// hardly one is INVALID, and none comes near the limit. Returns how the deviations of each kind
+/// scatter over their σ.
 fn good_parts_pass(still: usize, placements: usize, scenario: fn(Part) -> Scenario) -> Vec<f64> {
     let (mut ratios, mut refused) = (Vec::new(), Vec::new());
     for (kind, part) in stock() {
@@ -340,7 +343,8 @@ fn dents_fail(placements: usize, scenario: fn(Part) -> Scenario) {
     assert_eq!(missed, 0);
 }
 
-/// Dents that are narrow: 0.5 mm and 3 mm, seven pixels of the default camera and twenty of a large one.
+/// Dents that are narrow: 0.5 mm and 3 mm, seven pixels of the default camera and twenty of a large
+/// one.
 fn narrow_dents_fail(placements: usize, [width, height]: [u32; 2]) {
     let dent = Defect::Dent {
         x: 0.0,

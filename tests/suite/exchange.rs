@@ -1,4 +1,5 @@
-//! Recipes that come from elsewhere: none takes the place of a released one unasked, and none takes its part number.
+//! Recipes that come from elsewhere: none takes the place of a released one unasked, and none takes
+//! its part number.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, ONLINE, Place, Plc};

@@ -3,8 +3,8 @@
 use crate::written::laboratory;
 use fringed_lab::experiment::{BetterSequence, HEADER, Method, OpticsKind, Runner, Scene};
 
-/// Columns and rows of the camera: the picture of the study (docs/measurement.md), or the middle quarter of it with pixels of the same
-/// size.
+/// Columns and rows of the camera: the picture of the study (docs/measurement.md), or the middle
+/// quarter of it with pixels of the same size.
 const WHOLE: u32 = 512;
 const MIDDLE: u32 = 256;
 /// RMS of error / σ_z; with about ten thousand pixels the noise of this value is below 0.01.
@@ -61,7 +61,8 @@ fn check(limits: &Limits, camera: u32, sequences: &[BetterSequence]) {
     }
 }
 
-/// Not for the sawtooth: the paper's pattern is worst at the part's ends, which are outside of the middle of the picture.
+/// Not for the sawtooth: the paper's pattern is worst at the part's ends, which are outside of the
+/// middle of the picture.
 #[test]
 fn the_better_pattern_beats_the_papers_own_in_the_middle_of_cone_and_spline() {
     check(

@@ -1,4 +1,5 @@
-//! Exposure and gain on the page's API: what a step leaves behind that did not succeed, and which noise a recipe is judged by.
+//! Exposure and gain on the page's API: what a step leaves behind that did not succeed, and which
+//! noise a recipe is judged by.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, SMALL_HEAD, pause};
@@ -66,7 +67,8 @@ fn teach(browser: &mut Browser) {
     browser.wait_for_another(before.as_str().unwrap());
 }
 
-/// The same light in one refresh and with gain, where the camera exposes for several refreshes without.
+/// The same light in one refresh and with gain, where the camera exposes for several refreshes
+/// without.
 fn shorter(camera: &Value) -> Value {
     let refresh = camera["refresh_us"].as_f64().unwrap();
     let refreshes = (camera["exposure_us"].as_f64().unwrap() / refresh).round();

@@ -1,4 +1,5 @@
-//! Parts that are bright here and dark there, measured with longer exposures and less light where they are bright.
+//! Parts that are bright here and dark there, measured with longer exposures and less light where
+//! they are bright.
 
 use super::gauges::frames;
 use super::placement::{Bed, bed, scenario, taught_exposed};
@@ -80,7 +81,8 @@ impl Line {
     }
 }
 
-/// σ of one measurement by the difference of two, mm, over the pixels that `these` picks, and how many there are.
+/// σ of one measurement by the difference of two, mm, over the pixels that `these` picks, and how
+/// many there are.
 fn noise(first: &[f32], second: &[f32], these: impl Fn(usize) -> bool) -> (f64, usize) {
     let differences = (0..first.len())
         .filter(|&at| these(at))
@@ -94,8 +96,9 @@ fn noise(first: &[f32], second: &[f32], these: impl Fn(usize) -> bool) -> (f64, 
     (median / 0.6745 / 2.0_f64.sqrt(), count)
 }
 
-/// What two lines measure of the same part, with one exposure and with longer ones: σ of the latter over σ of the former where
-/// golden's modulation by one exposure is in `counts`, also so many pixels to the left and right, above and below.
+/// What two lines measure of the same part, with one exposure and with longer ones: σ of the latter
+/// over σ of the former where golden's modulation by one exposure is in `counts`, also so many
+/// pixels to the left and right, above and below.
 fn compared([once, longer]: &mut [Line; 2], counts: Range<f32>, around: usize) -> f64 {
     let modulation = once.recipe.arrays.modulation.clone();
     let (columns, rows, _) = once.recipe.conditions.camera;

@@ -1,4 +1,5 @@
-//! A dark part in front of a quiet camera: how much modulation is trusted follows from the camera's noise and is a property of the recipe.
+//! A dark part in front of a quiet camera: how much modulation is trusted follows from the camera's
+//! noise and is a property of the recipe.
 
 use super::gauges::{frames, plan};
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
@@ -74,8 +75,8 @@ fn a_dark_part_is_measured_by_a_quiet_camera_within_its_stated_noise() {
         }
         squares.push((error / f64::from(measured.heights.sigma[at])).powi(2));
     }
-    // Creases between surfaces have errors of the lens, which are no noise: the median has none of them. That of the square of a normal
-    // number is 0.455.
+    // Creases between surfaces have errors of the lens, which are no noise: the median has none of
+    // them. That of the square of a normal number is 0.455.
     squares.sort_by(f64::total_cmp);
     modulations.sort_by(f64::total_cmp);
     let ratio = (squares[squares.len() / 2] / 0.455).sqrt();

@@ -12,7 +12,8 @@ fn document(name: &str) -> String {
     fs::read_to_string(root().join("docs").join(name)).unwrap()
 }
 
-/// Members of a recipe, version 2. If this fails, do not change the test without a new version: files of this one must stay readable.
+/// Members of a recipe, version 2. If this fails, do not change the test without a new version:
+/// files of this one must stay readable.
 const MEMBERS: [&str; 10] = [
     "recipe.json",
     "phase_function.npy",
@@ -142,7 +143,8 @@ fn collect(value: &Value, prefix: &str, keys: &mut BTreeSet<String>) {
     }
 }
 
-/// Name and content of each member of a ZIP file without compression (APPNOTE 6.3.10, section 4.3.7).
+/// Name and content of each member of a ZIP file without compression (APPNOTE 6.3.10, section
+/// 4.3.7).
 fn stored_members(mut zip: &[u8]) -> Vec<(String, Vec<u8>)> {
     let mut members = Vec::new();
     while let Some(header) = zip.strip_prefix(b"PK\x03\x04") {
@@ -248,8 +250,8 @@ fn the_documented_scenario_is_the_default_one() {
     assert_eq!(read, sim::Scenario::default());
 }
 
-/// Keys of `calibration.json`, version 2, of a head with a plate. If this fails, do not change the test without a new version: files of
-/// this one must stay readable.
+/// Keys of `calibration.json`, version 2, of a head with a plate. If this fails, do not change the
+/// test without a new version: files of this one must stay readable.
 const CALIBRATION: [&str; 72] = [
     "camera",
     "camera.bit_depth",

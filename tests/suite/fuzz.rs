@@ -1,6 +1,7 @@
 //! Damaged recordings give a result or an error, never a panic.
 //!
-//! The random numbers are seeded: a failing case prints its number, and the same number gives the same damage again.
+//! The random numbers are seeded: a failing case prints its number, and the same number gives the
+//! same damage again.
 
 use crate::written::{Written, geometric};
 use appliance::measure::measure;
@@ -187,7 +188,8 @@ fn extreme_numbers_never_panic() {
             let place = places[random.below(places.len())].clone();
             let number = NUMBERS[random.below(NUMBERS.len())];
             let old = whole[place.clone()].to_owned();
-            // Everywhere that the same number occurs (a ratio occurs with each of its frames), or once.
+            // Everywhere that the same number occurs (a ratio occurs with each of its frames), or
+            // once.
             if random.below(2) == 0 {
                 for place in places.iter().rev().filter(|p| whole[(*p).clone()] == old) {
                     text.replace_range(place.clone(), number);

@@ -19,8 +19,8 @@ use sim::{Part, Placement, Scenario};
 use std::fs;
 use std::time::Instant;
 
-/// Largest error of mean heights: 8-bit rounding without other noise is below 0.01 mm per pixel, and
-/// golden has the same.
+/// Largest error of mean heights: 8-bit rounding without other noise is below 0.01 mm per pixel,
+/// and golden has the same.
 const EXACT_MM: f64 = 0.01;
 /// The same after a motion was taken back; includes the error of the motion.
 const ALIGNED_MM: f64 = 0.015;
@@ -195,7 +195,8 @@ fn gauges_give_what_is_true_of_the_part_wherever_it_lies_within_its_tolerance() 
         off("x", place.shift_mm[0], 0.1);
         off("y", place.shift_mm[1], 0.1);
         off("z", place.shift_mm[2], 0.1);
-        // The bead's region is 8 pixels of 0.83 mm wide. Its top is 2.2 mm above the plate, with slopes to both sides.
+        // The bead's region is 8 pixels of 0.83 mm wide. Its top is 2.2 mm above the plate, with
+        // slopes to both sides.
         let range = value(&found, "range");
         assert!((0.1..2.2).contains(&range), "{range}");
         volumes.push(value(&found, "volume"));
@@ -391,10 +392,12 @@ fn a_part_that_the_short_sequence_cannot_vouch_for_is_measured_again_within_the_
         (1, 1),
         "one trigger, one result"
     );
-    // The full sequence after a shorter one, on a simulated head; the part is found outside its tolerance.
+    // The full sequence after a shorter one, on a simulated head; the part is found outside its
+    // tolerance.
     assert_eq!(words[31] & 0b11_1110, 0b11_1000, "{:b}", words[31]);
     assert_eq!(words[8], Verdict::Invalid.number());
-    // Judging before the longer sequence counts as processing too, although EXPOSURE_DONE comes after it.
+    // Judging before the longer sequence counts as processing too, although EXPOSURE_DONE comes
+    // after it.
     let processing = long(&plc.read(610, 2).unwrap(), 0);
     let after_exposure = long(&words, 20) - long(&words, 18);
     assert!(processing > after_exposure, "{processing} {after_exposure}");

@@ -1,4 +1,5 @@
-//! Golden is the mean of captures by every sequence: what an uncorrected response leaves in deviations from it, and in their uncertainty.
+//! Golden is the mean of captures by every sequence: what an uncorrected response leaves in
+//! deviations from it, and in their uncertainty.
 
 use super::gauges::{frames, plan};
 use super::placement::{Bed, bed, scenario, taught};
@@ -12,7 +13,8 @@ use tests::random::Random;
 
 /// Exponent of the light, of which the calibration knows nothing: the doctor lets it pass.
 const GAMMA: f64 = 1.08;
-/// Largest periodic error of a part that lies as taught, RMS, and the least that golden by other shifts would leave.
+/// Largest periodic error of a part that lies as taught, RMS, and the least that golden by other
+/// shifts would leave.
 const AS_TAUGHT_MM: f64 = 0.001;
 const BY_OTHER_SHIFTS_MM: f64 = 0.005;
 /// Bins of a fringe. An error of 3 shifts has three periods in it.

@@ -1,4 +1,5 @@
-//! The operations guide has every error code, and only log lines that the program writes; the manual page is complete.
+//! The operations guide has every error code, and only log lines that the program writes; the
+//! manual page is complete.
 
 use crate::written::{laboratory, program};
 use std::collections::BTreeSet;

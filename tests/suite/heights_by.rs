@@ -1,4 +1,5 @@
-//! Heights by the measured reference plane and by the models: `fringed calibrate --heights-by`, on one recording of a simulated head.
+//! Heights by the measured reference plane and by the models: `fringed calibrate --heights-by`, on
+//! one recording of a simulated head.
 
 use crate::written::program;
 use hal::model::DeviceModel;
@@ -19,7 +20,8 @@ height = 256
 const PLACEMENT: &str = "[placement]\nshift_mm = [0.0, 0.0, 4.0]\ntilt_deg = [6.0, -4.0]\n";
 /// Largest RMS difference of both kinds of heights where the models are exact, mm.
 const MOST_MM: f64 = 0.003;
-/// Radial distortion of the camera that is half a pixel in the corners of the frame: 726 px · k · 0.249³.
+/// Radial distortion of the camera that is half a pixel in the corners of the frame: 726 px · k ·
+/// 0.249³.
 const HALF_A_PIXEL: f64 = 0.0446;
 
 struct Head {
@@ -35,7 +37,8 @@ impl Head {
         self.path(name).to_str().unwrap().to_owned()
     }
 
-    /// Calibrates with these options into the state folder `state`, and returns the content of the calibration.
+    /// Calibrates with these options into the state folder `state`, and returns the content of the
+    /// calibration.
     fn calibrate(&self, state: &str, more: &[&str]) -> Value {
         let (state, scenario) = (self.text(state), self.text("plate.toml"));
         let all = [

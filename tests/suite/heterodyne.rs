@@ -1,4 +1,5 @@
-//! A recipe from a golden recording whose levels are unwrapped by beats: it is imported, and judges recordings.
+//! A recipe from a golden recording whose levels are unwrapped by beats: it is imported, and judges
+//! recordings.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, PATIENCE, Place, pause};
@@ -32,7 +33,8 @@ fn judged(daemon: &Daemon) -> Value {
     }
 }
 
-/// Teaches the recording `r` of a place, imports the recipe into a station that plays it, and judges it.
+/// Teaches the recording `r` of a place, imports the recipe into a station that plays it, and
+/// judges it.
 fn taught_and_judged(place: &Place) {
     let at = |name: &str| place.path(name).to_str().unwrap().to_owned();
     let config = "state = \"state\"\n[head]\nbackend = \"replay\"\nrecordings = [\"r\"]\n";

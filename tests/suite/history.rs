@@ -24,7 +24,8 @@ fn all() -> Filter {
     }
 }
 
-/// Kills a measuring daemon `times` times at random moments; the PLC remembers every SEQ that it read.
+/// Kills a measuring daemon `times` times at random moments; the PLC remembers every SEQ that it
+/// read.
 fn kills(times: usize) {
     let place = Place::new();
     let mut random = Random::new(0x5EED_0019);
@@ -44,7 +45,8 @@ fn kills(times: usize) {
         for token in 1..=1 + (random.below(4) as u16) {
             shown.push(long(&plc.measure(token), 0));
         }
-        // One more cycle is running: it may be anywhere between its trigger and the time after its result.
+        // One more cycle is running: it may be anywhere between its trigger and the time after its
+        // result.
         plc.wait("READY", |status| status.has(READY));
         plc.write(1, &trigger(100));
         let moment = Duration::from_micros(random.below(20_000) as u64);

@@ -1,4 +1,5 @@
-//! Hostile clients, and many ordinary ones: neither slows the measurement down, and the PLC can always connect.
+//! Hostile clients, and many ordinary ones: neither slows the measurement down, and the PLC can
+//! always connect.
 
 use crate::station_plc::{PATIENCE, READY, SMALL_HEAD, long, trigger};
 use appliance::config::Config;
@@ -138,8 +139,8 @@ impl Load {
 /// Period of polling.
 const POLL: Duration = Duration::from_millis(50);
 
-/// Ten clients that poll the registers at 20 Hz, and one open page, which follows the events and fetches the picture of
-/// each new result.
+/// Ten clients that poll the registers at 20 Hz, and one open page, which follows the events and
+/// fetches the picture of each new result.
 fn polite(daemon: &Daemon, polls: &Arc<AtomicU64>) -> Load {
     let mut load = Load::default();
     let (modbus, http) = (daemon.modbus, daemon.http);
@@ -200,8 +201,8 @@ const FLOOD: usize = 250;
 /// Pause between two waves.
 const BREATH: Duration = Duration::from_millis(20);
 
-/// Floods of connections, truncated and oversized frames, random bytes, bytes that arrive one by one, and requests whose
-/// answers are not read.
+/// Floods of connections, truncated and oversized frames, random bytes, bytes that arrive one by
+/// one, and requests whose answers are not read.
 fn hostile(modbus: SocketAddr, connections: &Arc<AtomicU64>) -> Load {
     let mut load = Load::default();
     let counted = Arc::clone(connections);
@@ -246,8 +247,8 @@ fn hostile(modbus: SocketAddr, connections: &Arc<AtomicU64>) -> Load {
     load
 }
 
-/// Medians of the processor time of the processing, ms: without load, with ordinary load, under attack, measured in turn. Also
-/// the number of connections of the attack.
+/// Medians of the processor time of the processing, ms: without load, with ordinary load, under
+/// attack, measured in turn. Also the number of connections of the attack.
 fn figures(bed: &mut Bed, rounds: usize, cycles: usize) -> ([f64; 3], u64) {
     let (polls, connections) = (Arc::default(), Arc::default());
     let mut times: [Vec<f64>; 3] = Default::default();
@@ -288,8 +289,8 @@ fn a_plc_measures_during_and_after_an_attack_and_nobody_else_can_trigger() {
         "only the PLC triggers"
     );
     assert_eq!(snapshot.missed, 0);
-    // New clients are served as soon as the last connections of the attack have made room; one from the address of the attack may
-    // read but not write.
+    // New clients are served as soon as the last connections of the attack have made room; one from
+    // the address of the attack may read but not write.
     let modbus = bed.daemon.modbus;
     bed.runtime.block_on(async {
         let began = Instant::now();

@@ -5,8 +5,8 @@ use std::path::Path;
 use tests::files;
 use tests::shared::root;
 
-/// Longest file, in lines without tests. Files have 100–300 lines and one concept each; at this length
-/// a file clearly has two.
+/// Longest file, in lines without tests. Files have 100–300 lines and one concept each; at this
+/// length a file clearly has two.
 const MAX_LINES: usize = 450;
 
 /// A source file: its path from the root, and its text.

@@ -1,5 +1,5 @@
-//! Parts that cannot be judged: the reason names the likeliest cause, with a code of its own for a PLC, and a head that is ill gives INVALID,
-//! never FAIL.
+//! Parts that cannot be judged: the reason names the likeliest cause, with a code of its own for a
+//! PLC, and a head that is ill gives INVALID, never FAIL.
 
 use super::limits::cycle;
 use super::placement::{Bed, bed, taught_within};

@@ -1,4 +1,5 @@
-//! Files that are uploaded to the page go to the storage: they use no memory, and no temporary file remains.
+//! Files that are uploaded to the page go to the storage: they use no memory, and no temporary file
+//! remains.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, PATIENCE, Place};

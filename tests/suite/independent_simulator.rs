@@ -11,13 +11,14 @@ use tests::shared;
 
 /// Largest difference of true heights, RMS mm; it is far below the noise of a measurement.
 const HEIGHT_RMS_MM: f64 = 0.01;
-/// Smallest share of pixels with the same class 2: the two programs find silhouettes and depth edges differently.
+/// Smallest share of pixels with the same class 2: the two programs find silhouettes and depth
+/// edges differently.
 const CLASS_AGREEMENT: f64 = 0.995;
-/// Frames without noise differ from the recorded ones by the noise: uniform ±6.375 counts and rounding twice have
-/// σ 3.69; the rest is margin for the depth edges.
+/// Frames without noise differ from the recorded ones by the noise: uniform ±6.375 counts and
+/// rounding twice have σ 3.69; the rest is margin for the depth edges.
 const FRAME_RMS_COUNTS: std::ops::Range<f64> = 3.5..3.85;
-/// The study interpolated its rasters bilinearly. That spreads a pixel's light by a triangle of variance 1/6, as a square (variance 1/12)
-/// does through a lens of this σ.
+/// The study interpolated its rasters bilinearly. That spreads a pixel's light by a triangle of
+/// variance 1/6, as a square (variance 1/12) does through a lens of this σ.
 const TRIANGLE_PX: f64 = 0.288_675;
 
 /// grey = 255/2 · (1 + sin 2π(ratio · Φ_P(ξ, η) + shift)), rounded: the format's definition.

@@ -1,4 +1,5 @@
-//! Inputs of the fuzz targets: small examples, inputs that once failed, and seeded damage to the examples.
+//! Inputs of the fuzz targets: small examples, inputs that once failed, and seeded damage to the
+//! examples.
 
 use algo::inspect::Measure;
 use serde_json::json;

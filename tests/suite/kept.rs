@@ -89,7 +89,8 @@ fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_delete
     assert_eq!(status, 200);
     let file = place.path("part.zip");
     fs::write(&file, zip).unwrap();
-    // Without limits the dent passes. With the new name no generation of the recipe that judged the part remains.
+    // Without limits the dent passes. With the new name no generation of the recipe that judged the
+    // part remains.
     let taught = fs::read(place.recipe()).unwrap();
     assert_eq!(taught, fs::read(folder.join("recipe.recipe")).unwrap());
     browser.sign_in(&daemon);
@@ -157,7 +158,8 @@ fn project(recipe: &Path, production: usize) {
 #[test]
 fn a_kept_fail_plays_as_a_head_to_test_a_plc_with_by_the_documented_commands() {
     let documented = fs::read_to_string(root().join("docs/modbus.md")).unwrap();
-    // A taught recipe projects all frames. If it starts with the shortest sequence, the head that measured had the patterns of others too.
+    // A taught recipe projects all frames. If it starts with the shortest sequence, the head that
+    // measured had the patterns of others too.
     for production in [None, Some(0)] {
         let place = place_with_a_dent();
         if let Some(production) = production {

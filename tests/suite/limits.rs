@@ -150,8 +150,9 @@ impl Line {
         triangulator.point(at % width, at / width, height)
     }
 
-    /// Places with a uniform distribution over the visible surface. They are at least the dent's radius away from the flowerpot's rim
-    /// and from the edges and openings of the sheet metal, and not at a silhouette.
+    /// Places with a uniform distribution over the visible surface. They are at least the dent's
+    /// radius away from the flowerpot's rim and from the edges and openings of the sheet metal, and
+    /// not at a silhouette.
     fn places(&self, pot: bool, count: usize, seed: u64) -> Vec<Vector> {
         let width = self.plan.conditions().camera.0 as usize;
         let heights = self.bed.stage.truth().height;
@@ -171,7 +172,8 @@ impl Line {
         let areas: Vec<f64> = (0..heights.len()).map(area).collect();
         let total: f64 = areas.iter().sum();
         let rim = POT_HALF_HEIGHT_MM - DIAMETER_MM / 2.0 * POT_COSINE;
-        // The two pixels at a silhouette are never compared; on the sheet metal the radius of a dent is 12 pixels.
+        // The two pixels at a silhouette are never compared; on the sheet metal the radius of a
+        // dent is 12 pixels.
         let reach = if pot { 2 } else { 12 };
         let keeps_away = |at: usize, middle: Vector| {
             let (row, column) = (at / width, at % width);
@@ -198,7 +200,8 @@ impl Line {
     }
 }
 
-/// Teaches goldens and measures good parts of each: all pass, and the largest deviations are as predicted, within relative bounds.
+/// Teaches goldens and measures good parts of each: all pass, and the largest deviations are as
+/// predicted, within relative bounds.
 fn keep_their_limits(
     goldens: u64,
     parts: usize,
@@ -270,7 +273,8 @@ fn good_parts_of_every_stock_kind_keep_the_limits_that_teaching_sets() {
 #[test]
 #[ignore = "takes minutes: `.ci/run full`"]
 fn two_hundred_good_parts_of_every_stock_kind_keep_the_limits_that_teaching_sets() {
-    // Measured: the mean is up to 18 % below its prediction (spline), the scatter up to 28 % (cone), so the limits are safe.
+    // Measured: the mean is up to 18 % below its prediction (spline), the scatter up to 28 %
+    // (cone), so the limits are safe.
     keep_their_limits(10, 20, scenario, [0.20, 0.35]);
 }
 

@@ -33,7 +33,8 @@ pub const CONE: &str = "study-cone-adaptive";
 pub const SPLINE: &str = "study-spline-dense121";
 const ALL: [&str; 5] = [SKULL, BOARD, SPHERE, CONE, SPLINE];
 
-/// A shared recording, measured; `None` if it is not on this machine, and then the test counts as skipped.
+/// A shared recording, measured; `None` if it is not on this machine, and then the test counts as
+/// skipped.
 pub fn shared_recording(name: &str) -> Option<&'static Measured> {
     static MEASURED: [OnceLock<Option<Measured>>; ALL.len()] =
         [const { OnceLock::new() }; ALL.len()];

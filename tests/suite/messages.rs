@@ -1,4 +1,5 @@
-//! What a stranger types first: each command does what the documentation says, or says what to write instead.
+//! What a stranger types first: each command does what the documentation says, or says what to
+//! write instead.
 
 use crate::station_plc::Place;
 use crate::written::program;

@@ -1,5 +1,5 @@
-//! A stranger's way: the shipped program with default settings, each stock part put in front of the simulated head over the API, taught with one
-//! click, and triggered by a PLC.
+//! A stranger's way: the shipped program with default settings, each stock part put in front of the
+//! simulated head over the API, taught with one click, and triggered by a PLC.
 
 use crate::every_part::stock;
 use crate::page::Browser;

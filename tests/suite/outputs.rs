@@ -104,7 +104,8 @@ fn the_report_has_every_key_and_its_counts_add_up() {
         let expected = twin.reason.iter().filter(|r| **r == reason).count();
         assert_eq!(reasons[reason.word()], expected, "{}", reason.word());
     }
-    // Dark pixels count as not lit unless the truth says otherwise; here it calls the dark patch unseen.
+    // Dark pixels count as not lit unless the truth says otherwise; here it calls the dark patch
+    // unseen.
     assert_eq!(reasons["dark"], 0);
     let unresolved: u64 = reasons.values().map(|n| n.as_u64().unwrap()).sum();
     assert_eq!(count("lit"), count("resolved") + unresolved);

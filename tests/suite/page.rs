@@ -146,7 +146,8 @@ fn limits_that_are_edited_on_the_page_change_the_verdict_and_the_fingerprint() {
             .starts_with(&fingerprint)
     );
     assert_eq!(plc.measure(2)[8], FAIL);
-    // A change that is based on an older version of the recipe does not undo somebody else's change.
+    // A change that is based on an older version of the recipe does not undo somebody else's
+    // change.
     edit["name"] = json!("other");
     let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
     assert_eq!(status, 409, "{answer}");
@@ -224,7 +225,8 @@ fn a_recipe_with_inverted_limits_is_refused_by_the_gauges_name_wherever_it_comes
     assert_eq!(run.code, 65, "{}", run.stderr);
     names(&run.stderr);
     assert_eq!(std::fs::read(place.recipe()).unwrap(), taught);
-    // Stored by a program that did not check limits: the previous generation is not used instead, and the recipe can be repaired.
+    // Stored by a program that did not check limits: the previous generation is not used instead,
+    // and the recipe can be repaired.
     let store = Store::at(&place.path("state/recipes"));
     store.save(1, &inverted).unwrap();
     names(&store.load(1).unwrap_err().to_string());

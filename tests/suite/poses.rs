@@ -1,4 +1,5 @@
-//! Poses of the board over the page's API: what is none, what the last one means, and what becomes of the models when poses change.
+//! Poses of the board over the page's API: what is none, what the last one means, and what becomes
+//! of the models when poses change.
 
 use crate::station_plc::{Daemon, Place};
 use crate::technician::{BOARD, STEP, Technician};

@@ -1,4 +1,5 @@
-//! Losses of power: after every file operation of a run the files are opened as a power loss may leave them, with the unsynced data complete, missing, or partly there.
+//! Losses of power: after every file operation of a run the files are opened as a power loss may
+//! leave them, with the unsynced data complete, missing, or partly there.
 
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long, pause};
 use crate::written::FRINGED;
@@ -107,7 +108,8 @@ impl Run {
         daemon
     }
 
-    /// Records a run that teaches, measures good parts, imports and deletes recipes, measures parts that are kept, and is killed.
+    /// Records a run that teaches, measures good parts, imports and deletes recipes, measures parts
+    /// that are kept, and is killed.
     fn recorded() -> Self {
         let place = Place::new();
         // Few pixels, as this test is about files.
@@ -329,7 +331,8 @@ fn results(state: &Path) -> Result<Vec<u32>, String> {
     Ok(found.iter().rev().map(|entry| entry.seq).collect())
 }
 
-/// Replays a run, with three losses of power after every `step`-th operation. Returns how many there were.
+/// Replays a run, with three losses of power after every `step`-th operation. Returns how many
+/// there were.
 fn losses(run: &Run, step: usize) -> usize {
     let folder = tempfile::tempdir().unwrap();
     let mut random = Random::new(SEED);

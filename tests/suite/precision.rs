@@ -1,4 +1,5 @@
-//! Repeatability of a coverage compared with its own prediction, and detection of defects among good parts at random placements.
+//! Repeatability of a coverage compared with its own prediction, and detection of defects among
+//! good parts at random placements.
 
 use super::gauges::{frames, gauge, plan};
 use super::placement::{Bed, bed, taught_within};
@@ -13,15 +14,18 @@ use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
 
-/// Largest relative difference between repeatability and prediction of a coverage; with 200 values the repeatability is known to 5 %.
+/// Largest relative difference between repeatability and prediction of a coverage; with 200 values
+/// the repeatability is known to 5 %.
 const COVERAGE: f64 = 0.30;
 const REPEATS: usize = 200;
 /// Largest displacement of parts in each direction, and largest tilt about x and y.
 const SHIFT_MM: f64 = 1.0;
 const TILT_DEG: f64 = 0.5;
-/// Then the shift moves the farthest corner by √3 mm, and the tilts move it by 0.9 mm, as it is 70 mm from the middle.
+/// Then the shift moves the farthest corner by √3 mm, and the tilts move it by 0.9 mm, as it is 70
+/// mm from the middle.
 const TOLERANCE_MM: f64 = 3.0;
-/// Deviations are averaged over 7 pixels of 0.66 mm, 4.6 mm: a dent of 0.3 mm and 8 mm is 0.16 mm deep on that mean.
+/// Deviations are averaged over 7 pixels of 0.66 mm, 4.6 mm: a dent of 0.3 mm and 8 mm is 0.16 mm
+/// deep on that mean.
 const SIDE: usize = 7;
 const LIMIT_MM: f64 = 0.1;
 const DEPTH_MM: f64 = 0.3;
@@ -62,10 +66,12 @@ fn repeats(name: &str, found: &[Inspection], gauge: usize) -> f64 {
     ratio
 }
 
-/// Light relative to that while teaching: in many places the modulation is then about 16 counts, the smallest that is trusted.
+/// Light relative to that while teaching: in many places the modulation is then about 16 counts,
+/// the smallest that is trusted.
 const FAINT: [f64; 2] = [0.25, 0.3];
 
-/// The repeatability of a coverage as a multiple of its prediction, for several lights and sequences.
+/// The repeatability of a coverage as a multiple of its prediction, for several lights and
+/// sequences.
 fn coverage_in_faint_light() -> Vec<f64> {
     let mut ratios = Vec::new();
     let (bed, taught) = small();
@@ -139,7 +145,8 @@ fn a_value_in_the_guard_band_is_invalid_and_says_why_and_passes_without_a_guard_
     assert_eq!((without.verdict(), without.reason), (Verdict::Pass, None));
 }
 
-/// Measures good parts, and parts with a dent; prints how many are rejected or missed and where the worst lay, and checks that there are none.
+/// Measures good parts, and parts with a dent; prints how many are rejected or missed and where the
+/// worst lay, and checks that there are none.
 fn rejects(good: usize, dented: usize) {
     let (mut bed, taught) = small();
     let mut file = taught.manifest.clone();

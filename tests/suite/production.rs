@@ -1,4 +1,5 @@
-//! Measurement in strips, as in production, compared with exact triangulation and with the comparison of whole maps.
+//! Measurement in strips, as in production, compared with exact triangulation and with the
+//! comparison of whole maps.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::whole_maps::{Comparison, Golden, factors};
@@ -19,16 +20,18 @@ use sim::parts::{Cone, Sawtooth, SheetMetal};
 use sim::{Part, Placement};
 use std::time::Instant;
 
-/// Largest difference between production's heights and the exact ones, mm: the noise of one level of four frames is
-/// a hundred times this RMS.
+/// Largest difference between production's heights and the exact ones, mm: the noise of one level
+/// of four frames is a hundred times this RMS.
 const MAX_RMS_MM: f64 = 0.5e-3;
 const MAX_ERROR_MM: f64 = 5e-3;
 /// Heights are returned in mm as f32, whose resolution is 1.5e-5 mm at ± 150 mm.
 const SINGLE_MM: f64 = 1.6e-5;
-/// At least this share of all pixels at all shifts gets its height from a cubic and not from the exact solution. This limits the
-/// time, not the error. The sawtooth has the smallest share, 0.798 through a lens with a blur of 0.5 px.
+/// At least this share of all pixels at all shifts gets its height from a cubic and not from the
+/// exact solution. This limits the time, not the error. The sawtooth has the smallest share, 0.798
+/// through a lens with a blur of 0.5 px.
 const REACHED: f64 = 0.79;
-/// The taught σ is stored in units of 32 nm; σ here is above 10 µm, and the σ of a mean has the same relative error.
+/// The taught σ is stored in units of 32 nm; σ here is above 10 µm, and the σ of a mean has the
+/// same relative error.
 const SIGMA_SHARE: f64 = 2e-3;
 
 pub(crate) fn parts() -> [(&'static str, Part); 3] {
@@ -269,7 +272,8 @@ pub(crate) fn expected(
     }
 }
 
-/// The noise of all pixels alike with which σ_z of the compared part has the RMS that it has by the light of each.
+/// The noise of all pixels alike with which σ_z of the compared part has the RMS that it has by the
+/// light of each.
 fn even_noise(recipe: &Recipe) -> SampleNoise {
     let arrays = &recipe.arrays;
     let compared = (0..arrays.valid.len()).filter(|&at| arrays.valid[at] != 0);

@@ -1,4 +1,5 @@
-//! `fringed-lab adapt --patterns` and `fringed measure --about`: from a preliminary recording to the heights of the adapted pattern.
+//! `fringed-lab adapt --patterns` and `fringed measure --about`: from a preliminary recording to
+//! the heights of the adapted pattern.
 
 use crate::adapt::turns;
 use crate::written::{Written, laboratory};
@@ -61,8 +62,8 @@ impl Bench {
         self.recording(PatternSpec::Vertical { fringes: 25.6 }, frames.collect())
     }
 
-    /// Projects the pictures of a folder that `adapt` wrote, as they are, and records the frames with what `sequence.json` says;
-    /// with `keys` also the harmonics.
+    /// Projects the pictures of a folder that `adapt` wrote, as they are, and records the frames
+    /// with what `sequence.json` says; with `keys` also the harmonics.
     fn project(&mut self, folder: &Path, keys: bool) -> Recording {
         let sequence = sequence(folder);
         let frames = sequence["frames"].as_array().expect("frames");

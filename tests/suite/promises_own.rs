@@ -5,9 +5,9 @@ use crate::measured::Measured;
 use tests::render::{Scene, levels};
 use tests::score::{rms, score};
 
-/// Error over predicted σ_z is 1 if the prediction is right; over some 7,000 pixels its RMS scatters
-/// by 1/√(2·7000) = 0.8 %. 10 % below and 20 % above leave room for the noise being uniform and
-/// rounded, and for B itself being measured.
+/// Error over predicted σ_z is 1 if the prediction is right; over some 7,000 pixels its RMS
+/// scatters by 1/√(2·7000) = 0.8 %. 10 % below and 20 % above leave room for the noise being
+/// uniform and rounded, and for B itself being measured.
 const NORMAL: std::ops::RangeInclusive<f64> = 0.9..=1.2;
 
 fn frames() -> Vec<(f64, f64)> {

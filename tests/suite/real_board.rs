@@ -1,4 +1,5 @@
-//! Five real poses of a checkerboard: the residuals of the models made of them, and what a pose that was left out is measured as.
+//! Five real poses of a checkerboard: the residuals of the models made of them, and what a pose
+//! that was left out is measured as.
 
 use crate::written::program;
 use algo::calibration::{Board, Corner};
@@ -15,7 +16,8 @@ use tests::files;
 use tests::plane::Plane;
 use tests::shared;
 
-/// Bounds on the five real poses: the residuals that OpenCV's adjustment leaves are .299 and .331 px.
+/// Bounds on the five real poses: the residuals that OpenCV's adjustment leaves are .299 and .331
+/// px.
 const CAMERA_PX: f64 = 0.33;
 const PROJECTOR_PX: f64 = 0.36;
 /// Largest RMS distance of a real board from a plane, mm, measured with models of other poses.

@@ -1,4 +1,5 @@
-//! Repeatability of every kind of gauge, and errors of heights, compared with their own predictions, over many placements of a part.
+//! Repeatability of every kind of gauge, and errors of heights, compared with their own
+//! predictions, over many placements of a part.
 
 use super::gauges::{all_kinds, frames, gauge, plan, regions};
 use super::placement::{Bed, TIMEOUT, bed, taught_within};
@@ -14,13 +15,16 @@ use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
 
-/// Scatter / σ of a gauge: RMS over all placements of the scatter about the mean of each placement, over that of the predicted σ.
+/// Scatter / σ of a gauge: RMS over all placements of the scatter about the mean of each placement,
+/// over that of the predicted σ.
 const SCATTER: std::ops::Range<f64> = 0.8..1.2;
-/// The same of deviations: on a displaced part several places compete, where interpolation between pixels is off by more than the
-/// noise, and the largest of them scatters less than the one that was found. Those that share pixels, or a tile of the search, count as
-/// one place, so what is predicted is too much rather than too little.
+/// The same of deviations: on a displaced part several places compete, where interpolation between
+/// pixels is off by more than the noise, and the largest of them scatters less than the one that
+/// was found. Those that share pixels, or a tile of the search, count as one place, so what is
+/// predicted is too much rather than too little.
 const COMPETING: std::ops::Range<f64> = 0.75..1.2;
-/// RMS of error / σ_z of pixels. The error is that against the truth, so it holds what noise does not explain, too.
+/// RMS of error / σ_z of pixels. The error is that against the truth, so it holds what noise does
+/// not explain, too.
 const ERROR: std::ops::Range<f64> = 0.9..1.1;
 /// Largest displacement of parts in each direction, and largest tilt about x and y.
 const SHIFT_MM: f64 = 1.0;
@@ -34,7 +38,8 @@ const SAFE: f64 = 0.5;
 /// A larger error is a wrong fringe order, or a pixel at an edge.
 const GROSS_MM: f64 = 1.0;
 
-/// The default head of 320 × 240 pixels with a taught sheet-metal part. `noise` sets the noise of its samples.
+/// The default head of 320 × 240 pixels with a taught sheet-metal part. `noise` sets the noise of
+/// its samples.
 fn line(noise: fn(&mut Scenario)) -> (Bed, TaughtRecipe) {
     let mut scenario = Scenario::default();
     let camera = &mut scenario.rig.camera;
@@ -193,7 +198,8 @@ fn repeats_by(
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
-/// RMS of error / σ_z over the resolved pixels of a part in random placements, with each sequence of its recipe.
+/// RMS of error / σ_z over the resolved pixels of a part in random placements, with each sequence
+/// of its recipe.
 fn errors(noise: fn(&mut Scenario), placements: usize) {
     let (mut bed, taught) = line(noise);
     let part = Part::SheetMetal(SheetMetal::default());

@@ -35,7 +35,8 @@ fn fingerprint(recipe: &Value) -> String {
     recipe["fingerprint"].as_str().unwrap().to_owned()
 }
 
-/// Gives recipe 1 names, a region and a limit that a good part violates; returns the changed recipe.
+/// Gives recipe 1 names, a region and a limit that a good part violates; returns the changed
+/// recipe.
 fn edit(browser: &mut Browser) -> Value {
     let before = browser.get("/api/recipes/1");
     let (mut regions, mut gauges) = (before["regions"].clone(), before["gauges"].clone());
@@ -176,7 +177,8 @@ fn a_recipe_is_deleted_on_the_page_unless_it_is_active_and_comes_back() {
         (&all["recipes"][0]["number"], &all["deleted"][0]["number"]),
         (&json!(2), &json!(1))
     );
-    // The number of a deleted recipe is not proposed for teaching, so that undo can bring the recipe back.
+    // The number of a deleted recipe is not proposed for teaching, so that undo can bring the
+    // recipe back.
     assert_eq!(all["free"], 3);
     assert_eq!(browser.ask("DELETE", "/api/recipes/1", &[]).0, 404);
     assert_eq!(browser.ask("POST", "/api/recipes/1/undo", &[]).0, 200);

@@ -1,7 +1,7 @@
 //! The rooms (groups of modules) of the daemon: which may import which.
 //!
-//! Checks every path in the code, also inside macros: `crate::a::B`, `crate::{a, b::C}`, `super::super::a`.
-//! The root of the crate re-exports nothing, so every such path names its room.
+//! Checks every path in the code, also inside macros: `crate::a::B`, `crate::{a, b::C}`,
+//! `super::super::a`. The root of the crate re-exports nothing, so every such path names its room.
 
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::BTreeSet;
@@ -125,7 +125,8 @@ fn joint(tokens: &[TokenTree], at: usize) -> bool {
     colon(at) && colon(at + 1)
 }
 
-/// Collects the paths that begin at this position after `prefix`, each with all of its names; returns where the first of them ends.
+/// Collects the paths that begin at this position after `prefix`, each with all of its names;
+/// returns where the first of them ends.
 fn follow(
     tokens: &[TokenTree],
     mut at: usize,

@@ -45,7 +45,8 @@ fn the_shortest_sequence_will_do_for_a_part_in_place_and_not_for_one_out_of_it()
         assert_eq!(found.step_up, None);
         assert!((z(found) - 0.3).abs() < 0.02, "{}", z(found));
     }
-    // Beyond the tolerance short sequences may be wrong. The full one measures the displacement, and is the last.
+    // Beyond the tolerance short sequences may be wrong. The full one measures the displacement,
+    // and is the last.
     place(&bed, 2.0);
     let short = inspect(&mut bed, &plan, 1);
     assert!(short.step_up.is_some());
@@ -83,7 +84,8 @@ fn sequences_of_the_same_length_and_of_different_kinds_are_all_run() {
         let resolved = layers.height_mm.iter().filter(|z| !z.is_nan()).count();
         assert!(resolved > 5000, "sequence {sequence}: {resolved}");
     }
-    // A recording names its frames, so a part that was judged with the second sequence is judged with it again.
+    // A recording names its frames, so a part that was judged with the second sequence is judged
+    // with it again.
     let other: Vec<_> = Shot::level(1.0, 1).collect();
     assert_eq!(plan.sequence_of(&other), None);
     let none = plan.inspect(3, &[], Instant::now());

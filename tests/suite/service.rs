@@ -1,4 +1,5 @@
-//! The daemon under a service manager: its `sd_notify` messages, its journal entries, and how it ends.
+//! The daemon under a service manager: its `sd_notify` messages, its journal entries, and how it
+//! ends.
 
 use crate::station_plc::{
     Daemon, ONLINE, PATIENCE, Place, Plc, READY, SMALL_HEAD, STOPPING, command, pause,
@@ -128,7 +129,8 @@ fn only_the_measuring_task_feeds_the_watchdog_and_a_hung_one_still_ends_in_time(
         let beat = manager.hear(WATCHDOG);
         assert!(beat.is_some(), "a sign of life came too late");
     }
-    // This recipe is a pipe without a writer: the measuring task, which reads recipes, waits for ever.
+    // This recipe is a pipe without a writer: the measuring task, which reads recipes, waits for
+    // ever.
     let recipe = place.path("state/recipes/0002.recipe");
     assert!(
         Command::new("mkfifo")
@@ -168,7 +170,8 @@ fn a_start_that_is_told_to_end_ends_cleanly() {
     assert!(boots.contains("stopped"), "{boots}");
 }
 
-/// Ends the daemon of a place by Ctrl-C as soon as `reached` is true of its output and the address of its page; returns its output.
+/// Ends the daemon of a place by Ctrl-C as soon as `reached` is true of its output and the address
+/// of its page; returns its output.
 fn interrupted(place: &Place, reached: &dyn Fn(&str, SocketAddr) -> bool) -> String {
     let free = TcpListener::bind("127.0.0.1:0").unwrap();
     let page = free.local_addr().unwrap();

@@ -1,4 +1,5 @@
-//! The shared recordings beside the project, if they are there: they can be opened and have the contents in their README.
+//! The shared recordings beside the project, if they are there: they can be opened and have the
+//! contents in their README.
 
 use hal::replay::recording::PatternSpec;
 use tests::shared;

@@ -1,4 +1,5 @@
-//! Shiny parts in front of the simulated head, compared with the textbook's own rendering of some of them.
+//! Shiny parts in front of the simulated head, compared with the textbook's own rendering of some
+//! of them.
 
 use crate::every_part::{Line, stock};
 use crate::placement::{bed, taught_within};
@@ -19,12 +20,13 @@ const SUB_RAYS: u32 = 4;
 /// Small enough that the brightest highlight does not clip.
 const GAIN: f64 = 0.4;
 const FULL_SCALE: f64 = 4095.0;
-/// Rounding of a sample, and of up to 100 weights of 1/65535 of diffuse + specular ≤ 2.25, each by a half: 0.5 + 0.4 · 4095 · 100 · 1.7e-5
-/// if all of them were off to the same side.
+/// Rounding of a sample, and of up to 100 weights of 1/65535 of diffuse + specular ≤ 2.25, each by
+/// a half: 0.5 + 0.4 · 4095 · 100 · 1.7e-5 if all of them were off to the same side.
 const TOLERANCE_COUNTS: f64 = 0.5 + 2.8;
 const GREYS: [u8; 3] = [0, 128, 255];
 
-/// A part, the body that its surface is a piece of, and how far along x and y of the part this piece goes.
+/// A part, the body that its surface is a piece of, and how far along x and y of the part this
+/// piece goes.
 fn bodies() -> [(Part, Placement, Body, f64); 2] {
     let shift_mm = [6.0, -4.0, 3.0];
     let ball = Sphere::default();
@@ -68,7 +70,8 @@ fn samples(scenario: &Scenario) -> Vec<Vec<f64>> {
     frames
 }
 
-/// Compares a rendered part with the textbook; returns how many pixels, and the brightest light and highlight in units of full scale.
+/// Compares a rendered part with the textbook; returns how many pixels, and the brightest light and
+/// highlight in units of full scale.
 fn compare(scenario: &Scenario, phong: &Phong, body: &Body, reach: f64) -> (usize, f64, f64) {
     let camera = Device::new(&scenario.rig.camera.model());
     let lamp = Device::new(&scenario.rig.projector.model());
@@ -214,7 +217,8 @@ fn a_highlight_is_not_taught_as_an_opening_of_the_part() {
     assert!(shining.iter().all(|opening| matte.contains(opening)));
 }
 
-/// Parts of a material that shines, taught and measured wherever they lie: no verdict is wrong, and hardly a pixel is.
+/// Parts of a material that shines, taught and measured wherever they lie: no verdict is wrong, and
+/// hardly a pixel is.
 #[test]
 #[ignore = "takes minutes: `.ci/run full`"]
 fn good_parts_that_shine_get_no_wrong_verdict_and_hardly_a_wrong_pixel() {

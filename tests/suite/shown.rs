@@ -1,5 +1,5 @@
-//! The picture of the deviation shows what the gauge has judged, live and from the history: its largest square is the gauge's value, and
-//! lies where the defect is.
+//! The picture of the deviation shows what the gauge has judged, live and from the history: its
+//! largest square is the gauge's value, and lies where the defect is.
 
 use crate::gauges::frames;
 use crate::history::recording;
@@ -22,10 +22,11 @@ const FAIL: u16 = 2;
 const HEAD: &str = "sub_rays = 2\n\n[rig.camera]\nwidth = 256\nheight = 256\n";
 /// Largest difference of the picture's largest square from the gauge's value, mm.
 const SAME_MM: f64 = 0.001;
-/// Largest distance of the square's middle from the middle of the dent, pixels. The top of the mean over 9 pixels is flat, and noise
-/// decides where on it the largest is.
+/// Largest distance of the square's middle from the middle of the dent, pixels. The top of the mean
+/// over 9 pixels is flat, and noise decides where on it the largest is.
 const NEAR_PX: f64 = 4.0;
-/// How far the part is moved, mm, and turned, degrees: at its corners it then moves by less than the tolerance of 1 mm.
+/// How far the part is moved, mm, and turned, degrees: at its corners it then moves by less than
+/// the tolerance of 1 mm.
 const SHIFT_MM: f64 = 0.6;
 const TURN_DEG: f64 = 0.1;
 const DEPTH_MM: f64 = 0.5;
@@ -126,7 +127,8 @@ impl Line {
         (sums.0 / weight, sums.1 / weight)
     }
 
-    /// A dented part that lies so: the picture's largest square is the gauge's, live and from the history, and lies in the dent.
+    /// A dented part that lies so: the picture's largest square is the gauge's, live and from the
+    /// history, and lies in the dent.
     fn shows_the_dent(&mut self, (x, y): (f64, f64), placement: &Placement) -> f64 {
         let dented = part(self.pot, vec![dent(x, y, DEPTH_MM)]);
         let (verdict, seq) = self.measure(&dented, placement);

@@ -1,4 +1,5 @@
-//! Calibration of the geometry through the simulator: a head of unknown lens and pose takes a board in ten poses.
+//! Calibration of the geometry through the simulator: a head of unknown lens and pose takes a board
+//! in ten poses.
 
 use appliance::head::calibration::Calibration;
 use appliance::head::geometry::{Geometry, SeenPose};
@@ -38,7 +39,8 @@ struct Taking {
     steps: usize,
 }
 
-/// A head near the default one: both lenses, distances and angles are off by some percent, optics and noise are those of a good head.
+/// A head near the default one: both lenses, distances and angles are off by some percent, optics
+/// and noise are those of a good head.
 fn head_of(random: &mut Random, taking: &Taking, scale_ppm: f64, bow_um: f64) -> Scenario {
     let mut scenario = Scenario {
         sub_rays: taking.sub_rays,
@@ -126,8 +128,9 @@ fn calibrated(scenario: &Scenario, taking: &Taking) -> Geometry {
     Geometry::of(&board, SIGMA_PPM, &seen).unwrap()
 }
 
-/// RMS errors of heights over the volume, and of lengths of 100 mm along x, y and z in it, mm: points that both devices see are measured
-/// with the models found, by the ray of their camera pixel and their ξ.
+/// RMS errors of heights over the volume, and of lengths of 100 mm along x, y and z in it, mm:
+/// points that both devices see are measured with the models found, by the ray of their camera
+/// pixel and their ξ.
 fn errors(scenario: &Scenario, found: &Geometry) -> (f64, f64) {
     let rig = &scenario.rig;
     let lenses = [&rig.camera, &rig.projector].map(|device| (Lens::new(device.model()), device));

@@ -1,4 +1,5 @@
-//! The part of a simulated head, set on the command line and over the page's API of the real program.
+//! The part of a simulated head, set on the command line and over the page's API of the real
+//! program.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, command};

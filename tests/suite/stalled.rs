@@ -1,4 +1,5 @@
-//! Nobody takes what the station gives away: its log, its results, its counter, its events. Everything else is as if somebody did.
+//! Nobody takes what the station gives away: its log, its results, its counter, its events.
+//! Everything else is as if somebody did.
 
 use crate::station_plc::{Daemon, ONLINE, Place, Plc, READY, RECIPE_OK, long};
 use rusqlite::Connection;
@@ -32,7 +33,8 @@ fn get(daemon: &Daemon, path: &str) -> String {
     String::from_utf8_lossy(&answer).into_owned()
 }
 
-/// Page, /healthz and Modbus answer, a recipe is refused and another one loaded, and parts get their verdicts; each at once.
+/// Page, /healthz and Modbus answer, a recipe is refused and another one loaded, and parts get
+/// their verdicts; each at once.
 fn works(daemon: &Daemon, plc: &mut Plc, tokens: std::ops::Range<u16>) {
     for path in ["/", "/healthz", "/api/snapshot", "/api/log"] {
         assert!(get(daemon, path).starts_with("HTTP/1.1 200"), "{path}");

@@ -30,12 +30,14 @@ pub const PATIENCE: Duration = Duration::from_secs(120);
 /// SIGTERM ends the daemon within this time.
 pub const STOPPING: Duration = Duration::from_secs(5);
 
-/// Passes the time between two questions of somebody who waits: asked without a pause, they would take the processor from what is waited for.
+/// Passes the time between two questions of somebody who waits: asked without a pause, they would
+/// take the processor from what is waited for.
 pub fn pause() {
     std::thread::sleep(Duration::from_millis(2));
 }
 
-/// A head with few pixels, for tests in which resolution does not matter: its light takes little time to compute.
+/// A head with few pixels, for tests in which resolution does not matter: its light takes little
+/// time to compute.
 pub const SMALL_HEAD: &str = "sub_rays = 2\n\n[rig.camera]\nwidth = 160\nheight = 160\n";
 
 /// A folder with the configuration of a small simulated head, and a state folder.
@@ -56,7 +58,8 @@ impl Place {
         self.folder.path().join(name)
     }
 
-    /// Puts a pipe in place of the result counter's file: a write waits until somebody reads, as on a busy disk. Returns the file.
+    /// Puts a pipe in place of the result counter's file: a write waits until somebody reads, as on
+    /// a busy disk. Returns the file.
     pub fn counter_that_hangs(&self) -> PathBuf {
         let counter = self.path("state/result-seq");
         fs::remove_file(&counter).unwrap();

@@ -1,4 +1,5 @@
-//! Two clients at once: two PLCs that trigger, and a page that changes recipes while a PLC measures.
+//! Two clients at once: two PLCs that trigger, and a page that changes recipes while a PLC
+//! measures.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, READY, long, trigger};

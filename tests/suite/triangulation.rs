@@ -1,5 +1,5 @@
-//! Triangulation compared with the textbook in rare cases: beyond the projector's raster, near the ends of
-//! the working range, and with patterns that give several heights.
+//! Triangulation compared with the textbook in rare cases: beyond the projector's raster, near the
+//! ends of the working range, and with patterns that give several heights.
 
 use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
 use appliance::head::seam;
@@ -12,17 +12,19 @@ use tests::render::{Scene, levels};
 
 const SEED: u64 = 7;
 const CASES: usize = 4000;
-/// The solver stops within 1e-7 mm; the textbook's bisection goes on to the last bit. The rest is rounding of phases.
+/// The solver stops within 1e-7 mm; the textbook's bisection goes on to the last bit. The rest is
+/// rounding of phases.
 const HEIGHT_MM: f64 = 2.5e-7;
-/// Turns per mm. Slopes are central differences, over ± 10 µm by the solver and over ± 5 µm by the textbook. Where the second
-/// derivative jumps by J, as the spline's does at its knots, each is off by at most J/4 times its half step. Here J is up to
-/// 2e-3 turn/mm², and 2e-3 / 4 · 10 µm = 5e-6.
+/// Turns per mm. Slopes are central differences, over ± 10 µm by the solver and over ± 5 µm by the
+/// textbook. Where the second derivative jumps by J, as the spline's does at its knots, each is off
+/// by at most J/4 times its half step. Here J is up to 2e-3 turn/mm², and 2e-3 / 4 · 10 µm = 5e-6.
 const SLOPE: f64 = 5e-6;
 /// Both evaluate the same spline or line in f64; phases are up to 100 turns.
 const PHASE_TURNS: f64 = 1e-9;
 
-/// The rig with only the middle 40 % of the projector's columns (102 of 256), so the camera sees beyond them. `turns` is the phase
-/// function in turns over (ξ, η) as shares of the narrow raster's width and height.
+/// The rig with only the middle 40 % of the projector's columns (102 of 256), so the camera sees
+/// beyond them. `turns` is the phase function in turns over (ξ, η) as shares of the narrow raster's
+/// width and height.
 fn narrow(turns: impl Fn(f64, f64) -> f64) -> Recording {
     let (columns, rows) = (102_usize, 192_usize);
     let scene = Scene {
@@ -65,8 +67,8 @@ fn triangulator(recording: &Recording) -> Triangulator {
     .unwrap()
 }
 
-/// Solves random pixels with phases up to `spread` turns off the reference phase both ways; returns how many had a height and how
-/// many had none.
+/// Solves random pixels with phases up to `spread` turns off the reference phase both ways; returns
+/// how many had a height and how many had none.
 fn compare(recording: &Recording, spread: f64) -> (usize, usize) {
     let (solver, rig) = (triangulator(recording), Rig::of(recording).unwrap());
     let pattern = Pattern::of(recording, 0);

@@ -10,14 +10,16 @@ use tests::score::rms;
 
 /// 1 % of the noise of one 4-frame level in the study, 7.4e-3 turn (docs/measurement.md, *Noise*).
 const PHASE_RMS_TURNS: f64 = 7.4e-5;
-/// Share of the pixels whose mask may differ, because a modulation or residual is so near its threshold that
-/// the last bit of the fixed point decides. In a small recording one such pixel is allowed.
+/// Share of the pixels whose mask may differ, because a modulation or residual is so near its
+/// threshold that the last bit of the fixed point decides. In a small recording one such pixel is
+/// allowed.
 const MASK_SHARE: f64 = 1e-4;
-/// A quarter of the residual error of the reference method in the study's best case. Both sides solve
-/// the same equation to 1e-7 mm; heights are stored in nm.
+/// A quarter of the residual error of the reference method in the study's best case. Both sides
+/// solve the same equation to 1e-7 mm; heights are stored in nm.
 const HEIGHT_RMS_MM: f64 = 5e-4;
-/// Relative error of σ_z: the fixed-point code rounds B to 12 bits and then takes an integer root of the mean power, rounding
-/// down both times. At the smallest modulation, 16/255 (257 of 4095 units), this is up to two units.
+/// Relative error of σ_z: the fixed-point code rounds B to 12 bits and then takes an integer root
+/// of the mean power, rounding down both times. At the smallest modulation, 16/255 (257 of 4095
+/// units), this is up to two units.
 const SIGMA_SHARE: f64 = 2.0 / 257.0;
 /// σ_z is written as f32.
 const NOISE_SHARE: f64 = 1e-6;
@@ -35,8 +37,8 @@ fn same(trust: Trust, reason: Reason) -> bool {
     trust.word() == reason.word()
 }
 
-/// Compares the phases of pixels that both resolve, and the masks of all pixels. `reason` has the twin's
-/// masks; whether they include heights follows `trust`.
+/// Compares the phases of pixels that both resolve, and the masks of all pixels. `reason` has the
+/// twin's masks; whether they include heights follows `trust`.
 fn compare(measured: &Measured, at: usize, twin: &PhaseTwin, reason: &[Reason]) -> Difference {
     let found = &measured.result.phases[at];
     let finest = levels_of(&measured.recording, at).last().unwrap().ratio;
@@ -181,7 +183,8 @@ fn the_fixed_point_equals_its_twin_in_every_form_depth_and_number_of_shifts() {
     for (name, recording) in cases::all() {
         let measured = Measured::new(recording);
         let reasons = &measured.result.report.unresolved;
-        // Each case has the reasons that it can have, so results are not equal only because they are empty.
+        // Each case has the reasons that it can have, so results are not equal only because they
+        // are empty.
         assert!(reasons["low_modulation"] + reasons["residual"] > 0 || name.starts_with("single"));
         check(name, &measured);
     }

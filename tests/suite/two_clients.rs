@@ -1,4 +1,5 @@
-//! Two clients at the same time: no change of a recipe is lost whose answer was success, and none of two that trigger is starved.
+//! Two clients at the same time: no change of a recipe is lost whose answer was success, and none
+//! of two that trigger is starved.
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY};
@@ -87,13 +88,15 @@ fn an_edit_does_not_undo_an_import_that_came_while_it_was_made() {
         });
         assert!([DONE, CONFLICT].contains(&edited), "{edited}");
         conflicts += usize::from(edited == CONFLICT);
-        // In either order: an import replaces an edit, and an edit with another base does not replace an import.
+        // In either order: an import replaces an edit, and an edit with another base does not
+        // replace an import.
         assert_eq!(editor.get("/api/recipes/1")["name"], name, "round {round}");
     }
     println!("{conflicts} of {} edits came too late", ROUNDS / 2);
 }
 
-/// Triggers until `ended`, asking for the status so many times in between; returns how many were accepted. Tokens begin at `first`.
+/// Triggers until `ended`, asking for the status so many times in between; returns how many were
+/// accepted. Tokens begin at `first`.
 fn trigger(daemon: &Daemon, first: u16, asks: usize, ended: &AtomicBool) -> u32 {
     let mut plc = Plc::connect(daemon);
     let mut accepted = 0;

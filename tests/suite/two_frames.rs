@@ -1,4 +1,5 @@
-//! Parts that are measured with two frames, the fringe and its complement, wherever they lie within 3 mm.
+//! Parts that are measured with two frames, the fringe and its complement, wherever they lie within
+//! 3 mm.
 
 use super::gauges::frames;
 use super::history::recording;
@@ -80,7 +81,8 @@ impl Line {
         frames(&mut self.bed, &self.plan, 0)
     }
 
-    /// A cycle as the station runs it, of a part in a random placement; the second value is the sequence that it was judged by.
+    /// A cycle as the station runs it, of a part in a random placement; the second value is the
+    /// sequence that it was judged by.
     fn cycle(&mut self, part: &Part) -> (Inspection, usize) {
         let placement = self.placement();
         self.bed.stage.place(part, &placement).unwrap();
@@ -97,7 +99,8 @@ impl Line {
     }
 }
 
-/// Judges parts in random placements. All verdicts must be right, and nine of ten without more frames.
+/// Judges parts in random placements. All verdicts must be right, and nine of ten without more
+/// frames.
 fn judge(line: &mut Line, part: &Part, expected: Verdict, count: usize) {
     let (mut right, mut by_two) = (0, 0);
     let mut values = Vec::new();

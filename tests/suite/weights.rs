@@ -1,4 +1,5 @@
-//! Weighted deviations: measurement in strips compared with the comparison of whole maps, for parts in place and displaced parts.
+//! Weighted deviations: measurement in strips compared with the comparison of whole maps, for parts
+//! in place and displaced parts.
 
 use super::placement::{bed, scenario, taught};
 use super::production::{compare, expected, frames, parts, plan, plan_with};
@@ -13,15 +14,15 @@ use appliance::recipe::{AlignmentKind, Recipe};
 use hal::frame::Frame;
 use sim::Placement;
 
-/// Largest difference between the two, mm, on gentle slopes: strips interpolate between nodes where on the taught part a pixel looks,
-/// this file computes it for each pixel.
+/// Largest difference between the two, mm, on gentle slopes: strips interpolate between nodes where
+/// on the taught part a pixel looks, this file computes it for each pixel.
 const BROUGHT_MM: f64 = 5e-5;
-/// How far that interpolation is off, pixels: a shift by half a pixel is bent by 1e-4 pixels between two nodes. It counts on steep
-/// slopes and beside creases.
+/// How far that interpolation is off, pixels: a shift by half a pixel is bent by 1e-4 pixels
+/// between two nodes. It counts on steep slopes and beside creases.
 const BENT_PX: f64 = 2e-4;
 
-/// Sets weights in a pattern, so that squares of a gauge have several different ones. `valid` holds them as [`Weight::bits`]: 1 is full
-/// weight, 60 and 190 are 60/256 and 190/256.
+/// Sets weights in a pattern, so that squares of a gauge have several different ones. `valid` holds
+/// them as [`Weight::bits`]: 1 is full weight, 60 and 190 are 60/256 and 190/256.
 fn weigh(taught: &mut TaughtRecipe) {
     let width = taught.manifest.camera.width as usize;
     let valid = taught.recipe.arrays.valid.iter_mut().enumerate();
@@ -56,8 +57,8 @@ fn strips_weigh_deviations_as_the_comparison_of_whole_maps_does() {
     assert!(changed > 0, "the weights change no reading");
 }
 
-/// Compares the deviation of an aligned part with maps in which golden is moved to where each pixel sees the part. Returns whether the
-/// weights change it.
+/// Compares the deviation of an aligned part with maps in which golden is moved to where each pixel
+/// sees the part. Returns whether the weights change it.
 fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]) -> bool {
     let production = plan.production();
     let views: Vec<_> = frames
@@ -77,8 +78,8 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
         .map(|mm| Height::from_mm(f64::from(*mm)))
         .collect();
     let factor = factors(recipe, plan, &taught);
-    // Golden as the pixel `at` sees it after the part's motion: the measured z minus its deviation, and the factor there, with and
-    // without the weight. It looks `aside` pixels beside its place.
+    // Golden as the pixel `at` sees it after the part's motion: the measured z minus its deviation,
+    // and the factor there, with and without the weight. It looks `aside` pixels beside its place.
     let moved_golden = |at: usize, z: f64, aside: f64| {
         let point = triangulator.point(at % width, at / width, Height::from_mm(z))?;
         let back = motion.undo(point);

@@ -1,5 +1,5 @@
-//! A whole measured height map against the golden one, pixel by pixel: deviation and coverage of regions. Production by strips is
-//! compared with it.
+//! A whole measured height map against the golden one, pixel by pixel: deviation and coverage of
+//! regions. Production by strips is compared with it.
 
 use algo::inspect::{Factor, Reading, Region, Square, Weight, normal_shares};
 use algo::pipeline::{HeightMap, KnownSurface, Window};
@@ -14,7 +14,8 @@ pub(crate) struct Golden {
     pub width: usize,
     /// Height as taught, [`Height::UNKNOWN`] where the part is not to be compared.
     pub height: Vec<Height>,
-    /// What height differences there are multiplied by: their share along the normal times their weight.
+    /// What height differences there are multiplied by: their share along the normal times their
+    /// weight.
     pub factor: Vec<f64>,
     /// The least side of the squares about each pixel; empty where any will do.
     pub sides: Vec<u8>,
@@ -25,7 +26,8 @@ pub(crate) struct Golden {
 pub(crate) struct Comparison<'a> {
     golden: &'a Golden,
     measured: &'a HeightMap,
-    /// Weighted deviation along the normal in nm and its variance in nm² of each pixel that both maps know.
+    /// Weighted deviation along the normal in nm and its variance in nm² of each pixel that both
+    /// maps know.
     deviations: Vec<Option<(i64, f64)>>,
 }
 
@@ -70,9 +72,9 @@ impl<'a> Comparison<'a> {
         })
     }
 
-    /// The deviation from golden of largest magnitude in a region, with its sign, each pixel's times its weight, after
-    /// averaging over squares of `side` pixels (odd; 1 = none): single noisy pixels do not decide. `None`
-    /// where no square has enough pixels that both maps know.
+    /// The deviation from golden of largest magnitude in a region, with its sign, each pixel's
+    /// times its weight, after averaging over squares of `side` pixels (odd; 1 = none): single
+    /// noisy pixels do not decide. `None` where no square has enough pixels that both maps know.
     pub fn deviation(&self, region: &Region, side: usize) -> Option<Reading> {
         let places = region
             .spans()
@@ -91,7 +93,8 @@ impl<'a> Comparison<'a> {
             .max_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))
     }
 
-    /// The share of a region's pixels that the measurement resolves. What noise does to it is not known here.
+    /// The share of a region's pixels that the measurement resolves. What noise does to it is not
+    /// known here.
     pub fn coverage(&self, region: &Region) -> Reading {
         let resolved = region
             .places(self.golden.width)

@@ -1,4 +1,5 @@
-//! Prints hashes of the kernels' results, and decodes single cases for counting instructions, on any machine.
+//! Prints hashes of the kernels' results, and decodes single cases for counting instructions, on
+//! any machine.
 //!
 //! ```text
 //! cargo run -p algo --example probe                 one line per back-end and case: hashes of the maps
@@ -7,12 +8,15 @@
 //!                                                   pixels
 //! ```
 //!
-//! CASE is the name of a case, one of `cases.rs` or another of that form; with `/background` appended three quarters of the
-//! frames are dark, with `/arrival` the coarser levels are decoded on arrival, with `/aligned` every frame begins at a page of
-//! 16 KiB, as a camera's buffers do, with `/quiet` a quiet head's modulations are trusted. At the end may stand a back-end, as in `single-4-8@ssse3`; without it the fastest is used.
+//! CASE is the name of a case, one of `cases.rs` or another of that form; with `/background`
+//! appended three quarters of the frames are dark, with `/arrival` the coarser levels are decoded
+//! on arrival, with `/aligned` every frame begins at a page of 16 KiB, as a camera's buffers do,
+//! with `/quiet` a quiet head's modulations are trusted. At the end may stand a back-end, as in
+//! `single-4-8@ssse3`; without it the fastest is used.
 //!
-//! The hashes must be those of `frozen.txt` on every machine and with every back-end; a test here checks it. After a
-//! change that is meant to change bits, `probe | sed 's/[^ ]* //' | awk '!seen[$0]++'` writes that file anew.
+//! The hashes must be those of `frozen.txt` on every machine and with every back-end; a test here
+//! checks it. After a change that is meant to change bits, `probe | sed 's/[^ ]* //' | awk
+//! '!seen[$0]++'` writes that file anew.
 
 mod cases;
 mod hash;
@@ -170,8 +174,9 @@ mod tests {
             let rig = rig::triangulator(width, height).unwrap();
             triangulate(&rig, &decoder, None, &mut map);
             for reason in Trust::REASONS {
-                // A single level is the coarsest and has no unwrapping step, so no residual; only maps have unknown pixels; 8
-                // shifts tolerate saturation; a phase within a few turns of the map is within the working range.
+                // A single level is the coarsest and has no unwrapping step, so no residual; only
+                // maps have unknown pixels; 8 shifts tolerate saturation; a phase within a few
+                // turns of the map is within the working range.
                 let expected = match reason {
                     Trust::LowModulation => case.levels.len() > 1,
                     Trust::Saturated => case.levels[0].1 < 8,

@@ -14,8 +14,8 @@ const PROJECTOR: (usize, usize) = (1024, 768);
 
 /// For a camera of `width` × `height` pixels.
 ///
-/// Both look straight down, with principal points shifted so that they see the same area: but for the lenses' distortion the
-/// phase on the plane is then linear along the camera's rows.
+/// Both look straight down, with principal points shifted so that they see the same area: but for
+/// the lenses' distortion the phase on the plane is then linear along the camera's rows.
 pub fn triangulator(width: usize, height: usize) -> Outcome<Triangulator> {
     let camera = device(
         (width, height),

@@ -1,4 +1,5 @@
-//! Frames of an uneven part, computed with integers only, so that they are the same on every machine.
+//! Frames of an uneven part, computed with integers only, so that they are the same on every
+//! machine.
 
 use super::Outcome;
 use super::cases::{Case, FRINGES};
@@ -11,7 +12,8 @@ use rand_xoshiro::rand_core::{Rng, SeedableRng};
 const PADDING: usize = 3;
 /// Half width of the noise as full scale / n: n of [`Lighting::Everything`], and of the others.
 const NOISE: (i64, i64) = (60, 250);
-/// Phase rise of the part, 1/65536 turn: less than half a turn, so that one level about a map is enough.
+/// Phase rise of the part, 1/65536 turn: less than half a turn, so that one level about a map is
+/// enough.
 const RISE: i64 = 20_000;
 
 /// How the scene is lit.
@@ -21,12 +23,14 @@ pub enum Lighting {
     Even,
     /// The same in the first quarter of the columns; the others are dark.
     Background,
-    /// Every reason to reject a pixel: four sixths of the rows have dark, saturated and weak patches, one sixth is noise alone,
-    /// and one has samples at the ends of the scale and modulations about the threshold.
+    /// Every reason to reject a pixel: four sixths of the rows have dark, saturated and weak
+    /// patches, one sixth is noise alone, and one has samples at the ends of the scale and
+    /// modulations about the threshold.
     Everything,
 }
 
-/// Bytes of which the address of a frame is a multiple, if it is aligned: a page of a Raspberry Pi 5.
+/// Bytes of which the address of a frame is a multiple, if it is aligned: a page of a Raspberry
+/// Pi 5.
 const PAGE: usize = 16 << 10;
 /// Bytes of which the length of a row is a multiple, if the frame is aligned: a line of the cache.
 const LINE: usize = 64;
@@ -193,7 +197,8 @@ impl Scene {
         let sample = match band {
             4 => below(full + 1),
             5 if u % 8 < 4 => [0, 1, full / 2, full - 1, full][below(5) as usize],
-            // With samples two of these increments apart, a level of 4 shifts is exactly at the threshold.
+            // With samples two of these increments apart, a level of 4 shifts is exactly at the
+            // threshold.
             5 => full / 2 + 16 * full / 255 * below(3),
             _ => {
                 // Offset and modulation, 1/256 of full scale.

@@ -1,17 +1,19 @@
 //! How bright each projector pixel may be, so that longer exposures do not saturate the camera.
 //!
-//! **Idea.** An exposure n times as long gives dark places n times the modulation, and so 1/n of the noise. Bright places would
-//! saturate: the projector is made darker where it lights them.
+//! **Idea.** An exposure n times as long gives dark places n times the modulation, and so 1/n of
+//! the noise. Bright places would saturate: the projector is made darker where it lights them.
 //!
-//! **Equation.** At a camera pixel that gets w of the projector's white and o of other light in one exposure (shares of full scale), n
-//! exposures stay below the share L with the share (Peng & Gupta 2008, eq. 1 with another I_max)
+//! **Equation.** At a camera pixel that gets w of the projector's white and o of other light in one
+//! exposure (shares of full scale), n exposures stay below the share L with the share (Peng & Gupta
+//! 2008, eq. 1 with another I_max)
 //!
 //! > a = (L − n o) / (n w), within 1/2n ≤ a ≤ 1
 //!
-//! of the projector's light: together at least half of one exposure's whole light, whatever else lights the part. Each camera pixel asks this
-//! of the projector pixel that lights it. The amplitude is the least that is asked for within the reach of the part's placement, and
-//! rises from there by at most 2 % (`SLOPE`) per projector pixel: a gradient within the blur σ of a lens, in projector pixels, shifts the
-//! fringes by a′/a σ² pixels.
+//! of the projector's light: together at least half of one exposure's whole light, whatever else
+//! lights the part. Each camera pixel asks this of the projector pixel that lights it. The
+//! amplitude is the least that is asked for within the reach of the part's placement, and rises
+//! from there by at most 2 % (`SLOPE`) per projector pixel: a gradient within the blur σ of a lens,
+//! in projector pixels, shifts the fringes by a′/a σ² pixels.
 
 use super::ProjectorMap;
 use super::map::UNKNOWN;
@@ -21,9 +23,11 @@ use crate::pipeline::{HeightMap, for_each_row};
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Largest rise of the amplitude from one projector pixel to the next, relative: with a lens of σ 1 px the fringes shift by 0.02 px.
+/// Largest rise of the amplitude from one projector pixel to the next, relative: with a lens of σ 1
+/// px the fringes shift by 0.02 px.
 const SLOPE: f32 = 0.02;
-/// Projector pixels by which the reach is larger than the placement's: blur, and pixels that no camera pixel asks for.
+/// Projector pixels by which the reach is larger than the placement's: blur, and pixels that no
+/// camera pixel asks for.
 const MARGIN: usize = 2;
 /// Every so many camera pixels in each direction, the reach is looked at.
 const SPACING: usize = 8;
@@ -33,7 +37,8 @@ const SPACING: usize = 8;
 pub struct Received {
     /// What does not come from the projector.
     pub other: f64,
-    /// What comes from the projector at white; infinite where it is not known because the pixel is saturated.
+    /// What comes from the projector at white; infinite where it is not known because the pixel is
+    /// saturated.
     pub white: f64,
 }
 
@@ -50,7 +55,8 @@ impl Received {
         }
     }
 
-    /// The share of the projector's light with which so many exposures stay below `most` of full scale.
+    /// The share of the projector's light with which so many exposures stay below `most` of full
+    /// scale.
     pub fn share(&self, exposures: u32, most: f64) -> f64 {
         let n = f64::from(exposures);
         let share = (most - n * self.other) / (n * self.white);
@@ -59,7 +65,8 @@ impl Received {
     }
 }
 
-/// The most projector pixels by which a point of the surface moves there with a part that is displaced by up to `tolerance` mm.
+/// The most projector pixels by which a point of the surface moves there with a part that is
+/// displaced by up to `tolerance` mm.
 pub fn reach(triangulator: &Triangulator, heights: &HeightMap, tolerance: f64) -> f64 {
     let width = heights.width.max(1);
     let rows = heights.height.len() / width;
@@ -80,8 +87,9 @@ pub fn reach(triangulator: &Triangulator, heights: &HeightMap, tolerance: f64) -
     tolerance * most
 }
 
-/// The amplitude of each pixel of a projector of (columns, rows), in 1/255 of full light: where the camera sees a projector point of
-/// `map`, at most the share of `wanted`, also within `reach` projector pixels; 255 where nothing asks for less.
+/// The amplitude of each pixel of a projector of (columns, rows), in 1/255 of full light: where the
+/// camera sees a projector point of `map`, at most the share of `wanted`, also within `reach`
+/// projector pixels; 255 where nothing asks for less.
 ///
 /// Tests: `no_place_within_reach_is_brighter_than_asked_and_it_rises_slowly`,
 /// `a_saturated_place_is_found_between_the_places_around_it`.
@@ -116,7 +124,8 @@ pub fn amplitude(
     amplitude.iter().map(level).collect()
 }
 
-/// The projector point of the pixel `u` of a row; of one that is not known, on the line between the known ones left and right of it.
+/// The projector point of the pixel `u` of a row; of one that is not known, on the line between the
+/// known ones left and right of it.
 fn between(points: &[[f64; 2]], u: usize) -> [f64; 2] {
     let known = |&at: &usize| !points[at][0].is_nan();
     let left = (0..=u).rev().find(known);
@@ -152,8 +161,8 @@ fn least_around(values: &[f32], (columns, rows): (usize, usize), reach: usize) -
     all
 }
 
-/// Lowers values until none is larger than a neighbour's by more than [`SLOPE`], relative to it: from the left and above, then from the
-/// right and below.
+/// Lowers values until none is larger than a neighbour's by more than [`SLOPE`], relative to it:
+/// from the left and above, then from the right and below.
 fn rise_slowly(values: &mut [f32], columns: usize) {
     let last = values.len().saturating_sub(1);
     for backwards in [false, true] {
@@ -176,7 +185,8 @@ fn rise_slowly(values: &mut [f32], columns: usize) {
 mod tests {
     use super::*;
 
-    /// A camera of 60 × 40 pixels that sees every second projector pixel of 120 × 80, and where it does not know which.
+    /// A camera of 60 × 40 pixels that sees every second projector pixel of 120 × 80, and where it
+    /// does not know which.
     fn map(unknown: impl Fn(usize, usize) -> bool) -> ProjectorMap {
         let points = (0..60 * 40).map(|at| match (at % 60, at / 60) {
             (u, v) if unknown(u, v) => UNKNOWN,

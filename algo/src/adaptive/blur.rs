@@ -1,12 +1,15 @@
 //! The blur of both lenses, from the contrast that fringes have on a part and on a plate.
 //!
-//! **Idea.** The projector's blur weakens fringes by their pitch in projector pixels, the camera's by their pitch in camera pixels. On
-//! steep surfaces these differ, so a part with slopes tells both apart.
+//! **Idea.** The projector's blur weakens fringes by their pitch in projector pixels, the camera's
+//! by their pitch in camera pixels. On steep surfaces these differ, so a part with slopes tells
+//! both apart.
 //!
-//! **Equation.** Of two frequencies f and c on a surface of slope J, the contrast beyond that of the pixels' squares falls by
-//! exp(−2π²(f² − c²)(σ_P² + |J|²σ_C²)): the logarithm is a straight line over |J|². Its two numbers are a least-squares fit through the
-//! medians of [`GROUPS`] groups of pixels of about the same slope, because medians ignore edges and noise. What calibration measured on
-//! a plate counts as much as all groups. Where all slopes are alike, the blur is put on the projector.
+//! **Equation.** Of two frequencies f and c on a surface of slope J, the contrast beyond that of
+//! the pixels' squares falls by exp(−2π²(f² − c²)(σ_P² + |J|²σ_C²)): the logarithm is a straight
+//! line over |J|². Its two numbers are a least-squares fit through the medians of [`GROUPS`] groups
+//! of pixels of about the same slope, because medians ignore edges and noise. What calibration
+//! measured on a plate counts as much as all groups. Where all slopes are alike, the blur is put on
+//! the projector.
 
 use super::contrast::{Blur, contrast};
 use alloc::vec::Vec;
@@ -27,8 +30,9 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// From the modulation at `fine` as a share of that at `coarse` (turns per projector pixel) on a surface of slope `[ju, jv]`.
-    /// `None` if they tell nothing, for example because one of them is unknown.
+    /// From the modulation at `fine` as a share of that at `coarse` (turns per projector pixel) on
+    /// a surface of slope `[ju, jv]`. `None` if they tell nothing, for example because one of them
+    /// is unknown.
     pub fn new([ju, jv]: [f64; 2], share: f64, [fine, coarse]: [f64; 2]) -> Option<Self> {
         let pixels = |g: f64| contrast(&Blur::default(), g, [g * ju, g * jv]);
         let lost = -libm::log(share * pixels(coarse) / pixels(fine));
@@ -42,7 +46,8 @@ impl Spread {
 }
 
 impl Blur {
-    /// The blur of both lenses from the pixels of a part, and from a plate, if one was measured. `None` without any.
+    /// The blur of both lenses from the pixels of a part, and from a plate, if one was measured.
+    /// `None` without any.
     pub fn fit(mut part: Vec<Spread>, plate: Option<Spread>) -> Option<Self> {
         part.sort_unstable_by(|a, b| a.steepness.total_cmp(&b.steepness));
         let size = part.len().div_ceil(GROUPS).max(1);

@@ -1,8 +1,9 @@
-//! Contrast of fringes after the optics of projector and camera, and what the projector's pixels add to them.
+//! Contrast of fringes after the optics of projector and camera, and what the projector's pixels
+//! add to them.
 //!
-//! A projector pixel is a bright square, which its lens blurs; a camera pixel integrates over a square of its own, and its lens
-//! blurs as well. So a sine of g turns per projector pixel, which the camera sees with the gradient (a, b) turns per camera pixel, has
-//! the contrast
+//! A projector pixel is a bright square, which its lens blurs; a camera pixel integrates over a
+//! square of its own, and its lens blurs as well. So a sine of g turns per projector pixel, which
+//! the camera sees with the gradient (a, b) turns per camera pixel, has the contrast
 //!
 //! ```text
 //! M(g) = sinc g · exp(−2π²σ_P²g²) · sinc a · sinc b · exp(−2π²σ_C²(a² + b²))        sinc x = sin πx / πx
@@ -32,19 +33,20 @@ pub struct Blur {
     pub camera: f64,
 }
 
-/// The contrast M of a sine of frequency `g` (turns per projector pixel) that the camera sees with gradient `[a, b]` (turns per camera
-/// pixel along u and v).
+/// The contrast M of a sine of frequency `g` (turns per projector pixel) that the camera sees with
+/// gradient `[a, b]` (turns per camera pixel along u and v).
 pub fn contrast(blur: &Blur, g: f64, [a, b]: [f64; 2]) -> f64 {
     let camera = sinc(a) * sinc(b) * gauss(blur.camera, libm::sqrt(a * a + b * b));
     sinc(g) * gauss(blur.projector, g) * camera
 }
 
-/// The light, as a share of the raster's sine, that the projector's squares show at 1 − g and 1 + g turns per pixel, where the camera
-/// sees the slope `[ju, jv]` (projector pixels per camera pixel).
+/// The light, as a share of the raster's sine, that the projector's squares show at 1 − g and 1 + g
+/// turns per pixel, where the camera sees the slope `[ju, jv]` (projector pixels per camera pixel).
 ///
-/// Shifting the sine shifts these replicas in step, so demodulation takes them for the sine: the phase is off by up to this share of
-/// the contrast, in radian, once per projector pixel. Of the camera's box the envelope counts, 1/πx instead of |sinc x|: where the
-/// box is blind depends on more than the slope.
+/// Shifting the sine shifts these replicas in step, so demodulation takes them for the sine: the
+/// phase is off by up to this share of the contrast, in radian, once per projector pixel. Of the
+/// camera's box the envelope counts, 1/πx instead of |sinc x|: where the box is blind depends on
+/// more than the slope.
 pub fn replicas(blur: &Blur, g: f64, [ju, jv]: [f64; 2]) -> f64 {
     let slope = libm::sqrt(ju * ju + jv * jv);
     let at = |f: f64| {

@@ -1,4 +1,5 @@
-//! A field of values over a raster, usually fringe frequencies over the projector's, and its filters.
+//! A field of values over a raster, usually fringe frequencies over the projector's, and its
+//! filters.
 
 use alloc::vec;
 use alloc::vec::Vec;
@@ -36,7 +37,8 @@ impl Field {
         inside.then(|| row as usize * self.columns + column as usize)
     }
 
-    /// Gaussian smoothing with σ in pixels along rows and along columns; edge values are repeated beyond the raster.
+    /// Gaussian smoothing with σ in pixels along rows and along columns; edge values are repeated
+    /// beyond the raster.
     pub fn smoothed(&self, [rows, columns]: [f64; 2]) -> Self {
         let rows = self.smoothed_rows(rows).transposed();
         rows.smoothed_rows(columns).transposed()
@@ -145,8 +147,8 @@ impl Field {
         }
     }
 
-    /// Fills unknown cells of each row by linear interpolation between known ones; beyond the outermost known cell its value is
-    /// repeated. A row without known cells becomes `otherwise`.
+    /// Fills unknown cells of each row by linear interpolation between known ones; beyond the
+    /// outermost known cell its value is repeated. A row without known cells becomes `otherwise`.
     pub fn fill_rows(&mut self, otherwise: f64) {
         crate::pipeline::for_each_row(&mut self.values, self.columns, |_, line| {
             let mut before: Option<usize> = None;

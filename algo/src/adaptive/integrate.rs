@@ -4,9 +4,9 @@ use super::Field;
 use crate::pipeline::map_rows;
 use alloc::vec::Vec;
 
-/// Φ(s, t) = Φ(s, t−1) + G(s, t−1) with a zero first column (Peng & Gupta 2008, eq. 8), in f64: each
-/// column rounds by at most half a unit of the last place, 2⁻⁴⁰ turn up to 16,384 turns. Over 10⁵ columns
-/// that is below 9.1e-8 turn, a tenth of a unit of Q20
+/// Φ(s, t) = Φ(s, t−1) + G(s, t−1) with a zero first column (Peng & Gupta 2008, eq. 8), in f64:
+/// each column rounds by at most half a unit of the last place, 2⁻⁴⁰ turn up to 16,384 turns. Over
+/// 10⁵ columns that is below 9.1e-8 turn, a tenth of a unit of Q20
 /// (`integration_over_a_hundred_thousand_columns_is_the_exact_sum`).
 pub(super) fn rows_from_zero(field: &Field) -> Vec<f64> {
     let mut turns = Vec::with_capacity(field.values.len());
@@ -20,9 +20,9 @@ pub(super) fn rows_from_zero(field: &Field) -> Vec<f64> {
     turns
 }
 
-/// As [`rows_from_zero`], with each row shifted so that its mean difference to the row above is 0 over the cells that are `seen`
-/// in both. With a zero first column rows shear against each other, which makes fringes across the rows as fine as the shear is
-/// steep. The lowest phase is 0.
+/// As [`rows_from_zero`], with each row shifted so that its mean difference to the row above is 0
+/// over the cells that are `seen` in both. With a zero first column rows shear against each other,
+/// which makes fringes across the rows as fine as the shear is steep. The lowest phase is 0.
 pub(super) fn balanced_rows(field: &Field, seen: &[bool]) -> Vec<f64> {
     let columns = field.columns.max(1);
     let mut turns = rows_from_zero(field);
@@ -71,10 +71,12 @@ mod tests {
     }
 
     const COLUMNS: usize = 100_000;
-    /// Half a unit of the last place below 16,384 turns, 2⁻⁴⁰, for each column: a tenth of a unit of Q20.
+    /// Half a unit of the last place below 16,384 turns, 2⁻⁴⁰, for each column: a tenth of a unit
+    /// of Q20.
     const SUM_ERROR: f64 = COLUMNS as f64 / 1_099_511_627_776.0;
 
-    /// The phase in front of each column, exact: frequencies from 2⁻¹¹ on are whole numbers of 2⁻⁶⁴.
+    /// The phase in front of each column, exact: frequencies from 2⁻¹¹ on are whole numbers of
+    /// 2⁻⁶⁴.
     fn exact(row: &[f64]) -> Vec<f64> {
         let unit = 18_446_744_073_709_551_616.0;
         let mut sum = 0_i128;
@@ -91,8 +93,8 @@ mod tests {
         errors.fold(0.0, f64::max)
     }
 
-    /// Rows of 10⁵ columns: uniform (every rounding alike), swept over all pitches from 4 to 128 px, and a
-    /// pitch that jumps between both.
+    /// Rows of 10⁵ columns: uniform (every rounding alike), swept over all pitches from 4 to 128
+    /// px, and a pitch that jumps between both.
     fn long_rows() -> Field {
         let mut field = Field::uniform(COLUMNS, 4, 0.1);
         for column in 0..COLUMNS {

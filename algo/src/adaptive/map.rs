@@ -8,8 +8,8 @@ use crate::units::AbsolutePhase;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The projector point (ξ, η) of each camera pixel, row-major over the camera's frame, NaN where it is
-/// not known.
+/// The projector point (ξ, η) of each camera pixel, row-major over the camera's frame, NaN where it
+/// is not known.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProjectorMap {
     /// Camera columns.
@@ -22,8 +22,9 @@ pub struct ProjectorMap {
 pub(super) const UNKNOWN: [f64; 2] = [f64::NAN; 2];
 
 impl ProjectorMap {
-    /// From the heights of a preliminary measurement with vertical fringes: η follows from projecting the point. As camera and
-    /// projector lie beside each other, an error of the height hardly changes η, and horizontal fringes are not needed.
+    /// From the heights of a preliminary measurement with vertical fringes: η follows from
+    /// projecting the point. As camera and projector lie beside each other, an error of the height
+    /// hardly changes η, and horizontal fringes are not needed.
     pub fn from_heights(triangulator: &Triangulator, heights: &HeightMap) -> Self {
         let width = heights.width;
         let mut points = vec![UNKNOWN; heights.height.len()];
@@ -40,8 +41,9 @@ impl ProjectorMap {
         Self { width, points }
     }
 
-    /// From preliminary measurements with vertical and horizontal fringes: ξ = `across` × vertical phase, η = `down` × horizontal
-    /// phase, where `across` and `down` are their pitches in projector pixels (Peng & Gupta 2008, eqs. 3 and 4).
+    /// From preliminary measurements with vertical and horizontal fringes: ξ = `across` × vertical
+    /// phase, η = `down` × horizontal phase, where `across` and `down` are their pitches in
+    /// projector pixels (Peng & Gupta 2008, eqs. 3 and 4).
     pub fn from_phases(
         [vertical, horizontal]: [&[AbsolutePhase]; 2],
         [across, down]: [f64; 2],
@@ -60,8 +62,8 @@ impl ProjectorMap {
         }
     }
 
-    /// The phase of each pixel under a phase function, if the surface has not moved since it was measured; unknown where
-    /// it was not resolved.
+    /// The phase of each pixel under a phase function, if the surface has not moved since it was
+    /// measured; unknown where it was not resolved.
     pub fn expected_phase(&self, function: &PhaseFunction) -> Vec<AbsolutePhase> {
         let phase = |[xi, eta]: &[f64; 2]| AbsolutePhase::from_turns(function.at(*xi, *eta));
         self.points.iter().map(phase).collect()
@@ -85,7 +87,8 @@ impl ProjectorMap {
         u >= 0 && v >= 0 && u < self.width as isize && v < self.height() as isize
     }
 
-    /// Erodes the known region by one pixel, because silhouettes mix surfaces: a pixel stays known if all 3 × 3 pixels around it, inside the frame, are known.
+    /// Erodes the known region by one pixel, because silhouettes mix surfaces: a pixel stays known
+    /// if all 3 × 3 pixels around it, inside the frame, are known.
     pub fn eroded(&self) -> Self {
         let points = (0..self.points.len()).map(|place| {
             let columns = around(place % self.width, 1, self.width);
@@ -102,9 +105,9 @@ impl ProjectorMap {
         }
     }
 
-    /// J = (∂ξ/∂u, ∂ξ/∂v) of each pixel, by a plane fit over its known 5 × 5 neighbours whose ξ differs by at most
-    /// `max_slope` projector pixels per camera pixel (so that surfaces do not mix at edges); NaN where the
-    /// neighbours do not determine it.
+    /// J = (∂ξ/∂u, ∂ξ/∂v) of each pixel, by a plane fit over its known 5 × 5 neighbours whose ξ
+    /// differs by at most `max_slope` projector pixels per camera pixel (so that surfaces do not
+    /// mix at edges); NaN where the neighbours do not determine it.
     pub fn slopes(&self, max_slope: f64) -> Vec<[f64; 2]> {
         let mut slopes = vec![[f64::NAN; 2]; self.points.len()];
         for_each_row(&mut slopes, self.width, |v, row| {
@@ -119,7 +122,8 @@ impl ProjectorMap {
 
     fn slope(&self, u: isize, v: isize, max_slope: f64) -> Option<[f64; 2]> {
         let [centre, _] = self.at(u, v)?;
-        // Sums of x = du, y = dv and z = Δξ and of their products; below, the products are taken about the means.
+        // Sums of x = du, y = dv and z = Δξ and of their products; below, the products are taken
+        // about the means.
         let (mut n, mut x, mut y, mut z) = (0.0, 0.0, 0.0, 0.0);
         let (mut xx, mut xy, mut yy, mut xz, mut yz) = (0.0, 0.0, 0.0, 0.0, 0.0);
         for dv in -2..=2_isize {

@@ -1,16 +1,19 @@
 //! The pattern of least error for the light, the noise and the contrast that a part has.
 //!
-//! **Idea.** The height's noise is proportional to 1 / (g · M(g)), frequency times contrast. So each part of the surface gets the
-//! frequency with the least error, instead of a fixed image pitch, but none so fine that its modulation could not be trusted. Needs
-//! one preliminary measurement with vertical fringes.
+//! **Idea.** The height's noise is proportional to 1 / (g · M(g)), frequency times contrast. So
+//! each part of the surface gets the frequency with the least error, instead of a fixed image
+//! pitch, but none so fine that its modulation could not be trusted. Needs one preliminary
+//! measurement with vertical fringes.
 //!
-//! **Equation.** Of the frequencies with B₀ · M(g) at least what noise asks for, where B₀ is the modulation without blur, the one that maximises
+//! **Equation.** Of the frequencies with B₀ · M(g) at least what noise asks for, where B₀ is the
+//! modulation without blur, the one that maximises
 //!
 //! ```text
 //! g · M(g) / √(n² + R(g)²/2)
 //! ```
 //!
-//! n is the noise of the phase where M = 1, and R what the squares of the projector's pixels add ([`replicas`]), both in radian.
+//! n is the noise of the phase where M = 1, and R what the squares of the projector's pixels add
+//! ([`replicas`]), both in radian.
 
 use super::contrast::{Blur, Optics, contrast, replicas};
 use super::field::Field;
@@ -23,37 +26,47 @@ use crate::pipeline::PhaseMap;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Default of the smallest pitch in projector pixels. Finer fringes gain little, and a part reaches fewer of them within its tolerance.
+/// Default of the smallest pitch in projector pixels. Finer fringes gain little, and a part reaches
+/// fewer of them within its tolerance.
 pub const PROJECTOR_PITCH: f64 = 5.0;
-/// Default of the smallest pitch in camera pixels: the maximum of g · M(g) with the box of the pixel alone.
+/// Default of the smallest pitch in camera pixels: the maximum of g · M(g) with the box of the
+/// pixel alone.
 pub const IMAGE_PITCH: f64 = 2.2;
-/// Largest pitch of a pattern, projector pixels. Where the part is so steep that this is not resolved, no pitch is.
+/// Largest pitch of a pattern, projector pixels. Where the part is so steep that this is not
+/// resolved, no pitch is.
 const MAX_PITCH: f64 = 128.0;
-/// Neighbours that differ by more than this many projector pixels per camera pixel lie on different surfaces.
+/// Neighbours that differ by more than this many projector pixels per camera pixel lie on different
+/// surfaces.
 pub const MAX_SLOPE: f64 = 6.0;
-/// Cells without a camera pixel take the frequency of a neighbour up to this far away, projector pixels.
+/// Cells without a camera pixel take the frequency of a neighbour up to this far away, projector
+/// pixels.
 const FILL: usize = 8;
 /// Reach of the minimum filter to each side, projector pixels.
 const MINIMUM_REACH: usize = 1;
-/// σ of the smoothing after it along and across the rows, projector pixels. Across the rows it is larger, because rows whose pitches differ
-/// shear against each other, and a shear that changes from row to row falsifies the phase where blur mixes them: with 3 px, the rows that
-/// pass the tip of the study's cone were off by 30 µm without noise.
+/// σ of the smoothing after it along and across the rows, projector pixels. Across the rows it is
+/// larger, because rows whose pitches differ shear against each other, and a shear that changes
+/// from row to row falsifies the phase where blur mixes them: with 3 px, the rows that pass the tip
+/// of the study's cone were off by 30 µm without noise.
 const SMOOTHING: [f64; 2] = [3.0, 6.0];
-/// Share of the largest worth that is enough. The maximum is flat: the last 0.2 % would cost 4 % of the contrast.
+/// Share of the largest worth that is enough. The maximum is flat: the last 0.2 % would cost 4 % of
+/// the contrast.
 const ENOUGH: f64 = 0.998;
 /// Frequencies that are tried between the coarsest and the finest, in geometric progression.
 const STEPS: usize = 160;
 /// √(2 / Σ N_i r_i² b_i²) of 12 frames: 7 + 5 of ratios 1 and 4/5 with the brightest waveforms.
 const TWELVE_FRAMES: f64 = 0.36;
-/// Error of the phase that light of an almost linear response leaves, radian: noise below it gains nothing.
+/// Error of the phase that light of an almost linear response leaves, radian: noise below it gains
+/// nothing.
 const LEAST_NOISE: f64 = 3e-3;
-/// By how many σ of a sample the modulation of sines stays above the least that is trusted. With the waveforms of 3 to 9 shifts, it is at least
-/// 15 % larger, and three times its own σ above.
+/// By how many σ of a sample the modulation of sines stays above the least that is trusted. With
+/// the waveforms of 3 to 9 shifts, it is at least 15 % larger, and three times its own σ above.
 const SAFE: f64 = 1.0;
-/// Reach to each side of the median by which light is found, camera pixels: pixels that are lit in part, along shadows and silhouettes,
-/// ask for nothing, because a narrow line of coarse fringes would shear the rows beside it.
+/// Reach to each side of the median by which light is found, camera pixels: pixels that are lit in
+/// part, along shadows and silhouettes, ask for nothing, because a narrow line of coarse fringes
+/// would shear the rows beside it.
 const LIGHT_REACH: usize = 5;
-/// No more contrast than this is asked for: less light than it needs cannot be helped by a coarser pitch.
+/// No more contrast than this is asked for: less light than it needs cannot be helped by a coarser
+/// pitch.
 const MOST_CONTRAST: f64 = 0.9;
 
 /// The light of each camera pixel.
@@ -68,8 +81,8 @@ pub struct Light {
 }
 
 impl Light {
-    /// The light of a preliminary measurement with fringes of `g` turns per projector pixel, on slopes by [`ProjectorMap::slopes`].
-    /// `noise` is σ of a sample in counts, if it is known.
+    /// The light of a preliminary measurement with fringes of `g` turns per projector pixel, on
+    /// slopes by [`ProjectorMap::slopes`]. `noise` is σ of a sample in counts, if it is known.
     pub fn of(
         (phases, decoder): (&PhaseMap, &Decoder),
         slopes: &[[f64; 2]],
@@ -139,8 +152,9 @@ struct Asked {
     noise: f64,
 }
 
-/// The frequency for a surface that the camera sees with slope J: the lowest whose worth reaches 99.8 % of the maximum within both
-/// limits of pitch, or the highest with the contrast that is asked for, if that is lower.
+/// The frequency for a surface that the camera sees with slope J: the lowest whose worth reaches
+/// 99.8 % of the maximum within both limits of pitch, or the highest with the contrast that is
+/// asked for, if that is lower.
 fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked) -> f64 {
     let blur = &optics.blur;
     let slope = libm::sqrt(ju * ju + jv * jv);
@@ -164,7 +178,8 @@ fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked) -> f64 {
     frequency(first(peak, |i| worth(i) >= enough))
 }
 
-/// The first of 0…`last` for which `holds` is true, given that it is true for all after it; `last` if it is for none before.
+/// The first of 0…`last` for which `holds` is true, given that it is true for all after it; `last`
+/// if it is for none before.
 fn first(last: usize, holds: impl Fn(usize) -> bool) -> usize {
     let (mut low, mut high) = (0, last);
     while low < high {
@@ -178,8 +193,9 @@ fn first(last: usize, holds: impl Fn(usize) -> bool) -> usize {
     low
 }
 
-/// RMS of σ_z in mm under the phase function `before`, and predicted for the same levels and shifts of `after`: σ_z of each pixel
-/// is proportional to 1 / (g · M(g)). `sigma` is σ_z of each camera pixel of `map` under `before`; `None` if no pixel has one.
+/// RMS of σ_z in mm under the phase function `before`, and predicted for the same levels and shifts
+/// of `after`: σ_z of each pixel is proportional to 1 / (g · M(g)). `sigma` is σ_z of each camera
+/// pixel of `map` under `before`; `None` if no pixel has one.
 pub fn predict(
     sigma: &[f32],
     map: &ProjectorMap,

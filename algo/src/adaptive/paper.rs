@@ -1,8 +1,8 @@
 //! The paper's adaptive pattern, unchanged (Peng & Gupta 2008, eqs. 2–9): the baseline.
 //!
 //! In turns: preliminary patterns Φ^V = ξ/(c p_P), Φ^H = η/p_H give each camera pixel its projector
-//! point. Where the fringes of the camera's image would be finer than p_I, |∂Φ^V/∂u| > 1/(c p_I), the
-//! pattern's pitch grows in proportion, G = 1/(c p_I p_P |∂Φ^V/∂u|); elsewhere it is p_P.
+//! point. Where the fringes of the camera's image would be finer than p_I, |∂Φ^V/∂u| > 1/(c p_I),
+//! the pattern's pitch grows in proportion, G = 1/(c p_I p_P |∂Φ^V/∂u|); elsewhere it is p_P.
 
 use super::field::Field;
 use super::integrate::rows_from_zero;
@@ -16,18 +16,21 @@ use alloc::vec::Vec;
 pub const PROJECTOR_PITCH: f64 = 8.0;
 /// c: the preliminary patterns' pitch is this many times p_P.
 pub const PRELIMINARY: f64 = 2.5;
-/// p_I, the smallest image pitch, in camera pixels. The paper does not state it; the baseline uses this.
+/// p_I, the smallest image pitch, in camera pixels. The paper does not state it; the baseline uses
+/// this.
 pub const IMAGE_PITCH: f64 = 5.0;
 /// Largest local pitch, projector pixels.
 const MAX_PITCH: f64 = 128.0;
-/// Neighbours that differ by more than this many projector pixels per camera pixel are depth edges, not slopes.
+/// Neighbours that differ by more than this many projector pixels per camera pixel are depth edges,
+/// not slopes.
 const MAX_SLOPE: f64 = 24.0;
 /// Smaller components of the mask are dropped, camera pixels.
 const MIN_COMPONENT: usize = 40;
 /// σ of the smoothing of G, projector pixels.
 const SMOOTHING: f64 = 4.0;
 
-/// Makes the paper's phase function for a part, over a projector of `columns` × `rows` pixels. `image_pitch` is p_I.
+/// Makes the paper's phase function for a part, over a projector of `columns` × `rows` pixels.
+/// `image_pitch` is p_I.
 ///
 /// # Errors
 /// If no pixel of the part is known.
@@ -71,8 +74,9 @@ fn slopes(map: &ProjectorMap) -> Vec<f64> {
         .collect()
 }
 
-/// Eq. 7 over the component's image in the pattern: its boundary is mapped by eq. 4 and filled; each
-/// cell takes the mean of the pixels that map to it, other cells are interpolated along their row.
+/// Eq. 7 over the component's image in the pattern: its boundary is mapped by eq. 4 and filled;
+/// each cell takes the mean of the pixels that map to it, other cells are interpolated along their
+/// row.
 fn stretch(
     field: &mut Field,
     map: &ProjectorMap,

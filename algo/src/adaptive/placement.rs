@@ -5,20 +5,23 @@
 //! surface and the declared tolerance of placement decide which pixels are safe.
 //!
 //! # Equation
-//! A part that is moved by at most T lies inside its own dilation by a ball of radius T (J. Serra, *Image Analysis and Mathematical
-//! Morphology*, 1982). Along the ray of pixel p, with ρ_q the distance of golden's point from the camera at pixel q and s the least
-//! distance in mm between the rays of neighbouring pixels, that dilation is between
+//! A part that is moved by at most T lies inside its own dilation by a ball of radius T (J.
+//! Serra, *Image Analysis and Mathematical Morphology*, 1982). Along the ray of pixel p, with ρ_q
+//! the distance of golden's point from the camera at pixel q and s the least distance in mm between
+//! the rays of neighbouring pixels, that dilation is between
 //!
 //! ```text
 //! near(p) = min_q ρ_q − h(|p − q|)      far(p) = max_q ρ_q + h(|p − q|)      h(d) = √(T² − (s · max(0, d − ½√2))²)
 //! ```
 //!
-//! over all pixels q with a real h. Half a pixel's diagonal covers the surface between the pixels, so nothing is stepped over,
-//! however narrow it is. The reach is the larger |Φ − Φ_golden(p)| of the two ends, as Φ is monotonic along a ray.
+//! over all pixels q with a real h. Half a pixel's diagonal covers the surface between the pixels,
+//! so nothing is stepped over, however narrow it is. The reach is the larger |Φ − Φ_golden(p)| of
+//! the two ends, as Φ is monotonic along a ray.
 //!
 //! # Cost
-//! About 4 (T/s)² maxima of a pixel, at most [`MAX_CELLS`] squared times 3: where T is more than that many pixels, ρ is dilated by a
-//! square first and q goes over every second pixel, every third and so on, with the square's half diagonal in place of the pixel's.
+//! About 4 (T/s)² maxima of a pixel, at most [`MAX_CELLS`] squared times 3: where T is more than
+//! that many pixels, ρ is dilated by a square first and q goes over every second pixel, every third
+//! and so on, with the square's half diagonal in place of the pixel's.
 
 use crate::geometry::{Triangulator, Vector};
 use crate::math::around;
@@ -34,8 +37,8 @@ const SPACING: usize = 8;
 /// The largest |ΔΦ| in turns of each pixel when the part is moved by up to `tolerance` mm
 /// in any direction; infinite where golden is unknown within reach of the move.
 ///
-/// Occlusion is neglected, which can only make the result larger. Tests: `a_narrow_rib_is_not_stepped_over`,
-/// `the_reach_is_that_of_moves_in_all_directions`.
+/// Occlusion is neglected, which can only make the result larger. Tests:
+/// `a_narrow_rib_is_not_stepped_over`, `the_reach_is_that_of_moves_in_all_directions`.
 pub fn phase_reach(triangulator: &Triangulator, golden: &KnownSurface, tolerance: f64) -> Vec<f32> {
     let width = golden.width.max(1);
     let eye = triangulator.camera().centre();
@@ -202,7 +205,8 @@ fn largest_around(values: Vec<f32>, width: usize, half: usize) -> Vec<f32> {
     out
 }
 
-/// Makes the reach of pixels within `away` of unknown golden pixels infinite: something unknown may move into view there.
+/// Makes the reach of pixels within `away` of unknown golden pixels infinite: something unknown may
+/// move into view there.
 fn forbid_near_unknown(reach: &mut [f32], known: &[bool], width: usize, away: usize) {
     let rows = known.len() / width;
     // Rows first, then columns: a separable square.
@@ -323,7 +327,8 @@ mod tests {
         found
     }
 
-    /// Slips of a single level on a rib, within a tolerance of 3 mm: where the mask allows them, and elsewhere.
+    /// Slips of a single level on a rib, within a tolerance of 3 mm: where the mask allows them,
+    /// and elsewhere.
     fn slips(size: (usize, usize), count: usize) -> (usize, usize) {
         const TOLERANCE_MM: f64 = 3.0;
         let rig = rig(size);

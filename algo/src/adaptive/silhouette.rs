@@ -1,11 +1,13 @@
 //! Silhouettes that the camera's blur falsifies.
 //!
-//! **Idea.** Blur mixes the light of neighbouring pixels. Inside a surface the neighbours on both sides pull the phase to either side
-//! alike. Beside a silhouette they are on one side only, and where the surface is steep there, the height is off by far more than its σ:
-//! no noise shows it, and no pitch helps.
+//! **Idea.** Blur mixes the light of neighbouring pixels. Inside a surface the neighbours on both
+//! sides pull the phase to either side alike. Beside a silhouette they are on one side only, and
+//! where the surface is steep there, the height is off by far more than its σ: no noise shows it,
+//! and no pitch helps.
 //!
-//! **Equation.** With weights w_k = exp(−k²/2σ²) of the pixels k = 0, 1, 2, … from the silhouette inwards, the light of the outermost
-//! pixel comes from Σ k w_k / Σ w_k pixels inwards. Times the step of ξ from pixel to pixel this is the shift in projector pixels.
+//! **Equation.** With weights w_k = exp(−k²/2σ²) of the pixels k = 0, 1, 2, … from the silhouette
+//! inwards, the light of the outermost pixel comes from Σ k w_k / Σ w_k pixels inwards. Times the
+//! step of ξ from pixel to pixel this is the shift in projector pixels.
 
 use super::ProjectorMap;
 use super::map::UNKNOWN;
@@ -16,8 +18,8 @@ const MOST_SHIFT: f64 = 0.5;
 const REACH: u32 = 64;
 
 impl ProjectorMap {
-    /// Without the pixels at silhouettes whose light comes from more than half a projector pixel beside them, for a camera whose blur has this σ,
-    /// camera pixels.
+    /// Without the pixels at silhouettes whose light comes from more than half a projector pixel
+    /// beside them, for a camera whose blur has this σ, camera pixels.
     pub fn without_blurred_silhouettes(&self, camera_blur: f64) -> Self {
         let inwards = inwards(camera_blur);
         let points = (0..self.points.len()).map(|place| {
@@ -35,7 +37,8 @@ impl ProjectorMap {
         }
     }
 
-    /// The largest step of ξ per pixel from a known pixel at a silhouette to known pixels near it. `None` away from silhouettes.
+    /// The largest step of ξ per pixel from a known pixel at a silhouette to known pixels near it.
+    /// `None` away from silhouettes.
     fn step_at_silhouette(&self, u: isize, v: isize) -> Option<f64> {
         let [here, _] = self.at(u, v)?;
         let (mut largest, mut beside) = (0.0_f64, false);

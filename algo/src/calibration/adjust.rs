@@ -1,11 +1,14 @@
-//! One adjustment of everything: both lenses, the relative pose, all poses of the board and its bow.
+//! One adjustment of everything: both lenses, the relative pose, all poses of the board and its
+//! bow.
 //!
-//! Observed are the corners in the camera (2 residuals each, camera px) and ξ, η at nodes on the board (2 residuals each, projector px: the
-//! camera's ray through the node meets the board, and the projector sees that point). Minimised is Σ ρ(|r|/σ) over both, with Huber's ρ
-//! (P. J. Huber, 1964), by Levenberg's and Marquardt's method on the normal equations; σ of camera and of projector are estimated from
-//! their residuals and the redundancy, in rounds, until the weights agree with the residuals (variance components, W. Förstner, 1979).
-//! Derivatives are central differences: each residual depends on 33 numbers only. The inverse of the last normal matrix, and what errors of the
-//! print add to it (`print`), is the covariance.
+//! Observed are the corners in the camera (2 residuals each, camera px) and ξ, η at nodes on the
+//! board (2 residuals each, projector px: the camera's ray through the node meets the board, and
+//! the projector sees that point). Minimised is Σ ρ(|r|/σ) over both, with Huber's ρ (P. J. Huber,
+//! 1964), by Levenberg's and Marquardt's method on the normal equations; σ of camera and of
+//! projector are estimated from their residuals and the redundancy, in rounds, until the weights
+//! agree with the residuals (variance components, W. Förstner, 1979). Derivatives are central
+//! differences: each residual depends on 33 numbers only. The inverse of the last normal matrix,
+//! and what errors of the print add to it (`print`), is the covariance.
 
 use super::board::FoundBoard;
 use super::nodes::Node;
@@ -70,7 +73,8 @@ pub struct Adjusted {
     pub residuals: Vec<[Residuals; 2]>,
     /// σ of one coordinate of camera and of projector, px.
     pub sigma: [f64; 2],
-    /// Covariance of the rig's numbers, row-major, in the order of [`Rig::moved`]; rows of fixed numbers are 0.
+    /// Covariance of the rig's numbers, row-major, in the order of [`Rig::moved`]; rows of fixed
+    /// numbers are 0.
     pub(super) covariance: Vec<f64>,
 }
 
@@ -81,7 +85,8 @@ pub struct Adjusted {
 )]
 pub struct Undetermined;
 
-/// Whether a number is adjusted. k₃ stays 0: over a frame it differs from k₁ and k₂ by less than it costs in uncertainty.
+/// Whether a number is adjusted. k₃ stays 0: over a frame it differs from k₁ and k₂ by less than it
+/// costs in uncertainty.
 fn is_free(number: usize, bowed: bool) -> bool {
     match number {
         at if at < 2 * LENS => at % LENS != LENS - 1,
@@ -297,7 +302,8 @@ impl Problem<'_> {
         views.map(split).collect()
     }
 
-    /// σ of both devices from their residuals: Σ w r² over the redundancy, shared in proportion to the observations.
+    /// σ of both devices from their residuals: Σ w r² over the redundancy, shared in proportion to
+    /// the observations.
     fn estimated(&self, rig: &Rig) -> Option<[f64; 2]> {
         let (mut sums, mut weights) = ([0.0; 2], [0.0; 2]);
         for at in 0..self.views.len() {
@@ -363,7 +369,8 @@ pub(super) fn weight(residual: [f64; 2], sigma: f64) -> f64 {
     if r <= HUBER { 1.0 } else { HUBER / r }
 }
 
-/// Step of a number's differences: its effect on a pixel is about 1e-3 px, where the predictions are exact to 1e-10.
+/// Step of a number's differences: its effect on a pixel is about 1e-3 px, where the predictions
+/// are exact to 1e-10.
 pub(super) fn step_of(number: usize) -> f64 {
     let in_lens = |at: usize| if at < 4 { 1e-2 } else { 1e-5 };
     let in_pose = |at: usize| if at < 3 { 1e-6 } else { 1e-3 };

@@ -1,5 +1,5 @@
-//! The residuals of an adjustment with their places, to be drawn as arrows: a pattern that repeats from pose to pose shows what the
-//! models lack.
+//! The residuals of an adjustment with their places, to be drawn as arrows: a pattern that repeats
+//! from pose to pose shows what the models lack.
 
 use super::adjust::{Adjusted, View, places};
 use alloc::vec::Vec;

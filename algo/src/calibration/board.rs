@@ -58,7 +58,8 @@ pub enum BoardError {
 
 /// Share of the corners that must be located.
 const LEAST_LOCATED: f64 = 0.9;
-/// Radius of the window about a corner, as a share of the shortest side of the squares beside it, and its bounds in px.
+/// Radius of the window about a corner, as a share of the shortest side of the squares beside it,
+/// and its bounds in px.
 const WINDOW: f64 = 0.3;
 const WINDOW_BOUNDS: (f64, f64) = (4.0, 14.0);
 /// How often the picture is halved in search of a large or blurred board.
@@ -81,11 +82,12 @@ impl Board {
         )
     }
 
-    /// Finds the board in a picture under even light. x runs along the columns, y such that the board's z points to the camera; of the two
-    /// ways round, that with x to the right, or down.
+    /// Finds the board in a picture under even light. x runs along the columns, y such that the
+    /// board's z points to the camera; of the two ways round, that with x to the right, or down.
     ///
     /// # Errors
-    /// If there is no grid of corners, one of another size, or too few of its corners can be located.
+    /// If there is no grid of corners, one of another size, or too few of its corners can be
+    /// located.
     pub fn find(&self, picture: &Picture) -> Result<FoundBoard, BoardError> {
         let brightest = picture.counts.iter().copied().fold(0.0, f32::max);
         // Noise and stray light of 2 % of the brightest are not to look like print.
@@ -181,7 +183,8 @@ impl Board {
         };
         let x = mean(1, &|at| (at + 1) % self.columns != 0);
         let y = mean(self.columns, &|_| true);
-        // Rows of the picture run down: a right-handed board that faces the camera has a negative cross product.
+        // Rows of the picture run down: a right-handed board that faces the camera has a negative
+        // cross product.
         if x.0 * y.1 - x.1 * y.0 > 0.0 {
             let flipped: Vec<_> = corners
                 .chunks(self.columns)
@@ -212,7 +215,8 @@ fn extent(numbers: impl Iterator<Item = i32> + Clone) -> (i32, usize) {
     (low, usize::try_from(high - low + 1).unwrap_or(0))
 }
 
-/// Directions of the two edges through a corner, from its neighbours in the grid, and the length of the shorter side beside it.
+/// Directions of the two edges through a corner, from its neighbours in the grid, and the length of
+/// the shorter side beside it.
 fn edges(grid: &Grid, (column, row): (i32, i32)) -> (Option<[(f64, f64); 2]>, f64) {
     let at = |right: i32, down: i32| grid.get(&(column + right, row + down));
     let mut shortest = f64::INFINITY;

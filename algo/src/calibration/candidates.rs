@@ -1,10 +1,11 @@
 //! Places that look like the inner corner of a checkerboard, to a pixel.
 //!
-//! On a ring of 16 samples I₀ … I₁₅ of radius 5 px about a corner, opposite samples are equal and those a quarter further are of the
-//! other colour. Response R = Σ|(I_n + I_{n+8}) − (I_{n+4} + I_{n+12})| − Σ|I_n − I_{n+8}| − 16·|mean of ring − mean of centre|: large at a
-//! corner, and not above 0 at edges and in even areas. Source: S. Bennett, J. Lasenby, "ChESS – quick and robust detection of
-//! chess-board features", Computer Vision and Image Understanding 118, 2014. Here of the picture's logarithm, so that a corner in little
-//! light responds as much as a bright one.
+//! On a ring of 16 samples I₀ … I₁₅ of radius 5 px about a corner, opposite samples are equal and
+//! those a quarter further are of the other colour. Response R = Σ|(I_n + I_{n+8}) − (I_{n+4} +
+//! I_{n+12})| − Σ|I_n − I_{n+8}| − 16·|mean of ring − mean of centre|: large at a corner, and not
+//! above 0 at edges and in even areas. Source: S. Bennett, J. Lasenby, "ChESS – quick and robust
+//! detection of chess-board features", Computer Vision and Image Understanding 118, 2014. Here of
+//! the picture's logarithm, so that a corner in little light responds as much as a bright one.
 
 use super::picture::Picture;
 use alloc::vec::Vec;
@@ -32,7 +33,8 @@ const RING: [(i32, i32); 16] = [
 const MARGIN: usize = 5;
 /// Two corners are at least this many pixels apart.
 const APART: usize = 5;
-/// Least response, of logarithms: print of 1 : 1.3 has 16 · ½ · 2 ln 1.3 / 2 ≈ 2 over all of the ring.
+/// Least response, of logarithms: print of 1 : 1.3 has 16 · ½ · 2 ln 1.3 / 2 ≈ 2 over all of the
+/// ring.
 const LEAST: f32 = 1.0;
 /// Most candidates: beyond, the weakest are noise.
 const MOST: usize = 4000;
@@ -49,7 +51,8 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Cosine of the angle between the harmonics: 1 of the same colours, −1 with black and white exchanged.
+    /// Cosine of the angle between the harmonics: 1 of the same colours, −1 with black and white
+    /// exchanged.
     pub fn alike(&self, other: &Self) -> f64 {
         let ((a, b), (c, d)) = (self.harmonic, other.harmonic);
         let lengths = libm::hypot(a, b) * libm::hypot(c, d);

@@ -1,10 +1,12 @@
-//! One inner corner of a checkerboard, to a few hundredths of a pixel: a model of the picture about it, fitted by least squares.
+//! One inner corner of a checkerboard, to a few hundredths of a pixel: a model of the picture about
+//! it, fitted by least squares.
 //!
-//! I(p) = (1 + g·d)·(a + b·erf(s₁/√2σ)·erf(s₂/√2σ)), d = p − corner, s_i = d·n_i with the normals n_i of the two edges at angles θ_i: two
-//! edges blurred by a Gaussian of σ px under light that falls off linearly. The model is exact for edges at right angles; for others it
-//! is symmetric about the corner, as is the blurred corner itself, so it has no bias. Nine unknowns (u, v, θ₁, θ₂, σ, a, b, g), Levenberg
-//! (1944) and Marquardt (1963). Corner and edges together are located with all of the contrast in the window, and σ says how sharp the
-//! picture is.
+//! I(p) = (1 + g·d)·(a + b·erf(s₁/√2σ)·erf(s₂/√2σ)), d = p − corner, s_i = d·n_i with the normals
+//! n_i of the two edges at angles θ_i: two edges blurred by a Gaussian of σ px under light that
+//! falls off linearly. The model is exact for edges at right angles; for others it is symmetric
+//! about the corner, as is the blurred corner itself, so it has no bias. Nine unknowns (u, v, θ₁,
+//! θ₂, σ, a, b, g), Levenberg (1944) and Marquardt (1963). Corner and edges together are located
+//! with all of the contrast in the window, and σ says how sharp the picture is.
 
 use super::picture::Picture;
 use crate::math::solve::Normal;
@@ -15,7 +17,8 @@ const N: usize = 9;
 const STEPS: usize = 30;
 /// The fit has converged when the corner moves less than this, px.
 const STILL: f64 = 1e-4;
-/// Least blur of a picture, px: sharper edges lie between two pixels and have no width that could be measured.
+/// Least blur of a picture, px: sharper edges lie between two pixels and have no width that could
+/// be measured.
 const SHARPEST: f64 = 0.2;
 /// Least share of the picture's variance in the window that the model must explain.
 const LEAST_EXPLAINED: f64 = 0.75;
@@ -31,8 +34,8 @@ pub struct Corner {
     pub blur: f64,
 }
 
-/// Locates the corner near (u, v) with the pixels within `radius` of it; `edges` are the directions of its two edges. `None` where the
-/// picture there is not that of a corner.
+/// Locates the corner near (u, v) with the pixels within `radius` of it; `edges` are the directions
+/// of its two edges. `None` where the picture there is not that of a corner.
 pub(super) fn locate(
     picture: &Picture,
     (u, v): (f64, f64),

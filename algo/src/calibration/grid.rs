@@ -1,10 +1,11 @@
 //! Candidates put in rows and columns, from one corner to its neighbours.
 //!
-//! Along an edge of the board the next corner has black and white exchanged, and lies about as far as the one before. A seed is a
-//! candidate with such a neighbour in each of the four directions of its edges; from there the grid grows by prediction (from two corners
-//! in line, or from a step beside), as long as a candidate of the right colours lies within a quarter of a step. Growing by neighbours
-//! holds for any perspective and distortion: A. Geiger et al., "Automatic camera and range sensor calibration using a single shot", ICRA
-//! 2012, grow with an energy instead.
+//! Along an edge of the board the next corner has black and white exchanged, and lies about as far
+//! as the one before. A seed is a candidate with such a neighbour in each of the four directions of
+//! its edges; from there the grid grows by prediction (from two corners in line, or from a step
+//! beside), as long as a candidate of the right colours lies within a quarter of a step. Growing by
+//! neighbours holds for any perspective and distortion: A. Geiger et al., "Automatic camera and
+//! range sensor calibration using a single shot", ICRA 2012, grow with an energy instead.
 
 use super::candidates::Candidate;
 use alloc::collections::BTreeMap;
@@ -14,7 +15,8 @@ use alloc::vec::Vec;
 const REACH: f64 = 0.25;
 /// Seeds that are tried.
 const SEEDS: usize = 200;
-/// Cosine between harmonics beyond which two candidates have the same colours; below its negative they are exchanged.
+/// Cosine between harmonics beyond which two candidates have the same colours; below its negative
+/// they are exchanged.
 const ALIKE: f64 = 0.4;
 /// The four directions of the grid.
 const AROUND: [(i32, i32); 4] = [(1, 0), (0, 1), (-1, 0), (0, -1)];
@@ -104,8 +106,9 @@ fn grow(grid: &mut Grid, candidates: &[Candidate]) {
     }
 }
 
-/// Where a corner that is not in the grid should lie, and the length of a step there: from the neighbours on each side, with the step
-/// behind them, or where there is none with that of a line beside.
+/// Where a corner that is not in the grid should lie, and the length of a step there: from the
+/// neighbours on each side, with the step behind them, or where there is none with that of a line
+/// beside.
 pub(super) fn predicted(grid: &Grid, (column, row): (i32, i32)) -> Option<((f64, f64), f64)> {
     let at = |right: i32, down: i32| {
         let corner = grid.get(&(column + right, row + down));

@@ -1,10 +1,12 @@
 //! First values of the adjustment, in closed form.
 //!
-//! Camera: homographies H from the board to the picture; with the principal point in the middle, each gives two linear equations for 1/f_x²
-//! and 1/f_y² (Z. Zhang, "A flexible new technique for camera calibration", PAMI 22, 2000, eqs. 3–4), then the board's pose.
-//! Projector: all points of all poses are then known in the camera's coordinates and do not lie in one plane, so that its 3 × 4 matrix follows
-//! from linear equations (Y. I. Abdel-Aziz, H. M. Karara, "Direct linear transformation", 1971), and from that its lens and pose (R. Hartley,
-//! A. Zisserman, "Multiple View Geometry", section 6.2.4). No shift of the projector's lens disturbs it.
+//! Camera: homographies H from the board to the picture; with the principal point in the middle,
+//! each gives two linear equations for 1/f_x² and 1/f_y² (Z. Zhang, "A flexible new technique for
+//! camera calibration", PAMI 22, 2000, eqs. 3–4), then the board's pose. Projector: all points of
+//! all poses are then known in the camera's coordinates and do not lie in one plane, so that its 3
+//! × 4 matrix follows from linear equations (Y. I. Abdel-Aziz, H. M. Karara, "Direct linear
+//! transformation", 1971), and from that its lens and pose (R. Hartley, A. Zisserman, "Multiple
+//! View Geometry", section 6.2.4). No shift of the projector's lens disturbs it.
 
 use super::board::Board;
 use super::pose::Pose;
@@ -15,8 +17,8 @@ use alloc::vec::Vec;
 /// A corner's place on the board and in the picture.
 pub(super) type Pair = ((f64, f64), (f64, f64));
 
-/// The columns of H from places on the board to places in the picture, both about their centres and of the order of 1: then its last element
-/// is not 0 and is set to 1.
+/// The columns of H from places on the board to places in the picture, both about their centres and
+/// of the order of 1: then its last element is not 0 and is set to 1.
 fn homography(pairs: impl Iterator<Item = Pair>) -> Option<[Vector; 3]> {
     let equations = pairs.flat_map(|((x, y), (u, v))| {
         [
@@ -32,8 +34,8 @@ fn homography(pairs: impl Iterator<Item = Pair>) -> Option<[Vector; 3]> {
     ])
 }
 
-/// Lens of the camera and poses of the board, from the corners of each pose in a picture of `width` × `height` pixels. `None` if they do not
-/// determine them: no pose is tilted.
+/// Lens of the camera and poses of the board, from the corners of each pose in a picture of `width`
+/// × `height` pixels. `None` if they do not determine them: no pose is tilted.
 pub(super) fn camera(
     board: &Board,
     (width, height): (usize, usize),
@@ -95,8 +97,9 @@ pub(super) enum Mirrored {
     Swapped,
 }
 
-/// Lens and pose of the projector, from points in the camera's coordinates and the projector pixels that light them. A mirrored picture of
-/// either device has no such pose: the error says how. `None` if the points do not determine it.
+/// Lens and pose of the projector, from points in the camera's coordinates and the projector pixels
+/// that light them. A mirrored picture of either device has no such pose: the error says how.
+/// `None` if the points do not determine it.
 pub(super) fn projector(points: &[(Vector, (f64, f64))]) -> Option<Result<(Lens, Pose), Mirrored>> {
     let n = points.len().max(1) as f64;
     let centre = points

@@ -1,4 +1,5 @@
-//! What the calibrated head measures of the board itself: its flatness, and the distances of its corners.
+//! What the calibrated head measures of the board itself: its flatness, and the distances of its
+//! corners.
 
 use super::adjust::{Adjusted, View};
 use super::predict::Target;
@@ -16,8 +17,8 @@ pub struct MeasuredBoard {
 }
 
 impl Adjusted {
-    /// Measures the board in one of its poses: nodes by triangulation, corners by the camera's rays on the nodes' plane. `None` if the pose
-    /// has too few nodes.
+    /// Measures the board in one of its poses: nodes by triangulation, corners by the camera's rays
+    /// on the nodes' plane. `None` if the pose has too few nodes.
     pub fn measured_board(&self, pose: usize, view: &View) -> Option<MeasuredBoard> {
         let world = self.rig.poses.last()?.inverse();
         let board = self.rig.poses.get(pose)?;

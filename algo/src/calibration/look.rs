@@ -7,15 +7,18 @@ use super::nodes::Fringes;
 use super::picture::Picture;
 use alloc::vec::Vec;
 
-/// Largest blur (σ of an edge) that is accepted, as a share of a square's side in the picture; real boards in focus have 0.01.
+/// Largest blur (σ of an edge) that is accepted, as a share of a square's side in the picture; real
+/// boards in focus have 0.01.
 const MOST_BLUR: f64 = 0.05;
-/// RMS distance of a level's corners from the mean of all levels beyond which the board moved, px: noise leaves 0.02.
+/// RMS distance of a level's corners from the mean of all levels beyond which the board moved, px:
+/// noise leaves 0.02.
 const MOST_MOTION: f64 = 0.12;
 /// Least share of the bright squares that must have a projector point.
 const LEAST_COVERED: f64 = 0.9;
-/// RMS distance of the corners of two pictures up to which the board lies in one place, as a share of a square's side, and in px: a pose that
-/// is nearer repeats the errors of another one and not only its corners, so that the residuals of both say less than they seem to. A board
-/// that is only tilted by 8° moves as far.
+/// RMS distance of the corners of two pictures up to which the board lies in one place, as a share
+/// of a square's side, and in px: a pose that is nearer repeats the errors of another one and not
+/// only its corners, so that the residuals of both say less than they seem to. A board that is only
+/// tilted by 8° moves as far.
 const SAME_PLACE: (f64, f64) = (0.03, MOST_MOTION);
 
 /// A pose that cannot be used.
@@ -86,7 +89,8 @@ pub fn look(board: &Board, levels: &[Picture], fringes: &Fringes<'_>) -> Result<
 }
 
 impl FoundBoard {
-    /// Whether the board lies where it lies in another picture of the same camera, whichever way round.
+    /// Whether the board lies where it lies in another picture of the same camera, whichever way
+    /// round.
     pub fn lies_as_in(&self, other: &Self) -> bool {
         let round = Self {
             corners: other.corners.iter().rev().copied().collect(),
@@ -132,7 +136,8 @@ fn apart(a: &FoundBoard, b: &FoundBoard) -> f64 {
     }
 }
 
-/// Share of the squares between inner corners, of the colour of which more have a node, that have one.
+/// Share of the squares between inner corners, of the colour of which more have a node, that have
+/// one.
 fn covered(board: &Board, squares: &[(usize, usize)]) -> f64 {
     let (columns, rows) = (board.columns - 1, board.rows - 1);
     let share = |colour: usize| {

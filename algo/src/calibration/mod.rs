@@ -1,4 +1,5 @@
-//! Calibration of the geometry: from pictures and phases of a checkerboard in several poses to the models of camera and projector.
+//! Calibration of the geometry: from pictures and phases of a checkerboard in several poses to the
+//! models of camera and projector.
 
 mod adjust;
 mod arrows;

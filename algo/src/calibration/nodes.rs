@@ -1,7 +1,8 @@
 //! Projector points ξ, η on the board: fits to the phases of small windows inside its squares.
 //!
-//! A window holds about a hundred pixels, so its fit has a tenth of their noise, and it keeps off the edges of the squares, where the
-//! camera's blur mixes the phases of bright and dark pixels with unequal weight.
+//! A window holds about a hundred pixels, so its fit has a tenth of their noise, and it keeps off
+//! the edges of the squares, where the camera's blur mixes the phases of bright and dark pixels
+//! with unequal weight.
 
 use super::board::{Board, FoundBoard};
 use super::corner::Corner;

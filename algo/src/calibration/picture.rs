@@ -1,4 +1,5 @@
-//! The offset of a level's frames as singles: what the scene looks like under even light, with less noise than one frame.
+//! The offset of a level's frames as singles: what the scene looks like under even light, with less
+//! noise than one frame.
 
 use crate::frame::{FrameView, Samples};
 use alloc::vec;
@@ -16,7 +17,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The mean of frames of equal size; over all shifts of one or more levels it is their offset A.
+    /// The mean of frames of equal size; over all shifts of one or more levels it is their offset
+    /// A.
     pub fn mean(frames: &[FrameView<'_>]) -> Self {
         let (width, height) = frames
             .first()
@@ -44,7 +46,8 @@ impl Picture {
         self.counts[v * self.width + u]
     }
 
-    /// The picture at half the size: means of 2 × 2 pixels. Pixel (u, v) of it lies at (2u + ½, 2v + ½) of this one.
+    /// The picture at half the size: means of 2 × 2 pixels. Pixel (u, v) of it lies at (2u + ½,
+    /// 2v + ½) of this one.
     #[must_use]
     pub fn halved(&self) -> Self {
         let (width, height) = (self.width / 2, self.height / 2);
@@ -62,8 +65,9 @@ impl Picture {
         }
     }
 
-    /// The logarithm of the picture, smoothed with the binomial kernel 1 4 6 4 1: even light or not, an edge between two albedos has the
-    /// same height. `floor` counts are added, so that noise in the dark stays small.
+    /// The logarithm of the picture, smoothed with the binomial kernel 1 4 6 4 1: even light or
+    /// not, an edge between two albedos has the same height. `floor` counts are added, so that
+    /// noise in the dark stays small.
     #[must_use]
     pub(super) fn levelled(&self, floor: f32) -> Self {
         let logarithm = |&counts: &f32| libm::logf(counts.max(0.0) + floor);

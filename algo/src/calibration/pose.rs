@@ -55,7 +55,8 @@ impl Pose {
         }
     }
 
-    /// With a small turn (rotation vector, rad) after R and a shift added to t, as one list: turn, then shift.
+    /// With a small turn (rotation vector, rad) after R and a shift added to t, as one list: turn,
+    /// then shift.
     #[must_use]
     pub fn moved(&self, by: &[f64]) -> Self {
         let turn = Vector::new(by[0], by[1], by[2]);
@@ -83,7 +84,8 @@ impl Pose {
         }
     }
 
-    /// The pose whose x and y axes are nearly `x` and `y`: made orthogonal, of length 1 and right-handed.
+    /// The pose whose x and y axes are nearly `x` and `y`: made orthogonal, of length 1 and
+    /// right-handed.
     pub(super) fn from_axes(x: Vector, y: Vector, shift: Vector) -> Self {
         let x = x * (1.0 / x.length());
         let y = y * (1.0 / y.length());

@@ -1,8 +1,11 @@
-//! What the calibration's uncertainty makes of measurements: σ of heights and of lengths, from the covariance of all numbers.
+//! What the calibration's uncertainty makes of measurements: σ of heights and of lengths, from the
+//! covariance of all numbers.
 //!
-//! A measured point is where the camera's ray of a pixel meets what the projector's ξ gives; a change of the rig's numbers p moves it. With
-//! the gradient g = ∂z/∂p of a height, or of a distance between two points, σ² = gᵀ C g (propagation of covariance, as in photogrammetry:
-//! E. Mikhail, F. Ackermann, "Observations and Least Squares", 1976). The scale of the board is not seen by any residual: its own σ is added.
+//! A measured point is where the camera's ray of a pixel meets what the projector's ξ gives; a
+//! change of the rig's numbers p moves it. With the gradient g = ∂z/∂p of a height, or of a
+//! distance between two points, σ² = gᵀ C g (propagation of covariance, as in photogrammetry: E.
+//! Mikhail, F. Ackermann, "Observations and Least Squares", 1976). The scale of the board is not
+//! seen by any residual: its own σ is added.
 
 use super::adjust::{Adjusted, step_of};
 use super::rig::{Rig, seen};
@@ -27,7 +30,8 @@ pub(super) struct Target {
     pub xi: f64,
 }
 
-/// Predicted errors of measurements with a calibration, without the noise of the measurement itself.
+/// Predicted errors of measurements with a calibration, without the noise of the measurement
+/// itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prediction {
     /// RMS of σ_z over the measuring volume, mm.
@@ -41,7 +45,8 @@ pub struct Prediction {
 }
 
 impl Adjusted {
-    /// σ of heights above the board's plane in the last pose, and of lengths. `scale` is σ of the board's own scale, relative.
+    /// σ of heights above the board's plane in the last pose, and of lengths. `scale` is σ of the
+    /// board's own scale, relative.
     pub fn prediction(
         &self,
         frame: (usize, usize),
@@ -178,7 +183,8 @@ impl Rig {
         pairs.into_iter().step_by(every).collect()
     }
 
-    /// Where this rig measures a target: the point of the pixel's ray whose ξ is the target's, in the world of the last pose.
+    /// Where this rig measures a target: the point of the pixel's ray whose ξ is the target's, in
+    /// the world of the last pose.
     pub(super) fn measured(&self, target: &Target) -> Option<Vector> {
         let world = self.poses.last()?.inverse();
         let (x, y) = self.camera.undistorted(target.pixel.0, target.pixel.1)?;

@@ -1,11 +1,15 @@
-//! Errors of the board's print: a corner that is printed off its place is off in all poses, so more poses do not average it out.
+//! Errors of the board's print: a corner that is printed off its place is off in all poses, so more
+//! poses do not average it out.
 //!
-//! Let d be the displacement of a corner on the board. Its residuals in the poses that see it are B d and noise, with B the derivative of the
-//! corner's pixel with its place; with the weights w, d̂ = (Σ Bᵀ w B)⁻¹ Σ Bᵀ w r. The mean square of d̂ over the corners, less the mean of
-//! (Σ Bᵀ w B)⁻¹, which noise alone would leave, is σ_d² (a component of variance, as in W. Förstner, 1979), with the share restored that the adjusted
-//! numbers have taken out of the residuals. A displacement moves the adjusted numbers by N⁻¹ G d, with G = Σ Jᵀ w B over the poses, so the
-//! covariance N⁻¹, which takes residuals to be independent, grows by σ_d² N⁻¹ (Σ G Gᵀ) N⁻¹ (propagation of covariance). What looks like another
-//! lens or pose, as a print that is stretched or sheared smoothly, leaves no residuals: it is not seen here.
+//! Let d be the displacement of a corner on the board. Its residuals in the poses that see it are B
+//! d and noise, with B the derivative of the corner's pixel with its place; with the weights w,
+//! d̂ = (Σ Bᵀ w B)⁻¹ Σ Bᵀ w r. The mean square of d̂ over the corners, less the mean of (Σ Bᵀ w
+//! B)⁻¹, which noise alone would leave, is σ_d² (a component of variance, as in W. Förstner, 1979),
+//! with the share restored that the adjusted numbers have taken out of the residuals. A
+//! displacement moves the adjusted numbers by N⁻¹ G d, with G = Σ Jᵀ w B over the poses, so the
+//! covariance N⁻¹, which takes residuals to be independent, grows by σ_d² N⁻¹ (Σ G Gᵀ) N⁻¹
+//! (propagation of covariance). What looks like another lens or pose, as a print that is stretched
+//! or sheared smoothly, leaves no residuals: it is not seen here.
 //!
 //! Held by `the_predicted_errors_cover_the_true_ones_of_50_heads_with_a_bad_print`.
 
@@ -130,7 +134,8 @@ impl Problem<'_> {
             noise += (xx + yy) / determinant;
         }
         let coordinates = 2.0 * corners.len() as f64;
-        // Of the coordinates of all displacements, as many as the numbers that all poses share and a pose's look like changes of these.
+        // Of the coordinates of all displacements, as many as the numbers that all poses share and
+        // a pose's look like changes of these.
         let shared = self.free.iter().filter(|&&at| at < SHARED + POSE).count() as f64;
         let left = 1.0 - (shared / coordinates).min(0.75);
         (found / left - noise) / coordinates

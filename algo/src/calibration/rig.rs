@@ -1,4 +1,5 @@
-//! What is adjusted: both lenses, the projector's pose to the camera, the board's pose in each picture, and the board's bow.
+//! What is adjusted: both lenses, the projector's pose to the camera, the board's pose in each
+//! picture, and the board's bow.
 
 use super::board::Board;
 use super::pose::Pose;
@@ -11,7 +12,8 @@ pub(super) const LENS: usize = 9;
 pub(super) const SHARED: usize = 2 * LENS + 6 + 3;
 /// Numbers of a pose.
 pub(super) const POSE: usize = 6;
-/// Rounds that find the point of a bowed board on a ray: each gains a factor of the board's slope, 1e-3.
+/// Rounds that find the point of a bowed board on a ray: each gains a factor of the board's slope,
+/// 1e-3.
 const ROUNDS: usize = 4;
 
 /// The geometry of a head and of the poses of a board in front of it.
@@ -27,8 +29,9 @@ pub struct Rig {
     pub relative: Pose,
     /// From the board's coordinates to the camera's, pose by pose.
     pub poses: Vec<Pose>,
-    /// The board's bow in mm: its surface is z = b₀(X² − m) + b₁(Y² − m') + b₂XY with X and Y from −1 to 1 over the corners and m, m' the means
-    /// of X² and Y² over them, so that the corners are in the plane z = 0 on average.
+    /// The board's bow in mm: its surface is z = b₀(X² − m) + b₁(Y² − m') + b₂XY with X and Y from
+    /// −1 to 1 over the corners and m, m' the means of X² and Y² over them, so that the corners are
+    /// in the plane z = 0 on average.
     pub bow: [f64; 3],
 }
 
@@ -38,7 +41,8 @@ impl Rig {
         SHARED + POSE * self.poses.len()
     }
 
-    /// The rig with `by` added to its numbers: camera, projector, relative pose, bow, then the poses.
+    /// The rig with `by` added to its numbers: camera, projector, relative pose, bow, then the
+    /// poses.
     pub(super) fn moved(&self, by: &[f64]) -> Self {
         let (camera, by) = by.split_at(LENS);
         let (projector, by) = by.split_at(LENS);

@@ -12,15 +12,18 @@ use core::array::from_fn;
 
 /// Least poses: three give the equations, and no more.
 const LEAST_POSES: usize = 3;
-/// Least angle between two of the board's normals, rad: parallel boards do not tell focal lengths from distances.
+/// Least angle between two of the board's normals, rad: parallel boards do not tell focal lengths
+/// from distances.
 const LEAST_TILT: f64 = 10.0 / 180.0 * core::f64::consts::PI;
-/// Poses from which the board's bow is adjusted: with fewer, it cannot be told from the lenses' distortion.
+/// Poses from which the board's bow is adjusted: with fewer, it cannot be told from the lenses'
+/// distortion.
 const BOWED_FROM: usize = 6;
 /// χ² of three degrees of freedom that a flat board exceeds once in 10⁶.
 const BOWED: f64 = 31.8;
 /// Largest RMS residual of a pose, camera or projector px.
 const MOST_RESIDUAL: f64 = 1.0;
-/// A pose whose residuals are this many times the median pose's, and above so many px, is not of this board and head.
+/// A pose whose residuals are this many times the median pose's, and above so many px, is not of
+/// this board and head.
 const OUTLYING: (f64, f64) = (3.0, 0.3);
 /// A pose whose blur is this many times the median pose's, and above so many px, is out of focus.
 const BLURRED: (f64, f64) = (2.5, 1.0);
@@ -112,10 +115,12 @@ impl CalibrationError {
     }
 }
 
-/// Calibrates camera and projector with all views of a board. `frame` is the size of the camera's picture.
+/// Calibrates camera and projector with all views of a board. `frame` is the size of the camera's
+/// picture.
 ///
 /// # Errors
-/// If the views do not determine the models, or one of them does not fit the others; if a picture is mirrored, which of both axes.
+/// If the views do not determine the models, or one of them does not fit the others; if a picture
+/// is mirrored, which of both axes.
 pub fn calibrate(
     board: &Board,
     frame: (usize, usize),
@@ -140,8 +145,8 @@ pub fn calibrate(
     }
 }
 
-/// The geometry of these views as it is known before it is adjusted: angles are right within a few degrees. `None` if there are too few, or
-/// they do not determine it.
+/// The geometry of these views as it is known before it is adjusted: angles are right within a few
+/// degrees. `None` if there are too few, or they do not determine it.
 pub fn estimate(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Rig> {
     if views.len() < LEAST_POSES {
         return None;
@@ -169,7 +174,8 @@ fn adjusted(first: Rig, views: &[View]) -> Result<Adjusted, CalibrationError> {
     Ok(adjusted)
 }
 
-/// First values in closed form; the error says how one picture is mirrored, `None` that the views do not determine them.
+/// First values in closed form; the error says how one picture is mirrored, `None` that the views
+/// do not determine them.
 fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Result<Rig, Mirrored>> {
     let pairs: Vec<Vec<Pair>> = views
         .iter()
@@ -286,7 +292,8 @@ impl Adjusted {
         libm::sqrt(self.covariance[number * self.rig.numbers() + number])
     }
 
-    /// The squared length of the board's bow in its own standard deviations: χ² of three degrees of freedom if the board is flat.
+    /// The squared length of the board's bow in its own standard deviations: χ² of three degrees of
+    /// freedom if the board is flat.
     fn bow_chi_square(&self) -> f64 {
         let all = self.rig.numbers();
         let row = |i| from_fn(|j| self.covariance[(SHARED - 3 + i) * all + SHARED - 3 + j]);

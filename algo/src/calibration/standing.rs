@@ -1,10 +1,11 @@
-//! How the board stands in a pose to camera and projector: whether it can be the plane that both look down at.
+//! How the board stands in a pose to camera and projector: whether it can be the plane that both
+//! look down at.
 
 use super::rig::Rig;
 use crate::geometry::Vector;
 
-/// A normal that is farther than this out of the plane of both lines of sight, or that much outside of both within it, is hardly that of the
-/// plane z = 0 of a head, rad.
+/// A normal that is farther than this out of the plane of both lines of sight, or that much outside
+/// of both within it, is hardly that of the plane z = 0 of a head, rad.
 const MOST_ASIDE: f64 = 10.0 / 180.0 * core::f64::consts::PI;
 
 /// Angles of the board's normal to the lines from its centre to the devices, rad.
@@ -33,7 +34,8 @@ impl Standing {
         }
     }
 
-    /// Whether it is hardly the plane z = 0 of a head, whose normal passes between camera and projector.
+    /// Whether it is hardly the plane z = 0 of a head, whose normal passes between camera and
+    /// projector.
     pub fn is_doubtful(&self) -> bool {
         self.aside > MOST_ASIDE || self.camera + self.projector > self.between + 2.0 * MOST_ASIDE
     }

@@ -1,9 +1,11 @@
 //! A Gray code without fringes: the projector's coordinate of each pixel from the cells alone.
 //!
-//! A pixel's cell gives its coordinate within half a cell. Where the picture crosses from one cell into the next, the one bit that
-//! changes there passes through the middle between bright and dark, and that place lies between two pixels as the zero of the bit's
-//! contrast does (linear interpolation; Trobina 1995 compares it with other ways). Between the two borders of a cell that are found in
-//! this way the coordinate runs linearly; where neighbouring pixels are cells apart, there are no borders, and half a cell is small.
+//! A pixel's cell gives its coordinate within half a cell. Where the picture crosses from one cell
+//! into the next, the one bit that changes there passes through the middle between bright and dark,
+//! and that place lies between two pixels as the zero of the bit's contrast does (linear
+//! interpolation; Trobina 1995 compares it with other ways). Between the two borders of a cell that
+//! are found in this way the coordinate runs linearly; where neighbouring pixels are cells apart,
+//! there are no borders, and half a cell is small.
 
 use super::{Cells, CodeError, CodePictures};
 use crate::frame::{FrameView, Samples};
@@ -32,9 +34,10 @@ struct Pixel {
 }
 
 impl CodePictures<'_> {
-    /// The phase of every pixel of a code of these cells, which lie along the projector's rows (`vertical` fringes) or columns. Pixels
-    /// are trusted from a modulation of `least` on; samples have this full scale. A pixel is a `Residual` where two bits are
-    /// undecided, or the cell is none of the projector's.
+    /// The phase of every pixel of a code of these cells, which lie along the projector's rows
+    /// (`vertical` fringes) or columns. Pixels are trusted from a modulation of `least` on; samples
+    /// have this full scale. A pixel is a `Residual` where two bits are undecided, or the cell is
+    /// none of the projector's.
     ///
     /// # Errors
     /// If the pictures do not form a code.
@@ -103,7 +106,8 @@ impl CodePictures<'_> {
                 true => line * width + along,
                 false => along * width + line,
             };
-            // The border behind, if the pixels since it are all of one cell: where it is, in pixels and in cells.
+            // The border behind, if the pixels since it are all of one cell: where it is, in pixels
+            // and in cells.
             let mut behind: Option<(f64, f64)> = None;
             for along in 0..length.saturating_sub(1) {
                 let (here, next) = (&pixels[at(along)], &pixels[at(along + 1)]);
@@ -136,8 +140,8 @@ impl CodePictures<'_> {
         places
     }
 
-    /// Where between a pixel and the next one along the cells the border of their cells lies, as a share of the way, and its place in
-    /// cells; `None` if they are not neighbours.
+    /// Where between a pixel and the next one along the cells the border of their cells lies, as a
+    /// share of the way, and its place in cells; `None` if they are not neighbours.
     fn border(
         &self,
         cells: &Cells,
@@ -175,7 +179,8 @@ impl Pixel {
             undecided = undecided << 1 | u16::from(doubt);
         }
         let (own, other) = cells.around(seen, undecided);
-        // With bits in doubt the pixel lies on the border of two cells, if these are all that changes there.
+        // With bits in doubt the pixel lies on the border of two cells, if these are all that
+        // changes there.
         let known = undecided == 0 || own.abs_diff(other) == 1;
         let trust = match known && u32::from(own) < cells.count {
             true => Trust::Resolved,
@@ -196,11 +201,13 @@ impl Cells {
         self.coding.word(u32::from(cell), self.bits)
     }
 
-    /// The cell that shows these bits, and that in which the undecided ones are the other way round.
+    /// The cell that shows these bits, and that in which the undecided ones are the other way
+    /// round.
     fn around(&self, seen: u16, undecided: u16) -> (u16, u16) {
         let mut own = seen;
         if self.coding.binary {
-            // On the border of two cells the lowest bits are 0111 and 1000; what the lowest of them is tells the own ones.
+            // On the border of two cells the lowest bits are 0111 and 1000; what the lowest of them
+            // is tells the own ones.
             let low = undecided >> 1 & undecided;
             let settled = match (low ^ seen) & 1 {
                 0 => low,

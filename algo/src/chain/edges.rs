@@ -1,5 +1,6 @@
-//! Where the cells of a code end within the fringes. The code and the phase know each other's edges: edge e of the cells lies at
-//! Φ = origin + e · width, so the phases that pixels have there tell whether offset, width, and the sign of the shifts are as stated.
+//! Where the cells of a code end within the fringes. The code and the phase know each other's
+//! edges: edge e of the cells lies at Φ = origin + e · width, so the phases that pixels have there
+//! tell whether offset, width, and the sign of the shifts are as stated.
 
 use super::{Cells, Seen};
 use crate::pipeline::PhaseMap;
@@ -7,14 +8,17 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
-/// Largest misalignment of cells and fringes that is not a matter of conventions, in turns: these differ by quarters of a turn.
+/// Largest misalignment of cells and fringes that is not a matter of conventions, in turns: these
+/// differ by quarters of a turn.
 pub const EXPECTED_TURNS: f64 = 0.125;
-/// Fewest edges that tell anything: any phases of so many are concentrated by chance once in 25 000 times.
+/// Fewest edges that tell anything: any phases of so many are concentrated by chance once in 25 000
+/// times.
 const FEWEST: usize = 24;
-/// Concentration of phases at edges that belong together: 0 for any phases, 1 for equal ones, and 0.65 if they are spread evenly over
-/// half a turn.
+/// Concentration of phases at edges that belong together: 0 for any phases, 1 for equal ones, and
+/// 0.65 if they are spread evenly over half a turn.
 const CONCENTRATED: f64 = 0.65;
-/// Largest change of the phase over an edge whose place is of use, turns: spread over it, phases have a concentration of 0.74.
+/// Largest change of the phase over an edge whose place is of use, turns: spread over it, phases
+/// have a concentration of 0.74.
 const LOCATED: f64 = 0.42;
 /// Farthest pixels between which an edge may lie: on it bits are not decisive.
 const FARTHEST: usize = 4;
@@ -22,7 +26,8 @@ const FARTHEST: usize = 4;
 const LARGEST_STEP: f64 = 0.45;
 /// Noise of the distance of two pixels, in cells.
 const NOISE: f64 = 0.1;
-/// How far the width of cells is sought around that which the phase advances by per cell, as a share of it.
+/// How far the width of cells is sought around that which the phase advances by per cell, as a
+/// share of it.
 const SOUGHT: f64 = 0.05;
 
 /// The edges of a code's cells in the wrapped phase of a level.
@@ -34,15 +39,16 @@ pub struct Edges {
     smooth: usize,
     /// Those of them whose edge is located well enough.
     located: usize,
-    /// Σ exp(2πi φ) at them, by the sum of the numbers of both cells and 1, which is twice the edge's.
+    /// Σ exp(2πi φ) at them, by the sum of the numbers of both cells and 1, which is twice the
+    /// edge's.
     sums: Vec<[f64; 2]>,
     /// Along rows and along columns, what the phase advances by in turns, and the code in cells.
     advances: [(f64, f64); 2],
 }
 
 impl Edges {
-    /// The edges of cells (in turns of the phase function) in a level of this ratio: its wrapped phase, and what each pixel sees of
-    /// the code.
+    /// The edges of cells (in turns of the phase function) in a level of this ratio: its wrapped
+    /// phase, and what each pixel sees of the code.
     pub fn of(wrapped: &PhaseMap, code: &[Seen], cells: &Cells, ratio: f64) -> Self {
         let (width, pixels) = (wrapped.width.max(1), wrapped.phase.len());
         let mut edges = Self {
@@ -71,7 +77,8 @@ impl Edges {
         turns: f64,
     ) {
         let all = ((1_u32 << cells.bits) - 1) as u16;
-        // The last pixel that is surely in a cell: its phase, cell, and what the phase advanced by since then in so many pixels.
+        // The last pixel that is surely in a cell: its phase, cell, and what the phase advanced by
+        // since then in so many pixels.
         let mut last: Option<(f64, i32, f64, usize)> = None;
         let mut before = 0.0;
         for at in pixels {
@@ -125,7 +132,8 @@ impl Edges {
         self.smooth as f64 / self.changes.max(1) as f64
     }
 
-    /// What the phase advances by per cell, in turns, from the sums over all pixels: negative if it falls where the code rises.
+    /// What the phase advances by per cell, in turns, from the sums over all pixels: negative if it
+    /// falls where the code rises.
     pub fn turns_per_cell(&self) -> f64 {
         let [rows, columns] = self.advances;
         let (turns, cells) = match libm::fabs(rows.1) >= libm::fabs(columns.1) {
@@ -147,8 +155,8 @@ impl Edges {
         self.last() - first.unwrap_or(0) as f64 / 2.0
     }
 
-    /// The phase at edge 0, in turns from −½ to ½, and how well the phases at all edges agree with cells that are `turns` wide
-    /// (negative where the phase falls), from 0 to 1.
+    /// The phase at edge 0, in turns from −½ to ½, and how well the phases at all edges agree with
+    /// cells that are `turns` wide (negative where the phase falls), from 0 to 1.
     pub fn origin(&self, turns: f64) -> (f64, f64) {
         let mut sum = [0.0; 2];
         let seen = self.sums.iter().enumerate();
@@ -164,7 +172,8 @@ impl Edges {
         )
     }
 
-    /// The width of cells in turns, near to [`Self::turns_per_cell`], that the phases at the edges agree with best.
+    /// The width of cells in turns, near to [`Self::turns_per_cell`], that the phases at the edges
+    /// agree with best.
     pub fn fitted(&self) -> f64 {
         let near = self.turns_per_cell();
         let span = self.span().max(1.0);
@@ -188,8 +197,9 @@ impl Edges {
         best.0
     }
 
-    /// By how many turns of a level of this ratio the phases at the edges of cells are off those that the cells should end at, if
-    /// there are enough edges that agree, and it is not a matter of conventions.
+    /// By how many turns of a level of this ratio the phases at the edges of cells are off those
+    /// that the cells should end at, if there are enough edges that agree, and it is not a matter
+    /// of conventions.
     pub fn misalignment(&self, cells: &Cells, ratio: f64) -> Option<f64> {
         let (origin, concentration) = self.origin(cells.width * ratio);
         let off = libm::remainder(origin - cells.origin * ratio, 1.0);

@@ -1,5 +1,5 @@
-//! Gray code: which cell of the projector lights a pixel, from one picture per bit (Sansoni, Carocci & Rodella 1999, with phase
-//! shifts as here).
+//! Gray code: which cell of the projector lights a pixel, from one picture per bit (Sansoni,
+//! Carocci & Rodella 1999, with phase shifts as here).
 
 use crate::frame::{FrameView, Samples};
 use alloc::vec;
@@ -8,8 +8,9 @@ use alloc::vec::Vec;
 /// Most bits of a code: as many cells as the widest projector has columns.
 pub const MAX_CODE_BITS: u8 = 13;
 
-/// A Gray code over the columns or rows of a projector: cell c shows the bits of c ^ (c >> 1), the most significant first.
-/// Neighbouring cells differ in one bit, so a pixel on their border is never wrong by more than one cell.
+/// A Gray code over the columns or rows of a projector: cell c shows the bits of c ^ (c >> 1), the
+/// most significant first. Neighbouring cells differ in one bit, so a pixel on their border is
+/// never wrong by more than one cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct GrayCode {
     /// Number of bits, and of pictures.
@@ -36,7 +37,8 @@ pub struct Coding {
 pub struct Seen {
     /// A bit for each picture, the last one's lowest: whether the pixel is bright in it.
     pub word: u16,
-    /// The bits of `word` that noise cannot change: their contrast is at least half of that of the clearest bit.
+    /// The bits of `word` that noise cannot change: their contrast is at least half of that of the
+    /// clearest bit.
     pub decisive: u16,
 }
 
@@ -56,15 +58,16 @@ pub enum CodeError {
 pub struct CodePictures<'a> {
     /// One per bit, the most significant first.
     pub bits: Vec<FrameView<'a>>,
-    /// What each bit is compared with: a bit is set where its sample is above the mean of these frames. One list for all bits (white
-    /// and black, or the shifts of a level, whose mean is the offset A), or one list per bit (the inverse picture).
+    /// What each bit is compared with: a bit is set where its sample is above the mean of these
+    /// frames. One list for all bits (white and black, or the shifts of a level, whose mean is the
+    /// offset A), or one list per bit (the inverse picture).
     pub against: Vec<Vec<FrameView<'a>>>,
 }
 
 impl GrayCode {
-    /// Number of cells on a raster of `length` pixels across them that can be told apart. Where the bits number one cell less than
-    /// there are, as where a code of as many cells as fringes was moved by half a cell, the last two show the same Gray code, and
-    /// neither counts.
+    /// Number of cells on a raster of `length` pixels across them that can be told apart. Where the
+    /// bits number one cell less than there are, as where a code of as many cells as fringes was
+    /// moved by half a cell, the last two show the same Gray code, and neither counts.
     pub fn cells(&self, length: u32) -> u32 {
         let most = 1_u32 << self.bits;
         let cells = libm::ceil((f64::from(length) + self.offset) / self.cell - 1e-9).max(1.0);
@@ -151,7 +154,8 @@ impl CodePictures<'_> {
         Ok(seen)
     }
 
-    /// By how much the samples of a row of a bit's picture are above what they are compared with, the same multiple for all bits.
+    /// By how much the samples of a row of a bit's picture are above what they are compared with,
+    /// the same multiple for all bits.
     fn contrasts(&self, bit: usize, v: usize) -> Vec<i64> {
         let against = self.against.get(bit).unwrap_or(&self.against[0]);
         let width = self.bits[bit].width();

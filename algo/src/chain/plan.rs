@@ -1,28 +1,34 @@
 //! The plan of a chain: where it starts, and by which beats it reaches the finest level.
 //!
-//! A beat of two levels a, b has phase φ_a − φ_b, ratio r_a − r_b and the noise of both (Cheng & Wyant 1985, for wavelengths; Reich,
-//! Ritter & Thesing 1997 and Towers, Towers & Jones 2003, for fringes); a beat of beats likewise. A beat, or a level, that spans
-//! at most one turn of the pattern is absolute by itself, as 2 φ_b − φ_a of 13 and 7 fringes; a Gray code is absolute within half a cell. From an absolute phase of
-//! ratio r_a the next level b gets its fringe order k = round(r_b Φ − φ_b). With a = Σ m_i φ_i and b = Σ n_i φ_i its argument has the
-//! error Σ (m_i r_b / r_a − n_i) e_i, where e_i is the noise of φ_i, which falls with √N_i. Of all chains of levels, beats and beats of beats the one is taken whose least safe step is the
-//! safest: (½ turn − what is uncertain by the code's cell) / noise.
+//! A beat of two levels a, b has phase φ_a − φ_b, ratio r_a − r_b and the noise of both (Cheng &
+//! Wyant 1985, for wavelengths; Reich, Ritter & Thesing 1997 and Towers, Towers & Jones 2003, for
+//! fringes); a beat of beats likewise. A beat, or a level, that spans at most one turn of the
+//! pattern is absolute by itself, as 2 φ_b − φ_a of 13 and 7 fringes; a Gray code is absolute
+//! within half a cell. From an absolute phase of ratio r_a the next level b gets its fringe order
+//! k = round(r_b Φ − φ_b). With a = Σ m_i φ_i and b = Σ n_i φ_i its argument has the error Σ (m_i
+//! r_b / r_a − n_i) e_i, where e_i is the noise of φ_i, which falls with √N_i. Of all chains of
+//! levels, beats and beats of beats the one is taken whose least safe step is the safest: (½ turn −
+//! what is uncertain by the code's cell) / noise.
 
 use super::Coding;
 use crate::pattern::{Level, MAX_LEVELS, PhaseRange};
 use alloc::vec::Vec;
 
-/// Largest noise of a step's fringe order, in units of the finest level's noise. Two levels of 64 and 63 fringes have 90.
+/// Largest noise of a step's fringe order, in units of the finest level's noise. Two levels of 64
+/// and 63 fringes have 90.
 pub const MAX_MAGNIFICATION: f64 = 128.0;
 /// Largest span of the chain's first level, in turns, that is still absolute by itself.
 const ONE_TURN: f64 = 1.001;
-/// Noise of a sample that the safety of steps is computed with, in turns of phase times √N: 0.01 turn for 4 shifts.
+/// Noise of a sample that the safety of steps is computed with, in turns of phase times √N: 0.01
+/// turn for 4 shifts.
 const NOISE: f64 = 0.02;
 /// Ratios below this are differences of equal numbers.
 const LEAST_RATIO: f64 = 1e-6;
 /// Rounding of a code's half cell beside half a turn.
 const ROUNDING: f64 = 1e-6;
-/// Least safety of the steps of a chain that starts about a map: 50 times the ratio in one step, with 4 shifts. [`NOISE`] is that of
-/// faint fringes, and wrong orders at its σ leave large residuals.
+/// Least safety of the steps of a chain that starts about a map: 50 times the ratio in one step,
+/// with 4 shifts. [`NOISE`] is that of faint fringes, and wrong orders at its σ leave large
+/// residuals.
 const SAFE: f64 = 1.0;
 
 /// The cells of a Gray code in turns of the phase function.
@@ -123,7 +129,8 @@ pub struct Chain {
 }
 
 impl Chain {
-    /// Finds the chain of levels (coarse to fine) of a phase function with this range, from a Gray code if there is one.
+    /// Finds the chain of levels (coarse to fine) of a phase function with this range, from a Gray
+    /// code if there is one.
     ///
     /// # Errors
     /// If there is none; the message says what to add.
@@ -150,7 +157,8 @@ impl Chain {
             });
         };
         let first = links[0].ratio;
-        // The part of a turn that the first link does not use is margin for noise, half on each side.
+        // The part of a turn that the first link does not use is margin for noise, half on each
+        // side.
         let margin = (1.0 - first * range.span()).max(0.0) / 2.0;
         let itself = Start::Itself(first * range.min - margin);
         let chain = Self::of(levels, links, cells.map_or(itself, Start::Code));
@@ -163,7 +171,8 @@ impl Chain {
         }
     }
 
-    /// The chain of levels whose phase is known to within some turns: from the coarsest level or beat from which all steps are safe.
+    /// The chain of levels whose phase is known to within some turns: from the coarsest level or
+    /// beat from which all steps are safe.
     pub fn about_map(levels: &[Level]) -> Self {
         let candidates = candidates(levels);
         let from = |start| {
@@ -255,7 +264,8 @@ impl Link {
     }
 }
 
-/// The safest way to the finest level, the last candidate, with its safety, from candidates that are known with the safety of `first`.
+/// The safest way to the finest level, the last candidate, with its safety, from candidates that
+/// are known with the safety of `first`.
 fn best(
     levels: &[Level],
     candidates: &[Link],
@@ -315,7 +325,8 @@ fn step_noise(from: &Link, to: &Link, levels: &[Level]) -> f64 {
     )
 }
 
-/// The levels, their beats, and the beats of these with each other and with levels, from coarse to fine; the finest level is the last.
+/// The levels, their beats, and the beats of these with each other and with levels, from coarse to
+/// fine; the finest level is the last.
 fn candidates(levels: &[Level]) -> Vec<Link> {
     let own = |at: usize| {
         let mut weights = [0; MAX_LEVELS];

@@ -1,4 +1,5 @@
-//! Chains on computed frames: every fringe order is right where the noise allows it, and what has no chain is refused.
+//! Chains on computed frames: every fringe order is right where the noise allows it, and what has
+//! no chain is refused.
 
 use super::*;
 use crate::frame::{FrameView, Samples};
@@ -87,7 +88,8 @@ impl Levels<'_> {
                 resolved += 1;
                 let truth = self.most() * column as f64 / f64::from(COLUMNS);
                 let error = (phase.turns() - truth).abs();
-                // σ of a phase with ± 2 counts of noise, 100 counts of modulation and 3 shifts is 0.0015 turn.
+                // σ of a phase with ± 2 counts of noise, 100 counts of modulation and 3 shifts is
+                // 0.0015 turn.
                 assert!(!(0.01..=0.5).contains(&error), "column {column}: {error}");
                 wrong += usize::from(error > 0.5);
             }

@@ -11,8 +11,9 @@ use alloc::vec;
 const MAX_RESIDUAL: f64 = 0.40;
 
 impl Chain {
-    /// The chain with the cells of its code moved to where they end within the fringes of the finest level, if that is near to where
-    /// they should: half a pixel of the projector, or an edge that is seen brighter than in its middle, is then no wrong order.
+    /// The chain with the cells of its code moved to where they end within the fringes of the
+    /// finest level, if that is near to where they should: half a pixel of the projector, or an
+    /// edge that is seen brighter than in its middle, is then no wrong order.
     #[must_use]
     pub fn aligned(mut self, edges: &Edges) -> Self {
         let finest = self.links[self.links.len() - 1].ratio;
@@ -22,23 +23,25 @@ impl Chain {
         self
     }
 
-    /// The absolute phase of every pixel, from the wrapped phases of all levels (coarse to fine, of one size) and, where the chain
-    /// starts from a code, what each pixel sees of it (row-major).
+    /// The absolute phase of every pixel, from the wrapped phases of all levels (coarse to fine, of
+    /// one size) and, where the chain starts from a code, what each pixel sees of it (row-major).
     ///
-    /// The modulation is the finest level's. A pixel is `Dark` or of `LowModulation` where a level that takes part is, the former if
-    /// it is the coarsest of them; its phase is a `Residual` where a fringe order would be a guess or the cell is none of the
-    /// projector's.
+    /// The modulation is the finest level's. A pixel is `Dark` or of `LowModulation` where a level
+    /// that takes part is, the former if it is the coarsest of them; its phase is a `Residual`
+    /// where a fringe order would be a guess or the cell is none of the projector's.
     pub fn unwrap(&self, wrapped: &[PhaseMap], code: Option<&[Seen]>) -> PhaseMap {
         self.unwrap_within(MAX_RESIDUAL, wrapped, code)
     }
 
-    /// As [`Self::unwrap`] for a chain that starts about a map: Φ in turns, row-major. A pixel is `Unexpected` where that is unknown.
+    /// As [`Self::unwrap`] for a chain that starts about a map: Φ in turns, row-major. A pixel is
+    /// `Unexpected` where that is unknown.
     pub fn unwrap_about(&self, wrapped: &[PhaseMap], map: &[AbsolutePhase]) -> PhaseMap {
         self.unwrap_from(MAX_RESIDUAL, wrapped, &Given::Map(map))
     }
 
-    /// As [`Self::unwrap`], with another largest residual of the steps between levels, in turns: of phases that have nothing to do with
-    /// each other a share of twice this limit passes each step. The step from a code is as in [`Self::unwrap`].
+    /// As [`Self::unwrap`], with another largest residual of the steps between levels, in turns: of
+    /// phases that have nothing to do with each other a share of twice this limit passes each step.
+    /// The step from a code is as in [`Self::unwrap`].
     pub fn unwrap_within(
         &self,
         residual: f64,
@@ -129,7 +132,8 @@ impl Chain {
         estimate.ok_or(Trust::Unexpected)
     }
 
-    /// Φ in the middle of the cell that a pixel sees, and the largest residual of the first link there.
+    /// Φ in the middle of the cell that a pixel sees, and the largest residual of the first link
+    /// there.
     ///
     /// # Errors
     /// If the cell is none of the projector's.
@@ -176,8 +180,9 @@ impl Link {
 }
 
 impl Cells {
-    /// Whether a pixel is surely in this cell and not in the neighbour at whose far side it would have the same phase: the bits in
-    /// which both differ are decisive. `aside` is how far the pixel lies before the middle of the cell, in turns.
+    /// Whether a pixel is surely in this cell and not in the neighbour at whose far side it would
+    /// have the same phase: the bits in which both differ are decisive. `aside` is how far the
+    /// pixel lies before the middle of the cell, in turns.
     fn decides(&self, cell: u32, aside: f64, seen: Seen) -> bool {
         let other = match aside > 0.0 {
             true => Some(cell + 1).filter(|&other| other < self.count),

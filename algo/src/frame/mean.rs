@@ -5,9 +5,9 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 /// The mean of frames of equal size, scaled from `full_scale` counts to 0…255. Over the shifts of a
-/// level it is the offset A: what the scene looks like under even light. Of a waveform's harmonics those of an order that is a
-/// multiple of the number of shifts stay in it: at most 0.17 B, and what optics leave of that, for N = 3; none for even N. So edges
-/// are not sought in it.
+/// level it is the offset A: what the scene looks like under even light. Of a waveform's harmonics
+/// those of an order that is a multiple of the number of shifts stay in it: at most 0.17 B, and
+/// what optics leave of that, for N = 3; none for even N. So edges are not sought in it.
 pub fn mean(frames: &[FrameView<'_>], full_scale: u16) -> Vec<u8> {
     let Some(first) = frames.first() else {
         return Vec::new();

@@ -1,4 +1,5 @@
-//! Borrowed camera frames, their mean, and a camera's noise: from pairs of frames, and as it is used.
+//! Borrowed camera frames, their mean, and a camera's noise: from pairs of frames, and as it is
+//! used.
 
 mod mean;
 mod noise;

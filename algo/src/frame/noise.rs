@@ -1,9 +1,10 @@
 //! The noise of a sample by the light that its pixel gets.
 
-/// σ of a sample by the light of its pixel, read noise and shot noise: σ² = read² + shot · I (photon transfer: Janesick 1987).
+/// σ of a sample by the light of its pixel, read noise and shot noise: σ² = read² + shot · I
+/// (photon transfer: Janesick 1987).
 ///
-/// The light is given by the mean signal I, or by the modulation B: both grow with the light that the part returns
-/// ([`signal_by_modulation`](crate::pipeline::signal_by_modulation)).
+/// The light is given by the mean signal I, or by the modulation B: both grow with the light that
+/// the part returns ([`signal_by_modulation`](crate::pipeline::signal_by_modulation)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampleNoise {
     /// Variance without light, counts².
@@ -40,7 +41,8 @@ impl SampleNoise {
         libm::sqrt(self.read + self.shot * light)
     }
 
-    /// The same by another measure of the light: nothing of that is `offset` counts of this one, and a count more is `slope` more.
+    /// The same by another measure of the light: nothing of that is `offset` counts of this one,
+    /// and a count more is `slope` more.
     #[must_use]
     pub fn by(self, [offset, slope]: [f64; 2]) -> Self {
         Self {

@@ -1,7 +1,8 @@
 //! A camera's noise as a function of its signal: read noise and shot noise.
 //!
-//! Two pictures of the same scene differ by noise alone: half the mean square of their difference is the variance of a sample.
-//! As a function of the signal it is read² + gain · signal (photon transfer: Janesick 1987), read noise and shot noise.
+//! Two pictures of the same scene differ by noise alone: half the mean square of their difference
+//! is the variance of a sample. As a function of the signal it is read² + gain · signal (photon
+//! transfer: Janesick 1987), read noise and shot noise.
 
 use alloc::vec::Vec;
 use libm::sqrt;
@@ -45,7 +46,8 @@ pub struct Noise {
 #[derive(Clone, Debug)]
 pub struct PhotonTransfer {
     full_scale: f64,
-    /// Sums of the mean of a pair and of half the square of its difference, and the number of pairs.
+    /// Sums of the mean of a pair and of half the square of its difference, and the number of
+    /// pairs.
     bins: [(f64, f64, u64); BINS],
 }
 
@@ -58,8 +60,9 @@ impl PhotonTransfer {
         }
     }
 
-    /// Adds two pictures of the same scene in counts. `levels` are the expected levels of their pixels, from other pictures,
-    /// because bins chosen by the pictures' own noise would bias the variance.
+    /// Adds two pictures of the same scene in counts. `levels` are the expected levels of their
+    /// pixels, from other pictures, because bins chosen by the pictures' own noise would bias the
+    /// variance.
     pub fn add(&mut self, first: &[f32], second: &[f32], levels: impl Iterator<Item = f64>) {
         let per_count = BINS as f64 / (self.full_scale + 1.0);
         for ((a, b), level) in first.iter().zip(second).zip(levels) {
@@ -97,8 +100,9 @@ impl PhotonTransfer {
     }
 }
 
-/// Read noise (variance) and shot noise (per count), by least squares with weights 1/(2σ⁴/n), the variance of a variance from n
-/// pairs. Without significant shot noise, or where the read noise's variance would be negative: the mean variance and 0.
+/// Read noise (variance) and shot noise (per count), by least squares with weights 1/(2σ⁴/n), the
+/// variance of a variance from n pairs. Without significant shot noise, or where the read noise's
+/// variance would be negative: the mean variance and 0.
 fn fit(points: &[NoisePoint]) -> Option<(f64, f64)> {
     let (mut w, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for point in points {

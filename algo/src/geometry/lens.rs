@@ -1,4 +1,5 @@
-//! A lens without its pose: Brown's distortion and the scale to pixels, in OpenCV's convention, without any check.
+//! A lens without its pose: Brown's distortion and the scale to pixels, in OpenCV's convention,
+//! without any check.
 //!
 //! With r² = x² + y² of a direction (x, y, 1),
 //! x_d = x(1 + k₁r² + k₂r⁴ + k₃r⁶) + 2p₁xy + p₂(r² + 2x²),
@@ -85,7 +86,8 @@ impl Lens {
         (xx, xy, yy, xx * yy - xy * xy)
     }
 
-    /// The direction (x, y, 1) that a pixel sees, by Newton's method from the distorted point; `None` where it does not converge.
+    /// The direction (x, y, 1) that a pixel sees, by Newton's method from the distorted point;
+    /// `None` where it does not converge.
     pub fn undistorted(&self, u: f64, v: f64) -> Option<(f64, f64)> {
         let (xd, yd) = ((u - self.cx) / self.fx, (v - self.cy) / self.fy);
         let (mut x, mut y) = (xd, yd);

@@ -1,4 +1,5 @@
-//! From absolute phase to height: models of camera and projector, the reference phase map, triangulation.
+//! From absolute phase to height: models of camera and projector, the reference phase map,
+//! triangulation.
 
 mod lens;
 mod pinhole;

@@ -1,7 +1,8 @@
-//! The model of camera and projector: a pinhole with Brown's distortion, in OpenCV's convention. A projector is an inverse camera.
+//! The model of camera and projector: a pinhole with Brown's distortion, in OpenCV's convention. A
+//! projector is an inverse camera.
 //!
-//! X_device = R · X_world + t; x = X/Z, y = Y/Z; from (x, y) to pixels as in [`Lens`]. Pixel centres at integers, x right, y down,
-//! z forward.
+//! X_device = R · X_world + t; x = X/Z, y = Y/Z; from (x, y) to pixels as in [`Lens`]. Pixel
+//! centres at integers, x right, y down, z forward.
 
 use super::{Lens, Vector};
 
@@ -24,7 +25,8 @@ pub struct PinholeModel {
     pub translation: [f64; 3],
 }
 
-/// A checked device model: every pixel of its frame has exactly one ray, and the iteration that finds it converges.
+/// A checked device model: every pixel of its frame has exactly one ray, and the iteration that
+/// finds it converges.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pinhole {
     model: PinholeModel,
@@ -34,7 +36,8 @@ pub struct Pinhole {
     centre: Vector,
     /// R as rows; its transpose turns rays into the world.
     rows: [Vector; 3],
-    /// Square of the normalised radius up to which the distortion is one-to-one; beyond it the distortion is continued linearly.
+    /// Square of the normalised radius up to which the distortion is one-to-one; beyond it the
+    /// distortion is continued linearly.
     radius_square: f64,
 }
 
@@ -45,8 +48,8 @@ pub enum ModelError {
     /// A number is not finite.
     #[error("{0} is not a finite number")]
     NotFinite(&'static str),
-    /// A focal length is not positive, or absurd for the frame: less than a hundredth of it (an angle of
-    /// view of 179°) or more than 1e6 pixels.
+    /// A focal length is not positive, or absurd for the frame: less than a hundredth of it (an
+    /// angle of view of 179°) or more than 1e6 pixels.
     #[error(
         "focal lengths {fx} and {fy}: both must be positive, at least a hundredth of the frame and \
          at most 1e6 pixels"
@@ -96,16 +99,17 @@ pub enum ModelError {
 const ROTATION_TOLERANCE: f64 = 1e-4;
 /// A kilometre in mm: a larger translation is in another unit, and f64 no longer resolves 1e-9 mm.
 const MAX_DISTANCE: f64 = 1e6;
-/// Radii up to which the distortion is checked, as multiples of the radius at the frame's border: the reference phase map is
-/// evaluated up to 15 % outside. The largest that is one-to-one is used; a model must reach the last.
+/// Radii up to which the distortion is checked, as multiples of the radius at the frame's border:
+/// the reference phase map is evaluated up to 15 % outside. The largest that is one-to-one is used;
+/// a model must reach the last.
 const REACHES: [f64; 4] = [1.3, 1.2, 1.1, 1.02];
 
 impl Pinhole {
     /// Checks a model for a frame of `width` × `height` pixels.
     ///
     /// # Errors
-    /// If a number is not finite or absurd, R is not a rotation, or the distortion is not one-to-one
-    /// over the frame.
+    /// If a number is not finite or absurd, R is not a rotation, or the distortion is not
+    /// one-to-one over the frame.
     pub fn new(model: PinholeModel, width: usize, height: usize) -> Result<Self, ModelError> {
         let finite = |what, numbers: &[f64]| {
             if numbers.iter().all(|x| x.is_finite()) {
@@ -148,8 +152,8 @@ impl Pinhole {
         pinhole.with_checked_distortion()
     }
 
-    /// Checks that the distortion is one-to-one, that is, its Jacobian's determinant is positive, from the axis to each border
-    /// pixel. Sets the radius up to which it is used.
+    /// Checks that the distortion is one-to-one, that is, its Jacobian's determinant is positive,
+    /// from the axis to each border pixel. Sets the radius up to which it is used.
     fn with_checked_distortion(mut self) -> Result<Self, ModelError> {
         let mut reach_left = 0;
         let mut radius_square = 0.0_f64;

@@ -3,9 +3,9 @@
 //! For any phase function, Φ_R(u, v) = Φ_P(ξ, η) at the projector point that lights the plane where
 //! the camera pixel looks (Peng & Gupta 2008, eqs. 10–11). That point comes from the device models,
 //! or from two measured maps of the plane, ξ = Φ_R^V / c_V and η = Φ_R^H / c_H. Raw, their noise is
-//! twice the measurement's, so what they are off the models is fitted smoothly: models that are exact
-//! then leave nothing to fit, and beyond the frame, where nothing was measured, the correction stays
-//! that of the frame's edge.
+//! twice the measurement's, so what they are off the models is fitted smoothly: models that are
+//! exact then leave nothing to fit, and beyond the frame, where nothing was measured, the
+//! correction stays that of the frame's edge.
 
 use crate::math::solve::Normal;
 
@@ -20,7 +20,8 @@ pub const TERMS: usize = (DEGREE + 1) * (DEGREE + 2) / 2;
 pub enum Reference {
     /// Computed from the two device models.
     Models,
-    /// Computed from the models and corrected by what a plate in the plane z = 0 was off them under a vertical and a horizontal pattern.
+    /// Computed from the models and corrected by what a plate in the plane z = 0 was off them under
+    /// a vertical and a horizontal pattern.
     Measured {
         /// Measured ξ(u, v) less that of the models, projector columns.
         xi: FittedMap,
@@ -29,7 +30,8 @@ pub enum Reference {
     },
 }
 
-/// A smooth map over the camera's frame: a polynomial of degree 6. Beyond the frame it has the values of the frame's edge.
+/// A smooth map over the camera's frame: a polynomial of degree 6. Beyond the frame it has the
+/// values of the frame's edge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FittedMap {
     coefficients: [f64; TERMS],
@@ -51,7 +53,8 @@ pub struct ReferenceError {
 }
 
 impl FittedMap {
-    /// The map with these coefficients over a frame of `width` × `height` pixels. It has no samples, so its residual is 0.
+    /// The map with these coefficients over a frame of `width` × `height` pixels. It has no
+    /// samples, so its residual is 0.
     pub fn new(width: usize, height: usize, coefficients: [f64; TERMS]) -> Self {
         let half = (
             (width as f64 / 2.0).max(0.5),
@@ -65,8 +68,8 @@ impl FittedMap {
         }
     }
 
-    /// The coefficients of the products T_i(x)·T_j(y), i + j ≤ 6, of Chebyshev polynomials, ordered by i and then by j; x and y run from
-    /// -1 to 1 over the frame.
+    /// The coefficients of the products T_i(x)·T_j(y), i + j ≤ 6, of Chebyshev polynomials, ordered
+    /// by i and then by j; x and y run from -1 to 1 over the frame.
     pub fn coefficients(&self) -> &[f64; TERMS] {
         &self.coefficients
     }

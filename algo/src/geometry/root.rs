@@ -1,12 +1,12 @@
 //! A root finder that keeps the root bracketed.
 
-/// A root of `f` between `a` and `b`, where f(a) = `fa` and f(b) = `fb` have opposite signs (or one is
-/// zero), to `tolerance` in the argument. `None` as soon as `f` returns `None`.
+/// A root of `f` between `a` and `b`, where f(a) = `fa` and f(b) = `fb` have opposite signs (or one
+/// is zero), to `tolerance` in the argument. `None` as soon as `f` returns `None`.
 ///
-/// Regula falsi with Anderson and Björck's weights (1973). Every third step is a bisection if the two
-/// before it have not halved the bracket, so three evaluations halve it at least once: at most about
-/// 3 log₂(|b − a| / tolerance) evaluations, typically 6. After 200 it returns the best point so far.
-/// `f` is never evaluated outside of the bracket.
+/// Regula falsi with Anderson and Björck's weights (1973). Every third step is a bisection if the
+/// two before it have not halved the bracket, so three evaluations halve it at least once: at most
+/// about 3 log₂(|b − a| / tolerance) evaluations, typically 6. After 200 it returns the best point
+/// so far. `f` is never evaluated outside of the bracket.
 pub(super) fn bracketed(
     f: impl Fn(f64) -> Option<f64>,
     (mut a, mut fa): (f64, f64),
@@ -30,8 +30,8 @@ pub(super) fn bracketed(
         } else {
             b - fb * (b - a) / (fb - fa)
         };
-        // A point closer than half the tolerance to an end would hardly shrink the bracket: move it away
-        // from that end, so that it may fall beyond the root. Signed as b − a.
+        // A point closer than half the tolerance to an end would hardly shrink the bracket: move it
+        // away from that end, so that it may fall beyond the root. Signed as b − a.
         let least = 0.5 * tolerance * if b > a { 1.0 } else { -1.0 };
         if libm::fabs(c - b) < libm::fabs(least) {
             c = b - least;
@@ -42,7 +42,8 @@ pub(super) fn bracketed(
         if fc * fb < 0.0 {
             (a, fa) = (b, fb);
         } else {
-            // The end `a` stays: its value is weighted down, so that the next point lies nearer to it.
+            // The end `a` stays: its value is weighted down, so that the next point lies nearer to
+            // it.
             let weight = 1.0 - fc / fb;
             fa *= if weight > 0.0 { weight } else { 0.5 };
         }

@@ -1,9 +1,11 @@
 //! Triangulation by the reference phase map (Peng & Gupta 2008, eqs. 10–11).
 //!
-//! The light ray from the projector through the point X(z), at height z on pixel (u, v)'s ray, meets the reference plane at R(z),
-//! which the camera would see at the pixel π(R(z)). So z solves Φ_R(π(R(z))) = Φ(u, v) in the working range, for any pattern and
-//! any distortion of either lens. With a reference map computed from the models, Φ_R(π(R(z))) is Φ_P at the projector pixel that
-//! lights X(z); with a measured one, at that pixel corrected by what the plane was off the models at π(R(z)).
+//! The light ray from the projector through the point X(z), at height z on pixel (u, v)'s ray,
+//! meets the reference plane at R(z), which the camera would see at the pixel π(R(z)). So z solves
+//! Φ_R(π(R(z))) = Φ(u, v) in the working range, for any pattern and any distortion of either lens.
+//! With a reference map computed from the models, Φ_R(π(R(z))) is Φ_P at the projector pixel that
+//! lights X(z); with a measured one, at that pixel corrected by what the plane was off the models
+//! at π(R(z)).
 //!
 //! Units: mm and turns. Accuracy: z within 2.5e-7 mm of the textbook for the same phase
 //! (`heights_beyond_the_raster_and_about_the_ends_of_the_range_are_the_textbooks`).
@@ -34,7 +36,8 @@ pub enum RigError {
     /// Camera and projector stand in the same place.
     #[error("camera and projector have the same centre: without a baseline there is no height")]
     NoBaseline,
-    /// The working range is empty or not finite, reaches up to a device, or lies wholly beyond ± 2147 mm.
+    /// The working range is empty or not finite, reaches up to a device, or lies wholly beyond ±
+    /// 2147 mm.
     #[error(
         "the working range {} to {} mm is empty or not finite, reaches up to a device, or lies beyond ±2147 mm",
         .0.low, .0.high
@@ -80,27 +83,28 @@ const HEIGHT_TOLERANCE: f64 = 1e-7;
 const NEAR_TOLERANCE: f64 = 1e-4;
 /// A secant step longer than this many mm has left the neighbourhood of the guess.
 const MAX_SECANT_STEP: f64 = 2.0;
-/// The numeric slope is taken over ± this many mm: small against any fringe, large against rounding. The
-/// first secant starts this far below the guess.
+/// The numeric slope is taken over ± this many mm: small against any fringe, large against
+/// rounding. The first secant starts this far below the guess.
 const SLOPE_STEP: f64 = 0.01;
 /// Pieces of the working range, each of which is searched for a change of sign, for a sampled phase
 /// function: it need not be monotone along the line of projector pixels that a camera ray crosses.
 const PIECES: usize = 16;
-/// Largest z component of a usable ray whose component along the optical axis is 1: from a height of
-/// 1 m, other rays meet the plane a thousand kilometres away or nowhere.
+/// Largest z component of a usable ray whose component along the optical axis is 1: from a height
+/// of 1 m, other rays meet the plane a thousand kilometres away or nowhere.
 const FALL: f64 = -1e-6;
-/// Where the phase changes by less than this over ± 0.2 × the camera's height, the height is only noise: the
-/// phase of one level of 4 frames has σ = 7.4e-3 turn. That happens on rays along the baseline, and
-/// everywhere if the fringes run along the baseline.
+/// Where the phase changes by less than this over ± 0.2 × the camera's height, the height is only
+/// noise: the phase of one level of 4 frames has σ = 7.4e-3 turn. That happens on rays along the
+/// baseline, and everywhere if the fringes run along the baseline.
 const LEAST_TURNS: f64 = 0.01;
 /// Heights are stored within ± this many mm.
 const HEIGHT_REACH: f64 = i32::MAX as f64 / 1e6;
-/// Half the default working range, as a share of the camera's distance from the plane along its axis.
+/// Half the default working range, as a share of the camera's distance from the plane along its
+/// axis.
 const RANGE_SHARE: f64 = 0.2;
 
 impl HeightRange {
-    /// The default working range of a rig: ± 0.2 × the camera's distance from the reference plane along its axis, the upper end at most
-    /// 0.9 × the lower device's z.
+    /// The default working range of a rig: ± 0.2 × the camera's distance from the reference plane
+    /// along its axis, the upper end at most 0.9 × the lower device's z.
     pub fn of(camera: &Pinhole, projector: &Pinhole) -> Self {
         let (eye, lamp) = (camera.centre(), projector.centre());
         let reach = RANGE_SHARE * eye.z / -camera.axis().z;
@@ -112,11 +116,13 @@ impl HeightRange {
 }
 
 impl Triangulator {
-    /// Joins the rig, the reference and the phase function. The default range is [`HeightRange::of`].
-    /// Any range is cut to the heights that can be stored, ± 2147 mm, without an error.
+    /// Joins the rig, the reference and the phase function. The default range is
+    /// [`HeightRange::of`]. Any range is cut to the heights that can be stored, ± 2147 mm, without
+    /// an error.
     ///
     /// # Errors
-    /// If the devices do not look down at the plane from two different places, or the range is unusable.
+    /// If the devices do not look down at the plane from two different places, or the range is
+    /// unusable.
     pub fn new(
         camera: Pinhole,
         projector: Pinhole,
@@ -221,8 +227,8 @@ impl Triangulator {
         }
     }
 
-    /// The largest |Φ − Φ_R| of pixel (u, v) in turns over the working range, and z in mm of the end of the range that
-    /// has it.
+    /// The largest |Φ − Φ_R| of pixel (u, v) in turns over the working range, and z in mm of the
+    /// end of the range that has it.
     pub fn phase_reach(&self, u: f64, v: f64) -> Option<(f64, f64)> {
         let (ray, reference) = (self.falling_ray(u, v)?, self.reference_phase(u, v)?);
         let ends = [self.range.low, self.range.high].into_iter();
@@ -235,8 +241,8 @@ impl Triangulator {
 
     /// The surface point that pixel (u, v) sees if its phase is `phase` (turns), or `None` where no
     /// height in the working range has that phase, several have, or the phase hardly depends on the
-    /// height. Several are noticed only where they lie in different sixteenths of the range, and only for a
-    /// sampled phase function.
+    /// height. Several are noticed only where they lie in different sixteenths of the range, and
+    /// only for a sampled phase function.
     pub fn solve(&self, u: f64, v: f64, phase: f64) -> Option<Solution> {
         let ray = self.falling_ray(u, v)?;
         let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);
@@ -263,9 +269,10 @@ impl Triangulator {
         self.solution(ray, z)
     }
 
-    /// As [`Self::solve`], starting from a height that is nearly right: about 5 evaluations of the phase
-    /// instead of 10, or 25 for a sampled function. Where several heights have the phase, the one near the
-    /// guess, unless the secant method does not converge: then the answer is that of [`Self::solve`].
+    /// As [`Self::solve`], starting from a height that is nearly right: about 5 evaluations of the
+    /// phase instead of 10, or 25 for a sampled function. Where several heights have the phase, the
+    /// one near the guess, unless the secant method does not converge: then the answer is that of
+    /// [`Self::solve`].
     pub fn solve_near(&self, u: f64, v: f64, phase: f64, guess: f64) -> Option<Solution> {
         let ray = self.falling_ray(u, v)?;
         let off = |z: f64| Some(self.phase_at(self.on_ray(ray, z))? - phase);
@@ -300,9 +307,9 @@ impl Triangulator {
         })
     }
 
-    /// The expansion z(Φ + δ) ≈ z + z′δ + z″δ²/2 of the height about a phase at pixel (u, v), in mm per
-    /// turn and turn²; the second derivative by central differences of ± ¼ turn, 0 where there is no
-    /// height for one of these two phases.
+    /// The expansion z(Φ + δ) ≈ z + z′δ + z″δ²/2 of the height about a phase at pixel (u, v), in mm
+    /// per turn and turn²; the second derivative by central differences of ± ¼ turn, 0 where there
+    /// is no height for one of these two phases.
     pub fn expand(&self, u: f64, v: f64, phase: f64) -> Option<Expansion> {
         const STEP: f64 = 0.25;
         let solution = self.solve(u, v, phase)?;

@@ -1,10 +1,13 @@
-//! The largest deviation of good parts, which noise alone makes: which pixels can hold a limit, and how often a good part exceeds it.
+//! The largest deviation of good parts, which noise alone makes: which pixels can hold a limit, and
+//! how often a good part exceeds it.
 //!
 //! # Idea
-//! A good part deviates from golden by noise only: golden's own, the measurement's, and that of the motion that is taken back.
-//! [`Measure::Deviation`](super::Measure) is the largest of the means over all squares, so a limit has to be held by the tail of an
-//! extreme, not by the noise of one square: among 10⁵ squares some are always 4 σ off. Where a surface is seen at a grazing angle or
-//! by little light, single squares are many times as noisy as the rest and make the extreme alone: their pixels get weights.
+//! A good part deviates from golden by noise only: golden's own, the measurement's, and that of the
+//! motion that is taken back. [`Measure::Deviation`](super::Measure) is the largest of the means
+//! over all squares, so a limit has to be held by the tail of an extreme, not by the noise of one
+//! square: among 10⁵ squares some are always 4 σ off. Where a surface is seen at a grazing angle or
+//! by little light, single squares are many times as noisy as the rest and make the extreme alone:
+//! their pixels get weights.
 //!
 //! # Equations
 //! The mean over a square with n compared pixels of weights w has
@@ -13,14 +16,16 @@
 //! σ² = (Σ w² σ_p² + (Σ w)² σ_m²) / n²
 //! ```
 //!
-//! σ_p is that of a pixel's deviation (√(golden² + measurement²)), σ_m what an error of the motion does to it, which moves all pixels of a
-//! square together. Where the square about a pixel has a higher σ than the limit allows, the pixel's weight is about the ratio of the
-//! two, else 1: with weights, no square is noisier than the limit allows.
+//! σ_p is that of a pixel's deviation (√(golden² + measurement²)), σ_m what an error of the motion
+//! does to it, which moves all pixels of a square together. Where the square about a pixel has a
+//! higher σ than the limit allows, the pixel's weight is about the ratio of the two, else 1: with
+//! weights, no square is noisier than the limit allows.
 //!
 //! There is a square about each pixel, so neighbours share pixels; along each axis the means
-//! correlate by 1 − k/L at k pixels, L the side. Excursions of such a field above t σ come in clumps, and the clumps are
-//! a Poisson process (D. Siegmund, *Approximate tail probabilities for the maxima of some random fields*, Ann. Probab. 16,
-//! 1988; ν by D. Siegmund, B. Yakir, *The Statistics of Gene Mapping*, 2007, 5.2):
+//! correlate by 1 − k/L at k pixels, L the side. Excursions of such a field above t σ come in
+//! clumps, and the clumps are a Poisson process (D. Siegmund, *Approximate tail probabilities for
+//! the maxima of some random fields*, Ann. Probab. 16, 1988; ν by D. Siegmund, B. Yakir, *The
+//! Statistics of Gene Mapping*, 2007, 5.2):
 //!
 //! ```text
 //! P(largest > x) = 1 − e^−Λ(x)        Λ(x) = Σ 2 φ(x/σ) σ/x θ(x/σ)²
@@ -28,18 +33,20 @@
 //! ν(μ) = (2/μ) (Φ(μ/2) − ½) / ((μ/2) Φ(μ/2) + φ(μ/2))
 //! ```
 //!
-//! The sum runs over the squares; Φ and φ are the normal distribution and its density (2 φ(t)/t approximates its two tails). θ is the
-//! number of clumps per square along an axis, 1 where excursions are so short that every square has its own. For low excursions
-//! (t of about 1) there are at least as many clumps as in disjoint squares, −ln(1 − 2 Q(t)) / L² each, Q the upper tail. Along an axis a run
-//! of n squares has n θ + 1 − θ clumps: the noisier end of the run counts in full, which is where extremes are when the noise
-//! grows towards an edge.
+//! The sum runs over the squares; Φ and φ are the normal distribution and its density (2 φ(t)/t
+//! approximates its two tails). θ is the number of clumps per square along an axis, 1 where
+//! excursions are so short that every square has its own. For low excursions (t of about 1) there
+//! are at least as many clumps as in disjoint squares, −ln(1 − 2 Q(t)) / L² each, Q the upper tail.
+//! Along an axis a run of n squares has n θ + 1 − θ clumps: the noisier end of the run counts in
+//! full, which is where extremes are when the noise grows towards an edge.
 //!
 //! # Shapes and units
 //! Maps are row-major over the camera's frame; lengths mm, variances mm².
 //!
 //! # Accuracy
-//! Mean and scatter of the largest of simulated squares within 5 % and 20 %, its upper tail within a half
-//! (`the_largest_of_simulated_squares_is_as_predicted`); on parts in front of the simulated head in `tests/suite/limits.rs`.
+//! Mean and scatter of the largest of simulated squares within 5 % and 20 %, its upper tail within
+//! a half (`the_largest_of_simulated_squares_is_as_predicted`); on parts in front of the simulated
+//! head in `tests/suite/limits.rs`.
 
 use super::Weight;
 use super::align::{Alignment, Facet, GoldenSurface};
@@ -64,9 +71,10 @@ pub struct DeviationNoise<'a> {
 }
 
 impl DeviationNoise<'_> {
-    /// The weights with which no mean over a square of `side` has a σ above `most`. First the middle of each square whose σ is higher
-    /// gets the ratio of the two as its weight. While that is not enough, because pixels beside it are noisier, the weights
-    /// of all pixels of the square are multiplied by the ratio that is left. Pixels whose weight would be below 1/16 are not
+    /// The weights with which no mean over a square of `side` has a σ above `most`. First the
+    /// middle of each square whose σ is higher gets the ratio of the two as its weight. While that
+    /// is not enough, because pixels beside it are noisier, the weights of all pixels of the square
+    /// are multiplied by the ratio that is left. Pixels whose weight would be below 1/16 are not
     /// compared.
     pub fn weights(&self, compared: &[bool], side: usize, most: f64) -> Vec<Weight> {
         let width = self.width.max(1);
@@ -102,8 +110,8 @@ impl DeviationNoise<'_> {
         }
     }
 
-    /// σ of the mean over the square of `side` pixels about each pixel; NaN where the pixel is not compared or too few pixels of the
-    /// square are.
+    /// σ of the mean over the square of `side` pixels about each pixel; NaN where the pixel is not
+    /// compared or too few pixels of the square are.
     pub fn of_squares(&self, weights: &[Weight], side: usize) -> Vec<f32> {
         let width = self.width.max(1);
         let least = MIN_SUPPORT * (side * side) as f64;
@@ -128,12 +136,13 @@ impl DeviationNoise<'_> {
     }
 }
 
-/// Variance of each pixel's deviation by the error of the motion that is found from heights with the noise of `golden`; 0 where no motion
-/// is found. The motion is found inside `window` from the pixels that count in
-/// full in `golden`; the variance is that of the pixels that are compared in `whole`.
+/// Variance of each pixel's deviation by the error of the motion that is found from heights with
+/// the noise of `golden`; 0 where no motion is found. The motion is found inside `window` from the
+/// pixels that count in full in `golden`; the variance is that of the pixels that are compared in
+/// `whole`.
 ///
-/// An error δ of the motion lifts a pixel by j·δ ([`Facet::jacobian`]), so the variance is jᵀ C j, C the
-/// covariance of the motion of a part that lies as taught.
+/// An error δ of the motion lifts a pixel by j·δ ([`Facet::jacobian`]), so the variance is jᵀ C j,
+/// C the covariance of the motion of a part that lies as taught.
 pub fn motion_variance(
     golden: GoldenSurface<'_>,
     whole: GoldenSurface<'_>,
@@ -177,7 +186,8 @@ fn of_facets(golden: GoldenSurface<'_>, value: impl Fn(&Facet, Vector) -> f64 + 
         for (u, value) in row.iter_mut().enumerate() {
             *value = of_pixel(u).unwrap_or(f32::NAN);
         }
-        // A facet needs a whole square of pixels: pixels beside an edge get the value of the next one in the row.
+        // A facet needs a whole square of pixels: pixels beside an edge get the value of the next
+        // one in the row.
         carry(row.iter_mut());
         carry(row.iter_mut().rev());
         for value in row.iter_mut().filter(|value| value.is_nan()) {
@@ -209,7 +219,8 @@ pub struct LargestDeviation {
 #[derive(Clone, Debug, PartialEq)]
 struct Field {
     side: f64,
-    /// How many squares have a σ in each bin ([`sigma_of`]), by the number of axes along which they are the end of a run.
+    /// How many squares have a σ in each bin ([`sigma_of`]), by the number of axes along which they
+    /// are the end of a run.
     bins: [Vec<u32>; 3],
 }
 
@@ -229,7 +240,8 @@ fn sigma_of(bin: usize) -> f64 {
 }
 
 impl LargestDeviation {
-    /// Of squares of `side` pixels with these σ, mm, in a frame of `width` columns; places with NaN have no square.
+    /// Of squares of `side` pixels with these σ, mm, in a frame of `width` columns; places with NaN
+    /// have no square.
     pub fn new(sigmas: &[f32], width: usize, side: usize) -> Self {
         let mut bins = [(); 3].map(|()| vec![0; BINS]);
         let width = width.max(1);
@@ -320,8 +332,8 @@ impl LargestDeviation {
     }
 }
 
-/// Clumps above t > 0 of a square of `side` pixels that lies inside its run along so many `axes`: 2 φ(t)/t with a factor θ(t) for each of
-/// these, at least those of one independent square in side².
+/// Clumps above t > 0 of a square of `side` pixels that lies inside its run along so many `axes`: 2
+/// φ(t)/t with a factor θ(t) for each of these, at least those of one independent square in side².
 fn clumps_per_square(t: f64, side: f64, axes: i32) -> f64 {
     let half = t * libm::sqrt(2.0 / side) / 2.0;
     let below = 0.5 * libm::erfc(-half / SQRT_2);
@@ -435,7 +447,8 @@ mod tests {
     fn what_is_too_noisy_counts_with_a_weight_that_makes_it_quiet_enough() {
         const WIDTH: usize = 40;
         const MOST: f64 = 0.02;
-        // Columns that get nine times as noisy towards the edge, and one that no weight makes quiet.
+        // Columns that get nine times as noisy towards the edge, and one that no weight makes
+        // quiet.
         let pixel: Vec<f32> = (0..WIDTH * WIDTH)
             .map(|place| match place % WIDTH {
                 0 => 900.0,

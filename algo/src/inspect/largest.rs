@@ -1,31 +1,35 @@
-//! What the largest deviation of a good part is expected to be, and how uncertain the largest deviation of any part is.
+//! What the largest deviation of a good part is expected to be, and how uncertain the largest
+//! deviation of any part is.
 //!
 //! # Idea
-//! The largest of many noisy means is not 0 on a good part, and scatters much less than one of them: over 10³ independent squares of
-//! error σ it reads 3.5 σ with a scatter of 0.3 σ. On a part with a defect that is far larger than that, it is the mean over one
-//! square and has its error. In between, the largest deviation is the greater of two: that of noise alone, M, and that of what
-//! does deviate, X. Where several places deviate by nearly as much, as edges of a displaced part do, X is the greatest of
-//! them, which scatters less than each.
+//! The largest of many noisy means is not 0 on a good part, and scatters much less than one of
+//! them: over 10³ independent squares of error σ it reads 3.5 σ with a scatter of 0.3 σ. On a part
+//! with a defect that is far larger than that, it is the mean over one square and has its error. In
+//! between, the largest deviation is the greater of two: that of noise alone, M, and that of what
+//! does deviate, X. Where several places deviate by nearly as much, as edges of a displaced part
+//! do, X is the greatest of them, which scatters less than each.
 //!
 //! # Equations
-//! M has the mean e and the scatter s of [`LargestDeviation`]. X is normal with a mean m and a scatter σ. Moments of their
-//! maximum (C. E. Clark, *The greatest of a finite set of random variables*, Oper. Res. 9, 1961, eqs. 2 and 3), a² = σ² + s²,
-//! α = (m − e)/a:
+//! M has the mean e and the scatter s of [`LargestDeviation`]. X is normal with a mean m and a
+//! scatter σ. Moments of their maximum (C. E. Clark, *The greatest of a finite set of random
+//! variables*, Oper. Res. 9, 1961, eqs. 2 and 3), a² = σ² + s², α = (m − e)/a:
 //!
 //! ```text
 //! E = m Φ(α) + e Φ(−α) + a φ(α)
 //! E₂ = (m² + σ²) Φ(α) + (e² + s²) Φ(−α) + (m + e) a φ(α)
 //! ```
 //!
-//! m is the one for which E is the measured value less 2 s: what noise alone reaches says nothing about a defect. σ is the scatter of the
-//! greatest of the squares that were found, from the same equations, one square after the other, with their measured values as means.
+//! m is the one for which E is the measured value less 2 s: what noise alone reaches says nothing
+//! about a defect. σ is the scatter of the greatest of the squares that were found, from the same
+//! equations, one square after the other, with their measured values as means.
 //!
 //! # Shapes and units
 //! Lengths in mm.
 //!
 //! # Accuracy
 //! Within 35 % where noise and defect are equally large, within 10 % from twice the noise on
-//! (`the_greater_of_noise_and_a_defect_scatters_as_predicted`); on parts in front of the simulated head in `tests/suite/repeatability.rs`.
+//! (`the_greater_of_noise_and_a_defect_scatters_as_predicted`); on parts in front of the simulated
+//! head in `tests/suite/repeatability.rs`.
 
 use super::good::{DeviationNoise, LargestDeviation};
 use super::{Region, Taught, Weight};
@@ -59,8 +63,9 @@ const HALVINGS: usize = 30;
 const FAR: f64 = 8.0;
 
 impl Largest {
-    /// Of the squares about the pixels of a region, of `side` pixels or what is needed more, where deviations have the noise of the `taught` heights alone;
-    /// with `times` the noise it is [`Self::times`] as large. `width` is that of the frame.
+    /// Of the squares about the pixels of a region, of `side` pixels or what is needed more, where
+    /// deviations have the noise of the `taught` heights alone; with `times` the noise it is
+    /// [`Self::times`] as large. `width` is that of the frame.
     pub fn of(taught: &Taught, width: usize, region: &Region, side: usize) -> Self {
         let pixels = taught.pixels().len();
         let variance = |place| {
@@ -105,7 +110,8 @@ impl Largest {
         0.5 * libm::erfc((self.mean - limit) / scatter / SQRT_2)
     }
 
-    /// The error of the largest of deviations that were found in squares that share no pixel: their magnitudes and variances.
+    /// The error of the largest of deviations that were found in squares that share no pixel: their
+    /// magnitudes and variances.
     pub(super) fn uncertain(
         self,
         largest: [f64; 2],
@@ -135,8 +141,8 @@ impl Largest {
     }
 }
 
-/// Mean and variance of the greater of two normal numbers with these means and variances, and how often it is the first. At least one
-/// variance is not 0.
+/// Mean and variance of the greater of two normal numbers with these means and variances, and how
+/// often it is the first. At least one variance is not 0.
 fn greater([m, u]: [f64; 2], [e, v]: [f64; 2]) -> ([f64; 2], f64) {
     let spread = libm::sqrt(u + v);
     let alpha = (m - e) / spread;
@@ -164,7 +170,8 @@ mod tests {
         libm::sqrt(-2.0 * libm::log(1.0 - share())) * libm::cos(2.0 * PI * share())
     }
 
-    /// The largest of all squares, one of which is off by `defect`: mean and standard deviation over many draws.
+    /// The largest of all squares, one of which is off by `defect`: mean and standard deviation
+    /// over many draws.
     fn drawn(defect: f64, random: &mut SplitMix64) -> (f64, f64) {
         let (mut sum, mut squares) = (0.0, 0.0);
         for _ in 0..DRAWS {
@@ -188,7 +195,8 @@ mod tests {
             let found = noise.uncertain([value, 1.0], []);
             assert_eq!((found.variance, found.defect), (scatter * scatter, 0.0));
         }
-        // A defect that noise does not reach has the error of its square, and one in between is in between.
+        // A defect that noise does not reach has the error of its square, and one in between is in
+        // between.
         for (defect, within) in [(4.5, 0.35), (6.0, 0.1), (9.0, 0.05)] {
             let (value, spread) = drawn(defect, &mut random);
             let found = noise.uncertain([value, 1.0], []);
@@ -209,7 +217,8 @@ mod tests {
             mean: 3.5,
             scatter: 0.3,
         };
-        // Means and errors of places: alike, a noisy one among quiet ones, and one that is far above the others.
+        // Means and errors of places: alike, a noisy one among quiet ones, and one that is far
+        // above the others.
         for (places, alone) in [
             (&[[12.0, 1.0]; 4][..], false),
             (&[[12.0, 2.0], [12.0, 0.5], [11.5, 0.5]], false),

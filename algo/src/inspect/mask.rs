@@ -4,8 +4,8 @@ use crate::math::around;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// The connected components of a mask, by region growing: their places in a row-major map. Pixels that share an edge are connected,
-/// and with `corners` those that share a corner.
+/// The connected components of a mask, by region growing: their places in a row-major map. Pixels
+/// that share an edge are connected, and with `corners` those that share a corner.
 pub(crate) fn components(mask: &[bool], width: usize, corners: bool) -> Vec<Vec<usize>> {
     let rows = mask.len() / width.max(1);
     let mut left = mask.to_vec();
@@ -35,7 +35,8 @@ pub(crate) fn components(mask: &[bool], width: usize, corners: bool) -> Vec<Vec<
     found
 }
 
-/// Takes `by` pixels off every edge of a mask (square neighbourhood); the frame's border is an edge.
+/// Takes `by` pixels off every edge of a mask (square neighbourhood); the frame's border is an
+/// edge.
 pub fn eroded(mask: &[bool], width: usize, by: usize) -> Vec<bool> {
     let rows = mask.len() / width.max(1);
     let inside = |column: usize, row: usize| {

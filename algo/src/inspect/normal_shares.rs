@@ -1,24 +1,27 @@
 //! The share of a height difference that lies along the surface's normal.
 //!
 //! # Idea
-//! A pixel that sees the part above golden sees it on its own ray: the difference dz of their heights belongs to the way dz · r along the
-//! ray, r scaled to r_z = 1. On a steep wall that way is much longer than the distance from the surface, which is what a tolerance of
-//! a profile limits (ISO 1101:2017, profile of a surface): that is dz · r·n, n the unit normal of golden.
+//! A pixel that sees the part above golden sees it on its own ray: the difference dz of their
+//! heights belongs to the way dz · r along the ray, r scaled to r_z = 1. On a steep wall that way
+//! is much longer than the distance from the surface, which is what a tolerance of a profile limits
+//! (ISO 1101:2017, profile of a surface): that is dz · r·n, n the unit normal of golden.
 //!
 //! # Equations
-//! With p(u, v) = eye + (z − z_eye) r(u, v) the points that neighbouring pixels see, and N = ∂p/∂u × ∂p/∂v,
+//! With p(u, v) = eye + (z − z_eye) r(u, v) the points that neighbouring pixels see, and N = ∂p/∂u
+//! × ∂p/∂v,
 //!
 //! ```text
 //! r·n = |N·r| / |N|        N·r = (z − z_eye)² (∂r/∂u × ∂r/∂v)·r
 //! ```
 //!
 //! # Shapes and units
-//! Maps are row-major over the camera's frame. The share has no unit; it is 1 on a surface that is parallel to the reference plane, and up to
-//! the length of r where the surface faces the camera.
+//! Maps are row-major over the camera's frame. The share has no unit; it is 1 on a surface that is
+//! parallel to the reference plane, and up to the length of r where the surface faces the camera.
 //!
 //! # Accuracy
-//! ∂z/∂u and ∂z/∂v are differences over [`REACH`] pixels to both sides: teaching compares no pixel whose neighbours within two are not known.
-//! On a tilted plane the share is exact to 1e-3 (`the_share_along_the_normal_of_a_plane_is_that_of_its_tilt_and_of_the_ray`).
+//! ∂z/∂u and ∂z/∂v are differences over [`REACH`] pixels to both sides: teaching compares no pixel
+//! whose neighbours within two are not known. On a tilted plane the share is exact to 1e-3
+//! (`the_share_along_the_normal_of_a_plane_is_that_of_its_tilt_and_of_the_ray`).
 
 use crate::geometry::{Triangulator, Vector};
 use crate::math::around;

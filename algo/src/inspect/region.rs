@@ -76,7 +76,8 @@ impl Region {
         })
     }
 
-    /// Becomes another region with its corners moved by `to`, in a frame of this size (width, height); it may hold no pixel then.
+    /// Becomes another region with its corners moved by `to`, in a frame of this size (width,
+    /// height); it may hold no pixel then.
     pub(super) fn become_moved(
         &mut self,
         other: &Self,

@@ -1,21 +1,23 @@
 //! Ripple: what a periodic error leaves in means over squares.
 //!
-//! **Idea.** An imperfect response gives phases an error that depends on where in a fringe a pixel lies, and on the sequence of shifts
-//! and levels. Where the same scene is measured by two sequences their difference has that error, and noise. Noise is not the same in
-//! two such differences, the error is: so the mean product of both is the variance of the error alone.
+//! **Idea.** An imperfect response gives phases an error that depends on where in a fringe a pixel
+//! lies, and on the sequence of shifts and levels. Where the same scene is measured by two
+//! sequences their difference has that error, and noise. Noise is not the same in two such
+//! differences, the error is: so the mean product of both is the variance of the error alone.
 //!
-//! It is not the same everywhere: where its period is near a whole number of pixels, a mean over a square does not take it out. What
-//! counts is where it is largest.
+//! It is not the same everywhere: where its period is near a whole number of pixels, a mean over a
+//! square does not take it out. What counts is where it is largest.
 //!
-//! **Equation.** With ā and b̄ the means of both differences over the square of L × L pixels about a pixel, and ⟨⟩ the mean over patches
-//! of 4 L × 4 L pixels,
+//! **Equation.** With ā and b̄ the means of both differences over the square of L × L pixels about
+//! a pixel, and ⟨⟩ the mean over patches of 4 L × 4 L pixels,
 //!
 //! ```text
 //! ripple = max √ max(0, ⟨ā b̄⟩ − 3/4 ⟨(ā − b̄)²⟩ / 2)
 //! ```
 //!
-//! ⟨(ā − b̄)²⟩ / 2 is the variance of the noise of ā. A patch has 16 independent squares, so the mean of the products of noises has a fourth
-//! of that as its error, of which three times are taken off.
+//! ⟨(ā − b̄)²⟩ / 2 is the variance of the noise of ā. A patch has 16 independent squares, so the
+//! mean of the products of noises has a fourth of that as its error, of which three times are taken
+//! off.
 //!
 //! **Shapes and units.** Maps are row-major; the ripple has the unit of the maps.
 //!
@@ -31,9 +33,10 @@ const NOISE: f64 = 3.0 / PATCH as f64 / 2.0;
 /// A patch has squares about at least this share of its pixels.
 const FILLED: f64 = 0.5;
 
-/// What the means of two maps over squares of `side` pixels have in common, RMS over the patch where that is largest, in frames of `width`
-/// columns with so many `pixels`. `values` are those of a pixel in both; pixels without values are left out, and squares and
-/// patches with too few. 0 if there is no patch.
+/// What the means of two maps over squares of `side` pixels have in common, RMS over the patch
+/// where that is largest, in frames of `width` columns with so many `pixels`. `values` are those of
+/// a pixel in both; pixels without values are left out, and squares and patches with too few. 0 if
+/// there is no patch.
 pub fn ripple(
     (width, pixels): (usize, usize),
     side: usize,

@@ -1,8 +1,8 @@
-//! How much a pixel's deviation counts in the mean over a square: its weight, and the share of a height difference that lies along the
-//! surface's normal.
+//! How much a pixel's deviation counts in the mean over a square: its weight, and the share of a
+//! height difference that lies along the surface's normal.
 
-/// The weight of a pixel as a byte: 0 if it is not compared, 1 if its deviation counts in full, n from 2 on if its deviation is
-/// multiplied by n/256.
+/// The weight of a pixel as a byte: 0 if it is not compared, 1 if its deviation counts in full, n
+/// from 2 on if its deviation is multiplied by n/256.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Weight(u8);
 
@@ -55,8 +55,9 @@ impl Weight {
     }
 }
 
-/// What a height difference along a line of sight is multiplied by, as a byte: n stands for (n + 1)/192, so that factors reach 1.33. It is the
-/// share of the difference that lies along the surface's normal ([`normal_shares`](super::normal_shares)), times the pixel's [`Weight`].
+/// What a height difference along a line of sight is multiplied by, as a byte: n stands for (n +
+/// 1)/192, so that factors reach 1.33. It is the share of the difference that lies along the
+/// surface's normal ([`normal_shares`](super::normal_shares)), times the pixel's [`Weight`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Factor(u8);
 

@@ -45,10 +45,12 @@ impl<const N: usize> Normal<N> {
     }
 }
 
-/// Solves the symmetric positive definite system `a · x = b` by Cholesky's method and leaves x in `b`.
+/// Solves the symmetric positive definite system `a · x = b` by Cholesky's method and leaves x in
+/// `b`.
 ///
-/// `a` is row-major n × n with n = `b.len()`; only its lower triangle is read, and it is overwritten. Returns `None` where the matrix is
-/// not positive definite to working precision, that is, where the observations do not determine the unknowns.
+/// `a` is row-major n × n with n = `b.len()`; only its lower triangle is read, and it is
+/// overwritten. Returns `None` where the matrix is not positive definite to working precision, that
+/// is, where the observations do not determine the unknowns.
 pub(crate) fn solve_symmetric(a: &mut [f64], b: &mut [f64]) -> Option<()> {
     let n = b.len();
     for j in 0..n {

@@ -5,8 +5,9 @@ use crate::trust::LeastModulation;
 use alloc::vec::Vec;
 
 impl Sequence {
-    /// How likely all levels are trusted in one measurement of a pixel, by the modulation that a sine has there. It is in counts of samples
-    /// with this full scale, and so is `noise`, σ of a sample. A level's modulation has σ_B = σ √(2 / N).
+    /// How likely all levels are trusted in one measurement of a pixel, by the modulation that a
+    /// sine has there. It is in counts of samples with this full scale, and so is `noise`, σ of a
+    /// sample. A level's modulation has σ_B = σ √(2 / N).
     pub fn chance_of_trust(
         &self,
         least: LeastModulation,

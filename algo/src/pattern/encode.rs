@@ -17,8 +17,8 @@ pub struct GreyRaster {
 
 /// The inverse of a projector's grey response.
 ///
-/// The projector shows grey level g with the light `measured[g]`. The inverse maps each level to the one whose light is nearest
-/// to linear between darkest and brightest.
+/// The projector shows grey level g with the light `measured[g]`. The inverse maps each level to
+/// the one whose light is nearest to linear between darkest and brightest.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GreyResponse {
     inverse: [u8; 256],
@@ -74,11 +74,11 @@ const STEPS: f64 = 65_536.0;
 /// 1.5 · 2⁵²: added to a number below 2⁵⁰, it leaves the nearest whole number in the low bits.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
 
-/// Encodes I(ξ, η) = I_max/2 · (1 + f(r·Φ_P(ξ, η) + s)), I_max = 255, rounded to grey levels; f is the shot's waveform, sin 2πx or
-/// another with peak 1 ([`Waveform`]).
+/// Encodes I(ξ, η) = I_max/2 · (1 + f(r·Φ_P(ξ, η) + s)), I_max = 255, rounded to grey levels; f is
+/// the shot's waveform, sin 2πx or another with peak 1 ([`Waveform`]).
 ///
-/// The argument is rounded to 1/65536 turn, which changes a grey level of a sine by at most 0.006 before its own rounding, and of
-/// another waveform by at most 0.02.
+/// The argument is rounded to 1/65536 turn, which changes a grey level of a sine by at most 0.006
+/// before its own rounding, and of another waveform by at most 0.02.
 #[derive(Clone, Debug)]
 pub struct Encoder {
     response: Option<GreyResponse>,
@@ -87,7 +87,8 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Prepared for the waveforms of `shots`. With a `response` grey levels pass through its inverse.
+    /// Prepared for the waveforms of `shots`. With a `response` grey levels pass through its
+    /// inverse.
     pub fn new<'a>(
         response: Option<&GreyResponse>,
         shots: impl IntoIterator<Item = &'a Shot>,
@@ -181,7 +182,8 @@ mod tests {
         assert_eq!(Encoder::new(None, &[]).raster(&sampled, shot), raster);
     }
 
-    /// Rasters with a pitch that is no multiple of a pixel, demodulated pixel by pixel by the definition of S and C.
+    /// Rasters with a pitch that is no multiple of a pixel, demodulated pixel by pixel by the
+    /// definition of S and C.
     #[test]
     fn a_waveform_has_the_phase_of_the_sine_and_more_modulation() {
         let function = PhaseFunction::vertical(601, 1, 601.0 / 6.3).unwrap();

@@ -4,13 +4,13 @@ use super::interpolate::catmull_rom;
 use alloc::vec::Vec;
 use core::fmt;
 
-/// Largest |Φ_P| and largest phase of a level, in turns: a projector of 4,096 columns at 4 pixels per turn. The kernels
-/// compute fringe orders in 16-bit words with at least 4 fractional bits.
+/// Largest |Φ_P| and largest phase of a level, in turns: a projector of 4,096 columns at 4 pixels
+/// per turn. The kernels compute fringe orders in 16-bit words with at least 4 fractional bits.
 pub const MAX_TURNS: f64 = 1000.0;
 
 /// The phase function Φ_P(ξ, η) of a pattern in turns, over projector pixels (ξ = column, η = row,
-/// centres at integers). Defined for every real ξ and η: it continues linearly outside its raster, so
-/// that a reference phase map can extend beyond the frame.
+/// centres at integers). Defined for every real ξ and η: it continues linearly outside its raster,
+/// so that a reference phase map can extend beyond the frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PhaseFunction {
     columns: usize,
@@ -24,7 +24,8 @@ enum Shape {
     Vertical { fringes: f64 },
     /// Φ_P = fringes · η / rows.
     Horizontal { fringes: f64 },
-    /// One value per pixel centre, row-major; between them Catmull–Rom (continuous first derivative).
+    /// One value per pixel centre, row-major; between them Catmull–Rom (continuous first
+    /// derivative).
     Sampled(Vec<f64>),
 }
 

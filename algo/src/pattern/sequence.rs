@@ -16,10 +16,11 @@ const SHIFT_TOLERANCE: f64 = 1e-6;
 const RATIO_TOLERANCE: f64 = 1e-6;
 /// Largest span of the coarsest level, in turns, that is still absolute by itself.
 const GEOMETRIC_SPAN: f64 = 1.001;
-/// Largest factor from the ratio of one geometric level to the next: a level's error of up to 1.4e-4 turn, times the factor, must
-/// stay far below the 0.40 turn that a residual may have.
+/// Largest factor from the ratio of one geometric level to the next: a level's error of up to
+/// 1.4e-4 turn, times the factor, must stay far below the 0.40 turn that a residual may have.
 pub const MAX_LEVEL_FACTOR: f64 = 64.0;
-/// Largest n of dense levels: Φ − Φ₀ then stays within ± 450 turns, which 16-bit words hold with 5 fractional bits.
+/// Largest n of dense levels: Φ − Φ₀ then stays within ± 450 turns, which 16-bit words hold with 5
+/// fractional bits.
 pub const MAX_DENSE_N: f64 = 30.0;
 
 /// All shifts at one ratio of the full phase function: s_k = start + k/N.
@@ -146,8 +147,9 @@ impl Sequence {
     /// anywhere.
     ///
     /// # Errors
-    /// If a level has a number of shifts out of range or they are not equally spaced, its frames show different waveforms or one
-    /// that its shifts cannot demodulate, or there are too many levels.
+    /// If a level has a number of shifts out of range or they are not equally spaced, its frames
+    /// show different waveforms or one that its shifts cannot demodulate, or there are too many
+    /// levels.
     pub fn from_frames(frames: &[Shot]) -> Result<Self, SequenceError> {
         if frames.is_empty() {
             return Err(SequenceError::Empty);
@@ -223,8 +225,8 @@ impl Sequence {
         })
     }
 
-    /// The standard geometric sequence for a phase function: `levels` levels of `shifts` shifts k/N, frames
-    /// from coarse to fine.
+    /// The standard geometric sequence for a phase function: `levels` levels of `shifts` shifts
+    /// k/N, frames from coarse to fine.
     ///
     /// The coarsest level spans 0.94 turn (one turn less a margin for noise on both sides), the
     /// finest has ratio 1, the factors between them are equal.
@@ -241,8 +243,8 @@ impl Sequence {
             .collect()
     }
 
-    /// The fringe and its complement at ratio 1: a level of two shifts, which no pixel can be demodulated from by itself.
-    /// [`crate::inspect::Production::place_pair`] fits it over windows.
+    /// The fringe and its complement at ratio 1: a level of two shifts, which no pixel can be
+    /// demodulated from by itself. [`crate::inspect::Production::place_pair`] fits it over windows.
     pub fn pair() -> Self {
         let level = Level {
             ratio: 1.0,

@@ -2,8 +2,9 @@
 
 use super::{Waveform, Waveforms};
 
-/// What one frame shows of a phase function Φ_P: I = I_max/2 · (1 + f(ratio · Φ_P + shift)), where f is the waveform with its peak
-/// scaled to 1, for a sine I = I_max/2 · (1 + sin 2π(ratio · Φ_P + shift)).
+/// What one frame shows of a phase function Φ_P: I = I_max/2 · (1 + f(ratio · Φ_P + shift)), where
+/// f is the waveform with its peak scaled to 1, for a sine I = I_max/2 · (1 + sin 2π(ratio · Φ_P +
+/// shift)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shot {
     /// Share of the full phase function. Frames of equal ratio form a level.

@@ -1,13 +1,17 @@
-//! Slips: how often a pixel gets a wrong fringe order that leaves no residual, so that nobody sees it.
+//! Slips: how often a pixel gets a wrong fringe order that leaves no residual, so that nobody sees
+//! it.
 //!
-//! **Idea.** A step of unwrapping rounds a number of turns. If noise takes that over 1/2 turn, the order is wrong. What is then left
-//! as a residual is one turn less that noise, so above 0.60 turn it is below the limit of 0.40 again. About a map there is a second
-//! way: the first of the steps is unambiguous only over some turns either way of the map. A phase near this edge, at which a
-//! displaced part may have it, is taken over it by less noise, and then no level contradicts another.
+//! **Idea.** A step of unwrapping rounds a number of turns. If noise takes that over 1/2 turn, the
+//! order is wrong. What is then left as a residual is one turn less that noise, so above 0.60 turn
+//! it is below the limit of 0.40 again. About a map there is a second way: the first of the steps
+//! is unambiguous only over some turns either way of the map. A phase near this edge, at which a
+//! displaced part may have it, is taken over it by less noise, and then no level contradicts
+//! another.
 //!
-//! **Equation.** With σ_I the noise of a sample, B the modulation that a sine has, and the fundamentals b_i of the levels' waveforms
-//! ([`super::Waveform`]), a level's wrapped phase has the error δ_i with σ_i = (σ_I / B) √(2 / N_i) / (2π b_i). The steps of
-//! unwrapping round (`phase::about`, and n = r_i / r_j from one geometric level j to the next, i)
+//! **Equation.** With σ_I the noise of a sample, B the modulation that a sine has, and the
+//! fundamentals b_i of the levels' waveforms ([`super::Waveform`]), a level's wrapped phase has the
+//! error δ_i with σ_i = (σ_I / B) √(2 / N_i) / (2π b_i). The steps of unwrapping round
+//! (`phase::about`, and n = r_i / r_j from one geometric level j to the next, i)
 //!
 //! ```text
 //! to the finest level, from the fast beat     (n − 1) δ_f − n δ_c
@@ -15,11 +19,13 @@
 //! to the next geometric level                 n δ_j − δ_i
 //! ```
 //!
-//! each with P = erfc(0.60 / (σ √2)). About a map, D turns from it, P = ½ erfc((E − |D|) / (σ √2)) is added: for one level E = 1/(2r)
-//! and σ = σ_f / r, for two E = n/2 and σ of n (δ_f − δ_c), for three E = n²/2 and σ of n² (δ_f − δ_m).
+//! each with P = erfc(0.60 / (σ √2)). About a map, D turns from it, P = ½ erfc((E − |D|) / (σ √2))
+//! is added: for one level E = 1/(2r) and σ = σ_f / r, for two E = n/2 and σ of n (δ_f − δ_c), for
+//! three E = n²/2 and σ of n² (δ_f − δ_m).
 //!
-//! **Accuracy.** The errors of phases of faint pixels are not quite normal: at the least trusted modulation and a noise of ± 2.5 % of full
-//! scale, normal noise makes 0.8 to 1.5 times as many slips, and uniform noise fewer (`simulated_pixels_slip_as_often_as_predicted`).
+//! **Accuracy.** The errors of phases of faint pixels are not quite normal: at the least trusted
+//! modulation and a noise of ± 2.5 % of full scale, normal noise makes 0.8 to 1.5 times as many
+//! slips, and uniform noise fewer (`simulated_pixels_slip_as_often_as_predicted`).
 
 use super::sequence::MAX_LEVELS;
 use super::{Level, PhaseRange, Sequence, SequenceError, Unwrapping};
@@ -33,7 +39,8 @@ const UNSEEN: f64 = 0.60;
 pub struct Slips {
     /// σ of what each step rounds, in turns where σ_I = B.
     steps: heapless::Vec<f64, MAX_LEVELS>,
-    /// About a map: how far from it the phase is unambiguous, and σ of that distance where σ_I = B, turns.
+    /// About a map: how far from it the phase is unambiguous, and σ of that distance where σ_I = B,
+    /// turns.
     edge: Option<(f64, f64)>,
 }
 
@@ -79,8 +86,8 @@ impl Slips {
         Ok(Self { steps, edge })
     }
 
-    /// The share of pixels that get a wrong order unseen, where a sample's noise is so many times the modulation that a sine has, and
-    /// the phase lies `away` turns from the map.
+    /// The share of pixels that get a wrong order unseen, where a sample's noise is so many times
+    /// the modulation that a sine has, and the phase lies `away` turns from the map.
     pub fn rate(&self, noise: f64, away: f64) -> f64 {
         let steps = self.steps.iter().map(|sigma| unseen(sigma * noise));
         let edge = self.edge.map_or(0.0, |(edge, sigma)| {
@@ -90,7 +97,8 @@ impl Slips {
     }
 }
 
-/// σ of a sum of wrapped phases, each with its factor and its level's shifts and fundamental, in turns where σ_I = B.
+/// σ of a sum of wrapped phases, each with its factor and its level's shifts and fundamental, in
+/// turns where σ_I = B.
 pub(super) fn sigma(terms: &[(f64, usize, f64)]) -> f64 {
     let variance = |&(factor, shifts, fundamental): &(f64, usize, f64)| {
         let factor = factor / fundamental;
@@ -145,7 +153,8 @@ mod tests {
     /// Simulated over predicted rates: see *Accuracy*.
     const SIMULATED: core::ops::Range<f64> = 0.75..1.75;
 
-    /// The share of resolved pixels that the decoder gives another order than the true one, of `pixels` with normal noise.
+    /// The share of resolved pixels that the decoder gives another order than the true one, of
+    /// `pixels` with normal noise.
     fn simulated(shots: &[Shot], noise: f64, away: f64, pixels: usize) -> f64 {
         // So bright that none is rejected for its modulation.
         const MODULATION: f64 = 8000.0;

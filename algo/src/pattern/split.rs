@@ -1,21 +1,25 @@
 //! Split: how the frames of a measurement about a known map are divided among its levels.
 //!
-//! **Idea.** Every frame of a dense level carries accuracy, the more the nearer its ratio is to 1; but the nearer the ratios, the
-//! larger the factor by which the noise of their beats is multiplied. So the best split has as much information as the rate of
-//! wrong fringe orders that nobody sees allows.
+//! **Idea.** Every frame of a dense level carries accuracy, the more the nearer its ratio is to 1;
+//! but the nearer the ratios, the larger the factor by which the noise of their beats is
+//! multiplied. So the best split has as much information as the rate of wrong fringe orders that
+//! nobody sees allows.
 //!
-//! **Equation.** σ_Φ² = σ_I² / (2π² Σ N_i r_i² b_i² B²) with the fundamentals b_i of the levels' waveforms ([`super::Waveform`]), for ratios
-//! 1, 1 − 1/n² (not with two levels) and 1 − 1/n. The rate of wrong orders that nobody sees is that of [`super::Slips`] with sines, at
-//! the map and at the least modulation that is trusted.
+//! **Equation.** σ_Φ² = σ_I² / (2π² Σ N_i r_i² b_i² B²) with the fundamentals b_i of the levels'
+//! waveforms ([`super::Waveform`]), for ratios 1, 1 − 1/n² (not with two levels) and 1 − 1/n. The
+//! rate of wrong orders that nobody sees is that of [`super::Slips`] with sines, at the map and at
+//! the least modulation that is trusted.
 //!
-//! **Reach.** How far the phase may lie from the map: 0.40 turn for one level, n/2 − 0.2 for two, n²/2 − n for three.
+//! **Reach.** How far the phase may lie from the map: 0.40 turn for one level, n/2 − 0.2 for two,
+//! n²/2 − n for three.
 
 use super::slips::{sigma, unseen};
 use super::{Shot, Waveforms};
 use crate::trust::NOISE_OVER_LEAST;
 use alloc::vec::Vec;
 
-/// The largest rate of unseen wrong orders among the pixels of the least trusted modulation, if any split keeps it.
+/// The largest rate of unseen wrong orders among the pixels of the least trusted modulation, if any
+/// split keeps it.
 const MAX_SLIPS: f64 = 2e-4;
 /// Fewest and most shifts of a level: the kernels add up these without a weight for each sample.
 const SHIFTS: core::ops::RangeInclusive<usize> = 3..=MAX_LEVEL_SHIFTS;
@@ -28,16 +32,17 @@ const MAX_N: u32 = 12;
 pub struct Split {
     /// Ratio and number of shifts of each level, from coarse to fine.
     pub levels: heapless::Vec<(f64, usize), 3>,
-    /// Rate of wrong fringe orders that leave no residual, among the pixels of the least trusted modulation, where the map is within
-    /// reach; 0 for one level, which has no residuals.
+    /// Rate of wrong fringe orders that leave no residual, among the pixels of the least trusted
+    /// modulation, where the map is within reach; 0 for one level, which has no residuals.
     pub slips: f64,
     /// How far the phase may lie from the map, turns.
     pub reach: f64,
 }
 
 impl Split {
-    /// The most accurate one of so many frames whose reach is at least `reach` turns and whose rate of unseen wrong orders is at most
-    /// 2e-4; the one with the lowest rate if none has that. `None` if so many frames have no such reach.
+    /// The most accurate one of so many frames whose reach is at least `reach` turns and whose rate
+    /// of unseen wrong orders is at most 2e-4; the one with the lowest rate if none has that.
+    /// `None` if so many frames have no such reach.
     pub fn best(frames: usize, reach: f64, waveforms: Waveforms) -> Option<Self> {
         let fundamentals: [f64; MAX_LEVEL_SHIFTS + 1] =
             core::array::from_fn(|shifts| waveforms(shifts).fundamental());

@@ -1,22 +1,24 @@
 //! Waveforms: what is projected instead of a sine, so that the same light gives more modulation.
 //!
-//! **Idea.** Demodulation with N equally spaced shifts is blind to every harmonic h of the projected waveform except those with
-//! h ≡ ±1 (mod N), wherever blur and the raster's sampling leave them: harmonic h turns by h/N per shift, and its samples add up to
-//! 0 in S and C. So a waveform may have all the others, and with them its fundamental may be larger than its peak.
+//! **Idea.** Demodulation with N equally spaced shifts is blind to every harmonic h of the
+//! projected waveform except those with h ≡ ±1 (mod N), wherever blur and the raster's sampling
+//! leave them: harmonic h turns by h/N per shift, and its samples add up to 0 in S and C. So a
+//! waveform may have all the others, and with them its fundamental may be larger than its peak.
 //!
-//! **Equation.** f(x) = sin 2πx + Σ a_h sin 2πhx. With the peak scaled to 1, the fundamental is b = 1 / max |f|. The largest b of
-//! any waveform is 2 / (N tan(π/2N)) for odd N and 4 / (N tan(π/N)) for even N: the width of a zonogon of N segments. The shares
-//! below are the solution of the linear programme "minimise t, |f(x)| ≤ t" over 0 ≤ x ≤ 1/4, with odd h up to 13 that N tells from
-//! the fundamental (odd harmonics keep f symmetric). For N = 3 and 6 it is sin 2πx + sin 6πx / 6, known as third-harmonic
-//! injection of power electronics.
+//! **Equation.** f(x) = sin 2πx + Σ a_h sin 2πhx. With the peak scaled to 1, the fundamental is b =
+//! 1 / max |f|. The largest b of any waveform is 2 / (N tan(π/2N)) for odd N and 4 / (N tan(π/N))
+//! for even N: the width of a zonogon of N segments. The shares below are the solution of the
+//! linear programme "minimise t, |f(x)| ≤ t" over 0 ≤ x ≤ 1/4, with odd h up to 13 that N tells
+//! from the fundamental (odd harmonics keep f symmetric). For N = 3 and 6 it is sin 2πx + sin 6πx /
+//! 6, known as third-harmonic injection of power electronics.
 //!
 //! | N | 3, 6 | 4 | 5 | 7 | 8 | 9 |
 //! |---|---|---|---|---|---|---|
 //! | bound of b | 1.1547 | 1 | 1.2311 | 1.2518 | 1.2071 | 1.2603 |
 //! | reached | 1.1547 | 1 | 1.2310 | 1.2517 | 1.2070 | 1.2568 |
 //!
-//! The noise of the phase falls by 1/b. It needs a response that is linear within about 1 %: a gamma error makes h = 2 and products
-//! of harmonics.
+//! The noise of the phase falls by 1/b. It needs a response that is linear within about 1 %: a
+//! gamma error makes h = 2 and products of harmonics.
 //!
 //! **Tests.** `each_number_of_shifts_has_its_largest_fundamental_and_no_alias`, and on rasters
 //! `a_waveform_has_the_phase_of_the_sine_and_more_modulation`.
@@ -28,13 +30,15 @@ pub const MAX_ORDER: u8 = 15;
 /// Samples of a turn among which the peak is sought: it is found within 1e-5.
 const SAMPLES: u32 = 4096;
 
-/// Chooses the waveform of a level by its number of shifts: [`Waveform::brightest`] or [`Waveform::sine`].
+/// Chooses the waveform of a level by its number of shifts: [`Waveform::brightest`] or
+/// [`Waveform::sine`].
 pub type Waveforms = fn(usize) -> Waveform;
 
 /// A periodic waveform: a sine and its harmonics, all in phase with it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Waveform {
-    /// Amplitude of each order as a share of the fundamental's. That of order 0 is 0, that of order 1 is 1.
+    /// Amplitude of each order as a share of the fundamental's. That of order 0 is 0, that of order
+    /// 1 is 1.
     shares: [f64; MAX_ORDER as usize + 1],
 }
 
@@ -53,8 +57,8 @@ impl Waveform {
         Self::SINE
     }
 
-    /// With these harmonics: order, from 2 to [`MAX_ORDER`], and share of the fundamental's amplitude. Others are left out: files
-    /// that name them are refused before.
+    /// With these harmonics: order, from 2 to [`MAX_ORDER`], and share of the fundamental's
+    /// amplitude. Others are left out: files that name them are refused before.
     pub const fn of(harmonics: &[(u8, f64)]) -> Self {
         let mut shares = [0.0; MAX_ORDER as usize + 1];
         shares[1] = 1.0;
@@ -69,7 +73,8 @@ impl Waveform {
         Self { shares }
     }
 
-    /// The one with the largest fundamental that `shifts` shifts demodulate like a sine; a sine for 4 and for more than 9 shifts.
+    /// The one with the largest fundamental that `shifts` shifts demodulate like a sine; a sine for
+    /// 4 and for more than 9 shifts.
     pub const fn brightest(shifts: usize) -> Self {
         match shifts {
             3 | 6 => Self::of(&[(3, 1.0 / 6.0)]),
@@ -99,7 +104,8 @@ impl Waveform {
         }
     }
 
-    /// The harmonics that it has: order and share of the fundamental's amplitude, in ascending order.
+    /// The harmonics that it has: order and share of the fundamental's amplitude, in ascending
+    /// order.
     pub fn harmonics(&self) -> impl Iterator<Item = (u8, f64)> + '_ {
         let orders = (0..).zip(self.shares).skip(2);
         orders.filter(|(_, share)| *share != 0.0)

@@ -1,12 +1,14 @@
-//! Unwrapping about a known map Φ₀: dense levels by their beats, or a single level within half a turn.
+//! Unwrapping about a known map Φ₀: dense levels by their beats, or a single level within half a
+//! turn.
 //!
-//! **Idea.** Levels whose ratios are all close to 1 carry the full accuracy each, but none is unambiguous. Relative to a map of
-//! about the expected phase, the differences between levels (beats) vary slowly and are unambiguous over n²/2 turns either way.
-//! They unwrap each other up to the finest level, and then all levels are averaged.
+//! **Idea.** Levels whose ratios are all close to 1 carry the full accuracy each, but none is
+//! unambiguous. Relative to a map of about the expected phase, the differences between levels
+//! (beats) vary slowly and are unambiguous over n²/2 turns either way. They unwrap each other up to
+//! the finest level, and then all levels are averaged.
 //!
-//! **Equation.** Ratios of Towers, Towers & Jones 2003 (their optimum series): coarse r_c = 1 − 1/n, middle r_m = 1 − 1/n²,
-//! finest r_f = 1; the middle one may be missing. Each beat is unwrapped by the one before it as by a coarser level
-//! ([`UnwrapStep`]); D = Φ − Φ₀:
+//! **Equation.** Ratios of Towers, Towers & Jones 2003 (their optimum series): coarse r_c = 1 −
+//! 1/n, middle r_m = 1 − 1/n², finest r_f = 1; the middle one may be missing. Each beat is
+//! unwrapped by the one before it as by a coarser level ([`UnwrapStep`]); D = Φ − Φ₀:
 //!
 //! ```text
 //! q_i = φ_i − frac(r_i Φ₀)                        i = c, m, f
@@ -17,20 +19,21 @@
 //! D   = D_f − Σ p_i e_i,    p_i = N_i r_i / Σ N r²
 //! ```
 //!
-//! The last line is the mean of D_i = D_f − e_i / r_i with weights N_i r_i². It gives the orders that adding one level after the
-//! other to the mean gives, because they are the same. A **single** level has D = wrap(q_f) / r_f: it is right only within half
-//! a turn of the map.
+//! The last line is the mean of D_i = D_f − e_i / r_i with weights N_i r_i². It gives the orders
+//! that adding one level after the other to the mean gives, because they are the same. A **single**
+//! level has D = wrap(q_f) / r_f: it is right only within half a turn of the map.
 //!
-//! **Shapes and units.** Half a block of pixels; wrapped phases and residuals in words of 1/65536 turn, Φ₀ and Φ in double words
-//! of 1/65536 turn.
+//! **Shapes and units.** Half a block of pixels; wrapped phases and residuals in words of 1/65536
+//! turn, Φ₀ and Φ in double words of 1/65536 turn.
 //!
-//! **Departures.** The best weights are N_i r_i² B_i²; the modulations B_i are left out, which saves a quotient and a root per
-//! pixel, a fifth of the time. Dense levels have nearly the same modulation: at a pitch of 8 pixels a blur of 1 pixel (σ) leaves
-//! 0.81 at r = 5/6 and 0.73 at r = 1, so σ_Φ is 0.3 % above its least
-//! (`weights_without_modulations_lose_next_to_nothing`).
+//! **Departures.** The best weights are N_i r_i² B_i²; the modulations B_i are left out, which
+//! saves a quotient and a root per pixel, a fifth of the time. Dense levels have nearly the same
+//! modulation: at a pitch of 8 pixels a blur of 1 pixel (σ) leaves 0.81 at r = 5/6 and 0.73 at r =
+//! 1, so σ_Φ is 0.3 % above its least (`weights_without_modulations_lose_next_to_nothing`).
 //!
 //! **Accuracy.** Every form against the textbook in f64, and no wrong fringe order:
-//! `any_shifts_depth_ratios_size_and_stride_decode_as_the_textbook_says`, `no_fringe_order_slips_at_any_wrap_about_a_map`.
+//! `any_shifts_depth_ratios_size_and_stride_decode_as_the_textbook_says`,
+//! `no_fringe_order_slips_at_any_wrap_about_a_map`.
 
 use super::level::Demodulated;
 use super::unwrap_step::{Absolute, Turns, UnwrapStep, UnwrapStepLanes, q15, word};
@@ -57,8 +60,8 @@ struct Dense {
     fast: UnwrapStep,
     /// r_m = 1 − 1/n², and the step from the slow beat to the fast one.
     middle: Option<(FixedRatio, UnwrapStep)>,
-    /// p_c and p_m (0 without a middle level). With a middle level p_c includes p_m · `mean_gain`, because the kernel takes e_m
-    /// about the mean of finest and coarse level.
+    /// p_c and p_m (0 without a middle level). With a middle level p_c includes p_m · `mean_gain`,
+    /// because the kernel takes e_m about the mean of finest and coarse level.
     weights: [f64; 2],
     /// By how much e_m is smaller about that mean than about the finest level, as a share of e_c.
     mean_gain: f64,
@@ -252,7 +255,8 @@ impl<V: Lanes> AboutLanes<V> {
         })
     }
 
-    /// Unwraps half a block (`half` 0 or 1) about Φ₀, given as double words (`known`) and as orders and fractions (`map`).
+    /// Unwraps half a block (`half` 0 or 1) about Φ₀, given as double words (`known`) and as orders
+    /// and fractions (`map`).
     #[inline(always)]
     pub fn unwrap(
         &self,
@@ -284,7 +288,8 @@ impl<V: Lanes> AboutLanes<V> {
         }
         Unwrapped {
             phase: [v.add32(known[0], delta[0]), v.add32(known[1], delta[1])],
-            // A single level has no residual: that the map is near enough is ensured where the map is made.
+            // A single level has no residual: that the map is near enough is ensured where the map
+            // is made.
             residual: v.splat16(0),
         }
     }

@@ -1,7 +1,8 @@
 //! Wrapped phase and length of a folded pointer, by multiplications of words.
 //!
-//! **Idea.** After folding ([`super::fold`]) the pointer (C, S) lies in the first octant, so its angle is the arctangent of
-//! t = short / long, 0 ≤ t ≤ 1. Both the quotient and the arctangent are polynomials.
+//! **Idea.** After folding ([`super::fold`]) the pointer (C, S) lies in the first octant, so its
+//! angle is the arctangent of t = short / long, 0 ≤ t ≤ 1. Both the quotient and the arctangent are
+//! polynomials.
 //!
 //! **Equation**, fine quality:
 //!
@@ -13,17 +14,20 @@
 //! √(S² + C²) = long · √(1 + t²)                   a polynomial of degree 2 in t²
 //! ```
 //!
-//! Rough quality, for levels that only give the fringe order of the next: R is a cubic, there is no Newton step, a is of degree 3.
+//! Rough quality, for levels that only give the fringe order of the next: R is a cubic, there is no
+//! Newton step, a is of degree 3.
 //!
-//! **Shapes and units.** Half a block. `long` is Q15 in ½…1, `short` the same scale; t in Q15; angles in 1/65536 turn, inside
-//! the fine arctangent in 1/131072 turn so that its roundings stay below the last bit.
+//! **Shapes and units.** Half a block. `long` is Q15 in ½…1, `short` the same scale; t in Q15;
+//! angles in 1/65536 turn, inside the fine arctangent in 1/131072 turn so that its roundings stay
+//! below the last bit.
 //!
-//! **Departures** from `atan2`: no table, no division and no hardware estimate of a reciprocal, which would differ from machine
-//! to machine. The coefficients are minimax; their last digits come from a search over all pairs of 8-bit differences.
+//! **Departures** from `atan2`: no table, no division and no hardware estimate of a reciprocal,
+//! which would differ from machine to machine. The coefficients are minimax; their last digits come
+//! from a search over all pairs of 8-bit differences.
 //!
-//! **Accuracy.** Over all pairs of 8-bit differences of a trusted pixel the fine angle is off by at most 2.24e-5 turn, RMS 6.2e-6
-//! (`every_pair_of_8_bit_differences_is_within_the_bound`), the rough one by at most 3.2e-4
-//! (`every_rough_angle_is_within_the_bound`).
+//! **Accuracy.** Over all pairs of 8-bit differences of a trusted pixel the fine angle is off by at
+//! most 2.24e-5 turn, RMS 6.2e-6 (`every_pair_of_8_bit_differences_is_within_the_bound`), the rough
+//! one by at most 3.2e-4 (`every_rough_angle_is_within_the_bound`).
 
 use super::fold::Folded;
 use crate::simd::Lanes;
@@ -83,8 +87,9 @@ impl<V: Lanes> AngleLanes<V> {
     }
 }
 
-/// Constants in all lanes, for each half. With few registers they stay in memory; copies of their own let each instruction read its
-/// operand from there, where a copy for both would be loaded to a register first.
+/// Constants in all lanes, for each half. With few registers they stay in memory; copies of their
+/// own let each instruction read its operand from there, where a copy for both would be loaded to a
+/// register first.
 #[inline(always)]
 fn halves<V: Lanes, const N: usize>(v: V, constants: [i16; N]) -> [[V::W; N]; 2] {
     let low = splat(v, constants);
@@ -98,7 +103,8 @@ fn halves<V: Lanes, const N: usize>(v: V, constants: [i16; N]) -> [[V::W; N]; 2]
 
 #[inline(always)]
 fn splat<V: Lanes, const N: usize>(v: V, constants: [i16; N]) -> [V::W; N] {
-    // Hidden from the compiler, which otherwise builds each constant anew at every use instead of loading it.
+    // Hidden from the compiler, which otherwise builds each constant anew at every use instead of
+    // loading it.
     let constants = black_box(constants);
     let mut lanes = [v.splat16(0); N];
     let mut at = 0;

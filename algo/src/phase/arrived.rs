@@ -1,8 +1,9 @@
 //! What is kept of levels that were decoded on arrival, while the next level was being exposed.
 //!
-//! Geometric levels update one set of maps in place: the phase that the levels so far predict for the next one. Levels about a
-//! known map are combined after the last one, so wrapped phase and flags of each are kept. Rows are at least one block wide, so
-//! that frames narrower than a block need no copies of them.
+//! Geometric levels update one set of maps in place: the phase that the levels so far predict for
+//! the next one. Levels about a known map are combined after the last one, so wrapped phase and
+//! flags of each are kept. Rows are at least one block wide, so that frames narrower than a block
+//! need no copies of them.
 
 use super::level::Demodulated;
 use super::narrow::MAX_PIXELS;
@@ -49,8 +50,8 @@ pub(crate) enum ArrivedRow<W, B> {
     },
 }
 
-/// The phase expected at the next level ([`super::unwrap_step::ExpectedPhase`]) along a row, with maps of words `W` and of
-/// bytes `B`: owned or borrowed.
+/// The phase expected at the next level ([`super::unwrap_step::ExpectedPhase`]) along a row, with
+/// maps of words `W` and of bytes `B`: owned or borrowed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Expected<W, B> {
     /// Modulo one turn, 1/65536 turn.
@@ -66,7 +67,8 @@ pub(crate) type ExpectedRow<'a> = Expected<&'a [u16], &'a [u8]>;
 /// A row of [`Expected`], to be written.
 pub(crate) type ExpectedRowMut<'a> = Expected<&'a mut [u16], &'a mut [u8]>;
 
-/// No reason so far to reject a pixel. Larger than every reason, so that the smaller of two numbers is the first reason.
+/// No reason so far to reject a pixel. Larger than every reason, so that the smaller of two numbers
+/// is the first reason.
 pub(super) const NO_REASON: u8 = u8::MAX;
 
 /// A demodulated level along a row, with maps of words `W` and of bytes `B`: owned or borrowed.
@@ -259,8 +261,8 @@ impl WrappedRow<'_> {
 }
 
 impl WrappedRowMut<'_> {
-    /// Of several levels of `pixels` each: the coarsest, if it has arrived before, and level `at` to be written. `None` if there
-    /// is no room for it, which there is not for the finest.
+    /// Of several levels of `pixels` each: the coarsest, if it has arrived before, and level `at`
+    /// to be written. `None` if there is no room for it, which there is not for the finest.
     pub fn level(
         &mut self,
         at: usize,

@@ -1,4 +1,5 @@
-//! The decoder of a sequence: its plan, the predicted noise, and the check that frames fit it. `rows.rs` decodes.
+//! The decoder of a sequence: its plan, the predicted noise, and the check that frames fit it.
+//! `rows.rs` decodes.
 
 use super::arrived::Arrived;
 use super::level::Level;
@@ -168,7 +169,8 @@ impl Decoder {
         self.unwrapping
     }
 
-    /// Whether the sequence is the fringe and its complement ([`Sequence::pair`]): [`Self::row`] has no phase of it.
+    /// Whether the sequence is the fringe and its complement ([`Sequence::pair`]): [`Self::row`]
+    /// has no phase of it.
     pub fn is_pair(&self) -> bool {
         self.frame_count == 2
     }
@@ -183,8 +185,8 @@ impl Decoder {
         ((1_u32 << self.bit_depth) - 1) as u16
     }
 
-    /// σ_Φ of a resolved pixel in turns: σ_I / 2π · √(2 / Σ N_i r_i² B²). B is the finest level's, the smallest of all, so that σ
-    /// is not too small.
+    /// σ_Φ of a resolved pixel in turns: σ_I / 2π · √(2 / Σ N_i r_i² B²). B is the finest level's,
+    /// the smallest of all, so that σ is not too small.
     ///
     /// `noise` is σ_I, the noise of one sample.
     pub fn phase_noise(&self, modulation: Modulation, noise: SampleNoise) -> f64 {
@@ -240,7 +242,8 @@ impl Decoder {
         Ok(())
     }
 
-    /// Checks that `frames` fit the next level after those that have arrived: count, size, sample type.
+    /// Checks that `frames` fit the next level after those that have arrived: count, size, sample
+    /// type.
     ///
     /// # Errors
     /// Naming what does not fit.
@@ -285,7 +288,8 @@ impl Decoder {
         self.check_arrival(frames, arrived)
     }
 
-    /// For each level, coarse to fine: the places of its frames in the sequence, in the order of their shifts.
+    /// For each level, coarse to fine: the places of its frames in the sequence, in the order of
+    /// their shifts.
     pub fn levels(&self) -> impl ExactSizeIterator<Item = &[usize]> {
         self.levels.iter().map(|level| &level.frames[..])
     }

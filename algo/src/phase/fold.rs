@@ -1,25 +1,29 @@
-//! The samples of a level at a block of pixels → the pointer (C, S) of its fringes, folded into the first octant.
+//! The samples of a level at a block of pixels → the pointer (C, S) of its fringes, folded into the
+//! first octant.
 //!
-//! **Idea.** N shifted samples of a fringe are projected on cosine and sine of their shifts. Offset A drops out; what remains is
-//! a pointer whose angle is the phase and whose length is proportional to the modulation. Signs and swap of its components are
-//! taken out ("folded"), so that [`super::angle`] needs an arctangent of 0…1 only.
+//! **Idea.** N shifted samples of a fringe are projected on cosine and sine of their shifts. Offset
+//! A drops out; what remains is a pointer whose angle is the phase and whose length is proportional
+//! to the modulation. Signs and swap of its components are taken out ("folded"), so that
+//! [`super::angle`] needs an arctangent of 0…1 only.
 //!
-//! **Equation.** I_k = A + B sin 2π(φ + s_k) (Peng & Gupta 2008, eq. 1 with a shift); N equally spaced shifts (Bruning et al.
-//! 1974):
+//! **Equation.** I_k = A + B sin 2π(φ + s_k) (Peng & Gupta 2008, eq. 1 with a shift); N equally
+//! spaced shifts (Bruning et al. 1974):
 //!
 //! ```text
 //! S = Σ I_k cos 2πs_k      C = Σ I_k sin 2πs_k      φ = atan2(S, C) / 2π      B = (2/N) √(S² + C²)
 //! ```
 //!
-//! Four shifts of 8 bits are folded in bytes, exactly, all others in words from S and C of [`super::terms`]. Where little modulation is
-//! trusted, pointers in words may be too short to be normalised at once: they are lifted by two bits in blocks that have such pixels.
+//! Four shifts of 8 bits are folded in bytes, exactly, all others in words from S and C of
+//! [`super::terms`]. Where little modulation is trusted, pointers in words may be too short to be
+//! normalised at once: they are lifted by two bits in blocks that have such pixels.
 //!
-//! **Shapes and units.** Samples in counts of the bit depth, one block of each of the N rows; components in words, scaled by a
-//! power of two so that the longer one uses 15 bits.
+//! **Shapes and units.** Samples in counts of the bit depth, one block of each of the N rows;
+//! components in words, scaled by a power of two so that the longer one uses 15 bits.
 //!
-//! **Accuracy.** Folding rounds nothing. The threshold of modulation is decided from S² + C² in words; at 8 bits that is exact
-//! for N = 3, 4 and 6 (`the_modulation_threshold_is_sixteen_counts_exactly`), else within 3/4 of a unit of the words, 2.5e-4 of
-//! 16 counts and 1.5e-3 of 4.
+//! **Accuracy.** Folding rounds nothing. The threshold of modulation is decided from S² + C² in
+//! words; at 8 bits that is exact for N = 3, 4 and 6
+//! (`the_modulation_threshold_is_sixteen_counts_exactly`), else within 3/4 of a unit of the words,
+//! 2.5e-4 of 16 counts and 1.5e-3 of 4.
 
 use super::level::{FAINT, LevelLanes};
 use super::terms::Pointers;
@@ -27,7 +31,8 @@ use crate::simd::Lanes;
 
 /// The pointers of a block, folded into the first octant, and how to unfold their angles.
 pub(super) struct Folded<V: Lanes> {
-    /// The longer component, scaled by a power of two to 2¹⁴…2¹⁵ (below that only where the modulation is too small).
+    /// The longer component, scaled by a power of two to 2¹⁴…2¹⁵ (below that only where the
+    /// modulation is too small).
     pub long: [V::W; 2],
     /// The shorter component, with the same factor.
     pub short: [V::W; 2],
@@ -39,7 +44,8 @@ pub(super) struct Folded<V: Lanes> {
     pub sign: [V::W; 2],
     /// The axis that the angle is measured from, 1/65536 turn.
     pub axis: [V::W; 2],
-    /// In words, where that takes fewer operations: the angle is this less the octant's (0 or a quarter of a turn, 1/65536 turn).
+    /// In words, where that takes fewer operations: the angle is this less the octant's (0 or a
+    /// quarter of a turn, 1/65536 turn).
     pub base: Option<[V::W; 2]>,
     /// Mask: the modulation is at least the trusted minimum.
     pub strong: V::B,
@@ -61,11 +67,13 @@ impl<V: Lanes> Folded<V> {
     }
 }
 
-/// Tells the compiler that a branch is seldom taken: then registers are saved there and not before it.
+/// Tells the compiler that a branch is seldom taken: then registers are saved there and not before
+/// it.
 #[cold]
 fn seldom() {}
 
-/// Folds a block of four shifts of 8 bits, S = I₀ − I₂ and C = I₁ − I₃, in bytes with the signs apart.
+/// Folds a block of four shifts of 8 bits, S = I₀ − I₂ and C = I₁ − I₃, in bytes with the signs
+/// apart.
 #[inline(always)]
 pub(super) fn fold_four<V: Lanes>(
     v: V,
@@ -75,7 +83,8 @@ pub(super) fn fold_four<V: Lanes>(
     let (even, odd) = (v.max8(i0, i2), v.max8(i1, i3));
     let s = v.sub8(even, v.min8(i0, i2));
     let c = v.sub8(odd, v.min8(i1, i3));
-    // The signs of S and C. Where one is 0 its sign is of no consequence: the angle is the same from either side.
+    // The signs of S and C. Where one is 0 its sign is of no consequence: the angle is the same
+    // from either side.
     let (s_down, c_down) = (v.eq8(even, i2), v.eq8(odd, i3));
     let (long, short) = (v.max8(s, c), v.min8(s, c));
     let steep = v.eq8(long, s);
@@ -98,10 +107,12 @@ pub(super) fn fold_four<V: Lanes>(
     }
 }
 
-/// Mask: the sum of both squares is at least the level's least power; and whether it is set nowhere.
+/// Mask: the sum of both squares is at least the level's least power; and whether it is set
+/// nowhere.
 #[inline(always)]
 fn strong_four<V: Lanes>(v: V, level: &LevelLanes<'_, V>, long: V::B, short: V::B) -> (V::B, bool) {
-    // On most of a part the longer component is enough by itself, and in the background no shorter one makes up for it.
+    // On most of a part the longer component is enough by itself, and in the background no shorter
+    // one makes up for it.
     if v.all_at_least(long, level.four.long_enough) {
         return (v.splat8(u8::MAX), false);
     }
@@ -182,8 +193,8 @@ fn lifted<V: Lanes>(v: V, level: &LevelLanes<'_, V>, mut long: V::W, mut short: 
     v.normalised(long, short)
 }
 
-/// Mask: the sum of both squares is at least the level's least power. Takes the magnitudes: of S and C the compiler for NEON would
-/// narrow one half twice.
+/// Mask: the sum of both squares is at least the level's least power. Takes the magnitudes: of S
+/// and C the compiler for NEON would narrow one half twice.
 #[inline(always)]
 fn strong_words<V: Lanes>(v: V, level: &LevelLanes<'_, V>, a: V::W, b: V::W) -> V::W {
     let power = v.dot(a, a, b, b);

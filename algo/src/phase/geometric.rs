@@ -1,8 +1,10 @@
-//! The plan of coarse-to-fine unwrapping: the turn of the coarsest level, the steps between levels, the scale of the result.
+//! The plan of coarse-to-fine unwrapping: the turn of the coarsest level, the steps between levels,
+//! the scale of the result.
 //!
-//! The coarsest level spans at most one turn of the pattern, so its wrapped phase is absolute once it is known where that turn
-//! begins. Each further level is one [`UnwrapStep`] (Huntley & Saldner 1993). Phases are counted from an origin per level near
-//! the middle of its range, so that orders take as few bits as possible.
+//! The coarsest level spans at most one turn of the pattern, so its wrapped phase is absolute once
+//! it is known where that turn begins. Each further level is one [`UnwrapStep`] (Huntley & Saldner
+//! 1993). Phases are counted from an origin per level near the middle of its range, so that orders
+//! take as few bits as possible.
 
 use super::unwrap_step::UnwrapStep;
 use crate::pattern::{Level, PhaseRange, SequenceError};
@@ -25,7 +27,8 @@ pub(super) struct Geometric {
 impl Geometric {
     pub fn new(levels: &[Level], range: PhaseRange) -> Result<Self, SequenceError> {
         let coarsest = levels[0].ratio;
-        // The part of a turn that the coarsest level does not use is margin for noise, half on each side.
+        // The part of a turn that the coarsest level does not use is margin for noise, half on each
+        // side.
         let margin = (1.0 - coarsest * range.span()).max(0.0) / 2.0;
         let middle = libm::rint((coarsest * range.min - margin + 0.5) * 65_536.0);
         // A level's phase lies within ± `reach` turns of its origin.
@@ -53,8 +56,9 @@ impl Geometric {
         })
     }
 
-    /// Adds the origin's fraction and divides by the finest level's ratio, for the few sequences that need it: a single level
-    /// (its origin lies between two orders), or a finest ratio other than 1.
+    /// Adds the origin's fraction and divides by the finest level's ratio, for the few sequences
+    /// that need it: a single level (its origin lies between two orders), or a finest ratio other
+    /// than 1.
     pub fn finish(&self, phases: &mut [i32]) {
         let part = self.origin & 0xFFFF;
         if part == 0 && self.scale.is_none() {

@@ -1,7 +1,9 @@
-//! The plan of a level's demodulation, and demodulation itself: samples → wrapped phase and modulation.
+//! The plan of a level's demodulation, and demodulation itself: samples → wrapped phase and
+//! modulation.
 //!
-//! [`super::terms`] has the equations of S and C, [`super::angle`] those of phase and length. This file chooses, per number of
-//! shifts and bit depth, how S and C are computed, their scaling, and the threshold in their unit.
+//! [`super::terms`] has the equations of S and C, [`super::angle`] those of phase and length. This
+//! file chooses, per number of shifts and bit depth, how S and C are computed, their scaling, and
+//! the threshold in their unit.
 //!
 //! Modulations come out as shares of full scale in units of full scale / 32767.5, that is half of a
 //! [`crate::units::Modulation`]; the stores double them.
@@ -15,18 +17,20 @@ use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
 /// Sines of at least this many shifts are trusted even with samples at full scale: the periodic
-/// error of a slight saturation falls from 3e-3 turn (4 shifts) to 7e-4 turn. The flat tops of other waveforms keep it at 3e-3 turn.
+/// error of a slight saturation falls from 3e-3 turn (4 shifts) to 7e-4 turn. The flat tops of
+/// other waveforms keep it at 3e-3 turn.
 pub const FULL_TRUST_SHIFTS: usize = 8;
 
-/// What rounding may take off √(S² + C²) at the threshold, in units of S and C, so that a modulation of exactly the minimum is
-/// trusted.
+/// What rounding may take off √(S² + C²) at the threshold, in units of S and C, so that a
+/// modulation of exactly the minimum is trusted.
 const TIE: f64 = 0.75;
 /// Where |S| and |C| are below this, [`Lanes::normalised`] needs them lifted first.
 pub(super) const FAINT: i16 = 1 << 10;
 /// Largest bit depth of the forms that subtract samples: four of them must fit a word.
 const WORD_FORM_BITS: u8 = 12;
-/// The largest S or C where its unit is chosen to fill a word, with room for roundings. With this one the rounded weights of N = 5,
-/// 7, 8 and 9 turn the pointer by at most 2.4e-7 turn; with others by up to 3e-6.
+/// The largest S or C where its unit is chosen to fill a word, with room for roundings. With this
+/// one the rounded weights of N = 5, 7, 8 and 9 turn the pointer by at most 2.4e-7 turn; with
+/// others by up to 3e-6.
 const LARGEST: f64 = 32_694.0;
 
 /// A level prepared for demodulation at one bit depth.
@@ -52,7 +56,8 @@ pub(crate) struct Level {
     per_count: f64,
     /// S² + C² must be above this.
     pub below_least_power: i32,
-    /// Where |S| or |C| is at least this, S² + C² is above `below_least_power`, and the pointer is not [`FAINT`].
+    /// Where |S| or |C| is at least this, S² + C² is above `below_least_power`, and the pointer is
+    /// not [`FAINT`].
     long_enough: i16,
     /// Whether a pixel whose pointer is [`FAINT`] can be trusted.
     pub faint: bool,
@@ -145,7 +150,8 @@ impl Level {
                 scale / f64::from(1_u32 << bit_depth)
             }
         };
-        // B = (2/N) · length · √(1 + t²) / unit, here as a share of full scale in half units of `Modulation`.
+        // B = (2/N) · length · √(1 + t²) / unit, here as a share of full scale in half units of
+        // `Modulation`.
         let mut factor = 2.0 / shifts as f64 / (unit * full_scale) * 32_767.5;
         let doubled = factor * core::f64::consts::SQRT_2 >= 0.999;
         if doubled {
@@ -185,7 +191,8 @@ impl Level {
         } else {
             enough
         };
-        // The words of four shifts of 8 bits are differences shifted left by 7 bits; other levels do not use this.
+        // The words of four shifts of 8 bits are differences shifted left by 7 bits; other levels
+        // do not use this.
         let below = (self.below_least_power >> (2 * lift_of(8, 4))).min(255 * 255 - 1);
         self.four = LeastOfFour {
             power: below as u16 + 1,
@@ -252,8 +259,9 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
         }
     }
 
-    /// Wrapped phase of a folded block, and modulation in units of full scale / 32767.5 (not meaningful where it is below the
-    /// trusted minimum). `doubled` is [`super::source::Frames::DOUBLED`]: whether the plan's `doubled` can be set at all.
+    /// Wrapped phase of a folded block, and modulation in units of full scale / 32767.5 (not
+    /// meaningful where it is below the trusted minimum). `doubled` is
+    /// [`super::source::Frames::DOUBLED`]: whether the plan's `doubled` can be set at all.
     #[inline(always)]
     pub fn fine(
         &self,
@@ -289,7 +297,8 @@ pub(super) const fn lift_of(bit_depth: u8, shifts: usize) -> u8 {
     16 - bit_depth - if shifts == 6 { 2 } else { 1 }
 }
 
-/// The largest S or C of samples from 0 to 1: half of the sum of the weights' magnitudes, because the weights add up to 0.
+/// The largest S or C of samples from 0 to 1: half of the sum of the weights' magnitudes, because
+/// the weights add up to 0.
 fn largest(shifts: usize, start: f64) -> f64 {
     let sum = |weight: fn(f64) -> f64| -> f64 {
         let weights = (0..shifts).map(|k| weight(TAU * (start + k as f64 / shifts as f64)));
@@ -319,8 +328,8 @@ fn weights_of_terms(shifts: usize, scale: f64) -> [[i32; 2]; 2] {
     })
 }
 
-/// The weights of a level's samples in S and C, multiplied by `scale`, two samples at a time. Those of S add up to 0, and so do
-/// those of C: the offset A drops out exactly.
+/// The weights of a level's samples in S and C, multiplied by `scale`, two samples at a time. Those
+/// of S add up to 0, and so do those of C: the offset A drops out exactly.
 fn weights_of_samples(level: &pattern::Level, scale: f64) -> Vec<[i32; 2]> {
     let shifts = level.shifts();
     let angle = |k: usize| TAU * (level.start + k as f64 / shifts as f64);

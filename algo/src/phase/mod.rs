@@ -1,8 +1,9 @@
 //! From the samples of a pixel to its absolute phase, its modulation and whether to trust it.
 //!
-//! `terms`, `fold`, `angle` and `level` demodulate a level: samples → wrapped phase and modulation. `unwrap_step` is one step of temporal
-//! unwrapping; `geometric` and `about` plan its two forms. `kernel` joins them for rows of pixels; `decode` and `rows` are the
-//! entry. `arrived` keeps what levels that are decoded on arrival leave for the next.
+//! `terms`, `fold`, `angle` and `level` demodulate a level: samples → wrapped phase and modulation.
+//! `unwrap_step` is one step of temporal unwrapping; `geometric` and `about` plan its two forms.
+//! `kernel` joins them for rows of pixels; `decode` and `rows` are the entry. `arrived` keeps what
+//! levels that are decoded on arrival leave for the next.
 
 mod about;
 mod angle;

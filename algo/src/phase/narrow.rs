@@ -1,4 +1,5 @@
-//! Decoding fewer columns than a block: a block of the row around them, or a padded copy of rows that are narrower than a block.
+//! Decoding fewer columns than a block: a block of the row around them, or a padded copy of rows
+//! that are narrower than a block.
 
 use super::PhaseRow;
 use super::samples::BlockSample;

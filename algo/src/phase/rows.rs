@@ -1,7 +1,7 @@
 //! Decoding row by row: all levels at once, or each on arrival.
 //!
-//! Chooses the sample type, gathers the rows of the frames, widens columns that are fewer than a block, and calls the kernel of
-//! the sequence's form.
+//! Chooses the sample type, gathers the rows of the frames, widens columns that are fewer than a
+//! block, and calls the kernel of the sequence's form.
 
 use super::arrived::{Arrived, ArrivedRow, WrappedRow};
 use super::kernel::{about, geometric, on_arrival};
@@ -25,9 +25,11 @@ impl Decoder {
         }
     }
 
-    /// Decodes `columns` of row `v` of frames that [`Self::check`] has passed, into the same columns of `out`.
+    /// Decodes `columns` of row `v` of frames that [`Self::check`] has passed, into the same
+    /// columns of `out`.
     ///
-    /// `map` is the row of the known map for dense and single-level sequences; other sequences do not read it.
+    /// `map` is the row of the known map for dense and single-level sequences; other sequences do
+    /// not read it.
     pub fn row(
         &self,
         frames: &[FrameView<'_>],
@@ -43,8 +45,8 @@ impl Decoder {
         }
     }
 
-    /// Decodes row `v` of level `level`, whose frames [`Self::check_arrival`] has passed. Blocks that the coarsest level found
-    /// dark are skipped.
+    /// Decodes row `v` of level `level`, whose frames [`Self::check_arrival`] has passed. Blocks
+    /// that the coarsest level found dark are skipped.
     pub(crate) fn arrive_row(
         &self,
         level: usize,
@@ -59,7 +61,8 @@ impl Decoder {
         }
     }
 
-    /// As [`Self::row`], from the levels that have arrived, which are all but the finest, and the frames of the finest.
+    /// As [`Self::row`], from the levels that have arrived, which are all but the finest, and the
+    /// frames of the finest.
     pub fn last_row(
         &self,
         arrived: &Arrived,
@@ -192,7 +195,8 @@ impl Decoder {
         few.copy_to(out, columns, near.start);
     }
 
-    /// Decodes from the rows of the finest level's frames and what has arrived from column `start` on.
+    /// Decodes from the rows of the finest level's frames and what has arrived from column `start`
+    /// on.
     fn last<T: RowSample>(
         &self,
         rows: &[&[T]],
@@ -225,7 +229,8 @@ impl Decoder {
                 let before: heapless::Vec<WrappedRow<'_>, MAX_LEVELS> = before.collect();
                 about::finest_row(backend, plan, levels, &before, rows, map, columns, out);
             }
-            // A decoder has levels, and `Decoder::arrived` makes the layout that fits the unwrapper.
+            // A decoder has levels, and `Decoder::arrived` makes the layout that fits the
+            // unwrapper.
             _ => {}
         }
     }

@@ -1,4 +1,5 @@
-//! The sample types of frames, and what the kernels need of a block of samples: bytes of 8 bits, words of 9 to 16.
+//! The sample types of frames, and what the kernels need of a block of samples: bytes of 8 bits,
+//! words of 9 to 16.
 
 use super::level::{LevelLanes, lift_of};
 use crate::frame::Sample;
@@ -13,7 +14,8 @@ pub(crate) trait BlockSample: Sample {
     fn bytes<'r, 'a, const N: usize>(rows: &'r [&'a [Self]; N]) -> Option<&'r [&'a [u8]; N]>;
     /// The block of `row` that starts at `at`.
     fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> Self::Block<V>;
-    /// The bits of the depth: samples above full scale, which levels of many shifts tolerate, must not overflow sums.
+    /// The bits of the depth: samples above full scale, which levels of many shifts tolerate, must
+    /// not overflow sums.
     fn of_depth<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>)
     -> Self::Block<V>;
     /// As words, moved up to 16 bits and counted from the middle of their range.
@@ -24,7 +26,8 @@ pub(crate) trait BlockSample: Sample {
     fn sum<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
     /// a − b, of at most 15 bits.
     fn difference<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
-    /// Bits by which differences of N = 3, 4 or 6 samples are shifted left to fill words, less one, and as they are.
+    /// Bits by which differences of N = 3, 4 or 6 samples are shifted left to fill words, less one,
+    /// and as they are.
     fn lift<V: Lanes, const N: usize>(v: V, level: &LevelLanes<'_, V>) -> [V::Count; 2];
     /// The brighter of two.
     fn brighter<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> Self::Block<V>;

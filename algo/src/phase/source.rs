@@ -1,7 +1,9 @@
-//! Where a level's blocks come from: the rows of its frames, or maps if it was demodulated on arrival.
+//! Where a level's blocks come from: the rows of its frames, or maps if it was demodulated on
+//! arrival.
 //!
-//! Kernels are generic over this, so that decoding all levels at once and decoding on arrival share one body. Four rows of bytes
-//! are a form of their own, the fastest; [`Rows`] takes any number of shifts of any sample type.
+//! Kernels are generic over this, so that decoding all levels at once and decoding on arrival share
+//! one body. Four rows of bytes are a form of their own, the fastest; [`Rows`] takes any number of
+//! shifts of any sample type.
 
 use super::angle::AngleLanes;
 use super::arrived::WrappedRow;
@@ -14,8 +16,9 @@ use core::sync::atomic::{Ordering, compiler_fence};
 
 /// The rows of a level's frames, in the order of their shifts.
 pub(crate) trait Frames: Copy {
-    /// Whether the modulation may come out halved ([`LevelLanes::fine`]): never with bytes in the forms of [`super::terms`], where
-    /// the pointer is 1.49 times as long as the modulation or longer.
+    /// Whether the modulation may come out halved ([`LevelLanes::fine`]): never with bytes in the
+    /// forms of [`super::terms`], where the pointer is 1.49 times as long as the modulation or
+    /// longer.
     const DOUBLED: bool;
     /// Whether [`Self::fold_in_line`] keeps anything.
     const LINES: bool;
@@ -31,9 +34,10 @@ pub(crate) trait Frames: Copy {
     /// The block at `at`, folded; samples `after` behind it are prefetched.
     fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize, after: usize)
     -> Folded<V>;
-    /// As [`Self::fold`], for the blocks of a cache line in their order. The first loads all of each row's line before the next row's,
-    /// and keeps the others: frames that begin at pages have equal pixels in the same set of the cache, which holds fewer lines
-    /// than there are frames. The line of the sample `ahead` is prefetched. With [`Place::Other`] nothing is read.
+    /// As [`Self::fold`], for the blocks of a cache line in their order. The first loads all of
+    /// each row's line before the next row's, and keeps the others: frames that begin at pages have
+    /// equal pixels in the same set of the cache, which holds fewer lines than there are frames.
+    /// The line of the sample `ahead` is prefetched. With [`Place::Other`] nothing is read.
     fn fold_in_line<V: Lanes>(
         &self,
         v: V,
@@ -111,8 +115,8 @@ impl<const N: usize> Frames for [&[u8]; N] {
             Place::Other(block) => blocks = kept[block - 1],
             Place::First => {
                 while k < N {
-                    // Two rows at once where there are registers for it: their blocks are neighbours in what is kept, and are stored
-                    // in pairs.
+                    // Two rows at once where there are registers for it: their blocks are
+                    // neighbours in what is kept, and are stored in pairs.
                     let pair = if V::FEW_REGISTERS {
                         k
                     } else {

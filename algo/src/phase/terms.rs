@@ -1,7 +1,9 @@
-//! The samples of a block → S and C, for each number of shifts from 3 to 9, and by weights for any other.
+//! The samples of a block → S and C, for each number of shifts from 3 to 9, and by weights for any
+//! other.
 //!
-//! **Idea.** Shifts half a turn apart have weights of opposite sign, shifts k and N − k have mirrored ones. So S and C are sums of a
-//! few differences of samples, of half as many products or fewer, and the offset A drops out of every difference exactly.
+//! **Idea.** Shifts half a turn apart have weights of opposite sign, shifts k and N − k have
+//! mirrored ones. So S and C are sums of a few differences of samples, of half as many products or
+//! fewer, and the offset A drops out of every difference exactly.
 //!
 //! **Equation.** S = Σ I_k cos 2πk/N and C = Σ I_k sin 2πk/N ([`super::fold`]) become
 //!
@@ -18,14 +20,17 @@
 //! | 3, 6 | 1, 1; 2, 1 | words: S exact, C = (√3/2) · difference with one rounding |
 //! | 5, 8, 7, 9 | 2, 2; 2, 2; 3, 3; 4, 4 | products in 32 bits, rounded to words once |
 //!
-//! Any other N, shifts that do not start on the grid of k/N, and samples of more than 12 bits (whose differences do not fit words)
-//! are summed with weights: S = Σ w_k (I_k − middle), C likewise, in 32 bits, rounded to words once. The weights of S add up to 0,
-//! and so do those of C. N = 4 of more than 12 bits is S = (I_0 − I_2)/4, rounded, from two means.
+//! Any other N, shifts that do not start on the grid of k/N, and samples of more than 12 bits
+//! (whose differences do not fit words) are summed with weights: S = Σ w_k (I_k − middle), C
+//! likewise, in 32 bits, rounded to words once. The weights of S add up to 0, and so do those of C.
+//! N = 4 of more than 12 bits is S = (I_0 − I_2)/4, rounded, from two means.
 //!
-//! **Shapes and units.** One block of each row. S and C are words of at most 32,700, in the unit that [`super::level`] chooses.
+//! **Shapes and units.** One block of each row. S and C are words of at most 32,700, in the unit
+//! that [`super::level`] chooses.
 //!
-//! **Accuracy.** S and C are within half a unit, and the rounded weights of N = 5, 7, 8 and 9 turn the pointer by less than 3e-7
-//! turn. Phase and modulation of every N at every depth: `every_number_of_shifts_is_within_the_bounds` and
+//! **Accuracy.** S and C are within half a unit, and the rounded weights of N = 5, 7, 8 and 9 turn
+//! the pointer by less than 3e-7 turn. Phase and modulation of every N at every depth:
+//! `every_number_of_shifts_is_within_the_bounds` and
 //! `any_number_of_steps_at_any_depth_agrees_with_the_definition`.
 
 use super::level::{FULL_TRUST_SHIFTS, LevelLanes, Samples};
@@ -146,7 +151,8 @@ fn four<V: Lanes, T: BlockSample>(
     let mut quarter = a;
     let mut half = 0;
     while half < 2 {
-        // The mean of unsigned a and 65535 − b is (a − b)/2 + 32768; the mean of that and 32768 has half of the difference.
+        // The mean of unsigned a and 65535 − b is (a − b)/2 + 32768; the mean of that and 32768 has
+        // half of the difference.
         let mean = v.mean(v.xor(a[half], middle), v.xor(b[half], v.splat16(i16::MAX)));
         quarter[half] = v.xor(v.mean(mean, middle), middle);
         half += 1;
@@ -250,7 +256,8 @@ fn weighted<V: Lanes, T: BlockSample>(
     let mut s = [[zero; 2]; 2];
     let mut c = [[zero; 2]; 2];
     let mut brightest = T::load(v, rows.row(0), at);
-    // Two rows at a time: one instruction multiplies and adds two pairs of words. The last weight of an odd N is 0.
+    // Two rows at a time: one instruction multiplies and adds two pairs of words. The last weight
+    // of an odd N is 0.
     for (pair, &[along, across]) in level.plan.weights.iter().enumerate() {
         let (first, second) = (
             rows.row(2 * pair),

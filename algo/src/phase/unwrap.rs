@@ -1,4 +1,5 @@
-//! What both ways of unwrapping share: the choice between them, the limit of residuals, and the information in a sequence.
+//! What both ways of unwrapping share: the choice between them, the limit of residuals, and the
+//! information in a sequence.
 
 use super::about::About;
 use super::geometric::Geometric;
@@ -35,9 +36,10 @@ impl Unwrapper {
     }
 }
 
-/// Σ N_i r_i² (b_i/b_f)² over the levels that carry the result's accuracy: of geometric levels only the finest, because the coarser
-/// ones only give fringe orders; of dense levels all, because they are averaged. b_i/b_f is the fundamental of a level's waveform
-/// over that of the finest level, whose modulation is known.
+/// Σ N_i r_i² (b_i/b_f)² over the levels that carry the result's accuracy: of geometric levels only
+/// the finest, because the coarser ones only give fringe orders; of dense levels all, because they
+/// are averaged. b_i/b_f is the fundamental of a level's waveform over that of the finest level,
+/// whose modulation is known.
 pub(super) fn information(unwrapping: Unwrapping, sequence: &Sequence) -> f64 {
     let levels = sequence.levels();
     let accurate = match unwrapping {

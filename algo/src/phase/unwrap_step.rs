@@ -1,7 +1,9 @@
-//! One step of temporal unwrapping: the absolute phase of a coarse level gives the fringe order of a finer one.
+//! One step of temporal unwrapping: the absolute phase of a coarse level gives the fringe order of
+//! a finer one.
 //!
-//! **Idea.** The coarse phase times the quotient of the two ratios predicts the fine phase. The fine level's wrapped phase is
-//! more accurate but lacks its whole turns; the prediction supplies them.
+//! **Idea.** The coarse phase times the quotient of the two ratios predicts the fine phase. The
+//! fine level's wrapped phase is more accurate but lacks its whole turns; the prediction supplies
+//! them.
 //!
 //! **Equation** (Huntley & Saldner 1993; Zuo et al. 2016), with n = r_fine / r_coarse:
 //!
@@ -12,16 +14,20 @@
 //! residual = |expected − Φ_fine|          a pixel with more than 0.40 turn is rejected
 //! ```
 //!
-//! **Shapes and units.** Half a block of pixels in 16-bit words; phases in 1/65536 turn, so that the wrap of the word is the
-//! wrap of the phase. An absolute phase takes two words, its fringe order and its fraction ([`Turns`]).
+//! **Shapes and units.** Half a block of pixels in 16-bit words; phases in 1/65536 turn, so that
+//! the wrap of the word is the wrap of the phase. An absolute phase takes two words, its fringe
+//! order and its fraction ([`Turns`]).
 //!
-//! **Departure.** n · Φ does not fit a word, so it is computed twice ([`ExpectedPhase`]). Modulo one turn it is within 2/65536
-//! turn; that gives the residual. Its whole turns are needed only within ± 0.1 turn, because a residual above 0.40 is rejected
-//! anyway; they come from a fixed-point product with as many fractional bits as fit beside the largest number of turns.
-//! The coarse phase that it is taken of is in one word ([`Absolute`]): its whole turns and the leading bits of its fraction, with the
-//! fractional bits of the step before, whose order and fraction are then merged by a mask.
+//! **Departure.** n · Φ does not fit a word, so it is computed twice ([`ExpectedPhase`]). Modulo
+//! one turn it is within 2/65536 turn; that gives the residual. Its whole turns are needed only
+//! within ± 0.1 turn, because a residual above 0.40 is rejected anyway; they come from a
+//! fixed-point product with as many fractional bits as fit beside the largest number of turns. The
+//! coarse phase that it is taken of is in one word ([`Absolute`]): its whole turns and the leading
+//! bits of its fraction, with the fractional bits of the step before, whose order and fraction are
+//! then merged by a mask.
 //!
-//! **Accuracy.** No fringe order differs from the exact one: `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`,
+//! **Accuracy.** No fringe order differs from the exact one:
+//! `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`,
 //! `as_many_turns_as_documented_decode_in_every_fringe_and_more_are_refused`,
 //! `the_largest_step_between_levels_decodes_and_a_larger_one_is_refused`.
 
@@ -43,23 +49,25 @@ pub(super) struct UnwrapStep {
     bits: u8,
     /// Fractional bits of the coarse phase in one word.
     coarse_bits: u8,
-    /// By how much that word is shifted to the left before the product ([`UnwrapStepLanes::expected_of_any_step`]).
+    /// By how much that word is shifted to the left before the product
+    /// ([`UnwrapStepLanes::expected_of_any_step`]).
     coarse_left: u8,
     /// What the origins add to the product, and half a turn for rounding.
     offset: i16,
 }
 
-/// Fewest fractional bits of the product: with 4, truncation of the product and of the fine phase moves what is rounded to the
-/// fringe order by at most 1/16 turn each.
+/// Fewest fractional bits of the product: with 4, truncation of the product and of the fine phase
+/// moves what is rounded to the fringe order by at most 1/16 turn each.
 const LEAST_BITS: f64 = 4.0;
 
 /// An n this near to a whole number is taken as that number: over 1000 turns that is 1e-6 turn.
 const WHOLE: f64 = 1e-9;
 
 impl UnwrapStep {
-    /// A step from coarse phases within ± `reach` turns of their origin to n times as many; `behind` is n · that origin less
-    /// the origin of the fine phase, in turns. The coarse phases come from the step `before`, or are wrapped ones. `None` if a word
-    /// cannot hold the fine phases with enough precision.
+    /// A step from coarse phases within ± `reach` turns of their origin to n times as many;
+    /// `behind` is n · that origin less the origin of the fine phase, in turns. The coarse phases
+    /// come from the step `before`, or are wrapped ones. `None` if a word cannot hold the fine
+    /// phases with enough precision.
     pub fn new(n: f64, reach: f64, behind: f64, before: Option<&Self>) -> Option<Self> {
         // The quotient of two ratios has rounding errors even where n is whole.
         let next = libm::rint(n);
@@ -69,8 +77,8 @@ impl UnwrapStep {
             n
         };
         let coarse_bits = before.map_or(16, |step| step.bits);
-        // From the third step on the word may have room for more turns than there are; the first two, of which one pass consists, do
-        // without the shift.
+        // From the third step on the word may have room for more turns than there are; the first
+        // two, of which one pass consists, do without the shift.
         let order_bits = libm::ceil(libm::log2(2.0 * (reach + 0.5))) as u8;
         let coarse_left = match before {
             Some(step) if step.coarse_bits < 16 => (16 - coarse_bits).saturating_sub(order_bits),
@@ -210,7 +218,8 @@ impl<V: Lanes> UnwrapStepLanes<V> {
         }
     }
 
-    /// As [`Self::expected`], for any step of a sequence; the other functions are for its first two.
+    /// As [`Self::expected`], for any step of a sequence; the other functions are for its first
+    /// two.
     #[inline(always)]
     pub fn expected_of_any_step(&self, v: V, coarse: [Absolute<V>; 2]) -> [ExpectedPhase<V>; 2] {
         let [mut low, mut high] = coarse;
@@ -247,8 +256,9 @@ impl<V: Lanes> UnwrapStepLanes<V> {
         ]
     }
 
-    /// Unwraps `wrapped`, the fine level's phases, by coarse ones: the absolute phases, and the residuals' magnitudes (unsigned,
-    /// 1/65536 turn). The bits of [`Self::expected`] and [`Self::unwrap_expected`].
+    /// Unwraps `wrapped`, the fine level's phases, by coarse ones: the absolute phases, and the
+    /// residuals' magnitudes (unsigned, 1/65536 turn). The bits of [`Self::expected`] and
+    /// [`Self::unwrap_expected`].
     #[inline(always)]
     pub fn unwrap(
         &self,

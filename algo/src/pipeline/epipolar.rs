@@ -1,11 +1,14 @@
-//! Epipolar consistency: whether camera and projector still stand to each other as their models say, from the phases of any part.
+//! Epipolar consistency: whether camera and projector still stand to each other as their models
+//! say, from the phases of any part.
 //!
-//! What a camera pixel sees lies on its ray, and the projector sees this ray as a curve, the epipolar line of the pixel (R. Hartley,
-//! A. Zisserman, "Multiple View Geometry", 2003, ch. 9). ξ of vertical fringes says where on it the point is; η of horizontal fringes is
-//! not needed for the height, so it tests the models: the distance e of (ξ, η) from the line is noise where they are right. A head
-//! that was knocked leaves e = a + b·x + c·y over the frame, x and y from −1 to 1: a turn about the line of the centres leaves
-//! a = f·angle, one about an optical axis a gradient. A turn in the plane of both axes moves points along the lines and leaves next to
-//! nothing: it shows in the height of the reference plane only.
+//! What a camera pixel sees lies on its ray, and the projector sees this ray as a curve, the
+//! epipolar line of the pixel (R. Hartley, A. Zisserman, "Multiple View Geometry", 2003, ch. 9). ξ
+//! of vertical fringes says where on it the point is; η of horizontal fringes is not needed for the
+//! height, so it tests the models: the distance e of (ξ, η) from the line is noise where they are
+//! right. A head that was knocked leaves e = a + b·x + c·y over the frame, x and y from −1 to 1: a
+//! turn about the line of the centres leaves a = f·angle, one about an optical axis a gradient. A
+//! turn in the plane of both axes moves points along the lines and leaves next to nothing: it shows
+//! in the height of the reference plane only.
 
 use super::PhaseMap;
 use crate::geometry::{Pinhole, Vector};
@@ -13,7 +16,8 @@ use crate::math::solve::Normal;
 use crate::trust::Trust;
 use alloc::vec::Vec;
 
-/// Pixels more than this many times the RMS off the first fit are left out of the second: edges of the part, reflections.
+/// Pixels more than this many times the RMS off the first fit are left out of the second: edges of
+/// the part, reflections.
 const OUTLIER: f64 = 4.0;
 /// Fewer pixels say nothing about a head.
 const LEAST: usize = 500;
@@ -40,8 +44,8 @@ pub struct Epipolar {
 }
 
 impl Epipolar {
-    /// Compares the phases of vertical and horizontal fringes, of `pitch` projector pixels each, with the models. `None` if fewer than
-    /// 500 of the pixels looked at are resolved under both.
+    /// Compares the phases of vertical and horizontal fringes, of `pitch` projector pixels each,
+    /// with the models. `None` if fewer than 500 of the pixels looked at are resolved under both.
     pub fn of(
         (camera, projector): (&Pinhole, &Pinhole),
         [vertical, horizontal]: [&PhaseMap; 2],
@@ -147,7 +151,8 @@ mod tests {
     /// Half width of the uniform noise of ξ and η, projector pixels.
     const NOISE: f64 = 0.2;
 
-    /// A device that looks at the origin from `angle` rad towards +x, turned about its own x, y, z by small angles.
+    /// A device that looks at the origin from `angle` rad towards +x, turned about its own x, y, z
+    /// by small angles.
     fn device(size: (usize, usize), focal: f64, angle: f64, turn: [f64; 3]) -> Pinhole {
         let (sin, cos) = (libm::sin(angle), libm::cos(angle));
         let rows = [[cos, 0.0, -sin], [0.0, -1.0, 0.0], [-sin, 0.0, -cos]];
@@ -176,7 +181,8 @@ mod tests {
         )
     }
 
-    /// Phases of a curved part in front of a head; the first rows are not resolved, and a few pixels are wrong.
+    /// Phases of a curved part in front of a head; the first rows are not resolved, and a few
+    /// pixels are wrong.
     fn phases((camera, projector): &(Pinhole, Pinhole)) -> [PhaseMap; 2] {
         let mut random = SplitMix64::seed_from_u64(3);
         let mut noise = || NOISE * ((random.next_u64() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0);

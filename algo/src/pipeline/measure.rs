@@ -90,8 +90,8 @@ pub fn decode(
     ))
 }
 
-/// Decodes the frames of the next level on arrival, while those of finer levels are being exposed. Levels arrive from coarse to
-/// fine, frames are in the order of their shifts.
+/// Decodes the frames of the next level on arrival, while those of finer levels are being exposed.
+/// Levels arrive from coarse to fine, frames are in the order of their shifts.
 ///
 /// # Errors
 /// If the frames do not fit the level, or `arrived` was made for frames of another size.
@@ -111,10 +111,12 @@ pub fn arrive(
     Ok(())
 }
 
-/// As [`decode`], from the coarser levels that have gone through [`arrive`] and the frames of the finest.
+/// As [`decode`], from the coarser levels that have gone through [`arrive`] and the frames of the
+/// finest.
 ///
 /// # Errors
-/// If the frames do not fit the finest level, another level has not arrived, or the frames have another size.
+/// If the frames do not fit the finest level, another level has not arrived, or the frames have
+/// another size.
 pub fn decode_last(
     decoder: &Decoder,
     arrived: &Arrived,
@@ -128,7 +130,8 @@ pub fn decode_last(
     }))
 }
 
-/// A phase map of the size of `frame`: calls `decode` with each row, the known map's row and the columns inside the window.
+/// A phase map of the size of `frame`: calls `decode` with each row, the known map's row and the
+/// columns inside the window.
 fn each_row(
     frame: &FrameView<'_>,
     map: Option<&[AbsolutePhase]>,
@@ -146,8 +149,8 @@ fn each_row(
     phases
 }
 
-/// Triangulates every resolved pixel, and marks those without a height in the working range as [`Trust::OutOfRange`]. `noise` is that of
-/// one sample, for σ_z.
+/// Triangulates every resolved pixel, and marks those without a height in the working range as
+/// [`Trust::OutOfRange`]. `noise` is that of one sample, for σ_z.
 pub fn triangulate(
     triangulator: &Triangulator,
     decoder: &Decoder,
@@ -159,7 +162,8 @@ pub fn triangulate(
     })
 }
 
-/// As [`triangulate`], of phases whose σ in turns follows in another way from the modulation, or is not known.
+/// As [`triangulate`], of phases whose σ in turns follows in another way from the modulation, or is
+/// not known.
 pub fn triangulate_with(
     triangulator: &Triangulator,
     phases: &mut PhaseMap,

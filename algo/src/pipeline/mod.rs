@@ -1,4 +1,5 @@
-//! Whole frames: decoding, triangulation, heights about a known surface. Rows run serially or on a rayon pool, with the same bits.
+//! Whole frames: decoding, triangulation, heights about a known surface. Rows run serially or on a
+//! rayon pool, with the same bits.
 
 mod cubic;
 mod epipolar;

@@ -7,15 +7,17 @@ use crate::phase::Trust;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
-/// σ_I, the noise of one sample in counts; `None` if no level has redundancy or no pixel is resolved.
+/// σ_I, the noise of one sample in counts; `None` if no level has redundancy or no pixel is
+/// resolved.
 ///
 /// A level of N shifts has N − 3 degrees of freedom beside offset, modulation and phase:
 /// Σ I² − (ΣI)²/N − (2/N)(S² + C²) has the expectation (N − 3) σ_I²; for N = 4 it is
 /// (I₀ + I₂ − I₁ − I₃)²/4. Averaged over all resolved pixels and all such levels.
 ///
-/// A harmonic h of the projected waveform takes the place h mod N of the level's discrete Fourier transform, and N − h mod N. What
-/// optics leave of it is not known, so these places are left out as S and C are, each with its degree of freedom. The waveforms
-/// for 5, 7 and 9 shifts leave none, those for 6 and 8 shifts 2 and 3.
+/// A harmonic h of the projected waveform takes the place h mod N of the level's discrete Fourier
+/// transform, and N − h mod N. What optics leave of it is not known, so these places are left out
+/// as S and C are, each with its degree of freedom. The waveforms for 5, 7 and 9 shifts leave none,
+/// those for 6 and 8 shifts 2 and 3.
 pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) -> Option<f64> {
     let levels: Vec<Fit> = sequence.levels().iter().filter_map(Fit::new).collect();
     let width = frames.first()?.width();
@@ -37,9 +39,10 @@ pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trus
     (freedom > 0.0).then(|| libm::sqrt(squares / freedom))
 }
 
-/// The mean signal of a resolved pixel by its modulation, both of the finest level: offset in counts, and counts per count, neither below 0.
-/// It is the least-squares line, because not all light is modulated: light from elsewhere is not, nor what blur takes. Samples have
-/// `full_scale` counts at most.
+/// The mean signal of a resolved pixel by its modulation, both of the finest level: offset in
+/// counts, and counts per count, neither below 0. It is the least-squares line, because not all
+/// light is modulated: light from elsewhere is not, nor what blur takes. Samples have `full_scale`
+/// counts at most.
 pub fn signal_by_modulation(
     sequence: &Sequence,
     (frames, full_scale): (&[FrameView<'_>], u16),
@@ -92,12 +95,13 @@ fn count(row: &Samples<'_>, u: usize) -> u16 {
     }
 }
 
-/// What a level's samples are fitted by: offset, fundamental, and the places of the waveform's harmonics.
+/// What a level's samples are fitted by: offset, fundamental, and the places of the waveform's
+/// harmonics.
 struct Fit {
     /// Places of the frames in the sequence.
     frames: Vec<usize>,
-    /// For each place of the transform that is fitted, its share of the sum of squares (2/N, or 1/N at N/2), and cosine and sine for
-    /// each frame.
+    /// For each place of the transform that is fitted, its share of the sum of squares (2/N, or 1/N
+    /// at N/2), and cosine and sine for each frame.
     places: Vec<(f64, Vec<(f64, f64)>)>,
     /// Degrees of freedom that are left.
     freedom: usize,
@@ -161,7 +165,8 @@ mod tests {
     use crate::pattern::{Shot, Waveform};
     use crate::units::Modulation;
 
-    /// Frames of a scene with a side of so many pixels, from the sample of each pixel under each shot.
+    /// Frames of a scene with a side of so many pixels, from the sample of each pixel under each
+    /// shot.
     fn frames(
         side: usize,
         shots: &[Shot],
@@ -179,7 +184,8 @@ mod tests {
             .collect()
     }
 
-    /// σ of uniform noise of ±6 counts, from samples of a waveform with half of the harmonics' contrast.
+    /// σ of uniform noise of ±6 counts, from samples of a waveform with half of the harmonics'
+    /// contrast.
     #[test]
     fn harmonics_of_a_waveform_are_not_taken_for_noise() {
         const SIDE: usize = 128;
@@ -213,7 +219,8 @@ mod tests {
         }
     }
 
-    /// A part of several shades in light from elsewhere: frames of two levels, and what is found in them.
+    /// A part of several shades in light from elsewhere: frames of two levels, and what is found in
+    /// them.
     #[test]
     fn the_signal_follows_from_the_modulation_with_light_from_elsewhere() {
         const SIDE: usize = 64;

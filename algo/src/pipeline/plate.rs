@@ -1,8 +1,9 @@
 //! A reference phase map, measured on a flat plate in the plane z = 0.
 //!
-//! Φ_R^V and Φ_R^H (Peng & Gupta 2008, eqs. 10–11) give the projector point that lights each camera pixel's point of the plane:
-//! ξ = pitch · Φ_R^V, η = pitch · Φ_R^H. The measured phases are noisy, so what they are off those that the models predict is fitted by a
-//! polynomial of degree 6, which has a hundredth of their noise.
+//! Φ_R^V and Φ_R^H (Peng & Gupta 2008, eqs. 10–11) give the projector point that lights each camera
+//! pixel's point of the plane: ξ = pitch · Φ_R^V, η = pitch · Φ_R^H. The measured phases are noisy,
+//! so what they are off those that the models predict is fitted by a polynomial of degree 6, which
+//! has a hundredth of their noise.
 
 use super::PhaseMap;
 use crate::geometry::{FittedMap, ReferenceError, fit_map};
@@ -10,11 +11,13 @@ use crate::trust::Trust;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Pixels whose residual to the first fit is more than this many times its RMS (dust, scratches) are left out of the second.
+/// Pixels whose residual to the first fit is more than this many times its RMS (dust, scratches)
+/// are left out of the second.
 const OUTLIER: f64 = 4.0;
 /// Least share of the frame that the plate must fill: beyond the plate the fit extrapolates.
 const LEAST_FILLED: f64 = 0.6;
-/// Side of the squares over which residuals are averaged, so that noise averages out and the lack of fit remains, pixels.
+/// Side of the squares over which residuals are averaged, so that noise averages out and the lack
+/// of fit remains, pixels.
 const SQUARE: usize = 16;
 
 /// One reference phase map.
@@ -49,8 +52,8 @@ pub enum PlateError {
 }
 
 impl Plate {
-    /// Fits the phases of a plate; `predicted` are those of the models at a camera pixel, turns, or `None` where it does not look at
-    /// the plane.
+    /// Fits the phases of a plate; `predicted` are those of the models at a camera pixel, turns, or
+    /// `None` where it does not look at the plane.
     ///
     /// # Errors
     /// If too little of the frame is resolved, or the resolved pixels do not determine the fit.
@@ -93,7 +96,8 @@ impl Plate {
     }
 }
 
-/// Lack of fit, RMS: the mean square of the squares' mean residuals, less the contribution of noise.
+/// Lack of fit, RMS: the mean square of the squares' mean residuals, less the contribution of
+/// noise.
 fn lack_of_fit(fit: &FittedMap, samples: &[(f64, f64, f64)], width: usize, height: usize) -> f64 {
     let across = width.div_ceil(SQUARE);
     let mut squares = vec![(0.0, 0.0, 0.0); across * height.div_ceil(SQUARE)];
@@ -156,7 +160,8 @@ mod tests {
         for at in 50 * SIDE + 20..50 * SIDE + 60 {
             phases.phase[at] = AbsolutePhase::from_turns(0.0);
         }
-        // The models say nothing of the last column, and are off the plate by all that is not linear.
+        // The models say nothing of the last column, and are off the plate by all that is not
+        // linear.
         let predicted = |u: f64, v: f64| {
             let seen = u < (SIDE - 1) as f64;
             seen.then_some(3.0 + 0.1 * u + 0.02 * v)

@@ -6,11 +6,11 @@ use crate::pattern::{Level, PhaseRange, Sequence, Shot};
 use crate::phase::{DecodeError, Decoder, LeastModulation};
 use alloc::vec::Vec;
 
-/// Decodes one level of a sequence to its wrapped phase: `phase` is φ, 0 ≤ φ < 1 turn of that level, modulation and trust are the
-/// level's. `frames` are those of the whole sequence.
+/// Decodes one level of a sequence to its wrapped phase: `phase` is φ, 0 ≤ φ < 1 turn of that
+/// level, modulation and trust are the level's. `frames` are those of the whole sequence.
 ///
-/// A level of ratio 1 over a phase function of one turn is absolute by itself, so the production kernels decode it, with their
-/// accuracy ([`Decoder`]). Modulations are trusted from `least` on.
+/// A level of ratio 1 over a phase function of one turn is absolute by itself, so the production
+/// kernels decode it, with their accuracy ([`Decoder`]). Modulations are trusted from `least` on.
 ///
 /// # Errors
 /// If the frames do not fit the level, or `bit_depth` is not 8 to 16.
@@ -40,7 +40,8 @@ mod tests {
     use crate::phase::Trust;
     use std::vec::Vec;
 
-    /// The bound of the arctangent for 8-bit samples and their rounding (B = 100 counts): 2.4e-5 + √2 · 0.5 / (2π · 100) turn.
+    /// The bound of the arctangent for 8-bit samples and their rounding (B = 100 counts): 2.4e-5 +
+    /// √2 · 0.5 / (2π · 100) turn.
     const TOLERANCE: f64 = 1.2e-3;
 
     #[test]

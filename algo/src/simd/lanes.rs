@@ -1,12 +1,13 @@
 //! The operations that a back-end provides: a block of pixels as lanes of 8, 16 and 32 bits.
 //!
-//! A block is [`Lanes::PIXELS`] neighbouring pixels of a row: one vector of bytes, two of words (`[W; 2]`), four of
-//! double words. Each back-end may distribute the pixels over these halves in its own way: its loads and widening operations agree
-//! with its stores and narrowing operations, so kernels do not depend on it.
+//! A block is [`Lanes::PIXELS`] neighbouring pixels of a row: one vector of bytes, two of words
+//! (`[W; 2]`), four of double words. Each back-end may distribute the pixels over these halves in
+//! its own way: its loads and widening operations agree with its stores and narrowing operations,
+//! so kernels do not depend on it.
 //!
-//! Every operation has one result on every machine: it is integer, or IEEE 754 single precision with + − ×. Words are
-//! signed or unsigned as the operation says; overflow wraps around unless the name says otherwise. Loads and stores
-//! panic outside of their slice.
+//! Every operation has one result on every machine: it is integer, or IEEE 754 single precision
+//! with + − ×. Words are signed or unsigned as the operation says; overflow wraps around unless the
+//! name says otherwise. Loads and stores panic outside of their slice.
 
 use core::fmt::Debug;
 
@@ -26,17 +27,20 @@ pub(crate) struct Scaled<W> {
 
 /// A back-end. A value of it proves that its instructions are available on this machine.
 ///
-/// Operations with a body are composed of others; a back-end defines them itself only where it has a shorter way.
+/// Operations with a body are composed of others; a back-end defines them itself only where it has
+/// a shorter way.
 pub(crate) trait Lanes: Copy + Debug {
     /// Pixels of a block.
     const PIXELS: usize;
     /// Whether there are too few registers for the constants of a kernel.
     const FEW_REGISTERS: bool = true;
-    /// Whether [`Self::normalised`] needs components of at least 2¹⁰; else it takes shorter ones, too.
+    /// Whether [`Self::normalised`] needs components of at least 2¹⁰; else it takes shorter ones,
+    /// too.
     const LIFTS_FAINT: bool = true;
     /// How many samples ahead of their use rows are prefetched.
     const AHEAD: usize;
-    /// The same where the rows of several levels are read: a sample then takes longer, and fewer lines wait that displace one another.
+    /// The same where the rows of several levels are read: a sample then takes longer, and fewer
+    /// lines wait that displace one another.
     const AHEAD_OF_MANY: usize = Self::AHEAD / 2;
     /// A byte per pixel of a block.
     type B: Copy;
@@ -57,7 +61,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn splat8(self, x: u8) -> Self::B;
     /// The block of `from` that starts at `at`.
     fn load8(self, from: &[u8], at: usize) -> Self::B;
-    /// The blocks of the cache line of `from` that starts at `at`: of the four the first [`LINE`] / [`Self::PIXELS`].
+    /// The blocks of the cache line of `from` that starts at `at`: of the four the first [`LINE`] /
+    /// [`Self::PIXELS`].
     #[inline(always)]
     fn load_line(self, from: &[u8], at: usize) -> [Self::B; 4] {
         let mut blocks = [self.load8(from, at); 4];
@@ -68,9 +73,10 @@ pub(crate) trait Lanes: Copy + Debug {
         }
         blocks
     }
-    /// Prefetches what lies `after` samples behind the block at `at`. That is [`Self::AHEAD`] or [`Self::AHEAD_OF_MANY`] where whole
-    /// rows are read, because rows follow one another in memory; where only some columns of each row are read it is the length of a
-    /// row, so that the same columns of the next row are prefetched.
+    /// Prefetches what lies `after` samples behind the block at `at`. That is [`Self::AHEAD`] or
+    /// [`Self::AHEAD_OF_MANY`] where whole rows are read, because rows follow one another in
+    /// memory; where only some columns of each row are read it is the length of a row, so that the
+    /// same columns of the next row are prefetched.
     fn fetch<T>(self, row: &[T], at: usize, after: usize);
     /// Prefetches the cache line of sample `at`, which may lie behind the row.
     #[inline(always)]
@@ -100,8 +106,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn excess8(self, a: Self::B, b: Self::B) -> Self::B {
         self.sub8(self.max8(a, b), b)
     }
-    /// 128 where s is set, of pixels where the first mask is set, or c of others; and 64 more where the first mask is set. All are
-    /// masks.
+    /// 128 where s is set, of pixels where the first mask is set, or c of others; and 64 more where
+    /// the first mask is set. All are masks.
     #[inline(always)]
     fn quarters8(self, mask: Self::B, s: Self::B, c: Self::B) -> Self::B {
         let half = self.and8(self.pick8(mask, s, c), self.splat8(128));
@@ -142,7 +148,8 @@ pub(crate) trait Lanes: Copy + Debug {
         let [low, high] = self.widen(x, self.splat8(0));
         [self.shl::<7>(low), self.shl::<7>(high)]
     }
-    /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 4 or short > long.
+    /// Both as words times 128 · 2ⁿ, with n so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 4 or
+    /// short > long.
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W>;
     /// The bytes of words, two per pixel, in any order.
     fn bytes_of(self, x: Self::W) -> Self::B;
@@ -194,7 +201,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn halve(self, x: Self::W) -> Self::W;
     /// (a + b + 1) / 2 rounded down, unsigned.
     fn mean(self, a: Self::W, b: Self::W) -> Self::W;
-    /// Both times 2ⁿ, with n from 0 to 4 so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 2¹⁰ or short > long.
+    /// Both times 2ⁿ, with n from 0 to 4 so that 2¹⁴ ≤ long < 2¹⁵. Unspecified where long < 2¹⁰ or
+    /// short > long.
     fn normalised(self, long: Self::W, short: Self::W) -> [Self::W; 2];
     /// |x|, 32768 of −32768 as an unsigned word.
     fn abs(self, x: Self::W) -> Self::W;
@@ -240,9 +248,11 @@ pub(crate) trait Lanes: Copy + Debug {
     fn split(self, x: [Self::D; 2]) -> (Self::W, Self::W);
     /// a · b + c · d, signed.
     fn dot(self, a: Self::W, b: Self::W, c: Self::W, d: Self::W) -> [Self::D; 2];
-    /// a · b + c · d, signed, where each double word is b + 65536 · d: the same b and d for every pixel.
+    /// a · b + c · d, signed, where each double word is b + 65536 · d: the same b and d for every
+    /// pixel.
     fn dot_pair(self, a: Self::W, c: Self::W, bd: Self::D) -> [Self::D; 2];
-    /// x / 2ⁿ rounded to nearest, signed and kept inside a word; n below 31, and x + 2ⁿ⁻¹ must not overflow.
+    /// x / 2ⁿ rounded to nearest, signed and kept inside a word; n below 31, and x + 2ⁿ⁻¹ must not
+    /// overflow.
     fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W;
     /// The same for a fixed n from 1 to 16.
     #[inline(always)]
@@ -290,7 +300,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn mul_single(self, a: Self::F, b: Self::F) -> Self::F;
 }
 
-/// Defines the operations of a back-end that are one expression each, as `name(self, arguments) -> result = expression;`.
+/// Defines the operations of a back-end that are one expression each, as `name(self, arguments) ->
+/// result = expression;`.
 ///
 /// `$within` is the macro that the expression is wrapped in, `$inline` the argument of `#[inline]`.
 macro_rules! operations {

@@ -1,12 +1,15 @@
-//! Vector instructions behind one small trait, and the choice of the back-end that this machine has.
+//! Vector instructions behind one small trait, and the choice of the back-end that this machine
+//! has.
 //!
-//! The phase kernels are written in the operations of `Lanes`. `Portable` defines them as plain code; `Avx2`, `Ssse3` and
-//! `Neon` give the same results by vector instructions. A value of a back-end proves that its instructions are available, so its
-//! operations are safe to call. This is the only module with `unsafe`: intrinsics that the proof covers, and loads and
-//! stores inside slices whose length has been asserted.
+//! The phase kernels are written in the operations of `Lanes`. `Portable` defines them as plain
+//! code; `Avx2`, `Ssse3` and `Neon` give the same results by vector instructions. A value of a
+//! back-end proves that its instructions are available, so its operations are safe to call. This is
+//! the only module with `unsafe`: intrinsics that the proof covers, and loads and stores inside
+//! slices whose length has been asserted.
 //!
-//! Kernels are generic functions that are inlined into entry points compiled for the back-end's instructions (`back_end_entry!`).
-//! They contain no closures, because those would be compiled without these instructions.
+//! Kernels are generic functions that are inlined into entry points compiled for the back-end's
+//! instructions (`back_end_entry!`). They contain no closures, because those would be compiled
+//! without these instructions.
 #![allow(unsafe_code)]
 
 #[cfg(target_arch = "x86_64")]
@@ -36,7 +39,8 @@ pub(crate) use rows::Rows;
 #[cfg(target_arch = "x86_64")]
 pub(crate) use ssse3::Ssse3;
 
-/// A back-end of the phase kernels: the instructions that they are compiled for. All give the same bits.
+/// A back-end of the phase kernels: the instructions that they are compiled for. All give the same
+/// bits.
 #[derive(Clone, Copy, Debug)]
 pub struct Backend(pub(crate) Proof);
 
@@ -93,8 +97,9 @@ impl Backend {
     }
 }
 
-/// Makes the compiler align the stack of the function that this is inlined into to a line of the cache. It would not do so for vectors
-/// that it later finds no register for; where one of these lies across the border of two pages, a kernel takes twice as long.
+/// Makes the compiler align the stack of the function that this is inlined into to a line of the
+/// cache. It would not do so for vectors that it later finds no register for; where one of these
+/// lies across the border of two pages, a kernel takes twice as long.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub(crate) fn align_stack() {
@@ -104,8 +109,8 @@ pub(crate) fn align_stack() {
     core::hint::black_box(&line.0);
 }
 
-/// Defines `fn name(backend: Backend, arguments)`, which runs the generic `kernel(lanes, arguments)` compiled for that
-/// back-end's instructions.
+/// Defines `fn name(backend: Backend, arguments)`, which runs the generic `kernel(lanes,
+/// arguments)` compiled for that back-end's instructions.
 macro_rules! back_end_entry {
     ($(#[$doc:meta])* fn $name:ident [$($generics:tt)*] = $kernel:ident ( $($arg:ident : $type:ty),* $(,)? )) => {
         $(#[$doc])*

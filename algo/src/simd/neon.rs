@@ -14,13 +14,15 @@ const BYTES: usize = 16;
 /// Calls intrinsics of NEON.
 macro_rules! neon {
     ($e:expr) => {{
-        // SAFETY: every aarch64 processor that this is compiled for has NEON, the only condition of intrinsics on values.
+        // SAFETY: every aarch64 processor that this is compiled for has NEON, the only condition of
+        // intrinsics on values.
         unsafe { $e }
     }};
 }
 
-/// One instruction that changes its first operand, in lanes of this form. Of the intrinsics with the same result the compiler makes two
-/// or three: it computes the inverse of a mask, or adds in an order of its own.
+/// One instruction that changes its first operand, in lanes of this form. Of the intrinsics with
+/// the same result the compiler makes two or three: it computes the inverse of a mask, or adds in
+/// an order of its own.
 macro_rules! in_place {
     ($instruction:literal, $lanes:literal, $a:expr, $b:expr, $c:expr) => {{
         let mut a = $a;
@@ -140,8 +142,9 @@ impl Lanes for Neon {
     #[inline(always)]
     fn quarters8(self, mask: Self::B, s: Self::B, c: Self::B) -> Self::B {
         let mut half = c;
-        // SAFETY: an instruction of NEON that reads and writes registers only. It names what kernels compute of the same masks, so that
-        // this is done before and no copy of the one that changes is needed.
+        // SAFETY: an instruction of NEON that reads and writes registers only. It names what
+        // kernels compute of the same masks, so that this is done before and no copy of the one
+        // that changes is needed.
         unsafe {
             asm!(
                 "bit {0:v}.16b, {1:v}.16b, {2:v}.16b // {3:v}",
@@ -216,7 +219,8 @@ impl Lanes for Neon {
             let n = vreinterpretq_s8_u8(vclzq_u8(long));
             (vshlq_u8(long, n), vshlq_u8(short, n))
         });
-        // The upper byte of 4 · long − 3 · 2¹⁵: the longer without its leading bit, doubled, with its sign bit inverted.
+        // The upper byte of 4 · long − 3 · 2¹⁵: the longer without its leading bit, doubled, with
+        // its sign bit inverted.
         let centred = neon!(veorq_u8(vshlq_n_u8::<1>(long), vdupq_n_u8(128)));
         Scaled {
             long: self.widen_128(long),
@@ -333,7 +337,8 @@ impl Lanes for Neon {
     fn store32_joined(self, to: &mut [i32], at: usize, low: [Self::W; 2], high: [Self::W; 2]) {
         let block = block_mut(to, at, BYTES);
         let start = block.as_mut_ptr().cast();
-        // SAFETY: the slice holds the 16 double words that are written as pairs of words, 8 at a time; the lower word comes first.
+        // SAFETY: the slice holds the 16 double words that are written as pairs of words, 8 at a
+        // time; the lower word comes first.
         unsafe {
             vst2q_s16(start, int16x8x2_t(low[0], high[0]));
             vst2q_s16(start.add(16), int16x8x2_t(low[1], high[1]));

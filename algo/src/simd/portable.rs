@@ -1,7 +1,9 @@
-//! The back-end without any particular instructions: arrays, written so that each line can be checked against [`Lanes`].
+//! The back-end without any particular instructions: arrays, written so that each line can be
+//! checked against [`Lanes`].
 //!
-//! It is the oracle of the other back-ends, and the fallback of machines without them. Its operations are not inlined, because
-//! kernels of hundreds of inlined loops take minutes to compile.
+//! It is the oracle of the other back-ends, and the fallback of machines without them. Its
+//! operations are not inlined, because kernels of hundreds of inlined loops take minutes to
+//! compile.
 
 use super::lanes::{Lanes, Scaled, operations};
 use crate::math::nearest;

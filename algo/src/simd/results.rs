@@ -83,7 +83,8 @@ impl<'a> Results<'a> {
         v.claim_ahead(self.modulation, at);
         v.claim_ahead(self.trust, at);
         v.store16(self.modulation, at, modulation);
-        // SAFETY: `Trust` is one byte with the numbers 0 to `LAST`, and no byte above `LAST` is stored.
+        // SAFETY: `Trust` is one byte with the numbers 0 to `LAST`, and no byte above `LAST` is
+        // stored.
         let bytes = unsafe {
             core::slice::from_raw_parts_mut(self.trust.as_mut_ptr().cast(), self.trust.len())
         };

@@ -80,8 +80,8 @@ pub(super) fn block_mut<T>(row: &mut [T], at: usize, pixels: usize) -> &mut [T] 
     unsafe { row.get_unchecked_mut(at..at + pixels) }
 }
 
-/// Asserts that a block of `pixels` at `at` ends within `length`. Always in this form, so that the compiler merges the checks of
-/// all rows of one length.
+/// Asserts that a block of `pixels` at `at` ends within `length`. Always in this form, so that the
+/// compiler merges the checks of all rows of one length.
 #[inline(always)]
 fn assert_fits(at: usize, pixels: usize, length: usize) {
     assert!(length >= pixels && at <= length - pixels);

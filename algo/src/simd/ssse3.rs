@@ -1,7 +1,8 @@
 //! The back-end of x86-64 with SSSE3, for processors without AVX2.
 //!
-//! Every operation is that of AVX2 on half as many pixels. Three of the instructions that AVX2 uses have no form in SSSE3 (they came with
-//! SSE4.1) and are composed here: picking by a mask, the larger of unsigned words, and the test for zero.
+//! Every operation is that of AVX2 on half as many pixels. Three of the instructions that AVX2 uses
+//! have no form in SSSE3 (they came with SSE4.1) and are composed here: picking by a mask, the
+//! larger of unsigned words, and the test for zero.
 
 use super::lanes::{Lanes, Scaled, operations};
 use super::rows::{block, block_mut};
@@ -28,8 +29,8 @@ const BYTES: usize = 16;
 /// Calls intrinsics of SSSE3. Sound because `self` proves that the processor has it.
 macro_rules! ssse3 {
     ($e:expr) => {{
-        // SAFETY: an `Ssse3` exists only where the processor has SSSE3 (`Ssse3::detect`), the only condition of intrinsics on
-        // values.
+        // SAFETY: an `Ssse3` exists only where the processor has SSSE3 (`Ssse3::detect`), the only
+        // condition of intrinsics on values.
         unsafe { $e }
     }};
 }
@@ -102,7 +103,8 @@ impl Lanes for Ssse3 {
     #[inline(always)]
     fn load8(self, from: &[u8], at: usize) -> Self::B {
         let block = block(from, at, BYTES);
-        // SAFETY: the slice holds the 16 bytes that are read; the load needs no alignment; `self` proves SSSE3.
+        // SAFETY: the slice holds the 16 bytes that are read; the load needs no alignment; `self`
+        // proves SSSE3.
         unsafe { _mm_loadu_si128(block.as_ptr().cast()) }
     }
     #[inline(always)]
@@ -120,7 +122,8 @@ impl Lanes for Ssse3 {
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
         let block = block_mut(to, at, BYTES);
-        // SAFETY: the slice holds the 16 bytes that are written; the store needs no alignment; `self` proves SSSE3.
+        // SAFETY: the slice holds the 16 bytes that are written; the store needs no alignment;
+        // `self` proves SSSE3.
         unsafe { _mm_storeu_si128(block.as_mut_ptr().cast(), x) }
     }
     #[inline(always)]
@@ -181,8 +184,8 @@ impl Lanes for Ssse3 {
     }
     #[inline(always)]
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
-        // The five leading bits of the longer decide the scale: with the first of them it is 128, a low byte, else 256 to 4096, a high
-        // byte by the others. A set high bit reads 0.
+        // The five leading bits of the longer decide the scale: with the first of them it is 128, a
+        // low byte, else 256 to 4096, a high byte by the others. A set high bit reads 0.
         let scale = ssse3!({
             let table = _mm_setr_epi8(16, 8, 4, 4, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1);
             let first = _mm_and_si128(long, _mm_set1_epi8(-128));

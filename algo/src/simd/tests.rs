@@ -12,7 +12,8 @@ const WIDTH: usize = 64;
 
 /// Rows of lanes, made anew for every round.
 pub(super) struct Inputs {
-    /// Two rows of any bytes, two of masks, and a pointer's components of 8 bits: 4 ≤ long, short ≤ long.
+    /// Two rows of any bytes, two of masks, and a pointer's components of 8 bits: 4 ≤ long, short ≤
+    /// long.
     bytes: [[u8; WIDTH]; 6],
     /// Four rows of any words, and a pointer's components: 2¹⁰ ≤ long < 2¹⁵, short ≤ long.
     words: [[u16; WIDTH]; 6],

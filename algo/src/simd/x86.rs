@@ -1,15 +1,17 @@
-//! What the back-ends of x86-64 share: prefetching, and an operation that both compose in the same way.
+//! What the back-ends of x86-64 share: prefetching, and an operation that both compose in the same
+//! way.
 
 use super::lanes::{Lanes, Scaled};
 use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
-/// Rows of a single level are prefetched this many samples ahead, about 350 ns of work with AVX2; so is half of it of several.
+/// Rows of a single level are prefetched this many samples ahead, about 350 ns of work with AVX2;
+/// so is half of it of several.
 pub(super) const AHEAD: usize = 512;
 /// Bytes of a cache line.
 const LINE: usize = 64;
 
-/// Prefetches the cache lines of the block `after` samples behind the one at `at`: there are more rows than the processor's own
-/// prefetcher follows. A block is `PIXELS` samples.
+/// Prefetches the cache lines of the block `after` samples behind the one at `at`: there are more
+/// rows than the processor's own prefetcher follows. A block is `PIXELS` samples.
 #[inline(always)]
 pub(super) fn hint<T, const PIXELS: usize, const HINT: i32>(row: &[T], at: usize, after: usize) {
     let bytes = PIXELS * size_of::<T>();

@@ -1,5 +1,5 @@
-//! The program `fringed-lab`: benchmarks and experiments on what the daemon `fringed` is made of, and the
-//! workbench for recordings of other pictures and patterns for a part.
+//! The program `fringed-lab`: benchmarks and experiments on what the daemon `fringed` is made of,
+//! and the workbench for recordings of other pictures and patterns for a part.
 
 pub mod accuracy;
 pub mod benchmark;

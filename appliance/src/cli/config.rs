@@ -71,7 +71,8 @@ fn check_named_files(config: &Config) -> Result<(), Failure> {
                 Recording::open(folder)?;
             }
         }
-        // This back-end names no files. Its devices are not opened, because a running station may hold them.
+        // This back-end names no files. Its devices are not opened, because a running station may
+        // hold them.
         Backend::Rpi => {}
     }
     Ok(())

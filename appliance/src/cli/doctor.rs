@@ -10,7 +10,8 @@ use crate::system::priority;
 use serde_json::json;
 use std::path::PathBuf;
 
-/// Examine the head: devices, format, mode, flips, trigger, light, exposure, delay, contrast, grey response, geometry.
+/// Examine the head: devices, format, mode, flips, trigger, light, exposure, delay, contrast, grey
+/// response, geometry.
 #[derive(Debug, clap::Args)]
 pub struct Doctor {
     /// Examine a simulated head of this scenario instead of the configured head.

@@ -125,7 +125,8 @@ impl From<HistoryError> for Failure {
     }
 }
 
-/// The time of a result, to the second: by the clock, else by a browser's clock, else since the start of the daemon.
+/// The time of a result, to the second: by the clock, else by a browser's clock, else since the
+/// start of the daemon.
 fn moment(entry: &Entry) -> String {
     let second = |us| format!("{:.19}", time::utc(us));
     match (entry.time_utc_us, entry.browser_utc_us) {

@@ -1,4 +1,5 @@
-//! `fringed idle`: leaves the output lines at their idle levels, for the service manager after the daemon was killed.
+//! `fringed idle`: leaves the output lines at their idle levels, for the service manager after the
+//! daemon was killed.
 
 use crate::config::Config;
 use crate::error::Failure;
@@ -17,7 +18,8 @@ impl Idle {
     /// Opens each line at its idle level and releases it.
     ///
     /// # Errors
-    /// If the configuration is wrong, or a line cannot be used, for example because a running station holds it (69).
+    /// If the configuration is wrong, or a line cannot be used, for example because a running
+    /// station holds it (69).
     pub fn run(&self) -> Result<(), Failure> {
         let config = self.config.as_deref().map(Config::read).transpose()?;
         backend::leave_lines_idle(&config.unwrap_or_default())

@@ -107,7 +107,8 @@ pub fn main() -> ExitCode {
     start(run)
 }
 
-/// Parses the arguments of this process, runs the command and returns its exit code. Options may stand before the command or after it.
+/// Parses the arguments of this process, runs the command and returns its exit code. Options may
+/// stand before the command or after it.
 pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode {
     journal::take_panics();
     let code = carry_out(run);

@@ -89,7 +89,8 @@ pub struct Measuring {
 }
 
 impl Files {
-    /// The configuration: the named file or the defaults, with the state folder of the command line.
+    /// The configuration: the named file or the defaults, with the state folder of the command
+    /// line.
     ///
     /// # Errors
     /// If the file is missing or wrong.
@@ -118,7 +119,8 @@ impl Files {
         }
     }
 
-    /// The configured head, with the calibration in the state folder unless the configuration names another.
+    /// The configured head, with the calibration in the state folder unless the configuration names
+    /// another.
     pub fn head(&self, config: &Config) -> HeadConfig {
         match self.state_folder() {
             Ok(state) => config.head_in(&state),
@@ -145,7 +147,8 @@ impl Serving {
 }
 
 impl Threads {
-    /// A pool of computing threads: as many as the command line says, else `configured`; 0 = one per core.
+    /// A pool of computing threads: as many as the command line says, else `configured`; 0 = one
+    /// per core.
     ///
     /// # Errors
     /// If threads cannot be started (exit code 70).
@@ -210,8 +213,9 @@ impl Output {
     }
 }
 
-/// Moves options that stand before a command behind it, where clap expects them: `fringed --state DIR recipe list` becomes
-/// `fringed recipe list --state DIR`. Clap then checks that the command has these options.
+/// Moves options that stand before a command behind it, where clap expects them: `fringed --state
+/// DIR recipe list` becomes `fringed recipe list --state DIR`. Clap then checks that the command
+/// has these options.
 pub fn behind_the_command(
     tree: &Command,
     arguments: impl Iterator<Item = OsString>,

@@ -13,16 +13,20 @@ use sim::parts::Board;
 /// The part in front of a simulated head, if not the scenario's.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SimulatedPart {
-    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth, sphere, tube, spline, face, handset, plane, board or empty.
+    /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth,
+    /// sphere, tube, spline, face, handset, plane, board or empty.
     #[arg(long, value_name = "KIND")]
     part: Option<String>,
-    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm along its normal, or of sheet_metal missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
+    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm along its normal, or of
+    /// sheet_metal missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
     #[arg(long, value_name = "KIND:NUMBERS")]
     defect: Vec<String>,
-    /// What the simulated part is made of: matte, rolled_steel or oiled. If it is left out, the scenario's light says how a part reflects.
+    /// What the simulated part is made of: matte, rolled_steel or oiled. If it is left out, the
+    /// scenario's light says how a part reflects.
     #[arg(long, value_name = "NAME", value_parser = material())]
     material: Option<Material>,
-    /// Place the simulated board in this one of the ten poses that are recommended for a calibration; 10 lies in z = 0.
+    /// Place the simulated board in this one of the ten poses that are recommended for a
+    /// calibration; 10 lies in z = 0.
     #[arg(long, value_name = "NUMBER", value_parser = number(1, Board::POSES.len() as u8), conflicts_with_all = ["shift", "tilt", "rotate"])]
     pose: Option<u8>,
     /// Move the simulated part by this, mm.

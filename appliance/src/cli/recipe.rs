@@ -1,7 +1,7 @@
 //! `fringed recipe`: lists, exports, imports and deletes the station's recipes, and undoes changes.
 //!
-//! A running station uses an imported recipe when it is selected next. Deleting and undoing need a stopped station or its page,
-//! because the recipe may be active.
+//! A running station uses an imported recipe when it is selected next. Deleting and undoing need a
+//! stopped station or its page, because the recipe may be active.
 
 use super::names;
 use super::numbers::number;
@@ -40,7 +40,8 @@ pub enum RecipeCommand {
         /// Store it under this number instead of the one in the file.
         #[arg(long, value_parser = number(1, MAX_RECIPE))]
         number: Option<u16>,
-        /// Replace the recipe that has this number; it stays as the previous generation, `fringed recipe undo` brings it back.
+        /// Replace the recipe that has this number; it stays as the previous generation, `fringed
+        /// recipe undo` brings it back.
         #[arg(long)]
         replace: bool,
         #[command(flatten)]
@@ -48,10 +49,11 @@ pub enum RecipeCommand {
         #[command(flatten)]
         quiet: Quiet,
     },
-    /// Delete a recipe; `undo` brings it back. Not while a station runs: its page deletes recipes as well.
+    /// Delete a recipe; `undo` brings it back. Not while a station runs: its page deletes recipes
+    /// as well.
     Delete(Numbered),
-    /// Bring back a deleted recipe, or the previous generation; the same again takes it back. Not while a station
-    /// runs: its page undoes as well.
+    /// Bring back a deleted recipe, or the previous generation; the same again takes it back. Not
+    /// while a station runs: its page undoes as well.
     Undo(Numbered),
 }
 
@@ -71,8 +73,8 @@ impl RecipeCommand {
     /// Does it.
     ///
     /// # Errors
-    /// If the recipe does not exist (66), is damaged or of another calibration (65), a station has it in use (69), or the
-    /// store cannot be written (73).
+    /// If the recipe does not exist (66), is damaged or of another calibration (65), a station has
+    /// it in use (69), or the store cannot be written (73).
     pub fn run(&self) -> Result<(), Failure> {
         match self {
             Self::List { files, json } => {

@@ -56,8 +56,8 @@ impl Record {
     /// Opens the head, takes the sequence and writes it.
     ///
     /// # Errors
-    /// If the recipe cannot be read or does not fit the head, the head cannot be opened, the pattern cannot be shown, or the folder cannot
-    /// be written.
+    /// If the recipe cannot be read or does not fit the head, the head cannot be opened, the
+    /// pattern cannot be shown, or the folder cannot be written.
     pub fn run(&self) -> Result<(), Failure> {
         let mut config = self.files.configuration()?;
         config.head.part = self.part.placed(&config.head)?;
@@ -111,7 +111,8 @@ impl Record {
     }
 }
 
-/// Takes the sequence for production of a recipe. Two frames alone have no phase, so the sequence behind them is taken.
+/// Takes the sequence for production of a recipe. Two frames alone have no phase, so the sequence
+/// behind them is taken.
 fn take_of_recipe(
     opened: &mut Opened,
     recipe: Recipe,

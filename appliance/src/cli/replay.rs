@@ -1,5 +1,6 @@
-//! `fringed replay RECORDING`: judges a part that did not pass again, from its recorded frames, and compares the result with the one in
-//! the history, bit by bit. With `--recipe FILE` it judges any frames of the recipe's sequences.
+//! `fringed replay RECORDING`: judges a part that did not pass again, from its recorded frames, and
+//! compares the result with the one in the history, bit by bit. With `--recipe FILE` it judges any
+//! frames of the recipe's sequences.
 
 use super::options::Measuring;
 use crate::error::{Exit, Failure};
@@ -17,9 +18,11 @@ use std::time::Instant;
 /// Judge a part that did not pass again, from its recorded frames, or any recording by a recipe.
 #[derive(Debug, clap::Args)]
 pub struct Replay {
-    /// The folder of its frames, which `fringed history` names, or their ZIP from the page; with a recipe also imported frames.
+    /// The folder of its frames, which `fringed history` names, or their ZIP from the page; with a
+    /// recipe also imported frames.
     recording: PathBuf,
-    /// Another recipe than the one that it was judged by: a file, or `stored` for the station's recipe of the same number.
+    /// Another recipe than the one that it was judged by: a file, or `stored` for the station's
+    /// recipe of the same number.
     #[arg(long, value_name = "FILE|stored")]
     recipe: Option<PathBuf>,
     #[command(flatten)]
@@ -39,8 +42,9 @@ impl Replay {
     /// Judges and compares.
     ///
     /// # Errors
-    /// If the recording, the recipe or the history's result is missing (66) or damaged (65), the frames do not fit the recipe (65), the
-    /// results differ (70), or as for every command with a configuration and a state folder.
+    /// If the recording, the recipe or the history's result is missing (66) or damaged (65), the
+    /// frames do not fit the recipe (65), the results differ (70), or as for every command with a
+    /// configuration and a state folder.
     pub fn run(&self) -> Result<(), Failure> {
         let options = &self.measuring;
         let unpacked = Unpacked::of(&self.recording)?;
@@ -117,7 +121,8 @@ impl Replay {
         }
     }
 
-    /// The state folder: that of `--state` if it is given, else the one that the recording lies in, else the configured one.
+    /// The state folder: that of `--state` if it is given, else the one that the recording lies in,
+    /// else the configured one.
     fn state(&self) -> Result<PathBuf, Failure> {
         let files = &self.measuring.files;
         let own = self.recording.canonicalize().ok();
@@ -163,8 +168,9 @@ impl Replay {
     }
 }
 
-/// The result of a recording in the history: the one that names the recording, else the one with the SEQ in the recording's name. It is
-/// ignored if its recipe or PART_ID is not the recording's: the history may be another station's, or have begun again at SEQ 1.
+/// The result of a recording in the history: the one that names the recording, else the one with
+/// the SEQ in the recording's name. It is ignored if its recipe or PART_ID is not the recording's:
+/// the history may be another station's, or have begun again at SEQ 1.
 fn result_of(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Entry>, Failure> {
     let reader = Reader::of(state);
     let Some(name) = name.filter(|_| reader.path().exists()) else {

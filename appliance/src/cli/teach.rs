@@ -31,28 +31,31 @@ pub struct Teach {
     /// Recipe number.
     #[arg(long, value_parser = number(1, MAX_RECIPE))]
     number: u16,
-    /// Replace the recipe that has this number; it stays as the previous generation, `fringed recipe undo` brings it back.
+    /// Replace the recipe that has this number; it stays as the previous generation, `fringed
+    /// recipe undo` brings it back.
     #[arg(long, conflicts_with = "out")]
     replace: bool,
     /// Keep regions, gauges and limits of the recipe that is replaced.
     #[arg(long, requires = "replace")]
     keep_gauges: bool,
-    /// Part number: the key that a PLC may select by; without it that of the recipe that is replaced, or PART-NNNN.
+    /// Part number: the key that a PLC may select by; without it that of the recipe that is
+    /// replaced, or PART-NNNN.
     #[arg(long, value_parser = part_number)]
     part_number: Option<String>,
     /// Name for people; without it that of the recipe that is replaced, or Part N.
     #[arg(long, value_parser = name)]
     name: Option<String>,
-    /// How far parts may lie from where this one lies, in any direction, mm; without it as in the recipe that is replaced,
-    /// or 1.
+    /// How far parts may lie from where this one lies, in any direction, mm; without it as in the
+    /// recipe that is replaced, or 1.
     #[arg(long, value_name = "MM", value_parser = number(0.0, MAX_TOLERANCE_MM))]
     tolerance: Option<f64>,
-    /// Expose each frame so many times as long as the head is set to, with less light where the part is bright: dark places have less
-    /// noise; without it as in the recipe that is replaced, or 1.
+    /// Expose each frame so many times as long as the head is set to, with less light where the
+    /// part is bright: dark places have less noise; without it as in the recipe that is replaced,
+    /// or 1.
     #[arg(long, value_name = "N", conflicts_with = "golden", value_parser = number(1, MAX_EXPOSURES))]
     exposures: Option<u32>,
-    /// Let cycles begin with two frames, the fringe and its complement; where they do not hold, the sequence that the limits ask
-    /// for follows in the same cycle.
+    /// Let cycles begin with two frames, the fringe and its complement; where they do not hold, the
+    /// sequence that the limits ask for follows in the same cycle.
     #[arg(long, value_name = "2", value_parser = number(2_u16, 2))]
     frames: Option<u16>,
     /// Recording of the good part with the full sequence; its pattern becomes the recipe's. Without
@@ -121,7 +124,8 @@ impl Teach {
     /// Teaches, stores the recipe and prints which sequence was chosen and why.
     ///
     /// # Errors
-    /// If the part cannot be taught, the number is taken, or the recipe cannot be stored; a recipe stored before is unchanged.
+    /// If the part cannot be taught, the number is taken, or the recipe cannot be stored; a recipe
+    /// stored before is unchanged.
     pub fn run(&self) -> Result<(), Failure> {
         let options = &self.measuring;
         let mut config = options.files.configuration()?;

@@ -1,4 +1,5 @@
-//! Checks that the settings of real devices fit each other; the bounds of each stand beside it in [`hal::setup`].
+//! Checks that the settings of real devices fit each other; the bounds of each stand beside it in
+//! [`hal::setup`].
 
 use super::Config;
 use hal::bounds::within;

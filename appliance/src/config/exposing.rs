@@ -13,8 +13,9 @@ impl HeadConfig {
         }
     }
 
-    /// Sets exposure and gain. What follows from the exposure changes with it: the camera's period keeps its time between two exposures, and a
-    /// pulse that sets the exposure keeps its difference from it.
+    /// Sets exposure and gain. What follows from the exposure changes with it: the camera's period
+    /// keeps its time between two exposures, and a pulse that sets the exposure keeps its
+    /// difference from it.
     pub fn expose(&mut self, exposing: Exposing) {
         let (camera, trigger) = (&mut self.camera, &mut self.trigger);
         let before = camera.exposure_us;

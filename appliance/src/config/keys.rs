@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-/// All keys as a table in Markdown, as `docs/configuration.md` has it; tests compare them with the structs.
+/// All keys as a table in Markdown, as `docs/configuration.md` has it; tests compare them with the
+/// structs.
 pub const TABLE: &str = include_str!("keys.md");
 
 /// One key.
@@ -123,7 +124,8 @@ mod tests {
         }
     }
 
-    /// What [`Config::check`] says if one key is `value`; none if it takes it, or the type of the key does not.
+    /// What [`Config::check`] says if one key is `value`; none if it takes it, or the type of the
+    /// key does not.
     fn refusal(key: &str, value: f64) -> Option<String> {
         let (section, name) = key.rsplit_once('.').unwrap_or_default();
         // A width and a height are written both or neither.
@@ -153,7 +155,8 @@ mod tests {
             for (bound, beyond) in [(low, -1.0), (high, 1.0)] {
                 let Some(bound) = bound else { continue };
                 let name = key.name;
-                // A value that is written out of its type's range is refused by the parser, so that nothing is compared with it.
+                // A value that is written out of its type's range is refused by the parser, so that
+                // nothing is compared with it.
                 let Some(words) = refusal(name, bound + beyond) else {
                     let all = [0.0, f64::from(u8::MAX), f64::from(u32::MAX)];
                     assert!(all.contains(&bound), "{name} takes {}", bound + beyond);

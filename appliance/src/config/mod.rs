@@ -160,7 +160,8 @@ bounded! {
         pub trigger: TriggerSetup = Fields,
         /// The head's `calibration.json`; none = in the state folder.
         pub calibration: Option<PathBuf> = Longest(MAX_PATH),
-        /// The part in front of the simulated head instead of the scenario's, from the command line.
+        /// The part in front of the simulated head instead of the scenario's, from the command
+        /// line.
         #[serde(skip)]
         pub part: Option<Placed>,
         /// Exposure and gain that were kept on the page.
@@ -379,7 +380,8 @@ mod tests {
             let row = format!("| {signal} | {} |", line.as_deref().unwrap());
             assert!(wiring.contains(&row), "no wire for {row}");
         }
-        // The camera exposes 14.26 µs longer than its pulse, and the configured exposure is that time.
+        // The camera exposes 14.26 µs longer than its pulse, and the configured exposure is that
+        // time.
         let exposed = f64::from(trigger.pulse_us) + 14.26;
         assert!((exposed - f64::from(config.head.camera.exposure_us)).abs() < 1.0);
     }

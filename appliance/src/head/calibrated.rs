@@ -1,4 +1,5 @@
-//! Measures a part with a pattern of the caller's choice, where no recipe describes the measurement: for teaching and experiments.
+//! Measures a part with a pattern of the caller's choice, where no recipe describes the
+//! measurement: for teaching and experiments.
 
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
@@ -53,12 +54,13 @@ fn impossible(error: impl std::fmt::Display) -> MeasureError {
 }
 
 impl CalibratedHead<'_> {
-    /// Projects the shots of a phase function and measures the part in the default working range of [`Triangulator::new`]. Levels that are unwrapped about a
-    /// known map take `map` (row-major), or without one the reference phase map. `progress` gets the share of the frames taken.
+    /// Projects the shots of a phase function and measures the part in the default working range of
+    /// [`Triangulator::new`]. Levels that are unwrapped about a known map take `map` (row-major),
+    /// or without one the reference phase map. `progress` gets the share of the frames taken.
     ///
     /// # Errors
-    /// If a device fails, the sequence cannot be decoded, or camera and projector do not look down at the reference plane from two
-    /// different points.
+    /// If a device fails, the sequence cannot be decoded, or camera and projector do not look down
+    /// at the reference plane from two different points.
     pub fn measure(
         &mut self,
         function: &PhaseFunction,

@@ -1,4 +1,5 @@
-//! Pictures without models: which rasters are shown for them, and the recording that their frames make.
+//! Pictures without models: which rasters are shown for them, and the recording that their frames
+//! make.
 
 use super::calibration::Calibration;
 use super::rasters::rasters;
@@ -46,7 +47,8 @@ impl Shown {
         Ok(shown)
     }
 
-    /// Adds `levels` of `steps` shifts of one direction, the finest with so many fringes over the projector, else one per 12 pixels.
+    /// Adds `levels` of `steps` shifts of one direction, the finest with so many fringes over the
+    /// projector, else one per 12 pixels.
     ///
     /// # Errors
     /// In words: no projector of this size can show them.

@@ -18,8 +18,8 @@ pub struct Channel<'a> {
     pub function: PhaseFunction,
     /// Its frames and levels.
     pub scan: Scan<'a>,
-    /// What the frames of the levels show that the scan's decoder takes: of all, or of the finest alone if the production kernels do not know
-    /// the levels' form.
+    /// What the frames of the levels show that the scan's decoder takes: of all, or of the finest
+    /// alone if the production kernels do not know the levels' form.
     pub shots: Vec<Shot>,
     /// Whether the production kernels know the levels' form.
     recognised: bool,
@@ -32,7 +32,8 @@ pub trait Expected {
     /// Its name for reports.
     fn name(&self) -> &'static str;
 
-    /// Φ of each pixel, row-major, for levels that are unwrapped in this way; unknown where it is not safe for them.
+    /// Φ of each pixel, row-major, for levels that are unwrapped in this way; unknown where it is
+    /// not safe for them.
     fn map(&self, unwrapping: pattern::Unwrapping) -> Vec<AbsolutePhase>;
 
     /// The same for levels that are right within so many turns of it.
@@ -102,8 +103,8 @@ impl<'a> Channel<'a> {
         })
     }
 
-    /// How the levels can be unwrapped: from a code if there is one, else as the production kernels do, else by beats; about `known` or
-    /// the reference map where they need a map.
+    /// How the levels can be unwrapped: from a code if there is one, else as the production kernels
+    /// do, else by beats; about `known` or the reference map where they need a map.
     ///
     /// # Errors
     /// In words: there is a code, and levels and code do not fit each other.
@@ -275,8 +276,8 @@ impl Unwrapping {
         }
     }
 
-    /// What is ambiguous about levels that are unwrapped about the reference map, in words: the working range holds more turns than
-    /// they tell apart.
+    /// What is ambiguous about levels that are unwrapped about the reference map, in words: the
+    /// working range holds more turns than they tell apart.
     pub fn ambiguity(
         &self,
         channel: &Channel<'_>,

@@ -1,4 +1,5 @@
-//! A recording's Gray code, ready to be decoded: beside the fringes that it numbers, or without any.
+//! A recording's Gray code, ready to be decoded: beside the fringes that it numbers, or without
+//! any.
 
 use super::seam;
 use algo::chain::{Cells, CodePictures, Coding, GrayCode};
@@ -23,11 +24,12 @@ pub struct Code<'a> {
 }
 
 impl<'a> Code<'a> {
-    /// A code of a recording. Its pictures are compared with their inverse, else with white and black, else with the mean of these
-    /// frames `beside` it.
+    /// A code of a recording. Its pictures are compared with their inverse, else with white and
+    /// black, else with the mean of these frames `beside` it.
     ///
     /// # Errors
-    /// In words: the code has nothing to be compared with, numbers no straight fringes, or a frame is not one of its format.
+    /// In words: the code has nothing to be compared with, numbers no straight fringes, or a frame
+    /// is not one of its format.
     pub fn new(
         code: &'a RecordedCode,
         recording: &'a Recording,
@@ -125,7 +127,8 @@ impl<'a> CodeAlone<'a> {
         }))
     }
 
-    /// The same pictures, read with their bits in the other order if `reversed`, and as another coding.
+    /// The same pictures, read with their bits in the other order if `reversed`, and as another
+    /// coding.
     #[must_use]
     pub fn read_as(&self, reversed: bool, coding: Coding) -> Self {
         let mut other = self.clone();
@@ -151,7 +154,8 @@ impl<'a> CodeAlone<'a> {
         phases.map_err(|error| error.to_string())
     }
 
-    /// Pictures whose mean is what the camera sees under even light: each bit with its inverse, or white and black.
+    /// Pictures whose mean is what the camera sees under even light: each bit with its inverse, or
+    /// white and black.
     pub fn even(&self) -> Vec<FrameView<'a>> {
         let CodePictures { bits, against } = &self.pictures;
         let is_inverse = against.iter().all(|frames| frames.len() == 1);

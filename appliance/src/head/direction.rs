@@ -1,5 +1,5 @@
-//! Which fringes tell heights best. Along a camera's ray the projector point moves on an epipolar line: fringes that run along it
-//! hardly change their phase with the height.
+//! Which fringes tell heights best. Along a camera's ray the projector point moves on an epipolar
+//! line: fringes that run along it hardly change their phase with the height.
 
 use algo::geometry::Triangulator;
 use algo::units::Height;
@@ -9,7 +9,8 @@ use hal::replay::recording::PatternSpec;
 const GRID: usize = 16;
 /// Rise over which slopes are taken, mm.
 const RISE_MM: f64 = 0.5;
-/// Fringes that use less than this share of their frequency are poor: heights are five times as noisy as by fringes across.
+/// Fringes that use less than this share of their frequency are poor: heights are five times as
+/// noisy as by fringes across.
 const LEAST_SHARE: f64 = 0.2;
 
 /// What fringes tell of heights near z = 0.
@@ -22,7 +23,8 @@ pub struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// Of a rig and a phase function; `None` if the projector lights nothing of z = 0 that the camera sees.
+    /// Of a rig and a phase function; `None` if the projector lights nothing of z = 0 that the
+    /// camera sees.
     pub fn of(triangulator: &Triangulator) -> Option<Self> {
         let (camera, function) = (triangulator.camera(), triangulator.function());
         let inside = |at: f64, size: usize| (0.0..size as f64).contains(&at);

@@ -1,5 +1,5 @@
-//! Exposure and gain of the camera. The noise of a sample belongs to both: what was measured or taught at one setting is not true of
-//! another.
+//! Exposure and gain of the camera. The noise of a sample belongs to both: what was measured or
+//! taught at one setting is not true of another.
 
 use hal::bounds::{Bound, Fields, MAX_EXPOSURE_US, within};
 use hal::setup::MOST_GAIN;
@@ -54,7 +54,8 @@ impl Exposing {
         within("gain", self.gain, least_gain, MOST_GAIN)
     }
 
-    /// Checks that the exposure is a whole number of refreshes of the projector, to a hundredth of one.
+    /// Checks that the exposure is a whole number of refreshes of the projector, to a hundredth of
+    /// one.
     ///
     /// # Errors
     /// In words that name the key and the nearest whole number.

@@ -16,8 +16,8 @@ use hal::replay::recording::PatternSpec;
 
 /// Columns and rows of the frame that are looked at for corners.
 pub const CELLS: (usize, usize) = (8, 6);
-/// Least and largest width of what a camera sees of a board's plane, mm. No head has less, and a board whose size is stated in metres is a
-/// thousand times as large.
+/// Least and largest width of what a camera sees of a board's plane, mm. No head has less, and a
+/// board whose size is stated in metres is a thousand times as large.
 const VIEW_MM: (f64, f64) = (5.0, 1e5);
 
 /// One pose of the board, as a head saw it.
@@ -88,7 +88,8 @@ pub fn same_place(other: &str) -> String {
     format!("the board lies where it lies in {other}")
 }
 
-/// The absolute phases of one pattern of a recording, and the offset of each of its levels, or of its code.
+/// The absolute phases of one pattern of a recording, and the offset of each of its levels, or of
+/// its code.
 fn decoded(
     recording: &Recording,
     pattern: usize,
@@ -98,7 +99,8 @@ fn decoded(
         levels.push(Picture::mean(&code.even()));
         return code.phases(LeastModulation::default());
     }
-    // Not the least of the camera's noise: in black squares the light of bright ones around them would have a phase, which is not the place's.
+    // Not the least of the camera's noise: in black squares the light of bright ones around them
+    // would have a phase, which is not the place's.
     let channel = Channel::new(recording, pattern, LeastModulation::default())?;
     let unwrapping = channel.unwrapping(None, &Err("the models are to be made".into()))?;
     if unwrapping.missing().is_some() {
@@ -147,7 +149,8 @@ pub struct Geometry {
     pub prediction: Prediction,
     /// The board in each pose, as the calibrated head measures it.
     pub measured: Vec<Option<MeasuredBoard>>,
-    /// The residuals of each pose: of its corners in the camera, and of its points in the projector.
+    /// The residuals of each pose: of its corners in the camera, and of its points in the
+    /// projector.
     pub arrows: Vec<[Vec<Arrow>; 2]>,
     /// The last pose, which is z = 0.
     pub ground: Ground,
@@ -161,7 +164,8 @@ impl Geometry {
     /// Adjusts all poses together. `sigma_ppm` is σ of the board's scale.
     ///
     /// # Errors
-    /// In words, with the recording to blame: the poses are of different heads, do not determine the models, or do not fit each other.
+    /// In words, with the recording to blame: the poses are of different heads, do not determine
+    /// the models, or do not fit each other.
     pub fn of(board: &Board, sigma_ppm: f64, poses: &[SeenPose]) -> Result<Self, String> {
         let Some(first) = poses.first() else {
             return Err(CalibrationError::Few { given: 0 }.to_string());

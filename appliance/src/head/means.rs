@@ -1,4 +1,5 @@
-//! The mean of several captures of a scene that does not move: one frame of 16 bits for each of the patterns that are loaded.
+//! The mean of several captures of a scene that does not move: one frame of 16 bits for each of the
+//! patterns that are loaded.
 
 use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Samples};
@@ -8,14 +9,15 @@ use std::time::Duration;
 
 /// Captures that a mean is of.
 pub const CAPTURES: usize = 4;
-/// Bits of the samples that are summed; those of a camera with more lose their last ones. Four of them are less than
-/// [`SATURATED`].
+/// Bits of the samples that are summed; those of a camera with more lose their last ones. Four of
+/// them are less than [`SATURATED`].
 const BITS: u8 = 14;
 /// The sum where one of the samples was at full scale.
 const SATURATED: u16 = u16::MAX;
 
-/// Takes [`CAPTURES`] frames of each of the loaded patterns, and gives their means. Where one of the samples of a pixel was at full scale
-/// its mean is. `progress` gets the share of the frames taken; it may end the captures by `false`, and then there are no means.
+/// Takes [`CAPTURES`] frames of each of the loaded patterns, and gives their means. Where one of
+/// the samples of a pixel was at full scale its mean is. `progress` gets the share of the frames
+/// taken; it may end the captures by `false`, and then there are no means.
 ///
 /// # Errors
 /// Of the device that failed.

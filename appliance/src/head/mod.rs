@@ -1,4 +1,5 @@
-//! The head as a measuring instrument: its calibration, what can be measured on it, and the doctor that checks it.
+//! The head as a measuring instrument: its calibration, what can be measured on it, and the doctor
+//! that checks it.
 
 pub mod board;
 pub mod calibrate;

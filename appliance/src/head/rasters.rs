@@ -1,4 +1,5 @@
-//! The grey rasters that the projector shows for a phase function, corrected by the inverse of its measured grey response.
+//! The grey rasters that the projector shows for a phase function, corrected by the inverse of its
+//! measured grey response.
 
 use crate::head::calibration::Calibration;
 use crate::head::seam;
@@ -89,7 +90,8 @@ impl Illumination {
     }
 }
 
-/// Vertical fringes of `pitch` pixels over a projector of this size, at each of so many shifts of a turn.
+/// Vertical fringes of `pitch` pixels over a projector of this size, at each of so many shifts of a
+/// turn.
 ///
 /// # Errors
 /// `Unsupported` if the projector is too small for them.

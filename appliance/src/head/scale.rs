@@ -5,7 +5,8 @@ use super::calibration::geometry::GeometryFile;
 use algo::calibration::Board;
 use serde::{Deserialize, Serialize};
 
-/// Largest difference from a stated length, and of the baseline from the calibration before, as a share.
+/// Largest difference from a stated length, and of the baseline from the calibration before, as a
+/// share.
 const MOST_SCALE: f64 = 0.01;
 
 /// How the scale of the models was checked.
@@ -21,7 +22,8 @@ pub enum Scale {
 }
 
 impl Scale {
-    /// Compares a length on the board, mm, from the first to the last inner corner of its longer side, with its squares.
+    /// Compares a length on the board, mm, from the first to the last inner corner of its longer
+    /// side, with its squares.
     ///
     /// # Errors
     /// In words: they differ by more than 1 %.
@@ -35,7 +37,8 @@ impl Scale {
         }
     }
 
-    /// How the scale of the models `now` was checked: with a `length` on the board, else with the calibration `before` of the same head.
+    /// How the scale of the models `now` was checked: with a `length` on the board, else with the
+    /// calibration `before` of the same head.
     ///
     /// # Errors
     /// In words: the baselines differ by more than 1 %.

@@ -1,5 +1,5 @@
-//! One sequence of a pattern: takes its frames with the head, and turns them into phases and heights. Everything but production, which
-//! measures in strips, measures in this way.
+//! One sequence of a pattern: takes its frames with the head, and turns them into phases and
+//! heights. Everything but production, which measures in strips, measures in this way.
 
 use super::calibration::Calibration;
 use super::rasters::rasters;
@@ -14,7 +14,8 @@ use hal::frame::Frame;
 use hal::head::Head;
 use std::time::Duration;
 
-/// Projects the shots of a phase function and takes a frame of each, in their order. `progress` gets the share of the frames taken.
+/// Projects the shots of a phase function and takes a frame of each, in their order. `progress`
+/// gets the share of the frames taken.
 ///
 /// # Errors
 /// Of the device that failed.
@@ -30,7 +31,8 @@ pub fn take(
     take_loaded(head, shots.len(), timeout, progress)
 }
 
-/// Takes a frame of each of so many patterns, which are loaded. `progress` gets the share of the frames taken.
+/// Takes a frame of each of so many patterns, which are loaded. `progress` gets the share of the
+/// frames taken.
 ///
 /// # Errors
 /// Of the device that failed.
@@ -64,7 +66,8 @@ impl<'a> Scan<'a> {
     /// The frames of `shots`, in their order, of a phase function of `range`.
     ///
     /// # Errors
-    /// In words: the shots make no sequence that can be decoded, or a frame is not one of its format.
+    /// In words: the shots make no sequence that can be decoded, or a frame is not one of its
+    /// format.
     pub fn new(
         range: PhaseRange,
         shots: &[Shot],
@@ -73,11 +76,13 @@ impl<'a> Scan<'a> {
         Self::with(range, shots, shots, frames)
     }
 
-    /// As [`Self::new`] for levels that the decoder cannot unwrap. Its decoder is that of the finest level alone: it gives the noise
-    /// of a phase that was unwrapped in another way ([`algo::chain`]).
+    /// As [`Self::new`] for levels that the decoder cannot unwrap. Its decoder is that of the
+    /// finest level alone: it gives the noise of a phase that was unwrapped in another way
+    /// ([`algo::chain`]).
     ///
     /// # Errors
-    /// In words: the shots are no levels, the finest is too fine or too coarse, or a frame is not one of its format.
+    /// In words: the shots are no levels, the finest is too fine or too coarse, or a frame is not
+    /// one of its format.
     pub fn of_levels(
         range: PhaseRange,
         shots: &[Shot],
@@ -144,8 +149,8 @@ impl<'a> Scan<'a> {
         calibration.noise.by([offset * unit, slope])
     }
 
-    /// The heights of its phases, and their σ where the noise of a sample is known; phases outside of the working range lose
-    /// their trust.
+    /// The heights of its phases, and their σ where the noise of a sample is known; phases outside
+    /// of the working range lose their trust.
     pub fn heights(
         &self,
         triangulator: &Triangulator,

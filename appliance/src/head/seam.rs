@@ -1,4 +1,5 @@
-//! Converts between devices and computation: `hal`'s frames, models and patterns, and the types of `algo`.
+//! Converts between devices and computation: `hal`'s frames, models and patterns, and the types of
+//! `algo`.
 
 use algo::frame::{FrameError, FrameView, Samples};
 use algo::geometry::{FittedMap, Pinhole, PinholeModel, Reference};

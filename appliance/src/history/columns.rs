@@ -3,8 +3,9 @@
 use crate::station::{Placement, Square, Stages, Verdict};
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 
-/// Declares a type that the history keeps: first its columns, each once, with its value and its type in SQL, then the fields that
-/// are no columns. A column and a key in JSON have the name of the field.
+/// Declares a type that the history keeps: first its columns, each once, with its value and its
+/// type in SQL, then the fields that are no columns. A column and a key in JSON have the name of
+/// the field.
 macro_rules! columns {
     (
         $(#[$about:meta])* $name:ident in $table:literal, $from:ident: $source:ty;

@@ -14,8 +14,9 @@ const COLUMNS: &str = "seq,time_utc,recipe,fingerprint,part_id,press_stroke,toke
     valid_points,coverage_permille,temperature_c,height_noise_mm,fitness_permille,exposure_us,total_us,stages_us,recording,time_source";
 
 impl Reader {
-    /// Writes the results that pass the filter, newest first, with the names of all their gauges in the header line. A gauge
-    /// has seven columns: value with its unit, σ, two limits, decision bits, U and the magnitude that is expected on a good part.
+    /// Writes the results that pass the filter, newest first, with the names of all their gauges in
+    /// the header line. A gauge has seven columns: value with its unit, σ, two limits, decision
+    /// bits, U and the magnitude that is expected on a good part.
     ///
     /// # Errors
     /// [`HistoryError`], also where `out` takes no more.
@@ -133,7 +134,8 @@ fn number(number: Option<f64>) -> String {
     number.map_or_else(String::new, |number| number.to_string())
 }
 
-/// A text, quoted where it must be; what a spreadsheet would take for a formula gets an apostrophe in front.
+/// A text, quoted where it must be; what a spreadsheet would take for a formula gets an apostrophe
+/// in front.
 fn quoted(text: &str) -> Cow<'_, str> {
     let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
     let guard = if formula { "'" } else { "" };

@@ -54,12 +54,13 @@ columns! {
         placement: Option<Placement> = record.inspection.placement.filter(is_finite), "TEXT";
         /// The folder in `recordings/` that holds the frames, if they were kept.
         recording: Option<String> = None, "TEXT";
-        /// Why the frames of a part that did not pass were not kept, as far as known; see [`super::Unkept`].
+        /// Why the frames of a part that did not pass were not kept, as far as known; see
+        /// [`super::Unkept`].
         unkept: Option<String> = None, "TEXT";
     }
     {
-        /// Where the clock was not synchronised: the trigger time in µs since 1970 UTC by the clock of a browser whose user
-        /// signed in during the same start.
+        /// Where the clock was not synchronised: the trigger time in µs since 1970 UTC by the clock
+        /// of a browser whose user signed in during the same start.
         browser_utc_us: Option<u64> = None;
         /// The gauges, in the recipe's order.
         gauges: Vec<GaugeEntry> = record.inspection.gauges.iter().map(GaugeEntry::of).collect();
@@ -103,7 +104,8 @@ pub struct Filter {
     pub verdict: Option<Verdict>,
     /// Of this PART_ID.
     pub part_id: Option<u32>,
-    /// Triggered at or after this time, µs since 1970 UTC. Results without a time are then left out.
+    /// Triggered at or after this time, µs since 1970 UTC. Results without a time are then left
+    /// out.
     pub since_us: Option<u64>,
     /// Triggered before this time.
     pub until_us: Option<u64>,
@@ -140,8 +142,9 @@ fn is_finite(placement: &Placement) -> bool {
 /// Flags that say how a cycle went, not what its frames show.
 const COURSE: u16 = flag::RETRIED | flag::STEPPED_UP | flag::WARM_UP;
 
-/// How a replayed result differs from the stored one, in words; `None` if it is the same bit by bit. What belongs to the cycle
-/// and not to its frames is not compared: numbers, times, temperature, the flags of its course.
+/// How a replayed result differs from the stored one, in words; `None` if it is the same bit by
+/// bit. What belongs to the cycle and not to its frames is not compared: numbers, times,
+/// temperature, the flags of its course.
 pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
     let same = Entry {
         recipe: replayed.recipe,

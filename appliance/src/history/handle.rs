@@ -20,7 +20,8 @@ use std::time::Duration;
 /// Longest wait of a sign-in for its time to be stored.
 const DATING: Duration = Duration::from_secs(2);
 
-/// As many numbers are skipped where the counter is lost: those of results that were shown and not stored.
+/// As many numbers are skipped where the counter is lost: those of results that were shown and not
+/// stored.
 const UNKNOWN: u32 = SLOTS + AHEAD;
 
 /// The way to the history's threads. Cheap to clone.
@@ -34,8 +35,9 @@ pub struct History {
     pub(super) keeper: Keeper,
 }
 
-/// Opens the history of a state folder, and stores what the run before has shown and the database lacks. Answers with the way to
-/// it, its thread's side, the SEQ of the next result, and what had to be set aside.
+/// Opens the history of a state folder, and stores what the run before has shown and the database
+/// lacks. Answers with the way to it, its thread's side, the SEQ of the next result, and what had
+/// to be set aside.
 ///
 /// # Errors
 /// If database, folder or counter can neither be opened nor begun.
@@ -51,7 +53,8 @@ pub fn open(
     };
     let (mut writer, complaint) = Writer::open(&state.join(DATABASE), bounds.results)?;
     let owner = std::fs::metadata(state).map_err(|error| failed("", error))?;
-    // Where the system has no shared memory, or another process has it, a kill skips numbers and loses results that wait.
+    // Where the system has no shared memory, or another process has it, a kill skips numbers and
+    // loses results that wait.
     let spool = Spool::open(&numbering.serial, owner.uid()).ok();
     let found = spool.as_ref().and_then(|spool| match &numbering.counted {
         Ok(counted) => spool.of_run(counted.run),
@@ -61,7 +64,8 @@ pub fn open(
     let (last, mut shown) = found.unwrap_or((counted.last, Vec::new()));
     let stored = writer.last_seq()?;
     shown.retain(|entry| stored.is_none_or(|stored| is_after(entry.seq, stored)));
-    // A counter that was lost or taken from an older copy of the folder must not bring back a number.
+    // A counter that was lost or taken from an older copy of the folder must not bring back a
+    // number.
     let last = stored.filter(|&seq| is_after(seq, last)).unwrap_or(last);
     let lost = numbering.counted.clone().err();
     let skipped = match lost {
@@ -110,7 +114,8 @@ impl History {
     /// Takes a SEQ into use.
     ///
     /// # Errors
-    /// No number is reserved after it. The card is asked for more, and the station hears when it has answered.
+    /// No number is reserved after it. The card is asked for more, and the station hears when it
+    /// has answered.
     pub fn take(&self, seq: u32) -> Result<(), Unstored> {
         self.seqs.take(seq)
     }
@@ -130,8 +135,9 @@ impl History {
         }
     }
 
-    /// Hands over the frames of a part, made by `part`, if it did not pass; after its result. Where those of another are
-    /// still being written these are not kept, and the history says so: the line goes on.
+    /// Hands over the frames of a part, made by `part`, if it did not pass; after its result. Where
+    /// those of another are still being written these are not kept, and the history says so: the
+    /// line goes on.
     pub fn keep(&self, record: &ResultRecord, part: impl FnOnce() -> JudgedPart) {
         let failed = matches!(record.verdict, Verdict::Fail | Verdict::Invalid);
         if failed && let Err(why) = self.keeper.keep(part) {
@@ -141,8 +147,8 @@ impl History {
         }
     }
 
-    /// Stores when this start of the daemon, BOOT_ID, was by the clock of a signed-in user's browser; waits until that is done
-    /// and answers whether it is.
+    /// Stores when this start of the daemon, BOOT_ID, was by the clock of a signed-in user's
+    /// browser; waits until that is done and answers whether it is.
     pub fn date(&self, boot_id: u32, utc_us: u64) -> bool {
         let (stored, done) = sync_channel(1);
         let dated = Message::Dated {
@@ -158,8 +164,8 @@ impl History {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// Ends the threads once they have stored what they can; `last_seq` is the last of all. Answers whether they will: not while
-    /// a card that hangs has filled the queue.
+    /// Ends the threads once they have stored what they can; `last_seq` is the last of all. Answers
+    /// whether they will: not while a card that hangs has filled the queue.
     pub fn stop(&self, last_seq: u32) -> bool {
         // A thread that is gone has stopped.
         let stop = self.queue.try_send(Message::Stop { last_seq });

@@ -1,5 +1,5 @@
-//! The thread `recordings`: writes the frames of failed parts. It is not the history's thread, because a recording takes as long
-//! as many results.
+//! The thread `recordings`: writes the frames of failed parts. It is not the history's thread,
+//! because a recording takes as long as many results.
 
 use super::recordings::{JudgedPart, Recordings};
 use super::task::Message;
@@ -21,7 +21,8 @@ enum Order {
 #[derive(Clone)]
 pub(super) struct Keeper {
     orders: SyncSender<Order>,
-    /// A failed part waits or is being written: its frames are memory that the head cannot use, so there is one at a time.
+    /// A failed part waits or is being written: its frames are memory that the head cannot use, so
+    /// there is one at a time.
     busy: Arc<AtomicBool>,
     quota: u64,
 }
@@ -34,7 +35,8 @@ pub(super) struct Keeping {
     history: SyncSender<Message>,
 }
 
-/// Opens the folder of recordings; `recipes` are those of the station. What happens to the recordings is sent to the `history`.
+/// Opens the folder of recordings; `recipes` are those of the station. What happens to the
+/// recordings is sent to the `history`.
 ///
 /// # Errors
 /// Whatever the file system answers.
@@ -62,7 +64,8 @@ pub(super) fn open(
 }
 
 impl Keeper {
-    /// Hands over a part that did not pass, made by `part`; the error says why its frames are not kept.
+    /// Hands over a part that did not pass, made by `part`; the error says why its frames are not
+    /// kept.
     pub(super) fn keep(&self, part: impl FnOnce() -> JudgedPart) -> Result<(), Unkept> {
         if self.quota == 0 {
             return Err(Unkept::Off);
@@ -77,7 +80,8 @@ impl Keeper {
         })
     }
 
-    /// Asks for the oldest recording to be removed: results are worth more than the frames of old parts.
+    /// Asks for the oldest recording to be removed: results are worth more than the frames of old
+    /// parts.
     pub(super) fn make_room(&self) {
         // With a full queue of orders it is asked again with the next result.
         let _ = self.orders.try_send(Order::MakeRoom);

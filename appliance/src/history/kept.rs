@@ -1,4 +1,5 @@
-//! Opens the recording of a part that a station judged, so that it can be judged again: frames, calibration, recipe.
+//! Opens the recording of a part that a station judged, so that it can be judged again: frames,
+//! calibration, recipe.
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
@@ -14,7 +15,8 @@ use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
-/// A recording that a station made of a part that it had judged, or another one that a recipe is to judge.
+/// A recording that a station made of a part that it had judged, or another one that a recipe is to
+/// judge.
 #[derive(Debug)]
 pub struct Kept {
     recording: Recording,
@@ -38,8 +40,9 @@ impl Kept {
         Self::of(folder, recording, None)
     }
 
-    /// Opens a recording that is to be judged by this recipe, which need not have judged it before: frames that were imported, for
-    /// example. The noise of a sample is the recipe's where the recording states none.
+    /// Opens a recording that is to be judged by this recipe, which need not have judged it before:
+    /// frames that were imported, for example. The noise of a sample is the recipe's where the
+    /// recording states none.
     ///
     /// # Errors
     /// If it is not there (66), damaged, or without models (65).
@@ -91,11 +94,12 @@ impl Kept {
         self.recording.frames.iter().map(seam::shot).collect()
     }
 
-    /// The recipe that judged the part: the recording's own, else the generation of the station's that has its fingerprint.
-    /// The answer says whether it is the recording's.
+    /// The recipe that judged the part: the recording's own, else the generation of the station's
+    /// that has its fingerprint. The answer says whether it is the recording's.
     ///
     /// # Errors
-    /// If neither the recording nor the store has it (66), or the recording's is damaged or another one (65).
+    /// If neither the recording nor the store has it (66), or the recording's is damaged or another
+    /// one (65).
     pub fn recipe(&self, stored: &Store) -> Result<(Recipe, bool), Failure> {
         let Some(RecipeReference {
             number,
@@ -138,7 +142,8 @@ impl Kept {
         Plan::new(recipe, &self.calibration, simulated)
     }
 
-    /// Fingerprint of the calibration that the part was measured with, if the recording has its recipe.
+    /// Fingerprint of the calibration that the part was measured with, if the recording has its
+    /// recipe.
     fn calibration_then(&self) -> Option<String> {
         let file = File::open(self.own.as_ref()?).ok()?;
         Some(archive::manifest(file).ok()?.calibration)

@@ -1,9 +1,10 @@
 //! The history: every result in an SQLite database, and the frames of failed parts as recordings.
 //!
-//! Threads of its own write ([`Task`]); the station and the measuring task hand over through a bounded queue ([`History`]) and
-//! never wait. The page and the command line read with a [`Reader`], which sees every stored result; reader and writer do not
-//! hold each other up (SQLite's write-ahead log). All calls of a reader block: call them from `tokio::task::spawn_blocking`
-//! where a socket runtime must go on.
+//! Threads of its own write ([`Task`]); the station and the measuring task hand over through a
+//! bounded queue ([`History`]) and never wait. The page and the command line read with a
+//! [`Reader`], which sees every stored result; reader and writer do not hold each other up
+//! (SQLite's write-ahead log). All calls of a reader block: call them from
+//! `tokio::task::spawn_blocking` where a socket runtime must go on.
 //!
 //! ```text
 //! station ───result──► spool                            shared memory, which kill -9 does not touch
@@ -12,9 +13,10 @@
 //! measuring ──frames──► one slot ─► thread `recordings` ─► recordings/NAME ──► `fringed replay`
 //! ```
 //!
-//! A result is shown before it is stored: a card that takes a second makes no verdict late. Each result is put into the spool
-//! before it is shown, and the next start stores what the database lacks: kill -9 costs at most the result in flight, however
-//! busy the card was. A loss of power costs what was not synced yet: what came in the time that the card takes for one sync.
+//! A result is shown before it is stored: a card that takes a second makes no verdict late. Each
+//! result is put into the spool before it is shown, and the next start stores what the database
+//! lacks: kill -9 costs at most the result in flight, however busy the card was. A loss of power
+//! costs what was not synced yet: what came in the time that the card takes for one sync.
 
 mod columns;
 pub mod csv;
@@ -66,8 +68,8 @@ pub struct HistoryError {
     pub path: std::path::PathBuf,
     /// What is wrong.
     pub reason: String,
-    /// What the file is called when it is set aside, between its stem and its extension, where it is damaged, of another version or no
-    /// history at all.
+    /// What the file is called when it is set aside, between its stem and its extension, where it
+    /// is damaged, of another version or no history at all.
     pub aside: Option<String>,
 }
 

@@ -13,8 +13,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// Results that are read from the database at a time.
 const BATCH: usize = 256;
 
-/// Reads one history. Cheap to clone; each call opens the database, so that it also sees a new one that was begun in place of
-/// one that cannot be used. Every call blocks.
+/// Reads one history. Cheap to clone; each call opens the database, so that it also sees a new one
+/// that was begun in place of one that cannot be used. Every call blocks.
 #[derive(Clone, Debug)]
 pub struct Reader {
     path: PathBuf,
@@ -101,7 +101,8 @@ impl Reader {
     /// The results that pass the filter, newest first.
     ///
     /// # Errors
-    /// [`HistoryError`] if the database is missing, busy for seconds, damaged, or of another version.
+    /// [`HistoryError`] if the database is missing, busy for seconds, damaged, or of another
+    /// version.
     pub fn results(&self, filter: &Filter) -> Result<Vec<Entry>, HistoryError> {
         let mut all = Vec::new();
         self.each(filter, |entry| {
@@ -149,8 +150,9 @@ impl Reader {
         Ok(found.map(|name| self.recordings.join(name)))
     }
 
-    /// Hands each result that passes the filter to `take`, newest first; stops at its first error. Results are read in batches
-    /// and nothing of the database is held between them, so that its log does not grow while `take` is slow.
+    /// Hands each result that passes the filter to `take`, newest first; stops at its first error.
+    /// Results are read in batches and nothing of the database is held between them, so that its
+    /// log does not grow while `take` is slow.
     pub(super) fn each(
         &self,
         filter: &Filter,
@@ -201,7 +203,8 @@ impl Reader {
         Ok(counts)
     }
 
-    /// How many results a filter by time leaves out because it is not known when they were; 0 for one that asks for no time.
+    /// How many results a filter by time leaves out because it is not known when they were; 0 for
+    /// one that asks for no time.
     ///
     /// # Errors
     /// As [`Self::results`].
@@ -223,7 +226,8 @@ impl Reader {
         self.read(|connection| connection.query_row(&query, values, |row| row.get(0)))
     }
 
-    /// When starts of the daemon were, in µs since 1970 UTC by the clock of a signed-in user's browser, by BOOT_ID.
+    /// When starts of the daemon were, in µs since 1970 UTC by the clock of a signed-in user's
+    /// browser, by BOOT_ID.
     ///
     /// # Errors
     /// As [`Self::results`].
@@ -232,7 +236,8 @@ impl Reader {
         self.read(|connection| rows(connection, query, (), |row| Ok((row.get(0)?, row.get(1)?))))
     }
 
-    /// The gauges of a recipe over its last results, in the order in which the newest of them has them.
+    /// The gauges of a recipe over its last results, in the order in which the newest of them has
+    /// them.
     ///
     /// # Errors
     /// As [`Self::results`].

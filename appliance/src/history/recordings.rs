@@ -1,8 +1,10 @@
-//! The recordings of parts that did not pass (FAIL or INVALID): a folder with a quota, from which the oldest are removed.
+//! The recordings of parts that did not pass (FAIL or INVALID): a folder with a quota, from which
+//! the oldest are removed.
 //!
-//! Each recording holds the recipe that judged the part, so that the part can be judged again after the recipe was edited or
-//! deleted. The recipe is a hard link to the store's file, which the store replaces and never changes: it takes no room while
-//! the store or another recording has it, counts once towards the quota, and goes with its last link.
+//! Each recording holds the recipe that judged the part, so that the part can be judged again after
+//! the recipe was edited or deleted. The recipe is a hard link to the store's file, which the store
+//! replaces and never changes: it takes no room while the store or another recording has it, counts
+//! once towards the quota, and goes with its last link.
 
 use crate::head::calibration::Calibration;
 use crate::recipe::plan::Plan;
@@ -37,8 +39,9 @@ pub struct JudgedPart {
 }
 
 impl JudgedPart {
-    /// Writes the frames as the new folder `folder`, with the recipe that judged the part, if it is among the files `recipes`.
-    /// The recipe is left out where it is not among them, or where it and the frames would take more than `most` bytes.
+    /// Writes the frames as the new folder `folder`, with the recipe that judged the part, if it is
+    /// among the files `recipes`. The recipe is left out where it is not among them, or where it
+    /// and the frames would take more than `most` bytes.
     ///
     /// # Errors
     /// [`RecorderError`]; nothing of it is left then.
@@ -54,11 +57,13 @@ impl JudgedPart {
             let fits = |path: &&PathBuf| fs::metadata(path).is_ok_and(|file| file.len() <= room);
             let own = partial.join(RECIPE);
             let added = recipes.iter().filter(fits).any(|path| {
-                // Checked under its new name: the store may give the old one to another file at any time.
+                // Checked under its new name: the store may give the old one to another file at any
+                // time.
                 name_also(path, &own).is_ok() && fingerprint_of(&own).as_ref() == Some(fingerprint)
             });
             if !added {
-                // There may be nothing to remove. A recording without a recipe is judged again by the store's.
+                // There may be nothing to remove. A recording without a recipe is judged again by
+                // the store's.
                 let _ = fs::remove_file(&own);
             }
         })
@@ -86,7 +91,8 @@ struct OnDisk {
     name: String,
     /// Without its recipe.
     bytes: u64,
-    /// The inode number and size in bytes of the recipe's file, by which links to the same file are counted once.
+    /// The inode number and size in bytes of the recipe's file, by which links to the same file are
+    /// counted once.
     recipe: Option<(u64, u64)>,
 }
 
@@ -104,7 +110,8 @@ impl OnDisk {
 }
 
 impl Recordings {
-    /// Opens the folder and removes recordings that were being written or removed when the program was killed. `recipes` are those of the station, `quota` is in bytes.
+    /// Opens the folder and removes recordings that were being written or removed when the program
+    /// was killed. `recipes` are those of the station, `quota` is in bytes.
     ///
     /// # Errors
     /// Whatever the file system answers.
@@ -141,8 +148,9 @@ impl Recordings {
     pub(super) fn keep(&mut self, part: &JudgedPart) -> Result<String, RecorderError> {
         let name = name_of(&part.record);
         let folder = self.folder.join(&name);
-        // The recipe of the newest recording is tried first: a recipe that was imported again is a new file in the store with the same
-        // fingerprint, and a link to that file would take room for a second copy.
+        // The recipe of the newest recording is tried first: a recipe that was imported again is a
+        // new file in the store with the same fingerprint, and a link to that file would take room
+        // for a second copy.
         let before = self.kept.back().filter(|kept| kept.recipe.is_some());
         let before = before.map(|kept| self.folder.join(&kept.name).join(RECIPE));
         let stored = self.recipes.generations(part.plan.id().number);
@@ -152,7 +160,8 @@ impl Recordings {
         Ok(name)
     }
 
-    /// Removes the oldest recording if all together are over the quota, and answers with its name; to be repeated until there is none.
+    /// Removes the oldest recording if all together are over the quota, and answers with its name;
+    /// to be repeated until there is none.
     pub(super) fn remove_over_quota(&mut self) -> Option<String> {
         let recipes: BTreeMap<u64, u64> = self.kept.iter().filter_map(|kept| kept.recipe).collect();
         let frames: u64 = self.kept.iter().map(|kept| kept.bytes).sum();
@@ -163,19 +172,21 @@ impl Recordings {
         }
     }
 
-    /// Removes the oldest recording; answers with its name. It is renamed first, so that a loss of power leaves a whole recording
-    /// or none.
+    /// Removes the oldest recording; answers with its name. It is renamed first, so that a loss of
+    /// power leaves a whole recording or none.
     pub(super) fn remove_oldest(&mut self) -> Option<String> {
         let OnDisk { name, .. } = self.kept.pop_front()?;
         let nameless = self.folder.join(format!(".{name}.partial-removed"));
-        // What cannot be removed now is removed at the next start. If it could not be renamed either, it is counted again from then on.
+        // What cannot be removed now is removed at the next start. If it could not be renamed
+        // either, it is counted again from then on.
         let _ = rename_whole(&self.folder.join(&name), &nameless)
             .and_then(|()| fs::remove_dir_all(nameless));
         Some(name)
     }
 }
 
-/// The name of a result's recording, `0000000042-0003-fail`: SEQ, recipe, verdict. Sorted by name they are sorted by SEQ.
+/// The name of a result's recording, `0000000042-0003-fail`: SEQ, recipe, verdict. Sorted by name
+/// they are sorted by SEQ.
 pub fn name_of(record: &ResultRecord) -> String {
     let verdict = match record.verdict {
         Verdict::Pass => "pass",
@@ -232,7 +243,8 @@ fn recording(part: &JudgedPart) -> Recording {
 mod tests {
     use super::*;
 
-    /// A recording by hand: frames of 100 bytes, and a recipe of 1000, linked to `recipe` or a file of its own.
+    /// A recording by hand: frames of 100 bytes, and a recipe of 1000, linked to `recipe` or a file
+    /// of its own.
     fn put(folder: &Path, seq: u32, recipe: Option<&Path>) {
         let place = folder.join(format!("{seq:010}-0001-fail"));
         fs::create_dir_all(&place).unwrap();

@@ -14,8 +14,8 @@ pub const VERSION: i64 = 2;
 /// Longest wait for another process that holds the database, the command line's for instance.
 const BUSY: Duration = Duration::from_secs(2);
 
-/// Longest wait for readers while nothing is stored: most queries take some milliseconds, and a sixth of a fast line's queue is
-/// filled by then.
+/// Longest wait for readers while nothing is stored: most queries take some milliseconds, and a
+/// sixth of a fast line's queue is filled by then.
 const READING: Duration = Duration::from_secs(1);
 /// What a damaged database is called when it is set aside, between its stem and its extension.
 pub(super) const DAMAGED: &str = "damaged";
@@ -50,8 +50,8 @@ CREATE TABLE start (boot_id TEXT PRIMARY KEY, browser_utc_us INTEGER NOT NULL);
     )
 }
 
-/// Prepares a connection that reads only. Readers see of a result, where the clock was not synchronised, also the time of its
-/// trigger by the clock of a signed-in user's browser.
+/// Prepares a connection that reads only. Readers see of a result, where the clock was not
+/// synchronised, also the time of its trigger by the clock of a signed-in user's browser.
 const DATED: &str = "
 PRAGMA temp_store = memory;
 CREATE TEMP VIEW dated AS SELECT result.*, CASE WHEN time_utc_us IS NULL THEN
@@ -122,8 +122,8 @@ pub(super) fn log_bytes(path: &Path) -> u64 {
     fs::metadata(log_of(path)).map_or(0, |found| found.len())
 }
 
-/// Brings the log into the database, syncs both, and begins the log anew. Where a reader still needs it after [`READING`] the
-/// log stays as it is.
+/// Brings the log into the database, syncs both, and begins the log anew. Where a reader still
+/// needs it after [`READING`] the log stays as it is.
 ///
 /// # Errors
 /// Whatever SQLite answers.
@@ -210,7 +210,8 @@ pub(super) fn set_aside(path: &Path, name: &str) -> std::io::Result<PathBuf> {
     }
     for suffix in ["-wal", "-shm"] {
         let (from, to) = (with_suffix(path, suffix), with_suffix(&aside, suffix));
-        // Without a log of its own the database must not get that of the one that was set aside before.
+        // Without a log of its own the database must not get that of the one that was set aside
+        // before.
         if fs::rename(&from, &to).is_err() {
             let _ = fs::remove_file(&to);
         }

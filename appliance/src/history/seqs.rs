@@ -1,8 +1,10 @@
-//! Reserves RESULT_SEQs on the card ahead of their use, so that no number is used twice and no result waits for the card.
+//! Reserves RESULT_SEQs on the card ahead of their use, so that no number is used twice and no
+//! result waits for the card.
 //!
-//! The counter's file says which SEQs may be in use. As soon as a quarter of the reserved numbers are used, a thread of its own
-//! (`reserving`) reserves [`AHEAD`] again; nothing else that waits for the card runs on it. After a loss of power numbers go on
-//! behind the reservation, so that at most [`AHEAD`] are skipped; after kill -9 behind the last result in shared memory
+//! The counter's file says which SEQs may be in use. As soon as a quarter of the reserved numbers
+//! are used, a thread of its own (`reserving`) reserves [`AHEAD`] again; nothing else that waits
+//! for the card runs on it. After a loss of power numbers go on behind the reservation, so that at
+//! most [`AHEAD`] are skipped; after kill -9 behind the last result in shared memory
 //! (`history/spool.rs`). A stop writes the SEQ of the last result, so that none is skipped.
 
 use super::spool::Spool;
@@ -12,7 +14,8 @@ use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// The most numbers that are reserved: at 86 results a second the storage may take half a second for one sync.
+/// The most numbers that are reserved: at 86 results a second the storage may take half a second
+/// for one sync.
 pub const AHEAD: u32 = 64;
 /// With so many left, more are reserved.
 const FEW: i32 = (AHEAD / 4 * 3) as i32;
@@ -31,8 +34,8 @@ pub struct Numbering {
 }
 
 impl Numbering {
-    /// Reserves the first numbers from `next` on, before anything is measured, and begins this run in the spool. The answer has
-    /// no spool where it cannot be written.
+    /// Reserves the first numbers from `next` on, before anything is measured, and begins this run
+    /// in the spool. The answer has no spool where it cannot be written.
     ///
     /// # Errors
     /// Whatever the file system answers.
@@ -140,8 +143,8 @@ impl Seqs {
         Some(format!("reserve result numbers: {words}: free space"))
     }
 
-    /// Reserves numbers whenever more are asked for, until [`Self::stop`]. `again` gets the last SEQ in use when the station waited
-    /// for numbers and there are some.
+    /// Reserves numbers whenever more are asked for, until [`Self::stop`]. `again` gets the last
+    /// SEQ in use when the station waited for numbers and there are some.
     pub(super) fn run(&self, again: impl Fn(u32)) {
         loop {
             let idle = |numbers: &mut Numbers| numbers.asked.is_none() && !numbers.stopping;
@@ -155,8 +158,8 @@ impl Seqs {
         }
     }
 
-    /// Reserves more where they are asked for: it waits for the card. Answers with the last SEQ in use if the station waited for
-    /// numbers and there are some.
+    /// Reserves more where they are asked for: it waits for the card. Answers with the last SEQ in
+    /// use if the station waited for numbers and there are some.
     fn refill(&self) -> Option<u32> {
         let last = {
             let numbers = self.numbers();
@@ -269,7 +272,8 @@ mod tests {
         assert!(skipped > 0);
         let (seqs, own) = begin(9, next);
         seqs.take(next + AHEAD - 2).unwrap();
-        // The last one that is reserved: it does not come back, also after a loss of power, and no other may follow.
+        // The last one that is reserved: it does not come back, also after a loss of power, and no
+        // other may follow.
         let last = next + AHEAD - 1;
         assert!(matches!(seqs.take(last), Err(Unstored::Busy(_))));
         show(&own, last);

@@ -1,12 +1,13 @@
 //! The last results in memory that outlives this process but not the system.
 //!
-//! Each result is put into POSIX shared memory before it is shown. No card is behind that memory, so this takes microseconds
-//! whatever the card does. After kill -9 the next start stores the results that the database lacks, and numbers go on behind
-//! the newest one: a number whose result is not here was never shown. A loss of power takes the memory away; then numbers go
-//! on behind those that are reserved on the card ([`super::seqs`]).
+//! Each result is put into POSIX shared memory before it is shown. No card is behind that memory,
+//! so this takes microseconds whatever the card does. After kill -9 the next start stores the
+//! results that the database lacks, and numbers go on behind the newest one: a number whose result
+//! is not here was never shown. A loss of power takes the memory away; then numbers go on behind
+//! those that are reserved on the card ([`super::seqs`]).
 //!
-//! The first slot says which run of the daemon the content belongs to. It counts only where the counter on the card names the
-//! same run: the state folder may be an older copy.
+//! The first slot says which run of the daemon the content belongs to. It counts only where the
+//! counter on the card names the same run: the state folder may be an older copy.
 
 use super::entry::Entry;
 use rustix::fs::Mode;
@@ -17,7 +18,8 @@ use std::os::unix::fs::{FileExt as _, MetadataExt as _};
 
 /// Results that are kept: as many as may wait for the card, six seconds of the fastest line.
 pub(super) const SLOTS: u32 = 512;
-/// Bytes of a slot; a result with as many gauges as the registers hold takes a quarter. Only what was written takes memory.
+/// Bytes of a slot; a result with as many gauges as the registers hold takes a quarter. Only what
+/// was written takes memory.
 const SLOT: usize = 16 << 10;
 /// Bytes of a number: hexadecimal digits.
 const DIGITS: usize = 8;
@@ -36,11 +38,12 @@ pub(super) fn is_after(seq: u32, other: u32) -> bool {
 }
 
 impl Spool {
-    /// Opens the spool of the device with this serial, or begins it. `owner` is the user that the state folder belongs to.
+    /// Opens the spool of the device with this serial, or begins it. `owner` is the user that the
+    /// state folder belongs to.
     ///
     /// # Errors
-    /// Whatever the system answers; `PermissionDenied` where it belongs to another user, `WouldBlock` where another process
-    /// has it.
+    /// Whatever the system answers; `PermissionDenied` where it belongs to another user,
+    /// `WouldBlock` where another process has it.
     pub fn open(serial: &str, owner: u32) -> io::Result<Self> {
         let plain = |c: &char| c.is_ascii_alphanumeric() || *c == '-';
         let plain: String = serial.chars().filter(plain).collect();
@@ -54,8 +57,8 @@ impl Spool {
         Ok(Self { file, name })
     }
 
-    /// The last SEQ that the run which the card names has shown, and the results that are here, oldest first. `None` where the
-    /// content belongs to another run, or nothing is here.
+    /// The last SEQ that the run which the card names has shown, and the results that are here,
+    /// oldest first. `None` where the content belongs to another run, or nothing is here.
     pub fn of_run(&self, run: u32) -> Option<(u32, Vec<Entry>)> {
         self.begun(run).map(|last| self.since(last))
     }
@@ -80,8 +83,8 @@ impl Spool {
         (run != 0 && [before, current].contains(&run)).then_some(last)
     }
 
-    /// Says that the content belongs to both of these runs, and that `last` is the last SEQ in use. Whatever belongs to
-    /// neither is removed.
+    /// Says that the content belongs to both of these runs, and that `last` is the last SEQ in use.
+    /// Whatever belongs to neither is removed.
     ///
     /// # Errors
     /// Whatever the system answers.

@@ -1,5 +1,5 @@
-//! The history's thread: takes results from a bounded queue and stores them. Each commit waits for the card; results that come
-//! meanwhile go into the next one together.
+//! The history's thread: takes results from a bounded queue and stores them. Each commit waits for
+//! the card; results that come meanwhile go into the next one together.
 
 use super::HistoryError;
 use super::entry::Entry;
@@ -19,16 +19,19 @@ use std::time::{Duration, Instant};
 
 /// Results that may wait for the card before some are lost to the history.
 pub(super) const MAX_WAITING: usize = SLOTS as usize;
-/// When nothing has come for this long, the log is brought into the database, and a card that refused is asked again.
+/// When nothing has come for this long, the log is brought into the database, and a card that
+/// refused is asked again.
 const PAUSE: Duration = Duration::from_secs(1);
-/// The log is also brought into the database when it is longer by so many bytes than after the last time.
+/// The log is also brought into the database when it is longer by so many bytes than after the last
+/// time.
 const STRETCH: u64 = 4 << 20;
 /// A log that is longer than this is a warning.
 const TOO_LONG: u64 = 32 << 20;
 /// When the daemon ends, a recording that is being written has this long.
 const LAST_PART: Duration = Duration::from_secs(1);
 
-/// What reaches the thread: from the station, from a sign-in, from the thread that writes recordings.
+/// What reaches the thread: from the station, from a sign-in, from the thread that writes
+/// recordings.
 pub(super) enum Message {
     Result(Box<Entry>),
     /// The name under which the frames of a result are kept, or why they are not.
@@ -175,7 +178,8 @@ impl Task {
         Ok(())
     }
 
-    /// Stores what waits and bounds the log; what went wrong, in words. `paused`: nothing has come for a while.
+    /// Stores what waits and bounds the log; what went wrong, in words. `paused`: nothing has come
+    /// for a while.
     fn flush(&mut self, paused: bool) -> Option<String> {
         let stored = match self.store() {
             Ok(begun) => {
@@ -209,7 +213,8 @@ impl Task {
         Ok(Some(begun))
     }
 
-    /// Brings the log into the database where it has grown or nothing comes; what is wrong with it, in words.
+    /// Brings the log into the database where it has grown or nothing comes; what is wrong with it,
+    /// in words.
     fn bound_log(&mut self, paused: bool) -> Option<String> {
         if paused || self.writer.log_bytes() >= self.due {
             let brought = self.writer.checkpoint();
@@ -228,8 +233,8 @@ impl Task {
         })
     }
 
-    /// Gives back numbers that were not used, and waits for the recording that is being written: half of one is removed at the
-    /// next start.
+    /// Gives back numbers that were not used, and waits for the recording that is being written:
+    /// half of one is removed at the next start.
     fn end(
         mut self,
         last_seq: u32,

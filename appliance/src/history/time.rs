@@ -12,8 +12,8 @@ pub fn utc(us: u64) -> String {
     format!("{sign}{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{us:06}Z")
 }
 
-/// Year, month and day of a number of days since 1970-01-01 (H. Hinnant, "chrono-compatible low-level date algorithms",
-/// `civil_from_days`, for days that are not negative).
+/// Year, month and day of a number of days since 1970-01-01 (H. Hinnant, "chrono-compatible
+/// low-level date algorithms", `civil_from_days`, for days that are not negative).
 fn civil(days: u64) -> (u64, u64, u64) {
     let shifted = days + 719_468;
     let (era, day) = (shifted / 146_097, shifted % 146_097);
@@ -29,8 +29,8 @@ fn civil(days: u64) -> (u64, u64, u64) {
     (era * 400 + year + carry, month, of_month)
 }
 
-/// The µs since 1970 UTC of a date (`2026-11-21`) or a time (`2026-11-21T16:30`, `2026-11-21T16:30:00+01:00`; without
-/// a zone it is UTC), as SQLite reads it.
+/// The µs since 1970 UTC of a date (`2026-11-21`) or a time (`2026-11-21T16:30`,
+/// `2026-11-21T16:30:00+01:00`; without a zone it is UTC), as SQLite reads it.
 ///
 /// # Errors
 /// In words, if the text is not a date or time.

@@ -5,7 +5,8 @@ use crate::station::{Stages, Verdict};
 use hal::replay::recorder::RecorderError;
 use std::io::ErrorKind;
 
-/// Why the frames of a part that did not pass are not kept, or no longer. `docs/formats.md` has the texts in the database.
+/// Why the frames of a part that did not pass are not kept, or no longer. `docs/formats.md` has the
+/// texts in the database.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unkept {
     /// Recordings are switched off.

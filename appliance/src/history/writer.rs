@@ -56,13 +56,15 @@ impl Writer {
         })
     }
 
-    /// Sets the database aside, which `why` says is damaged, and begins a new one; answers with a line for the log.
+    /// Sets the database aside, which `why` says is damaged, and begins a new one; answers with a
+    /// line for the log.
     ///
     /// # Errors
     /// If that is not possible; then nothing can be stored until it is.
     pub fn begin_anew(&mut self, why: &HistoryError) -> Result<String, HistoryError> {
         let failed = |error| HistoryError::of(&self.path, &error);
-        // Closed before it is renamed: a log that is still open would be taken for the new database's.
+        // Closed before it is renamed: a log that is still open would be taken for the new
+        // database's.
         self.connection = Connection::open_in_memory().map_err(failed)?;
         let said = set_aside(why)?;
         self.connection = schema::open(&self.path)?;
@@ -89,7 +91,8 @@ impl Writer {
         seq.optional().map_err(|error| self.failed(&error))
     }
 
-    /// Stores results in one transaction and removes the oldest above the limit: all of it happens, or nothing.
+    /// Stores results in one transaction and removes the oldest above the limit: all of it happens,
+    /// or nothing.
     ///
     /// # Errors
     /// [`HistoryError`]; then nothing was stored.
@@ -165,8 +168,8 @@ impl Writer {
         self.change(linked, params![name, why.to_string()])
     }
 
-    /// Notes when a start of the daemon was by the clock of a signed-in user's browser, in place of what another one said
-    /// before.
+    /// Notes when a start of the daemon was by the clock of a signed-in user's browser, in place of
+    /// what another one said before.
     ///
     /// # Errors
     /// [`HistoryError`].

@@ -1,7 +1,8 @@
 //! Digital lines: start in, and busy, ok and fault out, for presses without Modbus and for lamps.
 //!
-//! One thread serves them. It follows the station's snapshots, as Modbus and the page do, and its start is a trigger by edge, as
-//! the page's is. When the GPIO chip is lost it is opened again until that succeeds; meanwhile pull resistors hold the fault line on.
+//! One thread serves them. It follows the station's snapshots, as Modbus and the page do, and its
+//! start is a trigger by edge, as the page's is. When the GPIO chip is lost it is opened again
+//! until that succeeds; meanwhile pull resistors hold the fault line on.
 
 mod signals;
 

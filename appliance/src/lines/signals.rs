@@ -14,7 +14,8 @@ pub struct Signals {
     pub fault: bool,
 }
 
-/// Follows a station. Ok is never on for a part that was not measured: not for the part before, nor for one whose start was missed.
+/// Follows a station. Ok is never on for a part that was not measured: not for the part before, nor
+/// for one whose start was missed.
 #[derive(Clone, Copy, Debug)]
 pub struct Follower {
     seq: u32,
@@ -24,7 +25,8 @@ pub struct Follower {
 }
 
 impl Follower {
-    /// Starts with a snapshot and its signals. Its result is of an earlier part, so it does not count.
+    /// Starts with a snapshot and its signals. Its result is of an earlier part, so it does not
+    /// count.
     pub fn new(snapshot: &Snapshot) -> (Self, Signals) {
         let mut follower = Self {
             seq: snapshot.result_seq,
@@ -36,7 +38,8 @@ impl Follower {
         (follower, follower.said)
     }
 
-    /// The signals to set after this snapshot, in order; none if nothing changed. Snapshots in between may be missing.
+    /// The signals to set after this snapshot, in order; none if nothing changed. Snapshots in
+    /// between may be missing.
     pub fn follow(&mut self, snapshot: &Snapshot) -> impl Iterator<Item = Signals> + use<> {
         let finished = snapshot.result_seq != self.seq;
         let missed = snapshot.missed != self.missed;
@@ -47,7 +50,8 @@ impl Follower {
         // Work in this snapshot is on a later part.
         self.passed &= !snapshot.is_working() && !missed;
         (self.seq, self.missed) = (snapshot.result_seq, snapshot.missed);
-        // A whole cycle may pass between two snapshots; a machine that waits for busy must still see it.
+        // A whole cycle may pass between two snapshots; a machine that waits for busy must still
+        // see it.
         let unseen = (finished && !self.said.busy).then_some(Signals {
             busy: true,
             ..Signals::default()

@@ -1,5 +1,5 @@
-//! The phase that is expected in a recording: a recipe's golden map, the prediction from a preliminary measurement, or a map from a
-//! file.
+//! The phase that is expected in a recording: a recipe's golden map, the prediction from a
+//! preliminary measurement, or a map from a file.
 
 use crate::head::channel::Expected;
 use crate::head::seam;
@@ -24,7 +24,8 @@ pub(super) struct Known {
     pub pattern: usize,
     /// Φ, row-major over the camera's frame, unknown where it was not resolved.
     phase: Vec<AbsolutePhase>,
-    /// How far a placement within the recipe's tolerance can move the phase, turns; `None` without a recipe.
+    /// How far a placement within the recipe's tolerance can move the phase, turns; `None` without
+    /// a recipe.
     reach: Option<Vec<f32>>,
 }
 
@@ -153,7 +154,8 @@ impl Known {
     }
 }
 
-/// The largest difference of two phase functions over the pixels of the raster, in turns; `None` if their rasters differ.
+/// The largest difference of two phase functions over the pixels of the raster, in turns; `None` if
+/// their rasters differ.
 fn difference(a: &PhaseFunction, b: &PhaseFunction) -> Option<f64> {
     if (a.columns(), a.rows()) != (b.columns(), b.rows()) {
         return None;

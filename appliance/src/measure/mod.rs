@@ -33,9 +33,11 @@ use std::time::Instant;
 /// A measured recording.
 #[derive(Debug)]
 pub struct Measurement {
-    /// The absolute phase of each pattern of the recording; without any phase where `wrapped_only` says why.
+    /// The absolute phase of each pattern of the recording; without any phase where `wrapped_only`
+    /// says why.
     pub phases: Vec<PhaseMap>,
-    /// The wrapped phase of each pattern's finest level, in turns of that level, with its modulation and trust.
+    /// The wrapped phase of each pattern's finest level, in turns of that level, with its
+    /// modulation and trust.
     pub wrapped: Vec<PhaseMap>,
     /// For each pattern why it has no absolute phase; `None` if it has one.
     pub wrapped_only: Vec<Option<String>>,
@@ -49,7 +51,8 @@ pub struct Measurement {
     pub shots: Vec<Shot>,
     /// Largest sample.
     pub full_scale: u16,
-    /// Of Gray codes alone, for each pattern what it numbers, "column" or "row", and projector pixels per turn.
+    /// Of Gray codes alone, for each pattern what it numbers, "column" or "row", and projector
+    /// pixels per turn.
     pub places: Vec<(&'static str, f64)>,
     /// The summary.
     pub report: Report,
@@ -57,8 +60,8 @@ pub struct Measurement {
     pub intensity: Vec<u8>,
 }
 
-/// Measures every pattern of a recording. The one whose phase changes most with the height gives the heights, without models the first vertical
-/// one.
+/// Measures every pattern of a recording. The one whose phase changes most with the height gives
+/// the heights, without models the first vertical one.
 ///
 /// # Errors
 /// If levels cannot be unwrapped or a model is absurd; the message names `folder`.
@@ -66,7 +69,8 @@ pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Fail
     measure_with(recording, folder, None)
 }
 
-/// As [`measure`], with levels that need a map unwrapped about the phase that a preliminary measurement of the part predicts.
+/// As [`measure`], with levels that need a map unwrapped about the phase that a preliminary
+/// measurement of the part predicts.
 ///
 /// # Errors
 /// As for [`measure`], and if the preliminary map is of frames of another size.
@@ -79,7 +83,8 @@ pub fn measure_after(
     measure_about(recording, folder, None, Some(known))
 }
 
-/// As [`measure`], with levels that need a map unwrapped about this one: Φ in turns, NaN where it is not known.
+/// As [`measure`], with levels that need a map unwrapped about this one: Φ in turns, NaN where it
+/// is not known.
 ///
 /// # Errors
 /// As for [`measure`], and if the map has not the size of the frames.
@@ -92,9 +97,9 @@ pub fn measure_about_map(
     measure_about(recording, folder, None, Some(known))
 }
 
-/// As [`measure`], with a recipe: the height comes from the recipe's pattern, and levels that need a map are unwrapped about its
-/// golden phase instead of the reference map. The least modulation is the recipe's, and noise and working range are where the recording
-/// has none.
+/// As [`measure`], with a recipe: the height comes from the recipe's pattern, and levels that need
+/// a map are unwrapped about its golden phase instead of the reference map. The least modulation is
+/// the recipe's, and noise and working range are where the recording has none.
 ///
 /// # Errors
 /// As for [`measure`], and if the recipe is of another pattern or of frames of another size.
@@ -244,7 +249,8 @@ pub fn least_modulation(recording: &Recording) -> LeastModulation {
     recording.noise_counts.map(of_noise).unwrap_or_default()
 }
 
-/// The pattern that gives the height: that whose phase changes most with it, else the first vertical one, else the first.
+/// The pattern that gives the height: that whose phase changes most with it, else the first
+/// vertical one, else the first.
 fn primary_of(recording: &Recording, sensitivities: &[Option<Sensitivity>]) -> usize {
     let mut best = (0.0, vertical_of(recording));
     for (at, found) in sensitivities.iter().enumerate() {
@@ -300,7 +306,8 @@ impl Geometry {
     /// What makes heights of this phase function's phases.
     ///
     /// # Errors
-    /// The inner one says which model is missing, the outer one what is wrong with those that are there.
+    /// The inner one says which model is missing, the outer one what is wrong with those that are
+    /// there.
     pub fn triangulator(
         &self,
         function: &PhaseFunction,

@@ -7,15 +7,17 @@ use hal::replay::Recording;
 use std::io::ErrorKind;
 use std::path::Path;
 
-/// Heights are looked for within this share of the lower device's height about z = 0: the calibration's plane need not be near the
-/// part, because it was not taken for this recording.
+/// Heights are looked for within this share of the lower device's height about z = 0: the
+/// calibration's plane need not be near the part, because it was not taken for this recording.
 const REACH: f64 = 0.5;
 
-/// Replaces the models of a recording by those of a calibration, and its working range, which was stated about another plane. Returns σ of
-/// a height by the uncertainty of these models, mm, if they were made from a board.
+/// Replaces the models of a recording by those of a calibration, and its working range, which was
+/// stated about another plane. Returns σ of a height by the uncertainty of these models, mm, if
+/// they were made from a board.
 ///
 /// # Errors
-/// If there is no such file (66), or it cannot be used or is of a head with frames or a raster of another size (65).
+/// If there is no such file (66), or it cannot be used or is of a head with frames or a raster of
+/// another size (65).
 pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>, Failure> {
     let failed = |exit, words: String| Failure::because(exit, path.display(), words);
     let bytes = std::fs::read(path).map_err(|error| match error.kind() {

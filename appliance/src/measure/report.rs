@@ -15,14 +15,17 @@ use std::fmt::Write as _;
 /// How the levels were unwrapped.
 #[derive(Clone, Debug, Serialize)]
 pub struct Manner {
-    /// Geometric, dense, single, heterodyne, gray code, gray code alone, or wrapped where nothing is known.
+    /// Geometric, dense, single, heterodyne, gray code, gray code alone, or wrapped where nothing
+    /// is known.
     pub kind: &'static str,
     /// The levels' ratios from coarse to fine.
     pub ratios: Vec<f64>,
-    /// Ratios of the levels and beats (in brackets) by which they were unwrapped, from coarse to fine, if by a chain.
+    /// Ratios of the levels and beats (in brackets) by which they were unwrapped, from coarse to
+    /// fine, if by a chain.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chain: Option<Vec<String>>,
-    /// The map that they were unwrapped about: reference, golden, preliminary or given; `None` if they are absolute by themselves.
+    /// The map that they were unwrapped about: reference, golden, preliminary or given; `None` if
+    /// they are absolute by themselves.
     pub map: Option<&'static str>,
     /// The recipe that was given.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -45,7 +48,8 @@ pub struct Report {
     pub manner: Manner,
     /// Wall time per stage in µs.
     pub stage_us: BTreeMap<&'static str, u64>,
-    /// σ of one sample in counts: the recording's, else the recipe's, else from the frames' redundancy (N ≥ 4).
+    /// σ of one sample in counts: the recording's, else the recipe's, else from the frames'
+    /// redundancy (N ≥ 4).
     pub noise_counts: Option<f64>,
     /// Why there is only the wrapped phase of the finest level, if there is no absolute phase.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -68,7 +72,8 @@ pub struct Report {
     /// RMS of the predicted σ_z over resolved pixels, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sigma_mm: Option<f64>,
-    /// U = 2 √(`sigma_mm`² + σ²), σ that of a height by the uncertainty of the calibration that was named, mm.
+    /// U = 2 √(`sigma_mm`² + σ²), σ that of a height by the uncertainty of the calibration that was
+    /// named, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub uncertainty_mm: Option<f64>,
     /// What could be done about pixels that are not resolved.
@@ -156,7 +161,8 @@ impl Report {
         }
     }
 
-    /// Adds the uncertainty of the models that were measured with: σ of a height in mm, if it is known.
+    /// Adds the uncertainty of the models that were measured with: σ of a height in mm, if it is
+    /// known.
     pub fn add_models(&mut self, sigma_mm: Option<f64>) {
         let both = self.sigma_mm.zip(sigma_mm);
         self.uncertainty_mm = both.map(|(noise, models)| COVERAGE_FACTOR * noise.hypot(models));
@@ -256,7 +262,8 @@ impl Report {
     }
 }
 
-/// What could be done about `beyond` of the lit pixels that are out of range, or where next to none is lit.
+/// What could be done about `beyond` of the lit pixels that are out of range, or where next to none
+/// is lit.
 fn advice(
     pixels: usize,
     lit: usize,

@@ -7,7 +7,8 @@ use crate::station::{ControlWrite, Masked};
 /// First of the reserved registers at the end of CONTROL.
 const RESERVED: u16 = a::PART_NUMBER + 16;
 
-/// The write of `words` to the registers from `first` on, or `None` if a reserved register is not 0.
+/// The write of `words` to the registers from `first` on, or `None` if a reserved register is
+/// not 0.
 ///
 /// The caller has checked that they lie in CONTROL. Half of a 32-bit item changes that half only.
 pub fn control_write(first: u16, words: &[u16], order: WordOrder) -> Option<ControlWrite> {

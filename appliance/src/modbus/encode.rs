@@ -1,4 +1,5 @@
-//! From a snapshot to the 16-bit words of each block. Which value a register has is in the table of [`map`].
+//! From a snapshot to the 16-bit words of each block. Which value a register has is in the table of
+//! [`map`].
 
 use super::map::{self, Block};
 use crate::config::WordOrder;
@@ -98,7 +99,8 @@ impl Item for &str {
     }
 }
 
-/// The words of a block, `block.last - block.first + 1` of them; zeros for a block that is not served.
+/// The words of a block, `block.last - block.first + 1` of them; zeros for a block that is not
+/// served.
 pub fn block_words(snapshot: &Snapshot, block: &Block, order: WordOrder) -> Vec<u16> {
     let mut words = Words {
         first: block.first,
@@ -144,7 +146,8 @@ pub(super) fn mask(record: &ResultRecord, set: impl Fn(&Decision) -> bool) -> u3
     bits.iter().rev().fold(0, |mask, bit| mask << 1 | bit)
 }
 
-/// A number of a gauge, only if the gauge is valid: a number beside VALID = 0 would be taken for a measurement.
+/// A number of a gauge, only if the gauge is valid: a number beside VALID = 0 would be taken for a
+/// measurement.
 pub(super) fn measured(gauge: &GaugeValue, number: Option<f64>) -> Option<f64> {
     number.filter(|_| gauge.decision.valid)
 }

@@ -1,9 +1,11 @@
-//! The guard of one connection: passes on complete, well-formed frames one at a time and enforces both time-outs.
+//! The guard of one connection: passes on complete, well-formed frames one at a time and enforces
+//! both time-outs.
 //!
-//! It stands between the socket and `tokio-modbus`, whose server has no time-outs, closes the connection on a request that
-//! contradicts itself, and panics on an FC15 whose quantity exceeds its bytes. A flawed request is replaced by an empty one
-//! of the same function, and its exception is left for the service in [`FrameFlaw`]. This is sound because the library asks
-//! for more bytes only after it has answered, and the guard never hands out more than one frame.
+//! It stands between the socket and `tokio-modbus`, whose server has no time-outs, closes the
+//! connection on a request that contradicts itself, and panics on an FC15 whose quantity exceeds
+//! its bytes. A flawed request is replaced by an empty one of the same function, and its exception
+//! is left for the service in [`FrameFlaw`]. This is sound because the library asks for more bytes
+//! only after it has answered, and the guard never hands out more than one frame.
 
 use std::future::Future;
 use std::pin::Pin;
@@ -54,7 +56,8 @@ pub struct Guard<T> {
 }
 
 impl<T> Guard<T> {
-    /// Guards `stream`: `idle` between two requests, `frame` to finish a started frame or to take an answer.
+    /// Guards `stream`: `idle` between two requests, `frame` to finish a started frame or to take
+    /// an answer.
     pub fn new(stream: T, place: Place, flaw: FrameFlaw, idle: Duration, frame: Duration) -> Self {
         Self {
             stream,
@@ -146,8 +149,8 @@ fn stand_in(function: u8) -> Vec<u8> {
         .collect()
 }
 
-/// Checks that a request does not contradict itself: length, byte count, quantity of a write, coil value. The error is the
-/// exception to answer with.
+/// Checks that a request does not contradict itself: length, byte count, quantity of a write, coil
+/// value. The error is the exception to answer with.
 fn check(pdu: &[u8]) -> Result<(), u8> {
     // A write's quantity and byte count agree with each other and with the bytes that came.
     let counts =

@@ -6,8 +6,8 @@ use crate::config::WordOrder;
 use crate::station::Snapshot;
 use serde_json::{Value, json};
 
-/// `{"registers": [{"address", "name", "type", "block", "served", "values", "meaning"}]}`; `values` has one text per item, decoded
-/// from the words in their normal order.
+/// `{"registers": [{"address", "name", "type", "block", "served", "values", "meaning"}]}`; `values`
+/// has one text per item, decoded from the words in their normal order.
 pub fn live(snapshot: &Snapshot) -> Value {
     let rows: Vec<Value> = registers()
         .map(|(block, row)| {

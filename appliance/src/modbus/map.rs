@@ -92,8 +92,9 @@ impl Register {
     }
 }
 
-/// Declares each block once, with its addresses and whether it can be written, and each row once: address, name, type, number of
-/// items, value, meaning. The values come from the snapshot or from the result that the block shows.
+/// Declares each block once, with its addresses and whether it can be written, and each row once:
+/// address, name, type, number of items, value, meaning. The values come from the snapshot or from
+/// the result that the block shows.
 macro_rules! registers {
     ($($module:ident $block:ident $first:literal..=$last:literal, $writable:literal, $shown:ident: $from:ty {
         $($address:literal $name:ident $kind:ident x $items:literal = $value:expr, $meaning:literal;)*
@@ -243,7 +244,8 @@ pub const OLDEST: Block = Block {
     ..RESULT
 };
 
-/// Every block with its rows, by address. OLDEST repeats the rows of RESULT, moved by [`Block::first`].
+/// Every block with its rows, by address. OLDEST repeats the rows of RESULT, moved by
+/// [`Block::first`].
 pub const BLOCKS: [(Block, &[Register]); 9] = [
     (CONTROL, at::control::ROWS),
     (STATUS, at::status::ROWS),

@@ -1,7 +1,8 @@
 //! Places: the limit on connections, and which one is closed for a new one.
 //!
-//! One place is kept for a client that may write. When all connections are in use, the one idle for longest is closed for the new one;
-//! if none is idle, the new one is refused. Readers never displace writers.
+//! One place is kept for a client that may write. When all connections are in use, the one idle for
+//! longest is closed for the new one; if none is idle, the new one is refused. Readers never
+//! displace writers.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll};
@@ -9,9 +10,11 @@ use std::time::{Duration, Instant};
 
 use tokio::sync::oneshot;
 
-/// A connection is idle if its last request is older than this: a slow PLC has then missed three polls.
+/// A connection is idle if its last request is older than this: a slow PLC has then missed three
+/// polls.
 const IDLE: Duration = Duration::from_secs(5);
-/// A connection that has sent no complete request yet is idle after this, which is far longer than a round trip.
+/// A connection that has sent no complete request yet is idle after this, which is far longer than
+/// a round trip.
 const MUTE: Duration = Duration::from_millis(250);
 
 /// The places of one server. Cheap to clone.
@@ -58,7 +61,8 @@ impl Table {
         Some((number, closed))
     }
 
-    /// The connection to close for a new one: readers before writers, and among them the one that has been idle for longest.
+    /// The connection to close for a new one: readers before writers, and among them the one that
+    /// has been idle for longest.
     fn idle_longest(&self, may_write: bool, now: Instant) -> Option<u64> {
         let idle = |other: &&Connection| {
             let patience = if other.spoke { IDLE } else { MUTE };

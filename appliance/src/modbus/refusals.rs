@@ -1,4 +1,5 @@
-//! Refusals for the log: what was refused to which address, with a rate limit, so that an attack cannot flood the log.
+//! Refusals for the log: what was refused to which address, with a rate limit, so that an attack
+//! cannot flood the log.
 
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, PoisonError};

@@ -27,7 +27,8 @@ fn version() -> String {
     format!("{}.{}", VERSION >> 8, VERSION & 0xFF)
 }
 
-/// The map as CSV: one header line, one line per row. `reference` is the 3xxxxx/4xxxxx notation of the PDU address.
+/// The map as CSV: one header line, one line per row. `reference` is the 3xxxxx/4xxxxx notation of
+/// the PDU address.
 pub fn registers_csv() -> String {
     let mut csv =
         String::from("address,reference,name,type,registers,access,block,served,meaning\n");
@@ -47,8 +48,8 @@ pub fn registers_csv() -> String {
     csv
 }
 
-/// The map as JSON: `{"format", "version", "registers": [{"address", "reference", "name", "type", "registers", "access",
-/// "block", "served", "meaning"}]}`.
+/// The map as JSON: `{"format", "version", "registers": [{"address", "reference", "name", "type",
+/// "registers", "access", "block", "served", "meaning"}]}`.
 pub fn registers_json() -> serde_json::Value {
     let rows: Vec<_> = registers()
         .map(|(block, row)| {

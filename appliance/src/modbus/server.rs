@@ -1,4 +1,5 @@
-//! The server: accepts connections on top of `tokio-modbus`, within their limits of number and time.
+//! The server: accepts connections on top of `tokio-modbus`, within their limits of number and
+//! time.
 
 use std::future::Future;
 use std::net::{IpAddr, SocketAddr};
@@ -64,7 +65,8 @@ pub async fn serve(
     let on_connected = |stream: TcpStream, peer: SocketAddr| {
         let connection = admit(peer.ip()).map(|(place, may_write)| {
             let number = connections.fetch_add(1, Ordering::Relaxed);
-            // Nagle's algorithm would delay the small answers. If it cannot be switched off the connection still works.
+            // Nagle's algorithm would delay the small answers. If it cannot be switched off the
+            // connection still works.
             let _ = stream.set_nodelay(true);
             let flaw = FrameFlaw::default();
             let service = PlcService {
@@ -86,7 +88,8 @@ pub async fn serve(
     };
     let accept = async {
         loop {
-            // Returns only when accept fails, for example without free file descriptors: wait, then go on.
+            // Returns only when accept fails, for example without free file descriptors: wait, then
+            // go on.
             let _ = server.serve(&on_connected, |_broken_connection| ()).await;
             tokio::time::sleep(Duration::from_millis(100)).await;
         }

@@ -28,7 +28,8 @@ pub const MAX_WRITE_BITS: usize = 1968;
 /// Coils and discrete inputs: one word each.
 const BITS: u16 = 16;
 
-/// The guard's verdict on the frame that the library decodes next: 0, or the exception to answer with.
+/// The guard's verdict on the frame that the library decodes next: 0, or the exception to answer
+/// with.
 pub type FrameFlaw = Arc<AtomicU8>;
 
 /// The service of one connection.
@@ -66,7 +67,8 @@ impl PlcService {
             self.refusals.note(Refused::Write, self.peer);
             return Err(ExceptionCode::IllegalFunction);
         }
-        // A flawed frame was replaced by an empty one of its function, which must not be carried out.
+        // A flawed frame was replaced by an empty one of its function, which must not be carried
+        // out.
         match self.flaw.load(Ordering::Relaxed) {
             0 => {}
             flaw => return Err(ExceptionCode::new(flaw)),
@@ -201,10 +203,12 @@ fn bits(word: u16, first: u16, count: u16) -> Result<Vec<bool>, ExceptionCode> {
         .collect())
 }
 
-/// The answer to FC43/14 after its function code. `tokio-modbus` 0.17 does not export its type, so the bytes are built here:
-/// MEI type, read code, conformity (0x83: extended, stream and individual), more follows, next object, number of objects, objects.
+/// The answer to FC43/14 after its function code. `tokio-modbus` 0.17 does not export its type, so
+/// the bytes are built here: MEI type, read code, conformity (0x83: extended, stream and
+/// individual), more follows, next object, number of objects, objects.
 ///
-/// Stream access (read code 1–3) starts at `object` if that exists, else at the first one; read code 4 gives one object.
+/// Stream access (read code 1–3) starts at `object` if that exists, else at the first one; read
+/// code 4 gives one object.
 fn identification(
     identity: &Identity,
     read_code: u8,

@@ -1,7 +1,8 @@
 //! A checkerboard as a PDF: to scale, with its size written on it.
 //!
-//! Coordinates of a page are in points of 1/72 inch from its lower left corner (ISO 32000-1, 8.3.2.3); `re` and `f` fill a rectangle
-//! (8.5.2, 8.5.3), `Tj` shows a text (9.4.3) in one of the 14 standard fonts, which need not be embedded (9.6.2.2).
+//! Coordinates of a page are in points of 1/72 inch from its lower left corner (ISO 32000-1,
+//! 8.3.2.3); `re` and `f` fill a rectangle (8.5.2, 8.5.3), `Tj` shows a text (9.4.3) in one of the
+//! 14 standard fonts, which need not be embedded (9.6.2.2).
 
 use algo::calibration::Board;
 use std::fmt::Write as _;

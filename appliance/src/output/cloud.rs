@@ -48,10 +48,11 @@ impl Axes {
     }
 }
 
-/// A binary little-endian PLY: one vertex per known height with float x, y, z in mm, uchar intensity and float sigma (σ_z in mm, NaN
-/// where not known).
+/// A binary little-endian PLY: one vertex per known height with float x, y, z in mm, uchar
+/// intensity and float sigma (σ_z in mm, NaN where not known).
 ///
-/// `heights` are row-major in rows of `width` pixels; `shade` gives intensity and σ_z of the pixel of an index.
+/// `heights` are row-major in rows of `width` pixels; `shade` gives intensity and σ_z of the pixel
+/// of an index.
 pub fn ply(
     triangulator: &Triangulator,
     axes: Axes,

@@ -11,7 +11,8 @@ const SCALE_WIDTH: usize = 96;
 const MIN_HEIGHT: usize = 120;
 const MARGIN: usize = 12;
 const BAR_WIDTH: usize = 16;
-/// Share of the heights at each end that the scale leaves out, so that single outliers do not stretch it.
+/// Share of the heights at each end that the scale leaves out, so that single outliers do not
+/// stretch it.
 const TAIL: f64 = 0.005;
 
 /// A PNG of `mm` (row-major, NaN = unresolved), coloured by height, with a scale bar in mm.

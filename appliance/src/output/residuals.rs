@@ -1,4 +1,5 @@
-//! Pictures of a calibration: the residuals of both devices as arrows, and where in the frame the board was seen.
+//! Pictures of a calibration: the residuals of both devices as arrows, and where in the frame the
+//! board was seen.
 
 use super::canvas::{Canvas, LETTER, LINE};
 use algo::calibration::Arrow;
@@ -23,7 +24,8 @@ fn colour(pose: usize) -> [u8; 3] {
     COLOURS[pose % COLOURS.len()]
 }
 
-/// A device's residuals in all poses, each pose in a colour of its own, as a PNG; `device` is its name and `size` its columns and rows.
+/// A device's residuals in all poses, each pose in a colour of its own, as a PNG; `device` is its
+/// name and `size` its columns and rows.
 pub fn arrows_png(device: &str, size: (usize, usize), poses: &[&[Arrow]]) -> Vec<u8> {
     let mut canvas = Canvas::<3>::new(size.0, size.1);
     for (pose, arrows) in poses.iter().enumerate() {
@@ -49,8 +51,8 @@ pub fn arrows_png(device: &str, size: (usize, usize), poses: &[&[Arrow]]) -> Vec
     canvas.png(png::Compression::Fast)
 }
 
-/// Where in the camera's frame corners were seen, each pose in a colour of its own, as a PNG; cells of `cells` columns and rows
-/// without any are lighter.
+/// Where in the camera's frame corners were seen, each pose in a colour of its own, as a PNG; cells
+/// of `cells` columns and rows without any are lighter.
 pub fn coverage_png(size: (usize, usize), cells: (usize, usize), poses: &[&[Arrow]]) -> Vec<u8> {
     let cell = |(x, y): (f64, f64)| {
         let of = |at: f64, size: usize, cells: usize| {

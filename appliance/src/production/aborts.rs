@@ -4,7 +4,8 @@ use crate::station::JobId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// The last aborted job: set by the station, read by the measuring task between two frames. Cheap to clone.
+/// The last aborted job: set by the station, read by the measuring task between two frames. Cheap
+/// to clone.
 #[derive(Clone, Debug, Default)]
 pub struct Aborts(Arc<AtomicU64>);
 

@@ -1,4 +1,5 @@
-//! A cycle of the measuring task: one sequence after the other until one is good enough, then the result.
+//! A cycle of the measuring task: one sequence after the other until one is good enough, then the
+//! result.
 
 use super::stopwatch::timed_on;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker};
@@ -29,7 +30,8 @@ impl Worker {
     pub(super) fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> JudgedBy {
         let id = job.job;
         let Some(plan) = plan else {
-            // Not reached: the station accepts triggers only with an active recipe, whose plan this is.
+            // Not reached: the station accepts triggers only with an active recipe, whose plan this
+            // is.
             let message = "measure: no recipe is loaded".into();
             self.station.event(failed(id, error_code::RIG, message));
             return JudgedBy::default();
@@ -51,7 +53,8 @@ impl Worker {
                 flags |= RETRIED;
             }
             let last = sequence + 1 >= plan.sequence_count();
-            // Not before the judgement if another sequence may follow: the part must stay in place until then.
+            // Not before the judgement if another sequence may follow: the part must stay in place
+            // until then.
             if last {
                 self.station.event(Event::ExposureDone { job: id });
             }
@@ -88,8 +91,8 @@ impl Worker {
         }
     }
 
-    /// Takes the frames of a sequence and decodes each level on arrival; the time is the processor's for decoding. `None` if frames
-    /// are missing; the station has then got the reason.
+    /// Takes the frames of a sequence and decodes each level on arrival; the time is the
+    /// processor's for decoding. `None` if frames are missing; the station has then got the reason.
     fn take(
         &mut self,
         plan: &Plan,

@@ -1,7 +1,8 @@
 //! Pictures and downloads of the last cycle, computed only on request.
 //!
-//! The measuring task keeps the plan and the frames of the last cycle. A request for something computed from them is queued, and
-//! its thread waits; the measuring task answers when it has nothing more urgent to do.
+//! The measuring task keeps the plan and the frames of the last cycle. A request for something
+//! computed from them is queued, and its thread waits; the measuring task answers when it has
+//! nothing more urgent to do.
 
 use crate::history::JudgedPart;
 use crate::recipe::plan::Layers;
@@ -24,7 +25,8 @@ pub struct LastCycleRequests(Arc<Mutex<Inside>>);
 #[derive(Default)]
 struct Inside {
     waiting: Vec<Request>,
-    /// The layers (height, deviation and modulation maps) that were computed last, with the SEQ of their result.
+    /// The layers (height, deviation and modulation maps) that were computed last, with the SEQ of
+    /// their result.
     layers: Option<(u32, Arc<Layers>)>,
 }
 
@@ -33,8 +35,9 @@ impl LastCycleRequests {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has the measuring task compute `answer`, and waits for it, 3 s at most. `None` if there are no frames, too many requests
-    /// wait, or the task is busy for longer: then the request stays in the queue, and its answer is computed and dropped.
+    /// Has the measuring task compute `answer`, and waits for it, 3 s at most. `None` if there are
+    /// no frames, too many requests wait, or the task is busy for longer: then the request stays in
+    /// the queue, and its answer is computed and dropped.
     pub fn ask<T: Send + 'static>(
         &self,
         answer: impl FnOnce(&JudgedPart) -> T + Send + 'static,
@@ -53,8 +56,9 @@ impl LastCycleRequests {
         receiver.recv_timeout(PATIENCE).ok().flatten()
     }
 
-    /// The layers of the last cycle and the SEQ of its result. Those that were computed last are returned again if they are of result
-    /// `seq`, the caller's latest, or if no others can be computed.
+    /// The layers of the last cycle and the SEQ of its result. Those that were computed last are
+    /// returned again if they are of result `seq`, the caller's latest, or if no others can be
+    /// computed.
     pub fn layers(&self, seq: u32) -> Option<(u32, Arc<Layers>)> {
         let made = self.inside().layers.clone();
         if let Some((of, _)) = &made

@@ -54,7 +54,8 @@ pub enum Order {
     Measure(Job),
     /// Load a recipe.
     Load(JobId, RecipeKey),
-    /// Teach the part in front of the head as the recipe of this number; whether to keep the gauges of the one that it replaces.
+    /// Teach the part in front of the head as the recipe of this number; whether to keep the gauges
+    /// of the one that it replaces.
     Teach(JobId, u16, bool),
     /// Carry out the step of commissioning that waits.
     Commission(JobId),
@@ -117,8 +118,8 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Works until [`Order::Stop`] or until all senders of orders are gone. `begin` tells the station that the task is ready;
-    /// `first` is then requested of the station.
+    /// Works until [`Order::Stop`] or until all senders of orders are gone. `begin` tells the
+    /// station that the task is ready; `first` is then requested of the station.
     pub fn run(mut self, orders: &Receiver<Order>, begin: Event, first: Option<Request>) {
         self.progress.clear();
         self.tell_condition();
@@ -167,7 +168,8 @@ impl Worker {
                     self.commission(job, &mut plan);
                 }
                 Ok(Order::Look(look)) => {
-                    // Pictures that are asked for one after another leave no time for the sign of life below.
+                    // Pictures that are asked for one after another leave no time for the sign of
+                    // life below.
                     self.station.event(Event::Alive);
                     self.look(look, plan.as_ref());
                 }
@@ -194,7 +196,8 @@ impl Worker {
         }
     }
 
-    /// Reports what the projector's controller says of itself, if that has changed; nothing is known of one that is lost.
+    /// Reports what the projector's controller says of itself, if that has changed; nothing is
+    /// known of one that is lost.
     fn tell_projector(&self, state: Option<ControllerState>) {
         let known = state.map_or_else(ProjectorHealth::default, |state| ProjectorHealth {
             temperature_c: state.temperature_c,
@@ -294,8 +297,9 @@ impl Worker {
         }
     }
 
-    /// Loads the patterns of the active recipe into the projector again, after those of another one may have replaced them. If that
-    /// fails, there is no plan any more, and each trigger ends INVALID.
+    /// Loads the patterns of the active recipe into the projector again, after those of another one
+    /// may have replaced them. If that fails, there is no plan any more, and each trigger ends
+    /// INVALID.
     fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
         let Some(before) = plan else { return };
         let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
@@ -309,8 +313,9 @@ impl Worker {
         }
     }
 
-    /// Makes a recipe ready to measure: plans it and loads its patterns. `shown` is the plan whose patterns the head holds; if it is
-    /// the one that is asked for, there is nothing to do. The second result warns that the previous generation of the recipe is used.
+    /// Makes a recipe ready to measure: plans it and loads its patterns. `shown` is the plan whose
+    /// patterns the head holds; if it is the one that is asked for, there is nothing to do. The
+    /// second result warns that the previous generation of the recipe is used.
     fn prepare(
         &mut self,
         key: &RecipeKey,
@@ -350,7 +355,8 @@ impl Worker {
                     None => Plan::new(loaded.recipe, calibration, simulated),
                 });
                 let plan = Arc::new(planned.map_err(refuse_plan)?);
-                // The plan of the previous generation does not belong to the stamp of the newest file.
+                // The plan of the previous generation does not belong to the stamp of the newest
+                // file.
                 if let Some(stamp) = stamp.filter(|_| loaded.fallback.is_none()) {
                     self.shelf.put(stamp, fingerprint, plan.clone());
                 }
@@ -383,8 +389,8 @@ fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
 
 /// Runs what makes a recipe ready, and turns a panic into a refusal of the recipe.
 ///
-/// Recipes are imported from outside. One that makes the computation panic must not end the process: the next start would load it
-/// again, and so on.
+/// Recipes are imported from outside. One that makes the computation panic must not end the
+/// process: the next start would load it again, and so on.
 pub(crate) fn caught<T>(
     prepare: impl FnOnce() -> Result<T, (RecipeResult, String)>,
 ) -> Result<T, (RecipeResult, String)> {

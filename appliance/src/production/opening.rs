@@ -1,4 +1,5 @@
-//! Opens the head at the start: once, or again and again until it is there if a service manager started the program.
+//! Opens the head at the start: once, or again and again until it is there if a service manager
+//! started the program.
 
 use super::Order;
 use super::recovery::{Pause, REMEDY};
@@ -31,9 +32,10 @@ pub struct Opening<'a> {
 }
 
 impl Opening<'_> {
-    /// Opens the head; returns it with the event that tells the station that it can work. `outcome` gets the outcome of the first
-    /// attempt for the caller of the start: where parts are placed in front of a simulated head, or `None` as long as the head is
-    /// waited for. Returns `None` if the head cannot be opened or the daemon ends.
+    /// Opens the head; returns it with the event that tells the station that it can work. `outcome`
+    /// gets the outcome of the first attempt for the caller of the start: where parts are placed in
+    /// front of a simulated head, or `None` as long as the head is waited for. Returns `None` if
+    /// the head cannot be opened or the daemon ends.
     pub fn run(
         &self,
         orders: &Receiver<Order>,

@@ -1,4 +1,5 @@
-//! Recovery of a lost head: reports a fault with its remedy, and opens the head again until it is there.
+//! Recovery of a lost head: reports a fault with its remedy, and opens the head again until it is
+//! there.
 
 use super::{Order, SIGN_OF_LIFE, Worker, active};
 use crate::error::code_of;
@@ -15,7 +16,8 @@ const LONGEST_WAIT: u32 = 16;
 /// The remedy for a head that is not there.
 pub(super) const REMEDY: &str = "the head is opened again by itself as soon as it is there; the cable and the power of camera and projector are what to check";
 
-/// Whether the head has to be opened again: a device is gone, or one did not answer in time and is in an unknown state.
+/// Whether the head has to be opened again: a device is gone, or one did not answer in time and is
+/// in an unknown state.
 pub fn is_lost(error: &Error) -> bool {
     matches!(error, Error::Disconnected { .. } | Error::Timeout { .. })
 }
@@ -77,7 +79,8 @@ impl Worker {
     }
 }
 
-/// The pause between two attempts to open a head: from one sign of life to [`LONGEST_WAIT`], doubled after each attempt.
+/// The pause between two attempts to open a head: from one sign of life to [`LONGEST_WAIT`],
+/// doubled after each attempt.
 #[derive(Default)]
 pub(super) struct Pause {
     /// Of the last pause.
@@ -85,8 +88,8 @@ pub(super) struct Pause {
 }
 
 impl Pause {
-    /// Waits until it is time to try again, giving signs of life; `Break` when the daemon ends. Orders that come are dropped:
-    /// the fault has ended their jobs.
+    /// Waits until it is time to try again, giving signs of life; `Break` when the daemon ends.
+    /// Orders that come are dropped: the fault has ended their jobs.
     pub(super) fn wait(
         &mut self,
         orders: &Receiver<Order>,

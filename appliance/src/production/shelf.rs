@@ -1,11 +1,12 @@
-//! A cache of plans: those used last stay, so that a line that changes back and forth between recipes does not wait.
+//! A cache of plans: those used last stay, so that a line that changes back and forth between
+//! recipes does not wait.
 
 use crate::recipe::plan::Plan;
 use crate::recipe::store::Stamp;
 use std::sync::Arc;
 
-/// Most bytes of the kept plans, including the active one, and of the file that is being read beside them: two recipes for a
-/// camera of 1.6 megapixels, or dozens for a small one.
+/// Most bytes of the kept plans, including the active one, and of the file that is being read
+/// beside them: two recipes for a camera of 1.6 megapixels, or dozens for a small one.
 const ROOM: u64 = 112 << 20;
 
 /// The plans; the most recently used one is the last.

@@ -4,16 +4,16 @@ use rayon::ThreadPool;
 use rustix::time::{ClockId, clock_gettime};
 use std::time::Duration;
 
-/// Runs `work` and returns the processor time that this thread spent on it. Time in which another thread had the core does not
-/// count.
+/// Runs `work` and returns the processor time that this thread spent on it. Time in which another
+/// thread had the core does not count.
 pub fn timed(work: impl FnOnce()) -> Duration {
     let began = now();
     work();
     now().saturating_sub(began)
 }
 
-/// Runs `work` on `pool` and returns its result and the processor time of all threads of the pool meanwhile. On a pool of several
-/// threads this includes their search for work.
+/// Runs `work` on `pool` and returns its result and the processor time of all threads of the pool
+/// meanwhile. On a pool of several threads this includes their search for work.
 pub fn timed_on<T: Send>(pool: &ThreadPool, work: impl FnOnce() -> T + Send) -> (T, Duration) {
     let spent = || pool.broadcast(|_| now()).into_iter().sum::<Duration>();
     let began = spent();

@@ -1,4 +1,5 @@
-//! Teaching on the station: from the part in front of the head to a stored recipe that is ready to measure.
+//! Teaching on the station: from the part in front of the head to a stored recipe that is ready to
+//! measure.
 
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, recovery};
 use crate::recipe::plan::Plan;
@@ -8,8 +9,8 @@ use crate::station::{Event, JobId, RecipeKey, StationHandle, error_code};
 use std::sync::Arc;
 
 impl Worker {
-    /// Teaches the part in front of the head and stores it as recipe `number`; it is the active one then. Where that fails the
-    /// recipe before stays active.
+    /// Teaches the part in front of the head and stores it as recipe `number`; it is the active one
+    /// then. Where that fails the recipe before stays active.
     pub(super) fn teach(
         &mut self,
         job: JobId,
@@ -109,8 +110,8 @@ impl Worker {
         failed
     }
 
-    /// Stores a recipe. `kept` is the one whose gauges it has taken over. It must still be the stored one: an edit that was stored
-    /// meanwhile must not be lost.
+    /// Stores a recipe. `kept` is the one whose gauges it has taken over. It must still be the
+    /// stored one: an edit that was stored meanwhile must not be lost.
     fn store(&self, taught: &TaughtRecipe, kept: Option<RecipeFile>) -> Result<(), (u16, String)> {
         for reason in &taught.choice.reasons {
             self.progress.log(reason);

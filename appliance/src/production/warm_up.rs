@@ -4,10 +4,12 @@ use std::time::{Duration, Instant};
 
 /// A head is warm once no device has changed by more than [`STEADY_C`] for so long.
 const STEADY_FOR: Duration = Duration::from_secs(300);
-/// °C. A projector's lamp shifts its picture by some hundredths of a pixel per degree; a steady head scatters by less than half of that.
+/// °C. A projector's lamp shifts its picture by some hundredths of a pixel per degree; a steady
+/// head scatters by less than half of that.
 const STEADY_C: f64 = 1.0;
 
-/// The temperature of each device since when it has been steady; a head without temperatures is taken to be warm.
+/// The temperature of each device since when it has been steady; a head without temperatures is
+/// taken to be warm.
 #[derive(Debug, Default)]
 pub struct WarmUp {
     /// Of the camera and of the projector.
@@ -22,7 +24,8 @@ struct Steady {
 }
 
 impl WarmUp {
-    /// Notes the temperatures of camera and projector, where they are known. Answers whether the head's state has changed.
+    /// Notes the temperatures of camera and projector, where they are known. Answers whether the
+    /// head's state has changed.
     pub fn note(&mut self, celsius: [Option<f64>; 2], now: Instant) -> bool {
         for (device, celsius) in self.devices.iter_mut().zip(celsius) {
             let Some(celsius) = celsius else {

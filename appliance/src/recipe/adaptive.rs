@@ -50,8 +50,8 @@ impl Preliminary {
         Ok(Self { function, shots })
     }
 
-    /// The pattern for the part that was measured with these fringes: that of least error for the part's light, the noise of the camera and the
-    /// blur that the part and the calibration show.
+    /// The pattern for the part that was measured with these fringes: that of least error for the
+    /// part's light, the noise of the camera and the blur that the part and the calibration show.
     ///
     /// # Errors
     /// If nothing of the part is known, or its pattern cannot be shown.
@@ -84,7 +84,8 @@ impl Preliminary {
         })
     }
 
-    /// The blur by the modulation of the finest and of the coarsest level on the part, and by the contrast that was calibrated.
+    /// The blur by the modulation of the finest and of the coarsest level on the part, and by the
+    /// contrast that was calibrated.
     fn blur(
         &self,
         part: &Measured,
@@ -110,8 +111,8 @@ impl Preliminary {
     }
 }
 
-/// The blur by the contrast of all pitches that calibration measured, on the reference plane in the middle of the frame. A pitch
-/// counts by how much blur weakens it.
+/// The blur by the contrast of all pitches that calibration measured, on the reference plane in the
+/// middle of the frame. A pitch counts by how much blur weakens it.
 fn on_plate(contrast: &ContrastFile, triangulator: &Triangulator) -> Option<Spread> {
     let [coarsest, finer @ ..] = &contrast.pitches[..] else {
         return None;
@@ -154,7 +155,8 @@ mod tests {
     use sim::{Part, Scenario};
     use std::time::Duration;
 
-    /// A sphere in front of a small head with these σ of both lenses: what is projected, and its measurement.
+    /// A sphere in front of a small head with these σ of both lenses: what is projected, and its
+    /// measurement.
     fn sphere(projector: f64, camera: f64) -> (Preliminary, Measured, Calibration) {
         let mut scenario = Scenario {
             part: Part::Sphere(Sphere::default()),

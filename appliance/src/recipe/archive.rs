@@ -20,10 +20,12 @@ const MAX_MANIFEST: u64 = 1 << 20;
 /// The fingerprint in the manifest while the fingerprint is computed.
 const NO_FINGERPRINT: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 
-/// Defines [`Arrays`] with what is done to each of them by its name, which is also that of its member.
+/// Defines [`Arrays`] with what is done to each of them by its name, which is also that of its
+/// member.
 macro_rules! arrays {
     ($($(#[$doc:meta])* $name:ident: $element:ty,)*) => {
-        /// The arrays of a recipe, row-major over the camera's frame except the phase function and the amplitude.
+        /// The arrays of a recipe, row-major over the camera's frame except the phase function and
+        /// the amplitude.
         #[derive(Clone, Debug, Default, PartialEq)]
         pub struct Arrays {
             $($(#[$doc])* pub $name: Vec<$element>,)*
@@ -35,7 +37,8 @@ macro_rules! arrays {
                 vec![$((stringify!($name), self.$name.len())),*]
             }
 
-            /// The arrays by their members' names, in rows of as many `columns` as an array of this name has.
+            /// The arrays by their members' names, in rows of as many `columns` as an array of this
+            /// name has.
             fn members(&self, columns: impl Fn(&str) -> u32) -> Vec<(&'static str, Vec<u8>)> {
                 vec![$((
                     concat!(stringify!($name), ".npy"),
@@ -66,18 +69,22 @@ arrays! {
     height_slope: f32,
     /// ∂²z/∂Φ² in mm per turn².
     height_curvature: f32,
-    /// Weight of a pixel's deviation from golden ([`algo::inspect::Weight::bits`]); 0 where it is not compared.
+    /// Weight of a pixel's deviation from golden ([`algo::inspect::Weight::bits`]); 0 where it is
+    /// not compared.
     valid: u8,
     /// Modulation as taught, in counts.
     modulation: f32,
-    /// Largest |ΔΦ| in turns that a placement within the tolerance can cause; infinite where golden is not resolved.
+    /// Largest |ΔΦ| in turns that a placement within the tolerance can cause; infinite where golden
+    /// is not resolved.
     phase_reach: f32,
-    /// For all sequences but the full one, behind each other: Φ as taught by this sequence less `golden_phase`, 1/65536 turn. Empty
-    /// where golden was not measured with them.
+    /// For all sequences but the full one, behind each other: Φ as taught by this sequence less
+    /// `golden_phase`, 1/65536 turn. Empty where golden was not measured with them.
     sequence_offset: i16,
-    /// The light of each pixel of the projector's raster, in 1/255 of what its pattern asks for; empty where that is all of it.
+    /// The light of each pixel of the projector's raster, in 1/255 of what its pattern asks for;
+    /// empty where that is all of it.
     amplitude: u8,
-    /// Least side of the squares of a deviation about each pixel, in pixels; empty where any will do.
+    /// Least side of the squares of a deviation about each pixel, in pixels; empty where any will
+    /// do.
     smoothing: u8,
 }
 
@@ -88,7 +95,8 @@ impl Arrays {
     }
 }
 
-/// What is wrong with a file that is not a ZIP, lacks a member, or has one that cannot be read; with the remedy.
+/// What is wrong with a file that is not a ZIP, lacks a member, or has one that cannot be read;
+/// with the remedy.
 pub(super) fn broken(what: impl std::fmt::Display) -> String {
     let what = shortened(&what.to_string());
     format!("{what}: export the recipe again or teach it")
@@ -136,8 +144,8 @@ pub(crate) fn seal(
     Ok((bytes, fingerprint))
 }
 
-/// Unpacks a recipe of `size` bytes and checks its fingerprint. The bytes of one member at a time are in memory, beside the
-/// arrays read so far.
+/// Unpacks a recipe of `size` bytes and checks its fingerprint. The bytes of one member at a time
+/// are in memory, beside the arrays read so far.
 ///
 /// # Errors
 /// In words, with the remedy: it is not a recipe, of another version, or changed.
@@ -152,7 +160,8 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
             .content(&name, size)
             .map_err(|error| broken(format!("member {name}: {error}")))?;
         hash.add(&name, &content);
-        // A wrong fingerprint, checked below, is the better message: the file as a whole was damaged.
+        // A wrong fingerprint, checked below, is the better message: the file as a whole was
+        // damaged.
         problem = problem.or(arrays.read(&name, &content).err());
     }
     let computed = hash.finish();
@@ -169,12 +178,14 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
     }
 }
 
-/// Whether it is a recipe that this program reads, and its content agrees with the fingerprint; read through a small buffer.
+/// Whether it is a recipe that this program reads, and its content agrees with the fingerprint;
+/// read through a small buffer.
 pub fn is_sound(source: impl Read + Seek) -> bool {
     agrees(source, |text| Some(parse(text).ok()?.fingerprint))
 }
 
-/// Whether the content agrees with the fingerprint that the manifest states, whatever else that says: it is not damaged.
+/// Whether the content agrees with the fingerprint that the manifest states, whatever else that
+/// says: it is not damaged.
 pub(super) fn is_undamaged(source: impl Read + Seek) -> bool {
     #[derive(serde::Deserialize)]
     struct Stated {
@@ -235,9 +246,11 @@ pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, String> {
 /// Reads the text of a manifest and checks the bounds of its values.
 ///
 /// # Errors
-/// In words, with the remedy: it is not a manifest, of another version, or a value is out of its bounds.
+/// In words, with the remedy: it is not a manifest, of another version, or a value is out of its
+/// bounds.
 pub fn parse(text: &str) -> Result<RecipeFile, String> {
-    /// What every version has, read first: another version is reported as such, whatever else it contains.
+    /// What every version has, read first: another version is reported as such, whatever else it
+    /// contains.
     #[derive(serde::Deserialize)]
     struct Header {
         #[serde(default)]
@@ -273,8 +286,8 @@ fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, String> {
         .map_err(|error| broken(format!("member {name}: {error}")))
 }
 
-/// SHA-256 over the manifest and then all other members in the order of their names; the name and the content of each are
-/// preceded by their lengths.
+/// SHA-256 over the manifest and then all other members in the order of their names; the name and
+/// the content of each are preceded by their lengths.
 struct Fingerprint(Sha256);
 
 impl Fingerprint {
@@ -337,8 +350,8 @@ mod tests {
         let manifest = format!("{{\"fingerprint\": \"{NO_FINGERPRINT}\"}}");
         let members = || vec![("b.npy", b"second".to_vec()), ("a.npy", b"first".to_vec())];
         let (_, fingerprint) = seal(&manifest, members()).unwrap();
-        // docs/formats.md: of each member, recipe.json first and the others by name, the length of its name, its name, the number of
-        // its bytes, its bytes.
+        // docs/formats.md: of each member, recipe.json first and the others by name, the length of
+        // its name, its name, the number of its bytes, its bytes.
         let all = [
             ("recipe.json", manifest.as_bytes()),
             ("a.npy", b"first"),

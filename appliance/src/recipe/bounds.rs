@@ -1,5 +1,5 @@
-//! Bounds of `recipe.json`: a value outside is refused, naming its key, before anything is computed with it. Those of single values stand
-//! beside them in [`super::file`].
+//! Bounds of `recipe.json`: a value outside is refused, naming its key, before anything is computed
+//! with it. Those of single values stand beside them in [`super::file`].
 //!
 //! The same bounds hold for files that are read and for edits; `docs/formats.md` lists them.
 
@@ -27,7 +27,8 @@ pub const MAX_EXPOSURES: u32 = 4;
 pub const MAX_GUARD_K: f64 = 10.0;
 
 impl RecipeFile {
-    /// Checks each value by itself; [`Recipe::check`](super::Recipe::check) checks that they fit each other and the arrays.
+    /// Checks each value by itself; [`Recipe::check`](super::Recipe::check) checks that they fit
+    /// each other and the arrays.
     ///
     /// # Errors
     /// In words that name the key, the value and the bounds.
@@ -67,7 +68,8 @@ impl RecipeFile {
     }
 }
 
-/// Checks each element of the list `name`; an error begins with the element's place and `separator`.
+/// Checks each element of the list `name`; an error begins with the element's place and
+/// `separator`.
 fn each<T>(
     name: &str,
     separator: &str,
@@ -101,7 +103,8 @@ impl RegionFile {
     fn check_bounds(&self) -> Result<(), String> {
         Fields.check("", self)?;
         length("polygon", self.polygon.len(), 3, MAX_CORNERS)?;
-        // Polygons are clipped to the frame: corners up to one frame's width outside of it are enough for any shape.
+        // Polygons are clipped to the frame: corners up to one frame's width outside of it are
+        // enough for any shape.
         let far = f64::from(MAX_SIDE);
         for corner in self.polygon.as_flattened() {
             within("polygon", *corner, -far, 2.0 * far)?;

@@ -1,4 +1,5 @@
-//! The sequences that a part can be measured with, and what is predicted of each: noise, where it is safe, wrong orders.
+//! The sequences that a part can be measured with, and what is predicted of each: noise, where it
+//! is safe, wrong orders.
 
 use super::archive::Arrays;
 use super::captures::Offsets;
@@ -18,8 +19,8 @@ pub(super) fn candidates(waveforms: Waveforms, full: &[Shot]) -> Vec<Candidate> 
     let mut full = full.to_vec();
     // The finest level last: the coarser ones are decoded while it is being exposed.
     full.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
-    // Levels of ratios 0.8 and 1 repeat together only after 5 turns: unambiguous within ± 2.5 turns of golden, less a margin for
-    // noise ([`SequenceKind::reach`]).
+    // Levels of ratios 0.8 and 1 repeat together only after 5 turns: unambiguous within ± 2.5 turns
+    // of golden, less a margin for noise ([`SequenceKind::reach`]).
     let level = |ratio, shifts| Shot::level_as(ratio, shifts, waveforms);
     vec![
         (SequenceKind::SingleLevel, level(1.0, 3).collect()),
@@ -33,8 +34,9 @@ pub(super) fn candidates(waveforms: Waveforms, full: &[Shot]) -> Vec<Candidate> 
 }
 
 impl GoldenPart<'_> {
-    /// The candidates, each with its predicted noise, the share of the surface where it is safe (where no placement within the tolerance
-    /// makes its phase ambiguous), and how often its orders are wrong unseen.
+    /// The candidates, each with its predicted noise, the share of the surface where it is safe
+    /// (where no placement within the tolerance makes its phase ambiguous), and how often its
+    /// orders are wrong unseen.
     pub(super) fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
         let candidates = candidates(self.calibration.waveforms(), self.full);
         let rated = |(kind, frames)| self.rated(kind, frames, arrays);
@@ -42,7 +44,8 @@ impl GoldenPart<'_> {
         for (sequence, offsets) in sequences.iter_mut().zip(self.offsets) {
             sequence.ripple_mm = Some(self.ripple(offsets, arrays));
         }
-        // The others are known against the full one alone, whose own is less than any of them: it is the mean of three levels.
+        // The others are known against the full one alone, whose own is less than any of them: it
+        // is the mean of three levels.
         let known = sequences.iter().filter_map(|sequence| sequence.ripple_mm);
         let least = known.reduce(f64::min);
         if let Some(full) = sequences.last_mut() {
@@ -74,8 +77,8 @@ impl GoldenPart<'_> {
         // Of a geometric sequence only the finest level contributes to the accuracy.
         let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
         let carries = |ratio: f64| !absolute || ratio >= 0.999;
-        // The modulation as taught is that of golden's finest level, which is the full sequence's; other waveforms have another
-        // share of it.
+        // The modulation as taught is that of golden's finest level, which is the full sequence's;
+        // other waveforms have another share of it.
         let taught = finest_waveform(self.full).fundamental();
         let squares = frames
             .iter()
@@ -112,9 +115,10 @@ impl GoldenPart<'_> {
         }
     }
 
-    /// The share of the frame that one measurement with these frames is expected to resolve of a part that lies as taught. Golden, the mean of
-    /// several, also has pixels that the noise of one measurement takes below the least modulation; and a sequence of limited reach leaves
-    /// out what a placement could move further than that.
+    /// The share of the frame that one measurement with these frames is expected to resolve of a
+    /// part that lies as taught. Golden, the mean of several, also has pixels that the noise of one
+    /// measurement takes below the least modulation; and a sequence of limited reach leaves out
+    /// what a placement could move further than that.
     pub(super) fn expected_coverage(
         &self,
         sequence: &SequenceFile,
@@ -133,8 +137,8 @@ impl GoldenPart<'_> {
         Some(chances.sum::<f64>() / self.phases.trust.len().max(1) as f64)
     }
 
-    /// How often these frames give one of some pixels a wrong order unseen, if they can be unwrapped; of a sequence that counts as safe for
-    /// every placement, at the map.
+    /// How often these frames give one of some pixels a wrong order unseen, if they can be
+    /// unwrapped; of a sequence that counts as safe for every placement, at the map.
     fn unseen_orders<P: Iterator<Item = usize>>(
         &self,
         (kind, frames): (SequenceKind, &[Shot]),

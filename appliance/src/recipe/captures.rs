@@ -1,8 +1,10 @@
-//! Golden's captures: the part, measured several times without a motion between, by every sequence that production may use.
+//! Golden's captures: the part, measured several times without a motion between, by every sequence
+//! that production may use.
 //!
-//! Shifts of different numbers and levels of different ratios see the harmonics of an imperfect response differently, so each sequence
-//! has a periodic error of its own. Production compares phases with golden's by the same sequence, in which the error of a part that
-//! lies as taught is the same: so the difference of each sequence from the full one is measured here.
+//! Shifts of different numbers and levels of different ratios see the harmonics of an imperfect
+//! response differently, so each sequence has a periodic error of its own. Production compares
+//! phases with golden's by the same sequence, in which the error of a part that lies as taught is
+//! the same: so the difference of each sequence from the full one is measured here.
 //!
 //! The captures are averaged as two means, from which follows what of that difference is noise.
 
@@ -25,7 +27,8 @@ const MEANS: usize = 2;
 /// All captures.
 pub const CAPTURES: usize = MEANS * means::CAPTURES;
 
-/// For each pixel the phase by a sequence less that by the full one, 1/65536 turn: of each mean. 0 where one of both is not resolved.
+/// For each pixel the phase by a sequence less that by the full one, 1/65536 turn: of each mean. 0
+/// where one of both is not resolved.
 pub type Offsets = [Vec<i16>; MEANS];
 
 /// The part by all captures.
@@ -48,8 +51,9 @@ pub struct Captured {
 }
 
 impl Captured {
-    /// Measures the part in this light with sequences of a phase function; the last is the full one, which is unwrapped about `expected`,
-    /// the others are about that. `progress` gets the share of the frames taken and may end it by `false`.
+    /// Measures the part in this light with sequences of a phase function; the last is the full
+    /// one, which is unwrapped about `expected`, the others are about that. `progress` gets the
+    /// share of the frames taken and may end it by `false`.
     ///
     /// # Errors
     /// As of [`super::teach::teach`].

@@ -14,7 +14,8 @@ use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
 use std::io::{Cursor, Read, Seek};
 
-/// Most different sides of squares of one recipe, with 0 where any will do: each takes time in every cycle.
+/// Most different sides of squares of one recipe, with 0 where any will do: each takes time in
+/// every cycle.
 const MAX_SIDES: usize = 5;
 
 /// A recipe whose parts fit each other, parsed into what planning and measuring need.
@@ -28,8 +29,8 @@ pub struct Recipe {
     pub demands: Demands,
     /// Φ_P.
     pub function: PhaseFunction,
-    /// The sequences that a part is measured with in turn, until one is good enough: the one for production, and behind it
-    /// those that unwrap further.
+    /// The sequences that a part is measured with in turn, until one is good enough: the one for
+    /// production, and behind it those that unwrap further.
     pub sequences: Vec<RecipeSequence>,
     /// What its gauges measure.
     pub gauges: Vec<Gauge>,
@@ -120,7 +121,8 @@ impl Recipe {
         Self::read(Cursor::new(bytes), bytes.len() as u64)
     }
 
-    /// As [`Self::from_bytes`], from a file of `size` bytes that is not read into memory as a whole.
+    /// As [`Self::from_bytes`], from a file of `size` bytes that is not read into memory as a
+    /// whole.
     ///
     /// # Errors
     /// As above.
@@ -130,7 +132,8 @@ impl Recipe {
         Ok(recipe)
     }
 
-    /// As [`Self::read`], with the manifest and without checking whether it can judge: an edit may be about to correct them.
+    /// As [`Self::read`], with the manifest and without checking whether it can judge: an edit may
+    /// be about to correct them.
     ///
     /// # Errors
     /// As above.
@@ -279,7 +282,8 @@ impl From<&RecipeFile> for RecipeId {
 }
 
 impl Conditions {
-    /// What the recipe was taught with and what the head is set to, where they are not the same: then its noise is not the head's.
+    /// What the recipe was taught with and what the head is set to, where they are not the same:
+    /// then its noise is not the head's.
     pub fn set_otherwise(&self, head: &Calibration) -> Option<[Exposing; 2]> {
         let (taught, present) = self.exposing.zip(head.exposing)?;
         (!taught.agrees(&present)).then_some([taught, present])

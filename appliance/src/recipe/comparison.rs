@@ -1,4 +1,5 @@
-//! The fixed pattern against the adaptive one on the taught part, as measured while teaching with equally many frames.
+//! The fixed pattern against the adaptive one on the taught part, as measured while teaching with
+//! equally many frames.
 
 use algo::pattern::MAX_FRAMES;
 use algo::phase::Trust;

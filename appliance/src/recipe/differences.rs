@@ -4,7 +4,8 @@ use super::file::{GaugeFile, RecipeFile};
 use hal::bounds::clipped;
 
 impl RecipeFile {
-    /// How it differs from the one `before`: each limit with both of its values; "nothing" if it does not.
+    /// How it differs from the one `before`: each limit with both of its values; "nothing" if it
+    /// does not.
     pub fn differences(&self, before: &Self) -> String {
         let mut words = Vec::new();
         let mut text = |what: &str, from: &str, to: &str| {
@@ -44,7 +45,8 @@ impl RecipeFile {
         }
     }
 
-    /// Which gauges have another slot than `before`, in words; `None` if none has. A PLC reads gauges by their slots.
+    /// Which gauges have another slot than `before`, in words; `None` if none has. A PLC reads
+    /// gauges by their slots.
     pub fn other_slots(&self, before: &Self) -> Option<String> {
         let slot = |gauges: &[GaugeFile], name: &str| {
             let mut names = gauges.iter().map(|gauge| &gauge.name);

@@ -12,7 +12,8 @@ use serde::Deserialize;
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Edit {
-    /// Fingerprint of the recipe that the change is based on; if another one is stored, the change is refused.
+    /// Fingerprint of the recipe that the change is based on; if another one is stored, the change
+    /// is refused.
     pub fingerprint: String,
     /// For people.
     pub name: Option<String>,
@@ -41,8 +42,8 @@ pub struct Edited {
     pub other_slots: Option<String>,
 }
 
-/// Changes a stored recipe; what was stored before stays as the previous generation. `fits` tries the changed recipe on the
-/// head and says in words why it cannot be used there.
+/// Changes a stored recipe; what was stored before stays as the previous generation. `fits` tries
+/// the changed recipe on the head and says in words why it cannot be used there.
 ///
 /// # Errors
 /// The recipe cannot be read, was changed since, would not be usable, or cannot be stored.

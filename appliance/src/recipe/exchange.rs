@@ -1,4 +1,5 @@
-//! Lists, exports and imports stored recipes. A file is imported only if it is whole, and replaces a recipe only on request.
+//! Lists, exports and imports stored recipes. A file is imported only if it is whole, and replaces
+//! a recipe only on request.
 
 use super::archive::{self, broken};
 use super::incoming::Incoming;
@@ -90,7 +91,8 @@ impl Imported {
 }
 
 impl Store {
-    /// All stored recipes by their manifests. Fingerprints are not checked here but when a recipe is loaded.
+    /// All stored recipes by their manifests. Fingerprints are not checked here but when a recipe
+    /// is loaded.
     pub fn list(&self) -> Vec<Listed> {
         let numbers = self.numbers().into_iter();
         numbers.map(|number| self.listed(number)).collect()
@@ -140,12 +142,13 @@ impl Store {
         }
     }
 
-    /// Imports a recipe from a file; one that is replaced stays as the previous generation. `fits` tries the recipe on the head and
-    /// says in words why it cannot be used there.
+    /// Imports a recipe from a file; one that is replaced stays as the previous generation. `fits`
+    /// tries the recipe on the head and says in words why it cannot be used there.
     ///
     /// # Errors
-    /// If the file is not a whole recipe, of a newer version, or does not fit the head; if the number is taken and not to be replaced,
-    /// with `replace` as the remedy; or if the store cannot be written. The store is then unchanged.
+    /// If the file is not a whole recipe, of a newer version, or does not fit the head; if the
+    /// number is taken and not to be replaced, with `replace` as the remedy; or if the store cannot
+    /// be written. The store is then unchanged.
     pub fn import(
         &self,
         source: &Path,
@@ -158,7 +161,8 @@ impl Store {
             path: source.to_path_buf(),
             source: error,
         };
-        // Copied first, so that what is stored is what was checked, even if the source changes meanwhile.
+        // Copied first, so that what is stored is what was checked, even if the source changes
+        // meanwhile.
         let _alone = self.lock().map_err(write(&self.folder))?;
         let opened = File::open(source).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (size, mut opened) = opened.map_err(missing)?;
@@ -170,11 +174,12 @@ impl Store {
         self.take_locked(incoming, id, to, replace)
     }
 
-    /// Stores a received recipe, which was checked and has this `id`; one that is replaced stays as the previous generation.
+    /// Stores a received recipe, which was checked and has this `id`; one that is replaced stays as
+    /// the previous generation.
     ///
     /// # Errors
-    /// If the number is taken and not to be replaced, with `replace` as the remedy, another recipe has the part number, or the store
-    /// cannot be written. The store is then unchanged.
+    /// If the number is taken and not to be replaced, with `replace` as the remedy, another recipe
+    /// has the part number, or the store cannot be written. The store is then unchanged.
     pub fn take(
         &self,
         incoming: Incoming,

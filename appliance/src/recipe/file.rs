@@ -61,9 +61,11 @@ bounded! {
         pub pattern: PatternFile,
         /// The sequences that the part can be measured with, from the cheapest to the full one.
         pub sequences: Vec<SequenceFile>,
-        /// Which of them is projected first in production, counted from 0; longer ones may follow in the same cycle.
+        /// Which of them is projected first in production, counted from 0; longer ones may follow
+        /// in the same cycle.
         pub production: usize,
-        /// Whether a cycle begins with the fringe and its complement at ratio 1, before the sequence for production.
+        /// Whether a cycle begins with the fringe and its complement at ratio 1, before the
+        /// sequence for production.
         pub two_frames: bool,
         /// How far a part may lie from where it was taught, in any direction, mm.
         pub placement_tolerance_mm: f64 = 0.0..=MAX_TOLERANCE_MM,
@@ -71,7 +73,8 @@ bounded! {
         pub alignment: AlignmentKind,
         /// Working range of z in mm.
         pub range_mm: [f64; 2],
-        /// Exposure and gain that the camera was set to; `None` where it was taught from a recording.
+        /// Exposure and gain that the camera was set to; `None` where it was taught from a
+        /// recording.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub exposing: Option<Exposing> = Fields,
         /// Each frame is exposed so many times as long as the head is set to, 1 to 4.
@@ -82,8 +85,9 @@ bounded! {
         pub read_noise_counts: f64 = 0.0..=MAX_NOISE_COUNTS,
         /// Variance of a sample in counts² that a count of golden's modulation adds.
         pub shot_noise: f64 = 0.0..=MAX_NOISE_COUNTS,
-        /// Median of the mean of each pixel's samples over golden's surface, counts: with it a pattern that is blurred is told from one that is too dark.
-        /// `None` where it was taught from a recording.
+        /// Median of the mean of each pixel's samples over golden's surface, counts: with it a
+        /// pattern that is blurred is told from one that is too dark. `None` where it was taught
+        /// from a recording.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub golden_offset_counts: Option<f64>,
         /// Captures that golden is the mean of; 1 where it was taught from a recording.
@@ -97,7 +101,8 @@ bounded! {
         pub expansion_range_turns: f64 = 1e-3..=MAX_FRINGES,
         /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.
         pub min_coverage: f64 = 0.0..=1.0,
-        /// A value inside its limits but nearer to one than this many times its uncertainty u is neither PASS nor FAIL.
+        /// A value inside its limits but nearer to one than this many times its uncertainty u is
+        /// neither PASS nor FAIL.
         pub guard_k: f64 = 0.0..=MAX_GUARD_K,
         /// Whether it only measures: no gauge has a limit that a part can miss.
         pub judges_nothing: bool,
@@ -105,13 +110,16 @@ bounded! {
         pub regions: Vec<RegionFile>,
         /// At most 16.
         pub gauges: Vec<GaugeFile>,
-        /// Fixed against adaptive pattern, as measured when it was taught; `None` if it was taught from a recording.
+        /// Fixed against adaptive pattern, as measured when it was taught; `None` if it was taught
+        /// from a recording.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub comparison: Option<ComparisonFile> = Fields,
-        /// The deviation of good parts, as predicted when it was taught; `None` where the limits are not those that teaching set.
+        /// The deviation of good parts, as predicted when it was taught; `None` where the limits
+        /// are not those that teaching set.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub good_parts: Option<GoodPartsFile> = Fields,
-        /// Per gauge that was tried with golden at other places, how many good parts would pass; empty if nothing was tried.
+        /// Per gauge that was tried with golden at other places, how many good parts would pass;
+        /// empty if nothing was tried.
         pub tried: Vec<TriedFile> = Fields,
     }
 
@@ -198,7 +206,8 @@ bounded! {
     pub struct SequenceFile {
         /// What it can unwrap.
         pub kind: SequenceKind,
-        /// What each frame shows: [ratio, shift in turns], and the harmonics of a waveform that is not a sine.
+        /// What each frame shows: [ratio, shift in turns], and the harmonics of a waveform that is
+        /// not a sine.
         #[serde(with = "super::shots")]
         pub frames: Vec<Shot>,
         /// Predicted σ_z, RMS over the golden surface, mm.
@@ -206,7 +215,8 @@ bounded! {
         /// Share of the golden surface whose phase stays within the sequence's reach for every
         /// placement inside the tolerance.
         pub safe_share: f64 = 0.0..=1.0,
-        /// RMS of the periodic error of the mean height over a square of 9 × 9 pixels by it, where it is largest, mm; `None` where it was taught from a recording.
+        /// RMS of the periodic error of the mean height over a square of 9 × 9 pixels by it, where
+        /// it is largest, mm; `None` where it was taught from a recording.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub ripple_mm: Option<f64> = 0.0..=MAX_SIGMA_MM,
         /// How often it gets a fringe order wrong unseen; `None` where it cannot be unwrapped.
@@ -214,25 +224,26 @@ bounded! {
         pub unseen_orders: Option<UnseenFile> = Fields,
     }
 
-    /// Shares of pixels that get a wrong fringe order without a residual, for parts anywhere within the placement tolerance
-    /// ([`algo::pattern::Slips`]).
+    /// Shares of pixels that get a wrong fringe order without a residual, for parts anywhere within
+    /// the placement tolerance ([`algo::pattern::Slips`]).
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(deny_unknown_fields)]
     pub struct UnseenFile {
-        /// Mean over the golden surface where the sequence is safe, by the modulation and the phase reach of each pixel.
+        /// Mean over the golden surface where the sequence is safe, by the modulation and the phase
+        /// reach of each pixel.
         pub part: f64 = 0.0..=1.0,
         /// Of pixels of the least trusted modulation, where the phase reach is largest.
         pub darkest: f64 = 0.0..=1.0,
     }
 }
 
-/// The kinds of sequence, ordered by how far from the golden map they can unwrap. Dense levels have the ratios 1, 1 − 1/n and perhaps
-/// 1 − 1/n² (`docs/measurement.md`).
+/// The kinds of sequence, ordered by how far from the golden map they can unwrap. Dense levels have
+/// the ratios 1, 1 − 1/n and perhaps 1 − 1/n² (`docs/measurement.md`).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SequenceKind {
-    /// The fringe and its complement, fitted in windows about golden as the part lies in the picture. It is not in the list of
-    /// sequences: [`RecipeFile::two_frames`].
+    /// The fringe and its complement, fitted in windows about golden as the part lies in the
+    /// picture. It is not in the list of sequences: [`RecipeFile::two_frames`].
     #[serde(skip)]
     TwoFrames,
     /// One level: |ΔΦ| < 0.4 turn, of 0.5 that are unambiguous.
@@ -244,9 +255,9 @@ pub enum SequenceKind {
 }
 
 impl SequenceKind {
-    /// Largest |ΔΦ| about the golden map that is unwrapped correctly, in turns; `None` for the full sequence, in which a
-    /// wrong fringe order leaves a large residual, so that the pixel is rejected, and for two frames, which are not unwrapped about
-    /// golden as it was taught.
+    /// Largest |ΔΦ| about the golden map that is unwrapped correctly, in turns; `None` for the full
+    /// sequence, in which a wrong fringe order leaves a large residual, so that the pixel is
+    /// rejected, and for two frames, which are not unwrapped about golden as it was taught.
     pub fn reach(self) -> Option<f32> {
         match self {
             Self::SingleLevel => Some(0.4),
@@ -256,8 +267,9 @@ impl SequenceKind {
     }
 }
 
-/// The part of a phase map about which a sequence can unwrap any part within the placement tolerance. `changes` are the largest |ΔΦ| that
-/// such a placement can cause, in turns (`phase_reach.npy`); where they are not below `limit`, the sequence's [`SequenceKind::reach`],
+/// The part of a phase map about which a sequence can unwrap any part within the placement
+/// tolerance. `changes` are the largest |ΔΦ| that such a placement can cause, in turns
+/// (`phase_reach.npy`); where they are not below `limit`, the sequence's [`SequenceKind::reach`],
 /// the phase becomes unknown.
 pub fn safe(phase: &[AbsolutePhase], changes: &[f32], limit: f32) -> Vec<AbsolutePhase> {
     let pairs = phase.iter().zip(changes);

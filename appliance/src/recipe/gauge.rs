@@ -11,8 +11,9 @@ use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::fmt::Display;
 
-/// A gauge as it is written. Its limits are parsed once its name and unit are known, so that a refusal can name the gauge and
-/// its bounds; the parser's message would only give the line and column.
+/// A gauge as it is written. Its limits are parsed once its name and unit are known, so that a
+/// refusal can name the gauge and its bounds; the parser's message would only give the line and
+/// column.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GaugeText {
@@ -59,7 +60,8 @@ impl TryFrom<GaugeText> for GaugeFile {
     }
 }
 
-/// All kinds, for programs that show or edit recipes: an example of each, or one for each value of the field that its unit depends on.
+/// All kinds, for programs that show or edit recipes: an example of each, or one for each value of
+/// the field that its unit depends on.
 pub fn kinds() -> Value {
     let row = |measures: Measure| {
         let Facts {
@@ -151,7 +153,8 @@ impl GaugeFile {
         }
     }
 
-    /// Whether a part can miss one of its limits: those at the ends of what its unit can have are kept by every part.
+    /// Whether a part can miss one of its limits: those at the ends of what its unit can have are
+    /// kept by every part.
     pub(super) fn can_fail(&self) -> bool {
         let facts = self.measures.facts();
         let [least, most] = facts.unit.range();

@@ -1,7 +1,8 @@
 //! Generations of a recipe: keeping the previous one, deleting, and undoing both.
 //!
-//! Beside `NNNN.recipe` lies `NNNN.recipe.previous`, its previous generation. `NNNN.recipe.kept` is a deleted recipe or, while
-//! two generations are being exchanged, a second link to the newest one. A kill between any two renames loses no generation.
+//! Beside `NNNN.recipe` lies `NNNN.recipe.previous`, its previous generation. `NNNN.recipe.kept` is
+//! a deleted recipe or, while two generations are being exchanged, a second link to the newest one.
+//! A kill between any two renames loses no generation.
 
 use super::RecipeFile;
 use super::store::{ChangeError, LoadError, Store, is_sound, manifest_at, write};
@@ -19,8 +20,8 @@ impl Store {
         self.folder.join(format!("{number:04}.recipe.kept"))
     }
 
-    /// Makes the current generation the previous one, unless it is damaged: a damaged file must not replace a sound
-    /// previous generation.
+    /// Makes the current generation the previous one, unless it is damaged: a damaged file must not
+    /// replace a sound previous generation.
     pub(super) fn keep_previous(&self, number: u16) -> io::Result<()> {
         let (path, previous) = (self.path(number), self.previous(number));
         if !is_sound(&path) {
@@ -28,7 +29,8 @@ impl Store {
         }
         // A second link: the current generation keeps its name until it is replaced.
         name_also(&path, &previous)?;
-        // A recipe that was deleted before the current one was stored would be two generations back now.
+        // A recipe that was deleted before the current one was stored would be two generations back
+        // now.
         remove(&self.kept(number)).map(drop)
     }
 
@@ -38,7 +40,8 @@ impl Store {
         files.into_iter().find(|file| file.exists())
     }
 
-    /// The manifest of what [`Store::undo`] restores: the previous generation, or the deleted recipe.
+    /// The manifest of what [`Store::undo`] restores: the previous generation, or the deleted
+    /// recipe.
     pub fn manifest_before(&self, number: u16) -> Option<RecipeFile> {
         manifest_at(&self.before(number)?)
     }
@@ -63,13 +66,14 @@ impl Store {
         (1..=9999).find(|number| taken.binary_search(number).is_err())
     }
 
-    /// Exchanges the newest and the previous generation, or restores a deleted recipe. A second undo reverses the first.
-    /// `calibration` is the fingerprint of the head's, where it is known: a generation that was made for another one does not take
-    /// the place of one that this head can use. Returns the manifest of what is now the newest generation.
+    /// Exchanges the newest and the previous generation, or restores a deleted recipe. A second
+    /// undo reverses the first. `calibration` is the fingerprint of the head's, where it is known:
+    /// a generation that was made for another one does not take the place of one that this head can
+    /// use. Returns the manifest of what is now the newest generation.
     ///
     /// # Errors
-    /// If there is nothing to restore, it is damaged, was made for another calibration than the head's, or has the part number of
-    /// another recipe, or the files cannot be renamed.
+    /// If there is nothing to restore, it is damaged, was made for another calibration than the
+    /// head's, or has the part number of another recipe, or the files cannot be renamed.
     pub fn undo(&self, number: u16, calibration: Option<&str>) -> Result<RecipeFile, ChangeError> {
         let _alone = self.lock().map_err(write(&self.folder))?;
         let before = self.before(number).ok_or(ChangeError::Nothing(number))?;
@@ -101,8 +105,9 @@ impl Store {
         Ok(restored)
     }
 
-    /// Deletes a recipe. Its newest sound generation is kept, for [`Store::undo`], until another recipe with this number is
-    /// replaced or deleted. The caller makes sure that no station has the recipe active.
+    /// Deletes a recipe. Its newest sound generation is kept, for [`Store::undo`], until another
+    /// recipe with this number is replaced or deleted. The caller makes sure that no station has
+    /// the recipe active.
     ///
     /// # Errors
     /// If there is no such recipe or its files cannot be renamed or removed.

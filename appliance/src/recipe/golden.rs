@@ -19,14 +19,15 @@ use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 use std::io::Cursor;
 
-/// The area where deviations are compared is eroded by this many pixels on each side: pixels at silhouettes mix two surfaces.
+/// The area where deviations are compared is eroded by this many pixels on each side: pixels at
+/// silhouettes mix two surfaces.
 const EROSION_PX: usize = 2;
 /// Pixels whose taught height is less certain than this are not compared, mm (1 σ).
 const MAX_SIGMA_MM: f64 = 0.25;
 /// Least share of the golden surface that must be resolved.
 const MIN_COVERAGE: f64 = 0.80;
-/// Guard bands of new recipes: with k = 1.65 one in 20 parts that lie just outside of a limit would pass (ISO 14253-1:2017), with 2
-/// one in 44.
+/// Guard bands of new recipes: with k = 1.65 one in 20 parts that lie just outside of a limit would
+/// pass (ISO 14253-1:2017), with 2 one in 44.
 const GUARD_K: f64 = 2.0;
 /// An opening has at least this many pixels.
 const OPENING_PIXELS: usize = 60;
@@ -34,7 +35,8 @@ const OPENING_PIXELS: usize = 60;
 const OPENING_COVERAGE: f64 = 0.25;
 /// At most this many openings get a gauge, the largest ones.
 const MAX_OPENINGS: usize = 8;
-/// Half the diagonals of an opening's region, an upright diamond, are at least this many pixels long.
+/// Half the diagonals of an opening's region, an upright diamond, are at least this many pixels
+/// long.
 const OPENING_REACH: usize = 4;
 /// |ΔΦ| up to which the expansion of the height is used, turns.
 const EXPANSION_TURNS: f64 = 0.5;
@@ -74,7 +76,8 @@ pub struct GoldenPart<'a> {
     pub phases: &'a PhaseMap,
     /// Golden height of each camera pixel, with the σ of one capture.
     pub heights: &'a HeightMap,
-    /// The difference from this phase by each of the other sequences, in their order; none if they were not measured.
+    /// The difference from this phase by each of the other sequences, in their order; none if they
+    /// were not measured.
     pub offsets: &'a [Offsets],
     /// The noise of a sample by the modulation of its pixel in one capture.
     pub noise: SampleNoise,
@@ -143,9 +146,10 @@ impl TaughtRecipe {
 }
 
 impl GoldenPart<'_> {
-    /// Makes the recipe: expansion of the height, phase reach (from which follows where a short sequence is safe), sequences, regions
-    /// and gauges. The gauges are the deviation from golden and the coverage of the whole frame, and, for each of the up to
-    /// 8 largest openings of the part that have 60 pixels and room for a region, the coverage of the opening.
+    /// Makes the recipe: expansion of the height, phase reach (from which follows where a short
+    /// sequence is safe), sequences, regions and gauges. The gauges are the deviation from golden
+    /// and the coverage of the whole frame, and, for each of the up to 8 largest openings of the
+    /// part that have 60 pixels and room for a region, the coverage of the opening.
     ///
     /// # Errors
     /// In words, if the recipe could not be packed, or not be loaded again.
@@ -294,7 +298,8 @@ fn mean(offsets: &Offsets) -> impl Iterator<Item = i16> + '_ {
     first.iter().zip(second).map(|(a, b)| a.midpoint(*b))
 }
 
-/// The regions and gauges of a part that is seen by these pixels: those of the whole frame, and those of its openings.
+/// The regions and gauges of a part that is seen by these pixels: those of the whole frame, and
+/// those of its openings.
 fn gauges(seen: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
     let rows = seen.len() / width.max(1);
     let (right, bottom) = (width as f64 - 0.5, rows as f64 - 0.5);

@@ -1,12 +1,14 @@
 //! Predicts what the deviation gauge reads on good parts, and sets its limit accordingly.
 //!
-//! The limit is the requested tolerance if the part can be measured that well. In squares that are too noisy for it, deviations
-//! get less weight, and teaching reports on how much of the surface, and by which factor a deviation must be larger there to be
-//! found. If that concerned more than a small share of the pixels, the limit is wider instead, and teaching reports that the
-//! tolerance cannot be held.
+//! The limit is the requested tolerance if the part can be measured that well. In squares that are
+//! too noisy for it, deviations get less weight, and teaching reports on how much of the surface,
+//! and by which factor a deviation must be larger there to be found. If that concerned more than a
+//! small share of the pixels, the limit is wider instead, and teaching reports that the tolerance
+//! cannot be held.
 //!
-//! Squares are as small as noise allows about each pixel: their largest deviation on good parts stays below a third of the limit, so that small
-//! deep defects are seen at nearly their depth (`sides`). Parts that lie elsewhere than golden deviate by more than noise, as golden is
+//! Squares are as small as noise allows about each pixel: their largest deviation on good parts
+//! stays below a third of the limit, so that small deep defects are seen at nearly their depth
+//! (`sides`). Parts that lie elsewhere than golden deviate by more than noise, as golden is
 //! interpolated between pixels: teaching tries that with golden, displaced (`proof`).
 //!
 //! Leaving such pixels out instead misses nearly all dents among them
@@ -22,22 +24,24 @@ use hal::bounded;
 use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
-/// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be measured that well, else the limit is
-/// wider.
+/// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be
+/// measured that well, else the limit is wider.
 pub(super) const DEVIATION_MM: f64 = 0.15;
-/// At most this share of the compared pixels counts with less weight or not at all; else the limit is wider.
+/// At most this share of the compared pixels counts with less weight or not at all; else the limit
+/// is wider.
 const WEIGHED: f64 = 0.05;
-/// Squares have at most a σ of the limit by this: of a part with 10⁴ squares of just this σ, one in 10⁶ exceeds the limit.
+/// Squares have at most a σ of the limit by this: of a part with 10⁴ squares of just this σ, one in
+/// 10⁶ exceeds the limit.
 pub(super) const SIGMAS: f64 = 6.5;
 /// At most this share of good parts is predicted to exceed the limit.
 const BEYOND: f64 = 1e-6;
-/// Sides of squares in camera pixels, the smallest first. A single pixel may be a wild one. In the largest a dent of 8 mm is still seen at
-/// half its depth by 0.4 mm per pixel.
+/// Sides of squares in camera pixels, the smallest first. A single pixel may be a wild one. In the
+/// largest a dent of 8 mm is still seen at half its depth by 0.4 mm per pixel.
 pub(super) const SIDES: [usize; 4] = [3, 5, 7, 9];
 /// The largest deviation of good parts is to stay below this share of the limit.
 pub(super) const ROOM: f64 = 1.0 / 3.0;
-/// Limits wider than the tolerance are rounded up to a multiple of this, mm; each is wider than the one before by this factor,
-/// and at most so many times the tolerance.
+/// Limits wider than the tolerance are rounded up to a multiple of this, mm; each is wider than the
+/// one before by this factor, and at most so many times the tolerance.
 const STEP_MM: f64 = 0.01;
 const WIDER: f64 = 1.1;
 const WIDEST: f64 = 20.0;
@@ -47,8 +51,8 @@ fn length() -> RangeInclusive<f64> {
     0.0..=Unit::Length.range()[1]
 }
 
-/// Diameter of a dent of which a mean over a square has nine tenths of the depth, over the square's side: of a depth that falls as cos²(πr/D) the
-/// mean over side a is 1 − (π²/6) a²/D².
+/// Diameter of a dent of which a mean over a square has nine tenths of the depth, over the square's
+/// side: of a depth that falls as cos²(πr/D) the mean over side a is 1 − (π²/6) a²/D².
 pub(super) const DENT: f64 = 4.06;
 
 bounded! {
@@ -60,7 +64,8 @@ bounded! {
         pub tolerance_mm: f64 = length(),
         /// The limit that was set, ± mm.
         pub limit_mm: f64 = length(),
-        /// The largest deviation of a good part that lies as taught: mean and standard deviation over parts and goldens, mm.
+        /// The largest deviation of a good part that lies as taught: mean and standard deviation
+        /// over parts and goldens, mm.
         pub largest_mm: f64 = length(),
         /// See above.
         pub scatter_mm: f64 = length(),
@@ -68,21 +73,23 @@ bounded! {
         pub beyond: f64 = 0.0..=1.0,
         /// Share of the pixels that are too noisy for the limit to be compared at all.
         pub left_out: f64 = 0.0..=1.0,
-        /// Share of the surface, by its area, that is too noisy for the limit, and so counts with less weight.
+        /// Share of the surface, by its area, that is too noisy for the limit, and so counts with
+        /// less weight.
         pub weighed: f64 = 0.0..=1.0,
         /// The least of these weights; 1 where there are none.
         pub least_weight: f64 = 1.0 / 256.0..=1.0,
         /// The side of the squares that all of this is of, pixels.
         pub smoothing_px: usize = 1..=usize::from(u16::MAX),
-        /// The largest side of the squares about the pixels where that would be too noisy; 0 where there are none.
+        /// The largest side of the squares about the pixels where that would be too noisy; 0 where
+        /// there are none.
         pub wider_px: usize = 0..=usize::from(u8::MAX),
         /// Share of the compared pixels that these are about.
         pub wider: f64 = 0.0..=1.0,
-        /// Diameter of a dent that is seen at nine tenths of its depth in squares of `smoothing_px` where the part faces the camera, mm; 0
-        /// if not known. U says nothing of narrower ones.
+        /// Diameter of a dent that is seen at nine tenths of its depth in squares of `smoothing_px`
+        /// where the part faces the camera, mm; 0 if not known. U says nothing of narrower ones.
         pub dent_mm: f64 = length(),
-        /// The largest deviation of good parts that lie anywhere within the placement tolerance: median and spread, mm; 0 if it was not
-        /// tried.
+        /// The largest deviation of good parts that lie anywhere within the placement tolerance:
+        /// median and spread, mm; 0 if it was not tried.
         pub displaced_mm: f64 = length(),
         /// See above.
         pub displaced_scatter_mm: f64 = length(),
@@ -113,8 +120,8 @@ pub(super) struct Weighed {
 }
 
 impl Noise<'_> {
-    /// The limit of the deviation for a tolerance, and the weights of the pixels for this limit, in squares of the largest side. `mask` is
-    /// not 0 where the part can be compared.
+    /// The limit of the deviation for a tolerance, and the weights of the pixels for this limit, in
+    /// squares of the largest side. `mask` is not 0 where the part can be compared.
     pub fn weigh(&self, mask: &[u8], tolerance_mm: f64) -> Weighed {
         let width = self.surface.width;
         let valid: Vec<bool> = mask.iter().map(|&valid| valid != 0).collect();
@@ -132,7 +139,8 @@ impl Noise<'_> {
         let full: Vec<Weight> = valid.iter().copied().map(Weight::from).collect();
         let whole = self.taught(&full);
         let whole = self.golden_surface(&whole);
-        // The motion is found from what counts in full, and what does depends on the motion: once each.
+        // The motion is found from what counts in full, and what does depends on the motion: once
+        // each.
         let (_, weights) = limited(&noise, &valid, tolerance_mm);
         let taught = self.taught(&weights);
         let window = vec![0..width; valid.len() / width.max(1)];
@@ -209,7 +217,8 @@ impl Weighed {
         self.weights.iter().map(|weight| weight.bits()).collect()
     }
 
-    /// Sets what good parts are predicted to deviate by in squares of these sides; returns the distribution.
+    /// Sets what good parts are predicted to deviate by in squares of these sides; returns the
+    /// distribution.
     pub fn predict(&mut self, sides: &Sides) -> LargestDeviation {
         let mut largest = LargestDeviation::default();
         let compared = |place: &usize| self.weights[*place].compared();
@@ -237,7 +246,8 @@ impl Weighed {
         largest
     }
 
-    /// Squares as small as noise allows, and as `farthest` does, where the image of a part moves by up to `away` pixels.
+    /// Squares as small as noise allows, and as `farthest` does, where the image of a part moves by
+    /// up to `away` pixels.
     pub fn sides(&self, farthest: &Farthest, away: usize) -> Sides {
         let sigmas = SIDES.map(|side| self.sigmas(side));
         let full = |place: usize| {
@@ -248,7 +258,8 @@ impl Weighed {
         Sides::new((&sigmas, farthest), full, limit, (self.width, away))
     }
 
-    /// σ of the mean over the square of `side` pixels about each pixel, mm; NaN where there is none.
+    /// σ of the mean over the square of `side` pixels about each pixel, mm; NaN where there is
+    /// none.
     fn sigmas(&self, side: usize) -> Vec<f32> {
         let noise = DeviationNoise {
             width: self.width,
@@ -259,7 +270,8 @@ impl Weighed {
     }
 }
 
-/// The limit, at least the tolerance, that all but [`WEIGHED`] of the pixels can hold, and the weights with which the others can.
+/// The limit, at least the tolerance, that all but [`WEIGHED`] of the pixels can hold, and the
+/// weights with which the others can.
 fn limited(noise: &DeviationNoise<'_>, valid: &[bool], tolerance_mm: f64) -> (f64, Vec<Weight>) {
     let side = SIDES[SIDES.len() - 1];
     let least = (1.0 - WEIGHED) * count(valid);

@@ -1,4 +1,5 @@
-//! The light of a part's patterns when frames are exposed for longer: where the camera would saturate, there is less of it.
+//! The light of a part's patterns when frames are exposed for longer: where the camera would
+//! saturate, there is less of it.
 
 use super::adaptive::{Preliminary, SHIFTS};
 use super::golden::Naming;
@@ -9,13 +10,15 @@ use algo::adaptive::ProjectorMap;
 use algo::adaptive::amplitude::{Received, amplitude, reach};
 use hal::frame::{Frame, Samples};
 
-/// Samples may reach this share of full scale, less their noise: a part that lies differently reflects a little more.
+/// Samples may reach this share of full scale, less their noise: a part that lies differently
+/// reflects a little more.
 const MOST: f64 = 0.9;
 /// Noise that a sample may have beyond that, in σ.
 const NOISE_SIGMAS: f64 = 4.0;
 
 impl Preliminary {
-    /// The light for a part that was measured with these fringes, in one exposure of their whole light.
+    /// The light for a part that was measured with these fringes, in one exposure of their whole
+    /// light.
     pub(super) fn illumination(
         &self,
         part: &Measured,

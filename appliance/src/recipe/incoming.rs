@@ -1,4 +1,5 @@
-//! A recipe file that is being received: written beside the stored recipes under a temporary name, checked, then renamed.
+//! A recipe file that is being received: written beside the stored recipes under a temporary name,
+//! checked, then renamed.
 //!
 //! Dropping it removes the file; files that a kill leaves behind are removed at the next start.
 
@@ -28,7 +29,8 @@ impl Store {
     /// Begins a file of `expected` bytes; 0 if the size is not known.
     ///
     /// # Errors
-    /// Errors of the file system, or that the file would leave less free storage than the station needs.
+    /// Errors of the file system, or that the file would leave less free storage than the station
+    /// needs.
     pub fn receive(&self, expected: u64) -> io::Result<Incoming> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         loop {
@@ -49,7 +51,8 @@ impl Store {
         }
     }
 
-    /// Stores a received file under a number; the old recipe stays as the previous generation. The caller holds the lock.
+    /// Stores a received file under a number; the old recipe stays as the previous generation. The
+    /// caller holds the lock.
     pub(super) fn put_received(&self, incoming: Incoming, number: u16) -> io::Result<()> {
         incoming.file.sync_all()?;
         self.keep_previous(number)?;
@@ -126,7 +129,8 @@ impl Write for Incoming {
 
 impl Drop for Incoming {
     fn drop(&mut self) {
-        // Once it is stored there is nothing to remove; what cannot be removed now is removed at the next start.
+        // Once it is stored there is nothing to remove; what cannot be removed now is removed at
+        // the next start.
         let _ = fs::remove_file(&self.path);
     }
 }

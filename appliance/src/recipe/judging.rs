@@ -1,13 +1,15 @@
-//! Whether a recipe can judge: limits that a part can keep and miss, names that are unique, steps between two regions.
+//! Whether a recipe can judge: limits that a part can keep and miss, names that are unique, steps
+//! between two regions.
 //!
-//! Without this a part of any shape passes, and nobody sees why. It is checked whenever a recipe is taught, imported, edited or loaded.
+//! Without this a part of any shape passes, and nobody sees why. It is checked whenever a recipe is
+//! taught, imported, edited or loaded.
 
 use super::file::{GaugeFile, RecipeFile};
 use std::collections::HashSet;
 
 impl RecipeFile {
-    /// Refuses a recipe whose verdict does not depend on the part as its gauges say, and one without any limit that does not state
-    /// `judges_nothing`.
+    /// Refuses a recipe whose verdict does not depend on the part as its gauges say, and one
+    /// without any limit that does not state `judges_nothing`.
     ///
     /// # Errors
     /// In words, with the name of the first such gauge and the remedy.
@@ -59,7 +61,8 @@ impl RecipeFile {
     }
 }
 
-/// Refuses a name that two regions or two gauges have: limits and references would belong to either.
+/// Refuses a name that two regions or two gauges have: limits and references would belong to
+/// either.
 pub(super) fn check_unique<'a>(
     what: &str,
     names: impl Iterator<Item = &'a String>,

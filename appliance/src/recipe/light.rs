@@ -1,7 +1,9 @@
-//! How much of golden's light comes back from a part, so that a head that is out of focus, too dark or too bright is told from a wrong part.
+//! How much of golden's light comes back from a part, so that a head that is out of focus, too dark
+//! or too bright is told from a wrong part.
 //!
-//! The pattern's contrast falls where something blurs it, the mean of a pixel's samples does not; both fall with the light; foreign light
-//! raises the mean alone. Medians over pixels of golden's compared surface, so that a part that lies elsewhere changes little.
+//! The pattern's contrast falls where something blurs it, the mean of a pixel's samples does not;
+//! both fall with the light; foreign light raises the mean alone. Medians over pixels of golden's
+//! compared surface, so that a part that lies elsewhere changes little.
 
 use super::archive::Arrays;
 use super::median::median;
@@ -125,7 +127,8 @@ impl GoldenLight {
 }
 
 impl Light {
-    /// The light of these frames, whose finest level has this modulation; none if golden's is not known anywhere.
+    /// The light of these frames, whose finest level has this modulation; none if golden's is not
+    /// known anywhere.
     pub fn of(
         golden: &GoldenLight,
         views: &[FrameView<'_>],
@@ -148,7 +151,8 @@ impl Light {
         })
     }
 
-    /// The likeliest reason why a part cannot be measured in this light; none if the light is as it was.
+    /// The likeliest reason why a part cannot be measured in this light; none if the light is as it
+    /// was.
     pub fn cause(self) -> Option<Cause> {
         let Self {
             modulation,
@@ -156,8 +160,9 @@ impl Light {
             saturated,
         } = self;
         let foreign = offset.is_some_and(|offset| offset > modulation.max(1.0) + FOREIGN);
-        // Foreign light raises the offset, so contrast is that of no more light than golden's; where the pattern's light has fallen, what is left
-        // of the offset is foreign to a larger part.
+        // Foreign light raises the offset, so contrast is that of no more light than golden's;
+        // where the pattern's light has fallen, what is left of the offset is foreign to a larger
+        // part.
         let contrast = offset.map_or(1.0, |offset| modulation / offset.min(1.0));
         let least = match offset.is_some_and(|offset| offset < LOW) {
             true => LOW * LOW,
@@ -178,7 +183,8 @@ impl Light {
     }
 }
 
-/// The median of the mean samples of the resolved pixels, counts of these frames; none without such pixels.
+/// The median of the mean samples of the resolved pixels, counts of these frames; none without such
+/// pixels.
 pub(super) fn offset_counts(views: &[FrameView<'_>], phases: &PhaseMap) -> Option<f64> {
     let places = phases.trust.iter().enumerate();
     let resolved = places.filter(|(_, trust)| **trust == Trust::Resolved);

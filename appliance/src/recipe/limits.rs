@@ -1,5 +1,5 @@
-//! Sets the squares and the limits of the gauges that teaching proposes, by what good parts are predicted to read and by what golden reads at
-//! other places.
+//! Sets the squares and the limits of the gauges that teaching proposes, by what good parts are
+//! predicted to read and by what golden reads at other places.
 
 use super::archive::Arrays;
 use super::golden::GoldenPart;
@@ -12,14 +12,17 @@ use algo::inspect::Basis;
 use algo::inspect::kinds::Deviation;
 use algo::pipeline::KnownSurface;
 
-/// What displaced parts deviate by beside their sharpest creases, and how far that scatters from placement to placement, as multiples of what is
-/// worked out: golden knows only what its pixels see of a crease (parts in front of the simulated head: `tests/suite/every_part.rs`).
+/// What displaced parts deviate by beside their sharpest creases, and how far that scatters from
+/// placement to placement, as multiples of what is worked out: golden knows only what its pixels
+/// see of a crease (parts in front of the simulated head: `tests/suite/every_part.rs`).
 const BEND: f64 = 2.0;
 const BEND_SPREAD: f64 = 0.12;
 
 impl GoldenPart<'_> {
-    /// Sets the squares and the limits of the gauges by what good parts are predicted to read, wherever they lie within the placement tolerance;
-    /// overwrites `arrays.valid` (0 or 1) with the weights of the pixels and `arrays.smoothing` with the sides of their squares. Returns what to say of it.
+    /// Sets the squares and the limits of the gauges by what good parts are predicted to read,
+    /// wherever they lie within the placement tolerance; overwrites `arrays.valid` (0 or 1) with
+    /// the weights of the pixels and `arrays.smoothing` with the sides of their squares. Returns
+    /// what to say of it.
     pub(super) fn set_limits(
         &self,
         surface: KnownSurface,

@@ -1,14 +1,19 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
-//! - On disk: [`mod@file`] is the manifest, [`bounds`] the bounds of its values, [`archive`] the ZIP with its fingerprint.
-//! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot judge, [`plan`] joins that with the
-//!   head's calibration; `light` tells bad light from bad parts.
-//! - Stored: [`store`] keeps the files of a station, [`generations`] previous generations and deleted recipes, [`incoming`]
-//!   files that are being uploaded; [`exchange`] lists, exports and imports, [`edit`] changes,
-//!   `differences` says what was changed.
-//! - Made: [`teach`] measures the part, `illumination` chooses its light, [`adaptive`] makes its pattern, [`captures`] measures the part
-//!   with this pattern by every sequence that production may use (`candidates`), [`golden`] makes the recipe, [`planner`] chooses the
-//!   sequence, [`good_parts`] squares and limit of the deviation, `sides` those squares from place to place, `limits` sets and `proof` tries the limits of all gauges; [`replace`] keeps names and gauges of a recipe that is taught again.
+//! - On disk: [`mod@file`] is the manifest, [`bounds`] the bounds of its values, [`archive`] the
+//!   ZIP with its fingerprint.
+//! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot
+//!   judge, [`plan`] joins that with the head's calibration; `light` tells bad light from bad
+//!   parts.
+//! - Stored: [`store`] keeps the files of a station, [`generations`] previous generations and
+//!   deleted recipes, [`incoming`] files that are being uploaded; [`exchange`] lists, exports and
+//!   imports, [`edit`] changes, `differences` says what was changed.
+//! - Made: [`teach`] measures the part, `illumination` chooses its light, [`adaptive`] makes its
+//!   pattern, [`captures`] measures the part with this pattern by every sequence that production
+//!   may use (`candidates`), [`golden`] makes the recipe, [`planner`] chooses the sequence,
+//!   [`good_parts`] squares and limit of the deviation, `sides` those squares from place to place,
+//!   `limits` sets and `proof` tries the limits of all gauges; [`replace`] keeps names and gauges
+//!   of a recipe that is taught again.
 
 pub mod adaptive;
 pub mod archive;

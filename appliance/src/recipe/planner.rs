@@ -18,14 +18,14 @@ const LEAST_RATE: f64 = 1e-12;
 pub struct Choice {
     /// Its index.
     pub production: usize,
-    /// One line per sequence, cheapest first: its noise, its safe share and how often its fringe orders are wrong unseen, and why it was
-    /// chosen or not.
+    /// One line per sequence, cheapest first: its noise, its safe share and how often its fringe
+    /// orders are wrong unseen, and why it was chosen or not.
     pub reasons: Vec<String>,
 }
 
-/// The largest σ_z, RMS over the surface, in mm, that is allowed by the limits of gauges with a smoothing square (deviations,
-/// flatness, peak-to-valley). Squares of deviations have `widest` pixels where they must. Gauges that average over regions are
-/// far less noisy and do not count.
+/// The largest σ_z, RMS over the surface, in mm, that is allowed by the limits of gauges with a
+/// smoothing square (deviations, flatness, peak-to-valley). Squares of deviations have `widest`
+/// pixels where they must. Gauges that average over regions are far less noisy and do not count.
 pub fn allowed_sigma(gauges: &[GaugeFile], widest: usize) -> f64 {
     let allowed = gauges.iter().filter_map(|gauge| {
         let facts = gauge.measures.facts();
@@ -49,7 +49,8 @@ pub fn allowed_sigma(gauges: &[GaugeFile], widest: usize) -> f64 {
     allowed.fold(f64::INFINITY, f64::min)
 }
 
-/// Chooses the cheapest sequence that is good enough; the full one, which is the last, if none is. `widest` is as for [`allowed_sigma`].
+/// Chooses the cheapest sequence that is good enough; the full one, which is the last, if none is.
+/// `widest` is as for [`allowed_sigma`].
 pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile], widest: usize) -> Choice {
     let allowed = allowed_sigma(gauges, widest);
     // Only the full sequence resolves material where golden has none.

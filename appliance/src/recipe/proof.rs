@@ -1,6 +1,8 @@
-//! Teaching proves its recipe: cycles as production runs them, on the part as it lies and on golden wherever else it may lie.
+//! Teaching proves its recipe: cycles as production runs them, on the part as it lies and on golden
+//! wherever else it may lie.
 //!
-//! Limits are predicted from noise; what noise does not explain is found here, where nothing is at stake yet. Each cycle is that of a
+//! Limits are predicted from noise; what noise does not explain is found here, where nothing is at
+//! stake yet. Each cycle is that of a
 //! [`Plan`]: the same sequences, limits and guard band. A limit that would refuse the recipe's own part is moved until it holds, and teaching
 //! says so.
 
@@ -19,15 +21,17 @@ use algo::units::Modulation;
 use hal::head::Head;
 use std::time::{Duration, Instant};
 
-/// The coverage of a good part may be lower than expected by this share of the frame. Noise alone causes less: of 200,000 pixels
-/// that are all just at the least trusted modulation, the number of resolved ones has σ = √200,000 / 2, and 6 σ of the difference
-/// of two such numbers is 1,900, or 0.7 % of a frame of only 512 × 512 pixels.
+/// The coverage of a good part may be lower than expected by this share of the frame. Noise alone
+/// causes less: of 200,000 pixels that are all just at the least trusted modulation, the number of
+/// resolved ones has σ = √200,000 / 2, and 6 σ of the difference of two such numbers is 1,900, or
+/// 0.7 % of a frame of only 512 × 512 pixels.
 pub(super) const COVERAGE_CHANGE: f64 = 0.01;
 /// Cycles of the part as it lies.
 const STILL: usize = 5;
 /// Placements that are worked out: the scatter of the largest deviation is then known to a fifth.
 const PLACEMENTS: usize = 16;
-/// Placements reach this share of the tolerance: what is worked out has the error of the motion, too.
+/// Placements reach this share of the tolerance: what is worked out has the error of the motion,
+/// too.
 const REACH: f64 = 0.98;
 /// At most this share of an opening is covered by good parts.
 const MOST_COVERED: f64 = 0.5;
@@ -72,8 +76,9 @@ impl Proof {
         })
     }
 
-    /// The part as taught, judged at places within the recipe's placement tolerance; none where parts are not aligned, or if cycles begin
-    /// with two frames. `farthest` gets what it deviates by in squares of all sides; then there is no noise.
+    /// The part as taught, judged at places within the recipe's placement tolerance; none where
+    /// parts are not aligned, or if cycles begin with two frames. `farthest` gets what it deviates
+    /// by in squares of all sides; then there is no noise.
     pub fn displaced(&self, mut farthest: Option<&mut Farthest>) -> Vec<Inspection> {
         let judged = (1..).zip(&self.places);
         let judged = judged.map_while(|(seed, motion)| {
@@ -96,8 +101,9 @@ impl Proof {
     }
 }
 
-/// Motions that take the farthest corner of a box by `reach` mm, in all six components: points of an additive recurrence that fills their cube
-/// evenly, with powers of the root of x⁷ = x + 1 (M. Roberts, *The unreasonable effectiveness of quasirandom sequences*, 2018).
+/// Motions that take the farthest corner of a box by `reach` mm, in all six components: points of
+/// an additive recurrence that fills their cube evenly, with powers of the root of x⁷ = x + 1 (M.
+/// Roberts, *The unreasonable effectiveness of quasirandom sequences*, 2018).
 fn placements(corners: &[Vector], reach: f64) -> Vec<Motion> {
     const ROOT: f64 = 1.112_775_684_278_706;
     if corners.is_empty() {
@@ -159,7 +165,8 @@ pub(super) fn as_it_lies(
     Ok(judged)
 }
 
-/// Leaves out the openings that these cycles of good parts cover for the most part, such as a place that is just too dark to be resolved; says which.
+/// Leaves out the openings that these cycles of good parts cover for the most part, such as a place
+/// that is just too dark to be resolved; says which.
 pub(super) fn leave_out_covered(
     manifest: &mut RecipeFile,
     judged: &mut [Inspection],
@@ -190,7 +197,8 @@ pub(super) fn leave_out_covered(
     words
 }
 
-/// Moves the limits that some of these cycles of good parts do not keep, so that all do; says which.
+/// Moves the limits that some of these cycles of good parts do not keep, so that all do; says
+/// which.
 pub(super) fn hold(manifest: &mut RecipeFile, judged: &[Inspection]) -> Vec<String> {
     let mut words = Vec::new();
     let guard_k = manifest.guard_k;
@@ -290,7 +298,8 @@ fn normal(values: &[f64]) -> Option<Largest> {
     })
 }
 
-/// Why most of these cycles of the part itself were not judged, if so: no limit of a gauge helps there.
+/// Why most of these cycles of the part itself were not judged, if so: no limit of a gauge helps
+/// there.
 pub(super) fn not_judged(judged: &[Inspection]) -> Option<String> {
     let invalid = judged.iter().filter(|inspection| {
         inspection.verdict() == Verdict::Invalid && inspection.guarded().next().is_none()
@@ -311,8 +320,8 @@ pub(super) fn not_judged(judged: &[Inspection]) -> Option<String> {
 pub(super) struct Magnitudes {
     /// Their median.
     pub middle: f64,
-    /// Their standard deviation, by the median distance from the median: of placements that are worked out, single ones can be wrong where
-    /// golden is seen at a grazing angle.
+    /// Their standard deviation, by the median distance from the median: of placements that are
+    /// worked out, single ones can be wrong where golden is seen at a grazing angle.
     pub spread: f64,
 }
 

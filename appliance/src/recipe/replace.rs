@@ -6,7 +6,8 @@ use super::{RecipeFile, Store};
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 
-/// Names, placement tolerance and exposures of a recipe that is taught under a number: those of the recipe that it replaces, if any.
+/// Names, placement tolerance and exposures of a recipe that is taught under a number: those of the
+/// recipe that it replaces, if any.
 pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
     let kept = replaced.cloned();
     let exposures = replaced.map_or(1, |file| file.exposures);
@@ -28,8 +29,8 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
     }
 }
 
-/// Refuses to `attempt` something under a number that is taken, naming the recipe, how to `replace` it, and a number that is free, after
-/// `instead`.
+/// Refuses to `attempt` something under a number that is taken, naming the recipe, how to `replace`
+/// it, and a number that is free, after `instead`.
 ///
 /// # Errors
 /// In words: the number is taken.
@@ -70,7 +71,8 @@ pub fn no_gauges(number: u16) -> String {
 /// Checks that the gauges of a recipe can be kept on a head with frames of (width, height).
 ///
 /// # Errors
-/// In words: the frames have another size (regions are polygons in camera pixels), or it cannot judge.
+/// In words: the frames have another size (regions are polygons in camera pixels), or it cannot
+/// judge.
 pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<(), String> {
     let camera = &replaced.camera;
     if (camera.width, camera.height) == (width, height) {
@@ -82,8 +84,9 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
     ))
 }
 
-/// Gives a recipe that was just taught the regions, gauges, limits, guard band and least coverage of the one that it replaces, and its
-/// two frames if it begins with them; the production sequence is chosen again for those limits.
+/// Gives a recipe that was just taught the regions, gauges, limits, guard band and least coverage
+/// of the one that it replaces, and its two frames if it begins with them; the production sequence
+/// is chosen again for those limits.
 ///
 /// # Errors
 /// In words, if they do not fit what was taught.

@@ -1,5 +1,5 @@
-//! What frames show, as recipes store it: [ratio, shift in turns], and for a waveform that is not a sine
-//! [ratio, shift, [[order, share of the fundamental], …]].
+//! What frames show, as recipes store it: [ratio, shift in turns], and for a waveform that is not a
+//! sine [ratio, shift, [[order, share of the fundamental], …]].
 
 use algo::pattern::{Shot, Waveform};
 use serde::de::{Error, SeqAccess, Visitor};

@@ -1,14 +1,16 @@
-//! The side of the square about each pixel whose mean deviation is compared: as small as noise and golden's interpolation allow there.
+//! The side of the square about each pixel whose mean deviation is compared: as small as noise and
+//! golden's interpolation allow there.
 //!
-//! A small deep defect is seen at its depth only in squares that are no larger than it. Where heights are noisy, or where golden is bent and so
-//! deviates from itself when it is displaced, only larger squares keep good parts inside the limits. Both differ from place to place,
-//! so the side does: on a cone squares are large at its tip and its rim alone.
+//! A small deep defect is seen at its depth only in squares that are no larger than it. Where
+//! heights are noisy, or where golden is bent and so deviates from itself when it is displaced,
+//! only larger squares keep good parts inside the limits. Both differ from place to place, so the
+//! side does: on a cone squares are large at its tip and its rim alone.
 
 use super::good_parts::{ROOM, SIDES, SIGMAS};
 use algo::inspect::{Production, Strips};
 
-/// The side that squares have where nothing asks for a larger one, and the least side about each pixel, 0 where no part is
-/// compared; empty where all have the smallest.
+/// The side that squares have where nothing asks for a larger one, and the least side about each
+/// pixel, 0 where no part is compared; empty where all have the smallest.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Sides {
     pub smallest: usize,
@@ -17,13 +19,16 @@ pub(super) struct Sides {
 
 /// The side about pixels that no smaller one is good enough for.
 const LARGEST: usize = SIDES[SIDES.len() - 1];
-/// What placements that are worked out without noise deviate by is to stay below this share of the limit: beside creases parts deviate by twice
-/// as much, as golden knows only what its pixels see of a crease, and noise comes on top.
+/// What placements that are worked out without noise deviate by is to stay below this share of the
+/// limit: beside creases parts deviate by twice as much, as golden knows only what its pixels see
+/// of a crease, and noise comes on top.
 const PLACED: f64 = 0.1;
-/// At least this share of the compared pixels has a side beside the largest: looking at each takes time.
+/// At least this share of the compared pixels has a side beside the largest: looking at each takes
+/// time.
 const WORTH: f64 = 0.01;
 
-/// The two largest |means| over the squares of each of [`SIDES`] about each pixel, over placements that are worked out.
+/// The two largest |means| over the squares of each of [`SIDES`] about each pixel, over placements
+/// that are worked out.
 #[derive(Debug, Default)]
 pub(super) struct Farthest([Vec<[f32; 2]>; SIDES.len()]);
 
@@ -45,7 +50,8 @@ impl Farthest {
         }
     }
 
-    /// What one placement at least reaches beside the farthest: a single one can be worked out wrong.
+    /// What one placement at least reaches beside the farthest: a single one can be worked out
+    /// wrong.
     fn at(&self, side: usize, place: usize) -> f64 {
         let second = self.0[side].get(place).map_or(0.0, |[_, second]| *second);
         f64::from(second)
@@ -61,9 +67,10 @@ impl Sides {
         }
     }
 
-    /// As small as they may be for a limit in mm, in a frame of `width` columns: `sigmas` are σ of the means over squares of each of
-    /// [`SIDES`] in mm, NaN where there is none. Only pixels that count in full, as `full` says, have smaller ones than the largest; the
-    /// image of a part moves by up to `away` pixels.
+    /// As small as they may be for a limit in mm, in a frame of `width` columns: `sigmas` are σ of
+    /// the means over squares of each of [`SIDES`] in mm, NaN where there is none. Only pixels that
+    /// count in full, as `full` says, have smaller ones than the largest; the image of a part moves
+    /// by up to `away` pixels.
     pub fn new(
         (sigmas, farthest): (&[Vec<f32>; SIDES.len()], &Farthest),
         full: impl Fn(usize) -> Option<bool>,

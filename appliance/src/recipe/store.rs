@@ -1,4 +1,5 @@
-//! The stored recipes of a station: a folder with a file `NNNN.recipe` for each, and its previous generation.
+//! The stored recipes of a station: a folder with a file `NNNN.recipe` for each, and its previous
+//! generation.
 
 use super::{Recipe, RecipeFile, archive};
 use crate::error::{Exit, Failure};
@@ -48,7 +49,8 @@ pub enum LoadError {
     },
 }
 
-/// A change to the stored recipes, an edit, an import or an export that failed; the recipes are unchanged.
+/// A change to the stored recipes, an edit, an import or an export that failed; the recipes are
+/// unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum ChangeError {
     /// There is no such recipe, or it is damaged.
@@ -59,7 +61,8 @@ pub enum ChangeError {
         "undo recipe {0}: no previous generation of it is stored, and it was not deleted: teach or import it"
     )]
     Nothing(u16),
-    /// The number has a recipe, which is not to be replaced without being asked for: in words, with the remedy.
+    /// The number has a recipe, which is not to be replaced without being asked for: in words, with
+    /// the remedy.
     #[error("{words}")]
     Taken {
         /// The number.
@@ -173,7 +176,8 @@ impl Store {
         [self.path(number), self.previous(number), self.kept(number)]
     }
 
-    /// Stores a packed recipe under its number; the recipe that had it stays as the previous generation.
+    /// Stores a packed recipe under its number; the recipe that had it stays as the previous
+    /// generation.
     ///
     /// # Errors
     /// Errors of the file system; the stored recipe is then unchanged.
@@ -182,9 +186,10 @@ impl Store {
         self.put(number, bytes)
     }
 
-    /// Stores a packed recipe in place of the one with the fingerprint `base`. Returns `false`, storing nothing, if another one
-    /// was stored or the recipe was deleted since `base` was read. Comparing and storing happen under one lock, so that one of two
-    /// clients with the same base is refused.
+    /// Stores a packed recipe in place of the one with the fingerprint `base`. Returns `false`,
+    /// storing nothing, if another one was stored or the recipe was deleted since `base` was read.
+    /// Comparing and storing happen under one lock, so that one of two clients with the same base
+    /// is refused.
     ///
     /// # Errors
     /// As [`Store::save`].
@@ -206,7 +211,8 @@ impl Store {
     fn is_newest(&self, number: u16, fingerprint: &str) -> bool {
         let has =
             |path: &Path| manifest_at(path).is_some_and(|file| file.fingerprint == fingerprint);
-        // Almost always it is the newest file; the whole file is hashed only if that one does not have the fingerprint.
+        // Almost always it is the newest file; the whole file is hashed only if that one does not
+        // have the fingerprint.
         has(&self.path(number)) || self.whole(number).is_ok_and(|whole| has(&whole))
     }
 
@@ -217,19 +223,20 @@ impl Store {
         Ok(lock)
     }
 
-    /// Loads a recipe by number. If the newest generation is damaged, the previous one is loaded, and [`LoadedRecipe::fallback`] says
-    /// why.
+    /// Loads a recipe by number. If the newest generation is damaged, the previous one is loaded,
+    /// and [`LoadedRecipe::fallback`] says why.
     ///
     /// # Errors
-    /// If there is none, no generation can be used, or the recipe cannot judge. The previous generation is not used in the last case:
-    /// it may judge by other limits.
+    /// If there is none, no generation can be used, or the recipe cannot judge. The previous
+    /// generation is not used in the last case: it may judge by other limits.
     pub fn load(&self, number: u16) -> Result<LoadedRecipe, LoadError> {
         let loaded = self.load_to_edit(number)?;
         refuse_judging(&self.path(number), &loaded.file)?;
         Ok(loaded)
     }
 
-    /// As [`Self::load`] without checking whether the recipe can judge: an edit may be about to correct it.
+    /// As [`Self::load`] without checking whether the recipe can judge: an edit may be about to
+    /// correct it.
     ///
     /// # Errors
     /// If there is none, or no generation can be used.
@@ -356,7 +363,8 @@ impl Store {
         numbers
     }
 
-    /// Refuses to give a recipe a part number that another one has: a PLC selects by it. A recipe may keep the one that it has.
+    /// Refuses to give a recipe a part number that another one has: a PLC selects by it. A recipe
+    /// may keep the one that it has.
     ///
     /// # Errors
     /// In words: which recipe has it, with the remedy.
@@ -370,7 +378,8 @@ impl Store {
         }
     }
 
-    /// The recipe that has a part number which recipe `number` does not have; `None` if it may have it.
+    /// The recipe that has a part number which recipe `number` does not have; `None` if it may have
+    /// it.
     pub(super) fn other_holder(&self, number: u16, part_number: &str) -> Option<u16> {
         let holders = self.holders(part_number);
         match holders.contains(&number) {
@@ -411,7 +420,8 @@ pub(super) fn is_sound(path: &Path) -> bool {
     fs::File::open(path).is_ok_and(|file| archive::is_sound(io::BufReader::new(file)))
 }
 
-/// Whether the content of a recipe's file agrees with the fingerprint that it states, even if it cannot be used.
+/// Whether the content of a recipe's file agrees with the fingerprint that it states, even if it
+/// cannot be used.
 fn is_undamaged(path: &Path) -> bool {
     fs::File::open(path).is_ok_and(|file| archive::is_undamaged(io::BufReader::new(file)))
 }

@@ -84,8 +84,10 @@ impl From<AdaptError> for TeachError {
     }
 }
 
-/// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern, measures it again and again with that one by
-/// every sequence that production may use, makes the recipe, and tries it on the part; nothing is stored here. The part must not move meanwhile. `progress` gets the share done and the current stage in words.
+/// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern,
+/// measures it again and again with that one by every sequence that production may use, makes the
+/// recipe, and tries it on the part; nothing is stored here. The part must not move meanwhile.
+/// `progress` gets the share done and the current stage in words.
 ///
 /// # Errors
 /// If a device fails or the scene cannot be taught.
@@ -104,8 +106,8 @@ pub fn teach(
     teach_while(head, calibration, naming, timeout, &computing, &all)
 }
 
-/// As [`teach`], but it ends before the next stage or capture when `progress` returns `false`. `computing` marks the stages that use no
-/// device.
+/// As [`teach`], but it ends before the next stage or capture when `progress` returns `false`.
+/// `computing` marks the stages that use no device.
 ///
 /// # Errors
 /// As [`teach`]; [`TeachError::Ended`] if `progress` ended it.
@@ -211,7 +213,8 @@ pub fn teach_while(
 /// Refuses a scene that shows too little to be taught.
 ///
 /// # Errors
-/// If less than half a per cent of the frame is resolved: the most frequent reason, with the remedy.
+/// If less than half a per cent of the frame is resolved: the most frequent reason, with the
+/// remedy.
 pub fn refuse_empty(phases: &PhaseMap) -> Result<(), TeachError> {
     let pixels = phases.trust.len() as f64;
     if phases.count(Trust::Resolved) as f64 >= LEAST_RESOLVED * pixels {

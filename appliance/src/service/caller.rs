@@ -1,4 +1,5 @@
-//! The caller of the daemon: the service manager that gets its status, and the source of its stop signal.
+//! The caller of the daemon: the service manager that gets its status, and the source of its stop
+//! signal.
 
 use crate::system::notify::Notify;
 use crate::system::stop_signal::StopSignal;

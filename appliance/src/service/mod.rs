@@ -1,7 +1,8 @@
 //! The running daemon: starts and stops its threads, and connects them.
 //!
-//! One OS thread measures ([`crate::production`]), one serves the sockets on a current-thread runtime, and others write the history,
-//! serve the lines and survey the machine. They share the station through its handle.
+//! One OS thread measures ([`crate::production`]), one serves the sockets on a current-thread
+//! runtime, and others write the history, serve the lines and survey the machine. They share the
+//! station through its handle.
 
 mod caller;
 mod serving;
@@ -82,9 +83,10 @@ pub struct Daemon {
 }
 
 impl Daemon {
-    /// Starts everything and returns when the head is open. The station then loads its recipe; on a simulated head without one, it
-    /// teaches one. For a service manager as `caller` it also returns if the head is missing; the measuring task then waits for the
-    /// head as for a lost one. On the caller's stop signal it returns at once; the daemon can then only be stopped.
+    /// Starts everything and returns when the head is open. The station then loads its recipe; on a
+    /// simulated head without one, it teaches one. For a service manager as `caller` it also
+    /// returns if the head is missing; the measuring task then waits for the head as for a lost
+    /// one. On the caller's stop signal it returns at once; the daemon can then only be stopped.
     ///
     /// # Errors
     /// If the state folder cannot be used (73), a port is in use or the head missing (69), or the
@@ -362,14 +364,16 @@ fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Statio
     Ok(Station::new(settings, Micros(0)))
 }
 
-/// Carries out the station's effects. It is called with the station locked, so it only hands them over and never waits.
+/// Carries out the station's effects. It is called with the station locked, so it only hands them
+/// over and never waits.
 fn effects(
     orders: mpsc::Sender<Order>,
     aborts: Aborts,
     history: History,
     progress: Progress,
 ) -> impl FnMut(Effect) -> Option<Event> {
-    // If the measuring task is gone, the order is lost, and the station's deadline for the job passes.
+    // If the measuring task is gone, the order is lost, and the station's deadline for the job
+    // passes.
     let order = move |order| drop(orders.send(order));
     move |effect| {
         match effect {
@@ -394,7 +398,8 @@ fn effects(
     }
 }
 
-/// The station's first request: to load its recipe. Without one, a simulated head teaches the part in front of it.
+/// The station's first request: to load its recipe. Without one, a simulated head teaches the part
+/// in front of it.
 fn first_request(config: &Config, simulated: bool, recipes: &Store) -> Option<Request> {
     let number = config.station.recipe;
     if recipes.numbers().contains(&number) {

@@ -7,8 +7,8 @@ use crate::station::{RecipeResult, Snapshot};
 use std::sync::Arc;
 
 impl Daemon {
-    /// Waits until the station has its recipe or cannot get it. With a recipe it is READY, unless the PLC has not set ONLINE or
-    /// selects another recipe.
+    /// Waits until the station has its recipe or cannot get it. With a recipe it is READY, unless
+    /// the PLC has not set ONLINE or selects another recipe.
     ///
     /// # Errors
     /// The station has a fault, or its recipe could be neither loaded nor taught.

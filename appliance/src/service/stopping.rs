@@ -9,13 +9,16 @@ use std::time::{Duration, Instant};
 
 /// Time between two checks whether a thread has ended.
 const POLLING: Duration = Duration::from_millis(2);
-/// A measuring task that has not ended after this time is abandoned: each wait for a device ends after 2 s.
+/// A measuring task that has not ended after this time is abandoned: each wait for a device ends
+/// after 2 s.
 const MEASURING: Duration = Duration::from_secs(3);
-/// A thread that has not ended after this time is abandoned: a stop takes at most 5 s, whatever hangs.
+/// A thread that has not ended after this time is abandoned: a stop takes at most 5 s, whatever
+/// hangs.
 const STOPPING: Duration = Duration::from_millis(4500);
 
 impl Daemon {
-    /// Stops everything: the cycle in flight ends with its result, INVALID if it was still exposing; then the sockets close.
+    /// Stops everything: the cycle in flight ends with its result, INVALID if it was still
+    /// exposing; then the sockets close.
     pub fn stop(self) {
         self.station.event(Event::Stop);
         self.end();
@@ -49,8 +52,8 @@ impl Daemon {
     }
 }
 
-/// Waits for a thread to end as long as it is `needed`, until `until` at most: a thread that hangs in a device or the storage must
-/// not keep the program alive.
+/// Waits for a thread to end as long as it is `needed`, until `until` at most: a thread that hangs
+/// in a device or the storage must not keep the program alive.
 fn join_while(
     thread: JoinHandle<()>,
     until: Instant,

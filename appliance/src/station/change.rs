@@ -1,4 +1,5 @@
-//! A change of recipe or head: a load, a teach or a step of commissioning, from its order to the worker's answer.
+//! A change of recipe or head: a load, a teach or a step of commissioning, from its order to the
+//! worker's answer.
 
 use super::control::BY_PART_NUMBER;
 use super::error_code;
@@ -12,7 +13,8 @@ use super::state::State;
 use std::sync::Arc;
 
 impl Station {
-    /// RECIPE_LOAD: a load that is refused is one that failed, because the PLC may trigger without looking at the answer.
+    /// RECIPE_LOAD: a load that is refused is one that failed, because the PLC may trigger without
+    /// looking at the answer.
     pub(super) fn plc_load(&mut self, effects: &mut Effects) {
         let select = self.plc.registers.recipe_select;
         let key = match select {
@@ -132,7 +134,8 @@ impl Station {
         }
     }
 
-    /// Whether the station waits for this job in a state of the kind; then the wait is over. Otherwise the answer is logged as late.
+    /// Whether the station waits for this job in a state of the kind; then the wait is over.
+    /// Otherwise the answer is logged as late.
     fn ends(&mut self, waits: bool, job: JobId, what: &str, effects: &mut Effects) -> bool {
         let ends = waits && self.state.job() == Some(job);
         if ends {
@@ -222,7 +225,8 @@ impl Station {
         }
     }
 
-    /// A step of commissioning has ended. After one that changed the calibration no recipe is active.
+    /// A step of commissioning has ended. After one that changed the calibration no recipe is
+    /// active.
     pub(super) fn commissioned(
         &mut self,
         job: JobId,

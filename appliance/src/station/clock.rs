@@ -1,6 +1,7 @@
 //! The station's time: monotonic, and as UTC while the system clock is synchronised.
 
-/// Time since the start of the daemon in µs, on a clock that never runs backwards. Always an argument, never read.
+/// Time since the start of the daemon in µs, on a clock that never runs backwards. Always an
+/// argument, never read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Micros(pub u64);
 

@@ -1,4 +1,5 @@
-//! The CONTROL block as the station sees it: stored registers, one write, and the edges of one connection.
+//! The CONTROL block as the station sees it: stored registers, one write, and the edges of one
+//! connection.
 
 use std::ops::{BitAnd, BitOr, Not};
 
@@ -69,7 +70,8 @@ impl Default for ControlRegisters {
 }
 
 impl ControlRegisters {
-    /// PART_NUMBER as text: up to the first NUL, without spaces around it; characters that are not ASCII become `?`.
+    /// PART_NUMBER as text: up to the first NUL, without spaces around it; characters that are not
+    /// ASCII become `?`.
     pub fn part_number_text(&self) -> String {
         let written = self.part_number.iter().take_while(|&&byte| byte != 0);
         let text: String = written
@@ -181,7 +183,8 @@ impl ControlWrite {
 
 /// The levels that one connection has written to CONTROL, so that its edges are its own.
 ///
-/// A connection's first write of a bit only sets the reference level: a 1 that an old session left behind does not fire.
+/// A connection's first write of a bit only sets the reference level: a 1 that an old session left
+/// behind does not fire.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ConnectionEdges {
     client: Client,
@@ -203,7 +206,8 @@ impl ConnectionEdges {
         self.client
     }
 
-    /// Takes the write's CONTROL bits and answers with those that rose against this connection's own last level.
+    /// Takes the write's CONTROL bits and answers with those that rose against this connection's
+    /// own last level.
     pub fn rise(&mut self, control: Masked<u16>) -> u16 {
         let rising = control.value & control.mask & self.known & !self.level & EDGES;
         self.level = control.onto(self.level);

@@ -101,7 +101,8 @@ impl Station {
         self.publish(cycle, Arc::new(inspection), effects);
     }
 
-    /// The cycle that `job` answers for, taken out of the state; the state becomes the one after it.
+    /// The cycle that `job` answers for, taken out of the state; the state becomes the one after
+    /// it.
     fn take_cycle(&mut self, job: JobId, what: &str, effects: &mut Effects) -> Option<Cycle> {
         match std::mem::replace(&mut self.state, State::Offline) {
             State::Acquiring { cycle, .. } | State::Processing { cycle, .. }

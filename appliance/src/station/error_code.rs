@@ -1,4 +1,5 @@
-//! ERROR_CODE: every code that a result or a fault can have; `docs/operations.md` has the table with the remedies.
+//! ERROR_CODE: every code that a result or a fault can have; `docs/operations.md` has the table
+//! with the remedies.
 
 /// The camera is lost.
 pub const CAMERA_LOST: u16 = 101;
@@ -18,8 +19,9 @@ pub const LINES_LOST: u16 = 303;
 pub const NOTHING_TO_TEACH: u16 = 401;
 /// A stored recipe is damaged or cannot be used on this head; it stays stored.
 pub const RECIPE_UNUSABLE: u16 = 402;
-/// The geometry, the pattern and a recipe do not fit each other: teaching cannot triangulate with them, the recipe that was
-/// taught cannot be made ready to measure, or a trigger came without a recipe.
+/// The geometry, the pattern and a recipe do not fit each other: teaching cannot triangulate with
+/// them, the recipe that was taught cannot be made ready to measure, or a trigger came without a
+/// recipe.
 pub const RIG: u16 = 501;
 /// The head has no calibration that can be used.
 pub const NOT_CALIBRATED: u16 = 502;
@@ -29,7 +31,8 @@ pub const NOT_STORED: u16 = 601;
 pub const STORAGE_FULL: u16 = 602;
 /// The number of a result could not be stored.
 pub const SEQ_NOT_STORED: u16 = 603;
-/// The measuring task did not answer before the deadline of a job, or gave no sign of life while it had none.
+/// The measuring task did not answer before the deadline of a job, or gave no sign of life while it
+/// had none.
 pub const DEADLINE: u16 = 801;
 /// The PLC or a stop ended the cycle before it had a result.
 pub const ABORTED: u16 = 802;

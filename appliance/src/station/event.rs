@@ -9,11 +9,13 @@ use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
 use super::turns::Client;
 
-/// The number of one order to the worker. Each answer carries it, so that a late answer is recognised.
+/// The number of one order to the worker. Each answer carries it, so that a late answer is
+/// recognised.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct JobId(pub u64);
 
-/// A request that does not come from the PLC: from the daemon's start, the command line or the page.
+/// A request that does not come from the PLC: from the daemon's start, the command line or the
+/// page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
     /// Load a recipe.
@@ -38,8 +40,8 @@ pub struct Condition {
     pub warming_up: bool,
     /// STATUS bit 15.
     pub calibration_valid: bool,
-    /// WARNING bits, see [`super::snapshot::warning`]; `PLC_LOST` and `CLOCK_UNSYNCED` are the station's own and ignored here. Those of
-    /// the next inspection replace them.
+    /// WARNING bits, see [`super::snapshot::warning`]; `PLC_LOST` and `CLOCK_UNSYNCED` are the
+    /// station's own and ignored here. Those of the next inspection replace them.
     pub warnings: u16,
 }
 
@@ -173,7 +175,8 @@ pub enum Event {
         /// The time in µs since 1970 UTC, if the clock is synchronised.
         utc_us: Option<u64>,
     },
-    /// The daemon is asked to end; sent again once the measuring task no longer answers, which ends the cycle in flight.
+    /// The daemon is asked to end; sent again once the measuring task no longer answers, which ends
+    /// the cycle in flight.
     Stop,
 }
 
@@ -251,8 +254,9 @@ pub enum Effect {
         /// The running job.
         job: JobId,
     },
-    /// Make sure that this RESULT_SEQ is stored as used and that another one may follow, and answer with [`Event::Stored`].
-    /// Always directly before the [`Effect::Publish`] of that result; again while none may follow.
+    /// Make sure that this RESULT_SEQ is stored as used and that another one may follow, and answer
+    /// with [`Event::Stored`]. Always directly before the [`Effect::Publish`] of that result; again
+    /// while none may follow.
     PersistSeq(u32),
     /// A result is complete: for the history.
     Publish(Arc<ResultRecord>),

@@ -16,7 +16,8 @@ pub enum ClearedBy {
     Recovery,
     /// Results cannot be stored: clears by itself when they can.
     Storage,
-    /// The worker was silent while it had nothing to do: clears by itself with its next sign of life.
+    /// The worker was silent while it had nothing to do: clears by itself with its next sign of
+    /// life.
     Life,
 }
 

@@ -50,8 +50,9 @@ impl Decision {
             .fold(0, |bits, (k, &set)| bits | (u16::from(set) << k))
     }
 
-    /// The decision for a value. Without a finite value it is not valid, and no other bit is set. A value within its limits, but
-    /// inside the guard band of one, proves neither that the part conforms nor that it does not: it is doubtful and no pass.
+    /// The decision for a value. Without a finite value it is not valid, and no other bit is set. A
+    /// value within its limits, but inside the guard band of one, proves neither that the part
+    /// conforms nor that it does not: it is doubtful and no pass.
     pub fn of(measured: &Measured, limits: &GaugeLimits) -> Self {
         let Some(value) = measured.value.filter(|value| value.is_finite()) else {
             return Self::default();
@@ -75,13 +76,15 @@ impl Decision {
         }
     }
 
-    /// Whether the value was measured, lies within its limits and is no pass, because it lies in the guard band.
+    /// Whether the value was measured, lies within its limits and is no pass, because it lies in
+    /// the guard band.
     pub fn guarded(self) -> bool {
         self.valid && !self.pass && !self.low && !self.high
     }
 }
 
-/// k of the expanded uncertainty U = k u that is shown: about 95 % of normal errors (JCGM 100:2008, 6.2).
+/// k of the expanded uncertainty U = k u that is shown: about 95 % of normal errors (JCGM 100:2008,
+/// 6.2).
 pub const COVERAGE_FACTOR: f64 = 2.0;
 
 /// What was found for a gauge, in its unit.
@@ -145,7 +148,8 @@ pub struct GaugeValue {
     pub value: Option<f64>,
     /// One standard deviation of the value; `None` where it is not predicted.
     pub sigma: Option<f64>,
-    /// U = [`COVERAGE_FACTOR`] · u, u with the systematic part of the error; `None` where σ is not predicted.
+    /// U = [`COVERAGE_FACTOR`] · u, u with the systematic part of the error; `None` where σ is not
+    /// predicted.
     pub uncertainty: Option<f64>,
     /// The magnitude that is expected on a good part; `None` where it is that of the part.
     pub expected: Option<f64>,
@@ -163,8 +167,8 @@ pub struct GaugeValue {
 }
 
 impl GaugeValue {
-    /// A gauge with the decision that follows from its value and limits. A σ of 0 says that nothing is known of it: a share of which no
-    /// pixel is near the threshold would have none.
+    /// A gauge with the decision that follows from its value and limits. A σ of 0 says that nothing
+    /// is known of it: a share of which no pixel is near the threshold would have none.
     pub fn judged(
         name: impl Into<Arc<str>>,
         unit: Unit,

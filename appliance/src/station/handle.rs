@@ -14,8 +14,8 @@ use super::machine::Station;
 use super::snapshot::Snapshot;
 use super::step::step;
 
-/// Carries out effects, in order. Called with the station locked, so it only passes effects on and never waits. An event that it
-/// returns is taken before the snapshot is published.
+/// Carries out effects, in order. Called with the station locked, so it only passes effects on and
+/// never waits. An event that it returns is taken before the snapshot is published.
 pub type EffectSink = Box<dyn FnMut(Effect) -> Option<Event> + Send>;
 
 struct Guarded {
@@ -23,7 +23,8 @@ struct Guarded {
     sink: EffectSink,
 }
 
-/// Access to the station for the worker, Modbus and the page. Cheap to clone; clones share the station.
+/// Access to the station for the worker, Modbus and the page. Cheap to clone; clones share the
+/// station.
 #[derive(Clone)]
 pub struct StationHandle {
     guarded: Arc<Mutex<Guarded>>,
@@ -58,7 +59,8 @@ impl StationHandle {
     /// Applies one write of the PLC as a unit and answers with the snapshot after it.
     ///
     /// # Errors
-    /// A value is refused (see [`ControlWrite::check`]): then nothing was applied and `edges` are as before.
+    /// A value is refused (see [`ControlWrite::check`]): then nothing was applied and `edges` are
+    /// as before.
     pub fn write(
         &self,
         edges: &mut ConnectionEdges,
@@ -89,7 +91,8 @@ impl StationHandle {
         let mut guarded = self.lock();
         let mut next = Some(event);
         while let Some(event) = next.take() {
-            // Read under the lock, so that events are numbered in the order in which they are taken.
+            // Read under the lock, so that events are numbered in the order in which they are
+            // taken.
             let (station, effects) = step(guarded.station.clone(), event, self.now());
             guarded.station = station;
             for effect in effects {
@@ -103,7 +106,8 @@ impl StationHandle {
     }
 
     fn lock(&self) -> MutexGuard<'_, Guarded> {
-        // After a panic in the sink the station is still consistent: it is stored before its effects are carried out.
+        // After a panic in the sink the station is still consistent: it is stored before its
+        // effects are carried out.
         self.guarded.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

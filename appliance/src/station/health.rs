@@ -1,4 +1,5 @@
-//! Health: measured values of system, head and clients for the HEALTH registers, with the limits of storage and temperature.
+//! Health: measured values of system, head and clients for the HEALTH registers, with the limits of
+//! storage and temperature.
 
 use std::sync::Arc;
 
@@ -6,12 +7,13 @@ use serde::Serialize;
 
 /// Less free storage than this is a warning, MiB: a day of results and some recordings.
 pub const LOW_STORAGE_MIB: u64 = 256;
-/// Less free storage than this is a fault, MiB: a recipe is written whole beside its two generations, each up to 8 MiB.
+/// Less free storage than this is a fault, MiB: a recipe is written whole beside its two
+/// generations, each up to 8 MiB.
 pub const FULL_STORAGE_MIB: u64 = 24;
 /// From here on the processor is a warning, °C: small computers slow themselves down at 80 to 85.
 pub const HOT_PROCESSOR_C: f64 = 80.0;
-/// From here on the projector is a warning, °C: the long-term limit of the micromirror array (data sheet of the DLP3010, recommended
-/// operating conditions).
+/// From here on the projector is a warning, °C: the long-term limit of the micromirror array (data
+/// sheet of the DLP3010, recommended operating conditions).
 pub const HOT_PROJECTOR_C: f64 = 70.0;
 
 /// Bits of [`Power`].
@@ -29,8 +31,9 @@ mod power {
 pub struct Power(u16);
 
 impl Power {
-    /// From the bits of `get_throttled`: 0–3 now, 16–19 the same since the computer's start (Raspberry Pi documentation, *vcgencmd*,
-    /// get_throttled). Reading may reset the latter, so those of the reading `before` stay.
+    /// From the bits of `get_throttled`: 0–3 now, 16–19 the same since the computer's start
+    /// (Raspberry Pi documentation, *vcgencmd*, get_throttled). Reading may reset the latter, so
+    /// those of the reading `before` stay.
     pub fn of(firmware: u32, before: Option<Self>) -> Self {
         let nibble = |at: u32| ((firmware >> at) & 0xF) as u16;
         let seen = before.unwrap_or_default().0 & 0xF0;
@@ -122,7 +125,8 @@ pub struct Pace {
     pub dropped: u32,
     /// Refreshes that the projector missed.
     pub missed_flips: u32,
-    /// Patterns that were shown again because no frame was exposed to them alone, or their frame was spoiled.
+    /// Patterns that were shown again because no frame was exposed to them alone, or their frame
+    /// was spoiled.
     #[serde(rename = "retaken_patterns")]
     pub retaken: u32,
     /// Largest deviation of a flip from its expected time and of an exposure from its trigger, µs.

@@ -1,4 +1,5 @@
-//! What the station remembers between two events, its settings, and the few changes that several events share.
+//! What the station remembers between two events, its settings, and the few changes that several
+//! events share.
 
 use std::sync::Arc;
 
@@ -67,7 +68,8 @@ pub struct Settings {
     pub limits: Limits,
 }
 
-/// The station: plain values, each part with the transitions that only it decides. [`super::step()`] is its only entry.
+/// The station: plain values, each part with the transitions that only it decides.
+/// [`super::step()`] is its only entry.
 #[derive(Debug, Clone)]
 pub struct Station {
     pub(super) settings: Settings,
@@ -134,7 +136,8 @@ impl Station {
         self.clock.now().after(limit)
     }
 
-    /// Whether the worker meets its deadlines: that of the wait it is in, else a sign of life now and then.
+    /// Whether the worker meets its deadlines: that of the wait it is in, else a sign of life now
+    /// and then.
     pub(super) fn worker_is_in_time(&self) -> bool {
         let now = self.clock.now();
         match self.state.deadline() {
@@ -158,7 +161,8 @@ impl Station {
 
 /// Queues an effect.
 pub(super) fn push(effects: &mut Effects, effect: Effect) {
-    // One event causes far fewer than the capacity; the random walk test holds that nothing is ever dropped here.
+    // One event causes far fewer than the capacity; the random walk test holds that nothing is ever
+    // dropped here.
     let pushed = effects.push(effect);
     debug_assert!(
         pushed.is_ok(),

@@ -1,43 +1,58 @@
 //! The station: the pure state machine that decides, and the snapshot that it publishes.
 //!
-//! [`step()`] is a function `(station, event, now) → (station, effects)`. It knows no thread, no socket and no clock: time is
-//! an argument ([`Micros`]), the worker and the PLC are [`Event`]s, and everything it wants done is an [`Effect`]. Its
-//! registers follow `docs/modbus.md`, version 1.3. Modbus and the page see nothing but one immutable [`Snapshot`].
-//! [`StationHandle`] is the one place where the machine meets a clock, a mutex and channels.
+//! [`step()`] is a function `(station, event, now) → (station, effects)`. It knows no thread, no
+//! socket and no clock: time is an argument ([`Micros`]), the worker and the PLC are [`Event`]s,
+//! and everything it wants done is an [`Effect`]. Its registers follow `docs/modbus.md`, version
+//! 1.3. Modbus and the page see nothing but one immutable [`Snapshot`]. [`StationHandle`] is the
+//! one place where the machine meets a clock, a mutex and channels.
 //!
-//! [`machine`] holds the parts: clock, PLC, request counters, recipes, worker, results. Each part has its own file and is changed
-//! only by its own functions. `step` sends an event to the transition that takes it: `plc` (a write), `cycle` (trigger to
-//! result), `change` (load and teach), `watch` (faults).
+//! [`machine`] holds the parts: clock, PLC, request counters, recipes, worker, results. Each part
+//! has its own file and is changed only by its own functions. `step` sends an event to the
+//! transition that takes it: `plc` (a write), `cycle` (trigger to result), `change` (load and
+//! teach), `watch` (faults).
 //!
 //! Decisions where the register map is silent:
 //!
-//! - **Every accepted trigger ends in exactly one result.** A measurement that failed, was aborted or ran into its deadline
-//!   gives a result with verdict INVALID and the cause in its ERROR_CODE; results since the start = TRIGGERS − cycles in flight.
-//! - **RECIPE_LOAD beats TRIGGER in one write**: the load begins, the trigger is rejected as not ready. Measuring the new
-//!   part with the old recipe could pass the wrong part. With RECIPE_SELECT 0 nothing is loaded and the trigger counts.
-//! - **A part is measured only with the recipe that was asked for.** Every trigger, from the PLC or the page, is rejected with reason 6
-//!   while the RECIPE_SELECT that is held in CONTROL names another recipe than the active one, and after a load that failed
-//!   until one succeeds. READY is then 0, so it always says whether a trigger would be accepted.
-//! - The bits of one CONTROL write act in this order: ERROR_RESET, ABORT, ONLINE, RESULT_ACK, BUFFERED, RECIPE_LOAD, TEACH,
-//!   TRIGGER. So one write can clear a fault and trigger. An abort takes effect when the worker answers; until then the
-//!   station is busy.
-//! - A trigger by edge answers with TOKEN 0 unless the same write brings a new token. LAST_TOKEN changes only by a token.
-//! - RECIPE_OK means that the requested recipe is the active one: a failed load keeps the old recipe and clears the bit; no
-//!   trigger is accepted without it. Loading the recipe that is still active sets it again.
-//! - A load that the page asks for while the station is busy is refused and changes nothing. A load that the PLC asks for then
-//!   counts as one that failed, because the PLC may trigger without looking at the answer.
-//! - TEACH with RECIPE_SELECT 0 or 65535 replaces the active recipe, so it is rejected where a trigger would be with reason 6.
-//! - ERROR and ERROR_CODE show a fault, else the last failed cycle until a cycle succeeds or ERROR_RESET.
-//! - EXPOSURE_DONE also rises with the result of a cycle whose exposure was never reported: the head is idle, the part may move.
-//! - The PLC's heartbeat is watched from its first change on; a PLC that never uses it is never reported lost.
-//! - A fault of a lost device, of storage and of an idle worker's silence clears by itself when its cause is gone; only the
-//!   fault of a missed deadline waits for ERROR_RESET, because it is not known what the worker did meanwhile.
-//! - A lost device ends the cycle in flight as INVALID. After its recovery the active recipe is the one that the worker still
-//!   holds. A load or teach that the loss interrupted counts as a load that failed.
-//! - Full storage is a fault only between two jobs: the cycle in flight still gets its result. A result whose SEQ could not be
-//!   stored is shown, but no further trigger is accepted until that SEQ is stored.
-//! - Of clients that trigger without a pause each is granted in turn; until then the one that was granted last is rejected as not ready,
-//!   although READY is 1.
+//! - **Every accepted trigger ends in exactly one result.** A measurement that failed, was aborted
+//!   or ran into its deadline gives a result with verdict INVALID and the cause in its ERROR_CODE;
+//!   results since the start = TRIGGERS − cycles in flight.
+//! - **RECIPE_LOAD beats TRIGGER in one write**: the load begins, the trigger is rejected as not
+//!   ready. Measuring the new part with the old recipe could pass the wrong part. With
+//!   RECIPE_SELECT 0 nothing is loaded and the trigger counts.
+//! - **A part is measured only with the recipe that was asked for.** Every trigger, from the PLC or
+//!   the page, is rejected with reason 6 while the RECIPE_SELECT that is held in CONTROL names
+//!   another recipe than the active one, and after a load that failed until one succeeds. READY is
+//!   then 0, so it always says whether a trigger would be accepted.
+//! - The bits of one CONTROL write act in this order: ERROR_RESET, ABORT, ONLINE, RESULT_ACK,
+//!   BUFFERED, RECIPE_LOAD, TEACH, TRIGGER. So one write can clear a fault and trigger. An abort
+//!   takes effect when the worker answers; until then the station is busy.
+//! - A trigger by edge answers with TOKEN 0 unless the same write brings a new token. LAST_TOKEN
+//!   changes only by a token.
+//! - RECIPE_OK means that the requested recipe is the active one: a failed load keeps the old
+//!   recipe and clears the bit; no trigger is accepted without it. Loading the recipe that is still
+//!   active sets it again.
+//! - A load that the page asks for while the station is busy is refused and changes nothing. A load
+//!   that the PLC asks for then counts as one that failed, because the PLC may trigger without
+//!   looking at the answer.
+//! - TEACH with RECIPE_SELECT 0 or 65535 replaces the active recipe, so it is rejected where a
+//!   trigger would be with reason 6.
+//! - ERROR and ERROR_CODE show a fault, else the last failed cycle until a cycle succeeds or
+//!   ERROR_RESET.
+//! - EXPOSURE_DONE also rises with the result of a cycle whose exposure was never reported: the
+//!   head is idle, the part may move.
+//! - The PLC's heartbeat is watched from its first change on; a PLC that never uses it is never
+//!   reported lost.
+//! - A fault of a lost device, of storage and of an idle worker's silence clears by itself when its
+//!   cause is gone; only the fault of a missed deadline waits for ERROR_RESET, because it is not
+//!   known what the worker did meanwhile.
+//! - A lost device ends the cycle in flight as INVALID. After its recovery the active recipe is the
+//!   one that the worker still holds. A load or teach that the loss interrupted counts as a load
+//!   that failed.
+//! - Full storage is a fault only between two jobs: the cycle in flight still gets its result. A
+//!   result whose SEQ could not be stored is shown, but no further trigger is accepted until that
+//!   SEQ is stored.
+//! - Of clients that trigger without a pause each is granted in turn; until then the one that was
+//!   granted last is rejected as not ready, although READY is 1.
 //! - REJECT_REASON stays until the next rejected request.
 
 #[macro_use]

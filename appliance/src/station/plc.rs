@@ -1,4 +1,5 @@
-//! The PLC: its registers and heartbeat, and one write of it. Fields act first, then the CONTROL bits in their order, the trigger last.
+//! The PLC: its registers and heartbeat, and one write of it. Fields act first, then the CONTROL
+//! bits in their order, the trigger last.
 
 use super::clock::Micros;
 use super::control::{self, ControlRegisters, ControlWrite};

@@ -101,7 +101,8 @@ impl Recipes {
         self.result = result;
     }
 
-    /// A load or a teach was interrupted. What the worker holds now is not known, so no recipe is active.
+    /// A load or a teach was interrupted. What the worker holds now is not known, so no recipe is
+    /// active.
     pub(super) fn interrupt(&mut self) {
         self.active = None;
         self.result = RecipeResult::Busy;
@@ -112,8 +113,8 @@ impl Recipes {
         self.active.is_some() && self.result == RecipeResult::Ok
     }
 
-    /// Whether a part must not be measured with the active recipe, because another one was asked for: by the RECIPE_SELECT
-    /// that is held in CONTROL, or by a load that failed.
+    /// Whether a part must not be measured with the active recipe, because another one was asked
+    /// for: by the RECIPE_SELECT that is held in CONTROL, or by a load that failed.
     pub(super) fn is_other_asked_for(&self, control: &ControlRegisters) -> bool {
         let selected = |recipe: &ActiveRecipe| match control.recipe_select {
             0 => true,

@@ -1,5 +1,5 @@
-//! What became of requests: triggers of any source (PLC, page, start line) counted as accepted or missed, the last token of the PLC,
-//! why the last request was rejected.
+//! What became of requests: triggers of any source (PLC, page, start line) counted as accepted or
+//! missed, the last token of the PLC, why the last request was rejected.
 
 /// The counters and latches of requests.
 #[derive(Debug, Clone, Default)]
@@ -17,8 +17,9 @@ pub(super) struct Requests {
 }
 
 impl Requests {
-    /// The token of a write if it is a trigger: neither 0 nor the last accepted one, whatever connection that came from. So a write
-    /// that is sent again does not measure again, until another token is accepted or the daemon is started again.
+    /// The token of a write if it is a trigger: neither 0 nor the last accepted one, whatever
+    /// connection that came from. So a write that is sent again does not measure again, until
+    /// another token is accepted or the daemon is started again.
     pub(super) fn new_token(&self, written: Option<u16>) -> Option<u16> {
         written.filter(|&token| token != 0 && token != self.last_token)
     }

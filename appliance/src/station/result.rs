@@ -23,7 +23,8 @@ pub enum Verdict {
     Pass,
     /// 2: every gauge was measured and at least one lies outside.
     Fail,
-    /// 3: something could not be measured, or a value lies so close to a limit that neither PASS nor FAIL is proven.
+    /// 3: something could not be measured, or a value lies so close to a limit that neither PASS
+    /// nor FAIL is proven.
     Invalid,
 }
 
@@ -83,12 +84,13 @@ pub mod flag {
 /// The pose of a part relative to its pose at teaching.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Placement {
-    /// Translation of the middle of its surface along x, y, z in mm, and rotation vector about it in degrees; `None` where the
-    /// part's shape does not determine the component.
+    /// Translation of the middle of its surface along x, y, z in mm, and rotation vector about it
+    /// in degrees; `None` where the part's shape does not determine the component.
     pub values: [Option<f64>; 6],
     /// Displacement of the corner of the part's bounding box that moved farthest.
     pub reach_mm: f64,
-    /// Share of the sampled points that do not fit: they lie on defects, or their fringe order is wrong.
+    /// Share of the sampled points that do not fit: they lie on defects, or their fringe order is
+    /// wrong.
     pub outliers: f64,
 }
 
@@ -117,7 +119,8 @@ pub struct Inspection {
     /// 0, or why it is INVALID as a code.
     #[serde(skip)]
     pub error_code: u16,
-    /// What its frames show of the head: WARNING bits `LOW_LIGHT`, `SATURATION`, `PATTERN_UNFIT`, `FRAME_SLIP`.
+    /// What its frames show of the head: WARNING bits `LOW_LIGHT`, `SATURATION`, `PATTERN_UNFIT`,
+    /// `FRAME_SLIP`.
     #[serde(skip)]
     pub warnings: u16,
     /// The recipe's gauges, in its order.
@@ -140,8 +143,8 @@ pub struct Inspection {
     pub skipped: Skipped,
     /// What the measuring task knows of its stages' times; [`ResultRecord::stages`] adds the rest.
     pub stages: Stages,
-    /// Processor time of the processing, summed over all computing threads, µs. Unlike the times above it does not grow when
-    /// other programs use the processor.
+    /// Processor time of the processing, summed over all computing threads, µs. Unlike the times
+    /// above it does not grow when other programs use the processor.
     pub cpu_us: u32,
     /// The part's pose, if it was aligned.
     pub placement: Option<Placement>,
@@ -151,9 +154,9 @@ pub struct Inspection {
 }
 
 impl Inspection {
-    /// The verdict that is shown. The worker's judgement can make it worse than the gauges say, never better: it is INVALID
-    /// without a judgement, without gauges, or with a gauge that was not measured; it is not PASS with a gauge outside its limits, or in
-    /// a guard band.
+    /// The verdict that is shown. The worker's judgement can make it worse than the gauges say,
+    /// never better: it is INVALID without a judgement, without gauges, or with a gauge that was
+    /// not measured; it is not PASS with a gauge outside its limits, or in a guard band.
     pub fn verdict(&self) -> Verdict {
         let unmeasured =
             self.gauges.is_empty() || self.gauges.iter().any(|gauge| !gauge.decision.valid);
@@ -203,7 +206,8 @@ pub struct ResultRecord {
     pub error_code: u16,
     /// Trigger time in µs since 1970 UTC, 0 if the clock is not synchronised.
     pub time_utc_us: u64,
-    /// Trigger time since the start of the daemon, s; also known while the clock is not synchronised.
+    /// Trigger time since the start of the daemon, s; also known while the clock is not
+    /// synchronised.
     #[serde(skip)]
     pub uptime_s: u32,
     /// BOOT_ID of that start.

@@ -1,4 +1,5 @@
-//! The results of this run as the PLC sees them: their numbers, the latest one with its handshake, the queue of BUFFERED mode.
+//! The results of this run as the PLC sees them: their numbers, the latest one with its handshake,
+//! the queue of BUFFERED mode.
 
 use std::sync::Arc;
 

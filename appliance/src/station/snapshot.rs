@@ -1,4 +1,5 @@
-//! The snapshot: one immutable copy of what the station shows. Registers and page are two views of it.
+//! The snapshot: one immutable copy of what the station shows. Registers and page are two views of
+//! it.
 
 use std::sync::Arc;
 
@@ -149,7 +150,8 @@ pub struct Snapshot {
     pub buffered: u16,
     /// REJECT_REASON, see [`super::refusal::reject`].
     pub reject_reason: u16,
-    /// Why a trigger would be rejected now, see [`super::refusal::reject`]; `None` exactly while READY.
+    /// Why a trigger would be rejected now, see [`super::refusal::reject`]; `None` exactly while
+    /// READY.
     pub refusal: Option<u16>,
     /// Seconds since the start.
     pub uptime_s: u32,
@@ -175,7 +177,8 @@ impl Snapshot {
         self.recipe.as_ref().map(|recipe| recipe.number)
     }
 
-    /// Whether the station is busy with something that ends by itself: every state but ready, offline and fault.
+    /// Whether the station is busy with something that ends by itself: every state but ready,
+    /// offline and fault.
     pub fn is_working(&self) -> bool {
         !matches!(self.state, 1 | 6 | 7)
     }

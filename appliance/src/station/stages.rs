@@ -52,8 +52,8 @@ pub struct StageTime {
     pub us: u32,
 }
 
-/// The times of a cycle's stages, in the order in which they first happened. A stage that happens again, with a longer
-/// sequence, adds to its time.
+/// The times of a cycle's stages, in the order in which they first happened. A stage that happens
+/// again, with a longer sequence, adds to its time.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Stages(heapless::Vec<StageTime, { Stage::COUNT }>);
 
@@ -90,7 +90,8 @@ impl Stages {
         processing.fold(0, |sum, time| sum.saturating_add(time.us))
     }
 
-    /// The stages of a cycle that took `total_us`: the time of no other stage is hand-over. Empty if no stage is known.
+    /// The stages of a cycle that took `total_us`: the time of no other stage is hand-over. Empty
+    /// if no stage is known.
     pub fn of_cycle(&self, total_us: u32) -> Self {
         let mut all = self.clone();
         if !all.0.is_empty() {

@@ -7,7 +7,8 @@ use super::fault::{ClearedBy, Fault};
 use super::machine::Station;
 use super::state::State;
 
-/// Takes one event. Every state takes every event; an event that makes no sense in a state changes nothing and is logged.
+/// Takes one event. Every state takes every event; an event that makes no sense in a state changes
+/// nothing and is logged.
 ///
 /// `now` must not run backwards; if it does, the last time is kept.
 pub fn step(mut station: Station, event: Event, now: Micros) -> (Station, Effects) {

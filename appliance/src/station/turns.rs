@@ -1,8 +1,10 @@
-//! Whose turn it is, where several clients trigger without a pause: each is granted in turn, else the fastest would starve the others.
+//! Whose turn it is, where several clients trigger without a pause: each is granted in turn, else
+//! the fastest would starve the others.
 //!
-//! A client that was rejected several times within a second, because the station was busy, waits for its turn. Until it has had it, the
-//! client that was granted last is rejected, if both are of one kind: a PLC never waits for the page, and a start line, which cannot
-//! ask again, never for anybody.
+//! A client that was rejected several times within a second, because the station was busy, waits
+//! for its turn. Until it has had it, the client that was granted last is rejected, if both are of
+//! one kind: a PLC never waits for the page, and a start line, which cannot ask again, never for
+//! anybody.
 
 use super::clock::Micros;
 
@@ -27,7 +29,8 @@ impl Client {
     }
 }
 
-/// Rejected triggers after which a client waits for its turn: one that asks less often does not compete.
+/// Rejected triggers after which a client waits for its turn: one that asks less often does not
+/// compete.
 const INSISTENT: u32 = 3;
 /// A client that has not asked again for so long does not wait any more.
 const PAUSE: Micros = Micros::from_millis(1000);

@@ -47,7 +47,8 @@ impl Station {
     pub(super) fn started(&mut self, effects: &mut Effects) {
         match &self.state {
             State::Boot { .. } => self.state = self.rest(),
-            // It booted too slowly, but it booted; or it was started anew and holds no recipe any more.
+            // It booted too slowly, but it booted; or it was started anew and holds no recipe any
+            // more.
             State::Fault(fault) if fault.cleared_by == ClearedBy::SignOfLife => {
                 self.recipes.active = None;
                 self.state = self.rest();
@@ -131,7 +132,8 @@ impl Station {
         }
     }
 
-    /// Takes a survey: full storage is a fault between two jobs, and clears by itself when there is room again.
+    /// Takes a survey: full storage is a fault between two jobs, and clears by itself when there is
+    /// room again.
     pub(super) fn surveyed(&mut self, system: System, effects: &mut Effects) {
         let free = system.free_storage_mib;
         self.health.system = system;

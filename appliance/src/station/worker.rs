@@ -1,5 +1,5 @@
-//! What the station knows of the measuring task (the worker): its last order, its last sign of life, and the HEARTBEAT that shows
-//! to the PLC that it lives.
+//! What the station knows of the measuring task (the worker): its last order, its last sign of
+//! life, and the HEARTBEAT that shows to the PLC that it lives.
 
 use super::clock::Micros;
 use super::event::JobId;
@@ -36,7 +36,8 @@ impl Worker {
         self.last_job
     }
 
-    /// Advances HEARTBEAT to `now`, or holds it while the worker misses its deadlines. Beats missed that way are not made up for.
+    /// Advances HEARTBEAT to `now`, or holds it while the worker misses its deadlines. Beats missed
+    /// that way are not made up for.
     pub(super) fn beat(&mut self, in_time: bool, now: Micros) {
         if !in_time {
             self.next_beat = now.after(BEAT);

@@ -1,8 +1,8 @@
 //! A ZIP that came from elsewhere: its directory is checked before any member is read.
 //!
-//! A directory of a few kilobytes can name the same bytes thousands of times. Here a ZIP has no more members than its
-//! format needs, no two members share a byte, and all are stored without compression: reading all of them costs as much
-//! as reading the file once.
+//! A directory of a few kilobytes can name the same bytes thousands of times. Here a ZIP has no
+//! more members than its format needs, no two members share a byte, and all are stored without
+//! compression: reading all of them costs as much as reading the file once.
 
 use std::io::{self, Read, Seek, SeekFrom};
 use zip::read::ZipFile;
@@ -24,7 +24,8 @@ impl<R: Read + Seek> Members<R> {
     /// Opens a ZIP of at most `most` members (folders count). Takes memory for the directory only.
     ///
     /// # Errors
-    /// In words: it is not a ZIP, has too many members, two of one name or two that share bytes, or one is compressed.
+    /// In words: it is not a ZIP, has too many members, two of one name or two that share bytes, or
+    /// one is compressed.
     pub fn open(mut source: R, most: usize) -> Result<Self, String> {
         let listed = listed(&mut source).map_err(|error| format!("read its end: {error}"))?;
         let listed = listed.ok_or("it is no ZIP, or was cut off")?;
@@ -105,8 +106,9 @@ impl<R: Read + Seek> Members<R> {
     }
 }
 
-/// The number of members in the record at the end; `None` if the file does not end in such a record with the directory right
-/// before it. A ZIP with a comment or with 64-bit sizes is refused: this program writes neither.
+/// The number of members in the record at the end; `None` if the file does not end in such a record
+/// with the directory right before it. A ZIP with a comment or with 64-bit sizes is refused: this
+/// program writes neither.
 fn listed(source: &mut (impl Read + Seek)) -> io::Result<Option<usize>> {
     let size = source.seek(SeekFrom::End(0))?;
     let Some(start) = size.checked_sub(END_BYTES as u64) else {

@@ -7,7 +7,8 @@ use std::io::{self, Read as _, Write as _};
 use std::os::unix::fs::OpenOptionsExt as _;
 use std::path::{Path, PathBuf};
 
-/// An output folder. Each file in it is whole at any time; an older one of the same name is replaced.
+/// An output folder. Each file in it is whole at any time; an older one of the same name is
+/// replaced.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
@@ -69,7 +70,8 @@ impl OutputFolder {
     }
 }
 
-/// Writes a file so that a loss of power leaves the old one or the new one, whole: see [`write_whole_with`].
+/// Writes a file so that a loss of power leaves the old one or the new one, whole: see
+/// [`write_whole_with`].
 ///
 /// # Errors
 /// Whatever the file system answers.
@@ -77,8 +79,8 @@ pub fn write_whole(target: &Path, bytes: &[u8]) -> io::Result<()> {
     write_whole_with(target, |file| file.write_all(bytes))
 }
 
-/// Writes a file under a temporary name with `fill`, syncs it, renames it, and syncs the folder. What cannot be finished is
-/// removed.
+/// Writes a file under a temporary name with `fill`, syncs it, renames it, and syncs the folder.
+/// What cannot be finished is removed.
 ///
 /// # Errors
 /// Whatever `fill` or the file system answers; then the old file stands.
@@ -97,8 +99,8 @@ pub fn write_whole_with(
     written
 }
 
-/// Reads a file of the state folder whole. What is no file is refused at once: a pipe, a device or a link to one would be read for
-/// ever. So is one of more than `most` bytes.
+/// Reads a file of the state folder whole. What is no file is refused at once: a pipe, a device or
+/// a link to one would be read for ever. So is one of more than `most` bytes.
 ///
 /// # Errors
 /// Whatever the file system answers; `InvalidData` for what is refused.
@@ -149,8 +151,8 @@ pub fn rename_whole(from: &Path, target: &Path) -> io::Result<()> {
     sync_folder_of(target)
 }
 
-/// Gives a file a second name (hard link), in place of whatever had it; the first one stays. A loss of power leaves under the
-/// second name what was there before, or this file.
+/// Gives a file a second name (hard link), in place of whatever had it; the first one stays. A loss
+/// of power leaves under the second name what was there before, or this file.
 ///
 /// # Errors
 /// Whatever the file system answers.
@@ -159,7 +161,8 @@ pub fn name_also(file: &Path, second: &Path) -> io::Result<()> {
     // Left by a kill; there may be none.
     let _ = fs::remove_file(&temporary);
     let named = fs::hard_link(file, &temporary).and_then(|()| rename_whole(&temporary, second));
-    // Two names of one file are not renamed, and a kill may have made this file the second one already.
+    // Two names of one file are not renamed, and a kill may have made this file the second one
+    // already.
     let _ = fs::remove_file(&temporary);
     // Not every file system gives a file two names.
     named.or_else(|_| copy_whole(file, second))

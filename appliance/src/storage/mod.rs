@@ -1,4 +1,5 @@
-//! Storage: the state folder, files that a loss of power leaves whole, and archives that came from elsewhere.
+//! Storage: the state folder, files that a loss of power leaves whole, and archives that came from
+//! elsewhere.
 
 pub mod archive;
 pub mod folder;

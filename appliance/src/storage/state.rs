@@ -14,7 +14,8 @@ pub struct StateFolder {
     _lock: File,
 }
 
-/// The counter's file: the last SEQ that may be in use, in decimal, and the run that wrote it, in hexadecimal.
+/// The counter's file: the last SEQ that may be in use, in decimal, and the run that wrote it, in
+/// hexadecimal.
 const COUNTER: &str = "result-seq";
 /// The serial's file.
 const SERIAL: &str = "serial";
@@ -47,8 +48,8 @@ impl StateFolder {
         Self::open_unless_held(path, (Exit::CannotCreate, remedy))
     }
 
-    /// As [`StateFolder::open`], for a command that changes what a running station uses; `instead` says how it is done while
-    /// the station runs.
+    /// As [`StateFolder::open`], for a command that changes what a running station uses; `instead`
+    /// says how it is done while the station runs.
     ///
     /// # Errors
     /// If it cannot be created or written (exit code 73), or a station uses it (exit code `used`).
@@ -155,7 +156,8 @@ impl Counted {
         words.next().is_none().then_some(Self { last, run })
     }
 
-    /// The content of the counter's file. Its length is always the same, so that overwriting it needs no room.
+    /// The content of the counter's file. Its length is always the same, so that overwriting it
+    /// needs no room.
     pub fn text(self) -> String {
         format!("{:010} {:08x}\n", self.last, self.run)
     }
@@ -174,8 +176,8 @@ impl Counter {
         let _ = fs::rename(&self.file, self.file.with_extension("damaged"));
     }
 
-    /// Stores that SEQs up to this one may be in use. It is written in place, within one sector: it needs no room on a full card,
-    /// and a loss of power leaves the old numbers or the new ones.
+    /// Stores that SEQs up to this one may be in use. It is written in place, within one sector: it
+    /// needs no room on a full card, and a loss of power leaves the old numbers or the new ones.
     ///
     /// # Errors
     /// Whatever the file system answers.

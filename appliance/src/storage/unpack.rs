@@ -8,8 +8,9 @@ use std::io;
 use std::os::unix::fs::DirBuilderExt as _;
 use std::path::{Component, Path, PathBuf};
 
-/// The most members that are unpacked. A recording has at most 1030 files: 1024 frames, the phase functions of up to two patterns, two maps of the ground
-/// truth, a manifest and a recipe. The rest is for entries of folders and for files that other programs add.
+/// The most members that are unpacked. A recording has at most 1030 files: 1024 frames, the phase
+/// functions of up to two patterns, two maps of the ground truth, a manifest and a recipe. The rest
+/// is for entries of folders and for files that other programs add.
 const MOST_MEMBERS: usize = 2048;
 /// What a recording's folder must hold.
 const MANIFEST: &str = "recording.json";

@@ -1,21 +1,22 @@
 //! The system clock, and whether it is synchronised.
 
 use std::time::{SystemTime, UNIX_EPOCH};
-/// The beginning of the year 10000, µs since 1970 UTC: dates in HTTP (RFC 9110), SQLite and most programs that read CSV have
-/// four digits for the year. Linux itself sets no clock past 2232.
+/// The beginning of the year 10000, µs since 1970 UTC: dates in HTTP (RFC 9110), SQLite and most
+/// programs that read CSV have four digits for the year. Linux itself sets no clock past 2232.
 const YEAR_10000_US: u64 = 253_402_300_800_000_000;
 /// The beginning of 2026, ms since 1970 UTC: this program was not there before.
 const YEAR_2026_MS: u64 = 1_767_225_600_000;
 /// The beginning of 2100.
 const YEAR_2100_MS: u64 = 4_102_444_800_000;
 
-/// The time in µs since 1970 UTC. `None` while no time service has synchronised the clock, or from the year 10000 on: a wrong
-/// time is worse than none.
+/// The time in µs since 1970 UTC. `None` while no time service has synchronised the clock, or from
+/// the year 10000 on: a wrong time is worse than none.
 pub fn utc_us() -> Option<u64> {
     in_calendars(system_us()).filter(|_| synchronised())
 }
 
-/// Whether the system clock shows a time for which there is no date in HTTP: before 1970, or from the year 10000 on.
+/// Whether the system clock shows a time for which there is no date in HTTP: before 1970, or from
+/// the year 10000 on.
 pub fn is_past_calendars() -> bool {
     in_calendars(system_us()).is_none()
 }
@@ -30,8 +31,8 @@ fn in_calendars(utc_us: Option<u64>) -> Option<u64> {
     utc_us.filter(|&us| us < YEAR_10000_US)
 }
 
-/// The time of a browser's clock in µs since 1970 UTC, given in ms; `None` before 2026 and from 2100 on, where that clock is
-/// certainly wrong.
+/// The time of a browser's clock in µs since 1970 UTC, given in ms; `None` before 2026 and from
+/// 2100 on, where that clock is certainly wrong.
 pub fn of_browser(ms: u64) -> Option<u64> {
     (YEAR_2026_MS..YEAR_2100_MS)
         .contains(&ms)

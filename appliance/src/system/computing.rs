@@ -1,4 +1,5 @@
-//! Whether the measuring task only computes: it then uses no device and stores nothing, so the program may end without waiting for it.
+//! Whether the measuring task only computes: it then uses no device and stores nothing, so the
+//! program may end without waiting for it.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

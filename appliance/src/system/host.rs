@@ -1,6 +1,8 @@
-//! What the computer reports about itself: power, temperature, versions, and how GPIO drivers treat released lines.
+//! What the computer reports about itself: power, temperature, versions, and how GPIO drivers treat
+//! released lines.
 //!
-//! Everything is read below a root folder, `/` except in tests. What a computer does not report is `None`, never an error.
+//! Everything is read below a root folder, `/` except in tests. What a computer does not report is
+//! `None`, never an error.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -31,7 +33,8 @@ impl Host {
         Some(text.trim().to_owned())
     }
 
-    /// The paths below the root of the entries of a folder whose name begins with `begin` and ends with `end`, sorted.
+    /// The paths below the root of the entries of a folder whose name begins with `begin` and ends
+    /// with `end`, sorted.
     fn entries(&self, folder: &str, begin: &str, end: &str) -> Vec<String> {
         let entries = fs::read_dir(self.root.join(folder)).into_iter().flatten();
         let names = entries
@@ -43,7 +46,8 @@ impl Host {
         paths
     }
 
-    /// What the firmware of a Raspberry Pi says of power and throttling: the bits of `vcgencmd get_throttled`, as its driver shows them.
+    /// What the firmware of a Raspberry Pi says of power and throttling: the bits of `vcgencmd
+    /// get_throttled`, as its driver shows them.
     pub fn throttled(&self) -> Option<u32> {
         let devices = "sys/devices/platform";
         // soc/soc:firmware; on a Raspberry Pi 5 the node has an address in its name.
@@ -71,7 +75,8 @@ impl Host {
         self.text("proc/sys/kernel/osrelease")
     }
 
-    /// The version of libcamera that this process has loaded, such as "0.7.0": from the name of its file.
+    /// The version of libcamera that this process has loaded, such as "0.7.0": from the name of its
+    /// file.
     pub fn libcamera(&self) -> Option<String> {
         let maps = self.text("proc/self/maps")?;
         let mut names = maps.lines().filter_map(|line| line.rsplit('/').next());
@@ -79,20 +84,23 @@ impl Host {
         Some(version.to_owned())
     }
 
-    /// The last core that the kernel keeps free of ordinary threads (`isolcpus` on its command line).
+    /// The last core that the kernel keeps free of ordinary threads (`isolcpus` on its command
+    /// line).
     pub fn isolated_core(&self) -> Option<usize> {
         let cores = self.text("sys/devices/system/cpu/isolated")?;
         cores.rsplit([',', '-']).next()?.parse().ok()
     }
 
-    /// Whether the driver of the IMX296 waits for triggers; `None` if it is not loaded or has no such parameter.
+    /// Whether the driver of the IMX296 waits for triggers; `None` if it is not loaded or has no
+    /// such parameter.
     pub fn sensor_waits_for_triggers(&self) -> Option<bool> {
         let mode = self.text("sys/module/imx296/parameters/trigger_mode")?;
         mode.parse::<u32>().ok().map(|mode| mode != 0)
     }
 
-    /// Whether the driver of the GPIO chip with this label keeps the level of an output whose owner has gone: the parameter
-    /// `persist_gpio_outputs` of Raspberry Pi's kernels. `None` if the driver has no such parameter.
+    /// Whether the driver of the GPIO chip with this label keeps the level of an output whose owner
+    /// has gone: the parameter `persist_gpio_outputs` of Raspberry Pi's kernels. `None` if the
+    /// driver has no such parameter.
     pub fn keeps_released_outputs(&self, chip: &str) -> Option<bool> {
         // One driver serves the chips of all models before the Raspberry Pi 5.
         let driver = match chip {
@@ -109,15 +117,17 @@ impl Host {
     }
 }
 
-/// How long libcamera waits for a frame before it gives a camera up, where its configuration says so: the file that the variable
-/// `LIBCAMERA_RPI_CONFIG_FILE` names. Zero if it says nothing: about a second.
+/// How long libcamera waits for a frame before it gives a camera up, where its configuration says
+/// so: the file that the variable `LIBCAMERA_RPI_CONFIG_FILE` names. Zero if it says nothing: about
+/// a second.
 pub fn libcamera_patience() -> Duration {
     let file = std::env::var_os("LIBCAMERA_RPI_CONFIG_FILE");
     let text = file.and_then(|file| fs::read_to_string(file).ok());
     text.map_or(Duration::ZERO, |text| patience_in(&text))
 }
 
-/// `camera_timeout_value_ms` in a file of libcamera, whose YAML is one object of JSON with comments.
+/// `camera_timeout_value_ms` in a file of libcamera, whose YAML is one object of JSON with
+/// comments.
 fn patience_in(text: &str) -> Duration {
     let lines = text
         .lines()

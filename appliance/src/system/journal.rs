@@ -1,4 +1,5 @@
-//! Lines on stderr: with the program's name in front for people, with a priority for a journal, which adds name and time itself.
+//! Lines on stderr: with the program's name in front for people, with a priority for a journal,
+//! which adds name and time itself.
 
 use super::stderr;
 use std::backtrace::{Backtrace, BacktraceStatus};
@@ -32,7 +33,8 @@ pub(super) fn form_of_own(severity: Severity, words: &str) -> String {
     form("fringed", is_read_by_a_journal(), severity, words)
 }
 
-/// Writes panics as lines of the log, too: the system's own way is to wait for stderr in the thread that panics.
+/// Writes panics as lines of the log, too: the system's own way is to wait for stderr in the thread
+/// that panics.
 pub fn take_panics() {
     std::panic::set_hook(Box::new(|panic| {
         let thread = std::thread::current();

@@ -39,7 +39,8 @@ impl Logbook {
         lines.push_back(line);
     }
 
-    /// All lines, newest first: `utc_us` (null if the clock was not synchronised), `uptime_s`, `words`.
+    /// All lines, newest first: `utc_us` (null if the clock was not synchronised), `uptime_s`,
+    /// `words`.
     pub fn latest(&self) -> Vec<Value> {
         let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         lines.iter().rev().cloned().collect()

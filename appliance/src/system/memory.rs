@@ -4,8 +4,9 @@
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const LARGE: libc::c_int = 1 << 20;
 
-/// Makes large arrays go back to the system when they are dropped. By default the C library starts to keep them after a few were
-/// dropped; a change of recipe would leave 50 MB behind. A trigger allocates no large array, so it costs no time there.
+/// Makes large arrays go back to the system when they are dropped. By default the C library starts
+/// to keep them after a few were dropped; a change of recipe would leave 50 MB behind. A trigger
+/// allocates no large array, so it costs no time there.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(
     unsafe_code,

@@ -1,4 +1,5 @@
-//! The operating system: clock, signals, sockets, thread priorities, memory, the service manager; and the log on stderr.
+//! The operating system: clock, signals, sockets, thread priorities, memory, the service manager;
+//! and the log on stderr.
 
 use crate::error::{Exit, Failure};
 

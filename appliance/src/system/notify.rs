@@ -1,7 +1,8 @@
-//! Notifications to the service manager (`sd_notify`): READY, signs of life of the measuring task, the status line, the stop.
+//! Notifications to the service manager (`sd_notify`): READY, signs of life of the measuring task,
+//! the status line, the stop.
 //!
-//! Without a service manager nothing is sent. A notification that fails is dropped and measuring goes on: the manager's own
-//! time-outs notice what is missing.
+//! Without a service manager nothing is sent. A notification that fails is dropped and measuring
+//! goes on: the manager's own time-outs notice what is missing.
 
 use sd_notify::NotifyState;
 use std::sync::Arc;
@@ -40,7 +41,8 @@ impl Notify {
         self.connected
     }
 
-    /// The start is complete. From now on the watchdog takes silence of the measuring task for a hang.
+    /// The start is complete. From now on the watchdog takes silence of the measuring task for a
+    /// hang.
     pub fn ready(&self) {
         self.phase.fetch_max(RUNNING, Ordering::Relaxed);
         self.send(&[NotifyState::Ready]);
@@ -73,8 +75,8 @@ impl Notify {
     }
 }
 
-/// The measuring task's signs of life, the only source that feeds the watchdog. It cannot be cloned, so that no other thread can
-/// answer for a measuring task that hangs.
+/// The measuring task's signs of life, the only source that feeds the watchdog. It cannot be
+/// cloned, so that no other thread can answer for a measuring task that hangs.
 #[derive(Debug)]
 pub struct Pulse {
     notify: Notify,
@@ -96,7 +98,8 @@ impl Pulse {
         let next = now.saturating_add(millis(watchdog / BEATS));
         self.next_ms.store(next, Ordering::Relaxed);
         match self.notify.phase.load(Ordering::Relaxed) {
-            // A start may take long as long as it makes progress: each sign of life extends its time-out by one period.
+            // A start may take long as long as it makes progress: each sign of life extends its
+            // time-out by one period.
             STARTING => {
                 let more = u32::try_from(watchdog.as_micros()).unwrap_or(u32::MAX);
                 self.notify.send(&[NotifyState::ExtendTimeoutUsec(more)]);

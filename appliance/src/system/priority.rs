@@ -1,9 +1,12 @@
-//! Priorities of threads: those that must not slow the measuring task down, and the one that must not be late.
+//! Priorities of threads: those that must not slow the measuring task down, and the one that must
+//! not be late.
 
-/// Nice value of a thread that must not slow others down: on a busy core it gets a tenth of the share of another thread.
+/// Nice value of a thread that must not slow others down: on a busy core it gets a tenth of the
+/// share of another thread.
 #[cfg(target_os = "linux")]
 const NICE: libc::c_int = 10;
-/// Real-time priority of a thread that must not be late: above all ordinary threads, below the kernel's handlers of interrupts (50).
+/// Real-time priority of a thread that must not be late: above all ordinary threads, below the
+/// kernel's handlers of interrupts (50).
 #[cfg(target_os = "linux")]
 const PROMPT: libc::c_int = 20;
 
@@ -16,8 +19,8 @@ pub struct Prompt {
     pub core: Option<usize>,
 }
 
-/// Lowers the calling thread's priority below that of the program's other threads, also where a service manager has given the
-/// program a real-time priority, which a new thread inherits.
+/// Lowers the calling thread's priority below that of the program's other threads, also where a
+/// service manager has given the program a real-time priority, which a new thread inherits.
 #[cfg(target_os = "linux")]
 #[expect(
     unsafe_code,
@@ -25,7 +28,8 @@ pub struct Prompt {
 )]
 pub fn give_way() {
     let ordinary = libc::sched_param { sched_priority: 0 };
-    // SAFETY: both calls only read their arguments, and 0 names the calling thread. A thread may always give up priority.
+    // SAFETY: both calls only read their arguments, and 0 names the calling thread. A thread may
+    // always give up priority.
     unsafe {
         libc::sched_setscheduler(0, libc::SCHED_BATCH, &raw const ordinary);
         libc::setpriority(libc::PRIO_PROCESS, 0, NICE);
@@ -36,8 +40,9 @@ pub fn give_way() {
 #[cfg(not(target_os = "linux"))]
 pub fn give_way() {}
 
-/// Gives the calling thread a real-time priority, and `core` if there is one that the kernel keeps free of other work, as far as the
-/// system permits: `LimitRTPRIO=` of the service. Otherwise the thread goes on as it is.
+/// Gives the calling thread a real-time priority, and `core` if there is one that the kernel keeps
+/// free of other work, as far as the system permits: `LimitRTPRIO=` of the service. Otherwise the
+/// thread goes on as it is.
 #[cfg(target_os = "linux")]
 #[expect(
     unsafe_code,

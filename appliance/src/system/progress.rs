@@ -1,4 +1,5 @@
-//! A progress bar, and the log above it: both on stderr and not with `--quiet`, the bar only on a terminal.
+//! A progress bar, and the log above it: both on stderr and not with `--quiet`, the bar only on a
+//! terminal.
 
 use crate::system::journal::{self, Severity};
 use crate::system::logbook::Logbook;

@@ -6,7 +6,8 @@ use std::io;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr};
 use tokio::net::TcpListener;
 
-/// Opens the socket on which `what` is served. With port 0 the system chooses one: the listener's own address has it.
+/// Opens the socket on which `what` is served. With port 0 the system chooses one: the listener's
+/// own address has it.
 ///
 /// # Errors
 /// The address is in use, not permitted, or not of this machine (exit code 69).
@@ -30,7 +31,8 @@ pub async fn bind(what: &str, address: SocketAddr) -> Result<TcpListener, Failur
     })
 }
 
-/// Whether one of the networks contains an address. An IPv4-mapped IPv6 address counts as its IPv4 address.
+/// Whether one of the networks contains an address. An IPv4-mapped IPv6 address counts as its IPv4
+/// address.
 pub fn holds(networks: &[IpNet], address: IpAddr) -> bool {
     let address = address.to_canonical();
     networks.iter().any(|network| network.contains(&address))

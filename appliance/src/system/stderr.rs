@@ -1,10 +1,14 @@
-//! The thread that writes on stderr: the lines of the log and the bar, from whichever thread they come.
+//! The thread that writes on stderr: the lines of the log and the bar, from whichever thread they
+//! come.
 //!
-//! stderr can be a pipe that nobody reads, a terminal that was stopped, or a journal that hangs: a write then waits for as long as
-//! that lasts. Only the thread `stderr` waits. Lines are handed over in a buffer of `ROOM` bytes; those that find no room there, and
-//! those that stderr refuses (a full disk, a closed pipe), are counted, and the count is written once lines can be written again.
+//! stderr can be a pipe that nobody reads, a terminal that was stopped, or a journal that hangs: a
+//! write then waits for as long as that lasts. Only the thread `stderr` waits. Lines are handed
+//! over in a buffer of `ROOM` bytes; those that find no room there, and those that stderr refuses
+//! (a full disk, a closed pipe), are counted, and the count is written once lines can be written
+//! again.
 //!
-//! A command waits until its lines are written, so that they stand in order with what it prints. A daemon does not, after [`detach`].
+//! A command waits until its lines are written, so that they stand in order with what it prints. A
+//! daemon does not, after [`detach`].
 
 use super::journal::{self, Severity};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -50,7 +54,8 @@ pub fn detach() {
     STDERR.waiting().detached = true;
 }
 
-/// Waits until everything is written and the bar removed, in a daemon for half a second at most. Called at the end of the program.
+/// Waits until everything is written and the bar removed, in a daemon for half a second at most.
+/// Called at the end of the program.
 pub fn end() {
     if THREAD_BEGUN.get() == Some(&true) {
         STDERR.end();
@@ -303,7 +308,8 @@ mod tests {
     #[test]
     fn a_line_that_stderr_refuses_is_counted_and_ends_nothing() {
         let (told, hear) = std::sync::mpsc::channel();
-        // The first line, and two reports of it, the second of which is in front of the second line.
+        // The first line, and two reports of it, the second of which is in front of the second
+        // line.
         let outbox = writing(Refusing(3, told), false);
         outbox.put("first\n");
         outbox.put("second\n");

@@ -196,7 +196,8 @@ unit: mm
     for word in words.into_iter().filter(|word| !word.is_empty()) {
         let at = from + YAML[from..].find(word).unwrap();
         from = at + word.len();
-        // Nodes have no keys that messages repeat, but every message names the file, which is called `camera`.
+        // Nodes have no keys that messages repeat, but every message names the file, which is
+        // called `camera`.
         let place = Place(vec!["camera".into()]);
         for value in values()
             .iter()

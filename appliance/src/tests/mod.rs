@@ -1,7 +1,8 @@
-//! Boundary values in every key of every file and request: each is refused, naming its key, or the result can be used.
+//! Boundary values in every key of every file and request: each is refused, naming its key, or the
+//! result can be used.
 //!
-//! In a valid example of a format, each value, each element of a list and each list as a whole is replaced by each of [`VALUES`] in
-//! turn. The tests print their counts with `--nocapture`.
+//! In a valid example of a format, each value, each element of a list and each list as a whole is
+//! replaced by each of [`VALUES`] in turn. The tests print their counts with `--nocapture`.
 
 mod files;
 mod recipes;
@@ -15,7 +16,8 @@ use std::time::{Duration, Instant};
 
 pub(crate) use recipes::Bed;
 
-/// The replacements of a value, as JSON text: the ends of every type, values beyond them, and text that is not JSON.
+/// The replacements of a value, as JSON text: the ends of every type, values beyond them, and text
+/// that is not JSON.
 const VALUES: [&str; 30] = [
     "0",
     "1",
@@ -73,7 +75,8 @@ impl std::fmt::Display for Place {
 }
 
 impl Place {
-    /// Whether a message about a value names one of the keys of its path or its line; for a limit of a gauge, the gauge and the key.
+    /// Whether a message about a value names one of the keys of its path or its line; for a limit
+    /// of a gauge, the gauge and the key.
     pub fn is_named(&self, value: &str, words: &str) -> bool {
         if let [gauges, _, limit] = &self.0[..]
             && gauges == "gauges"
@@ -195,7 +198,8 @@ impl Tally {
         }
     }
 
-    /// Prints the counts, and checks that there were at least `least` cases, and that some were used and some refused.
+    /// Prints the counts, and checks that there were at least `least` cases, and that some were
+    /// used and some refused.
     pub fn end(&self, what: &str, least: usize) {
         let Self { cases, used, wrong } = self;
         println!("{what}: {cases} boundary values, {used} of them can be used");

@@ -117,7 +117,8 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
     let write = |tree: &Value| serde_json::to_string_pretty(tree).unwrap();
     let members = members(file, arrays);
     let read = |text: &str| {
-        // Parsed alone first: most cases are refused by the manifest, and need no archive with arrays.
+        // Parsed alone first: most cases are refused by the manifest, and need no archive with
+        // arrays.
         parse(text)?;
         let (bytes, _) = seal(text, members.clone()).unwrap();
         Recipe::from_bytes(&bytes)
@@ -196,8 +197,9 @@ fn a_recipe_for_a_projector_of_four_billion_columns_is_refused_and_does_not_repl
         words.contains("projector.width is 4294967295: write 1 to 8192"),
         "{words}"
     );
-    // As if somebody had stored it in the folder: it is listed with its problem, and the previous generation is used. Storing it again over a
-    // good recipe does not displace the last good generation either.
+    // As if somebody had stored it in the folder: it is listed with its problem, and the previous
+    // generation is used. Storing it again over a good recipe does not displace the last good
+    // generation either.
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path()).unwrap();
     store.save(1, &bed.bytes).unwrap();

@@ -29,7 +29,8 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
                 [head]\nscenario = \"head.toml\"\n";
     fs::write(&path, text).unwrap();
     let store = Store::open(&folder.path().join("state/recipes")).unwrap();
-    // As somebody may have stored it in the folder: every value is within its bounds, but no head can measure 9 m above the plane.
+    // As somebody may have stored it in the folder: every value is within its bounds, but no head
+    // can measure 9 m above the plane.
     let (mut file, arrays) = (bed.file.clone(), &bed.recipe.arrays);
     file.range_mm = [-10.0, 9000.0];
     store.save(1, &pack(&file, arrays).unwrap().0).unwrap();
@@ -100,7 +101,8 @@ fn a_panic_while_a_recipe_is_loaded_becomes_error_402_of_a_station_that_loads_an
         identity: Arc::new(identity),
         limits: Limits::default(),
     };
-    // The answers of a measuring task whose planning of recipe 1 panics, with words that were formatted or not.
+    // The answers of a measuring task whose planning of recipe 1 panics, with words that were
+    // formatted or not.
     let answer = |effect| {
         let Effect::Load {
             job,

@@ -1,4 +1,5 @@
-//! The board for a calibration as a PDF, so that it can be printed from the phone that sets up the head.
+//! The board for a calibration as a PDF, so that it can be printed from the phone that sets up the
+//! head.
 
 use axum::extract::Query;
 use axum::http::header;

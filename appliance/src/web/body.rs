@@ -58,7 +58,8 @@ pub struct Upload {
     _place: OwnedSemaphorePermit,
 }
 
-/// Reads a body that is a file. It is written to the recipes' storage as it comes, so it is never in memory as a whole.
+/// Reads a body that is a file. It is written to the recipes' storage as it comes, so it is never
+/// in memory as a whole.
 ///
 /// # Errors
 /// Too many files are being received; it is too long or too slow; or there is no room for it.

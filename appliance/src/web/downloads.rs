@@ -54,7 +54,8 @@ impl Content {
     }
 }
 
-/// Sends a file whose name and content `work` finds or makes; a few at a time, and each no faster than its client receives it.
+/// Sends a file whose name and content `work` finds or makes; a few at a time, and each no faster
+/// than its client receives it.
 ///
 /// # Errors
 /// Too many files are being sent, or what `work` answers.
@@ -93,7 +94,8 @@ pub(super) async fn send(
     Ok((headers, length, body).into_response())
 }
 
-/// The files of a folder, to be sent as a ZIP piece by piece: a recording with its recipe is too large to be in memory for each client.
+/// The files of a folder, to be sent as a ZIP piece by piece: a recording with its recipe is too
+/// large to be in memory for each client.
 pub(super) struct Packed {
     /// The folder's name in the ZIP.
     name: String,
@@ -101,7 +103,8 @@ pub(super) struct Packed {
 }
 
 impl Packed {
-    /// Opens every file in a folder and its subfolders, so that they can be read even if the folder is removed meanwhile.
+    /// Opens every file in a folder and its subfolders, so that they can be read even if the folder
+    /// is removed meanwhile.
     ///
     /// # Errors
     /// Whatever the file system answers.

@@ -1,6 +1,8 @@
-//! Server-sent events: the snapshot whenever it changes, and once a second so that the page knows that it is current.
+//! Server-sent events: the snapshot whenever it changes, and once a second so that the page knows
+//! that it is current.
 //!
-//! The connection of a follower ends with its stream, and that of a refused one with the refusal, so its slot is free again.
+//! The connection of a follower ends with its stream, and that of a refused one with the refusal,
+//! so its slot is free again.
 
 use std::convert::Infallible;
 use std::time::{Duration, Instant};

@@ -67,7 +67,8 @@ pub fn cookie(token: Option<&Token>) -> Option<HeaderValue> {
     HeaderValue::from_str(&text).ok()
 }
 
-/// Lets a request through only if it comes from this device's own page. The browser sets the Origin header, and no page can forge it.
+/// Lets a request through only if it comes from this device's own page. The browser sets the Origin
+/// header, and no page can forge it.
 pub async fn own_page_only(request: Request, next: Next) -> Response {
     if is_own(request.headers()) {
         return next.run(request).await;
@@ -105,8 +106,8 @@ pub async fn signed_in_only(
     response
 }
 
-/// Adds a line to the record of changes, with why the change was refused, or that it was done and perhaps what was changed; if that fails,
-/// the log says so.
+/// Adds a line to the record of changes, with why the change was refused, or that it was done and
+/// perhaps what was changed; if that fails, the log says so.
 pub async fn record(
     site: &Site,
     from: IpAddr,

@@ -37,7 +37,8 @@ pub(super) struct Wanted {
 }
 
 impl Wanted {
-    /// The filter, of the `usual` number of results unless asked for another one, and at `most` that many.
+    /// The filter, of the `usual` number of results unless asked for another one, and at `most`
+    /// that many.
     fn filter(self, usual: usize, most: usize) -> Result<Filter, Problem> {
         let judged = |word: String| {
             let words = format!("verdict={word}: write PASS, FAIL or INVALID");

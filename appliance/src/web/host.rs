@@ -1,7 +1,8 @@
 //! Checks the Host header of requests.
 //!
-//! Another site can let its own name resolve to this device (DNS rebinding) and then read it through its visitor's browser. It cannot
-//! forge the Host header, so only IP addresses, `localhost` and configured names are answered.
+//! Another site can let its own name resolve to this device (DNS rebinding) and then read it
+//! through its visitor's browser. It cannot forge the Host header, so only IP addresses,
+//! `localhost` and configured names are answered.
 
 use axum::http::{HeaderMap, HeaderName, StatusCode, Uri, header};
 use std::net::{IpAddr, Ipv6Addr};

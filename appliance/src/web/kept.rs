@@ -1,7 +1,8 @@
 //! One stored result in full, and the pictures of its part where the frames were kept.
 //!
-//! Pictures are computed from the recording by the code that makes those of the last part. That takes as much memory as a
-//! recipe, so it is done for one part at a time, on a thread with a lower priority than the measuring task.
+//! Pictures are computed from the recording by the code that makes those of the last part. That
+//! takes as much memory as a recipe, so it is done for one part at a time, on a thread with a lower
+//! priority than the measuring task.
 
 use axum::extract::{Path, State};
 use axum::response::Json;
@@ -17,7 +18,8 @@ use crate::history::why_no_frames;
 use crate::station::result::flag;
 use crate::system::priority;
 
-/// The pictures that were computed last, height, deviation, modulation, and the SEQ of their result.
+/// The pictures that were computed last, height, deviation, modulation, and the SEQ of their
+/// result.
 pub(super) type LastKept = Option<(u32, [Map; 3])>;
 
 pub(super) async fn one(

@@ -1,4 +1,5 @@
-//! Answers that change nothing: snapshot, pictures, registers, log, record of changes, health and readiness.
+//! Answers that change nothing: snapshot, pictures, registers, log, record of changes, health and
+//! readiness.
 
 use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
@@ -146,7 +147,8 @@ pub(super) async fn log(State(site): State<Site>) -> Result<Json<Value>, Problem
     Ok(Json(json!({ "lines": lines })))
 }
 
-/// Adds to lines without a time the time by a browser's clock, if the start of their `boot_id`, or this one, was dated by one.
+/// Adds to lines without a time the time by a browser's clock, if the start of their `boot_id`, or
+/// this one, was dated by one.
 fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
     // The times of starts are in the history.
     let starts = site.history.starts().unwrap_or_default();

@@ -8,10 +8,11 @@ use serde_json::json;
 const MAX_WIDTH: usize = 640;
 /// The word for "no value".
 const NONE: u16 = u16::MAX;
-/// The colours of deviations reach this many times as far as the gauge's limits, so that what is just outside differs from what is
-/// far outside.
+/// The colours of deviations reach this many times as far as the gauge's limits, so that what is
+/// just outside differs from what is far outside.
 const BEYOND: f64 = 2.0;
-/// Share of the values at each end that the colour scale leaves out, so that single outliers do not stretch it.
+/// Share of the values at each end that the colour scale leaves out, so that single outliers do not
+/// stretch it.
 const TAIL: f64 = 0.005;
 /// The header that describes the map.
 const MAP: HeaderName = HeaderName::from_static("x-map");
@@ -21,7 +22,8 @@ const MAP: HeaderName = HeaderName::from_static("x-map");
 pub enum Drawn {
     /// Colours over the range of the values; every so many pixels one is sent.
     Plain,
-    /// Colours that reach equally far to both sides of zero; of the pixels that become one, the largest deviation is sent.
+    /// Colours that reach equally far to both sides of zero; of the pixels that become one, the
+    /// largest deviation is sent.
     Deviation {
         /// The larger of the gauge's limits; without one the colours go by the values.
         limit: Option<f64>,
@@ -33,8 +35,9 @@ pub enum Drawn {
 pub struct Map {
     /// Little-endian u16: value = low + step · word; 65535 = none.
     pub words: Vec<u8>,
-    /// `width`, `height` of the map, `stride` (camera pixels per map pixel), `low`, `step`, `unit`, `scale` (both ends of
-    /// the colours), `seq` (of the result; absent for golden), and what the map is of.
+    /// `width`, `height` of the map, `stride` (camera pixels per map pixel), `low`, `step`, `unit`,
+    /// `scale` (both ends of the colours), `seq` (of the result; absent for golden), and what the
+    /// map is of.
     pub description: serde_json::Value,
 }
 

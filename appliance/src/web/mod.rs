@@ -1,9 +1,11 @@
-//! The technician's page and its API: shows the station and its results, and changes what may be changed.
+//! The technician's page and its API: shows the station and its results, and changes what may be
+//! changed.
 //!
-//! [`router`] is the table of all paths, described in `openapi.json`. Reading needs no login; every change passes the gate:
-//! Origin, session, record of changes. [`events`] are the server-sent events, [`view`] the JSON of a snapshot, [`host`] refuses
-//! requests for another host name, [`server`] listens and [`slots`] limits its connections. The files of the page are in
-//! `assets/` and compiled in.
+//! [`router`] is the table of all paths, described in `openapi.json`. Reading needs no login; every
+//! change passes the gate: Origin, session, record of changes. [`events`] are the server-sent
+//! events, [`view`] the JSON of a snapshot, [`host`] refuses requests for another host name,
+//! [`server`] listens and [`slots`] limits its connections. The files of the page are in `assets/`
+//! and compiled in.
 
 pub mod access;
 pub mod assets;

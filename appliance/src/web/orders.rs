@@ -88,8 +88,9 @@ pub(super) struct Reload {
     pub loading: bool,
 }
 
-/// Loads a recipe whose file was changed, if it is the active one, as soon as no cycle is in flight. Not after a load that failed: then
-/// it is not known whether the active recipe is the right one, and loading it would clear that.
+/// Loads a recipe whose file was changed, if it is the active one, as soon as no cycle is in
+/// flight. Not after a load that failed: then it is not known whether the active recipe is the
+/// right one, and loading it would clear that.
 pub(super) async fn reload(site: &Site, number: u16) -> Reload {
     let is_active = |snapshot: &Snapshot| snapshot.active() == Some(number);
     let mut snapshots = site.station.subscribe();

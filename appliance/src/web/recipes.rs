@@ -209,7 +209,8 @@ pub(super) async fn delete(
     Ok(Json(json!({ "number": number })))
 }
 
-/// Checks that a recipe that is to be stored can be used; answers with the reason where that cannot be checked on this head.
+/// Checks that a recipe that is to be stored can be used; answers with the reason where that cannot
+/// be checked on this head.
 ///
 /// # Errors
 /// In words: it was made for this head and cannot be used on it.
@@ -226,7 +227,8 @@ fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
     }
 }
 
-/// Takes a recipe from a file: under the number in the file or another one, and in place of a stored recipe only on request.
+/// Takes a recipe from a file: under the number in the file or another one, and in place of a
+/// stored recipe only on request.
 pub(super) async fn import(
     State(site): State<Site>,
     Query(to): Query<Destination>,

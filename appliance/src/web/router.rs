@@ -176,7 +176,8 @@ pub fn router(site: Site) -> Router {
         .with_state(site)
 }
 
-/// Refuses requests that do not name this device as their only host, and adds the headers of every answer.
+/// Refuses requests that do not name this device as their only host, and adds the headers of every
+/// answer.
 async fn guarded(State(site): State<Site>, request: Request, next: Next) -> Response {
     let mut response = match host::check(request.uri(), request.headers(), &site.hosts) {
         Ok(()) => next.run(request).await,

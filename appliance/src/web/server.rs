@@ -43,7 +43,8 @@ const READ_AHEAD: usize = 64 << 10;
 /// Pause after a connection that could not be accepted.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
-/// Serves the page on `listener` until `shutdown`. Open connections end with the runtime, not before.
+/// Serves the page on `listener` until `shutdown`. Open connections end with the runtime, not
+/// before.
 pub async fn serve(listener: TcpListener, site: Site, shutdown: impl Future<Output = ()>) {
     let router = router(site.clone());
     let slots = Slots::new(MOST_CONNECTIONS, MOST_EACH);
@@ -119,7 +120,8 @@ async fn answer(stream: TcpStream, peer: SocketAddr, slot: Arc<Slot>, router: Ro
     }
 }
 
-/// Reads what a client still sends, until it ends: a socket that is closed before breaks off the answer on its way to the client.
+/// Reads what a client still sends, until it ends: a socket that is closed before breaks off the
+/// answer on its way to the client.
 async fn drain(stream: &TcpStream) -> io::Result<()> {
     let mut sent = vec![0; READ_AHEAD];
     loop {

@@ -83,8 +83,9 @@ pub(super) async fn end(State(site): State<Site>, headers: HeaderMap) -> Respons
     with_cookie(gate::cookie(None), json!({ "signed_in": false }))
 }
 
-/// Dates this start by the clock of a browser whose user has signed in, where the device's own clock is not synchronised; answers with
-/// the outcome. The last sign-in counts, so a wrong time is corrected by signing in from a browser with the right one.
+/// Dates this start by the clock of a browser whose user has signed in, where the device's own
+/// clock is not synchronised; answers with the outcome. The last sign-in counts, so a wrong time is
+/// corrected by signing in from a browser with the right one.
 fn date(site: &Site, ms: u64, received: Micros) -> &'static str {
     if site.station.snapshot().warnings & warning::CLOCK_UNSYNCED == 0 {
         return "not needed";

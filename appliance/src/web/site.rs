@@ -26,9 +26,11 @@ use crate::web::access::Access;
 pub const MAX_FOLLOWERS: usize = 16;
 /// The most of them from one address: half of its connections are left for requests.
 pub const MAX_FOLLOWERS_EACH: usize = 8;
-/// The most pictures, files and recipes that are computed at a time; the measuring task needs the cores.
+/// The most pictures, files and recipes that are computed at a time; the measuring task needs the
+/// cores.
 const MAX_ASIDE: usize = 2;
-/// The most sign-ins, changes and records of them at a time. They have a limit of their own, so that reading does not delay them.
+/// The most sign-ins, changes and records of them at a time. They have a limit of their own, so
+/// that reading does not delay them.
 const MAX_CHANGES: usize = 2;
 /// The most files that are received at a time: each takes storage, and memory while it is checked.
 const MAX_ARRIVING: usize = 2;
@@ -55,8 +57,8 @@ pub struct Parts {
     pub live: Live,
     /// The stored results.
     pub history: Reader,
-    /// Stores the time of this start of the daemon, µs since 1970 UTC, by the clock of a signed-in user's browser; answers whether
-    /// it is stored.
+    /// Stores the time of this start of the daemon, µs since 1970 UTC, by the clock of a signed-in
+    /// user's browser; answers whether it is stored.
     pub date: Box<dyn Fn(u64) -> bool + Send + Sync>,
     /// The log.
     pub log: Logbook,

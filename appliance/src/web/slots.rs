@@ -1,8 +1,10 @@
-//! Slots for connections and for pages that follow the events: a limited number, shared fairly between addresses.
+//! Slots for connections and for pages that follow the events: a limited number, shared fairly
+//! between addresses.
 //!
-//! A slot is either waiting for a request or being answered. One address holds at most its share of the slots. When all are in use,
-//! the one waiting for longest is closed for the new one, so a crowd of silent connections displaces only itself. If none is
-//! waiting, the address with most slots loses one to an address with fewer, so no address can keep another out.
+//! A slot is either waiting for a request or being answered. One address holds at most its share of
+//! the slots. When all are in use, the one waiting for longest is closed for the new one, so a
+//! crowd of silent connections displaces only itself. If none is waiting, the address with most
+//! slots loses one to an address with fewer, so no address can keep another out.
 
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -60,7 +62,8 @@ impl Table {
         longest.min().map(|(_, number)| number)
     }
 
-    /// The newest slot of the address with most slots, if those are more than one that holds `held` now would have with another.
+    /// The newest slot of the address with most slots, if those are more than one that holds `held`
+    /// now would have with another.
     fn of_the_largest(&self, held: usize) -> Option<u64> {
         let counted = self.taken.iter().map(|taken| self.held_by(taken.holder));
         let (most, at) = counted.zip(0..).max()?;
@@ -75,8 +78,8 @@ impl Slots {
         Self(Arc::new(Inside { most, each, table }))
     }
 
-    /// A slot for `holder` (none for a proxy), which waits from `now` on. There is none if every slot that could be closed for it is
-    /// being answered.
+    /// A slot for `holder` (none for a proxy), which waits from `now` on. There is none if every
+    /// slot that could be closed for it is being answered.
     pub fn enter(&self, holder: Option<IpAddr>, now: Instant) -> Option<Slot> {
         let mut table = self.table();
         let held = table.held_by(holder);

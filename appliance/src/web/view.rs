@@ -1,4 +1,5 @@
-//! A snapshot as the JSON that the page and `/api/snapshot` show. Lengths in mm, angles in °, volumes in mm³, shares 0…1.
+//! A snapshot as the JSON that the page and `/api/snapshot` show. Lengths in mm, angles in °,
+//! volumes in mm³, shares 0…1.
 
 use serde_json::{Value, json};
 

@@ -2,7 +2,8 @@
 
 use rayon::prelude::*;
 
-/// Blurs `picture` of `width` columns with a Gaussian of σ `sigma` pixels; σ = 0 leaves it unchanged.
+/// Blurs `picture` of `width` columns with a Gaussian of σ `sigma` pixels; σ = 0 leaves it
+/// unchanged.
 ///
 /// The kernel reaches to 4 σ and sums to 1. The result is the same for any number of threads.
 pub(super) fn gaussian(picture: &mut [f32], width: usize, sigma: f64) {
@@ -30,7 +31,8 @@ pub(super) fn gaussian(picture: &mut [f32], width: usize, sigma: f64) {
         });
 }
 
-/// Σ kernel[d] · at(place + d − reach), where places outside 0…length − 1 are replaced by the nearest inside.
+/// Σ kernel[d] · at(place + d − reach), where places outside 0…length − 1 are replaced by the
+/// nearest inside.
 fn weighted(kernel: &[f32], place: usize, length: usize, at: impl Fn(usize) -> f32) -> f32 {
     let reach = kernel.len() / 2;
     let inside = |d: usize| (place + d).saturating_sub(reach).min(length - 1);

@@ -1,7 +1,8 @@
 //! A simulated projector controller for structured light, at one address of an I²C bus.
 //!
-//! It knows TI's command tables by itself (software programmer's guides DLPU075 and DLPU081) and nothing of the driver that it judges.
-//! It can be unplugged, switched off and on, disturbed, and be another controller than expected.
+//! It knows TI's command tables by itself (software programmer's guides DLPU075 and DLPU081) and
+//! nothing of the driver that it judges. It can be unplugged, switched off and on, disturbed, and
+//! be another controller than expected.
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -1,7 +1,8 @@
 //! A simulated head: surfaces, optics and noise under the light of a projector.
 //!
-//! The crate models light and does not know how fringes are decoded, so it can judge the code that decodes
-//! them. It implements a scene of hal's virtual head: it computes the camera's frames from the rasters that the projector shows.
+//! The crate models light and does not know how fringes are decoded, so it can judge the code that
+//! decodes them. It implements a scene of hal's virtual head: it computes the camera's frames from
+//! the rasters that the projector shows.
 
 mod blur;
 pub mod controller;

@@ -1,5 +1,5 @@
-//! Checks a scenario: a value outside its bounds, which stand beside the fields, is refused, naming its key, before anything is computed
-//! from it.
+//! Checks a scenario: a value outside its bounds, which stand beside the fields, is refused, naming
+//! its key, before anything is computed from it.
 
 use super::scenario::Scenario;
 use hal::bounds::{Bound, Fields};

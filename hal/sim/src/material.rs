@@ -4,7 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::scenario::Lighting;
 
-/// A material by name, instead of the `diffuse`, `specular` and `shininess` of a scenario's `[light]`.
+/// A material by name, instead of the `diffuse`, `specular` and `shininess` of a scenario's
+/// `[light]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Material {

@@ -1,14 +1,16 @@
 //! Pinhole camera with Brown distortion, in both directions, for the devices of the simulated rig.
 //!
-//! Brown's model as OpenCV writes it (D. C. Brown, "Close-range camera calibration", 1971): with r² = x² + y²,
-//! x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), and the like for y with p1 and p2 exchanged.
+//! Brown's model as OpenCV writes it (D. C. Brown, "Close-range camera calibration", 1971): with
+//! r² = x² + y², x_d = x (1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 x y + p2 (r² + 2 x²), and the like for
+//! y with p1 and p2 exchanged.
 
 use hal::model::DeviceModel;
 
 /// A point or direction in mm.
 pub type Vector = [f64; 3];
 
-/// Most iterations of the inversion; it converges quadratically and needs three for the default lenses.
+/// Most iterations of the inversion; it converges quadratically and needs three for the default
+/// lenses.
 const MAX_ITERATIONS: usize = 20;
 /// The inversion ends when the distorted point is met this closely, in units of the focal length.
 const CONVERGED: f64 = 1e-13;
@@ -38,7 +40,8 @@ impl Lens {
         self.centre
     }
 
-    /// The pixel onto which the world point `point` (mm) is projected; none if it is behind the device.
+    /// The pixel onto which the world point `point` (mm) is projected; none if it is behind the
+    /// device.
     #[must_use]
     pub fn project(&self, point: Vector) -> Option<[f64; 2]> {
         let turned = turned(&self.model.rotation, point);
@@ -53,7 +56,8 @@ impl Lens {
         ])
     }
 
-    /// Unit vector in world coordinates along the ray through pixel (u, v); pixel centres are integers.
+    /// Unit vector in world coordinates along the ray through pixel (u, v); pixel centres are
+    /// integers.
     #[must_use]
     pub fn ray(&self, u: f64, v: f64) -> Vector {
         let seen = [

@@ -1,6 +1,8 @@
-//! A scenario: rig, lighting, optics, noise and part of a simulated head, from TOML or built in code.
+//! A scenario: rig, lighting, optics, noise and part of a simulated head, from TOML or built in
+//! code.
 //!
-//! The defaults are the study's rig and lighting (docs/measurement.md, *The study's head and parts*) with the sheet-metal part.
+//! The defaults are the study's rig and lighting (docs/measurement.md, *The study's head and
+//! parts*) with the sheet-metal part.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
@@ -21,11 +23,13 @@ bounded! {
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Scenario {
-        /// Whether the pose and lens of both devices and their times are known from the start; a head without a calibration is commissioned first.
+        /// Whether the pose and lens of both devices and their times are known from the start; a
+        /// head without a calibration is commissioned first.
         pub calibrated: bool,
         /// Camera bits, 8, 10 or 12.
         pub bit_depth: u8,
-        /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its frames have half its columns and rows.
+        /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its
+        /// frames have half its columns and rows.
         pub colour: bool,
         /// Rays per pixel along each side, 1…16.
         pub sub_rays: u32 = 1..=16,
@@ -52,7 +56,8 @@ bounded! {
         pub faults: Faults = Fields,
     }
 
-    /// The two devices. Each looks at the world's origin from the xz plane; its image x runs along +x, its image y along −y.
+    /// The two devices. Each looks at the world's origin from the xz plane; its image x runs
+    /// along +x, its image y along −y.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Rig {
@@ -83,8 +88,9 @@ bounded! {
         pub knocked_deg: [f64; 3] = -10.0..=10.0,
     }
 
-    /// Phong's model: I = ambient + pattern/255 · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess), 1 = full scale. n is the surface's
-    /// normal, l the direction to the projector, v that to the camera, and r is l mirrored about n.
+    /// Phong's model: I = ambient + pattern/255 · (diffuse · max(0, n·l) + specular · max(0,
+    /// r·v)^shininess), 1 = full scale. n is the surface's normal, l the direction to the
+    /// projector, v that to the camera, and r is l mirrored about n.
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Lighting {
@@ -92,15 +98,17 @@ bounded! {
         pub ambient: f64 = 0.0..=100.0,
         /// Share of the projector's light that a surface reflects which faces the projector.
         pub diffuse: f64 = 0.0..=100.0,
-        /// Share of the projector's light that a surface reflects which mirrors the projector into the camera, 0…4.
+        /// Share of the projector's light that a surface reflects which mirrors the projector into
+        /// the camera, 0…4.
         pub specular: f64 = 0.0..=4.0,
         /// How narrow the highlight is: the exponent of its cosine, 1…500.
         pub shininess: f64 = 1.0..=500.0,
     }
 
-    /// Noise of the camera. The defaults are what public photon models state of cameras with Sony's IMX296: saturation capacity 10 636 e⁻,
-    /// temporal dark noise 4.81 e⁻ (with an ADC of 10 bits). No data sheet says so, and the spread of responses is an assumption: a head's
-    /// calibration measures its own noise.
+    /// Noise of the camera. The defaults are what public photon models state of cameras with Sony's
+    /// IMX296: saturation capacity 10 636 e⁻, temporal dark noise 4.81 e⁻ (with an ADC of 10 bits).
+    /// No data sheet says so, and the spread of responses is an assumption: a head's calibration
+    /// measures its own noise.
     #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Noise {
@@ -110,8 +118,8 @@ bounded! {
         pub read_noise_e: f64 = 0.0..=1000.0,
         /// σ of the pixels' response (photo-response non-uniformity), as a share, 0…0.1.
         pub prnu: f64 = 0.0..=0.1,
-        /// If given, the sensor has no other noise than a uniform one of this half-width, in counts of 8 bits; cameras with more bits have
-        /// the same share of full scale.
+        /// If given, the sensor has no other noise than a uniform one of this half-width, in counts
+        /// of 8 bits; cameras with more bits have the same share of full scale.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub noise_counts: Option<f64> = 0.0..=255.0,
         /// Seed; frame n of a head has the same noise whenever the seed is the same.
@@ -122,7 +130,8 @@ bounded! {
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Optics {
-        /// σ of the Gaussian with which the projector's lens blurs its square pixels, projector pixels, 0…20.
+        /// σ of the Gaussian with which the projector's lens blurs its square pixels, projector
+        /// pixels, 0…20.
         pub projector_blur_px: f64 = 0.0..=20.0,
         /// σ of the camera's Gaussian blur, camera pixels, 0…20.
         pub camera_blur_px: f64 = 0.0..=20.0,
@@ -130,8 +139,9 @@ bounded! {
         pub gamma: f64 = 0.1..=10.0,
         /// The camera's gain: counts at full scale for 1 / gain of the light, 0…100.
         pub gain: f64 = 0.0..=100.0,
-        /// By how much more light than its grey asks for a picture gets whose mean light is almost 0, as a share, −1…10; one of mean 1 gets
-        /// none, and others in proportion. So do projectors that adapt their LEDs to the content of a picture.
+        /// By how much more light than its grey asks for a picture gets whose mean light is almost
+        /// 0, as a share, −1…10; one of mean 1 gets none, and others in proportion. So do
+        /// projectors that adapt their LEDs to the content of a picture.
         pub content_gain: f64 = -1.0..=10.0,
     }
 
@@ -221,7 +231,8 @@ impl Noise {
     /// The half-width of the paper's uniform noise: 2.5 % of full scale.
     pub const PAPER: f64 = 0.025 * 255.0;
 
-    /// Variance of a sample in counts²: of read noise, and per count of shot noise. `counts` is what a full well is converted to.
+    /// Variance of a sample in counts²: of read noise, and per count of shot noise. `counts` is
+    /// what a full well is converted to.
     pub(super) fn variance(&self, counts: f64) -> [f64; 2] {
         let per_electron = counts / self.full_well_e;
         [(self.read_noise_e * per_electron).powi(2), per_electron]
@@ -241,7 +252,8 @@ impl Default for Optics {
 }
 
 impl RigDevice {
-    /// The geometry with which frames are made: that of the models, turned by what has knocked the device since.
+    /// The geometry with which frames are made: that of the models, turned by what has knocked the
+    /// device since.
     pub(crate) fn lens(&self) -> Lens {
         let model = self.model();
         let knock = turn(self.knocked_deg);
@@ -271,7 +283,8 @@ impl RigDevice {
             cy: centre(self.height),
             distortion: self.distortion,
             rotation: [cos, 0.0, -sin, 0.0, -1.0, 0.0, -sin, 0.0, -cos],
-            // The device is at distance · (sin, 0, cos) and looks at the origin along its own z axis.
+            // The device is at distance · (sin, 0, cos) and looks at the origin along its own z
+            // axis.
             translation_mm: [0.0, 0.0, self.distance_mm],
         }
     }
@@ -365,14 +378,16 @@ impl Scenario {
         places.map(|at| sensor[at]).collect()
     }
 
-    /// Standard deviation of one sample in counts of this camera at half of full scale, with rounding.
+    /// Standard deviation of one sample in counts of this camera at half of full scale, with
+    /// rounding.
     #[must_use]
     pub fn noise_sigma_counts(&self) -> f64 {
         let [read, shot] = self.noise_variance();
         (read + shot * self.full_scale() / 2.0).sqrt()
     }
 
-    /// Variance of one sample in counts² of this camera: without light, with rounding, and what a count of signal adds.
+    /// Variance of one sample in counts² of this camera: without light, with rounding, and what a
+    /// count of signal adds.
     #[must_use]
     pub fn noise_variance(&self) -> [f64; 2] {
         let full_scale = self.full_scale();

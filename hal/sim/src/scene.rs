@@ -1,7 +1,7 @@
 //! The frames of the simulated camera, from the rasters in view: light, blur, noise and counts.
 //!
-//! Measured in release on one core for 512 × 512 pixels: about 3 ms per frame including noise (the test
-//! `speed_of_building_a_transport_and_of_one_frame` prints it).
+//! Measured in release on one core for 512 × 512 pixels: about 3 ms per frame including noise (the
+//! test `speed_of_building_a_transport_and_of_one_frame` prints it).
 
 use std::sync::Arc;
 
@@ -172,7 +172,8 @@ impl Scene for SimScene {
     }
 }
 
-/// Brightens a raster's light by its mean, as a projector does that adapts to the content of a picture.
+/// Brightens a raster's light by its mean, as a projector does that adapts to the content of a
+/// picture.
 fn adapt(light: &mut [f32], content_gain: f64) {
     if content_gain == 0.0 {
         return;

@@ -1,10 +1,12 @@
 //! The camera's sensor: light to electrons to counts, with the noise of each step.
 //!
-//! A pixel collects e = `full_well_e` · light · (1 + p) electrons, where p is its share of the photo-response non-uniformity, the same
-//! in all frames. The count is gain · full scale / `full_well_e` · (e + √(e + read²) · z), clipped and rounded: shot noise, read noise and
-//! quantisation, σ²(count) = read² + shot · count in counts (J. R. Janesick, *Photon Transfer*, SPIE 2007). z is the sum of four uniform
-//! numbers, whose distribution function differs from the normal one by at most 0.007, and which is never beyond ± 3.47. The paper's sensor
-//! has uniform noise instead.
+//! A pixel collects e = `full_well_e` · light · (1 + p) electrons, where p is its share of the
+//! photo-response non-uniformity, the same in all frames. The count is gain · full scale /
+//! `full_well_e` · (e + √(e + read²) · z), clipped and rounded: shot noise, read noise and
+//! quantisation, σ²(count) = read² + shot · count in counts (J. R. Janesick, *Photon Transfer*,
+//! SPIE 2007). z is the sum of four uniform numbers, whose distribution function differs from the
+//! normal one by at most 0.007, and which is never beyond ± 3.47. The paper's sensor has uniform
+//! noise instead.
 
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -44,16 +46,18 @@ impl Sensor {
         (self.seed, self.exposed) = (seed, 0);
     }
 
-    /// The next frame's random numbers. The number of the frame is spread over all bits, so that neighbouring frames and seeds are
-    /// uncorrelated. Everything else draws from SplitMix64; Xoshiro256++ stays here because the demonstration's verdicts and many measured
-    /// figures depend on these frames.
+    /// The next frame's random numbers. The number of the frame is spread over all bits, so that
+    /// neighbouring frames and seeds are uncorrelated. Everything else draws from SplitMix64;
+    /// Xoshiro256++ stays here because the demonstration's verdicts and many measured figures
+    /// depend on these frames.
     pub fn next_frame(&mut self) -> Xoshiro256PlusPlus {
         self.exposed += 1;
         let spread = self.exposed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         Xoshiro256PlusPlus::seed_from_u64(self.seed ^ spread.rotate_left(17))
     }
 
-    /// Reads out `light` (of an exposure of normal length, 1 = full scale at gain 1), which was exposed `longer` times as long, with `gain`.
+    /// Reads out `light` (of an exposure of normal length, 1 = full scale at gain 1), which was
+    /// exposed `longer` times as long, with `gain`.
     pub fn read<T>(
         &self,
         [longer, gain]: [f64; 2],

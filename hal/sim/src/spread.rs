@@ -1,15 +1,19 @@
-//! How the light of a projector's pixel spreads: the pixel is a bright square, which the lens blurs.
+//! How the light of a projector's pixel spreads: the pixel is a bright square, which the lens
+//! blurs.
 //!
-//! The light at a point (x, y) of the projector plane is Σ raster(i, j) · k(x − i) · k(y − j), in projector pixels, with
-//! k = box ⊗ Gaussian of σ, which is k(d) = F((d + ½) / σ) − F((d − ½) / σ), where F is the cumulative normal distribution. The
-//! Gaussian is cut at ± 4 σ and scaled so that the weights of all pixels sum to 1 at every point.
+//! The light at a point (x, y) of the projector plane is Σ raster(i, j) · k(x − i) · k(y − j), in
+//! projector pixels, with k = box ⊗ Gaussian of σ, which is k(d) = F((d + ½) / σ) − F((d − ½) / σ),
+//! where F is the cumulative normal distribution. The Gaussian is cut at ± 4 σ and scaled so that
+//! the weights of all pixels sum to 1 at every point.
 //!
-//! F is interpolated linearly in a table. The error of k is below 1e-6 for the interpolation, and below 6.4e-5 of k for the cut
+//! F is interpolated linearly in a table. The error of k is below 1e-6 for the interpolation, and
+//! below 6.4e-5 of k for the cut
 //! (`a_pixels_light_is_the_integral_of_the_gaussian_over_its_square`).
 
 /// The Gaussian is cut at this many σ.
 const CUT: f64 = 4.0;
-/// Entries of the table per σ. Linear interpolation is off by at most max |F″| / (8 · 256²) = 0.242 / 524 288 = 4.6e-7.
+/// Entries of the table per σ. Linear interpolation is off by at most max |F″| / (8 · 256²) = 0.242
+/// / 524 288 = 4.6e-7.
 const ENTRIES: f64 = 256.0;
 /// Up to this σ the weights hold the whole blur.
 const WIDEST: f64 = 1.25;
@@ -25,10 +29,12 @@ pub(super) struct Spread {
     cumulative: Vec<f32>,
 }
 
-/// Splits a projector's blur of `sigma`: the σ of its [`Spread`], and that of a blur of the raster before it. The second is 0 up to σ = 1.25.
+/// Splits a projector's blur of `sigma`: the σ of its [`Spread`], and that of a blur of the raster
+/// before it. The second is 0 up to σ = 1.25.
 ///
-/// Beyond, the variances of both add up to σ². A raster that is blurred beforehand still has the replicas of its frequencies f at
-/// 1 − f, which light has not, but the spread's own Gaussian of σ = 1 leaves 2e-6 of them at a pitch of 6 pixels, and 5e-5 at 4.
+/// Beyond, the variances of both add up to σ². A raster that is blurred beforehand still has the
+/// replicas of its frequencies f at 1 − f, which light has not, but the spread's own Gaussian of
+/// σ = 1 leaves 2e-6 of them at a pitch of 6 pixels, and 5e-5 at 4.
 pub(super) fn split(sigma: f64) -> (f64, f64) {
     if sigma <= WIDEST {
         (sigma, 0.0)

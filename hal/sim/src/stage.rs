@@ -13,7 +13,8 @@ use hal::error::{DeviceKind, Error};
 use hal::head::Head;
 use hal::virtual_head::{self, Control, Scene as _};
 
-/// Placed parts whose light transport is kept; one that fills 512 × 512 pixels takes about 40 MB (lens of σ 0.5 px).
+/// Placed parts whose light transport is kept; one that fills 512 × 512 pixels takes about 40 MB
+/// (lens of σ 0.5 px).
 const MAX_REMEMBERED: usize = 8;
 
 /// The part in front of a simulated head. Clones place parts in front of the same head.
@@ -61,7 +62,8 @@ pub fn head(scenario: &Scenario) -> Result<(Head, Stage), Error> {
     head_with_progress(scenario, &|_| ())
 }
 
-/// As [`head`]; `progress` is called with the share of the light transport that is computed, 0…1, from any thread.
+/// As [`head`]; `progress` is called with the share of the light transport that is computed, 0…1,
+/// from any thread.
 ///
 /// # Errors
 /// As [`head`].
@@ -92,8 +94,9 @@ pub fn head_with_progress(
 }
 
 impl Stage {
-    /// Replaces the part by another of the scenario's material; the next exposure sees the new one. The light transport of the last few
-    /// parts is kept, so going back to one of them takes no time.
+    /// Replaces the part by another of the scenario's material; the next exposure sees the new one.
+    /// The light transport of the last few parts is kept, so going back to one of them takes no
+    /// time.
     ///
     /// # Errors
     /// `Unsupported` if a measure of the part or the placement is out of its range.
@@ -101,8 +104,8 @@ impl Stage {
         self.place_with_progress(part, self.scenario.material, placement, &|_| ())
     }
 
-    /// As [`Stage::place`], with a part of this material; without one the scenario's `light` says how it reflects. `progress` is called with
-    /// the share done, 0…1, from any thread.
+    /// As [`Stage::place`], with a part of this material; without one the scenario's `light` says
+    /// how it reflects. `progress` is called with the share done, 0…1, from any thread.
     ///
     /// # Errors
     /// As [`Stage::place`].
@@ -134,8 +137,9 @@ impl Stage {
         Ok(())
     }
 
-    /// Computes the light transport of `part` of a material, if any, without putting it in place. This is what takes long; meanwhile frames may be taken of
-    /// the present part. `progress` is called with the share done, 0…1, from any thread.
+    /// Computes the light transport of `part` of a material, if any, without putting it in place.
+    /// This is what takes long; meanwhile frames may be taken of the present part. `progress` is
+    /// called with the share done, 0…1, from any thread.
     ///
     /// # Errors
     /// `Unsupported` if a measure of the part or the placement is out of its range.
@@ -205,10 +209,12 @@ impl Stage {
         (self.control.exposure(), *gain)
     }
 
-    /// Sets the exposure and the gain of the camera. Longer exposures get more light, and more gain makes more counts of it.
+    /// Sets the exposure and the gain of the camera. Longer exposures get more light, and more gain
+    /// makes more counts of it.
     ///
     /// # Errors
-    /// `Unsupported` if the camera runs by itself with a shorter period, or the gain is out of its range.
+    /// `Unsupported` if the camera runs by itself with a shorter period, or the gain is out of its
+    /// range.
     pub fn expose(&self, exposure: Duration, gain: f64) -> Result<(), Error> {
         let period = Duration::from_micros(self.scenario.timing.camera_period_us);
         if !period.is_zero() && exposure > period {

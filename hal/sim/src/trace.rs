@@ -1,8 +1,9 @@
 //! Ray tracing: where a ray meets a surface, and whether a point of the surface sees the projector.
 //!
-//! Sphere tracing (J. C. Hart, 1996) of f(t) = z(t) − height(x(t), y(t)) along a ray with direction d: with slopes of at most L, f
-//! changes by at most |d_z| + L·|d_xy| per unit of t, so a step of |f| divided by that rate crosses nothing. Close to the surface a
-//! Newton step is tried and kept if it brackets the crossing; regula falsi then refines the crossing.
+//! Sphere tracing (J. C. Hart, 1996) of f(t) = z(t) − height(x(t), y(t)) along a ray with direction
+//! d: with slopes of at most L, f changes by at most |d_z| + L·|d_xy| per unit of t, so a step
+//! of |f| divided by that rate crosses nothing. Close to the surface a Newton step is tried and
+//! kept if it brackets the crossing; regula falsi then refines the crossing.
 
 use super::optics::{Vector, along, dot, normalised};
 use super::parts::Surface;
@@ -68,7 +69,8 @@ impl<'a> Traced<'a> {
         })
     }
 
-    /// Whether material lies between `hit` and a distant point in direction `towards`, a unit vector on the side of the normal.
+    /// Whether material lies between `hit` and a distant point in direction `towards`, a unit
+    /// vector on the side of the normal.
     pub fn shadowed(&self, hit: &Hit, towards: Vector) -> bool {
         let Some((_, end)) = self.clip(hit.point, towards) else {
             return false;
@@ -102,8 +104,9 @@ impl<'a> Traced<'a> {
         (start < end && end.is_finite()).then_some((start, end))
     }
 
-    /// The first crossing with material in start…end, and whether the ray came from above the surface. `side` states whether the ray
-    /// starts above the surface if it starts on the surface itself, where the sign of f is only rounding error.
+    /// The first crossing with material in start…end, and whether the ray came from above the
+    /// surface. `side` states whether the ray starts above the surface if it starts on the surface
+    /// itself, where the sign of f is only rounding error.
     fn crossing(
         &self,
         origin: Vector,
@@ -129,8 +132,8 @@ impl<'a> Traced<'a> {
                 return Some((t, above));
             }
         }
-        // The ray leaves the surface at a steeper slope than the surface has anywhere, so it never meets it again. This holds for most
-        // rays to the projector.
+        // The ray leaves the surface at a steeper slope than the surface has anywhere, so it never
+        // meets it again. This holds for most rays to the projector.
         if direction[2] * value.signum() > steepest {
             return None;
         }
@@ -147,7 +150,8 @@ impl<'a> Traced<'a> {
                 let falling = (value.abs() - ahead_value.abs()) / safe;
                 if falling > 0.0 {
                     let newton = ahead + ahead_value.abs() / falling * 1.01 + TOLERANCE_MM;
-                    // A Newton step that does not bracket a crossing may have passed one, so it is discarded.
+                    // A Newton step that does not bracket a crossing may have passed one, so it is
+                    // discarded.
                     if newton - ahead < 2.0 * NEAR_MM {
                         let value_there = over(newton);
                         if (value_there > 0.0) != above {
@@ -192,7 +196,8 @@ fn close_in(over: &impl Fn(f64) -> f64, near: (f64, f64), far: (f64, f64)) -> f6
     b
 }
 
-/// The cosine between normal and direction to the light: the share of the light that the surface receives; none from behind.
+/// The cosine between normal and direction to the light: the share of the light that the surface
+/// receives; none from behind.
 pub(super) fn facing(normal: Vector, towards: Vector) -> Option<f64> {
     let cosine = dot(normal, towards);
     (cosine > 0.0).then_some(cosine)

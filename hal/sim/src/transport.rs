@@ -1,13 +1,15 @@
 //! Light transport of a placed part: how much of each projector pixel arrives in each camera pixel.
 //!
-//! A frame is linear in the raster, so the geometry is computed once per placed part: for each of n × n sub-rays per
-//! camera pixel the point of the surface, its normal, whether it sees the projector, and the projector
-//! point (ξ, η) that lights it. The weights of the projector pixels whose light reaches it (`Spread`), of all sub-rays of a pixel, are
-//! merged into one row of a sparse matrix; a frame is then matrix × raster. The model of light is Phong's (1975),
-//! I = albedo · (ambient + pattern · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess)), averaged over the sub-rays, without
-//! fall-off with distance: n is the normal, l the direction to the projector, v that to the camera, and r = 2 (n·l) n − l. A surface that
-//! faces away from the projector has no highlight. Ambient light reaches shadowed points, too; a sub-ray that meets nothing has I = 0.
-//! Beyond the raster the projector is dark.
+//! A frame is linear in the raster, so the geometry is computed once per placed part: for each of n
+//! × n sub-rays per camera pixel the point of the surface, its normal, whether it sees the
+//! projector, and the projector point (ξ, η) that lights it. The weights of the projector pixels
+//! whose light reaches it (`Spread`), of all sub-rays of a pixel, are merged into one row of a
+//! sparse matrix; a frame is then matrix × raster. The model of light is Phong's (1975), I = albedo
+//! · (ambient + pattern · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess)), averaged
+//! over the sub-rays, without fall-off with distance: n is the normal, l the direction to the
+//! projector, v that to the camera, and r = 2 (n·l) n − l. A surface that faces away from the
+//! projector has no highlight. Ambient light reaches shadowed points, too; a sub-ray that meets
+//! nothing has I = 0. Beyond the raster the projector is dark.
 //!
 //! The result does not depend on the number of threads: every pixel is computed by itself.
 
@@ -20,14 +22,15 @@ use super::scenario::{Lighting, Placement, Scenario};
 use super::spread::{self, Spread};
 use super::trace::{Hit, Traced, facing};
 
-/// A pixel has a depth edge if a sub-ray meets the surface farther than this from the tangent plane at the central ray's hit,
-/// measured along the ray, mm.
+/// A pixel has a depth edge if a sub-ray meets the surface farther than this from the tangent plane
+/// at the central ray's hit, measured along the ray, mm.
 const DEPTH_EDGE_MM: f64 = 2.0;
 
 /// The ground truth of a placed part, per camera pixel, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Truth {
-    /// World z in mm where the pixel's central ray meets the part; NaN where camera and projector do not both see it.
+    /// World z in mm where the pixel's central ray meets the part; NaN where camera and projector
+    /// do not both see it.
     pub height: Vec<f32>,
     /// 0 unseen, 1 pixel centre lit, 2 whole pixel lit and no depth edge inside.
     pub class: Vec<u8>,
@@ -37,11 +40,13 @@ pub struct Truth {
 const LANES: usize = 4;
 /// A raster is followed by so many dark pixels, which the last taps read with weight 0.
 pub(super) const PADDING: usize = LANES - 1;
-/// The weight of a pixel that arrives completely, reflected as brightly as the part can: diffuse + specular. Rounding to whole weights
-/// changes the light by 3e-5 to 5e-5 of that RMS (36 to 100 weights, each off by at most 1/131 070).
+/// The weight of a pixel that arrives completely, reflected as brightly as the part can: diffuse +
+/// specular. Rounding to whole weights changes the light by 3e-5 to 5e-5 of that RMS (36 to 100
+/// weights, each off by at most 1/131 070).
 const WHOLE: f32 = 65_535.0;
 
-/// The sparse matrix from rasters to frames, and the ground truth: of one camera row, or of all. Light is in units of full scale.
+/// The sparse matrix from rasters to frames, and the ground truth: of one camera row, or of all.
+/// Light is in units of full scale.
 #[derive(Debug)]
 pub(super) struct Transport {
     /// Ambient light of each camera pixel.
@@ -95,8 +100,9 @@ pub(crate) fn rotation_of(placement: &Placement) -> [f64; 9] {
 }
 
 impl Transport {
-    /// Traces `part`, made of `material` or reflecting as the lighting says, at `placement` with the rig and lighting of `scenario`;
-    /// `progress` is called with the share done, 0…1, from any thread.
+    /// Traces `part`, made of `material` or reflecting as the lighting says, at `placement` with
+    /// the rig and lighting of `scenario`; `progress` is called with the share done, 0…1, from any
+    /// thread.
     pub fn build(
         scenario: &Scenario,
         part: &Part,
@@ -163,8 +169,8 @@ impl Transport {
         }
     }
 
-    /// The light of each camera pixel while the projector shows `raster` (light per projector pixel, 1 = white, and [`PADDING`]), or
-    /// is dark.
+    /// The light of each camera pixel while the projector shows `raster` (light per projector
+    /// pixel, 1 = white, and [`PADDING`]), or is dark.
     pub fn light(&self, raster: Option<&[f32]>, picture: &mut [f32]) {
         let Some(raster) = raster else {
             picture.copy_from_slice(&self.ambient);
@@ -197,7 +203,8 @@ struct Tracer<'a> {
     traced: Option<Traced<'a>>,
 }
 
-/// How a part reflects: shares of the brightest that it can be, so that no weight is larger than [`WHOLE`].
+/// How a part reflects: shares of the brightest that it can be, so that no weight is larger than
+/// [`WHOLE`].
 struct Reflection {
     /// diffuse + specular.
     brightest: f64,
@@ -235,7 +242,8 @@ impl Reflection {
     }
 }
 
-/// A point of the part that the projector lights: its place on the raster, and the share of the light that it reflects.
+/// A point of the part that the projector lights: its place on the raster, and the share of the
+/// light that it reflects.
 struct Lit {
     raster: [f64; 2],
     share: f64,
@@ -363,7 +371,8 @@ impl Tracer<'_> {
         }
         for (row, sums) in (top..).zip(sums.chunks_exact(columns)) {
             for (column, sums) in (left..).step_by(LANES).zip(sums.chunks_exact(LANES)) {
-                // The shares of a pixel's sub-rays add up to at most 1, and the spread of each to 1.
+                // The shares of a pixel's sub-rays add up to at most 1, and the spread of each
+                // to 1.
                 debug_assert!(sums.iter().all(|sum| *sum < WHOLE + 0.5));
                 let weights = std::array::from_fn(|lane| sums[lane].round() as u16);
                 if weights != [0; LANES] {
@@ -375,7 +384,8 @@ impl Tracer<'_> {
     }
 }
 
-/// Whether `hit` is off the tangent plane at `at`, along `direction`, by more than [`DEPTH_EDGE_MM`].
+/// Whether `hit` is off the tangent plane at `at`, along `direction`, by more than
+/// [`DEPTH_EDGE_MM`].
 fn depth_edge(at: &Hit, hit: &Hit, direction: Vector) -> bool {
     let off = dot(at.normal, minus(hit.point, at.point));
     let along_ray = off / dot(at.normal, direction).abs().max(1e-3);

@@ -1,7 +1,7 @@
 //! An I²C bus of the kernel, as the trait that the driver needs.
 //!
-//! `i2cdev` and `embedded-hal` are kept by the Rust embedded working group. `linux-embedded-hal` has the same adapter, but brings a
-//! further version of `nix` and four more crates for it.
+//! `i2cdev` and `embedded-hal` are kept by the Rust embedded working group. `linux-embedded-hal`
+//! has the same adapter, but brings a further version of `nix` and four more crates for it.
 
 use embedded_hal::i2c::{self, ErrorKind, NoAcknowledgeSource, Operation};
 use i2cdev::core::{I2CMessage as _, I2CTransfer as _};
@@ -33,7 +33,8 @@ impl Bus {
 }
 
 impl i2c::Error for BusError {
-    /// Errors of the kernel's drivers: `ENXIO` and `EREMOTEIO` mean that nobody acknowledged (Documentation/i2c/fault-codes.rst).
+    /// Errors of the kernel's drivers: `ENXIO` and `EREMOTEIO` mean that nobody acknowledged
+    /// (Documentation/i2c/fault-codes.rst).
     fn kind(&self) -> ErrorKind {
         let number = match &self.0 {
             LinuxI2CError::Errno(number) => Some(*number),

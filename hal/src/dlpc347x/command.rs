@@ -1,73 +1,82 @@
 //! The commands that are used, and how their parameters and answers are laid out.
 //!
-//! Each constant is an opcode, with its name in TI's guides and in brackets the function of TI's generated interface that has the
-//! same layout. The guides are the software programmer's guides of the DLPC3470 and DLPC3478 (Texas Instruments, DLPU075, 2018) and
-//! of the DLPC3479 (DLPU081, 2019), section 3; the interface is `dlpc347x.c` and `dlpc347x.h` (Texas Instruments, command
-//! specification 1.0, 2019), which is part of TI's evaluation software and of several public projects. Numbers of more than one byte
-//! have the least significant byte first.
+//! Each constant is an opcode, with its name in TI's guides and in brackets the function of TI's
+//! generated interface that has the same layout. The guides are the software programmer's guides of
+//! the DLPC3470 and DLPC3478 (Texas Instruments, DLPU075, 2018) and of the DLPC3479 (DLPU081,
+//! 2019), section 3; the interface is `dlpc347x.c` and `dlpc347x.h` (Texas Instruments, command
+//! specification 1.0, 2019), which is part of TI's evaluation software and of several public
+//! projects. Numbers of more than one byte have the least significant byte first.
 //!
-//! There is no command for dithering or the degamma curve in these sources, so they cannot be switched here; what is left of them is
-//! measured as the response of the projector.
+//! There is no command for dithering or the degamma curve in these sources, so they cannot be
+//! switched here; what is left of them is measured as the response of the projector.
 
 use crate::setup::Led;
 
-/// Write Operating Mode Select: one byte, [`PATTERN_STREAMING`] and others [`DLPC347X_WriteOperatingModeSelect`].
+/// Write Operating Mode Select: one byte, [`PATTERN_STREAMING`] and others
+/// [`DLPC347X_WriteOperatingModeSelect`].
 pub const WRITE_MODE: u8 = 0x05;
 /// Read Operating Mode Select: one byte [`DLPC347X_ReadOperatingModeSelect`].
 pub const READ_MODE: u8 = 0x06;
-/// The operating mode "external pattern streaming": patterns come over the video input, and image processing is not applied
-/// [`DLPC347X_OM_SENS_EXTERNAL_PATTERN`].
+/// The operating mode "external pattern streaming": patterns come over the video input, and image
+/// processing is not applied [`DLPC347X_OM_SENS_EXTERNAL_PATTERN`].
 pub const PATTERN_STREAMING: u8 = 3;
 
-/// Write LED Output Control Method: 0 manual, which disables CAIC (content-adaptive illumination control), 1 automatic
-/// [`DLPC347X_WriteLedOutputControlMethod`].
+/// Write LED Output Control Method: 0 manual, which disables CAIC (content-adaptive illumination
+/// control), 1 automatic [`DLPC347X_WriteLedOutputControlMethod`].
 pub const WRITE_LED_CONTROL: u8 = 0x50;
 /// Read LED Output Control Method: one byte [`DLPC347X_ReadLedOutputControlMethod`].
 pub const READ_LED_CONTROL: u8 = 0x51;
 /// Write RGB LED Enable: bit 0 red, 1 green, 2 blue [`DLPC347X_WriteRgbLedEnable`].
 pub const WRITE_LED_ENABLE: u8 = 0x52;
-/// Write RGB LED Current: two bytes each for red, green, blue, in steps of the LED driver [`DLPC347X_WriteRgbLedCurrent`].
+/// Write RGB LED Current: two bytes each for red, green, blue, in steps of the LED driver
+/// [`DLPC347X_WriteRgbLedCurrent`].
 pub const WRITE_LED_CURRENT: u8 = 0x54;
 /// Read RGB LED Current: as written [`DLPC347X_ReadRgbLedCurrent`].
 pub const READ_LED_CURRENT: u8 = 0x55;
-/// Read RGB LED Max Current: the largest values that the firmware allows, as READ_LED_CURRENT [`DLPC347X_ReadRgbLedMaxCurrent`].
+/// Read RGB LED Max Current: the largest values that the firmware allows, as READ_LED_CURRENT
+/// [`DLPC347X_ReadRgbLedMaxCurrent`].
 pub const READ_LED_MAX_CURRENT: u8 = 0x5D;
 
-/// Write Local Area Brightness Boost Control (LABB): bits 0-1 the control, 0 off; bits 4-7 sharpness; then a byte of strength
-/// [`DLPC347X_WriteLocalAreaBrightnessBoostControl`].
+/// Write Local Area Brightness Boost Control (LABB): bits 0-1 the control, 0 off; bits 4-7
+/// sharpness; then a byte of strength [`DLPC347X_WriteLocalAreaBrightnessBoostControl`].
 pub const WRITE_LABB: u8 = 0x80;
-/// Read Local Area Brightness Boost Control: as written, then a byte of gain [`DLPC347X_ReadLocalAreaBrightnessBoostControl`].
+/// Read Local Area Brightness Boost Control: as written, then a byte of gain
+/// [`DLPC347X_ReadLocalAreaBrightnessBoostControl`].
 pub const READ_LABB: u8 = 0x81;
 
-/// Write Trigger Out Configuration: bit 0 which (0 TRIG_OUT_1, 1 TRIG_OUT_2), bit 1 enable, bit 2 inversion; then a delay of four
-/// bytes, µs [`DLPC347X_WriteTriggerOutConfiguration`]. TRIG_OUT_1 marks a frame, with reference to its VSYNC; TRIG_OUT_2 is active
-/// while a pattern is exposed (data sheets of the DLPC3478 and the DLPC3479, 8-bit monochrome patterns).
+/// Write Trigger Out Configuration: bit 0 which (0 TRIG_OUT_1, 1 TRIG_OUT_2), bit 1 enable, bit 2
+/// inversion; then a delay of four bytes, µs [`DLPC347X_WriteTriggerOutConfiguration`]. TRIG_OUT_1
+/// marks a frame, with reference to its VSYNC; TRIG_OUT_2 is active while a pattern is exposed
+/// (data sheets of the DLPC3478 and the DLPC3479, 8-bit monochrome patterns).
 pub const WRITE_TRIGGER_OUT: u8 = 0x92;
-/// Write Pattern Configuration: the kind of patterns, their number per frame, the LEDs (as WRITE_LED_ENABLE), then four bytes each:
-/// illumination time, dark time before, dark time after, µs [`DLPC347X_WritePatternConfiguration`].
+/// Write Pattern Configuration: the kind of patterns, their number per frame, the LEDs (as
+/// WRITE_LED_ENABLE), then four bytes each: illumination time, dark time before, dark time after,
+/// µs [`DLPC347X_WritePatternConfiguration`].
 pub const WRITE_PATTERNS: u8 = 0x96;
 /// Read Pattern Configuration: as written [`DLPC347X_ReadPatternConfiguration`].
 pub const READ_PATTERNS: u8 = 0x97;
 /// Patterns of 8 bit in one colour [`DLPC347X_ST_EIGHT_BIT_MONO`].
 pub const EIGHT_BIT_MONO: u8 = 2;
-/// Read Validate Exposure Time: asked with the kind of streaming (0 external), the kind of patterns and an illumination time of four
-/// bytes, µs; answered with a byte, bit 0 supported, and four bytes each: least illumination time, least dark times before and after,
-/// µs [`DLPC347X_ReadValidateExposureTime`].
+/// Read Validate Exposure Time: asked with the kind of streaming (0 external), the kind of patterns
+/// and an illumination time of four bytes, µs; answered with a byte, bit 0 supported, and four
+/// bytes each: least illumination time, least dark times before and after, µs
+/// [`DLPC347X_ReadValidateExposureTime`].
 pub const READ_VALID_EXPOSURE: u8 = 0x9D;
 
 /// Read Short Status: see [`super::status`] [`DLPC347X_ReadShortStatus`].
 pub const READ_SHORT_STATUS: u8 = 0xD0;
 /// Read System Status: four bytes, see [`super::status`] [`DLPC347X_ReadSystemStatus`].
 pub const READ_SYSTEM_STATUS: u8 = 0xD1;
-/// Read Communication Status, asked with 2 for the I²C bus: a byte of errors and the opcode of the command that was aborted
-/// [`DLPC347X_ReadCommunicationStatus`].
+/// Read Communication Status, asked with 2 for the I²C bus: a byte of errors and the opcode of the
+/// command that was aborted [`DLPC347X_ReadCommunicationStatus`].
 pub const READ_COMMUNICATION_STATUS: u8 = 0xD3;
 /// Read Controller Device ID: one byte, see [`device_name`] [`DLPC347X_ReadControllerDeviceId`].
 pub const READ_DEVICE_ID: u8 = 0xD4;
 /// Read System Temperature: two bytes, 0.1 °C [`DLPC347X_ReadSystemTemperature`].
 pub const READ_TEMPERATURE: u8 = 0xD6;
 
-/// The name of a controller by its device id [`DLPC347X_ControllerDeviceId_e`]; `None` for an id that TI's interface does not list.
+/// The name of a controller by its device id [`DLPC347X_ControllerDeviceId_e`]; `None` for an id
+/// that TI's interface does not list.
 pub fn device_name(id: u8) -> Option<&'static str> {
     Some(match id {
         0x0 => "DLPC3430",
@@ -141,8 +150,8 @@ pub fn currents(answer: [u8; 6]) -> [u16; 3] {
     [[a, b], [c, d], [e, f]].map(u16::from_le_bytes)
 }
 
-/// The temperature in an answer, °C. TI's interface reads it without a sign, and the guides' form of a negative one is not known here,
-/// so that more than 150 °C is taken for not known.
+/// The temperature in an answer, °C. TI's interface reads it without a sign, and the guides' form
+/// of a negative one is not known here, so that more than 150 °C is taken for not known.
 pub fn celsius(answer: [u8; 2]) -> Option<f64> {
     Some(f64::from(u16::from_le_bytes(answer)) / 10.0).filter(|celsius| *celsius <= 150.0)
 }

@@ -10,8 +10,9 @@ use embedded_hal::i2c::I2c;
 use std::cell::RefCell;
 use std::time::Duration;
 
-/// A projector together with its controller. It is present as long as the controller answers and streams patterns: one that was
-/// switched off and on shows video again, and has to be set up again.
+/// A projector together with its controller. It is present as long as the controller answers and
+/// streams patterns: one that was switched off and on shows video again, and has to be set up
+/// again.
 pub struct Controlled<I> {
     projector: Box<dyn Projector>,
     watched: RefCell<Watched<I>>,
@@ -25,7 +26,8 @@ struct Watched<I> {
 }
 
 impl<I: I2c> Controlled<I> {
-    /// Sets the controller up for the refresh of a projector; [`Projector::present`] asks it at most once in a `period`.
+    /// Sets the controller up for the refresh of a projector; [`Projector::present`] asks it at
+    /// most once in a `period`.
     ///
     /// # Errors
     /// As [`Controller::set_up`].

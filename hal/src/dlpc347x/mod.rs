@@ -1,11 +1,12 @@
 //! TI's controllers DLPC3470, DLPC3478 and DLPC3479 of projectors for structured light, over I²C.
 //!
-//! Such a controller starts as one for video: it shows colours one after the other, and adapts brightness to the content of a picture,
-//! so that a grey level does not give the same light in every pattern. [`Controller::set_up`] chooses external pattern streaming: each
-//! frame of the video input is one pattern of 8 bit in one colour. Commands and layouts are in `command`.
+//! Such a controller starts as one for video: it shows colours one after the other, and adapts
+//! brightness to the content of a picture, so that a grey level does not give the same light in
+//! every pattern. [`Controller::set_up`] chooses external pattern streaming: each frame of the
+//! video input is one pattern of 8 bit in one colour. Commands and layouts are in `command`.
 //!
-//! A read is a write of the command, with a stop, and then a read, as in TI's own programs; so nothing else may talk to this controller
-//! in between. Every call is tried three times.
+//! A read is a write of the command, with a stop, and then a read, as in TI's own programs; so
+//! nothing else may talk to this controller in between. Every call is tried three times.
 
 #[cfg(feature = "i2c")]
 pub mod bus;
@@ -34,11 +35,13 @@ pub struct Controller<I> {
 }
 
 impl<I: I2c> Controller<I> {
-    /// Finds the controller at an address of 7 bits: 0x1B, or 0x1D if its address pin is high (36h and 3Ah with the bit for reading;
-    /// DLPU072, table 1-1, for this family). `led` is the colour that patterns are shown in.
+    /// Finds the controller at an address of 7 bits: 0x1B, or 0x1D if its address pin is high (36h
+    /// and 3Ah with the bit for reading; DLPU072, table 1-1, for this family). `led` is the colour
+    /// that patterns are shown in.
     ///
     /// # Errors
-    /// `Disconnected` if nothing answers or it is still starting, `Unsupported` if it is another controller.
+    /// `Disconnected` if nothing answers or it is still starting, `Unsupported` if it is another
+    /// controller.
     pub fn open(bus: I, address: u8, led: Led) -> Result<Self, Error> {
         let mut found = Self {
             bus,
@@ -62,12 +65,13 @@ impl<I: I2c> Controller<I> {
         Ok(found)
     }
 
-    /// Sets it up for patterns: CAIC and LABB off, one LED, its current if there is one, both trigger outputs, one pattern of 8 bit per
-    /// refresh that is exposed as long as the controller allows. Each setting is read back.
+    /// Sets it up for patterns: CAIC and LABB off, one LED, its current if there is one, both
+    /// trigger outputs, one pattern of 8 bit per refresh that is exposed as long as the controller
+    /// allows. Each setting is read back.
     ///
     /// # Errors
-    /// `Disconnected` if it does not answer, `Unsupported` if the current or the refresh is beyond its limits, `Protocol` if a setting
-    /// did not take.
+    /// `Disconnected` if it does not answer, `Unsupported` if the current or the refresh is beyond
+    /// its limits, `Protocol` if a setting did not take.
     pub fn set_up(&mut self, current: Option<u16>, refresh: Duration) -> Result<(), Error> {
         self.write("switch CAIC off", &[c::WRITE_LED_CONTROL, 0])?;
         self.write("switch LABB off", &[c::WRITE_LABB, 0, 0])?;
@@ -135,8 +139,9 @@ impl<I: I2c> Controller<I> {
         self.write("set the LED current", &bytes)
     }
 
-    /// The longest illumination of one pattern per refresh, and the dark times before and after, µs. The controller says how long it
-    /// must be dark for an illumination time; what is left of the refresh is asked for next.
+    /// The longest illumination of one pattern per refresh, and the dark times before and after,
+    /// µs. The controller says how long it must be dark for an illumination time; what is left of
+    /// the refresh is asked for next.
     fn exposure(&mut self, refresh: Duration) -> Result<(u32, [u32; 2]), Error> {
         let refresh_us = u32::try_from(refresh.as_micros()).unwrap_or(u32::MAX);
         let mut asked = refresh_us;

@@ -1,6 +1,7 @@
 //! What a controller says of its own condition, from READ_SHORT_STATUS and READ_SYSTEM_STATUS.
 //!
-//! Bits as in `DLPC347X_ShortStatus_s` and `DLPC347X_SystemStatus_s` of TI's interface ([`super::command`]).
+//! Bits as in `DLPC347X_ShortStatus_s` and `DLPC347X_SystemStatus_s` of TI's interface
+//! ([`super::command`]).
 
 use crate::controller::fault;
 

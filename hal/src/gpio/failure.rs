@@ -113,7 +113,8 @@ fn listed(names: &[String]) -> String {
 }
 
 impl From<LineError> for Error {
-    /// A removed chip is a disconnected device; every other error is `Unsupported` and keeps its message.
+    /// A removed chip is a disconnected device; every other error is `Unsupported` and keeps its
+    /// message.
     fn from(error: LineError) -> Self {
         match error {
             LineError::Removed { line } => {

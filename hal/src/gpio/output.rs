@@ -17,7 +17,8 @@ pub struct Output {
 }
 
 impl Output {
-    /// Opens the line `name` of the chip labelled `chip`; it has the state `idle` until it is set, and again after it is dropped.
+    /// Opens the line `name` of the chip labelled `chip`; it has the state `idle` until it is set,
+    /// and again after it is dropped.
     ///
     /// # Errors
     /// Why it cannot be opened.
@@ -35,8 +36,9 @@ impl Output {
     }
 }
 
-/// Leaves every named output of a station at its idle level: no trigger pulse, busy and ok off, fault on. For lines that a killed
-/// process left at their last level; all of them are tried. Returns the errors of those that cannot be used.
+/// Leaves every named output of a station at its idle level: no trigger pulse, busy and ok off,
+/// fault on. For lines that a killed process left at their last level; all of them are tried.
+/// Returns the errors of those that cannot be used.
 #[must_use]
 pub fn leave_idle(trigger: &TriggerSetup, lines: &LinesSetup) -> Vec<LineError> {
     let press = lines.outputs_active_low;

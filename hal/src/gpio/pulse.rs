@@ -1,10 +1,11 @@
 //! An output line that starts exposures with pulses of a given width.
 //!
-//! The caller begins a pulse, and a thread of this module ends it. A camera may expose for as long as the pulse lasts, so the width
-//! must not depend on how long a sleeping thread takes to wake: the thread wakes a little early and then polls the clock. The caller gives it
-//! a real-time priority and a core of its own, as far as the system permits. Both
-//! threads may still be interrupted by other work of the computer, so the clock is read before and after each edge, and a pulse
-//! that was too long or too short is reported.
+//! The caller begins a pulse, and a thread of this module ends it. A camera may expose for as long
+//! as the pulse lasts, so the width must not depend on how long a sleeping thread takes to wake:
+//! the thread wakes a little early and then polls the clock. The caller gives it a real-time
+//! priority and a core of its own, as far as the system permits. Both threads may still be
+//! interrupted by other work of the computer, so the clock is read before and after each edge, and
+//! a pulse that was too long or too short is reported.
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -19,7 +20,8 @@ use crate::setup::TriggerSetup;
 use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger, decides};
 use crate::units::Timestamp;
 
-/// How long before the end of a pulse the thread wakes: longer than waking usually takes, short enough to poll the clock meanwhile.
+/// How long before the end of a pulse the thread wakes: longer than waking usually takes, short
+/// enough to poll the clock meanwhile.
 const EARLY: Duration = Duration::from_micros(200);
 
 /// A trigger that makes pulses. When dropped, its line becomes idle, also in the middle of a pulse.
@@ -36,7 +38,8 @@ struct Pulsed {
     put: Box<Put>,
     /// Of a pulse for one exposure as the camera is set.
     width: Duration,
-    /// Locked from before an edge until its times are stored, so that a thread that locks it later knows them.
+    /// Locked from before an edge until its times are stored, so that a thread that locks it later
+    /// knows them.
     state: Mutex<State>,
     changed: Condvar,
 }
@@ -55,8 +58,8 @@ struct State {
 }
 
 impl Pulse {
-    /// Opens the line `name` of the chip as it is set up; it is idle. The thread that ends its pulses calls `prepare` first, to get the
-    /// priority and the core that it is to have.
+    /// Opens the line `name` of the chip as it is set up; it is idle. The thread that ends its
+    /// pulses calls `prepare` first, to get the priority and the core that it is to have.
     ///
     /// # Errors
     /// Why it cannot be opened.
@@ -107,7 +110,8 @@ impl Pulse {
 }
 
 impl Trigger for Pulse {
-    /// A pulse while the previous one is still on is lost, as it would be to a camera that still exposes.
+    /// A pulse while the previous one is still on is lost, as it would be to a camera that still
+    /// exposes.
     fn fire(&mut self) -> Result<Timestamp, Error> {
         let mut state = self.line.lock();
         if let Some(failed) = &state.failed {
@@ -164,7 +168,8 @@ impl Pulsed {
                 state = self.wait(state, Duration::MAX);
                 continue;
             };
-            // From the reading before the rise to the reading before the fall: both edges are delayed alike by their system calls.
+            // From the reading before the rise to the reading before the fall: both edges are
+            // delayed alike by their system calls.
             let ends = rise.0 + state.width;
             let left = ends.since(monotonic());
             if left > EARLY {
@@ -200,8 +205,8 @@ mod tests {
     /// How long an edge is interrupted.
     const STALL: Duration = Duration::from_millis(5);
 
-    /// Fires one pulse on a line whose edges take so long; its time, and the report of it if it was spoiled, fetched as soon as its
-    /// falling edge has begun.
+    /// Fires one pulse on a line whose edges take so long; its time, and the report of it if it was
+    /// spoiled, fetched as soon as its falling edge has begun.
     fn first(rise: Duration, fall: Duration) -> (Timestamp, Option<Spoiled>) {
         let (ends, ended) = std::sync::mpsc::channel();
         let put = move |on: bool| {

@@ -23,7 +23,8 @@ pub struct Start {
 }
 
 impl Start {
-    /// Opens the line `name` of the chip as it is set up. A line that is active already does not start a cycle.
+    /// Opens the line `name` of the chip as it is set up. A line that is active already does not
+    /// start a cycle.
     ///
     /// # Errors
     /// Why it cannot be opened.

@@ -1,4 +1,5 @@
-//! Work that may be ended at any time and leaves the loaded patterns as they are: a check between two cycles, a step of the set-up.
+//! Work that may be ended at any time and leaves the loaded patterns as they are: a check between
+//! two cycles, a step of the set-up.
 
 use std::sync::Arc;
 
@@ -10,11 +11,12 @@ use crate::projector::Raster;
 pub type GoOn = Arc<dyn Fn() -> bool + Send + Sync>;
 
 impl Head {
-    /// Replaces the patterns; within [`Head::aside`] only those behind the patterns that stay. They are exposed as the camera is set,
-    /// unless [`Head::expose`] follows.
+    /// Replaces the patterns; within [`Head::aside`] only those behind the patterns that stay. They
+    /// are exposed as the camera is set, unless [`Head::expose`] follows.
     ///
     /// # Errors
-    /// As [`Projector::load_behind`](crate::projector::Projector::load_behind); `Ended` as described there.
+    /// As [`Projector::load_behind`](crate::projector::Projector::load_behind); `Ended` as
+    /// described there.
     pub fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
         self.devices.expose(1)?;
         let kept = self.devices.kept;
@@ -33,10 +35,11 @@ impl Head {
         Ok(())
     }
 
-    /// Calls `work`, for which the first `kept` patterns stay loaded: what it loads comes behind them, and its indices count from there.
-    /// It exposes as the camera is set; patterns that stay are exposed afterwards as before.
-    /// When `go_on` returns `false`, loading ends before the next pattern, a sequence as soon as the camera has given the frames that
-    /// it was triggered for, and a watch within a refresh, each with the error `Ended`.
+    /// Calls `work`, for which the first `kept` patterns stay loaded: what it loads comes behind
+    /// them, and its indices count from there. It exposes as the camera is set; patterns that stay
+    /// are exposed afterwards as before. When `go_on` returns `false`, loading ends before the next
+    /// pattern, a sequence as soon as the camera has given the frames that it was triggered for,
+    /// and a watch within a refresh, each with the error `Ended`.
     pub fn aside<R>(&mut self, kept: usize, go_on: GoOn, work: impl FnOnce(&mut Self) -> R) -> R {
         let exposures = self.exposures();
         self.devices.kept = kept;

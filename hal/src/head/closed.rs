@@ -1,4 +1,5 @@
-//! A head whose devices are closed: it keeps their properties, and every call fails with `Disconnected`.
+//! A head whose devices are closed: it keeps their properties, and every call fails with
+//! `Disconnected`.
 //!
 //! A device can be open only once, so a lost head must be closed before it can be opened again.
 

@@ -47,7 +47,8 @@ impl FrameCount {
         self.missing
     }
 
-    /// How many frames were exposed before the one with this count, from the lowest count that arrived on.
+    /// How many frames were exposed before the one with this count, from the lowest count that
+    /// arrived on.
     pub fn before(&self, count: u64) -> u64 {
         count.saturating_sub(self.lowest)
     }

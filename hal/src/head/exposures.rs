@@ -1,7 +1,8 @@
 //! Patterns that are exposed several times as long as the camera is set to.
 //!
-//! A digital micromirror device makes grey levels over whole refreshes, so a longer exposure is a whole number of those that the camera
-//! is set to. What follows from the exposure (period of the camera, pulse of the trigger, times of patterns, time-outs) follows from
+//! A digital micromirror device makes grey levels over whole refreshes, so a longer exposure is a
+//! whole number of those that the camera is set to. What follows from the exposure (period of the
+//! camera, pulse of the trigger, times of patterns, time-outs) follows from
 //! [`Camera::timing`](crate::camera::Camera::timing).
 
 use super::{Devices, Head};
@@ -9,11 +10,12 @@ use crate::camera::Starts;
 use crate::error::Error;
 
 impl Head {
-    /// Exposes the patterns that are loaded `times` as long as the camera is set to, until others are loaded. A camera that is on is
-    /// started again by the next sequence.
+    /// Exposes the patterns that are loaded `times` as long as the camera is set to, until others
+    /// are loaded. A camera that is on is started again by the next sequence.
     ///
     /// # Errors
-    /// `Unsupported` if the projector's pulse sets the exposure, or the camera's back-end can only expose as it is set to.
+    /// `Unsupported` if the projector's pulse sets the exposure, or the camera's back-end can only
+    /// expose as it is set to.
     pub fn expose(&mut self, times: u32) -> Result<(), Error> {
         self.devices.expose(times.max(1))
     }

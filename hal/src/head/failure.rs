@@ -10,11 +10,13 @@ use crate::error::Error;
 pub(super) enum Blocked {
     /// The projector never flipped.
     NoFlip,
-    /// The camera gave no frame at all, or none during more than half of the allowed attempts, up to the last.
+    /// The camera gave no frame at all, or none during more than half of the allowed attempts, up
+    /// to the last.
     NoFrame,
     /// A pattern was shown as often as allowed, and no frame was exposed while only it was in view.
     Retakes,
-    /// A pattern was shown as often as allowed, and most of the rejected frames were spoiled by the trigger's pulses.
+    /// A pattern was shown as often as allowed, and most of the rejected frames were spoiled by the
+    /// trigger's pulses.
     Pulses,
     /// The time was over.
     Late,
@@ -78,7 +80,8 @@ impl Failure {
                 ),
                 "check the flip-to-light delay, what the camera's stamp marks, and the load of the processor",
             ),
-            // A time-out, because repeating the sequence may succeed: the pulses were too long since the computer was busy.
+            // A time-out, because repeating the sequence may succeed: the pulses were too long
+            // since the computer was busy.
             Blocked::Pulses => Error::timeout(
                 format!(
                     "{acquiring}: shown {attempts} times, pulses of the trigger were up to {:.2} ms off their length, \

@@ -1,9 +1,11 @@
-//! Which pattern a frame shows, decided from when patterns were in view and when the frame was exposed.
+//! Which pattern a frame shows, decided from when patterns were in view and when the frame was
+//! exposed.
 //!
-//! A pattern is in view from its flip plus the flip-to-light delay until the next flip plus that delay. A frame shows a pattern
-//! if its whole exposure lies within that time, widened by the tolerance. Before the next flip has been reported, the view lasts
-//! at least until that flip was queued, because no flip happens before it is queued. A frame that cannot be decided yet waits for
-//! the flip.
+//! A pattern is in view from its flip plus the flip-to-light delay until the next flip plus that
+//! delay. A frame shows a pattern if its whole exposure lies within that time, widened by the
+//! tolerance. Before the next flip has been reported, the view lasts at least until that flip was
+//! queued, because no flip happens before it is queued. A frame that cannot be decided yet waits
+//! for the flip.
 
 use std::time::Duration;
 
@@ -14,13 +16,15 @@ use crate::units::Timestamp;
 
 /// Views that are remembered. A frame older than all of them is stale.
 const MAX_VIEWS: usize = 16;
-/// Over how many refreshes the time of a flip is computed from its count: the nominal period is not exact.
+/// Over how many refreshes the time of a flip is computed from its count: the nominal period is not
+/// exact.
 const MAX_COUNTED: u64 = 8;
 
 /// What a frame shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Identity {
-    /// Exposed while only the pattern of this position was in view; the time is when it came into view.
+    /// Exposed while only the pattern of this position was in view; the time is when it came into
+    /// view.
     Of(usize, Timestamp),
     /// Exposed during a change of patterns.
     Straddles,
@@ -30,7 +34,8 @@ pub(super) enum Identity {
     Undecided,
 }
 
-/// A pattern in view. The time of its light by the flip's stamp and that by the flip's count may differ; the truth lies between.
+/// A pattern in view. The time of its light by the flip's stamp and that by the flip's count may
+/// differ; the truth lies between.
 #[derive(Clone, Copy, Debug)]
 struct View {
     position: usize,
@@ -66,7 +71,8 @@ impl Views {
         self.queued = Some(now);
     }
 
-    /// The queued flip happened and shows `position`. Returns the difference of its stamp from its time by the count of refreshes.
+    /// The queued flip happened and shows `position`. Returns the difference of its stamp from its
+    /// time by the count of refreshes.
     pub fn flipped(&mut self, position: usize, flip: Flip) -> Duration {
         let queued = self.queued.take().unwrap_or(flip.timestamp);
         let known = self.counted(flip);
@@ -90,8 +96,9 @@ impl Views {
         off
     }
 
-    /// The time of a flip by its count, from the stamps of the flips before it. A stamp is taken at its flip or too late, never too
-    /// early, so the earliest time that follows from any of them is used: one correct stamp is enough.
+    /// The time of a flip by its count, from the stamps of the flips before it. A stamp is taken at
+    /// its flip or too late, never too early, so the earliest time that follows from any of them is
+    /// used: one correct stamp is enough.
     fn counted(&self, flip: Flip) -> Option<Timestamp> {
         let expected = |view: &View| {
             let refreshes = flip.count.saturating_sub(view.flip.count);
@@ -120,7 +127,8 @@ impl Views {
             until = (view.earliest, true);
         }
         match until {
-            // Before any flip was reported: a frame that ends after the first light is possible may show the first pattern.
+            // Before any flip was reported: a frame that ends after the first light is possible may
+            // show the first pattern.
             (open, false) if end > open => Identity::Undecided,
             (_, false) => Identity::Stale,
             (first, true) if end > first => Identity::Straddles,

@@ -32,7 +32,8 @@ use streaming::Streaming;
 pub use timing::{Stamp, TOLERANCE, Timing};
 pub use watch::{Showing, Watched, WatchedFrame};
 
-/// A device may disappear without ending a wait; on a real clock the devices are polled at least this often.
+/// A device may disappear without ending a wait; on a real clock the devices are polled at least
+/// this often.
 const UNNOTICED: Duration = Duration::from_millis(100);
 
 /// Camera, projector and trigger in front of the same part, and the clock that they share.
@@ -68,7 +69,8 @@ pub struct Exposure {
     pub done: Timestamp,
     /// Longest time from a pattern's coming into view to the start of its exposure.
     pub lag: Duration,
-    /// Largest difference of a flip's stamp from its time by the count, and of an exposure's start from its trigger.
+    /// Largest difference of a flip's stamp from its time by the count, and of an exposure's start
+    /// from its trigger.
     pub sync_error: Duration,
     /// How often a pattern was shown again because it had given no usable frame.
     pub retaken: u32,
@@ -171,7 +173,8 @@ impl Head {
         self.devices.camera.temperature_c()
     }
 
-    /// What the projector's controller said of itself when it was last asked; `None` if there is none to ask.
+    /// What the projector's controller said of itself when it was last asked; `None` if there is
+    /// none to ask.
     pub fn controller(&self) -> Option<ControllerState> {
         self.devices.projector.controller()
     }
@@ -190,19 +193,22 @@ impl Head {
         self.devices.projector.present()
     }
 
-    /// Shows the patterns `indices` in this order, exposes one frame of each, and passes each frame to `sink` with
-    /// its pattern's index as soon as it and all frames before it have arrived, stamped with the start of its exposure.
+    /// Shows the patterns `indices` in this order, exposes one frame of each, and passes each frame
+    /// to `sink` with its pattern's index as soon as it and all frames before it have arrived,
+    /// stamped with the start of its exposure.
     ///
-    /// A frame belongs to a pattern if its whole exposure lies within the pattern's time in view, by the times and
-    /// counts of flips and frames and never by the order of arrival, and if no pulse of the trigger spoiled it. A pattern
-    /// without such a frame is shown again. The sequence ends at the latest `timeout` after its planned end.
-    /// However it ends, the projector is blank afterwards. The camera is stopped, unless it stays on ([`Camera::stays_on`]) and each trigger
-    /// gave its frame. `sink` delays no flip: another thread serves the
-    /// devices while `sink` runs.
+    /// A frame belongs to a pattern if its whole exposure lies within the pattern's time in view,
+    /// by the times and counts of flips and frames and never by the order of arrival, and if no
+    /// pulse of the trigger spoiled it. A pattern without such a frame is shown again. The sequence
+    /// ends at the latest `timeout` after its planned end. However it ends, the projector is blank
+    /// afterwards. The camera is stopped, unless it stays on ([`Camera::stays_on`]) and each
+    /// trigger gave its frame. `sink` delays no flip: another thread serves the devices while
+    /// `sink` runs.
     ///
     /// # Errors
-    /// The first error of a device; `Protocol` if `indices` is empty or frames never fit their patterns; `Timeout` if
-    /// the time is over, or flips or frames no longer arrive. `sink` has then received the frames before the failure.
+    /// The first error of a device; `Protocol` if `indices` is empty or frames never fit their
+    /// patterns; `Timeout` if the time is over, or flips or frames no longer arrive. `sink` has
+    /// then received the frames before the failure.
     pub fn acquire(
         &mut self,
         indices: &[usize],
@@ -296,7 +302,8 @@ fn beside(
     })
 }
 
-/// Passes events to the sequencer and does what it decides, until the sequence ends or `hand` returns `false`.
+/// Passes events to the sequencer and does what it decides, until the sequence ends or `hand`
+/// returns `false`.
 fn carry_out(
     devices: &mut Devices,
     sequencer: &mut Sequencer,
@@ -316,7 +323,8 @@ fn carry_out(
     } = devices;
     let refresh = projector.refresh();
     let timing = camera.timing();
-    // Once it is to be ended: until when the frames of the triggers that have fired are waited for, so that the camera can stay on.
+    // Once it is to be ended: until when the frames of the triggers that have fired are waited for,
+    // so that the camera can stay on.
     let mut ending: Option<Timestamp> = None;
     loop {
         while let Some(flip) = projector.poll_flip()? {
@@ -329,7 +337,8 @@ fn carry_out(
             let (start, count) = (start_of(&frame), frame.count());
             sequencer.frame(frame.restamped(start, count));
         }
-        // After the frames and before any decision: the pulse of a frame that has arrived has ended and is known.
+        // After the frames and before any decision: the pulse of a frame that has arrived has ended
+        // and is known.
         while let Some(pulse) = trigger.poll_spoiled() {
             sequencer.spoiled(pulse);
         }

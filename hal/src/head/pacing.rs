@@ -1,10 +1,12 @@
-//! When to flip and when to trigger: planned from the refresh, the flip-to-light delay and the timing of the camera.
+//! When to flip and when to trigger: planned from the refresh, the flip-to-light delay and the
+//! timing of the camera.
 //!
-//! The next pattern's light may come when the exposure of the pattern in view ends. With the flip-to-light delay L and refreshes
-//! of period r after the flip at T, an exposure that ends at E allows the flip at T + m r, where m is the smallest whole
-//! number with T + m r + L ≥ E (within the tolerance). So the flip is often queued while this pattern's frame is still being
-//! exposed or read out, and with a delay longer than an exposure even before the trigger fires. These plans do not decide which
-//! pattern a frame shows (`identity` does): a plan that fails costs a retake.
+//! The next pattern's light may come when the exposure of the pattern in view ends. With the
+//! flip-to-light delay L and refreshes of period r after the flip at T, an exposure that ends at E
+//! allows the flip at T + m r, where m is the smallest whole number with T + m r + L ≥ E (within
+//! the tolerance). So the flip is often queued while this pattern's frame is still being exposed or
+//! read out, and with a delay longer than an exposure even before the trigger fires. These plans do
+//! not decide which pattern a frame shows (`identity` does): a plan that fails costs a retake.
 
 use std::time::Duration;
 
@@ -104,8 +106,8 @@ impl Pacing {
         start + self.exposure
     }
 
-    /// The part of the tolerance that a plan may use. The rest is left for a trigger that fires a little late, and for the jitter of a
-    /// camera that runs by itself.
+    /// The part of the tolerance that a plan may use. The rest is left for a trigger that fires a
+    /// little late, and for the jitter of a camera that runs by itself.
     fn slack(&self) -> Duration {
         self.tolerance / 2
     }
@@ -121,8 +123,9 @@ impl Pacing {
         self.count
     }
 
-    /// Whether a trigger explains an exposure that started at `start`, with `before` exposures before it in this sequence: a triggered
-    /// camera starts an exposure at a trigger, and each exposure needs a trigger of its own. Otherwise its stamp is wrong.
+    /// Whether a trigger explains an exposure that started at `start`, with `before` exposures
+    /// before it in this sequence: a triggered camera starts an exposure at a trigger, and each
+    /// exposure needs a trigger of its own. Otherwise its stamp is wrong.
     pub fn explains(&self, start: Timestamp, before: u64) -> bool {
         let oldest = self.count - self.triggers.len();
         let prompt = |at: Timestamp| start.off(at) <= self.promptness;
@@ -132,7 +135,8 @@ impl Pacing {
                 .any(|(index, at)| index >= before && prompt(*at))
     }
 
-    /// A pulse was too long or too short. This matters to a camera that exposes for as long as its pulses last.
+    /// A pulse was too long or too short. This matters to a camera that exposes for as long as its
+    /// pulses last.
     pub fn spoiled(&mut self, pulse: Spoiled) {
         if !self.triggered || !pulse.decides(self.exposure) {
             return;
@@ -148,8 +152,9 @@ impl Pacing {
         known.find(|pulse| self.spoils(pulse, start)).copied()
     }
 
-    /// Whether this pulse spoiled an exposure which started at `start` by its stamp: its own exposure, whose stamp may mark the end and
-    /// then is off by as much as the pulse; or the next one, if it was triggered while the camera was busy for longer than planned.
+    /// Whether this pulse spoiled an exposure which started at `start` by its stamp: its own
+    /// exposure, whose stamp may mark the end and then is off by as much as the pulse; or the next
+    /// one, if it was triggered while the camera was busy for longer than planned.
     pub fn spoils(&self, pulse: &Spoiled, start: Timestamp) -> bool {
         let from = pulse.fired - (pulse.shorter + self.promptness);
         let busy = self.period.saturating_sub(self.promptness);
@@ -161,7 +166,8 @@ impl Pacing {
         self.phase = self.phase.max(Some(start));
     }
 
-    /// When the trigger of this attempt is due, provided that all earlier ones have fired; none for a camera that runs by itself.
+    /// When the trigger of this attempt is due, provided that all earlier ones have fired; none for
+    /// a camera that runs by itself.
     pub fn trigger(&self, attempt: &Attempt) -> Option<Timestamp> {
         self.triggered.then(|| attempt.light.max(self.free))
     }
@@ -199,7 +205,8 @@ impl Pacing {
         }
     }
 
-    /// When to queue the flip after `last`, and the count of the refresh with which it should happen; none while that cannot be planned.
+    /// When to queue the flip after `last`, and the count of the refresh with which it should
+    /// happen; none while that cannot be planned.
     pub fn next_flip<'a>(
         &self,
         attempts: impl Iterator<Item = &'a Attempt>,

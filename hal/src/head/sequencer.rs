@@ -1,9 +1,12 @@
-//! The sequencer decides which pattern to show when, when to trigger, and which pattern each frame shows.
+//! The sequencer decides which pattern to show when, when to trigger, and which pattern each frame
+//! shows.
 //!
-//! It receives events and the time as arguments ([`Sequencer::flipped`], [`Sequencer::fired`], [`Sequencer::spoiled`],
-//! [`Sequencer::frame`]) and returns what to do next ([`Sequencer::act`]); the head's loop carries that out. A *position* is a place
-//! in the sequence and has one pattern; an *attempt* is one showing of that pattern, with one trigger. A position whose attempt gave
-//! no frame is shown again, before the positions that follow it. Frames are handed over in the order of the sequence.
+//! It receives events and the time as arguments ([`Sequencer::flipped`], [`Sequencer::fired`],
+//! [`Sequencer::spoiled`], [`Sequencer::frame`]) and returns what to do next ([`Sequencer::act`]);
+//! the head's loop carries that out. A *position* is a place in the sequence and has one pattern;
+//! an *attempt* is one showing of that pattern, with one trigger. A position whose attempt gave no
+//! frame is shown again, before the positions that follow it. Frames are handed over in the order
+//! of the sequence.
 
 use std::collections::VecDeque;
 
@@ -63,7 +66,8 @@ struct Queued {
     wanted: Option<u64>,
 }
 
-/// The state of one sequence. It is reused for the next one, so that repeated sequences allocate nothing.
+/// The state of one sequence. It is reused for the next one, so that repeated sequences allocate
+/// nothing.
 #[derive(Debug, Default)]
 pub(super) struct Sequencer {
     pacing: Pacing,
@@ -129,7 +133,8 @@ impl Sequencer {
         }
     }
 
-    /// Whether each trigger of this sequence gave a frame that was handed over, so that no other can arrive later.
+    /// Whether each trigger of this sequence gave a frame that was handed over, so that no other
+    /// can arrive later.
     pub fn all_answered(&self) -> bool {
         self.handed == self.positions.len() && self.pacing.triggers() == self.handed
     }
@@ -179,7 +184,8 @@ impl Sequencer {
         self.pacing.fired(at);
     }
 
-    /// This pulse of the trigger was spoiled. Must be called before the next [`Sequencer::act`], which may decide its frame.
+    /// This pulse of the trigger was spoiled. Must be called before the next [`Sequencer::act`],
+    /// which may decide its frame.
     pub fn spoiled(&mut self, pulse: Spoiled) {
         self.pacing.spoiled(pulse);
     }
@@ -198,7 +204,8 @@ impl Sequencer {
         }
     }
 
-    /// What to do now. Flips and triggers come before frames, so that handing over delays none of them.
+    /// What to do now. Flips and triggers come before frames, so that handing over delays none of
+    /// them.
     pub fn act(&mut self, now: Timestamp) -> Act {
         self.decide(now);
         self.give_up_overdue(now);
@@ -241,7 +248,8 @@ impl Sequencer {
             .iter()
             .map(|frame| self.pacing.end(frame.timestamp()));
         let next = [flip, fire].into_iter().flatten().chain(overdue);
-        // A frame whose exposure ends in the future is decided at that time, unless the next flip decides it earlier.
+        // A frame whose exposure ends in the future is decided at that time, unless the next flip
+        // decides it earlier.
         let next = next.chain(decided.filter(|end| *end > now));
         Act::Wait(
             next.min()
@@ -313,7 +321,8 @@ impl Sequencer {
         so_far.lag = so_far.lag.max(start.since(light));
     }
 
-    /// A frame exposed from `start` showed no pattern alone: the position of its attempt is shown again at once.
+    /// A frame exposed from `start` showed no pattern alone: the position of its attempt is shown
+    /// again at once.
     fn retake_the_attempt_of(&mut self, start: Timestamp) {
         let near = self.pacing.exposure / 2;
         let meant = self.attempts.iter().position(|attempt| {
@@ -329,7 +338,8 @@ impl Sequencer {
         }
     }
 
-    /// The frame of a spoiled pulse has arrived: the position of its attempt is shown again at once, unless that is planned already.
+    /// The frame of a spoiled pulse has arrived: the position of its attempt is shown again at
+    /// once, unless that is planned already.
     fn retake_the_attempt_spoiled_by(&mut self, pulse: &Spoiled) {
         let spoiled = |at| self.pacing.spoils(pulse, at);
         let meant = |attempt: &Attempt| !attempt.done && attempt.fired.is_some_and(spoiled);
@@ -381,7 +391,8 @@ impl Sequencer {
         Some((due, Some(count)))
     }
 
-    /// When the next trigger is due. If the exposure would not end while the pattern is in view, its position is shown again instead.
+    /// When the next trigger is due. If the exposure would not end while the pattern is in view,
+    /// its position is shown again instead.
     fn trigger_due(&mut self, now: Timestamp) -> Option<Timestamp> {
         loop {
             let at = self.attempts.iter().position(Attempt::waits_for_trigger)?;

@@ -1,8 +1,9 @@
 //! Keeps a triggered camera on between sequences, because starting one may take half a second.
 //!
-//! It stays on only after a sequence in which each trigger gave its frame, so that no frame of it can arrive in the next one; a copy of
-//! such a frame is known by its count. It is stopped before it has waited for longer than it may ([`Camera::stays_on`](crate::camera::Camera::stays_on)), because
-//! libcamera gives up on a camera that gives no frame.
+//! It stays on only after a sequence in which each trigger gave its frame, so that no frame of it
+//! can arrive in the next one; a copy of such a frame is known by its count. It is stopped before
+//! it has waited for longer than it may ([`Camera::stays_on`](crate::camera::Camera::stays_on)),
+//! because libcamera gives up on a camera that gives no frame.
 
 use std::time::Duration;
 
@@ -33,7 +34,8 @@ impl Streaming {
 }
 
 impl Head {
-    /// How long a camera that is on may wait for the next sequence; zero if it is stopped after each.
+    /// How long a camera that is on may wait for the next sequence; zero if it is stopped after
+    /// each.
     pub fn stays_on(&self) -> Duration {
         self.devices.camera.stays_on()
     }
@@ -49,8 +51,8 @@ impl Head {
         devices.exposing(|_, start_up| Ok((start_up, false)))
     }
 
-    /// To be called now and then while nothing is measured: checks that camera and projector are still connected, and stops a camera that
-    /// has waited for as long as it may.
+    /// To be called now and then while nothing is measured: checks that camera and projector are
+    /// still connected, and stops a camera that has waited for as long as it may.
     ///
     /// # Errors
     /// `Disconnected` for the first one that is gone; an error of stopping the camera.
@@ -71,15 +73,17 @@ impl Head {
 }
 
 impl Devices {
-    /// Calls `work` with a running camera and how long it took to start. `work` also returns whether the camera may stay on: whether
-    /// each exposure has given its frame. However it ends, the projector is blank afterwards.
+    /// Calls `work` with a running camera and how long it took to start. `work` also returns
+    /// whether the camera may stay on: whether each exposure has given its frame. However it ends,
+    /// the projector is blank afterwards.
     pub fn exposing<R>(
         &mut self,
         work: impl FnOnce(&mut Self, Duration) -> Result<(R, bool), Error>,
     ) -> Result<R, Error> {
         let result = self.start().and_then(|start_up| work(self, start_up));
         let stays = matches!(result, Ok((_, true))) && !self.camera.stays_on().is_zero();
-        // Both calls are made even if the first fails; an error of `work` is more useful than theirs and goes first.
+        // Both calls are made even if the first fails; an error of `work` is more useful than
+        // theirs and goes first.
         let stopped = match stays {
             true => Ok(()),
             false => self.camera.stop(),

@@ -1,8 +1,8 @@
-//! Watching a head without a sequence: patterns are shown for whole refreshes, the camera exposes continuously, and everything that
-//! arrives is kept.
+//! Watching a head without a sequence: patterns are shown for whole refreshes, the camera exposes
+//! continuously, and everything that arrives is kept.
 //!
-//! No frame is assigned to a pattern, discarded or taken again. The doctor uses this to examine a head, and calibration to measure
-//! the times on which a sequence relies.
+//! No frame is assigned to a pattern, discarded or taken again. The doctor uses this to examine a
+//! head, and calibration to measure the times on which a sequence relies.
 
 use std::time::Duration;
 
@@ -21,7 +21,8 @@ pub struct Showing {
     pub index: usize,
     /// How many refreshes it is shown for, at least 1.
     pub refreshes: u32,
-    /// How many refreshes after the flip no trigger fires, so that the light has settled. A camera that runs by itself exposes anyway.
+    /// How many refreshes after the flip no trigger fires, so that the light has settled. A camera
+    /// that runs by itself exposes anyway.
     pub settle: u32,
 }
 
@@ -52,8 +53,8 @@ pub struct WatchedFrame<M> {
 }
 
 impl<M> Watched<M> {
-    /// Whether a spoiled pulse may have affected an exposure that started at `start` by its stamp: its own or a neighbouring one, as
-    /// stamps of the end are off by as much as the pulse.
+    /// Whether a spoiled pulse may have affected an exposure that started at `start` by its stamp:
+    /// its own or a neighbouring one, as stamps of the end are off by as much as the pulse.
     pub fn spoiled_near(&self, start: Timestamp) -> bool {
         let near = |pulse: &Spoiled| start.off(pulse.fired) <= pulse.width + pulse.off();
         self.spoiled.iter().any(near)
@@ -61,8 +62,9 @@ impl<M> Watched<M> {
 }
 
 impl Head {
-    /// Shows `showings` one after the other while the camera exposes as often as it does in a sequence, and measures every frame. Flips and
-    /// frames that do not arrive are missing in the result, without an error. Ends at the latest `timeout` after its planned end.
+    /// Shows `showings` one after the other while the camera exposes as often as it does in a
+    /// sequence, and measures every frame. Flips and frames that do not arrive are missing in the
+    /// result, without an error. Ends at the latest `timeout` after its planned end.
     ///
     /// # Errors
     /// The first error of a device.
@@ -76,7 +78,8 @@ impl Head {
         self.watching(showings, spacing, timeout, measure, None)
     }
 
-    /// As [`Head::watch`], with triggers `spacing` apart, or as far apart as the camera says if that is more.
+    /// As [`Head::watch`], with triggers `spacing` apart, or as far apart as the camera says if
+    /// that is more.
     ///
     /// # Errors
     /// The first error of a device.
@@ -90,7 +93,8 @@ impl Head {
         self.watching(showings, spacing, timeout, measure, None)
     }
 
-    /// As [`Head::watch`], but ends within a refresh when `go_on` returns `false`; what has arrived by then is the result.
+    /// As [`Head::watch`], but ends within a refresh when `go_on` returns `false`; what has arrived
+    /// by then is the result.
     ///
     /// # Errors
     /// As [`Head::watch`].
@@ -136,7 +140,8 @@ impl Head {
                         continue;
                     };
                     seen.flips.push(flip);
-                    // Well after the last refresh that this pattern is to have, and well before the next.
+                    // Well after the last refresh that this pattern is to have, and well before the
+                    // next.
                     next_flip =
                         flip.timestamp + (refresh * (showing.refreshes.max(1) - 1) + refresh / 8);
                     settled = Some(flip.timestamp + refresh * showing.settle);

@@ -56,7 +56,8 @@ impl Canvas {
 /// Writes grey levels as pixels, `pitch` bytes from row to row.
 fn draw(raster: &Raster, pitch: usize, memory: &mut [u8]) {
     let width = raster.width() as usize;
-    // Whole rows are copied from ordinary memory, as single bytes may be slow to write to the card's.
+    // Whole rows are copied from ordinary memory, as single bytes may be slow to write to the
+    // card's.
     let mut line = vec![0; width * PIXEL];
     for (row, into) in raster
         .pixels()

@@ -36,7 +36,8 @@ impl Device for Card {}
 impl ControlDevice for Card {}
 
 impl Card {
-    /// Opens a card with all its planes, for atomic commits. None if it has no display outputs, such as a 3-D accelerator.
+    /// Opens a card with all its planes, for atomic commits. None if it has no display outputs,
+    /// such as a 3-D accelerator.
     pub fn open(path: &Path) -> Result<Option<Self>, Error> {
         let attempt = || format!("opening the display card {}", path.display());
         let flags = OFlags::NONBLOCK | OFlags::CLOEXEC;
@@ -80,8 +81,8 @@ impl Card {
         Ok(Some(card))
     }
 
-    /// Makes this program the one that sets modes (DRM master); the console is then not shown. The remedy names
-    /// the usual causes of a refusal.
+    /// Makes this program the one that sets modes (DRM master); the console is then not shown. The
+    /// remedy names the usual causes of a refusal.
     pub fn own(&self) -> Result<(), Error> {
         self.acquire_master_lock().map_err(|_| {
             Error::unsupported(

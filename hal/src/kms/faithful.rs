@@ -1,7 +1,8 @@
 //! Display settings with which a driver leaves grey levels unchanged.
 //!
-//! A pattern is measured, not looked at: 0…255 must reach the projector as 0…255, pixel by pixel. Drivers may scale, dither or
-//! convert colours for better pictures. A property is set only if the driver has it with another value.
+//! A pattern is measured, not looked at: 0…255 must reach the projector as 0…255, pixel by pixel.
+//! Drivers may scale, dither or convert colours for better pictures. A property is set only if the
+//! driver has it with another value.
 
 use drm::control::property::ValueType;
 
@@ -30,7 +31,8 @@ pub(super) const CONNECTOR: &[(&str, Wanted)] = &[
     ("Colorspace", Wanted::Named("Default")),
 ];
 
-/// Properties of a CRTC: no look-up tables and colour matrices between buffer and connector, and a constant refresh rate.
+/// Properties of a CRTC: no look-up tables and colour matrices between buffer and connector, and a
+/// constant refresh rate.
 pub(super) const CRTC: &[(&str, Wanted)] = &[
     ("DEGAMMA_LUT", Wanted::Number(0)),
     ("CTM", Wanted::Number(0)),
@@ -45,7 +47,8 @@ pub(super) const PLANE: &[(&str, Wanted)] = &[
     ("alpha", Wanted::Number(0xffff)),
 ];
 
-/// The value that a property should have, by one of the lists above; none if it does not matter or the driver has no such value.
+/// The value that a property should have, by one of the lists above; none if it does not matter or
+/// the driver has no such value.
 pub(super) fn find(known: &[(&str, Wanted)], name: &str, kind: &ValueType) -> Option<u64> {
     let (_, wanted) = known.iter().find(|(known, _)| *known == name)?;
     match (wanted, kind) {

@@ -1,8 +1,9 @@
 //! A projector on a display connector of this computer, through the kernel's mode setting (KMS).
 //!
-//! [`open`] finds card, connector and mode, removes the console and everything else from the connector, and shows black. Patterns are
-//! drawn into the card's memory when they are loaded; a flip copies nothing. Each flip is one atomic commit that does not wait; its
-//! event has the kernel's count and time of the refresh with which the pattern is shown.
+//! [`open`] finds card, connector and mode, removes the console and everything else from the
+//! connector, and shows black. Patterns are drawn into the card's memory when they are loaded; a
+//! flip copies nothing. Each flip is one atomic commit that does not wait; its event has the
+//! kernel's count and time of the refresh with which the pattern is shown.
 //!
 //! Dropping a [`Display`] switches the connector off and returns the card to the console.
 
@@ -67,8 +68,8 @@ struct Commit {
 /// Opens the display of a setup in its mode and shows black.
 ///
 /// # Errors
-/// `Unsupported` if card, connector or mode does not exist, or another program uses the card; `Disconnected` if nothing is
-/// plugged in. The message lists what exists.
+/// `Unsupported` if card, connector or mode does not exist, or another program uses the card;
+/// `Disconnected` if nothing is plugged in. The message lists what exists.
 pub fn open(setup: &ProjectorSetup) -> Result<Display, Error> {
     let output = Output::find(setup)?;
     let size = (output.timings.width, output.timings.height);
@@ -98,9 +99,10 @@ impl Display {
         self.output.card.descriptor()
     }
 
-    /// Refreshes that the driver missed: whole refreshes that passed between the commit of a flip and the flip. A commit in the last
-    /// quarter of a refresh may be too late for the next one and is not counted. Refreshes for which no flip was queued in time show
-    /// in the count of the flips instead.
+    /// Refreshes that the driver missed: whole refreshes that passed between the commit of a flip
+    /// and the flip. A commit in the last quarter of a refresh may be too late for the next one and
+    /// is not counted. Refreshes for which no flip was queued in time show in the count of the
+    /// flips instead.
     #[must_use]
     pub fn missed(&self) -> u64 {
         self.missed
@@ -209,7 +211,8 @@ impl Projector for Display {
         true
     }
 
-    /// Waits until black is shown, at most a few refreshes, so that no visible picture is drawn over.
+    /// Waits until black is shown, at most a few refreshes, so that no visible picture is drawn
+    /// over.
     fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let size = self.size();
         all_of_size(&rasters, size)?;
@@ -290,7 +293,8 @@ impl Drop for Display {
             canvas.free(card);
         }
         self.black.free(card);
-        // Duplicates of the descriptor that are still open would otherwise keep this program the card's master.
+        // Duplicates of the descriptor that are still open would otherwise keep this program the
+        // card's master.
         let _ = card.release_master_lock();
     }
 }

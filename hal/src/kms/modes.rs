@@ -7,8 +7,9 @@ use drm::control::{Mode, ModeFlags, ModeTypeFlags};
 
 use crate::setup::ProjectorSetup;
 
-/// A mode fits if its rate differs by at most this share from the rate asked for. Modes are named by rounded rates: 59.94 Hz is called
-/// 60, and so is the 60.32 Hz of the VESA mode 800×600, the largest difference (0.53 %). Different rates are at least 4 % apart (24 and 25).
+/// A mode fits if its rate differs by at most this share from the rate asked for. Modes are named
+/// by rounded rates: 59.94 Hz is called 60, and so is the 60.32 Hz of the VESA mode 800×600, the
+/// largest difference (0.53 %). Different rates are at least 4 % apart (24 and 25).
 const NEAR: f64 = 0.01;
 
 /// Size and timing of a mode.
@@ -61,8 +62,8 @@ impl fmt::Display for Timings {
     }
 }
 
-/// The index of the mode to use: among the modes that fit, the nearest to the rate asked for; without a rate the preferred one, else
-/// the first. None if no mode fits.
+/// The index of the mode to use: among the modes that fit, the nearest to the rate asked for;
+/// without a rate the preferred one, else the first. None if no mode fits.
 pub(super) fn choose(modes: &[Timings], setup: &ProjectorSetup) -> Option<usize> {
     let off = |mode: &Timings| {
         setup

@@ -1,4 +1,5 @@
-//! The display pipeline from a buffer to the projector: a plane, the CRTC that shows it, and the connector.
+//! The display pipeline from a buffer to the projector: a plane, the CRTC that shows it, and the
+//! connector.
 
 use std::fs::File;
 use std::io;
@@ -18,7 +19,8 @@ use crate::setup::ProjectorSetup;
 /// Where the kernel shows the state of its connectors.
 const CONNECTORS: &str = "/sys/class/drm";
 
-/// As much of a display's description (EDID) as tells it from another: its first block. All zero without a display that answers.
+/// As much of a display's description (EDID) as tells it from another: its first block. All zero
+/// without a display that answers.
 type Edid = [u8; 128];
 
 /// A connector in its mode.
@@ -35,14 +37,16 @@ pub(super) struct Output {
     plane: Properties,
     /// The plane's property `FB_ID`: the framebuffer that it shows.
     framebuffer: property::Handle,
-    /// The kernel's status file of the connector, which does not probe the display; none if there is no such file.
+    /// The kernel's status file of the connector, which does not probe the display; none if there
+    /// is no such file.
     status: Option<File>,
     /// The kernel's file of the display's description, and what it held when the mode was chosen.
     edid: Option<(File, Edid)>,
 }
 
 impl Output {
-    /// Finds the card, connector and mode of a setup, and becomes the card's master. Sets nothing yet.
+    /// Finds the card, connector and mode of a setup, and becomes the card's master. Sets nothing
+    /// yet.
     pub fn find(setup: &ProjectorSetup) -> Result<Self, Error> {
         let (card, connector) = the_connector(setup)?;
         card.own()?;
@@ -90,7 +94,8 @@ impl Output {
         })
     }
 
-    /// Checks that the projector is plugged in, by what the kernel knows; the display is not probed.
+    /// Checks that the projector is plugged in, by what the kernel knows; the display is not
+    /// probed.
     pub fn present(&self, attempt: &str) -> Result<(), Error> {
         let Some(status) = &self.status else {
             return Ok(());
@@ -106,8 +111,9 @@ impl Output {
         }
     }
 
-    /// Checks that the display is the one whose modes are known. One that is switched on after the head was opened describes itself
-    /// only then, and one of those modes may be the only one that it shows. The kernel reads the description on a hotplug.
+    /// Checks that the display is the one whose modes are known. One that is switched on after the
+    /// head was opened describes itself only then, and one of those modes may be the only one that
+    /// it shows. The kernel reads the description on a hotplug.
     pub fn same_display(&self) -> Result<(), Error> {
         let now = self
             .edid
@@ -171,8 +177,8 @@ impl Output {
         self.card.atomic_commit(flags, request)
     }
 
-    /// The commit that sets the mode. It also sets every property that would change grey levels to a neutral value, and removes
-    /// everything else from the CRTC.
+    /// The commit that sets the mode. It also sets every property that would change grey levels to
+    /// a neutral value, and removes everything else from the CRTC.
     fn mode_request(&self, mode: u64, canvas: &canvas::Canvas) -> Result<AtomicModeReq, Error> {
         let mut request = AtomicModeReq::new();
         let (width, height) = (
@@ -180,7 +186,8 @@ impl Output {
             u64::from(self.timings.height),
         );
         let crtc = u64::from(u32::from(self.crtc));
-        // SRC: the part of the buffer, in 1/65536 pixels. CRTC: the place on the display, in pixels.
+        // SRC: the part of the buffer, in 1/65536 pixels. CRTC: the place on the display, in
+        // pixels.
         for (name, value) in [
             ("FB_ID", u32::from(canvas.shown_as).into()),
             ("CRTC_ID", crtc),
@@ -203,7 +210,8 @@ impl Output {
         Ok(request)
     }
 
-    /// Sets the properties that would change grey levels, such as gamma or scaling, to neutral values ([`faithful`]).
+    /// Sets the properties that would change grey levels, such as gamma or scaling, to neutral
+    /// values ([`faithful`]).
     fn be_faithful(&self, request: &mut AtomicModeReq) {
         for (object, wanted) in [
             (&self.connector, faithful::CONNECTOR),

@@ -1,8 +1,9 @@
 //! The memory of a camera's buffers: where it is from, and how it is read.
 //!
-//! A camera's driver allocates buffers that the processor does not cache, and reading them takes many times as long. So they are
-//! taken from a heap of cached memory where there is one, and each reading is framed by the calls that keep the cache right
-//! (`DMA_BUF_IOCTL_SYNC`; rpicam-apps does the same, in `core/dma_heaps.cpp` and `core/buffer_sync.cpp`).
+//! A camera's driver allocates buffers that the processor does not cache, and reading them takes
+//! many times as long. So they are taken from a heap of cached memory where there is one, and each
+//! reading is framed by the calls that keep the cache right (`DMA_BUF_IOCTL_SYNC`; rpicam-apps does
+//! the same, in `core/dma_heaps.cpp` and `core/buffer_sync.cpp`).
 
 use std::os::fd::{AsRawFd, OwnedFd};
 
@@ -14,8 +15,8 @@ use filedescriptor::FileDescriptor;
 use crate::error::Error;
 use crate::frame::Pixels;
 
-/// The heap of cached memory that cameras can write to, by the name that Raspberry Pi OS gives it: the system's heap on a Pi 5, the contiguous
-/// one on a Pi 4 and older.
+/// The heap of cached memory that cameras can write to, by the name that Raspberry Pi OS gives it:
+/// the system's heap on a Pi 5, the contiguous one on a Pi 4 and older.
 pub(super) const CACHED: &str = "/dev/dma_heap/vidbuf_cached";
 
 /// The first plane of a buffer, mapped for reading.
@@ -84,7 +85,8 @@ impl Mapped {
     }
 }
 
-/// Takes a buffer of `size` bytes from the heap of cached memory, and maps its first `length` bytes; `None` if there is no such heap.
+/// Takes a buffer of `size` bytes from the heap of cached memory, and maps its first `length`
+/// bytes; `None` if there is no such heap.
 ///
 /// # Errors
 /// `Unsupported` if it has no memory left; `Protocol` if the buffer cannot be used.
@@ -110,7 +112,8 @@ pub(super) fn cached(
     };
     let buffer =
         OwnedFrameBuffer::new(vec![plane], None).map_err(|cause| unmapped(length, cause))?;
-    // The crate libcamera 0.7.0 takes the descriptor, gives a duplicate of it to the library, and leaks the original.
+    // The crate libcamera 0.7.0 takes the descriptor, gives a duplicate of it to the library, and
+    // leaks the original.
     if buffer
         .planes()
         .get(0)

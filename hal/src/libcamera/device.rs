@@ -1,4 +1,5 @@
-//! The camera as the head uses it: it sends orders to the thread that owns the library, and fetches frames and errors from it.
+//! The camera as the head uses it: it sends orders to the thread that owns the library, and fetches
+//! frames and errors from it.
 
 use std::os::fd::OwnedFd;
 use std::sync::Arc;
@@ -18,8 +19,8 @@ use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};
 
-/// Longest time for opening, starting and stopping a camera, in which the sensor is powered up and programmed over I²C. If it takes
-/// longer, the driver hangs.
+/// Longest time for opening, starting and stopping a camera, in which the sensor is powered up and
+/// programmed over I²C. If it takes longer, the driver hangs.
 const PATIENCE: Duration = Duration::from_secs(15);
 /// A camera that libcamera lists.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,9 +73,10 @@ impl LibCamera {
     /// Opens a camera: finds it by its id, negotiates a format, and maps its buffers.
     ///
     /// # Errors
-    /// `Disconnected` if there is no camera, or none of that id; `Unsupported` if there are several and no id is given, if the camera does
-    /// not support the settings, listing what it supports, or if there is no memory for buffers; `Protocol` if another program uses it, one
-    /// is open in this program, or the library fails; `Timeout` if its driver hangs.
+    /// `Disconnected` if there is no camera, or none of that id; `Unsupported` if there are several
+    /// and no id is given, if the camera does not support the settings, listing what it supports,
+    /// or if there is no memory for buffers; `Protocol` if another program uses it, one is open in
+    /// this program, or the library fails; `Timeout` if its driver hangs.
     pub fn open(settings: Settings) -> Result<Self, Error> {
         let system = |cause: &dyn std::fmt::Display| {
             Error::protocol(
@@ -178,7 +180,8 @@ impl LibCamera {
         answered(&answers, format!("{attempt} the camera `{}`", self.id))
     }
 
-    /// Takes the next event and decrements the eventfd, which counts the events that were not fetched.
+    /// Takes the next event and decrements the eventfd, which counts the events that were not
+    /// fetched.
     fn fetch(&mut self) -> Result<Option<Event>, Error> {
         match self.events.try_recv() {
             Ok(event) => {
@@ -339,7 +342,8 @@ impl Camera for LibCamera {
 impl Drop for LibCamera {
     fn drop(&mut self) {
         let _ = self.orders.send(Order::Close);
-        // No other camera can be opened before the library is closed. If the driver hangs, the thread is left behind.
+        // No other camera can be opened before the library is closed. If the driver hangs, the
+        // thread is left behind.
         let _ = self.ended.recv_timeout(PATIENCE);
     }
 }

@@ -1,4 +1,5 @@
-//! Opening a camera: find it by its id, acquire it, negotiate a format, configure it, allocate and map its buffers.
+//! Opening a camera: find it by its id, acquire it, negotiate a format, configure it, allocate and
+//! map its buffers.
 
 use std::io;
 
@@ -51,9 +52,9 @@ pub(super) struct Opened {
     pub configured: Configured,
 }
 
-/// What to do where the library lists no camera. A module of image algorithms (IPA) that is not signed with the library's key runs in a
-/// process of its own, in user and network namespaces of its own (libcamera, `Process::isolate`); where these are forbidden, its cameras
-/// are missing.
+/// What to do where the library lists no camera. A module of image algorithms (IPA) that is not
+/// signed with the library's key runs in a process of its own, in user and network namespaces of
+/// its own (libcamera, `Process::isolate`); where these are forbidden, its cameras are missing.
 const NO_CAMERA: &str = "libcamera finds no camera at all: check cable and overlay, and that this user may open /dev/media* (group `video`). \
      If libcamera's messages say \"Failed to start proxy worker process\" (before 0.6: \"Failed to unshare execution context\"), its algorithms (IPA modules) are not signed for it and need \
      namespaces, which RestrictNamespaces= of the service forbids: install libcamera and libcamera-ipa of one source";
@@ -87,8 +88,9 @@ pub(super) fn refused(id: &str, attempt: &str, cause: &io::Error) -> Error {
 /// Opens the camera with these settings.
 ///
 /// # Errors
-/// `Disconnected` if there is no camera, or none of that id; `Unsupported` if there are several and no id is given, if the camera does not
-/// support the settings, or if there is no memory for buffers; `Protocol` if it is in use or the library fails.
+/// `Disconnected` if there is no camera, or none of that id; `Unsupported` if there are several and
+/// no id is given, if the camera does not support the settings, or if there is no memory for
+/// buffers; `Protocol` if it is in use or the library fails.
 pub(super) fn open(manager: &CameraManager, settings: &Settings) -> Result<Opened, Error> {
     let found = find(manager, settings.id.as_deref())?;
     let id = found.id();
@@ -210,7 +212,8 @@ fn no_stream(id: &str) -> Error {
     )
 }
 
-/// Checks that exposure, gain and frame length can be set, and that the sensor has the gain: the library takes the nearest that it has.
+/// Checks that exposure, gain and frame length can be set, and that the sensor has the gain: the
+/// library takes the nearest that it has.
 fn must_be_settable(camera: &Camera<'_>, id: &str, settings: &Settings) -> Result<(), Error> {
     let all = camera.controls();
     let missing: Vec<&str> = [
@@ -242,7 +245,8 @@ fn limits(control: &ControlInfo) -> Option<(f32, f32)> {
         .filter(|(least, most)| least < most)
 }
 
-/// Asks for every format that has the wanted samples ([`Reading`]), and returns the configuration of the best one that was granted.
+/// Asks for every format that has the wanted samples ([`Reading`]), and returns the configuration
+/// of the best one that was granted.
 fn agree(
     camera: &Camera<'_>,
     id: &str,

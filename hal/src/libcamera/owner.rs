@@ -1,4 +1,5 @@
-//! The thread that owns a camera and the library: it starts and stops the camera, queues requests, and copies the frames of completed ones.
+//! The thread that owns a camera and the library: it starts and stops the camera, queues requests,
+//! and copies the frames of completed ones.
 //!
 //! Copying here keeps it out of the thread that has to fire the next trigger.
 
@@ -39,7 +40,8 @@ pub(super) enum Order {
     Stop(Sender<Result<(), Error>>),
     /// The library has completed a request.
     Done(Request),
-    /// The frame of this request was fetched. Until then the camera does not get the request back, so frames that nobody fetches do not pile up.
+    /// The frame of this request was fetched. Until then the camera does not get the request back,
+    /// so frames that nobody fetches do not pile up.
     Fetched(usize),
     /// Close the camera and end.
     Close,
@@ -60,20 +62,23 @@ pub(super) struct Wires {
     pub orders: Receiver<Order>,
     pub home: Sender<Order>,
     pub events: Sender<Event>,
-    /// An eventfd that counts the events that were not fetched, so that it is readable as long as there is one.
+    /// An eventfd that counts the events that were not fetched, so that it is readable as long as
+    /// there is one.
     pub ready: Arc<OwnedFd>,
     /// Whether the camera is disconnected.
     pub gone: Arc<AtomicBool>,
     /// Number of requests that the library has.
     pub in_flight: Arc<AtomicUsize>,
-    /// Temperature of the sensor as of the last frame, °C, as bits of an `f32`; NaN if it does not say.
+    /// Temperature of the sensor as of the last frame, °C, as bits of an `f32`; NaN if it does not
+    /// say.
     pub celsius: Arc<AtomicU32>,
 }
 
 /// Calls `work` with the camera manager; a second one at the same time would abort the process.
 ///
 /// # Errors
-/// `Protocol` if another camera is open in this process or the library does not start; that of `work`.
+/// `Protocol` if another camera is open in this process or the library does not start; that of
+/// `work`.
 pub(super) fn with_manager<R>(
     work: impl FnOnce(&CameraManager) -> Result<R, Error>,
 ) -> Result<R, Error> {
@@ -168,7 +173,8 @@ impl Owner<'_> {
                 Order::Close => self.closing = true,
             }
         }
-        // A request must not outlive its camera, so `stop` takes back those in the library, and those still in the channel are dropped.
+        // A request must not outlive its camera, so `stop` takes back those in the library, and
+        // those still in the channel are dropped.
         let _ = self.stop();
         while self.wires.orders.try_recv().is_ok() {}
     }
@@ -192,7 +198,8 @@ impl Owner<'_> {
         let period = microseconds(exposing.period);
         let exposure = i32::try_from(exposing.exposure.as_micros()).unwrap_or(i32::MAX);
         let mut set = ControlList::new();
-        // A list that is not bound to a camera accepts every control; whether the values took effect is verified in the metadata.
+        // A list that is not bound to a camera accepts every control; whether the values took
+        // effect is verified in the metadata.
         let _ = set.set(controls::AeEnable(false));
         let _ = set.set(controls::ExposureTime(exposure));
         let _ = set.set(controls::AnalogueGain(exposing.gain));
@@ -266,7 +273,8 @@ impl Owner<'_> {
             return;
         }
         if status == RequestStatus::Cancelled {
-            // The camera was not stopped: libcamera cancels requests when a camera no longer answers.
+            // The camera was not stopped: libcamera cancels requests when a camera no longer
+            // answers.
             self.wires.gone.store(true, Ordering::Relaxed);
             let attempt = format!("waiting for a frame of the camera `{}`", self.opened.id);
             self.tell(Event::Refused(Error::disconnected(
@@ -352,7 +360,8 @@ impl Owner<'_> {
     }
 
     fn tell(&self, event: Event) {
-        // Signal the eventfd before sending: the receiver decrements it for each event that it fetches.
+        // Signal the eventfd before sending: the receiver decrements it for each event that it
+        // fetches.
         ring(&self.wires.ready);
         let _ = self.wires.events.send(event);
     }

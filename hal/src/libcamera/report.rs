@@ -1,18 +1,21 @@
-//! Checking a request's metadata: exposure, gain and frame period must be as set, and the stamp is converted to the head's clock.
+//! Checking a request's metadata: exposure, gain and frame period must be as set, and the stamp is
+//! converted to the head's clock.
 
 use std::time::Duration;
 
 use crate::error::Error;
 use crate::units::Timestamp;
 
-/// Sensors quantise their gain; the coarsest common increment is 0.3 dB, 3.5 %, and drivers round to the next value.
+/// Sensors quantise their gain; the coarsest common increment is 0.3 dB, 3.5 %, and drivers round
+/// to the next value.
 const GAIN_INCREMENT: f32 = 0.035;
 /// Metadata has whole microseconds.
 const MICROSECOND: Duration = Duration::from_micros(1);
 /// No frame can be older when it is fetched: libcamera would have given the camera up before.
 const OLDEST: Duration = Duration::from_secs(60);
 
-/// The exposure settings of a camera. They are set before it starts and do not change until it stops.
+/// The exposure settings of a camera. They are set before it starts and do not change until it
+/// stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Exposing {
     /// How long a frame is exposed.
@@ -34,7 +37,8 @@ pub(crate) struct Reported {
 }
 
 impl Exposing {
-    /// Checks that the sensor of the camera `id` has the gain, from the `least` to the `most` that it has.
+    /// Checks that the sensor of the camera `id` has the gain, from the `least` to the `most` that
+    /// it has.
     ///
     /// # Errors
     /// `Unsupported`, naming the limits.
@@ -51,8 +55,9 @@ impl Exposing {
 
     /// Checks that a frame of `rows` rows was taken as set.
     ///
-    /// A sensor's exposure and period are whole numbers of lines, and a line lasts at most the period divided by the number of rows (a
-    /// frame also has blank lines), so each may differ from its setting by that time.
+    /// A sensor's exposure and period are whole numbers of lines, and a line lasts at most the
+    /// period divided by the number of rows (a frame also has blank lines), so each may differ from
+    /// its setting by that time.
     ///
     /// # Errors
     /// `Protocol` if a value in the metadata differs or is missing.
@@ -89,7 +94,8 @@ impl Exposing {
     }
 }
 
-/// The time on `CLOCK_MONOTONIC`, and how far `CLOCK_BOOTTIME` is ahead of it: the time for which the computer was suspended.
+/// The time on `CLOCK_MONOTONIC`, and how far `CLOCK_BOOTTIME` is ahead of it: the time for which
+/// the computer was suspended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Clocks {
     pub monotonic: Timestamp,
@@ -97,9 +103,10 @@ pub(crate) struct Clocks {
 }
 
 impl Clocks {
-    /// From readings of the monotonic clock, the boot-time clock, and the monotonic clock again. The reading thread may be interrupted
-    /// in between, so `suspended` is from the reading with the shortest time between its two monotonic times, and too long by at most
-    /// that time. `monotonic` is the very last time that was read.
+    /// From readings of the monotonic clock, the boot-time clock, and the monotonic clock again.
+    /// The reading thread may be interrupted in between, so `suspended` is from the reading with
+    /// the shortest time between its two monotonic times, and too long by at most that time.
+    /// `monotonic` is the very last time that was read.
     pub fn of(readings: &[(Timestamp, Timestamp, Timestamp)]) -> Self {
         let spread = |(before, _, after): &&(Timestamp, Timestamp, Timestamp)| after.since(*before);
         let closest = readings.iter().min_by_key(spread);
@@ -112,11 +119,13 @@ impl Clocks {
     }
 }
 
-/// Converts a frame's stamp in ns to the head's clock. Libcamera documents `CLOCK_BOOTTIME`; most drivers stamp with `CLOCK_MONOTONIC`.
+/// Converts a frame's stamp in ns to the head's clock. Libcamera documents `CLOCK_BOOTTIME`; most
+/// drivers stamp with `CLOCK_MONOTONIC`.
 ///
-/// A frame is stamped before it is fetched, so a stamp later than the monotonic clock must be from the boot-time clock. The
-/// other way round this holds if the computer was suspended for longer than the frame is old: after a shorter time, if that happened,
-/// the stamp would be taken as monotonic, and be late by the time of suspension. `clocks` is read when the frame is fetched.
+/// A frame is stamped before it is fetched, so a stamp later than the monotonic clock must be from
+/// the boot-time clock. The other way round this holds if the computer was suspended for longer
+/// than the frame is old: after a shorter time, if that happened, the stamp would be taken as
+/// monotonic, and be late by the time of suspension. `clocks` is read when the frame is fetched.
 ///
 /// # Errors
 /// `Protocol` if the stamp fits neither.
@@ -163,7 +172,8 @@ mod tests {
     use super::*;
     use crate::error::ErrorKind;
 
-    /// The reference head: exposed for one refresh of the projector at 60 Hz, one frame in two refreshes.
+    /// The reference head: exposed for one refresh of the projector at 60 Hz, one frame in two
+    /// refreshes.
     const SET: Exposing = Exposing {
         exposure: Duration::from_micros(16_667),
         gain: 2.0,
@@ -263,7 +273,8 @@ mod tests {
     #[test]
     fn the_difference_of_two_clocks_is_found_although_readings_are_interrupted() {
         let at = Timestamp;
-        // Suspended for 5000; interrupted for 900 before and after the other clock was read, and not at all.
+        // Suspended for 5000; interrupted for 900 before and after the other clock was read, and
+        // not at all.
         let readings = [
             (at(1000), at(6905), at(1910)),
             (at(2000), at(7005), at(2910)),

@@ -1,8 +1,9 @@
 //! Debouncing of a start line: which of its edges is a start.
 //!
-//! A level counts when the line has kept it for the debounce time, so neither the bounces of a contact nor the spike of a press's
-//! motor start a cycle. The kernel queues 16 edges and drops further ones without notice. So the level after the last edge
-//! counts only if the line is read at the same level when it has settled.
+//! A level counts when the line has kept it for the debounce time, so neither the bounces of a
+//! contact nor the spike of a press's motor start a cycle. The kernel queues 16 edges and drops
+//! further ones without notice. So the level after the last edge counts only if the line is read at
+//! the same level when it has settled.
 
 use std::time::Duration;
 
@@ -18,7 +19,8 @@ pub struct Debounce {
 }
 
 impl Debounce {
-    /// A line that is settled at `active`; a new level counts once the line has kept it for `quiet`.
+    /// A line that is settled at `active`; a new level counts once the line has kept it for
+    /// `quiet`.
     #[must_use]
     pub fn new(quiet: Duration, active: bool) -> Self {
         Self {
@@ -39,7 +41,8 @@ impl Debounce {
         self.moved.map(|(at, _)| at + self.quiet)
     }
 
-    /// The line was read at `active` at time `now`, after all its edges. Returns since when it is active, if that is a start.
+    /// The line was read at `active` at time `now`, after all its edges. Returns since when it is
+    /// active, if that is a start.
     pub fn found(&mut self, now: Timestamp, active: bool) -> Option<Timestamp> {
         let (at, level) = self.moved?;
         if now < at + self.quiet {

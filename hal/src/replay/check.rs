@@ -243,7 +243,8 @@ fn inside(file: &str) -> Result<(), Wrong> {
     ))
 }
 
-/// Checks that the frames of equal ratio and pattern form a level whose shifts divide one turn evenly.
+/// Checks that the frames of equal ratio and pattern form a level whose shifts divide one turn
+/// evenly.
 fn levels(manifest: &Manifest) -> Result<(), Wrong> {
     let mut seen: Vec<(u64, usize)> = Vec::new();
     for frame in &manifest.frames {

@@ -76,7 +76,8 @@ pub(super) fn pictures(recording: &Recording) -> Vec<(String, &Frame)> {
     all
 }
 
-/// File name of a pattern: the format's name for the first pattern from a file, a numbered name for the second.
+/// File name of a pattern: the format's name for the first pattern from a file, a numbered name for
+/// the second.
 pub(super) fn phase_file(patterns: &[PatternSpec], index: usize) -> String {
     let first = patterns
         .iter()

@@ -1,4 +1,5 @@
-//! The file form of `recording.json`, versions 1 to 3: its keys and types, before any value is checked.
+//! The file form of `recording.json`, versions 1 to 3: its keys and types, before any value is
+//! checked.
 
 use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
@@ -14,8 +15,9 @@ use crate::model::{DeviceModel, PlaneModel};
 
 /// The name of the format, in every manifest.
 pub const FORMAT: &str = "fringed-recording";
-/// The newest version that this program reads. Version 2 has codes, white and black; version 3 notes, and codes with an offset or
-/// another coding. A recording is written as the first version that has what it holds, so that older programs read it.
+/// The newest version that this program reads. Version 2 has codes, white and black; version 3
+/// notes, and codes with an offset or another coding. A recording is written as the first version
+/// that has what it holds, so that older programs read it.
 pub const VERSION: u64 = 3;
 /// Longest description and note, characters.
 const MAX_TEXT: usize = 4096;
@@ -78,7 +80,8 @@ bounded! {
         /// Its geometry, if it is known.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub model: Option<DeviceModel>,
-        /// What the projector points of the plane z = 0 are off the models, where heights go by the measured ones.
+        /// What the projector points of the plane z = 0 are off the models, where heights go by the
+        /// measured ones.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub plane: Option<PlaneModel> = Fields,
     }
@@ -126,7 +129,8 @@ pub(crate) struct CodeEntry {
 }
 
 impl CodeEntry {
-    /// Whether it is a Gray code from the raster's edge on, bright where a bit is set, as version 2 knows it.
+    /// Whether it is a Gray code from the raster's edge on, bright where a bit is set, as version 2
+    /// knows it.
     pub fn is_plain(&self) -> bool {
         is_zero(&self.offset_px) && !self.binary && !self.inverted
     }

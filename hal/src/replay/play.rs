@@ -17,12 +17,13 @@ const EXPOSURE_REFRESHES: u32 = 2;
 
 /// A head that plays `recordings` one after the other, then from the first again.
 ///
-/// Pattern k gives recorded frame k, with the time and count of the replay. As many rasters must be loaded as a
-/// recording has frames. When each frame of a recording was given at least once, the next recording is played.
+/// Pattern k gives recorded frame k, with the time and count of the replay. As many rasters must be
+/// loaded as a recording has frames. When each frame of a recording was given at least once, the
+/// next recording is played.
 ///
 /// # Errors
-/// `Unsupported` if there is no recording, or if they differ in camera format, projector size, number of frames, or ratio and
-/// shift of a frame.
+/// `Unsupported` if there is no recording, or if they differ in camera format, projector size,
+/// number of frames, or ratio and shift of a frame.
 pub fn head(recordings: Vec<Recording>) -> Result<Head, Error> {
     let Some(first) = recordings.first() else {
         return Err(Error::unsupported(

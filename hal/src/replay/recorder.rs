@@ -47,7 +47,8 @@ pub fn write(recording: &Recording, folder: &Path) -> Result<(), RecorderError> 
     write_with(recording, folder, |_| ())
 }
 
-/// As [`write()`]; before the folder gets its name, `add` may add synced files of its own to it. It is given the temporary folder.
+/// As [`write()`]; before the folder gets its name, `add` may add synced files of its own to it. It
+/// is given the temporary folder.
 ///
 /// # Errors
 /// As [`write()`].
@@ -69,8 +70,9 @@ pub fn write_with(
     })
 }
 
-/// Writes everything of `recording` but its frames, as the new folder `folder`, for frames that are yet to be taken: the manifest
-/// names the file of each frame by its `count`, the place in the order of projection. `beside` are further files with their names.
+/// Writes everything of `recording` but its frames, as the new folder `folder`, for frames that are
+/// yet to be taken: the manifest names the file of each frame by its `count`, the place in the
+/// order of projection. `beside` are further files with their names.
 ///
 /// # Errors
 /// As [`write()`].
@@ -90,8 +92,9 @@ pub fn write_outline(
     })
 }
 
-/// Writes the frames of `recording`, and further ones with their names, as the new folder `folder`. It is a recording if there are
-/// frames of levels; a recording without them could not be opened, so then it is pictures only.
+/// Writes the frames of `recording`, and further ones with their names, as the new folder `folder`.
+/// It is a recording if there are frames of levels; a recording without them could not be opened,
+/// so then it is pictures only.
 ///
 /// # Errors
 /// As [`write()`].
@@ -142,18 +145,21 @@ fn checked(recording: &Recording, names: Names, folder: &Path) -> Result<Manifes
     }
 }
 
-/// Makes a folder with `fill` under a temporary name, syncs it and renames it. Nothing is left behind if that fails.
+/// Makes a folder with `fill` under a temporary name, syncs it and renames it. Nothing is left
+/// behind if that fails.
 fn settled(
     folder: &Path,
     fill: impl FnOnce(&Path) -> Result<(), RecorderError>,
 ) -> Result<(), RecorderError> {
     let partial = partial_name(folder);
-    // Created here and not in `fill`: if this fails, the folder is not ours and must not be removed.
+    // Created here and not in `fill`: if this fails, the folder is not ours and must not be
+    // removed.
     fs::create_dir(&partial).map_err(|source| create(&partial, source))?;
     let written = fill(&partial)
         .and_then(|()| settle(&partial, folder).map_err(|source| create(folder, source)));
     if written.is_err() {
-        // The first error is returned; that the temporary folder cannot be removed either is not worth another.
+        // The first error is returned; that the temporary folder cannot be removed either is not
+        // worth another.
         let _ = fs::remove_dir_all(&partial);
     }
     written
@@ -174,8 +180,9 @@ fn create(path: &Path, source: io::Error) -> RecorderError {
     }
 }
 
-/// Renames a folder of synced files to its final name, so that after a loss of power all of it has this name or nothing has. For
-/// this the folders are synced before the rename, and the parent folder after it.
+/// Renames a folder of synced files to its final name, so that after a loss of power all of it has
+/// this name or nothing has. For this the folders are synced before the rename, and the parent
+/// folder after it.
 fn settle(partial: &Path, folder: &Path) -> io::Result<()> {
     for entry in fs::read_dir(partial)? {
         let entry = entry?;

@@ -1,4 +1,5 @@
-//! A recording, loaded completely and checked: frames of a camera with everything that is needed to measure from them.
+//! A recording, loaded completely and checked: frames of a camera with everything that is needed to
+//! measure from them.
 
 use std::fs;
 use std::io::Read;
@@ -50,15 +51,16 @@ pub enum PatternSpec {
 }
 
 /// One frame of a recording, and the ratio and shift of the pattern that the projector showed:
-/// I_max/2 · (1 + f(ratio · Φ_P + shift)), with the projector's brightest grey I_max and f(x) = sin 2πx, or that and harmonics
-/// with a peak of 1.
+/// I_max/2 · (1 + f(ratio · Φ_P + shift)), with the projector's brightest grey I_max and f(x) = sin
+/// 2πx, or that and harmonics with a peak of 1.
 #[derive(Clone, Debug)]
 pub struct RecordedFrame {
     /// The level's share of the full phase function, above 0.
     pub ratio: f64,
     /// Phase shift in turns.
     pub shift_turns: f64,
-    /// Harmonics of the projected waveform, each with its order and its amplitude as a share of the fundamental's; none for a sine.
+    /// Harmonics of the projected waveform, each with its order and its amplitude as a share of the
+    /// fundamental's; none for a sine.
     pub harmonics: Vec<(u8, f64)>,
     /// Index into the recording's patterns.
     pub pattern: usize,
@@ -68,10 +70,12 @@ pub struct RecordedFrame {
     pub frame: Frame,
 }
 
-/// The pictures of a Gray code: cell c of the projector shows the bits of c ^ (c >> 1), or of c if it is `binary`.
+/// The pictures of a Gray code: cell c of the projector shows the bits of c ^ (c >> 1), or of c if
+/// it is `binary`.
 #[derive(Clone, Debug)]
 pub struct RecordedCode {
-    /// Index of the pattern whose fringes it numbers: cells lie along ξ for a vertical one, along η for a horizontal one.
+    /// Index of the pattern whose fringes it numbers: cells lie along ξ for a vertical one, along η
+    /// for a horizontal one.
     pub pattern: usize,
     /// Width of a cell in projector pixels.
     pub cell_px: f64,
@@ -108,7 +112,8 @@ pub struct Recording {
     pub noise_counts: Option<f64>,
     /// The projector.
     pub projector: RecordedProjector,
-    /// One or two patterns, for example vertical and horizontal fringes. Heights are from the one whose phase changes most with them.
+    /// One or two patterns, for example vertical and horizontal fringes. Heights are from the one
+    /// whose phase changes most with them.
     pub patterns: Vec<PatternSpec>,
     /// The frames in the order of the manifest; none of a recording of Gray codes alone.
     pub frames: Vec<RecordedFrame>,
@@ -126,7 +131,8 @@ pub struct Recording {
     pub part_id: Option<String>,
     /// The recipe that it was measured with.
     pub recipe: Option<RecipeReference>,
-    /// True z in mm on each pixel's central ray, row by row; NaN where camera and projector do not both see.
+    /// True z in mm on each pixel's central ray, row by row; NaN where camera and projector do not
+    /// both see.
     pub truth_height: Option<Vec<f32>>,
     /// 0 unseen, 1 pixel centre lit, 2 whole pixel lit and no depth edge inside; row by row.
     pub truth_class: Option<Vec<u8>>,
@@ -162,8 +168,8 @@ impl Recording {
     /// Loads and checks the recording in `folder`.
     ///
     /// # Errors
-    /// [`RecordingError::Missing`] if the folder or its manifest is not there, [`RecordingError::Content`] for
-    /// everything else, naming the file and the remedy.
+    /// [`RecordingError::Missing`] if the folder or its manifest is not there,
+    /// [`RecordingError::Content`] for everything else, naming the file and the remedy.
     pub fn open(folder: &Path) -> Result<Self, RecordingError> {
         let missing = |path: &Path, what| RecordingError::Missing {
             path: path.to_path_buf(),
@@ -368,8 +374,8 @@ fn array<T: Element>(
     .at(&path))
 }
 
-/// Reads one file of the folder. It must be a regular file of at most `limit` bytes, and must not be reached
-/// through a link that leads out of the folder.
+/// Reads one file of the folder. It must be a regular file of at most `limit` bytes, and must not
+/// be reached through a link that leads out of the folder.
 fn read(folder: &Path, name: &str, limit: u64) -> Result<Vec<u8>, RecordingError> {
     let path = folder.join(name);
     let wrong = |problem: String, remedy: &str| Wrong::new(problem, remedy).at(&path);

@@ -1,4 +1,5 @@
-//! Tests with small recordings: written, opened, played, and damaged in every way that format 1 forbids.
+//! Tests with small recordings: written, opened, played, and damaged in every way that format 1
+//! forbids.
 
 use std::fs;
 use std::path::Path;
@@ -146,7 +147,8 @@ fn a_recording_that_was_written_opens_as_the_same() {
         let folder = tempfile::tempdir().unwrap();
         let path = written(folder.path(), &before);
         let after = Recording::open(&path).unwrap();
-        // NaN is not equal to itself, so the truth is compared by its bits and the rest by its text.
+        // NaN is not equal to itself, so the truth is compared by its bits and the rest by its
+        // text.
         let bits = |r: &Recording| -> Vec<u32> {
             r.truth_height
                 .as_ref()

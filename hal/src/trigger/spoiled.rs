@@ -1,23 +1,27 @@
 //! Bounds of how long a pulse lasted, and whether the frame that it exposed can be used.
 //!
-//! Many cameras expose for as long as the pulse lasts, and the program that makes the pulses may be interrupted at any instruction
-//! for any time. Therefore the clock is read before and after each edge: a pulse lasted at least from after its rise to before its
-//! fall, and at most from before its rise to after its fall. An interruption between the edges moves these bounds, one inside an
+//! Many cameras expose for as long as the pulse lasts, and the program that makes the pulses may be
+//! interrupted at any instruction for any time. Therefore the clock is read before and after each
+//! edge: a pulse lasted at least from after its rise to before its fall, and at most from before
+//! its rise to after its fall. An interruption between the edges moves these bounds, one inside an
 //! edge widens them, so every interruption is noticed.
 //!
 //! # How much a pulse may be off
 //!
-//! N-step phase shifting (docs/measurement.md, *Pattern and wrapped phase*) has frames I_k = A + B sin(2πφ + θ_k), θ_k = 2πk/N, and φ = atan2(S, C) / 2π
-//! with S = Σ I_k cos θ_k and C = Σ I_k sin θ_k, which are NB/2 · (sin 2πφ, cos 2πφ). If one frame k is brighter by the share e, S and C
+//! N-step phase shifting (docs/measurement.md, *Pattern and wrapped phase*) has frames I_k = A + B
+//! sin(2πφ + θ_k), θ_k = 2πk/N, and φ = atan2(S, C) / 2π with S = Σ I_k cos θ_k and C = Σ I_k sin
+//! θ_k, which are NB/2 · (sin 2πφ, cos 2πφ). If one frame k is brighter by the share e, S and C
 //! change by e I_k (cos θ_k, sin θ_k), and to first order
 //!
 //! > Δφ = (C ΔS − S ΔC) / (S² + C²) / 2π = e / (πN) · (A/B + sin x) cos x turns, with x = 2πφ + θ_k,
 //!
-//! which is at most e / (πN) · (A/B + 1/2). All pixels of one phase have the same error, so averaging over an area does not reduce it.
-//! With e = 0.5 %, N = 4 and A = B (a pattern down to black, no other light) that is 0.0006 turn, a twelfth of the noise of one
-//! pixel in such a level (0.0074 turn, 0.056 mm in docs/measurement.md, *Noise*), or 0.0045 mm; with three steps and as much other
-//! light as the pattern's mean (A = 2 B) it is 0.0013 turn or 0.01 mm. A pulse of 16.7 ms that ends 200 µs late, which cannot be
-//! told from a good one by the frame's time stamp, causes 2.4 times that error.
+//! which is at most e / (πN) · (A/B + 1/2). All pixels of one phase have the same error, so
+//! averaging over an area does not reduce it. With e = 0.5 %, N = 4 and A = B (a pattern down to
+//! black, no other light) that is 0.0006 turn, a twelfth of the noise of one pixel in such a level
+//! (0.0074 turn, 0.056 mm in docs/measurement.md, *Noise*), or 0.0045 mm; with three steps and as
+//! much other light as the pattern's mean (A = 2 B) it is 0.0013 turn or 0.01 mm. A pulse of 16.7
+//! ms that ends 200 µs late, which cannot be told from a good one by the frame's time stamp, causes
+//! 2.4 times that error.
 
 use std::time::Duration;
 
@@ -25,8 +29,9 @@ use crate::units::Timestamp;
 
 /// The width of a pulse divided by this is how much the pulse may be off: 0.5 %.
 const WIDTH_DIVISOR: u32 = 200;
-/// It may be off by this in any case: even on an idle computer two edges are not known better (a system call for each takes some
-/// µs). This is more than 0.5 % of pulses below 4 ms, but a pulse that lasts a refresh of a projector that shows grey levels is longer.
+/// It may be off by this in any case: even on an idle computer two edges are not known better (a
+/// system call for each takes some µs). This is more than 0.5 % of pulses below 4 ms, but a pulse
+/// that lasts a refresh of a projector that shows grey levels is longer.
 const LEAST: Duration = Duration::from_micros(20);
 
 /// Readings of the head's clock around the two edges of a pulse.
@@ -71,7 +76,8 @@ impl Spoiled {
         (pulse.off() > (width / WIDTH_DIVISOR).max(LEAST)).then_some(pulse)
     }
 
-    /// Whether it determined the length of an exposure. A pulse shorter than half the exposure only starts it.
+    /// Whether it determined the length of an exposure. A pulse shorter than half the exposure only
+    /// starts it.
     #[must_use]
     pub fn decides(&self, exposure: Duration) -> bool {
         decides(self.width, exposure)
@@ -83,7 +89,8 @@ impl Spoiled {
         self.shorter.max(self.longer)
     }
 
-    /// An upper bound of the time at which it ended: not before the reading after its fall, and not before its planned end.
+    /// An upper bound of the time at which it ended: not before the reading after its fall, and not
+    /// before its planned end.
     #[must_use]
     pub fn ended(&self) -> Timestamp {
         self.fired + (self.width + self.longer)
@@ -102,7 +109,8 @@ mod tests {
         Duration::from_micros(us)
     }
 
-    /// A pulse whose rising edge took `rise`, whose falling edge began `after` the reading before the rise and took `fall`.
+    /// A pulse whose rising edge took `rise`, whose falling edge began `after` the reading before
+    /// the rise and took `fall`.
     fn pulse(rise: Duration, after: Duration, fall: Duration) -> Edges {
         let begun = Timestamp(1_000_000_000);
         Edges {
@@ -130,7 +138,8 @@ mod tests {
         let (stall, edge) = (us(100), us(2));
         let fired = Timestamp(1_000_000_000);
         for (what, edges, began, shorter, longer) in [
-            // The fall is timed from the reading before the rise, so the pulse may be shorter by the time that the rise took.
+            // The fall is timed from the reading before the rise, so the pulse may be shorter by
+            // the time that the rise took.
             ("in the rise", pulse(stall, WIDTH, edge), stall, stall, edge),
             (
                 "before the fall",

@@ -13,7 +13,8 @@ pub(super) struct Cable {
     pulled: u64,
 }
 
-/// The cables by [`DeviceKind`]. That of the GPIO chip has no effect, because the virtual trigger has none.
+/// The cables by [`DeviceKind`]. That of the GPIO chip has no effect, because the virtual trigger
+/// has none.
 pub(super) type Cables = [Cable; 3];
 
 impl<S> VirtualDevice<S> {
@@ -33,7 +34,8 @@ impl<S> VirtualDevice<S> {
 }
 
 impl<S> Control<S> {
-    /// Plugs a device in, or unplugs it. A device that was opened before it was unplugged keeps failing.
+    /// Plugs a device in, or unplugs it. A device that was opened before it was unplugged keeps
+    /// failing.
     pub fn plug(&self, device: DeviceKind, plugged: bool) {
         let cable = &mut lock(&self.bench).cables[device as usize];
         cable.pulled += u64::from(!plugged);

@@ -1,6 +1,8 @@
-//! The virtual camera: exposures start by trigger or by themselves, and their frames arrive after the readout.
+//! The virtual camera: exposures start by trigger or by themselves, and their frames arrive after
+//! the readout.
 //!
-//! A frame is computed when it is fetched, so a frame that is not fetched costs no time and uses no random numbers.
+//! A frame is computed when it is fetched, so a frame that is not fetched costs no time and uses no
+//! random numbers.
 
 use std::collections::VecDeque;
 use std::time::Duration;
@@ -14,7 +16,8 @@ use crate::frame::{Frame, FrameFormat};
 use crate::head::Stamp;
 use crate::units::Timestamp;
 
-/// Most frames that wait to be fetched; when one more arrives, the oldest is lost, as in a real driver.
+/// Most frames that wait to be fetched; when one more arrives, the oldest is lost, as in a real
+/// driver.
 const MAX_WAITING: usize = 4;
 const DEVICE: DeviceKind = DeviceKind::Camera;
 
@@ -52,7 +55,8 @@ impl Sensor {
         self.again = None;
     }
 
-    /// Receives a trigger pulse of this length. It is lost on an open wire, and if the camera is stopped or busy.
+    /// Receives a trigger pulse of this length. It is lost on an open wire, and if the camera is
+    /// stopped or busy.
     pub fn fire(&mut self, now: Timestamp, length: Duration, mechanics: &Mechanics, dice: Dice) {
         let faults = &mechanics.faults;
         let lost = !self.armed
@@ -105,7 +109,8 @@ impl Sensor {
         self.exposures.insert(place, exposure);
     }
 
-    /// The start of the next exposure of a camera that runs by itself, or that the projector triggers.
+    /// The start of the next exposure of a camera that runs by itself, or that the projector
+    /// triggers.
     fn next_start(&self, mechanics: &Mechanics) -> Option<Timestamp> {
         if self.armed && mechanics.by_projector {
             let refresh = u64::try_from(mechanics.refresh.as_nanos()).unwrap_or(u64::MAX);

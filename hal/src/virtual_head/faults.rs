@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::bounded;
 
 bounded! {
-    /// Faults of a simulated head. Chances are 0…1 per event, times are upper limits; all are 0 by default.
+    /// Faults of a simulated head. Chances are 0…1 per event, times are upper limits; all are 0 by
+    /// default.
     #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Faults {
@@ -25,8 +26,8 @@ bounded! {
         pub late_news: f64 = 0.0..=1.0,
         /// How late, at most, µs.
         pub late_news_us: u64,
-        /// Chance that the projector's driver stamps a flip one refresh late; never two in a row, which could not be distinguished
-        /// from a longer flip-to-light delay.
+        /// Chance that the projector's driver stamps a flip one refresh late; never two in a row,
+        /// which could not be distinguished from a longer flip-to-light delay.
         pub wrong_stamp: f64 = 0.0..=1.0,
         /// Chance that a frame is lost on its way.
         pub dropped: f64 = 0.0..=1.0,
@@ -42,13 +43,16 @@ bounded! {
         pub stamp_jitter_us: u64,
         /// Chance that a trigger is lost.
         pub lost_trigger: f64 = 0.0..=1.0,
-        /// Longest delay of an exposure after its trigger, or after its time by the camera's period, µs.
+        /// Longest delay of an exposure after its trigger, or after its time by the camera's
+        /// period, µs.
         pub trigger_jitter_us: u64,
-        /// Chance that a trigger's pulse, and so the exposure, lasts too long, by up to `long_pulse_us`: the computer was busy.
+        /// Chance that a trigger's pulse, and so the exposure, lasts too long, by up to
+        /// `long_pulse_us`: the computer was busy.
         pub long_pulse: f64 = 0.0..=1.0,
         /// How much too long, at most, µs.
         pub long_pulse_us: u64,
-        /// By how much the period of a camera that runs by itself is longer than stated, parts per million.
+        /// By how much the period of a camera that runs by itself is longer than stated, parts per
+        /// million.
         pub drift_ppm: i32,
         /// Chance that a wait lasts too long, by up to `stall_us`: the computer was busy.
         pub stall: f64 = 0.0..=1.0,

@@ -24,7 +24,8 @@ impl LightHistory {
         }
     }
 
-    /// From `at` on, `pattern` is in view. Later changes are removed, and those that no exposure since `needed` can receive.
+    /// From `at` on, `pattern` is in view. Later changes are removed, and those that no exposure
+    /// since `needed` can receive.
     pub fn change(&mut self, at: Timestamp, pattern: Option<usize>, needed: Timestamp) {
         while self.changes.len() > 1 && self.changes[1].0 <= needed {
             self.changes.pop_front();
@@ -35,7 +36,8 @@ impl LightHistory {
         self.changes.push_back((at, pattern));
     }
 
-    /// The patterns that were in view for `length` from `start` on, in order, each with its time as a share of `planned`.
+    /// The patterns that were in view for `length` from `start` on, in order, each with its time as
+    /// a share of `planned`.
     pub fn seen(
         &mut self,
         start: Timestamp,

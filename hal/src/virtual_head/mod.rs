@@ -1,10 +1,13 @@
-//! A virtual head: camera, projector, trigger and clock around one scene, without hardware; the common part of simulation and replay.
+//! A virtual head: camera, projector, trigger and clock around one scene, without hardware; the
+//! common part of simulation and replay.
 //!
-//! A back-end implements [`Scene`], which computes the camera's frames from the patterns in view, and gets a head from [`head`].
+//! A back-end implements [`Scene`], which computes the camera's frames from the patterns in view,
+//! and gets a head from [`head`].
 //!
-//! Nothing here waits in real time. The clock stands still between waits, and a wait sets it to the next event, at most to
-//! the end of the wait. So a sequence has the times of a real head, runs as fast as the computer can, and is the same every
-//! time. Light is integrated over each exposure: a frame that straddles two patterns shows both.
+//! Nothing here waits in real time. The clock stands still between waits, and a wait sets it to the
+//! next event, at most to the end of the wait. So a sequence has the times of a real head, runs as
+//! fast as the computer can, and is the same every time. Light is integrated over each exposure: a
+//! frame that straddles two patterns shows both.
 
 mod cables;
 mod camera;
@@ -46,7 +49,8 @@ pub trait Scene: Send {
     /// Columns and rows of the projector.
     fn projector_size(&self) -> (u32, u32);
 
-    /// Replaces the patterns behind the first `kept`, which are loaded; the size of the rasters has been checked.
+    /// Replaces the patterns behind the first `kept`, which are loaded; the size of the rasters has
+    /// been checked.
     ///
     /// # Errors
     /// If the scene cannot show them.
@@ -55,9 +59,10 @@ pub trait Scene: Send {
     /// Patterns loaded.
     fn loaded(&self) -> usize;
 
-    /// The frame of an exposure. `seen` lists the patterns (or none) that were in view, in order, each with its share of the exposure that
-    /// the camera is set to; it is not empty, and its shares sum to 1, or to more if the exposure lasted longer. `timestamp` and
-    /// `count` are the frame's.
+    /// The frame of an exposure. `seen` lists the patterns (or none) that were in view, in order,
+    /// each with its share of the exposure that the camera is set to; it is not empty, and its
+    /// shares sum to 1, or to more if the exposure lasted longer. `timestamp` and `count` are the
+    /// frame's.
     ///
     /// # Errors
     /// If the scene has no frame for this.
@@ -90,7 +95,8 @@ struct Bench<S> {
 /// One bench, shared by the devices and the [`Control`].
 type Shared<S> = Arc<Mutex<Bench<S>>>;
 
-/// Changes the scene of a virtual head, and plugs and unplugs its devices. Clones act on the same head.
+/// Changes the scene of a virtual head, and plugs and unplugs its devices. Clones act on the same
+/// head.
 pub struct Control<S> {
     bench: Shared<S>,
 }

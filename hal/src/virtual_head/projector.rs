@@ -1,4 +1,5 @@
-//! The virtual projector: flips happen with its refreshes; their reports and their light follow with delays.
+//! The virtual projector: flips happen with its refreshes; their reports and their light follow
+//! with delays.
 
 use std::time::Duration;
 

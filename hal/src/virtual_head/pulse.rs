@@ -12,7 +12,8 @@ use crate::units::Timestamp;
 #[derive(Default)]
 pub(super) struct Pulses {
     begun: u64,
-    /// The end of the latest pulse that lasts too long. All other pulses end before the camera can take the next one.
+    /// The end of the latest pulse that lasts too long. All other pulses end before the camera can
+    /// take the next one.
     on_until: Timestamp,
     /// Spoiled pulses that were not fetched yet.
     spoiled: SpoiledPulses,

@@ -1,4 +1,5 @@
-//! The times of a virtual head: refresh, exposure, readout and delays, and the delay that its calibration states.
+//! The times of a virtual head: refresh, exposure, readout and delays, and the delay that its
+//! calibration states.
 
 use std::time::Duration;
 
@@ -24,9 +25,11 @@ pub struct Mechanics {
     pub exposure: Duration,
     /// From the end of an exposure until its frame can be fetched.
     pub readout: Duration,
-    /// How long it takes to copy a frame out of the camera's buffer. A thread of its own copies one after the other.
+    /// How long it takes to copy a frame out of the camera's buffer. A thread of its own copies one
+    /// after the other.
     pub copy: Duration,
-    /// For how long after its readout a triggered camera still loses triggers, which it does not say.
+    /// For how long after its readout a triggered camera still loses triggers, which it does not
+    /// say.
     pub dead: Duration,
     /// Refreshes per pattern according to the head's calibration.
     pub calibrated_hold: u32,
@@ -34,9 +37,11 @@ pub struct Mechanics {
     pub start_up: Duration,
     /// How long a triggered camera may stay on without an exposure.
     pub stays_on: Duration,
-    /// Whether the projector triggers the camera, with the light of each refresh for which the camera is ready.
+    /// Whether the projector triggers the camera, with the light of each refresh for which the
+    /// camera is ready.
     pub by_projector: bool,
-    /// Of a camera that runs by itself: its period, and the time from its start to its first exposure.
+    /// Of a camera that runs by itself: its period, and the time from its start to its first
+    /// exposure.
     pub free_running: Option<(Duration, Duration)>,
     /// What the camera's stamps mark.
     pub stamp: Stamp,
@@ -49,8 +54,8 @@ pub struct Mechanics {
 }
 
 impl Mechanics {
-    /// A triggered camera that exposes for `refreshes` whole refreshes, as a digital micromirror device requires, and needs no time for
-    /// its readout.
+    /// A triggered camera that exposes for `refreshes` whole refreshes, as a digital micromirror
+    /// device requires, and needs no time for its readout.
     pub(crate) fn plain(refresh: Duration, refreshes: u32) -> Self {
         Self {
             refresh,

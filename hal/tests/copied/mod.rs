@@ -1,4 +1,5 @@
-//! Copying frames takes no time of the thread that fetches them and fires triggers, and reads cached memory where there is some.
+//! Copying frames takes no time of the thread that fetches them and fires triggers, and reads
+//! cached memory where there is some.
 
 use super::{next, samples, vimc, with_cameras};
 use hal::camera::Camera;
@@ -12,7 +13,8 @@ use std::time::Duration;
 /// Where a camera's buffers are looked for; Debian's kernel has that heap by another name.
 const CACHED: &str = "/dev/dma_heap/vidbuf_cached";
 const HEAP: &str = "/dev/dma_heap/system";
-/// Most processor time of fetching a frame, of this thread alone. Copying its 19,200 samples takes several times as long.
+/// Most processor time of fetching a frame, of this thread alone. Copying its 19,200 samples takes
+/// several times as long.
 const FETCHED: Duration = Duration::from_micros(50);
 
 /// Processor time of this thread.

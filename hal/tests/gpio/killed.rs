@@ -35,8 +35,8 @@ fn setups(active_low: bool) -> (TriggerSetup, LinesSetup) {
 #[test]
 #[ignore = "run by the test below, as the process that it kills"]
 fn holds_the_lines_as_in_a_cycle_until_it_is_killed() {
-    // A pulse is on, the station is busy, the last part passed, there is no fault. The trigger is the last line to be taken:
-    // when it is high, all are held.
+    // A pulse is on, the station is busy, the last part passed, there is no fault. The trigger is
+    // the last line to be taken: when it is high, all are held.
     let _held: Vec<Output> = LINES
         .iter()
         .rev()

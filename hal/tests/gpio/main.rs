@@ -1,4 +1,5 @@
-//! Lines of GPIO chips that the kernel simulates; these tests run in the virtual machine of `tests/vm` and are skipped elsewhere.
+//! Lines of GPIO chips that the kernel simulates; these tests run in the virtual machine of
+//! `tests/vm` and are skipped elsewhere.
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
@@ -21,15 +22,16 @@ use std::os::fd::AsFd;
 use std::thread;
 use std::time::Duration;
 
-/// How far a pulse may be off by the kernel's record: a system call of some 10 000 instructions of 2 ns, and the record's resolution of
-/// 1 µs.
+/// How far a pulse may be off by the kernel's record: a system call of some 10 000 instructions of
+/// 2 ns, and the record's resolution of 1 µs.
 const PULSE_TOLERANCE: Duration = Duration::from_micros(21);
 /// From this width on, half a percent of a pulse is much longer than its edges take.
 const MEASURED: Duration = Duration::from_millis(10);
 /// Longer than a start takes that comes; how long to wait for one that must not come.
 const PATIENCE: Duration = Duration::from_millis(200);
 
-/// Waits as a station does, for the descriptor and for the line to settle; returns the start that comes within `patience`.
+/// Waits as a station does, for the descriptor and for the line to settle; returns the start that
+/// comes within `patience`.
 fn next_start(start: &mut Start, patience: Duration) -> Option<Timestamp> {
     let descriptor = start.as_fd().try_clone_to_owned().unwrap();
     let mut clock = Monotonic::new(vec![descriptor]);

@@ -1,7 +1,8 @@
-//! A camera whose algorithms (IPA module) libcamera runs in a process of its own, as it does with modules that it does not trust, and what becomes
-//! of it where that process gets no namespaces.
+//! A camera whose algorithms (IPA module) libcamera runs in a process of its own, as it does with
+//! modules that it does not trust, and what becomes of it where that process gets no namespaces.
 //!
-//! In the service's unit `RestrictNamespaces=` refuses them; there is no such unit in this machine, so the kernel's limit does.
+//! In the service's unit `RestrictNamespaces=` refuses them; there is no such unit in this machine,
+//! so the kernel's limit does.
 
 use super::{Reading, settings, vimc, with_cameras};
 use hal::camera::Camera;

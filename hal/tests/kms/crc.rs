@@ -48,7 +48,8 @@ impl Checksums {
     }
 }
 
-/// The checksum of a raster: CRC-32 (reflected, from 0, not inverted) over its pixels as opaque 16-bit alpha, red, green, blue.
+/// The checksum of a raster: CRC-32 (reflected, from 0, not inverted) over its pixels as opaque
+/// 16-bit alpha, red, green, blue.
 pub fn of(raster: &Raster) -> u32 {
     let mut table = [0_u32; 256];
     for (index, entry) in (0..).zip(&mut table) {

@@ -1,4 +1,5 @@
-//! A display that describes itself (EDID) only after the head was opened: a projector that is switched on later.
+//! A display that describes itself (EDID) only after the head was opened: a projector that is
+//! switched on later.
 
 use super::machine::in_the_machine;
 use super::{open, rasters, show};
@@ -20,7 +21,8 @@ fn edid() -> [u8; 128] {
     edid[18..25].copy_from_slice(&[1, 3, 0x80, 0, 0, 0x78, 0x0A]);
     // No standard timings.
     edid[38..54].fill(1);
-    // 30 MHz; 856 + 144 columns, 480 + 20 rows; porch and sync 40 + 32 columns, 3 + 5 rows; positive pulses.
+    // 30 MHz; 856 + 144 columns, 480 + 20 rows; porch and sync 40 + 32 columns, 3 + 5 rows;
+    // positive pulses.
     edid[54..66].copy_from_slice(&[
         0xB8, 0x0B, 0x58, 0x90, 0x30, 0xE0, 0x14, 0x10, 40, 32, 0x35, 0,
     ]);
@@ -46,7 +48,8 @@ fn a_projector_that_is_switched_on_later_is_shown_the_mode_that_it_describes() {
     };
     let any = ProjectorSetup::default();
 
-    // It has no power while the head is opened, and the kernel was told that it is there: a standard mode is set.
+    // It has no power while the head is opened, and the kernel was told that it is there: a
+    // standard mode is set.
     let (display, _) = open(&any);
     assert_eq!((display.size(), display.present()), ((1024, 768), Ok(())));
     describe(&edid());

@@ -130,7 +130,8 @@ fn a_stall_is_in_the_count_of_the_flips_as_so_many_missed_refreshes() {
     let (mut display, mut clock) = open(&setup(1280, 720, 60.0));
     display.load(rasters(&display, 2)).unwrap();
     let mut last = show(&mut display, &mut clock, 0);
-    // Time in ms from a flip until the next one is queued, and the refreshes that are missed by that.
+    // Time in ms from a flip until the next one is queued, and the refreshes that are missed by
+    // that.
     for (stall, missed) in [(0, 0), (10, 0), (20, 1), (40, 2), (60, 3), (95, 5)] {
         let spent = clock.now().since(last.timestamp);
         rest(

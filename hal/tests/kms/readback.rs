@@ -1,4 +1,5 @@
-//! Reading back pixel by pixel what the virtual display shows, through the descriptor of the client that shows it.
+//! Reading back pixel by pixel what the virtual display shows, through the descriptor of the client
+//! that shows it.
 
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::thread::sleep;
@@ -62,7 +63,8 @@ impl Client {
         named.collect()
     }
 
-    /// The object that has a property of this name, the property and its value: the display's connector or its plane.
+    /// The object that has a property of this name, the property and its value: the display's
+    /// connector or its plane.
     fn named(&self, name: &str) -> (RawResourceHandle, property::Handle, u64) {
         let connector = self.connector(false).handle();
         let planes = self.plane_handles().unwrap();

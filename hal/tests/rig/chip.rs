@@ -1,4 +1,5 @@
-//! A GPIO chip with one line that the kernel simulates, and the wire at that line: when it went high, by the kernel's own record.
+//! A GPIO chip with one line that the kernel simulates, and the wire at that line: when it went
+//! high, by the kernel's own record.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::Read;

@@ -1,8 +1,9 @@
-//! A camera for the virtual display: it exposes when the wire goes high, or by itself, and its frames state which pattern was
-//! really in view.
+//! A camera for the virtual display: it exposes when the wire goes high, or by itself, and its
+//! frames state which pattern was really in view.
 //!
-//! It knows what was in view from the kernel alone: the count of refreshes when an exposure begins and ends, and the checksum of
-//! what the display showed in each refresh. It shares no code with the back-ends that show, count and trigger.
+//! It knows what was in view from the kernel alone: the count of refreshes when an exposure begins
+//! and ends, and the checksum of what the display showed in each refresh. It shares no code with
+//! the back-ends that show, count and trigger.
 
 use std::collections::HashMap;
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};

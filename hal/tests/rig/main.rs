@@ -1,4 +1,5 @@
-//! A whole head in the machine of `tests/vm`: display, trigger line, and a camera that knows which pattern was in view.
+//! A whole head in the machine of `tests/vm`: display, trigger line, and a camera that knows which
+//! pattern was in view.
 
 #![allow(clippy::panic, clippy::print_stdout, clippy::unwrap_used)]
 
@@ -132,7 +133,8 @@ fn rig(_: &Chip, kind: Kind, knows_patterns: bool) -> Head {
     )
 }
 
-/// Takes sequences of all patterns, each in another order, checks that every frame shows its pattern, and sums the counts up.
+/// Takes sequences of all patterns, each in another order, checks that every frame shows its
+/// pattern, and sums the counts up.
 fn take(rig: &mut Head, sequences: usize) -> Exposure {
     let mut sum = Exposure::default();
     for start in 0..sequences {

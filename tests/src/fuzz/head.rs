@@ -1,4 +1,5 @@
-//! Targets for the files that describe a station: calibration, OpenCV models, scenario, configuration.
+//! Targets for the files that describe a station: calibration, OpenCV models, scenario,
+//! configuration.
 
 use super::bounded;
 use appliance::config::Config;
@@ -34,7 +35,8 @@ thread_local! {
     static MODELS: TempDir = tempfile::tempdir().expect("a folder");
 }
 
-/// OpenCV models: the first byte selects unit, axis and plane. Every number of an accepted model is finite.
+/// OpenCV models: the first byte selects unit, axis and plane. Every number of an accepted model is
+/// finite.
 pub fn opencv(data: &[u8]) {
     let Some((declared, text)) = data.split_first() else {
         return;

@@ -1,4 +1,5 @@
-//! Fuzz targets: the parsers of files, Modbus and HTTP, as functions of bytes. None may panic, whatever the bytes are.
+//! Fuzz targets: the parsers of files, Modbus and HTTP, as functions of bytes. None may panic,
+//! whatever the bytes are.
 //!
 //! `tests/fuzz` calls them under libFuzzer; the suite calls them with the inputs stored there.
 
@@ -34,7 +35,8 @@ pub fn target(name: &str) -> Option<Target> {
     found.map(|(_, target)| *target)
 }
 
-/// Runs `work` and panics if this thread held more than `most` bytes at a time: a small file must not take much memory.
+/// Runs `work` and panics if this thread held more than `most` bytes at a time: a small file must
+/// not take much memory.
 fn bounded<T>(most: usize, work: impl FnOnce() -> T) -> T {
     let mut answer = None;
     let counted = allocation_counter::measure(|| answer = Some(work()));

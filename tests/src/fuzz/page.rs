@@ -24,8 +24,8 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::runtime::Runtime;
 use tokio::time::timeout;
 
-/// The address from which sessions are opened: another one than that of the inputs, which may be blocked after wrong guesses of the
-/// secret.
+/// The address from which sessions are opened: another one than that of the inputs, which may be
+/// blocked after wrong guesses of the secret.
 const ELSEWHERE: IpAddr = IpAddr::V4(Ipv4Addr::new(127, 0, 0, 2));
 /// Placeholder in an input for the token of a session.
 const TOKEN: &[u8] = b"@T@";
@@ -149,8 +149,8 @@ impl Page {
     }
 }
 
-/// The maps of the last cycle, with a thread that answers in place of the measuring task that there was no cycle: without it each
-/// request for a picture would wait for seconds.
+/// The maps of the last cycle, with a thread that answers in place of the measuring task that there
+/// was no cycle: without it each request for a picture would wait for seconds.
 fn no_cycle() -> LastCycleRequests {
     let maps = LastCycleRequests::default();
     let asked = maps.clone();
@@ -165,7 +165,8 @@ fn no_cycle() -> LastCycleRequests {
     maps
 }
 
-/// The bytes of one connection; `@T@` stands for the token of a session. The page answers or closes, and none of its workers panics.
+/// The bytes of one connection; `@T@` stands for the token of a session. The page answers or
+/// closes, and none of its workers panics.
 pub fn http(data: &[u8]) {
     PAGE.with(|page| {
         page.put_back();

@@ -64,7 +64,8 @@ impl Part {
         }
     }
 
-    /// Judges the part by another recipe, with each of its sequences for which there are enough frames.
+    /// Judges the part by another recipe, with each of its sequences for which there are enough
+    /// frames.
     pub fn judge(&self, plan: &Plan) {
         for sequence in 0..plan.sequence_count() {
             if let Some(frames) = self.frames.get(..plan.indices(sequence).len()) {

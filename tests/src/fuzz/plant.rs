@@ -1,4 +1,5 @@
-//! The target for Modbus: the bytes of one connection to the server, with a worker that carries out every effect.
+//! The target for Modbus: the bytes of one connection to the server, with a worker that carries out
+//! every effect.
 
 use appliance::config::WordOrder;
 use appliance::modbus::{Clients, Options, Refusals, serve};
@@ -161,7 +162,8 @@ fn recipe(number: u16, part_number: Arc<str>) -> ActiveRecipe {
 
 /// The bytes of one PLC. The first byte selects the server, and where the bytes are cut in two.
 ///
-/// The server closes, answers in whole frames, and as many parts are measured as triggers were counted.
+/// The server closes, answers in whole frames, and as many parts are measured as triggers were
+/// counted.
 pub fn modbus(data: &[u8]) {
     let Some((options, bytes)) = data.split_first() else {
         return;

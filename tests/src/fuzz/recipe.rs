@@ -25,7 +25,8 @@ pub fn zip(data: &[u8]) {
     });
 }
 
-/// A manifest, with the arrays of a taught part: it is checked, packed and planned, and the part judged by it.
+/// A manifest, with the arrays of a taught part: it is checked, packed and planned, and the part
+/// judged by it.
 pub fn json(data: &[u8]) {
     let part = &*PART;
     let Ok(mut file) = serde_json::from_slice::<RecipeFile>(data) else {
@@ -61,7 +62,8 @@ thread_local! {
     };
 }
 
-/// A change from the page: after an accepted one the recipe can be loaded and planned, and the part judged by it.
+/// A change from the page: after an accepted one the recipe can be loaded and planned, and the part
+/// judged by it.
 pub fn edit(data: &[u8]) {
     let part = &*PART;
     let Ok(mut wanted) = serde_json::from_slice::<Edit>(data) else {

@@ -25,7 +25,8 @@ pub struct PhaseTwin {
     pub form: Form,
     /// Φ in turns, NaN where rejected.
     pub phase: Vec<f64>,
-    /// Σ N r² · B², B of the finest level, counts²: the weight of the levels that the phase was computed from.
+    /// Σ N r² · B², B of the finest level, counts²: the weight of the levels that the phase was
+    /// computed from.
     pub information: Vec<f64>,
     /// Resolved or why not, before heights are computed.
     pub reason: Vec<Reason>,
@@ -60,8 +61,8 @@ pub fn levels_from(frames: impl Iterator<Item = (usize, f64, f64)>) -> Vec<Level
     levels
 }
 
-/// Decodes pattern `at` of a recording; dense and single levels are unwrapped about the reference phase map
-/// of the recording's models.
+/// Decodes pattern `at` of a recording; dense and single levels are unwrapped about the reference
+/// phase map of the recording's models.
 ///
 /// # Panics
 /// If the recording's levels have no known form, or need a map and the recording has no models.
@@ -96,8 +97,9 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
     }
 }
 
-/// σ of one sample in counts: the recording's, else estimated from the residuals of N ≥ 4 shifts after fitting offset,
-/// modulation and phase (N − 3 degrees of freedom), over all pixels that are resolved by `reason`.
+/// σ of one sample in counts: the recording's, else estimated from the residuals of N ≥ 4 shifts
+/// after fitting offset, modulation and phase (N − 3 degrees of freedom), over all pixels that are
+/// resolved by `reason`.
 pub fn sample_noise(recording: &Recording, at: usize, reason: &[Reason]) -> Option<f64> {
     if recording.noise_counts.is_some() {
         return recording.noise_counts;

@@ -15,13 +15,13 @@ pub struct Rig {
     pub range: (f64, f64),
 }
 
-/// Pieces of the working range in which a sampled phase function is searched for a change of sign; a
-/// change in more than one of them leaves the pixel unresolved. Part of the definition.
+/// Pieces of the working range in which a sampled phase function is searched for a change of sign;
+/// a change in more than one of them leaves the pixel unresolved. Part of the definition.
 const PIECES: usize = 16;
 /// Halvings of the bracket: 500 mm · 2⁻⁶⁰ is less than any rounding error.
 const HALVINGS: usize = 60;
-/// If the phase changes by less than this over ± 0.2 × the camera's height, it does not determine a height: one level of
-/// 4 frames has 7.4e-3 turn of noise. Part of the definition.
+/// If the phase changes by less than this over ± 0.2 × the camera's height, it does not determine a
+/// height: one level of 4 frames has 7.4e-3 turn of noise. Part of the definition.
 const LEAST_TURNS: f64 = 0.01;
 /// Half the distance over which the slope ∂Φ/∂z is computed, mm.
 const SLOPE_MM: f64 = 0.005;
@@ -57,8 +57,9 @@ impl Rig {
         self.phase_at(pattern, u, v, 0.0)
     }
 
-    /// The height in the working range at which pixel (u, v) sees `phase`, by bisection, and the slope ∂Φ/∂z there in turns per mm;
-    /// none if there is no such height, there are several, or the phase hardly depends on the height.
+    /// The height in the working range at which pixel (u, v) sees `phase`, by bisection, and the
+    /// slope ∂Φ/∂z there in turns per mm; none if there is no such height, there are several, or
+    /// the phase hardly depends on the height.
     pub fn height(&self, pattern: &Pattern, u: f64, v: f64, phase: f64) -> Option<(f64, f64)> {
         let (eye, ray) = (self.camera.centre(), self.camera.ray(u, v));
         let off = |z: f64| {

@@ -1,5 +1,5 @@
-//! The light of a round body under one lamp, by Phong's model (1975), in plain `f64`: ambient + pattern · (diffuse · n·l + specular ·
-//! (r·v)^shininess).
+//! The light of a round body under one lamp, by Phong's model (1975), in plain `f64`: ambient +
+//! pattern · (diffuse · n·l + specular · (r·v)^shininess).
 
 use super::device::{Device, Point};
 
@@ -34,7 +34,8 @@ pub struct Spot {
     pub at: Point,
     /// The outward normal.
     pub normal: Point,
-    /// What comes from it to the eye without the lamp, and from the lamp if that is white: of the diffuse and of the mirrored light.
+    /// What comes from it to the eye without the lamp, and from the lamp if that is white: of the
+    /// diffuse and of the mirrored light.
     pub light: [f64; 3],
 }
 
@@ -57,7 +58,8 @@ impl Body {
         self.axis.map_or(d, |axis| plus(d, -dot(d, axis), axis))
     }
 
-    /// The point that the ray of camera point (u, v) meets first: |c + s·d|² = R², with everything across the axis.
+    /// The point that the ray of camera point (u, v) meets first: |c + s·d|² = R², with everything
+    /// across the axis.
     pub fn seen(&self, camera: &Device, u: f64, v: f64) -> Option<(Point, Point)> {
         let (eye, ray) = (camera.centre(), camera.ray(u, v));
         let c = self.across(plus(eye, -1.0, self.centre));
@@ -90,7 +92,8 @@ impl Body {
                 light: [phong.ambient, 0.0, 0.0],
             });
         }
-        // The mirrored direction has the same part along the normal, and the opposite one across it.
+        // The mirrored direction has the same part along the normal, and the opposite one across
+        // it.
         let across = plus(to_lamp, -along, normal);
         let mirrored = plus(plus([0.0; 3], along, normal), -1.0, across);
         let highlight = dot(mirrored, to_eye).max(0.0).powf(phong.shininess);

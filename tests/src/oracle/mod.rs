@@ -1,8 +1,9 @@
-//! The textbook implementation: the whole way from frames to heights in plain `f64` loops, written to be read.
+//! The textbook implementation: the whole way from frames to heights in plain `f64` loops, written
+//! to be read.
 //!
-//! It is the independent twin of the fixed-point implementation. It shares no code with the crate that it
-//! judges, only the definitions: the keys of a recording (format 1) and the equations of docs/measurement.md.
-//! It prefers plain code to fast code.
+//! It is the independent twin of the fixed-point implementation. It shares no code with the crate
+//! that it judges, only the definitions: the keys of a recording (format 1) and the equations of
+//! docs/measurement.md. It prefers plain code to fast code.
 
 pub mod decode;
 pub mod demodulate;

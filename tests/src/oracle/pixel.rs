@@ -9,7 +9,8 @@ use super::{Level, Reason};
 pub struct PixelTwin {
     /// Φ in turns, NaN where rejected.
     pub phase: f64,
-    /// Σ N r² · B², B of the finest level, counts²: the weight of the levels that the phase was computed from.
+    /// Σ N r² · B², B of the finest level, counts²: the weight of the levels that the phase was
+    /// computed from.
     pub information: f64,
     /// Resolved or why not, before heights are computed.
     pub reason: Reason,
@@ -21,8 +22,8 @@ pub struct PixelTwin {
     pub scale: Scale,
 }
 
-/// Tolerance at the modulation threshold, counts. Sums of sines of 16-bit counts are exact to about 1e-11 counts, so with it a
-/// modulation of exactly 16 is not below 16.
+/// Tolerance at the modulation threshold, counts. Sums of sines of 16-bit counts are exact to about
+/// 1e-11 counts, so with it a modulation of exactly 16 is not below 16.
 const TIE: f64 = 1e-9;
 
 /// What decides about samples, in counts.
@@ -35,7 +36,8 @@ pub struct Scale {
 }
 
 impl Scale {
-    /// Of samples of so many bits: 16 of 255 counts, or with a known σ of a sample in counts σ/0.23, from 4 to 127.5 of 255.
+    /// Of samples of so many bits: 16 of 255 counts, or with a known σ of a sample in counts
+    /// σ/0.23, from 4 to 127.5 of 255.
     pub fn of(bit_depth: u8, noise: Option<f64>) -> Self {
         let full = f64::from((1_u32 << bit_depth) - 1);
         let count = full / 255.0;
@@ -47,8 +49,8 @@ impl Scale {
 }
 
 impl PixelTwin {
-    /// Decodes a pixel: `samples[i]` are those of `levels[i]`, levels from coarse to fine; `map` gives Φ₀ for
-    /// the forms that need one, NaN where it is unknown.
+    /// Decodes a pixel: `samples[i]` are those of `levels[i]`, levels from coarse to fine; `map`
+    /// gives Φ₀ for the forms that need one, NaN where it is unknown.
     pub fn of(
         form: Form,
         levels: &[Level],

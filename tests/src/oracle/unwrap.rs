@@ -74,8 +74,8 @@ impl Wrapped {
 /// How close a pixel's unwrapping was to another result.
 #[derive(Clone, Copy, Debug)]
 pub struct Doubt {
-    /// The smallest error of the wrapped phases, in turns, that could have changed a decision (a fringe
-    /// order, a wrap, a residual at its limit).
+    /// The smallest error of the wrapped phases, in turns, that could have changed a decision (a
+    /// fringe order, a wrap, a residual at its limit).
     pub slack: f64,
     /// The difference between the lowest and highest phase of the averaged levels, turns.
     pub spread: f64,
@@ -88,8 +88,8 @@ impl Doubt {
         spread: 0.0,
     };
 
-    /// Records a decision that is `distance` turns from its threshold, made from a sum of wrapped phases whose
-    /// factors add up to `gain`.
+    /// Records a decision that is `distance` turns from its threshold, made from a sum of wrapped
+    /// phases whose factors add up to `gain`.
     fn look(&mut self, distance: f64, gain: f64) {
         self.slack = self.slack.min(distance / gain);
     }
@@ -110,8 +110,8 @@ impl Doubt {
     }
 }
 
-/// Φ in turns and its information Σ N r² · B², B that of the finest level; none if a residual is above 0.40 turn.
-/// `levels` go from coarse to fine; `map` is Φ₀ for the forms that need one.
+/// Φ in turns and its information Σ N r² · B², B that of the finest level; none if a residual is
+/// above 0.40 turn. `levels` go from coarse to fine; `map` is Φ₀ for the forms that need one.
 pub fn unwrap(form: Form, levels: &[Wrapped], map: f64) -> Option<(f64, f64)> {
     unwrap_with_doubt(form, levels, map).0
 }
@@ -171,8 +171,9 @@ fn relative(level: Wrapped, map: f64) -> f64 {
     level.turns - (level.ratio * map).rem_euclid(1.0)
 }
 
-/// D_i = (q_i + round(r_i D − q_i)) / r_i for each level in turn, the finest first, D the mean of those so far with weights N r².
-/// `gain` is the factor by which an error of the wrapped phases is amplified in `start`.
+/// D_i = (q_i + round(r_i D − q_i)) / r_i for each level in turn, the finest first, D the mean of
+/// those so far with weights N r². `gain` is the factor by which an error of the wrapped phases is
+/// amplified in `start`.
 fn average(
     levels: &[Wrapped],
     start: f64,

@@ -1,8 +1,9 @@
 //! A model of a file system that loses power.
 //!
-//! Changes that have not been synced may be lost: of a file any of its writes, sector by sector; of a folder its latest changes of
-//! names, in their order. Syncing a file also keeps its own name and those of the folders above it, as the journals of ext4,
-//! XFS and btrfs do, but no other files. Mapped shared memory is never on the medium.
+//! Changes that have not been synced may be lost: of a file any of its writes, sector by sector; of
+//! a folder its latest changes of names, in their order. Syncing a file also keeps its own name and
+//! those of the folders above it, as the journals of ext4, XFS and btrfs do, but no other files.
+//! Mapped shared memory is never on the medium.
 
 use super::{Operation, What};
 use crate::random::Random;
@@ -49,7 +50,8 @@ type Naming = (String, Option<usize>);
 #[derive(Clone, Debug, Default)]
 struct Folder {
     certain: Names,
-    /// Since the last sync: names that were given to a node or removed; those of one operation happen together or not at all.
+    /// Since the last sync: names that were given to a node or removed; those of one operation
+    /// happen together or not at all.
     since: Vec<(u64, Vec<Naming>)>,
     now: Names,
 }
@@ -267,7 +269,8 @@ impl File {
 }
 
 impl Folder {
-    /// Makes certain what was done before `asked`, up to the last change of a name that is `wanted`.
+    /// Makes certain what was done before `asked`, up to the last change of a name that is
+    /// `wanted`.
     fn settle(&mut self, asked: u64, wanted: impl Fn(&str) -> bool) {
         let last = self.since.iter().rposition(|(done, names)| {
             *done <= asked && names.iter().any(|(name, _)| wanted(name))

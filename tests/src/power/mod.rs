@@ -1,7 +1,8 @@
-//! What a loss of power leaves of a folder: a run of the program is traced, and replayed up to any of its operations.
+//! What a loss of power leaves of a folder: a run of the program is traced, and replayed up to any
+//! of its operations.
 //!
-//! [`trace`] reads the operations from a log of `strace`; [`disk`] models which of them are certainly on the medium and which may
-//! be lost.
+//! [`trace`] reads the operations from a log of `strace`; [`disk`] models which of them are
+//! certainly on the medium and which may be lost.
 
 pub mod disk;
 pub mod trace;

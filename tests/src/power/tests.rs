@@ -32,7 +32,8 @@ fn write(path: &str, bytes: &[u8]) -> What {
     }
 }
 
-/// The different contents of `name` that losses of power after all operations may leave; `None` where it does not exist.
+/// The different contents of `name` that losses of power after all operations may leave; `None`
+/// where it does not exist.
 fn left_of(name: &str, all: Vec<What>) -> Vec<Option<Vec<u8>>> {
     let folder = tempfile::tempdir().unwrap();
     let mut disk = Disk::default();

@@ -7,8 +7,9 @@ use std::fs;
 use std::os::unix::ffi::OsStringExt as _;
 use std::path::{Path, PathBuf};
 
-/// All threads; times of start and end; descriptors with their paths; complete strings in hexadecimal. The tracer is not the
-/// program's parent (-D), so that the program can be killed as usual.
+/// All threads; times of start and end; descriptors with their paths; complete strings in
+/// hexadecimal. The tracer is not the program's parent (-D), so that the program can be killed as
+/// usual.
 pub const OPTIONS: [&str; 11] = [
     "-D",
     "-f",
@@ -127,7 +128,8 @@ fn at(folder: &str, name: &str) -> PathBuf {
     descriptor(folder).1.unwrap_or_default().join(path(name))
 }
 
-/// The position of a descriptor before a transfer of so many bytes; none if it always writes at the end.
+/// The position of a descriptor before a transfer of so many bytes; none if it always writes at the
+/// end.
 fn passed(places: &mut Places, text: &str, bytes: i64) -> Option<u64> {
     let place = places
         .entry(descriptor(text).0.to_owned())

@@ -9,7 +9,8 @@ use std::fs;
 use tests::board::{self, poses};
 use tests::{files, shared};
 
-/// Options for codes of 9 and 8 bits with cells of one pixel, each picture followed by its inverse, then white and black.
+/// Options for codes of 9 and 8 bits with cells of one pixel, each picture followed by its inverse,
+/// then white and black.
 const OPTIONS: [&str; 8] = [
     "--gray",
     "9,8",
@@ -55,7 +56,8 @@ fn a_gray_code_alone_gives_column_and_row_within_half_a_cell_and_better_between_
     let out = scene.measure();
     let report = files::report(&out);
     assert_eq!(report["kind"], "gray code alone");
-    // The picture of a cell of one pixel is that of its middle, and the camera's pixel takes the nearest.
+    // The picture of a cell of one pixel is that of its middle, and the camera's pixel takes the
+    // nearest.
     for (name, along) in [("column.npy", 0), ("row.npy", 1)] {
         let (_, most, count) = off(&out.join(name), along);
         assert!(
@@ -63,7 +65,8 @@ fn a_gray_code_alone_gives_column_and_row_within_half_a_cell_and_better_between_
             "{name}: {most} {count}"
         );
     }
-    // Cells of sixteen pixels are seen as six or seven: a border within one pixel is a place within three.
+    // Cells of sixteen pixels are seen as six or seven: a border within one pixel is a place within
+    // three.
     let scene = codes(16.0, [5, 4]);
     let options = [&OPTIONS[..], &["--gray-cell", "16"]].concat();
     let options: Vec<&str> = options

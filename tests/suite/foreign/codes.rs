@@ -1,4 +1,5 @@
-//! Gray codes beside fringes: read as they were projected, and named where they are described otherwise.
+//! Gray codes beside fringes: read as they were projected, and named where they are described
+//! otherwise.
 
 use super::scene::{HEIGHT, PROJECTOR, Scene, WIDTH, check_phase, lit_by, notes};
 use std::fs;
@@ -67,7 +68,8 @@ fn said(scene: &Scene, options: &[&str]) -> Vec<String> {
     notes(&run)
 }
 
-/// Imports without a finding, and checks that all but a few pixels of the picture have the right phase; none has a wrong one.
+/// Imports without a finding, and checks that all but a few pixels of the picture have the right
+/// phase; none has a wrong one.
 fn is_right(scene: &Scene, options: &[&str], pitch: f64) {
     let run = scene.import(&[options, &["--json"]].concat()).succeeded();
     assert_eq!(notes(&run), [""; 0], "{options:?}");

@@ -24,7 +24,8 @@ fn grey(scene: &Scene, at: usize) -> Vec<u8> {
     picture.samples.iter().map(|&sample| sample as u8).collect()
 }
 
-/// Imports without a word but those of `expected`, measures, and returns how many pixels are within `bound` projector pixels.
+/// Imports without a word but those of `expected`, measures, and returns how many pixels are within
+/// `bound` projector pixels.
 fn right(scene: &Scene, expected: &[&str], bound: f64) -> usize {
     let run = scene.import(&OPTIONS).succeeded();
     let found = notes(&run);

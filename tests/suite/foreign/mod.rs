@@ -1,4 +1,5 @@
-//! Other people's frames: imported, projected from our patterns, and taken with a head that is not calibrated.
+//! Other people's frames: imported, projected from our patterns, and taken with a head that is not
+//! calibrated.
 
 mod alone;
 mod cases;
@@ -17,7 +18,8 @@ use std::fs;
 use std::path::Path;
 use tests::{files, shared};
 
-/// Gray code of a cell, as OpenCV's `GrayCodePattern` shows it: the most significant bit first, each picture followed by its inverse.
+/// Gray code of a cell, as OpenCV's `GrayCodePattern` shows it: the most significant bit first,
+/// each picture followed by its inverse.
 fn gray(scene: &mut Scene, bits: u32, cell: f64, vertical: bool) {
     for bit in (0..bits).rev() {
         for inverse in [false, true] {
@@ -31,8 +33,9 @@ fn gray(scene: &mut Scene, bits: u32, cell: f64, vertical: bool) {
     }
 }
 
-/// The sequence of github.com/kamino410/phase-shifting (README and `phase_shifting.py gen 400 240 100`): three shifts −1/3, 0, 1/3 of a
-/// cosine with periods of a third and a half of `step`, for columns and then rows; Gray codes with cells of half of `step`; white, black.
+/// The sequence of github.com/kamino410/phase-shifting (README and `phase_shifting.py gen 400 240
+/// 100`): three shifts −1/3, 0, 1/3 of a cosine with periods of a third and a half of `step`, for
+/// columns and then rows; Gray codes with cells of half of `step`; white, black.
 #[test]
 fn fractional_periods_in_both_directions_with_a_gray_code_of_wide_cells_are_imported() {
     let mut scene = Scene::new();
@@ -95,7 +98,8 @@ fn fractional_periods_in_both_directions_with_a_gray_code_of_wide_cells_are_impo
         vertical.min(horizontal) > all * 99 / 100,
         "{vertical} {horizontal} of {all}"
     );
-    // A code in front of the fringes, without its inverse, white and black: compared with the fringes' mean.
+    // A code in front of the fringes, without its inverse, white and black: compared with the
+    // fringes' mean.
     let mut scene = Scene::new();
     for bit in (0..3).rev() {
         scene.show(|xi, _| {
@@ -140,7 +144,8 @@ fn confused_conventions_are_named_with_the_options_that_fit() {
     assert!(reversed[0].contains("--shift is reversed"), "{reversed:?}");
     let wrong = with("cos", "-", &["--fringes", "36,6,1", "--json"]);
     assert!(wrong[0].contains("check --fringes"), "{wrong:?}");
-    // With ratios of 5 a sine and a cosine agree in all orders; the coarsest level then wraps in the picture.
+    // With ratios of 5 a sine and a cosine agree in all orders; the coarsest level then wraps in
+    // the picture.
     let mut fives = Scene::new();
     for fringes in [1.0, 5.0, 25.0] {
         fives.level(fringes, 4, |k| k);

@@ -1,5 +1,5 @@
-//! Models of other programs beside imported pictures: without a plate, with a plate that is turned, and models that the fringes
-//! contradict.
+//! Models of other programs beside imported pictures: without a plate, with a plate that is turned,
+//! and models that the fringes contradict.
 
 use super::scene::{import, notes};
 use crate::written::{Written, program};
@@ -41,8 +41,8 @@ struct Imports {
     folder: tempfile::TempDir,
 }
 
-/// Both models in one file, as Python's json.dump writes them: R and T from the camera to the projector, and the camera's pose as that
-/// of the plate.
+/// Both models in one file, as Python's json.dump writes them: R and T from the camera to the
+/// projector, and the camera's pose as that of the plate.
 fn stereo(camera: &DeviceModel, projector: &DeviceModel) -> Value {
     let rows = |numbers: &[f64; 9]| numbers.chunks(3).map(Vec::from).collect::<Vec<_>>();
     let k = |of: &DeviceModel| json!([[of.fx, 0, of.cx], [0, of.fy, of.cy], [0, 0, 1]]);

@@ -9,7 +9,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use tests::files;
 
-/// What a camera sees that looks straight at each projector pixel, without ever being at full scale.
+/// What a camera sees that looks straight at each projector pixel, without ever being at full
+/// scale.
 fn photograph(from: &Path, to: &Path) {
     let picture = files::picture(from);
     let samples: Vec<u8> = picture
@@ -24,7 +25,8 @@ fn photograph(from: &Path, to: &Path) {
     writer.write_image_data(&samples).unwrap();
 }
 
-/// Options of `patterns`, the number of pictures, and the phase in turns that each projector pixel has then.
+/// Options of `patterns`, the number of pictures, and the phase in turns that each projector pixel
+/// has then.
 type Case<'a> = (&'a [&'a str], usize, &'a dyn Fn(usize) -> f64);
 
 #[test]

@@ -1,5 +1,5 @@
-//! What only the user knows of pictures: the camera's noise, the working range, fringes that differ by direction, and a recipe to judge
-//! them by.
+//! What only the user knows of pictures: the camera's noise, the working range, fringes that differ
+//! by direction, and a recipe to judge them by.
 
 use super::scene::{HEIGHT, PROJECTOR, Scene, WIDTH, check_phase, import, lit_by, notes};
 use crate::written::{Written, geometric, program};
@@ -199,7 +199,8 @@ fn within(found: &[f32], expected: &[f32], bound: f32) -> f64 {
     near.count() as f64 / found.len() as f64
 }
 
-/// Whether the surface of these heights is lit by a pixel of the projector's raster in each camera pixel, by the recording's models.
+/// Whether the surface of these heights is lit by a pixel of the projector's raster in each camera
+/// pixel, by the recording's models.
 fn lit_by_raster(recording: &Path, heights: &[f32]) -> Vec<bool> {
     let recording = Recording::open(recording).unwrap();
     let size = (recording.width, recording.height);
@@ -254,7 +255,8 @@ fn shared_pictures_with_noise_range_and_fringes_per_direction_are_right() {
         ];
         let out = measured(&case, "640x400", &options);
         let expected = values(&case.join("expected_height.npy"));
-        // The pictures show fringes beyond the raster's left edge, too, whose phase is that of its right edge: those pixels have no height.
+        // The pictures show fringes beyond the raster's left edge, too, whose phase is that of its
+        // right edge: those pixels have no height.
         let lit = lit_by_raster(&place.path().join("recording"), &expected);
         let found = values(&out.join("height.npy"));
         let of_raster = |values: &[f32]| {

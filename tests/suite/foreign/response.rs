@@ -54,8 +54,8 @@ fn a_response_that_is_not_linear_is_named_and_not_the_order_of_the_pictures() {
     );
 }
 
-/// Pictures of 1 and 8 fringes, 4 shifts, whose middle reflects more than the camera can see, in samples of 16 or 8 bits; the first
-/// column of the middle and the first one behind it.
+/// Pictures of 1 and 8 fringes, 4 shifts, whose middle reflects more than the camera can see, in
+/// samples of 16 or 8 bits; the first column of the middle and the first one behind it.
 fn overexposed(wide: bool) -> (Scene, [usize; 2]) {
     let scene = Scene::new();
     let mut random = tests::random::Random::new(9);

@@ -52,7 +52,8 @@ impl Scene {
         self.folder.path().join(name)
     }
 
-    /// Adds the picture of light that is a function of the projector pixel, 0 to 1, with ± 2 counts of noise.
+    /// Adds the picture of light that is a function of the projector pixel, 0 to 1, with ± 2 counts
+    /// of noise.
     pub fn show(&mut self, light: impl Fn(f64, f64) -> f64) {
         let mut samples = Vec::with_capacity(WIDTH * HEIGHT);
         for v in 0..HEIGHT {

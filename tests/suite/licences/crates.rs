@@ -1,4 +1,5 @@
-//! The crates on which the workspace depends, with the features for a real head, as cargo resolves them for each platform.
+//! The crates on which the workspace depends, with the features for a real head, as cargo resolves
+//! them for each platform.
 
 use serde_json::Value;
 use std::collections::{HashMap, HashSet};
@@ -19,7 +20,8 @@ pub struct Crate {
     pub authors: Vec<String>,
     /// Its folder on this machine.
     pub folder: PathBuf,
-    /// Whether its code is in `fringed` or `fringed-lab`; the others are only for building and testing.
+    /// Whether its code is in `fringed` or `fringed-lab`; the others are only for building and
+    /// testing.
     pub shipped: bool,
 }
 
@@ -62,7 +64,8 @@ pub fn all() -> Result<Vec<Crate>, String> {
     Ok(crates)
 }
 
-/// The crates in the programs: those that they reach by normal dependencies, not through build scripts, procedural macros or tests.
+/// The crates in the programs: those that they reach by normal dependencies, not through build
+/// scripts, procedural macros or tests.
 fn shipped(metadata: &Value) -> HashSet<String> {
     let is_proc_macro = |package: &Value| {
         let kinds = list(&package["targets"]).flat_map(|target| list(&target["kind"]));

@@ -1,5 +1,5 @@
-//! `docs/licences.txt` has the licence texts of every crate in the programs; the test needs no network. `deny.toml` lists
-//! the accepted licences, and the crates that may occur in two versions.
+//! `docs/licences.txt` has the licence texts of every crate in the programs; the test needs no
+//! network. `deny.toml` lists the accepted licences, and the crates that may occur in two versions.
 
 mod crates;
 mod texts;

@@ -94,7 +94,8 @@ fn terms(one: &Crate) -> Vec<String> {
     found.into_iter().map(|(_, text)| text).collect()
 }
 
-/// Collects the names, in capitals, and the texts of the licence files in a folder, and in folders with such a name.
+/// Collects the names, in capitals, and the texts of the licence files in a folder, and in folders
+/// with such a name.
 fn collect(folder: &Path, found: &mut Vec<(String, String)>) {
     for entry in fs::read_dir(folder).unwrap().map(Result::unwrap) {
         let name = entry.file_name().to_string_lossy().to_uppercase();

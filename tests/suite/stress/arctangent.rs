@@ -30,8 +30,8 @@ fn pair(pixel: usize) -> (i32, i32) {
     )
 }
 
-/// Four samples around `middle` with these differences, below full scale if possible, in the order of
-/// the shifts k/4: S = I₀ − I₂, C = I₁ − I₃.
+/// Four samples around `middle` with these differences, below full scale if possible, in the order
+/// of the shifts k/4: S = I₀ − I₂, C = I₁ − I₃.
 fn samples((s, c): (i32, i32), middle: i32) -> [u16; 4] {
     let two = |difference: i32| {
         let most = (254 - difference.abs()).max(0);

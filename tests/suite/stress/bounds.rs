@@ -1,4 +1,5 @@
-//! The largest difference between a decoded pixel and the textbook, and which pixels are too near a threshold to compare.
+//! The largest difference between a decoded pixel and the textbook, and which pixels are too near a
+//! threshold to compare.
 //!
 //! The bounds are those of a kernel in 16-bit lanes; they hold for every back-end.
 
@@ -10,31 +11,35 @@ use tests::oracle::demodulate::Demodulated;
 use tests::oracle::unwrap::Form;
 use tests::oracle::{Level, PixelTwin, Reason};
 
-/// The arctangent: a polynomial of degree 5, with a reciprocal from one Newton iteration (`algo/src/phase/angle.rs`).
+/// The arctangent: a polynomial of degree 5, with a reciprocal from one Newton iteration
+/// (`algo/src/phase/angle.rs`).
 pub const ARCTANGENT: f64 = 2.5e-5;
-/// The arctangent of geometric levels below the finest, which give only orders: a cubic with a cubic reciprocal. Every pair
-/// of 8-bit differences is within this bound (`every_rough_angle_is_within_the_bound` of `algo`).
+/// The arctangent of geometric levels below the finest, which give only orders: a cubic with a
+/// cubic reciprocal. Every pair of 8-bit differences is within this bound
+/// (`every_rough_angle_is_within_the_bound` of `algo`).
 const ROUGH_ARCTANGENT: f64 = 3.4e-4;
 /// Half a unit of 1/65536 turn.
 pub const ROUNDING: f64 = 1.0 / 131_072.0;
-/// S and C lie within ± N/2 of full scale; with 16 bits the rounding of each is 2⁻¹⁷ of N times full scale.
+/// S and C lie within ± N/2 of full scale; with 16 bits the rounding of each is 2⁻¹⁷ of N times
+/// full scale.
 const SUMS: f64 = 1.0 / 131_072.0;
 /// Half the last bit of a weight in Q15.
 const WEIGHTS: f64 = 1.0 / 65_536.0;
-/// Half the last bit of a factor (a ratio, its inverse, n) in Q20: its effect on a phase of one turn.
+/// Half the last bit of a factor (a ratio, its inverse, n) in Q20: its effect on a phase of one
+/// turn.
 const FACTORS: f64 = 1.0 / 2_097_152.0;
-/// Weights of 8 significant bits: the ratio of two is off by at most two parts in 256, so a mean changes
-/// by at most this share of the range of its values.
+/// Weights of 8 significant bits: the ratio of two is off by at most two parts in 256, so a mean
+/// changes by at most this share of the range of its values.
 const MEAN: f64 = 1.0 / 128.0;
-/// B is reported to 8 significant bits at the threshold (16/255: 257 of 4095 units), off by up to two
-/// units; σ_z has the same bound.
+/// B is reported to 8 significant bits at the threshold (16/255: 257 of 4095 units), off by up to
+/// two units; σ_z has the same bound.
 const MODULATION: f64 = 2.0 / 257.0;
 /// Masks may differ on this share of the pixels, apart from those on a threshold.
 const MASK_SHARE: f64 = 1e-4;
 /// At most this share of the pixels may be on a threshold, or too little would be compared.
 const TIE_SHARE: f64 = 0.03;
-/// RMS of the error of the finest level of a geometric sequence, turns: 1e-5 for the arctangent, and
-/// as much for sums and weights, whose worst case is 2.8e-5 at a quarter of full scale.
+/// RMS of the error of the finest level of a geometric sequence, turns: 1e-5 for the arctangent,
+/// and as much for sums and weights, whose worst case is 2.8e-5 at a quarter of full scale.
 const RMS: f64 = 2e-5;
 
 /// How much the rounding of a level's samples can change (S, C), in counts of B.
@@ -106,7 +111,8 @@ fn on_a_threshold(levels: &[Level], twin: &PixelTwin, stack: &Stack) -> bool {
     doubt.slack <= error + rough + ROUNDING + MEAN * doubt.spread + factors(levels, stack)
 }
 
-/// How much the rounding of the factors changes a decision, as an error of the wrapped phases, turns.
+/// How much the rounding of the factors changes a decision, as an error of the wrapped phases,
+/// turns.
 fn factors(levels: &[Level], stack: &Stack) -> f64 {
     let turns = stack.range.max.abs().max(stack.range.min.abs());
     match stack.form() {
@@ -142,8 +148,8 @@ pub struct Tally {
 }
 
 impl Tally {
-    /// Compares a decoded stack with the textbook: phases within their bound, which includes the fringe
-    /// orders, modulations, and masks.
+    /// Compares a decoded stack with the textbook: phases within their bound, which includes the
+    /// fringe orders, modulations, and masks.
     pub fn add(&mut self, stack: &Stack, found: &PhaseMap) {
         let (levels, form, twins) = (stack.levels(), stack.form(), stack.twins());
         let full_scale = stack.full_scale();

@@ -1,5 +1,5 @@
-//! Invalid calibrations are refused, and the error names what is wrong; every accepted calibration is a
-//! valid camera.
+//! Invalid calibrations are refused, and the error names what is wrong; every accepted calibration
+//! is a valid camera.
 
 use super::random::between;
 use super::rig;

@@ -12,14 +12,17 @@ use std::f64::consts::TAU;
 use tests::random::Random;
 
 const SEED: u64 = 20_260_606;
-/// Smallest trusted modulations at 8 bit; proportional to full scale. The first is that of unknown noise.
+/// Smallest trusted modulations at 8 bit; proportional to full scale. The first is that of unknown
+/// noise.
 const LEAST_COUNTS: [f64; 4] = [16.0, 4.0, 7.5, 25.0];
 /// The arctangent, turns.
 const ARCTANGENT: f64 = 2.5e-5;
-/// Half a unit in S and in C, which have 128 units per count of 255 at least, over 2π: turns · counts.
+/// Half a unit in S and in C, which have 128 units per count of 255 at least, over 2π: turns ·
+/// counts.
 const UNITS: f64 = 0.71 / 128.0 / TAU;
-/// RMS of the error with 8 shifts if the light exceeds full scale by a tenth, turns: a clipped sine has harmonics, and with N
-/// shifts those of order N ± 1 have an effect. The maximum is √2 times this for one of them, and twice this for both.
+/// RMS of the error with 8 shifts if the light exceeds full scale by a tenth, turns: a clipped sine
+/// has harmonics, and with N shifts those of order N ± 1 have an effect. The maximum is √2 times
+/// this for one of them, and twice this for both.
 const SATURATED_RMS: f64 = 7e-4;
 
 /// Three geometric levels of `shifts`.
@@ -156,7 +159,8 @@ fn the_phase_is_known_from(least: f64) {
             for pixel in 0..stack.pixels() {
                 let (turns, counts) = truth(pixel);
                 let counts = counts as f64;
-                // Rounded samples change S and C by at most half a count each, and so B by at most one.
+                // Rounded samples change S and C by at most half a count each, and so B by at most
+                // one.
                 let rounding = 1.0 / scale;
                 if counts + rounding < least {
                     assert_eq!(map.trust[pixel], Trust::Dark, "B = {counts}");

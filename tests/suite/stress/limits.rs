@@ -1,4 +1,5 @@
-//! Sequences at their documented limits are decoded; beyond a limit, planning refuses them with its name.
+//! Sequences at their documented limits are decoded; beyond a limit, planning refuses them with its
+//! name.
 
 use super::bounds::Tally;
 use super::random::between;
@@ -14,7 +15,8 @@ use tests::random::Random;
 
 const SEED: u64 = 20_260_608;
 
-/// The reason for which a sequence of these ratios, with `shifts` each, is refused for a phase function of this range.
+/// The reason for which a sequence of these ratios, with `shifts` each, is refused for a phase
+/// function of this range.
 fn refusal(ratios: &[f64], shifts: usize, (min, max): (f64, f64)) -> Option<String> {
     let frames = shots(ratios, shifts);
     let sequence = match Sequence::from_frames(&frames) {
@@ -33,7 +35,8 @@ fn names(refusal: Option<String>, words: &[String]) {
     }
 }
 
-/// Geometric ratios from one that spans 0.9 of the range up to `finest`, in steps of at most `step`.
+/// Geometric ratios from one that spans 0.9 of the range up to `finest`, in steps of at most
+/// `step`.
 fn climb(span: f64, finest: f64, step: f64) -> Vec<f64> {
     let coarsest = 0.9 / span;
     let steps = ((finest / coarsest).ln() / step.ln()).ceil().max(1.0);
@@ -67,7 +70,8 @@ fn lit(frames: Vec<Shot>, (min, max): (f64, f64), reach: f64) -> (Stack, Vec<f64
     (stack, phases)
 }
 
-/// Checks that every pixel is resolved, in its own fringe of the finest level, and agrees with the textbook.
+/// Checks that every pixel is resolved, in its own fringe of the finest level, and agrees with the
+/// textbook.
 fn decodes(name: &str, (stack, phases): (Stack, Vec<f64>)) {
     let map = stack.decode();
     let finest = stack.levels().last().unwrap().ratio;
@@ -132,8 +136,8 @@ fn as_many_fringes_as_documented_make_a_pattern_and_more_are_refused() {
 fn the_largest_step_between_levels_decodes_and_a_larger_one_is_refused() {
     let span = 0.9 * MAX_LEVEL_FACTOR;
     let ratios = [1.0 / MAX_LEVEL_FACTOR, 1.0];
-    // Half a count of 12 bit in a level of 16 shifts is an error of at most 9e-5 turn. The step must not enlarge it
-    // to more than the limit of the residual.
+    // Half a count of 12 bit in a level of 16 shifts is an error of at most 9e-5 turn. The step
+    // must not enlarge it to more than the limit of the residual.
     const {
         assert!(
             MAX_LEVEL_FACTOR * 9e-5 < 0.4,

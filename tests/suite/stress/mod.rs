@@ -1,8 +1,8 @@
 //! Numerical stability of the decoder, the patterns and the geometry at their limits.
 //!
-//! - [`stack`]: frames of any samples, decoded in every way; [`bounds`]: the largest difference from
-//!   the textbook; [`random`]: seeded stacks of every form; [`rig`]: rigs for triangulation; [`twins`]:
-//!   a rig that is compared with the textbook.
+//! - [`stack`]: frames of any samples, decoded in every way; [`bounds`]: the largest difference
+//!   from the textbook; [`random`]: seeded stacks of every form; [`rig`]: rigs for triangulation;
+//!   [`twins`]: a rig that is compared with the textbook.
 //! - Each other module tests one kind of limit; the bounds are in `algo`'s README.
 
 mod arctangent;

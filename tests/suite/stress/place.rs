@@ -1,5 +1,5 @@
-//! A pixel's result depends only on its samples: not on its place, the width of its row, the stride, or
-//! its neighbours.
+//! A pixel's result depends only on its samples: not on its place, the width of its row, the
+//! stride, or its neighbours.
 
 use super::random::{Draw, KINDS, stack};
 use super::stack::{Stack, shots};

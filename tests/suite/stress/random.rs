@@ -38,8 +38,9 @@ pub fn between(random: &mut Random, low: f64, high: f64) -> f64 {
     low + (high - low) * random.share()
 }
 
-/// A stack of lit pixels with noise of up to 3 % of full scale, some weak, some saturated, and some with
-/// random samples; also a map for the forms that need one, unknown at some pixels and too far off at others.
+/// A stack of lit pixels with noise of up to 3 % of full scale, some weak, some saturated, and some
+/// with random samples; also a map for the forms that need one, unknown at some pixels and too far
+/// off at others.
 pub fn stack(random: &mut Random, draw: Draw) -> Stack {
     let min = between(random, -20.0, 20.0);
     let span = between(random, 5.0, 150.0);

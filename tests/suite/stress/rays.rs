@@ -1,4 +1,5 @@
-//! Geometry in which the phase does not depend on the height: no panic, no NaN, and no wrong height.
+//! Geometry in which the phase does not depend on the height: no panic, no NaN, and no wrong
+//! height.
 
 use super::random::between;
 use super::rig::{self, PROJECTOR, looking_down};
@@ -162,7 +163,8 @@ fn rays_along_the_plane_or_upwards_have_no_height_and_no_reference() {
 #[test]
 fn rays_that_meet_no_light_of_their_phase_have_no_height() {
     let mut random = Random::new(SEED + 3);
-    // Both look in the same direction: a ray's phase approaches that of the parallel ray and never reaches it.
+    // Both look in the same direction: a ray's phase approaches that of the parallel ray and never
+    // reaches it.
     let twins = Twins::new(&down([0.0, 0.0, 600.0]), &lamp([150.0, 0.0, 600.0]), RANGE).unwrap();
     for _ in 0..2000 {
         let (u, v) = (

@@ -42,8 +42,9 @@ pub fn join(
     Triangulator::new(camera, projector, Reference::Models, function, range)
 }
 
-/// A device without distortion at `centre` that looks along −z with its image x along +x, then tilted by `degrees`
-/// about the image's y towards +x; half the width of its frame of `size` is `half` times the focal length.
+/// A device without distortion at `centre` that looks along −z with its image x along +x, then
+/// tilted by `degrees` about the image's y towards +x; half the width of its frame of `size` is
+/// `half` times the focal length.
 pub fn looking_down(
     centre: [f64; 3],
     degrees: f64,

@@ -16,7 +16,8 @@ use tests::oracle::{Level, PixelTwin, Scale, levels_from};
 pub struct Stack {
     pub width: usize,
     pub height: usize,
-    /// Distance of rows in samples; those between the end of a row and the next row are not part of the picture.
+    /// Distance of rows in samples; those between the end of a row and the next row are not part of
+    /// the picture.
     pub stride: usize,
     pub bit_depth: u8,
     /// The ratio and shift of each frame.
@@ -58,8 +59,8 @@ impl Stack {
         }
     }
 
-    /// The same frames with another stride. The gaps contain the brightest sample of the type, so reading
-    /// them is noticed.
+    /// The same frames with another stride. The gaps contain the brightest sample of the type, so
+    /// reading them is noticed.
     pub fn with_stride(mut self, stride: usize) -> Self {
         let gap = if self.bit_depth == 8 { 255 } else { u16::MAX };
         for frame in &mut self.samples {
@@ -138,8 +139,8 @@ impl Stack {
         (0..self.pixels()).map(twin).collect()
     }
 
-    /// Decodes with one and with two threads and on every back-end, and checks that all give the same
-    /// bits, and that rejected pixels have no phase.
+    /// Decodes with one and with two threads and on every back-end, and checks that all give the
+    /// same bits, and that rejected pixels have no phase.
     pub fn decode(&self) -> PhaseMap {
         self.decode_in(None)
     }
@@ -174,8 +175,8 @@ impl Stack {
             .with_least_modulation(self.least)
     }
 
-    /// The plan for every back-end that runs on this machine, with the back-end's name. Only this function
-    /// of the suite uses back-ends.
+    /// The plan for every back-end that runs on this machine, with the back-end's name. Only this
+    /// function of the suite uses back-ends.
     fn decoders(&self) -> Vec<(&'static str, Decoder)> {
         Backend::available()
             .map(|backend| (backend.name(), self.decoder().with_backend(backend)))

@@ -1,4 +1,5 @@
-//! With any number of shifts, depth, ratios, form, size and stride, decoding agrees with the textbook.
+//! With any number of shifts, depth, ratios, form, size and stride, decoding agrees with the
+//! textbook.
 
 use super::bounds::Tally;
 use super::random::{Draw, KINDS, stack};

@@ -1,4 +1,5 @@
-//! A rig for the program and for the textbook: every height of the program is checked with the textbook.
+//! A rig for the program and for the textbook: every height of the program is checked with the
+//! textbook.
 
 use super::random::between;
 use super::rig::{self, PROJECTOR};
@@ -11,8 +12,8 @@ use tests::random::Random;
 
 pub const FRINGES: f64 = 60.0;
 pub const FRAME: (usize, usize) = (65, 65);
-/// A smaller change over the default working range, ± 0.2 × the camera's height, is noise: one level of
-/// 4 frames has 7.4e-3 turn (docs/measurement.md, *Noise*).
+/// A smaller change over the default working range, ± 0.2 × the camera's height, is noise: one
+/// level of 4 frames has 7.4e-3 turn (docs/measurement.md, *Noise*).
 const LEAST_TURNS: f64 = 0.01;
 /// Half a unit of Q16.16.
 pub const UNIT: f64 = 0.5 / 65_536.0;
@@ -96,8 +97,8 @@ impl Twins {
         assert!(told >= LEAST_TURNS, "{place} is noise");
     }
 
-    /// Solves for surfaces at heights over the whole range and returns how many had a height, which must
-    /// be the right one within half a unit of the phase.
+    /// Solves for surfaces at heights over the whole range and returns how many had a height, which
+    /// must be the right one within half a unit of the phase.
     pub fn recovered(&self, random: &mut Random, (u, v): (f64, f64)) -> usize {
         let HeightRange { low, high } = self.solver.range();
         let mut found = 0;

@@ -14,8 +14,8 @@ const FRINGES: f64 = 100.0;
 /// Offset and modulation, shares of full scale.
 const LIGHT: (f64, f64) = (0.5, 0.3);
 
-/// Every 65,536th of a turn once, spread over the 100 fringes; every half turn of each fringe and phases
-/// within a few units and a few hundredths of it; both ends.
+/// Every 65,536th of a turn once, spread over the 100 fringes; every half turn of each fringe and
+/// phases within a few units and a few hundredths of it; both ends.
 fn phases(min: f64) -> Vec<f64> {
     let unit = 1.0 / 65_536.0;
     let mut phases: Vec<f64> = (0..65_536)
@@ -70,7 +70,8 @@ fn check(name: &str, phases: &[f64], stack: &Stack) {
         .map(|l| l.ratio)
         .fold(f64::INFINITY, f64::min);
     let ratio = if stack.map.is_some() { ratio } else { 1.0 };
-    // Samples off by half a count change (S, C) by at most N/2: 1/B radians; plus 1e-4 for the fixed point.
+    // Samples off by half a count change (S, C) by at most N/2: 1/B radians; plus 1e-4 for the
+    // fixed point.
     let bound = (1.0 / counts / TAU + 1e-4) / ratio;
     let mut worst = 0.0_f64;
     for (pixel, phase) in phases.iter().enumerate() {
@@ -99,7 +100,8 @@ fn no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes() {
             };
             for (count, shifts) in [(3, 4), (3, 3), (4, 5), (6, 3)] {
                 let frames = Sequence::geometric(range, count, shifts);
-                // Shifts from 0 are symmetric at the ends; with any other start rounding moves them over the end.
+                // Shifts from 0 are symmetric at the ends; with any other start rounding moves them
+                // over the end.
                 for start in [0.0, 0.137] {
                     let moved = frames
                         .iter()

@@ -1,4 +1,5 @@
-//! Heads of unknown pose and lens in front of a board: whether the calibration finds them, and whether it knows how well.
+//! Heads of unknown pose and lens in front of a board: whether the calibration finds them, and
+//! whether it knows how well.
 
 use super::Random;
 use crate::calibration::{
@@ -28,7 +29,8 @@ fn turned(x: f64, y: f64, z: f64) -> Pose {
     facing.moved(&[x, y, z, 0.0, 0.0, 0.0])
 }
 
-/// A head of unknown pose and lens, and `poses` poses of a board with 30 µm of bow whose scale is off by `scale`.
+/// A head of unknown pose and lens, and `poses` poses of a board with 30 µm of bow whose scale is
+/// off by `scale`.
 fn head(random: &mut Random, board: &Board, poses: usize, scale: f64) -> Rig {
     let mut lens = |focal: f64, (width, height): (usize, usize), lift: f64| {
         let focal = focal * (1.0 + 0.1 * random.signed());
@@ -47,7 +49,8 @@ fn head(random: &mut Random, board: &Board, poses: usize, scale: f64) -> Rig {
         }
     };
     let (camera, projector) = (lens(2300.0, FRAME, 0.0), lens(2000.0, RASTER, 0.3));
-    // The projector stands 200 mm beside and 50 mm below the camera and looks at what lies 400 mm before it, with its lens shifted up.
+    // The projector stands 200 mm beside and 50 mm below the camera and looks at what lies 400 mm
+    // before it, with its lens shifted up.
     let (sin, cos) = (0.447, libm::sqrt(1.0 - 0.447 * 0.447));
     let aimed = Pose {
         rows: [
@@ -138,7 +141,8 @@ fn printed(random: &mut Random, rig: &Rig, off: &[(f64, f64)]) -> Vec<View> {
     rig.poses.iter().map(view).collect()
 }
 
-/// RMS errors of heights and of lengths scaled to 100 mm, as the calibration `found` measures what `truth` sees, mm.
+/// RMS errors of heights and of lengths scaled to 100 mm, as the calibration `found` measures what
+/// `truth` sees, mm.
 fn errors(truth: &Rig, found: &Rig) -> (f64, f64) {
     let volume = truth.volume().unwrap();
     let targets = truth.targets(volume, FRAME, RASTER);

@@ -77,7 +77,8 @@ fn picture(shift: (f64, f64), seed: u64, blur: f64) -> Picture {
     }
 }
 
-/// Phases of fringes of 20 projector pixels: ξ = 300 + 2u, η = 100 + 2v, resolved in columns from `from`.
+/// Phases of fringes of 20 projector pixels: ξ = 300 + 2u, η = 100 + 2v, resolved in columns from
+/// `from`.
 fn phases(from: usize) -> [PhaseMap; 2] {
     let map = |turns: &dyn Fn(usize, usize) -> f64| {
         let mut map = PhaseMap::new(SIZE.0, SIZE.1);

@@ -3,7 +3,8 @@
 /// A symmetric matrix of the six unknowns: shifts along x, y, z, turns about x, y, z.
 pub type Matrix6 = [[f64; 6]; 6];
 
-/// Largest number of sweeps of Jacobi's method; six unknowns need five at most to reach the precision of `f64`.
+/// Largest number of sweeps of Jacobi's method; six unknowns need five at most to reach the
+/// precision of `f64`.
 const SWEEPS: usize = 12;
 /// Off-diagonal entries below this share of the diagonal are taken as 0: rounding adds as much.
 const ROUNDING: f64 = 1e-17;
@@ -67,17 +68,19 @@ pub struct Directions {
     pub left_out: [bool; 6],
 }
 
-/// A direction is determined only if its eigenvalue is at least this many times what the noise of the normals alone gives.
+/// A direction is determined only if its eigenvalue is at least this many times what the noise of
+/// the normals alone gives.
 const OVER_NOISE: f64 = 10.0;
-/// A direction is determined only if the noise of the points moves the part along it by at most this many mm (1 σ); turns are
-/// measured as the way of a point at the part's radius.
+/// A direction is determined only if the noise of the points moves the part along it by at most
+/// this many mm (1 σ); turns are measured as the way of a point at the part's radius.
 const LARGEST_SIGMA_MM: f64 = 0.05;
-/// A component is left out if more than this share of it lies in directions that are not determined.
+/// A component is left out if more than this share of it lies in directions that are not
+/// determined.
 const SHARE: f64 = 0.5;
 
 impl Directions {
-    /// Of a normal matrix Σ j jᵀ of rows in mm per mm. `noise` is what errors of the normals add to it, `sigma_mm` the
-    /// error of a residual, 1 σ.
+    /// Of a normal matrix Σ j jᵀ of rows in mm per mm. `noise` is what errors of the normals add to
+    /// it, `sigma_mm` the error of a residual, 1 σ.
     pub fn of(normal: &Matrix6, noise: &Matrix6, sigma_mm: f64) -> Self {
         let (values, vectors) = eigen(normal);
         let (mut kept, mut free) = (heapless::Vec::new(), heapless::Vec::new());
@@ -125,7 +128,8 @@ impl Directions {
         x
     }
 
-    /// A⁺ C A⁺, A⁺ the inverse along the directions that are determined: the covariance of x where b has covariance C.
+    /// A⁺ C A⁺, A⁺ the inverse along the directions that are determined: the covariance of x where
+    /// b has covariance C.
     pub fn covariance(&self, of_right: &Matrix6) -> Matrix6 {
         let mut covariance = [[0.0; 6]; 6];
         for (p, u) in &self.kept {

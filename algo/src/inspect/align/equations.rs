@@ -1,8 +1,8 @@
 //! The equations of the points in the linear problem, and their weighted sums.
 //!
 //! # Shapes and units
-//! Lengths in mm. Points are kept and summed four at a time, in their order: a sum is that of four sums over every fourth point, the same
-//! for all back-ends.
+//! Lengths in mm. Points are kept and summed four at a time, in their order: a sum is that of four
+//! sums over every fourth point, the same for all back-ends.
 
 use super::directions::Matrix6;
 use super::weight::WeightFunction;
@@ -100,8 +100,8 @@ impl Equations {
         libm::sqrt(self.both / self.points as f64)
     }
 
-    /// Weighs the points by their residuals after a further motion. σ of the residuals is that of their median, at least `least`;
-    /// the answer.
+    /// Weighs the points by their residuals after a further motion. σ of the residuals is that of
+    /// their median, at least `least`; the answer.
     pub fn weigh(
         &mut self,
         backend: Backend,
@@ -152,7 +152,8 @@ impl Equations {
         weights.filter(|weight| **weight > 0.0).count()
     }
 
-    /// Covariance of the right-hand side, mm², with Tukey's weights after a further motion; `scale` is σ of the residuals.
+    /// Covariance of the right-hand side, mm², with Tukey's weights after a further motion; `scale`
+    /// is σ of the residuals.
     pub fn covariance(&mut self, backend: Backend, further: &[f64; 6], scale: f64) -> Matrix6 {
         self.find_residuals(backend, further);
         self.find_weights(backend, WeightFunction::Tukey, scale);
@@ -191,8 +192,9 @@ impl Sums {
         core::array::from_fn(|i| self.0[SQUARES + i])
     }
 
-    /// Σ w n (x xᵀ + y yᵀ). n is the variance of the x and y of a point's lift m, and q its lever. The point's Jacobian is (m, q × m);
-    /// its derivatives by m_x and m_y are x = (1, 0, 0, 0, q_z, −q_y) and y = (0, 1, 0, −q_z, 0, q_x).
+    /// Σ w n (x xᵀ + y yᵀ). n is the variance of the x and y of a point's lift m, and q its lever.
+    /// The point's Jacobian is (m, q × m); its derivatives by m_x and m_y are x = (1, 0, 0, 0, q_z,
+    /// −q_y) and y = (0, 1, 0, −q_z, 0, q_x).
     pub fn lift_noise(&self) -> Matrix6 {
         let [n, x, y, z, zz, xz, yz, xx_yy] = core::array::from_fn(|i| self.0[SQUARES + 6 + i]);
         mirrored([

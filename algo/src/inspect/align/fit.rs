@@ -1,23 +1,26 @@
-//! The motion that brings measured points onto the golden surface: iterated, robust linear least squares.
+//! The motion that brings measured points onto the golden surface: iterated, robust linear least
+//! squares.
 //!
 //! # Idea
-//! Iteratively reweighted least squares of residuals along the camera's rays: a dent does not pull the part, and a bend is told
-//! from a motion by how many points agree with either.
+//! Iteratively reweighted least squares of residuals along the camera's rays: a dent does not pull
+//! the part, and a bend is told from a motion by how many points agree with either.
 //!
 //! # Equations
-//! A point p, after a motion is taken back, lies r = z − G(π(p)) above the golden surface G on its own ray π(p). A further shift τ and
-//! turn ω about c change that by −m·(τ + ω × (p − c)), m the facet's lift (point to plane: Y. Chen, G. Medioni, 1992). About one motion
-//! the problem is linear: 6 × 6 normal equations, solved along the directions that the shape determines. Residuals and lifts
-//! are worked out anew only where the solution leads far from that motion; about no motion at all they are planned
-//! beforehand. Weights are Huber's, then Tukey's (c = 1.345 and 4.685: 95 % efficient for normal errors; P. J. Huber, E. M. Ronchetti,
-//! *Robust Statistics*).
+//! A point p, after a motion is taken back, lies r = z − G(π(p)) above the golden surface G on its
+//! own ray π(p). A further shift τ and turn ω about c change that by −m·(τ + ω × (p − c)), m the
+//! facet's lift (point to plane: Y. Chen, G. Medioni, 1992). About one motion the problem is
+//! linear: 6 × 6 normal equations, solved along the directions that the shape determines. Residuals
+//! and lifts are worked out anew only where the solution leads far from that motion; about no
+//! motion at all they are planned beforehand. Weights are Huber's, then Tukey's (c = 1.345 and
+//! 4.685: 95 % efficient for normal errors; P. J. Huber, E. M. Ronchetti, *Robust Statistics*).
 //!
 //! # Shapes and units
-//! The unknowns are shifts in mm and turns as the way, in mm, of a point at the part's radius. Sums run over the points in
-//! their order.
+//! The unknowns are shifts in mm and turns as the way, in mm, of a point at the part's radius. Sums
+//! run over the points in their order.
 //!
 //! # Accuracy
-//! `a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components`, `a_dent_over_a_tenth_of_the_part_does_not_pull_it`.
+//! `a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components`,
+//! `a_dent_over_a_tenth_of_the_part_does_not_pull_it`.
 
 use super::Alignment;
 use super::directions::{Directions, Matrix6, form};
@@ -44,7 +47,8 @@ pub struct Sample {
 pub struct Placed {
     /// The motion from where it was taught.
     pub motion: Motion,
-    /// Covariance of the motion over repeated measurements, mm²; turns as the way of a point at the radius.
+    /// Covariance of the motion over repeated measurements, mm²; turns as the way of a point at the
+    /// radius.
     pub covariance: Matrix6,
     /// The part's radius, mm.
     pub radius: f64,
@@ -54,16 +58,17 @@ pub struct Placed {
     pub points: usize,
     /// Share of the points that do not.
     pub outliers: f64,
-    /// How far the motion takes the corner of the part's box that it takes farthest, mm: of all motions that differ along directions that
-    /// the shape does not determine, the one that takes it least far.
+    /// How far the motion takes the corner of the part's box that it takes farthest, mm: of all
+    /// motions that differ along directions that the shape does not determine, the one that takes
+    /// it least far.
     pub reach: f64,
     /// The error of that way, mm (1 σ).
     pub reach_sigma: f64,
 }
 
 impl Placed {
-    /// Component 0 to 5 of the motion and its error (1 σ): shifts in mm, turns in degrees; none if the part's shape does not
-    /// determine it.
+    /// Component 0 to 5 of the motion and its error (1 σ): shifts in mm, turns in degrees; none if
+    /// the part's shape does not determine it.
     pub fn component(&self, component: usize) -> Option<(f64, f64)> {
         let determined = !*self.left_out.get(component)?;
         let value = self.motion.values()[component];
@@ -77,12 +82,12 @@ impl Placed {
 
 /// Fewer points determine no motion.
 const LEAST_POINTS: usize = 24;
-/// Reweightings with each kind of weight, and the change of the solution below which they end: a fiftieth of the noise of the
-/// motion.
+/// Reweightings with each kind of weight, and the change of the solution below which they end: a
+/// fiftieth of the noise of the motion.
 const REWEIGHTINGS: usize = 8;
 const SMALL_CHANGE_MM: f64 = 1e-4;
-/// How often the problem is linearised, and how far from there it is taken to be linear: a surface with a radius of curvature of
-/// 2 mm is 0.6 µm off its facet there.
+/// How often the problem is linearised, and how far from there it is taken to be linear: a surface
+/// with a radius of curvature of 2 mm is 0.6 µm off its facet there.
 const ROUNDS: usize = 8;
 const NEAR_MM: f64 = 0.05;
 /// Corners of a box, and halvings until the least farthest way is known to a thousandth.
@@ -103,7 +108,8 @@ pub struct Fitting<'a> {
     pub golden: GoldenSurface<'a>,
     /// Where it is looked at, and the point that is turned about.
     pub plan: &'a Alignment,
-    /// The motion to begin with; directions that the shape does not determine keep it. None: none at all.
+    /// The motion to begin with; directions that the shape does not determine keep it. None: none
+    /// at all.
     pub from: Option<Motion>,
     pub(super) backend: Backend,
 }
@@ -128,8 +134,9 @@ struct Solved {
 impl Fitting<'_> {
     /// How the part lies; none if too few points lie on the surface.
     ///
-    /// Where many points disagree, a bent part may have been taken for a moved one: a second descent with Tukey's weights alone stays near
-    /// the part as taught, and the motion with which more points agree is taken.
+    /// Where many points disagree, a bent part may have been taken for a moved one: a second
+    /// descent with Tukey's weights alone stays near the part as taught, and the motion with which
+    /// more points agree is taken.
     pub fn fit(&self, samples: &[Sample], buffers: &mut FitBuffers) -> Option<Placed> {
         let moved = self.descend(WeightFunction::Huber, samples, buffers)?;
         if moved.placed.outliers <= SUSPICIOUS {
@@ -211,15 +218,16 @@ impl Fitting<'_> {
         }
     }
 
-    /// See [`Placed::reach`], and its σ; `free` are the directions that the shape does not determine.
+    /// See [`Placed::reach`], and its σ; `free` are the directions that the shape does not
+    /// determine.
     fn reach(&self, motion: &Motion, free: &[[f64; 6]], covariance: &Matrix6) -> (f64, f64) {
         let mut ways: heapless::Vec<Vector, CORNERS> = heapless::Vec::new();
         let corners = self.plan.corners.iter();
         ways.extend(corners.map(|corner| motion.apply(*corner) - *corner));
         let farthest = |ways: &[Vector]| ways.iter().map(|way| way.length()).fold(0.0, f64::max);
         let mut reach = farthest(&ways);
-        // The farthest way is a convex function of the share of each direction: the interval about its least value is halved, direction by
-        // direction.
+        // The farthest way is a convex function of the share of each direction: the interval about
+        // its least value is halved, direction by direction.
         let mut step = reach / 2.0;
         for _ in 0..HALVINGS {
             for direction in free {

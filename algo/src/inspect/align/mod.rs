@@ -1,4 +1,5 @@
-//! How a part lies against how it was taught: a small rigid motion, by least squares of measured points to the golden surface.
+//! How a part lies against how it was taught: a small rigid motion, by least squares of measured
+//! points to the golden surface.
 
 mod directions;
 mod equations;
@@ -32,7 +33,8 @@ pub struct Spot {
     pub facet: Facet,
 }
 
-/// The plan of an alignment: which pixels are used, and which components of a motion the part's shape determines.
+/// The plan of an alignment: which pixels are used, and which components of a motion the part's
+/// shape determines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
     /// The point that is turned about: the mean of the surface's points, mm.
@@ -50,10 +52,12 @@ pub struct Alignment {
 
 /// About so many rows of the part are used.
 const ROWS: usize = 48;
-/// About so many points are used: the error of their mean is about 1/40 of a pixel's, and the fit takes about 0.15 ms.
+/// About so many points are used: the error of their mean is about 1/40 of a pixel's, and the fit
+/// takes about 0.15 ms.
 const POINTS: usize = 1800;
-/// Where a wall is seen at a grazing angle, an error of the motion of a µm lifts it by tens of µm: the number of points is doubled, up
-/// to this factor, until no spot is lifted by more than [`MOST_LIFT_MM`].
+/// Where a wall is seen at a grazing angle, an error of the motion of a µm lifts it by tens of µm:
+/// the number of points is doubled, up to this factor, until no spot is lifted by more than
+/// [`MOST_LIFT_MM`].
 const MORE_POINTS: usize = 8;
 /// Largest error of a spot's height by that of the motion, mm (1 σ).
 const MOST_LIFT_MM: f64 = 0.01;
@@ -74,7 +78,8 @@ impl Alignment {
         }
     }
 
-    /// Plans it with about so many points. The second value is how a part that lies as taught is then found to lie.
+    /// Plans it with about so many points. The second value is how a part that lies as taught is
+    /// then found to lie.
     fn of_points(
         points: usize,
         golden: GoldenSurface<'_>,
@@ -119,7 +124,8 @@ impl Alignment {
         Some((alignment, placed))
     }
 
-    /// How a part that lies as taught is found to lie, with the noise of golden; none if the surface has too few points.
+    /// How a part that lies as taught is found to lie, with the noise of golden; none if the
+    /// surface has too few points.
     pub fn still(&self, golden: GoldenSurface<'_>) -> Option<Placed> {
         let still = |(at, spot): (usize, &Spot)| Sample {
             point: spot.point,

@@ -2,7 +2,8 @@
 
 use crate::geometry::Vector;
 
-/// p ↦ c + R (p − c) + t, R by the rotation vector's angle about its direction (Rodrigues' formula).
+/// p ↦ c + R (p − c) + t, R by the rotation vector's angle about its direction (Rodrigues'
+/// formula).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// c, the point that is turned about, mm.

@@ -19,22 +19,23 @@ pub struct GoldenSurface<'a> {
 /// A place of the surface and the plane through it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet {
-    /// m: a point that moves by δ rises by m·δ above the surface, both heights taken on the point's own ray. It is the
-    /// scaled normal n / (n·d), d the ray with d_z = 1.
+    /// m: a point that moves by δ rises by m·δ above the surface, both heights taken on the point's
+    /// own ray. It is the scaled normal n / (n·d), d the ray with d_z = 1.
     pub lift: Vector,
     /// The area in x and y that a pixel sees, mm².
     pub area: f64,
-    /// Error of m's x and y, 1 σ: that by the noise of the heights of one measurement. Golden may be the mean of several, but the
-    /// errors of slopes by pattern, blur and lenses, which no mean lowers, remain: on a body that can turn about its axis they
-    /// would else be taken for a shape that determines this turn.
+    /// Error of m's x and y, 1 σ: that by the noise of the heights of one measurement. Golden may
+    /// be the mean of several, but the errors of slopes by pattern, blur and lenses, which no mean
+    /// lowers, remain: on a body that can turn about its axis they would else be taken for a shape
+    /// that determines this turn.
     pub lift_noise: f64,
     /// Error of a height by the noise of one measurement, mm (1 σ).
     pub sigma: f64,
 }
 
 impl Facet {
-    /// −∂r/∂x at a point, r its height above the surface: what a shift in mm and a turn about `centre`, as the way in mm of a
-    /// point at `radius`, take off it where they are taken back.
+    /// −∂r/∂x at a point, r its height above the surface: what a shift in mm and a turn about
+    /// `centre`, as the way in mm of a point at `radius`, take off it where they are taken back.
     pub fn jacobian(&self, point: Vector, (centre, radius): (Vector, f64)) -> [f64; 6] {
         let turning = (point - centre).cross(self.lift) * (1.0 / radius);
         let lift = self.lift;
@@ -49,7 +50,8 @@ impl Facet {
 
 /// The plane is fitted to the heights of a square of this many pixels to each side.
 const REACH: usize = 2;
-/// Distance over which the camera's derivatives are taken, mm: small against the working distance, large against rounding.
+/// Distance over which the camera's derivatives are taken, mm: small against the working distance,
+/// large against rounding.
 const DELTA_MM: f64 = 0.01;
 /// Σ i² over that square.
 const SQUARES: f64 = 50.0;
@@ -77,8 +79,8 @@ impl GoldenSurface<'_> {
         Some(upper + (lower - upper) * fv)
     }
 
-    /// The facet about the pixel next to where `point` is `seen`: where the camera projects it. None unless all pixels of its square are
-    /// compared.
+    /// The facet about the pixel next to where `point` is `seen`: where the camera projects it.
+    /// None unless all pixels of its square are compared.
     pub fn facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
         self.facet_of(point, seen, Taught::all_compared)
     }

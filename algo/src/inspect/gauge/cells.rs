@@ -31,7 +31,8 @@ pub struct TooFine {
 const MAX_CELLS: usize = 1 << 16;
 /// A gauge that leaves the side of its cells to the grid has about so many.
 const CELLS: usize = 1024;
-/// A cell with fewer than this share of its square's pixels is left out, if the gauge asks for a side.
+/// A cell with fewer than this share of its square's pixels is left out, if the gauge asks for a
+/// side.
 const MIN_SUPPORT: f64 = 0.5;
 /// Least side of such cells in pixels.
 const MIN_SIDE: usize = 4;
@@ -125,7 +126,8 @@ pub struct Cell {
     pub at: usize,
     /// Pixels whose noise makes its error.
     pub pixels: f64,
-    /// Height, mm: as taught plus the mean deviation, so that it does not depend on which pixels of the cell were measured.
+    /// Height, mm: as taught plus the mean deviation, so that it does not depend on which pixels of
+    /// the cell were measured.
     pub height: f64,
     /// Deviation from golden in height, mm.
     pub deviation: f64,
@@ -133,9 +135,10 @@ pub struct Cell {
     pub taught: TaughtCell,
 }
 
-/// Appends the cells of a region to `out`; none if less than half of the pixels that it had as taught were measured. With `least`,
-/// only cells with at least so many measured pixels. Without, all cells that it had as taught: one without a measured pixel
-/// gets the mean deviation of the others.
+/// Appends the cells of a region to `out`; none if less than half of the pixels that it had as
+/// taught were measured. With `least`, only cells with at least so many measured pixels. Without,
+/// all cells that it had as taught: one without a measured pixel gets the mean deviation of the
+/// others.
 pub fn cells(sums: &[Sum], taught: &[TaughtCell], least: Option<i64>, out: &mut Vec<Cell>) {
     let had: u64 = taught.iter().map(|cell| u64::from(cell.pixels)).sum();
     let has: i64 = sums.iter().map(|sum| sum.count).sum();

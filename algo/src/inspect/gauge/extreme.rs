@@ -1,14 +1,16 @@
 //! What gauges that are not linear in height share: models of the errors of extremes and shares.
 //!
-//! Cells do not share pixels, so the errors of their means are independent, with σ² = σ_z² / side² each. The models need the
-//! cells' values only; `tests/suite/precision.rs` compares them with simulation.
+//! Cells do not share pixels, so the errors of their means are independent, with σ² = σ_z² / side²
+//! each. The models need the cells' values only; `tests/suite/precision.rs` compares them with
+//! simulation.
 
 use super::{Cell, Found};
 use crate::inspect::align::{Placed, form};
 use core::f64::consts::{PI, SQRT_2};
 
-/// Largest less smallest value, one per cell. Its error is made of those of both ends, each the largest of many noisy values,
-/// and of what an error of the motion does to the difference of the two cells.
+/// Largest less smallest value, one per cell. Its error is made of those of both ends, each the
+/// largest of many noisy values, and of what an error of the motion does to the difference of the
+/// two cells.
 pub(super) fn range(
     cells: &[Cell],
     values: &mut [f64],
@@ -38,14 +40,17 @@ pub(super) fn motion(g: &[f64; 6], placed: Option<&Placed>) -> f64 {
     placed.map_or(0.0, |placed| form(g, &placed.covariance, g).max(0.0))
 }
 
-/// Rounds in which the scatter of values is found without those that lie more than [`CLIP`] times of it off their mean.
+/// Rounds in which the scatter of values is found without those that lie more than [`CLIP`] times
+/// of it off their mean.
 const ROUNDS: usize = 4;
 const CLIP: f64 = 3.0;
-/// The largest of all values belongs to a defect, not to noise, where it lies more than this many times the scatter off the mean.
+/// The largest of all values belongs to a defect, not to noise, where it lies more than this many
+/// times the scatter off the mean.
 const DEFECT: f64 = 5.0;
 
-/// Estimates of true values: the measured ones, moved towards their mean until their scatter is less by σ², so that the scatter that
-/// the errors make does not count twice. Those of a defect stay where they are.
+/// Estimates of true values: the measured ones, moved towards their mean until their scatter is
+/// less by σ², so that the scatter that the errors make does not count twice. Those of a defect
+/// stay where they are.
 pub(super) struct Drawn {
     mean: f64,
     scatter: f64,
@@ -73,7 +78,8 @@ impl Drawn {
         }
     }
 
-    /// Whether a measured value lies more than `defect` times the scatter off the mean, and so belongs to a defect.
+    /// Whether a measured value lies more than `defect` times the scatter off the mean, and so
+    /// belongs to a defect.
     pub fn is_off(&self, measured: f64, defect: f64) -> bool {
         libm::fabs(measured - self.mean) > defect * self.scatter
     }
@@ -91,8 +97,8 @@ impl Drawn {
 const BINS_PER_SIGMA: f64 = 4.0;
 const BINS: usize = 40;
 
-/// Standard deviation, over repeated measurements, of the largest of values with an error of `sigma` each, from its distribution
-/// F(x) = Π Φ((x − mᵢ)/σ), m the true values ([`Drawn`]).
+/// Standard deviation, over repeated measurements, of the largest of values with an error of
+/// `sigma` each, from its distribution F(x) = Π Φ((x − mᵢ)/σ), m the true values ([`Drawn`]).
 fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
     if !(sigma > 0.0) {
         return 0.0;
@@ -107,7 +113,8 @@ fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
             bins[bin as usize] += 1.0;
         }
     }
-    // Integrated from 4 σ below the largest to 6 σ above in intervals of σ/8; the largest of a million reaches 5 σ.
+    // Integrated from 4 σ below the largest to 6 σ above in intervals of σ/8; the largest of a
+    // million reaches 5 σ.
     const STEP: f64 = 0.125;
     let (mut first, mut second) = (0.0, 0.0);
     for i in 0..80 {

@@ -5,8 +5,9 @@ use super::kind::*;
 use super::level::Plane;
 
 kind! {
-    /// The distance between the two planes parallel to the least-squares plane that enclose all cells, mm: peak-to-valley
-    /// flatness deviation FLTt about the reference plane LSPL of ISO 12781-1.
+    /// The distance between the two planes parallel to the least-squares plane that enclose all
+    /// cells, mm: peak-to-valley flatness deviation FLTt about the reference plane LSPL of ISO
+    /// 12781-1.
     Flatness {
         /// Side of the cells, pixels.
         smoothing_px: usize,

@@ -13,7 +13,8 @@ pub(super) use alloc::vec::Vec;
 /// What a value is worked out from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Basis {
-    /// The mean deviations of the squares of so many pixels a side about every pixel: odd, so that a square has a middle pixel.
+    /// The mean deviations of the squares of so many pixels a side about every pixel: odd, so that
+    /// a square has a middle pixel.
     Squares(usize),
     /// Cells of so many pixels a side.
     Cells(usize),
@@ -59,13 +60,15 @@ pub struct Facts {
     pub unit: Unit,
     /// What its value is worked out from.
     pub basis: Basis,
-    /// What its fields say, in words behind the kind's name; each name of a field in braces stands for its value.
+    /// What its fields say, in words behind the kind's name; each name of a field in braces stands
+    /// for its value.
     pub words: &'static str,
     /// Whether its value is made of deviations from golden along its normal, and not of heights.
     pub compares: bool,
     /// Whether no part can have a value below 0, which the unit does not say.
     pub never_negative: bool,
-    /// The deviation or height that the noise of a square or cell must stay below; without it the gauge's limits are.
+    /// The deviation or height that the noise of a square or cell must stay below; without it the
+    /// gauge's limits are.
     pub noise_limit: Option<f64>,
 }
 
@@ -136,7 +139,8 @@ macro_rules! kind {
 }
 pub(super) use kind;
 
-/// The cells of a gauge's regions as they were measured. Those of a kind that compares are along golden's normal.
+/// The cells of a gauge's regions as they were measured. Those of a kind that compares are along
+/// golden's normal.
 pub struct Evidence<'a> {
     /// The cells of its region, then those of the one that it is compared with.
     pub all: &'a [Cell],
@@ -165,10 +169,11 @@ impl<'a> Evidence<'a> {
         &self.all[self.count..]
     }
 
-    /// A value that is linear in height, whose derivatives w over the heights of the cells are in the room: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g.
-    /// n are a cell's pixels, σ_z² is the variance of one of them, g = Σ wᵢ jᵢ is the derivative of the value over the motion, j a cell's
-    /// Jacobian, and C the motion's covariance. The two terms are taken as independent: the pixels that the motion is found from are one
-    /// in some dozens of the gauge's.
+    /// A value that is linear in height, whose derivatives w over the heights of the cells are in
+    /// the room: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g. n are a cell's pixels, σ_z² is the variance of one
+    /// of them, g = Σ wᵢ jᵢ is the derivative of the value over the motion, j a cell's Jacobian,
+    /// and C the motion's covariance. The two terms are taken as independent: the pixels that the
+    /// motion is found from are one in some dozens of the gauge's.
     pub fn linear(&self, value: f64) -> Found {
         let (mut pixels, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
         for (at, (w, cell)) in self.room.iter().zip(self.all).enumerate() {

@@ -1,4 +1,5 @@
-//! What gauges that are linear in height share: their errors follow exactly from those of the pixels ([`Evidence::linear`](super::Evidence::linear)).
+//! What gauges that are linear in height share: their errors follow exactly from those of the
+//! pixels ([`Evidence::linear`](super::Evidence::linear)).
 
 use super::Cell;
 use alloc::vec::Vec;
@@ -19,7 +20,8 @@ pub(super) fn mean(cells: &[Cell], out: &mut Vec<f64>) -> Option<f64> {
     Some(sum / all)
 }
 
-/// The least-squares plane z = z₀ + p·(x − x₀) + q·(y − y₀) of cells, each weighing as its pixels as taught.
+/// The least-squares plane z = z₀ + p·(x − x₀) + q·(y − y₀) of cells, each weighing as its pixels
+/// as taught.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plane {
     pub centre: [f64; 3],

@@ -1,8 +1,9 @@
 //! What a gauge measures, and how its value and error follow from cells.
 //!
-//! A region is divided into square cells of pixels in golden's frame. A strip adds each measured pixel to the cell that holds its
-//! taught coordinates. The height of a cell is its taught height plus its pixels' mean deviation, so on a slope too it does not
-//! depend on which of them were measured. The values of all gauges but coverage, deviation and placement are worked out from
+//! A region is divided into square cells of pixels in golden's frame. A strip adds each measured
+//! pixel to the cell that holds its taught coordinates. The height of a cell is its taught height
+//! plus its pixels' mean deviation, so on a slope too it does not depend on which of them were
+//! measured. The values of all gauges but coverage, deviation and placement are worked out from
 //! these heights and deviations.
 
 mod cells;
@@ -39,12 +40,14 @@ pub(super) const MIN_SUPPORT: f64 = 0.5;
 pub struct Reading {
     /// The value in mm or as a share.
     pub value: f64,
-    /// Its error over repeated measurements of the same part, 1 σ, where the noise is known. Golden's own noise adds the same error
-    /// every time and is not in it.
+    /// Its error over repeated measurements of the same part, 1 σ, where the noise is known.
+    /// Golden's own noise adds the same error every time and is not in it.
     pub sigma: Option<f64>,
-    /// What its magnitude is expected to be on a good part with this noise: of a deviation, which is an extreme, and so not 0.
+    /// What its magnitude is expected to be on a good part with this noise: of a deviation, which
+    /// is an extreme, and so not 0.
     pub expected: Option<f64>,
-    /// What is the same in every measurement and so not in σ, 1 σ: the effect of golden's noise and of the calibration's error.
+    /// What is the same in every measurement and so not in σ, 1 σ: the effect of golden's noise and
+    /// of the calibration's error.
     pub systematic: f64,
     /// Where the value is, of a deviation.
     pub square: Option<Square>,
@@ -70,11 +73,13 @@ pub struct Found {
     pub pixels: f64,
     /// Variance by the error of the part's motion.
     pub motion: f64,
-    /// By how much errors of all heights of 1 mm, each with the sign that does most, change the value.
+    /// By how much errors of all heights of 1 mm, each with the sign that does most, change the
+    /// value.
     pub lever: f64,
 }
 
-/// The table of all kinds. A row is the file of a kind and an example; the struct's name in snake case is that of the kind in recipes.
+/// The table of all kinds. A row is the file of a kind and an example; the struct's name in snake
+/// case is that of the kind in recipes.
 macro_rules! kinds {
     ($($file:ident: $kind:ident { $($field:ident: $value:expr),* },)*) => {
         /// Every kind of gauge, each in its own file.

@@ -24,8 +24,9 @@ impl Kind for RmsDeviation {
         }
     }
 
-    /// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C g: the scatter of d² about fixed true
-    /// deviations, whose squares are estimated by d² − σ², and the error of the motion, g = Σ 2dᵢ jᵢ / n.
+    /// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C
+    /// g: the scatter of d² about fixed true deviations, whose squares are estimated by d² − σ²,
+    /// and the error of the motion, g = Σ 2dᵢ jᵢ / n.
     fn find(&self, of: Evidence<'_>) -> Option<Found> {
         let (cells, sigma) = (of.cells(), of.sigma);
         if cells.is_empty() {

@@ -1,4 +1,5 @@
-//! The cells of a region as they were taught: place, size, and how their heights change with a motion of the part.
+//! The cells of a region as they were taught: place, size, and how their heights change with a
+//! motion of the part.
 
 use super::Grid;
 use crate::geometry::Vector;
@@ -20,12 +21,14 @@ pub struct TaughtCell {
     pub y: f64,
     /// Their area in x and y, mm².
     pub area: f64,
-    /// −∂z/∂x of its height over the components x of the motion that is taken back: shifts in mm, turns as the way of a point at
-    /// the radius in mm ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)).
+    /// −∂z/∂x of its height over the components x of the motion that is taken back: shifts in mm,
+    /// turns as the way of a point at the radius in mm
+    /// ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)).
     pub jacobian: [f64; 6],
     /// Σ of the variances of its pixels' heights, mm².
     pub variance: f64,
-    /// The share of a height difference that lies along the normal ([`normal_shares`](crate::inspect::normal_shares)).
+    /// The share of a height difference that lies along the normal
+    /// ([`normal_shares`](crate::inspect::normal_shares)).
     pub normal: f64,
 }
 
@@ -88,7 +91,8 @@ pub(in crate::inspect) fn taught_cells(
     }
     let all: f64 = facets.iter().sum();
     let total = cells.iter().map(|cell| cell.area).sum::<f64>();
-    // A cell without a facet is taken to have pixels as large as those of the others, and to be flat.
+    // A cell without a facet is taken to have pixels as large as those of the others, and to be
+    // flat.
     let (mean, flat) = (total / all.max(1.0), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
     for (cell, facets) in cells.iter_mut().zip(facets) {
         let pixels = f64::from(cell.pixels);

@@ -18,7 +18,8 @@ pub enum Axis {
 }
 
 kind! {
-    /// The angle of the least-squares plane about an axis, degrees, right-handed; 0 is parallel to the plane z = 0.
+    /// The angle of the least-squares plane about an axis, degrees, right-handed; 0 is parallel to
+    /// the plane z = 0.
     Tilt {
         /// The axis.
         about: Axis,

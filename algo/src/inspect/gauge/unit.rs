@@ -35,8 +35,8 @@ impl Unit {
         }
     }
 
-    /// The smallest and the largest limit: a share is 0 to 1, an angle a half turn either way; anything else is what a
-    /// register holds, ±(2³¹ − 1) of its steps.
+    /// The smallest and the largest limit: a share is 0 to 1, an angle a half turn either way;
+    /// anything else is what a register holds, ±(2³¹ − 1) of its steps.
     pub fn range(self) -> [f64; 2] {
         let most = match self {
             Self::Share => return [0.0, 1.0],

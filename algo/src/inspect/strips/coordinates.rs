@@ -1,5 +1,5 @@
-//! Stage 3, align: the taught coordinates of a row's pixels, and how far they deviate from golden there: in height, for cells, and along the
-//! normal, for squares.
+//! Stage 3, align: the taught coordinates of a row's pixels, and how far they deviate from golden
+//! there: in height, for cells, and along the normal, for squares.
 
 use super::Production;
 use super::displaced::{
@@ -41,8 +41,9 @@ impl TaughtCoordinates {
         }
     }
 
-    /// Takes the part's motion back in row `v`, whose heights were found last: its deviations become those from golden at the
-    /// taught coordinates, along the normal. Coordinates are found for cells only.
+    /// Takes the part's motion back in row `v`, whose heights were found last: its deviations
+    /// become those from golden at the taught coordinates, along the normal. Coordinates are found
+    /// for cells only.
     pub fn align(
         &mut self,
         plan: &Production,
@@ -103,7 +104,8 @@ impl TaughtCoordinates {
         }
     }
 
-    /// What the height difference at pixel `u`, whose coordinates were found last, was multiplied by.
+    /// What the height difference at pixel `u`, whose coordinates were found last, was multiplied
+    /// by.
     pub fn factor(&self, plan: &Production, u: usize) -> f64 {
         let place = self.row[u] as usize * plan.size().0 + self.column[u] as usize;
         plan.taught.factor(place)

@@ -1,4 +1,5 @@
-//! Stage 4, accumulate: what the rows of a strip count: pixels of each trust, heights, coverage, and cells of gauges.
+//! Stage 4, accumulate: what the rows of a strip count: pixels of each trust, heights, coverage,
+//! and cells of gauges.
 
 use super::coordinates::TaughtCoordinates;
 use super::coverage::{add_variances, count_known};

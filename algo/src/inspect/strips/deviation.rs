@@ -1,17 +1,19 @@
 //! Stage 5, gauge: the reading of a deviation, the square with the largest mean.
 //!
-//! Height differences are multiplied by the factors w of their pixels: the share along golden's normal times the weight. The mean over n
-//! pixels has, with σ_p the noise of a pixel's height and C the covariance of the motion that was taken back,
+//! Height differences are multiplied by the factors w of their pixels: the share along golden's
+//! normal times the weight. The mean over n pixels has, with σ_p the noise of a pixel's height and
+//! C the covariance of the motion that was taken back,
 //!
 //! ```text
 //! σ² = Σ w² σ_p² / n² + gᵀ C g        g = Σ w j / n
 //! ```
 //!
-//! The deviation is the largest of many such means, so its own error is that of an extreme ([`largest`](crate::inspect::largest)): of
-//! noise, and of all squares that come near the one that was found. The motion's error differs from place to place, so each of these has its
-//! own.
-//! j is the Jacobian of a pixel's height over the motion ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)); it changes
-//! little over a square, so its mean over some pixels is taken.
+//! The deviation is the largest of many such means, so its own error is that of an extreme
+//! ([`largest`](crate::inspect::largest)): of noise, and of all squares that come near the one that
+//! was found. The motion's error differs from place to place, so each of these has its own. j is
+//! the Jacobian of a pixel's height over the motion
+//! ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)); it changes little over a square,
+//! so its mean over some pixels is taken.
 
 use super::height::base_nm;
 use super::pose::PoseField;
@@ -67,8 +69,8 @@ impl SquareNoise {
         }
     }
 
-    /// The variances of the mean over `count` pixels, mm²: by the pixels' noise and by the motion; and its lever, by which an error of all
-    /// heights changes it.
+    /// The variances of the mean over `count` pixels, mm²: by the pixels' noise and by the motion;
+    /// and its lever, by which an error of all heights changes it.
     fn variances(&self, count: f64, placed: Option<&Placed>) -> (f64, f64, f64) {
         // Beside an edge no pixel may have a facet: the surface is then taken to be flat.
         let mean = match self.sampled > 0.0 {
@@ -83,8 +85,9 @@ impl SquareNoise {
 }
 
 impl Production {
-    /// The reading of the first of the squares of `side` pixels that were found, in falling order; none if there is none. σ_z is `noisier`
-    /// times the taught σ. The errors of the squares are worked out here, for these few alone.
+    /// The reading of the first of the squares of `side` pixels that were found, in falling order;
+    /// none if there is none. σ_z is `noisier` times the taught σ. The errors of the squares are
+    /// worked out here, for these few alone.
     pub(super) fn deviation(
         &self,
         (found, side): (&[Extreme], usize),
@@ -116,7 +119,8 @@ impl Production {
             value: best.sum as f64 / best.count as f64 / 1e6,
             sigma: (sigma > 0.0).then_some(sigma),
             expected: Some(largest.mean).filter(|mean| *mean > 0.0),
-            // The extreme of noise scatters with golden's noise, too; that of a defect is shifted by it.
+            // The extreme of noise scatters with golden's noise, too; that of a defect is shifted
+            // by it.
             systematic: libm::hypot(
                 libm::sqrt(
                     golden * (extreme.defect * pixels + motion * smoothed / self.spot_variance()),
@@ -131,8 +135,8 @@ impl Production {
         })
     }
 
-    /// What good parts read that lie so, where noise alone would make this: golden is interpolated between pixels, which a part that is
-    /// displaced by a pixel shows in full.
+    /// What good parts read that lie so, where noise alone would make this: golden is interpolated
+    /// between pixels, which a part that is displaced by a pixel shows in full.
     fn of_displaced(&self, noise: Largest, gauge: usize, placed: Option<&Placed>) -> Largest {
         let displaced = self.displaced.get(gauge).copied().flatten();
         let (Some(displaced), Some(placed)) = (displaced, placed) else {
@@ -169,8 +173,8 @@ impl Production {
         noise
     }
 
-    /// The Jacobian, over the motion, of the height of what a pixel sees `offset_nm` above golden; none where the surface there has
-    /// no facet.
+    /// The Jacobian, over the motion, of the height of what a pixel sees `offset_nm` above golden;
+    /// none where the surface there has no facet.
     pub(super) fn lift(
         &self,
         placed: &Placed,

@@ -110,7 +110,8 @@ pub(super) struct Gauges {
 }
 
 impl Gauges {
-    /// Plans gauges. Deviations are at most `span_nm`; the motion of a part turns it as `alignment` says.
+    /// Plans gauges. Deviations are at most `span_nm`; the motion of a part turns it as `alignment`
+    /// says.
     pub fn new(
         list: Vec<Gauge>,
         golden: GoldenSurface<'_>,

@@ -1,7 +1,8 @@
-//! Stage 2, height: absolute phase → height offset, how far each pixel lies above the golden surface on its own ray.
+//! Stage 2, height: absolute phase → height offset, how far each pixel lies above the golden
+//! surface on its own ray.
 //!
-//! A cubic per pixel gives the offset ([`HeightCubics`](crate::pipeline::HeightCubics)); what it does not reach is triangulated
-//! exactly.
+//! A cubic per pixel gives the offset ([`HeightCubics`](crate::pipeline::HeightCubics)); what it
+//! does not reach is triangulated exactly.
 
 use super::Production;
 use super::recent::RecentRows;
@@ -44,8 +45,8 @@ impl HeightRow {
         }
     }
 
-    /// Finds the heights of columns of row `v`, which has just been decoded. Where the part is compared, the offset is the
-    /// deviation of a part that lies as taught.
+    /// Finds the heights of columns of row `v`, which has just been decoded. Where the part is
+    /// compared, the offset is the deviation of a part that lies as taught.
     pub fn find(
         &mut self,
         plan: &Production,
@@ -202,7 +203,8 @@ impl Production {
         })
     }
 
-    /// σ_z in nm of a pixel with this modulation and ∂z/∂Φ; of a pair that of the pixel's own samples, without its window.
+    /// σ_z in nm of a pixel with this modulation and ∂z/∂Φ; of a pair that of the pixel's own
+    /// samples, without its window.
     pub(super) fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
         let turns = self.decoder.phase_noise(modulation, self.noise);
         libm::fabs(turns * slope) * 1e6

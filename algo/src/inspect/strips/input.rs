@@ -1,4 +1,5 @@
-//! Input of an inspection: all frames, or those of the finest level and what was decoded of the others on arrival.
+//! Input of an inspection: all frames, or those of the finest level and what was decoded of the
+//! others on arrival.
 
 use super::Production;
 use crate::frame::FrameView;
@@ -10,7 +11,8 @@ use crate::pipeline::PhaseMap;
 pub enum Input<'a> {
     /// All frames of the sequence.
     Frames(&'a [FrameView<'a>]),
-    /// What was decoded of all other levels when they arrived ([`crate::pipeline::arrive`]), and the frames of the finest level.
+    /// What was decoded of all other levels when they arrived ([`crate::pipeline::arrive`]), and
+    /// the frames of the finest level.
     Finest(&'a Arrived, &'a [FrameView<'a>]),
     /// The phases of the whole frame, as a pair gives them ([`Production::place_pair`]).
     Phases(&'a PhaseMap),

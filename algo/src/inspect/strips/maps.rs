@@ -1,4 +1,5 @@
-//! Maps of the whole frame, for people: written on request, and what a gauge of deviation makes of them.
+//! Maps of the whole frame, for people: written on request, and what a gauge of deviation makes of
+//! them.
 
 use super::squares::extreme::least_support;
 use super::{Production, Strips};
@@ -11,8 +12,8 @@ use alloc::vec::Vec;
 pub struct Maps<'a> {
     /// z in mm of each pixel with a height, as the part lies.
     pub heights: Option<&'a mut [f32]>,
-    /// Deviation from golden along its normal in mm of each pixel that is compared, as the squares of a gauge get it: the part's motion
-    /// taken back, times golden's weight.
+    /// Deviation from golden along its normal in mm of each pixel that is compared, as the squares
+    /// of a gauge get it: the part's motion taken back, times golden's weight.
     pub deviation: Option<&'a mut [f32]>,
 }
 
@@ -37,10 +38,11 @@ impl<'a> Maps<'a> {
 }
 
 impl Production {
-    /// The mean deviation over the square about each pixel for a gauge of squares of `side` pixels, mm, from [`Maps::deviation`] of what was
-    /// inspected last in these strips. NaN where a gauge would not look: the middle is not compared, less than half of the square is, or the
-    /// middle lies outside of the regions, moved with the part, that gauges compare with golden. Without such gauges there
-    /// are means wherever the part is compared.
+    /// The mean deviation over the square about each pixel for a gauge of squares of `side` pixels,
+    /// mm, from [`Maps::deviation`] of what was inspected last in these strips. NaN where a gauge
+    /// would not look: the middle is not compared, less than half of the square is, or the middle
+    /// lies outside of the regions, moved with the part, that gauges compare with golden. Without
+    /// such gauges there are means wherever the part is compared.
     ///
     /// The largest in a gauge's region is its reading, up to the rounding of `deviation`:
     /// `the_map_of_square_means_has_the_reading_of_the_gauge_at_its_place`.
@@ -67,7 +69,8 @@ impl Production {
             .collect()
     }
 
-    /// Which of so many pixels lie in a region that a gauge compares with golden; all if there is no such gauge.
+    /// Which of so many pixels lie in a region that a gauge compares with golden; all if there is
+    /// no such gauge.
     fn compared_regions(&self, strips: &Strips, pixels: usize) -> Vec<bool> {
         let gauges = self.gauges.list.iter().enumerate();
         let mut comparing = gauges

@@ -1,26 +1,33 @@
 //! From frames to the readings of gauges in one pass over strips of rows.
 //!
 //! # Idea
-//! A strip works on one row at a time, so that everything stays in the processor's cache. Each row goes through the stages
+//! A strip works on one row at a time, so that everything stays in the processor's cache. Each row
+//! goes through the stages
 //!
 //! 1. **decode** (`decode`): frames → absolute phase Φ, modulation, trust;
-//! 2. **height** (`height`): Φ → height offset z − z₀ above the golden surface, on the pixel's own ray;
-//! 3. **align** (`coordinates`, `displaced`): takes the part's motion back by the pose field (`pose`): the pixel's taught coordinates,
-//!    and its deviation from golden there, in height and, weighted, along golden's normal ([`normal_shares`](super::normal_shares));
-//! 4. **accumulate** (`counts`, `coverage`, `squares`): counts, the sums of the gauges' cells ([`gauge`](super::gauge)), and
-//!    the square with the largest mean deviation along the normal; for the squares, the rows before this one are kept (`recent`);
-//! 5. **gauge** (`findings`, `deviation`, `uncertainty`): after all strips, readings and their errors from these sums.
+//! 2. **height** (`height`): Φ → height offset z − z₀ above the golden surface, on the pixel's own
+//!    ray;
+//! 3. **align** (`coordinates`, `displaced`): takes the part's motion back by the pose field
+//!    (`pose`): the pixel's taught coordinates, and its deviation from golden there, in height and,
+//!    weighted, along golden's normal ([`normal_shares`](super::normal_shares));
+//! 4. **accumulate** (`counts`, `coverage`, `squares`): counts, the sums of the gauges' cells
+//!    ([`gauge`](super::gauge)), and the square with the largest mean deviation along the normal;
+//!    for the squares, the rows before this one are kept (`recent`);
+//! 5. **gauge** (`findings`, `deviation`, `uncertainty`): after all strips, readings and their
+//!    errors from these sums.
 //!
-//! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few points of each are kept: the
-//! motion is found from these, in the order of the rows.
+//! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few
+//! points of each are kept: the motion is found from these, in the order of the rows.
 //!
 //! # Shapes and units
-//! No map of the whole frame is written, except those that are asked for (`maps`). Strips overlap by half of the largest square, so each
-//! finds all squares about its own rows. Offsets and deviations are in nm.
+//! No map of the whole frame is written, except those that are asked for (`maps`). Strips overlap
+//! by half of the largest square, so each finds all squares about its own rows. Offsets and
+//! deviations are in nm.
 //!
 //! # Accuracy
-//! All sums are whole numbers, so the findings do not depend on the number of strips or threads. They are those of a comparison
-//! of whole maps: `strips_find_what_the_comparison_of_whole_maps_finds`,
+//! All sums are whole numbers, so the findings do not depend on the number of strips or threads.
+//! They are those of a comparison of whole maps:
+//! `strips_find_what_the_comparison_of_whole_maps_finds`,
 //! `strips_weigh_deviations_as_the_comparison_of_whole_maps_does`.
 
 mod coordinates;
@@ -63,7 +70,8 @@ use core::ops::Range;
 use pose::PoseField;
 use strip::Strip;
 
-/// The strips of a frame, with the buffers of an inspection. Reused from cycle to cycle, so that a cycle allocates nothing.
+/// The strips of a frame, with the buffers of an inspection. Reused from cycle to cycle, so that a
+/// cycle allocates nothing.
 #[derive(Debug)]
 pub struct Strips {
     strips: Vec<Strip>,
@@ -101,8 +109,9 @@ impl Production {
         }
     }
 
-    /// Inspects a part, in strips from [`Self::strips`]. If `heights` is given (as long as a frame, row-major), it gets
-    /// z in mm, NaN where not resolved and outside of [`Self::window`]. The same as [`Self::place`] and [`Self::inspect_placed`].
+    /// Inspects a part, in strips from [`Self::strips`]. If `heights` is given (as long as a frame,
+    /// row-major), it gets z in mm, NaN where not resolved and outside of [`Self::window`]. The
+    /// same as [`Self::place`] and [`Self::inspect_placed`].
     ///
     /// # Errors
     /// If the frames are not what the decoder was made for. Nothing else can fail.
@@ -121,8 +130,8 @@ impl Production {
         self.inspect_placed(input, strips, placed, maps)
     }
 
-    /// The first half: how the part lies, from a few rows of each strip. None if parts are not aligned ([`Parts::aligned`]), or if
-    /// too few points are resolved.
+    /// The first half: how the part lies, from a few rows of each strip. None if parts are not
+    /// aligned ([`Parts::aligned`]), or if too few points are resolved.
     ///
     /// # Errors
     /// As [`Self::inspect`].
@@ -157,8 +166,8 @@ impl Production {
         Ok(fitting.fit(&strips.samples, &mut strips.fitting))
     }
 
-    /// The second half: the readings of a part that lies so, from the input and strips that it was placed with, and `maps`
-    /// of it.
+    /// The second half: the readings of a part that lies so, from the input and strips that it was
+    /// placed with, and `maps` of it.
     ///
     /// # Errors
     /// As [`Self::inspect`].

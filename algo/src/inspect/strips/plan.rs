@@ -25,26 +25,32 @@ pub struct Parts {
     pub triangulator: Arc<Triangulator>,
     /// How phases become heights.
     pub cubics: Arc<HeightCubics>,
-    /// Φ₀ that phases are unwrapped about and heights counted from, row-major, where it is not that of the cubics: a part of it, or the
-    /// part's phase as taught by this sequence, where the cubics have that by another one.
+    /// Φ₀ that phases are unwrapped about and heights counted from, row-major, where it is not that
+    /// of the cubics: a part of it, or the part's phase as taught by this sequence, where the
+    /// cubics have that by another one.
     pub map: Option<Vec<AbsolutePhase>>,
     /// The part as taught.
     pub taught: Taught,
     /// What is measured.
     pub gauges: Vec<Gauge>,
-    /// The columns of each row that are looked at: every gauge's region with half its smoothing and the part's motion around.
+    /// The columns of each row that are looked at: every gauge's region with half its smoothing and
+    /// the part's motion around.
     pub window: Vec<Range<usize>>,
     /// The noise of one sample by this sequence.
     pub noise: SampleNoise,
-    /// σ of a sample in counts, the same at all pixels, with which σ_z of the compared part as taught has the RMS that it has by `noise`.
+    /// σ of a sample in counts, the same at all pixels, with which σ_z of the compared part as
+    /// taught has the RMS that it has by `noise`.
     pub noise_counts: f64,
     /// Whether the part's motion is found and taken back.
     pub aligned: bool,
-    /// σ of golden's heights, as a multiple of the taught σ, which is that of one measurement with this decoder.
+    /// σ of golden's heights, as a multiple of the taught σ, which is that of one measurement with
+    /// this decoder.
     pub golden_noise: f64,
-    /// Per gauge, what a deviation is on good parts whose only noise is golden's; of other gauges not used.
+    /// Per gauge, what a deviation is on good parts whose only noise is golden's; of other gauges
+    /// not used.
     pub largest: Vec<Largest>,
-    /// Per gauge, what a deviation is on good parts that lie elsewhere than golden; none where it is not known.
+    /// Per gauge, what a deviation is on good parts that lie elsewhere than golden; none where it
+    /// is not known.
     pub displaced: Vec<Option<Largest>>,
     /// The error of the head's calibration.
     pub calibration: CalibrationError,
@@ -89,8 +95,8 @@ impl Production {
     /// Joins what is known of head and part.
     ///
     /// # Errors
-    /// If there are too many gauges, or one's squares are so large that sums of heights over them could overflow, or so small
-    /// that there are too many.
+    /// If there are too many gauges, or one's squares are so large that sums of heights over them
+    /// could overflow, or so small that there are too many.
     pub fn new(parts: Parts) -> Result<Self, Unmeasurable> {
         let Parts {
             decoder,

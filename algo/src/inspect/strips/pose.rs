@@ -1,8 +1,9 @@
 //! The pose field: by how much the motion of a part displaces what each pixel sees.
 //!
-//! A pixel that sees height z sees the part's point p. With the motion taken back, p is seen at (u, v) + (du, dv) and lies dz higher.
-//! These three values are worked out at nodes, for three heights each, and interpolated between: over the distance of two nodes they are linear
-//! and over the heights of a part quadratic in good approximation (0.003 pixels, see [`SPACING`]).
+//! A pixel that sees height z sees the part's point p. With the motion taken back, p is seen at (u,
+//! v) + (du, dv) and lies dz higher. These three values are worked out at nodes, for three heights
+//! each, and interpolated between: over the distance of two nodes they are linear and over the
+//! heights of a part quadratic in good approximation (0.003 pixels, see [`SPACING`]).
 
 use super::Production;
 use super::displaced::{BLOCK, BlockNumbers, Node, between, interpolate};
@@ -16,10 +17,12 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by 0.003 pixels between them.
+/// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by
+/// 0.003 pixels between them.
 const SPACING: usize = 64;
 
-/// The points that a node's pixel sees below, at and above the middle height; NaN where it sees nothing.
+/// The points that a node's pixel sees below, at and above the middle height; NaN where it sees
+/// nothing.
 type Sight = [Vector; 3];
 
 /// How the part of a cycle lies, and what that does to every pixel.
@@ -97,8 +100,8 @@ impl PoseField {
         }
     }
 
-    /// The displacements of the blocks of some columns of row `v` of a frame of `height` rows, interpolated between the rows of nodes
-    /// above and below. The others are left as they are.
+    /// The displacements of the blocks of some columns of row `v` of a frame of `height` rows,
+    /// interpolated between the rows of nodes above and below. The others are left as they are.
     pub fn row(
         &self,
         backend: Backend,
@@ -137,8 +140,8 @@ impl Production {
         [middle - half, middle, middle + half].map(|z| self.seen(u, v, z).unwrap_or(nothing))
     }
 
-    /// The displacements by a motion of the blocks between nodes along row `v`, given with their columns; NaN where one sees
-    /// nothing.
+    /// The displacements by a motion of the blocks between nodes along row `v`, given with their
+    /// columns; NaN where one sees nothing.
     fn displace<'a>(
         &self,
         motion: &Motion,

@@ -1,4 +1,5 @@
-//! The deviations of the last rows of a strip: as many rows as the largest square spans, and the one that it leaves.
+//! The deviations of the last rows of a strip: as many rows as the largest square spans, and the
+//! one that it leaves.
 
 use crate::pipeline::NO_OFFSET;
 use alloc::vec;
@@ -10,13 +11,15 @@ use core::ops::Range;
 pub(super) struct RecentRows {
     width: usize,
     rows: usize,
-    /// Deviations from golden along the normal in nm, weighted; [`NO_OFFSET`] where the part is not compared.
+    /// Deviations from golden along the normal in nm, weighted; [`NO_OFFSET`] where the part is not
+    /// compared.
     deviation: Vec<i32>,
     /// The columns of each row outside of which no pixel is compared.
     extent: Vec<Range<usize>>,
     /// A row in which no pixel is compared.
     empty: Vec<i32>,
-    /// The last row with a deviation that is too large for sums in 32 bits ([`super::squares::narrow`]).
+    /// The last row with a deviation that is too large for sums in 32 bits
+    /// ([`super::squares::narrow`]).
     pub overflow: Option<usize>,
 }
 

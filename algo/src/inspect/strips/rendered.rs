@@ -1,20 +1,24 @@
-//! A displaced part as this sequence would measure it, worked out from golden: what a recipe is tried with when no part is moved.
+//! A displaced part as this sequence would measure it, worked out from golden: what a recipe is
+//! tried with when no part is moved.
 //!
 //! # Idea
-//! The part as taught is a surface with a modulation at each pixel. Moved by a rigid motion, each pixel of the camera sees another point of
-//! it: where the pixel's ray meets the moved surface. The phase that the pattern has there, with the noise of its modulation, is what
-//! production would decode.
+//! The part as taught is a surface with a modulation at each pixel. Moved by a rigid motion, each
+//! pixel of the camera sees another point of it: where the pixel's ray meets the moved surface. The
+//! phase that the pattern has there, with the noise of its modulation, is what production would
+//! decode.
 //!
 //! # Equations
-//! With M the motion, π the camera's projection and G golden's height, z of a pixel's point p(z) solves
-//! q = M⁻¹ p(z), q_z = G(π(q)). A change of z moves q along nearly one ray of the camera as taught, so z ← z + G(π(q)) − q_z converges
-//! within a few steps. Between pixels G is the cubic through four of them in each direction (R. Keys, *Cubic convolution interpolation*,
-//! IEEE Trans. ASSP 29, 1981), where production compares with straight lines: what these miss of a bent surface is part of what
-//! displaced parts deviate by.
+//! With M the motion, π the camera's projection and G golden's height, z of a pixel's point p(z)
+//! solves q = M⁻¹ p(z), q_z = G(π(q)). A change of z moves q along nearly one ray of the camera as
+//! taught, so z ← z + G(π(q)) − q_z converges within a few steps. Between pixels G is the cubic
+//! through four of them in each direction (R. Keys, *Cubic convolution interpolation*, IEEE Trans.
+//! ASSP 29, 1981), where production compares with straight lines: what these miss of a bent surface
+//! is part of what displaced parts deviate by.
 //!
 //! # Accuracy
-//! Light that a motion sheds on other places, and what a pixel averages over beside creases, is as taught. Deviations of parts in front of the
-//! simulated head are compared with it in `tests/suite/every_part.rs`.
+//! Light that a motion sheds on other places, and what a pixel averages over beside creases, is as
+//! taught. Deviations of parts in front of the simulated head are compared with it in
+//! `tests/suite/every_part.rs`.
 
 use super::Production;
 use crate::inspect::align::Motion;
@@ -29,8 +33,8 @@ const STEPS: usize = 6;
 const LAST_STEP_MM: f64 = 1e-4;
 
 impl Production {
-    /// The phases of the part as taught after a motion. `modulation` is golden's by this sequence, row-major; other seeds give
-    /// other noise, none gives none.
+    /// The phases of the part as taught after a motion. `modulation` is golden's by this sequence,
+    /// row-major; other seeds give other noise, none gives none.
     pub fn rendered(
         &self,
         motion: &Motion,
@@ -121,7 +125,8 @@ impl Production {
         f64::from(self.decoder.full_scale())
     }
 
-    /// Golden's height between pixels, mm, by a cubic in each direction; none where one of the sixteen pixels is not known.
+    /// Golden's height between pixels, mm, by a cubic in each direction; none where one of the
+    /// sixteen pixels is not known.
     fn golden_height(&self, (u, v): (f64, f64)) -> Option<f64> {
         let (width, height) = self.size();
         let (left, top) = (libm::floor(u), libm::floor(v));
@@ -145,7 +150,8 @@ impl Production {
     }
 }
 
-/// The weights of four neighbours at this share of the way between the middle two (Keys, 1981, with a = −1/2).
+/// The weights of four neighbours at this share of the way between the middle two (Keys, 1981, with
+/// a = −1/2).
 fn cubic(x: f64) -> [f64; 4] {
     [
         x * (-0.5 + x * (1.0 - 0.5 * x)),
@@ -155,8 +161,8 @@ fn cubic(x: f64) -> [f64; 4] {
     ]
 }
 
-/// Two independent normal numbers that follow from a number (G. Box and M. Muller, 1958), by SplitMix64 (G. Steele, D. Lea and C. Flood,
-/// 2014).
+/// Two independent normal numbers that follow from a number (G. Box and M. Muller, 1958), by
+/// SplitMix64 (G. Steele, D. Lea and C. Flood, 2014).
 fn normal(mut state: u64) -> [f64; 2] {
     let [a, b] = [(); 2].map(|()| {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -44,7 +44,8 @@ impl Strip {
         }
     }
 
-    /// Inspects its rows, and those above and below that its squares reach into; `maps` get its own rows.
+    /// Inspects its rows, and those above and below that its squares reach into; `maps` get its own
+    /// rows.
     pub fn inspect(
         &mut self,
         plan: &Production,

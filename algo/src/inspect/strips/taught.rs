@@ -1,12 +1,14 @@
-//! The part as taught: where parts are compared with it, how noisy its heights were, and how much deviations count.
+//! The part as taught: where parts are compared with it, how noisy its heights were, and how much
+//! deviations count.
 
 use crate::inspect::{Factor, Weight};
 use crate::pipeline::{COMPARED, SIGMA, SQUARE};
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// The part as taught, as far as parts are compared with it; row-major. Its σ are those of one measurement with the sequence that parts
-/// are compared by: golden may be the mean of several ([`Parts::golden_noise`](super::Parts::golden_noise)).
+/// The part as taught, as far as parts are compared with it; row-major. Its σ are those of one
+/// measurement with the sequence that parts are compared by: golden may be the mean of several
+/// ([`Parts::golden_noise`](super::Parts::golden_noise)).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Taught {
     /// [`COMPARED`], [`SQUARE`] and σ.
@@ -24,8 +26,8 @@ impl Taught {
     const SIGMA_UNIT_NM: f64 = 32.0;
 
     /// From the weights of pixels, the shares of their height differences that lie along the normal
-    /// ([`normal_shares`](crate::inspect::normal_shares)), and σ of their heights in mm, NaN where not known. σ is stored in units of
-    /// 32 nm, at most half a mm.
+    /// ([`normal_shares`](crate::inspect::normal_shares)), and σ of their heights in mm, NaN where
+    /// not known. σ is stored in units of 32 nm, at most half a mm.
     pub fn new(pixels: impl Iterator<Item = (Weight, f32, f64)>) -> Self {
         let mut weights = Vec::with_capacity(pixels.size_hint().0);
         let mut factors = Vec::with_capacity(pixels.size_hint().0);
@@ -51,7 +53,8 @@ impl Taught {
         }
     }
 
-    /// With the least side that the squares of a deviation have about each pixel, row-major; empty where any will do.
+    /// With the least side that the squares of a deviation have about each pixel, row-major; empty
+    /// where any will do.
     #[must_use]
     pub fn with_least_sides(self, sides: Vec<u8>) -> Self {
         Self { sides, ..self }
@@ -78,7 +81,8 @@ impl Taught {
         sides
     }
 
-    /// The least sides of the pixels of row `v` of a frame of `width` columns; empty where any will do.
+    /// The least sides of the pixels of row `v` of a frame of `width` columns; empty where any will
+    /// do.
     pub(super) fn least_sides(&self, v: usize, width: usize) -> &[u8] {
         self.sides.get(v * width..(v + 1) * width).unwrap_or(&[])
     }
@@ -116,7 +120,8 @@ impl Taught {
         self.weights.get(place).copied().unwrap_or(Weight::FULL)
     }
 
-    /// What height differences at all places are multiplied by, row-major: the share along the normal times the weight.
+    /// What height differences at all places are multiplied by, row-major: the share along the
+    /// normal times the weight.
     pub(super) fn factors(&self) -> &[Factor] {
         &self.factors
     }

@@ -1,15 +1,20 @@
 //! Stage 5, gauge: from a value with the parts of its error to a reading.
 //!
-//! What changes from one measurement to the next is in σ; what is the same in each of them is systematic, and both together make the
-//! uncertainty u = √(σ² + systematic²) (JCGM 100:2008, 5.1.2). Systematic are:
+//! What changes from one measurement to the next is in σ; what is the same in each of them is
+//! systematic, and both together make the uncertainty u = √(σ² + systematic²) (JCGM 100:2008,
+//! 5.1.2). Systematic are:
 //!
-//! - the noise of golden, once, as a deviation from golden and through the motion, which is found against golden;
-//! - the error of the calibration: of a value that is made of heights the σ of heights times the value's lever, that is, as if errors
-//!   had the sign that does most everywhere; of one that is compared with golden, which the same head measured, only what a length
-//!   as long as the part's displacement is wrong by;
-//! - the periodic error of phases by an imperfect response, of RMS ρ ([`ripple`](crate::inspect::ripple)): a part that is displaced has it
-//!   at other places of the fringes than golden, so its deviation has √2 ρ, and 2 u is the largest by which two sines differ. ρ is
-//!   that of the place where it is largest, and taken to have the sign that does most everywhere.
+//! - the noise of golden, once, as a deviation from golden and through the motion, which is found
+//!   against golden;
+//! - the error of the calibration: of a value that is made of heights the σ of heights times the
+//!   value's lever, that is, as if errors had the sign that does most everywhere; of one that is
+//!   compared with golden, which the same head measured, only what a length as long as the part's
+//!   displacement is wrong by;
+//! - the periodic error of phases by an imperfect response, of RMS ρ
+//!   ([`ripple`](crate::inspect::ripple)): a part that is displaced has it at other places of the
+//!   fringes than golden, so its deviation has √2 ρ, and 2 u is the largest by which two sines
+//!   differ. ρ is that of the place where it is largest, and taken to have the sign that does most
+//!   everywhere.
 
 use super::Production;
 use super::pair::{correlated, smoothed};
@@ -39,7 +44,8 @@ pub(super) enum Made {
 }
 
 impl Production {
-    /// A reading; σ_z is `noisier` times the taught σ, and the variances of pixels were multiplied by `smoothed`.
+    /// A reading; σ_z is `noisier` times the taught σ, and the variances of pixels were multiplied
+    /// by `smoothed`.
     pub(super) fn reading_of(
         &self,
         found: Found,
@@ -76,8 +82,8 @@ impl Production {
         ratio * ratio
     }
 
-    /// The variance of the mean over a square of `side` pixels, over that of the mean of as many independent pixels
-    /// ([`smoothed`]): 1 but for a pair.
+    /// The variance of the mean over a square of `side` pixels, over that of the mean of as many
+    /// independent pixels ([`smoothed`]): 1 but for a pair.
     pub(super) fn square_variance(&self, side: usize) -> f64 {
         match self.decoder.is_pair() {
             true => smoothed(side),
@@ -85,8 +91,8 @@ impl Production {
         }
     }
 
-    /// What neighbouring cells of `side` pixels add to the variance of a sum over the squares of all ([`correlated`]): 1 but for a
-    /// pair.
+    /// What neighbouring cells of `side` pixels add to the variance of a sum over the squares of
+    /// all ([`correlated`]): 1 but for a pair.
     pub(super) fn cells_together(&self, side: usize) -> f64 {
         match self.decoder.is_pair() {
             true => correlated(side),
@@ -94,8 +100,8 @@ impl Production {
         }
     }
 
-    /// The variance of a spot of the alignment, over that of an independent pixel: 1 but for a pair, whose windows share pixels
-    /// where the spots are dense.
+    /// The variance of a spot of the alignment, over that of an independent pixel: 1 but for a
+    /// pair, whose windows share pixels where the spots are dense.
     pub(super) fn spot_variance(&self) -> f64 {
         let apart = self
             .alignment

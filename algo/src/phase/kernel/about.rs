@@ -9,14 +9,16 @@
 //! unwrap about Φ₀; store Φ, B of the finest level, and the first reason against each pixel
 //! ```
 //!
-//! **Shapes and units.** `rows[level][shift][u]` in counts, coarse to fine; `map` is Φ₀ of the row in 1/65536 turn; results as in
-//! [`super::geometric`]. A level that was demodulated on arrival is a [`WrappedRow`].
+//! **Shapes and units.** `rows[level][shift][u]` in counts, coarse to fine; `map` is Φ₀ of the row
+//! in 1/65536 turn; results as in [`super::geometric`]. A level that was demodulated on arrival is
+//! a [`WrappedRow`].
 //!
-//! **Departures from the plain form.** One body, [`dense_columns`], serves levels from frames and levels from maps ([`Source`]).
-//! It is compiled for 3 and for 4 shifts of 8 bits, and for two levels of 7 and 5; any others branch to the form of their number in
-//! every block.
+//! **Departures from the plain form.** One body, [`dense_columns`], serves levels from frames and
+//! levels from maps ([`Source`]). It is compiled for 3 and for 4 shifts of 8 bits, and for two
+//! levels of 7 and 5; any others branch to the form of their number in every block.
 //!
-//! **Accuracy.** As [`crate::phase::about`]; on arrival the same bits (`every_back_end_and_levels_on_arrival_give_the_same_bits`).
+//! **Accuracy.** As [`crate::phase::about`]; on arrival the same bits
+//! (`every_back_end_and_levels_on_arrival_give_the_same_bits`).
 
 use super::known::{KnownBlock, store};
 use super::next_block;
@@ -33,8 +35,8 @@ use crate::trust::Trust;
 use crate::units::AbsolutePhase;
 use core::ops::Range;
 
-/// Decodes columns of a row about a row of the known map, from the rows of each level's frames, coarse to fine, in the order of
-/// their shifts.
+/// Decodes columns of a row about a row of the known map, from the rows of each level's frames,
+/// coarse to fine, in the order of their shifts.
 pub(crate) fn decode_row<T: BlockSample>(
     backend: Backend,
     plan: &About,
@@ -167,7 +169,8 @@ back_end_entry! {
     )
 }
 
-/// Demodulates columns of a row of one level, except blocks that are all weak at the coarsest level.
+/// Demodulates columns of a row of one level, except blocks that are all weak at the coarsest
+/// level.
 pub(crate) fn demodulate_row<T: BlockSample>(
     backend: Backend,
     level: &Level,

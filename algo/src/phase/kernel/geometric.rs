@@ -1,9 +1,11 @@
 //! Geometric levels, all at once: frames of every level → absolute phase.
 //!
-//! **Idea.** The coarsest level spans at most one turn of the pattern, so it is absolute; each finer level takes its fringe order
-//! from the one before (temporal unwrapping, Huntley & Saldner 1993).
+//! **Idea.** The coarsest level spans at most one turn of the pattern, so it is absolute; each
+//! finer level takes its fringe order from the one before (temporal unwrapping, Huntley & Saldner
+//! 1993).
 //!
-//! **Equation**, for levels i = 1 (coarsest) to K with ratios r_i and n_i = r_i / r_{i−1}; Peng & Gupta 2008 use n_i = n, N = 4:
+//! **Equation**, for levels i = 1 (coarsest) to K with ratios r_i and n_i = r_i / r_{i−1}; Peng &
+//! Gupta 2008 use n_i = n, N = 4:
 //!
 //! ```text
 //! Φ_1 = φ_1                                        about the middle of its turn
@@ -16,22 +18,26 @@
 //!     φ_K in fine quality, unwrap; store Φ, B of level K, and the first reason against each pixel
 //! ```
 //!
-//! **Shapes and units.** `rows[level][shift][u]` in counts; results in 1/65536 turn, full scale / 65535 and [`Trust`], of the
-//! same columns.
+//! **Shapes and units.** `rows[level][shift][u]` in counts; results in 1/65536 turn, full scale /
+//! 65535 and [`Trust`], of the same columns.
 //!
-//! **Departures from the plain form.** Up to three levels are decoded in one pass over their frames ([`one_pass`]), so that only
-//! the result is written to memory. Level by level costs 1.4 times as many instructions on NEON and on AVX2 (three levels of four
-//! shifts, 8 bits), so that is for longer sequences only. The kernel is compiled for 3 to 9
-//! shifts of 8 bits; for any others it branches to the form of their number, which costs 2 of 20 instructions per pixel. Coarser
-//! levels have rough angles: they only choose a fringe order, and 3.2e-4 turn more in a residual that may be 0.40 changes none.
-//! Rows of bytes are read a whole cache line at a time ([`Frames::fold_in_line`]), because a camera's frames begin at pages: then
-//! 0.21 instead of 0.39 lines per pixel come into the first-level cache of a Cortex-A76 (12 frames, blocks of 32 pixels). That costs
-//! instructions on NEON, because the blocks that are decoded later are kept in memory meanwhile.
+//! **Departures from the plain form.** Up to three levels are decoded in one pass over their frames
+//! ([`one_pass`]), so that only the result is written to memory. Level by level costs 1.4 times as
+//! many instructions on NEON and on AVX2 (three levels of four shifts, 8 bits), so that is for
+//! longer sequences only. The kernel is compiled for 3 to 9 shifts of 8 bits; for any others it
+//! branches to the form of their number, which costs 2 of 20 instructions per pixel. Coarser levels
+//! have rough angles: they only choose a fringe order, and 3.2e-4 turn more in a residual that may
+//! be 0.40 changes none. Rows of bytes are read a whole cache line at a time
+//! ([`Frames::fold_in_line`]), because a camera's frames begin at pages: then 0.21 instead of 0.39
+//! lines per pixel come into the first-level cache of a Cortex-A76 (12 frames, blocks of 32
+//! pixels). That costs instructions on NEON, because the blocks that are decoded later are kept in
+//! memory meanwhile.
 //!
-//! **Accuracy.** ε / r_K turn of the textbook in f64, with ε from the arctangent and the rounding of samples (algo/README.md):
+//! **Accuracy.** ε / r_K turn of the textbook in f64, with ε from the arctangent and the rounding
+//! of samples (algo/README.md):
 //! `any_shifts_depth_ratios_size_and_stride_decode_as_the_textbook_says`; no wrong fringe order:
-//! `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`; the same bits on every back-end and on arrival:
-//! `every_back_end_and_levels_on_arrival_give_the_same_bits`.
+//! `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`; the same bits on every back-end and on
+//! arrival: `every_back_end_and_levels_on_arrival_give_the_same_bits`.
 
 use super::on_arrival::{finest_row_unscaled, level_row};
 use super::quality::dark_unless;
@@ -47,7 +53,8 @@ use crate::trust::Trust;
 use core::hint::black_box;
 use core::ops::Range;
 
-/// Decodes columns of a row from the rows of each level's frames, coarse to fine, in the order of their shifts.
+/// Decodes columns of a row from the rows of each level's frames, coarse to fine, in the order of
+/// their shifts.
 pub(crate) fn decode_row<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
@@ -109,7 +116,8 @@ fn width<T>(rows: &[&[&[T]]]) -> usize {
     rows[0].first().map_or(0, |row| row.len())
 }
 
-/// Any number of levels, one after the other, in stretches of columns whose predictions fit on the stack.
+/// Any number of levels, one after the other, in stretches of columns whose predictions fit on the
+/// stack.
 fn level_by_level<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
@@ -150,8 +158,8 @@ back_end_entry! {
 }
 
 back_end_entry! {
-    /// Two or three levels in one pass over the frames of all. These are not copied on the way: a copy in vectors of what has just been
-    /// written in words would wait for it.
+    /// Two or three levels in one pass over the frames of all. These are not copied on the way: a
+    /// copy in vectors of what has just been written in words would wait for it.
     fn one_pass [S: Frames, const BETWEEN: usize] = one_pass_columns(
         plan: &Geometric,
         levels: &[Level],
@@ -221,7 +229,8 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
     let mut kept = [S::nothing_kept(v); 3];
     let mut kept = &mut kept;
     if !V::FEW_REGISTERS {
-        // Behind a pointer of its own: a pair of registers cannot be stored far from the stack pointer.
+        // Behind a pointer of its own: a pair of registers cannot be stored far from the stack
+        // pointer.
         kept = black_box(kept);
     }
     let mut after = V::AHEAD_OF_MANY;
@@ -241,8 +250,8 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
                     block += 1;
                 }
             } else {
-                // The others of the line are read one by one. The part does not fill the row, and the next row has about the same
-                // lit columns: prefetch those from now on.
+                // The others of the line are read one by one. The part does not fill the row, and
+                // the next row has about the same lit columns: prefetch those from now on.
                 start = at + V::PIXELS;
                 after = width;
                 ahead = at + after;
@@ -269,8 +278,9 @@ struct OnePass<'a, V: Lanes, S: Frames, const BETWEEN: usize> {
 }
 
 impl<V: Lanes, S: Frames, const BETWEEN: usize> OnePass<'_, V, S, BETWEEN> {
-    /// Decodes a block. False if it is dark, which may not be asked of the others of a line: then only the coarsest level was read. The
-    /// line of the sample `ahead` is prefetched at finer levels.
+    /// Decodes a block. False if it is dark, which may not be asked of the others of a line: then
+    /// only the coarsest level was read. The line of the sample `ahead` is prefetched at finer
+    /// levels.
     #[inline(always)]
     fn block(
         &self,
@@ -291,8 +301,8 @@ impl<V: Lanes, S: Frames, const BETWEEN: usize> OnePass<'_, V, S, BETWEEN> {
             kept_coarsest,
         );
         let lit = folded.strong;
-        // The line of a lit block is lit nearly everywhere. With few registers the question costs less than a longer stretch without
-        // a branch, whose instructions the compiler mixes.
+        // The line of a lit block is lit nearly everywhere. With few registers the question costs
+        // less than a longer stretch without a branch, whose instructions the compiler mixes.
         let asked = V::FEW_REGISTERS || !matches!(place, Place::Other(_));
         if asked && folded.dark {
             out.store_unknown(v, at, v.splat8(Trust::Dark as u8));

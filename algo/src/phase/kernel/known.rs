@@ -1,4 +1,5 @@
-//! A block of the known map, and the last step of a block: unwrapping about it, and storing the result.
+//! A block of the known map, and the last step of a block: unwrapping about it, and storing the
+//! result.
 
 use super::quality::{Quality, resolved_mask, trust};
 use super::temporal::doubled_where;
@@ -48,8 +49,8 @@ impl<V: Lanes> KnownBlock<V> {
     }
 }
 
-/// Unwraps a block about the map and stores it. `lit` is the mask of the coarsest level's modulation, `modulation` is the finest
-/// level's.
+/// Unwraps a block about the map and stores it. `lit` is the mask of the coarsest level's
+/// modulation, `modulation` is the finest level's.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 pub(super) fn store<V: Lanes>(

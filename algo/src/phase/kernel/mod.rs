@@ -1,4 +1,5 @@
-//! The kernels: the rows of a level's frames → absolute phase, modulation and trust, block by block.
+//! The kernels: the rows of a level's frames → absolute phase, modulation and trust, block by
+//! block.
 //!
 //! | file | sequences | levels |
 //! |---|---|---|
@@ -6,9 +7,9 @@
 //! | [`on_arrival`] | geometric | one at a time, and the finest |
 //! | [`about`] | dense, single | all at once, one at a time, and the finest |
 //!
-//! A block is [`Lanes::PIXELS`] neighbouring pixels. Every step of a block is a function of `v: impl Lanes` that is inlined into
-//! an entry compiled for the back-end's instructions; see [`crate::simd`]. [`temporal`], [`known`] and [`quality`] hold what
-//! kernels share.
+//! A block is [`Lanes::PIXELS`] neighbouring pixels. Every step of a block is a function of `v:
+//! impl Lanes` that is inlined into an entry compiled for the back-end's instructions; see
+//! [`crate::simd`]. [`temporal`], [`known`] and [`quality`] hold what kernels share.
 
 pub(super) mod about;
 pub(super) mod geometric;
@@ -22,8 +23,8 @@ use crate::pattern::MAX_SHIFTS;
 use crate::simd::Lanes;
 use core::ops::Range;
 
-/// The start of the next block of `columns`, which are at least a block long. The last block is moved back so that it ends with
-/// them; it may overlap the one before.
+/// The start of the next block of `columns`, which are at least a block long. The last block is
+/// moved back so that it ends with them; it may overlap the one before.
 #[inline(always)]
 fn next_block<V: Lanes>(at: usize, columns: &Range<usize>) -> Option<usize> {
     if at >= columns.end {
@@ -32,10 +33,12 @@ fn next_block<V: Lanes>(at: usize, columns: &Range<usize>) -> Option<usize> {
     Some(at.min(columns.end - V::PIXELS))
 }
 
-/// Columns that are decoded level by level at a time: what each level predicts for the next is then on the stack.
+/// Columns that are decoded level by level at a time: what each level predicts for the next is then
+/// on the stack.
 const STRETCH: usize = 512;
 
-/// The columns in stretches of at most [`STRETCH`] and at least [`MAX_PIXELS`]; the last may overlap the one before.
+/// The columns in stretches of at most [`STRETCH`] and at least [`MAX_PIXELS`]; the last may
+/// overlap the one before.
 fn stretches(columns: Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let Range { start, end } = columns;
     (start..end).step_by(STRETCH).map(move |at| {

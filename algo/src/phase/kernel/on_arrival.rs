@@ -1,7 +1,9 @@
-//! Geometric levels, one at a time: each is decoded on arrival, while the frames of the next are being exposed.
+//! Geometric levels, one at a time: each is decoded on arrival, while the frames of the next are
+//! being exposed.
 //!
-//! **Idea.** After each level only the phase that it predicts for the next one is kept: expected fraction and turns, and the first
-//! reason against the pixel, 5 bytes. When the last frame arrives only the finest level is left to decode.
+//! **Idea.** After each level only the phase that it predicts for the next one is kept: expected
+//! fraction and turns, and the first reason against the pixel, 5 bytes. When the last frame arrives
+//! only the finest level is left to decode.
 //!
 //! **Equation and pseudo-code**: those of [`super::geometric`], with the loops exchanged:
 //!
@@ -13,11 +15,13 @@
 //!
 //! **Shapes and units.** [`ExpectedRow`], a row of the frame; else as in [`super::geometric`].
 //!
-//! **Departures from the plain form.** Blocks that are dark at the coarsest level are skipped later; their stored prediction is
-//! never read. The last block of a row may overlap the one before, whose prediction is for the next level by then, so what it
-//! needs is read before the row begins.
+//! **Departures from the plain form.** Blocks that are dark at the coarsest level are skipped
+//! later; their stored prediction is never read. The last block of a row may overlap the one
+//! before, whose prediction is for the next level by then, so what it needs is read before the row
+//! begins.
 //!
-//! **Accuracy.** The bits of [`super::geometric`]: `every_back_end_and_levels_on_arrival_give_the_same_bits`.
+//! **Accuracy.** The bits of [`super::geometric`]:
+//! `every_back_end_and_levels_on_arrival_give_the_same_bits`.
 
 use super::next_block;
 use super::quality::{Quality, dark_unless};

@@ -1,7 +1,8 @@
 //! Which pixels of a block are resolved, and the first reason why not.
 //!
-//! Reasons are bytes: the numbers of [`Trust`], or [`NO_REASON`], which is larger than all of them. So the smaller of two bytes
-//! is the reason that comes first, and levels are combined by a minimum.
+//! Reasons are bytes: the numbers of [`Trust`], or [`NO_REASON`], which is larger than all of them.
+//! So the smaller of two bytes is the reason that comes first, and levels are combined by a
+//! minimum.
 
 use crate::phase::arrived::NO_REASON;
 use crate::phase::unwrap::{MAX_RESIDUAL_BITS, too_large};
@@ -37,7 +38,8 @@ impl<V: Lanes> Quality<V> {
         self.brightest = v.max8(self.brightest, brightest);
     }
 
-    /// The first reason against each pixel. Does not tell [`Trust::Dark`] from [`Trust::LowModulation`].
+    /// The first reason against each pixel. Does not tell [`Trust::Dark`] from
+    /// [`Trust::LowModulation`].
     #[inline(always)]
     pub fn first_reason(&self, v: V) -> V::B {
         let residual = v.splat8(Trust::Residual as u8);
@@ -72,7 +74,8 @@ impl<V: Lanes> Quality<V> {
     }
 }
 
-/// Reasons of a block of which only the mask of lit pixels is known: [`NO_REASON`] or [`Trust::Dark`].
+/// Reasons of a block of which only the mask of lit pixels is known: [`NO_REASON`] or
+/// [`Trust::Dark`].
 #[inline(always)]
 pub(crate) fn dark_unless<V: Lanes>(v: V, lit: V::B) -> V::B {
     v.max8(lit, v.splat8(Trust::Dark as u8))

@@ -1,9 +1,10 @@
 //! Temporal unwrapping of one block, from the coarsest geometric level to the finest.
 //!
-//! A block goes back and forth between two states: [`UnwrappedBlock`], absolute up to a level, and [`ExpectedBlock`], what that
-//! predicts for the next one. [`crate::phase::unwrap_step`] has the equations; the reasons to reject pixels are collected on the
-//! way ([`Quality`]). [`super::geometric`] runs through all levels of a block, [`super::on_arrival`] stores the prediction between
-//! two levels.
+//! A block goes back and forth between two states: [`UnwrappedBlock`], absolute up to a level, and
+//! [`ExpectedBlock`], what that predicts for the next one. [`crate::phase::unwrap_step`] has the
+//! equations; the reasons to reject pixels are collected on the way ([`Quality`]).
+//! [`super::geometric`] runs through all levels of a block, [`super::on_arrival`] stores the
+//! prediction between two levels.
 
 use super::quality::{Quality, resolved_mask, trust};
 use crate::phase::angle::AngleLanes;
@@ -61,8 +62,9 @@ impl<V: Lanes> GeometricLanes<V> {
         ]
     }
 
-    /// Stores a block at the finest level: absolute phase and modulation of resolved pixels, the reason of others. `before` are
-    /// the reasons of coarser levels; the mask `clear` is set where there is none, or where `unwrapped` has one, too.
+    /// Stores a block at the finest level: absolute phase and modulation of resolved pixels, the
+    /// reason of others. `before` are the reasons of coarser levels; the mask `clear` is set where
+    /// there is none, or where `unwrapped` has one, too.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     pub fn store(
@@ -120,7 +122,8 @@ pub(super) struct UnwrappedBlock<V: Lanes> {
 }
 
 impl<V: Lanes> UnwrappedBlock<V> {
-    /// What the next level is unwrapped by in the same pass: with few registers by the prediction, which is then computed at once.
+    /// What the next level is unwrapped by in the same pass: with few registers by the prediction,
+    /// which is then computed at once.
     #[inline(always)]
     pub fn before(self, v: V, step: &UnwrapStepLanes<V>) -> Coarser<V> {
         if V::FEW_REGISTERS {
@@ -248,7 +251,8 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
     }
 }
 
-/// The rows of levels of N shifts of 8 bits each, up to three, for the kernels that are compiled for N; empty for other levels.
+/// The rows of levels of N shifts of 8 bits each, up to three, for the kernels that are compiled
+/// for N; empty for other levels.
 pub(super) fn rows_of_bytes<'r, 'a, T: BlockSample, const N: usize>(
     levels: &[Level],
     rows: &[&'r [&'a [T]]],

@@ -45,7 +45,8 @@ impl Map {
 const WIDTH: usize = 75;
 const HEIGHT: usize = 4;
 
-/// Frames of random samples, with dark and faint stretches and, of words, some of samples above full scale.
+/// Frames of random samples, with dark and faint stretches and, of words, some of samples above
+/// full scale.
 fn frames(count: usize, depth: u8, random: &mut SplitMix64) -> Vec<Vec<u16>> {
     (0..count)
         .map(|_| {

@@ -9,7 +9,8 @@ use crate::pattern::{PhaseRange, Sequence, Shot};
 use std::vec::Vec;
 
 const SHIFTS: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
-/// Least modulations: the bounds, about 5.66 counts, below which words are lifted, the one of unknown noise and about it, and others.
+/// Least modulations: the bounds, about 5.66 counts, below which words are lifted, the one of
+/// unknown noise and about it, and others.
 const LEAST: [f64; 10] = [4.0, 5.0, 5.69, 5.71, 15.9, 16.0, 16.1, 27.0, 40.0, 127.5];
 /// Quotient, polynomial and two roundings.
 const WORST_TURNS: f64 = 2.5e-5;

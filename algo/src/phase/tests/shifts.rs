@@ -7,19 +7,21 @@ use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::vec::Vec;
 
-/// Largest error and RMS of the phase in turns, and largest error of the modulation as a share. The arctangent's bound (2.5e-5);
-/// half a unit in S and in C at the least length of 3000; the polynomial for √(1 + t²) (6.5e-4), half a unit again (1.7e-4), and
-/// half a unit in the modulation at its least (2.4e-4).
+/// Largest error and RMS of the phase in turns, and largest error of the modulation as a share. The
+/// arctangent's bound (2.5e-5); half a unit in S and in C at the least length of 3000; the
+/// polynomial for √(1 + t²) (6.5e-4), half a unit again (1.7e-4), and half a unit in the modulation
+/// at its least (2.4e-4).
 const BOUND: [f64; 3] = [2.5e-5 + 3.75e-5, 1.1e-5, 1.1e-3];
 /// The same at the least length of N = 4 of more than 12 bits, 2056.
 const COARSE: [f64; 3] = [2.5e-5 + 5.5e-5, 1.3e-5, 1.4e-3];
-/// Least modulations in counts of 255; the bounds are those of the first, and what is not the arctangent's or the polynomial's share is
-/// larger where less is trusted.
+/// Least modulations in counts of 255; the bounds are those of the first, and what is not the
+/// arctangent's or the polynomial's share is larger where less is trusted.
 const LEAST: [f64; 3] = [16.0, 7.0, 4.0];
 /// Pixels per number of shifts and depth.
 const PIXELS: usize = 20_000;
 
-/// Samples of random offset, modulation from `least` of 255 counts on, and phase; one row per shift.
+/// Samples of random offset, modulation from `least` of 255 counts on, and phase; one row per
+/// shift.
 fn rows(shifts: &[f64], full: f64, least: f64, random: &mut SplitMix64) -> Vec<Vec<u16>> {
     let mut rows = std::vec![Vec::new(); shifts.len()];
     let mut draw = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;

@@ -2,8 +2,8 @@
 
 use core::f64::consts::TAU;
 
-/// σ of a mean with weights r² over that with the best weights, r² B², where a blur of σ pixels leaves a modulation of
-/// B = exp(−(2πσr/pitch)²/2).
+/// σ of a mean with weights r² over that with the best weights, r² B², where a blur of σ pixels
+/// leaves a modulation of B = exp(−(2πσr/pitch)²/2).
 fn loss(ratios: &[f64], blur_px: f64, pitch_px: f64) -> f64 {
     let (mut weights, mut scatter, mut information) = (0.0, 0.0, 0.0);
     for r in ratios {

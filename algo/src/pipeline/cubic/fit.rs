@@ -7,13 +7,15 @@ use core::ops::Range;
 
 /// Unit of the stored coefficients of y² and y³, nm: rounding is below 0.05 µm each.
 pub(super) const UNIT_NM: f64 = 100.0;
-/// The farthest a cubic is used from the known height, mm: offsets in nm are rounded in single precision below 2²².
+/// The farthest a cubic is used from the known height, mm: offsets in nm are rounded in single
+/// precision below 2²².
 const MAX_RISE_MM: f64 = 4.1;
-/// Largest error of a cubic at its nodes, mm: a fifth of the largest error that is allowed anywhere, because between the
-/// nodes it may be larger. Its RMS is far smaller.
+/// Largest error of a cubic at its nodes, mm: a fifth of the largest error that is allowed
+/// anywhere, because between the nodes it may be larger. Its RMS is far smaller.
 const MAX_MISS_MM: f64 = 1e-3;
-/// Offsets to which the cubic is fitted, as shares of the offset that the slope at the known height predicts for the
-/// range. At no pitch above 4 px per turn do the pattern's samples lie closer together than these nodes.
+/// Offsets to which the cubic is fitted, as shares of the offset that the slope at the known height
+/// predicts for the range. At no pitch above 4 px per turn do the pattern's samples lie closer
+/// together than these nodes.
 const NODES: [f64; 6] = [-1.06, -0.76, -0.34, 0.34, 0.76, 1.06];
 const LAST: usize = NODES.len() - 1;
 /// Step of the difference quotient of the slope at the known height, mm.
@@ -53,8 +55,8 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Computes the phases of columns of row `v`, none of which is known: the outermost two from their heights, the others by linear
-    /// interpolation.
+    /// Computes the phases of columns of row `v`, none of which is known: the outermost two from
+    /// their heights, the others by linear interpolation.
     pub fn between(
         &self,
         v: usize,
@@ -82,8 +84,8 @@ impl<'a> Fitting<'a> {
         known.then(|| self.triangulator.sight(u as f64, v as f64))?
     }
 
-    /// The cubic about phase and height of pixel (u, v); `None` if none fits, not even over a sixteenth of the range. An
-    /// unknown phase is computed from the height.
+    /// The cubic about phase and height of pixel (u, v); `None` if none fits, not even over a
+    /// sixteenth of the range. An unknown phase is computed from the height.
     pub fn cubic(
         &self,
         (u, v): (usize, usize),
@@ -115,7 +117,8 @@ impl<'a> Fitting<'a> {
         None
     }
 
-    /// The cubic through the known point that is fitted to offsets up to `step` mm, if its error is small enough.
+    /// The cubic through the known point that is fitted to offsets up to `step` mm, if its error is
+    /// small enough.
     fn fit(&self, sight: &Sight<'_>, (phase, height): (f64, f64), step: f64) -> Option<Cubic> {
         let share = 1.0 / self.range;
         let mut nodes = [(0.0, 0.0); NODES.len()];

@@ -1,8 +1,9 @@
 //! Height offsets from a known surface: z − z₀ as a cubic of Φ − Φ₀, planned for every pixel.
 //!
-//! With y = (Φ − Φ₀) / range: z − z₀ = a y + b y² + c y³, a least-squares fit to exact evaluations of Φ(z) on the pixel's line of
-//! sight (`fit.rs`). Each cubic is used within the pixel's own reach, the largest |Φ − Φ₀| up to the declared range for which it
-//! is within 1 µm of the exact height at the fitted points. Further away, and where no cubic fits, the exact triangulation is
+//! With y = (Φ − Φ₀) / range: z − z₀ = a y + b y² + c y³, a least-squares fit to exact evaluations
+//! of Φ(z) on the pixel's line of sight (`fit.rs`). Each cubic is used within the pixel's own
+//! reach, the largest |Φ − Φ₀| up to the declared range for which it is within 1 µm of the exact
+//! height at the fitted points. Further away, and where no cubic fits, the exact triangulation is
 //! used. A pixel takes 9 bytes beside Φ₀ and z₀.
 
 mod fit;
@@ -56,10 +57,12 @@ const REACH_UNIT: f64 = 1.0 / 128.0;
 const MAX_RANGE: f64 = 127.0 * REACH_UNIT;
 
 impl HeightCubics {
-    /// Plans the pixels inside `window` for |Φ − Φ₀| up to `range` turns (or a little less than a turn).
+    /// Plans the pixels inside `window` for |Φ − Φ₀| up to `range` turns (or a little less than a
+    /// turn).
     ///
-    /// Where z₀ is known and Φ₀ is not, Φ₀ is computed from z₀: exactly within `around` pixels of a pixel where it is known;
-    /// further away, where nothing is expected and there are no cubics, interpolated between exact values.
+    /// Where z₀ is known and Φ₀ is not, Φ₀ is computed from z₀: exactly within `around` pixels of a
+    /// pixel where it is known; further away, where nothing is expected and there are no cubics,
+    /// interpolated between exact values.
     pub fn new(
         triangulator: &Triangulator,
         surface: KnownSurface,
@@ -128,13 +131,14 @@ impl HeightCubics {
         self.range
     }
 
-    /// The largest |Φ − Φ₀| in turns for which the cubic of a pixel (row-major index) is used, 0 where there is none.
+    /// The largest |Φ − Φ₀| in turns for which the cubic of a pixel (row-major index) is used, 0
+    /// where there is none.
     pub fn reach(&self, place: usize) -> f64 {
         f64::from(self.reach[place]) * REACH_UNIT
     }
 
-    /// The heights of phases of row `v`, [`Height::UNKNOWN`] where the cubic does not reach them, as production computes them.
-    /// Slices are as long as the row.
+    /// The heights of phases of row `v`, [`Height::UNKNOWN`] where the cubic does not reach them,
+    /// as production computes them. Slices are as long as the row.
     pub fn heights(&self, backend: Backend, v: usize, phase: &[AbsolutePhase], out: &mut [Height]) {
         let width = self.surface.width;
         let seen = CubicInput {
@@ -175,7 +179,8 @@ impl HeightCubics {
         Some((first + y * (2.0 * second + y * 3.0 * third)) / self.range)
     }
 
-    /// A height in mm near that of a pixel's phase, by the cubic's slope at the known height; `None` beyond twice the range.
+    /// A height in mm near that of a pixel's phase, by the cubic's slope at the known height;
+    /// `None` beyond twice the range.
     pub fn near(&self, place: usize, phase: AbsolutePhase) -> Option<f64> {
         let (base, height) = (self.surface.phase[place], self.surface.height[place]);
         let known = base.is_known() && height.is_known() && self.reach[place] > 0;

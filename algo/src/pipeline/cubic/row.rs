@@ -1,8 +1,8 @@
 //! A row of phases → a row of height offsets from the known surface, in nm.
 //!
-//! z − z₀ = y (a + y (b + y c)), y = (Φ − Φ₀) / range; ∂z/∂y = a + y (2b + 3c y), σ_z² = noise · (∂z/∂y)² / B². Plain loops over
-//! slices, compiled for each back-end's instructions; single precision with + − × ÷ only and sums of whole numbers, so that the
-//! bits are the same everywhere.
+//! z − z₀ = y (a + y (b + y c)), y = (Φ − Φ₀) / range; ∂z/∂y = a + y (2b + 3c y), σ_z² = noise ·
+//! (∂z/∂y)² / B². Plain loops over slices, compiled for each back-end's instructions; single
+//! precision with + − × ÷ only and sums of whole numbers, so that the bits are the same everywhere.
 
 use super::fit::UNIT_NM;
 use crate::math::nearest::whole;

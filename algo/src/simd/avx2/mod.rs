@@ -1,7 +1,7 @@
 //! The back-end of x86-64 with AVX2.
 //!
-//! AVX2 widens within each 128-bit half of a vector: the first `W` of a block holds its pixels 0–7 and 16–23, the second 8–15 and
-//! 24–31. Narrowing restores the order.
+//! AVX2 widens within each 128-bit half of a vector: the first `W` of a block holds its pixels 0–7
+//! and 16–23, the second 8–15 and 24–31. Narrowing restores the order.
 
 mod memory;
 
@@ -31,8 +31,8 @@ const BYTES: usize = 32;
 /// Calls intrinsics of AVX2. Sound because `self` proves that the processor has it.
 macro_rules! avx2 {
     ($e:expr) => {{
-        // SAFETY: an `Avx2` exists only where the processor has AVX2 (`Avx2::detect`), the only condition of intrinsics on
-        // values.
+        // SAFETY: an `Avx2` exists only where the processor has AVX2 (`Avx2::detect`), the only
+        // condition of intrinsics on values.
         unsafe { $e }
     }};
 }
@@ -106,7 +106,8 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn load8(self, from: &[u8], at: usize) -> Self::B {
         let block = block(from, at, BYTES);
-        // SAFETY: the slice holds the 32 bytes that are read; the load needs no alignment; `self` proves AVX2.
+        // SAFETY: the slice holds the 32 bytes that are read; the load needs no alignment; `self`
+        // proves AVX2.
         unsafe { _mm256_loadu_si256(block.as_ptr().cast()) }
     }
     #[inline(always)]
@@ -124,7 +125,8 @@ impl Lanes for Avx2 {
     #[inline(always)]
     fn store8(self, to: &mut [u8], at: usize, x: Self::B) {
         let block = block_mut(to, at, BYTES);
-        // SAFETY: the slice holds the 32 bytes that are written; the store needs no alignment; `self` proves AVX2.
+        // SAFETY: the slice holds the 32 bytes that are written; the store needs no alignment;
+        // `self` proves AVX2.
         unsafe { _mm256_storeu_si256(block.as_mut_ptr().cast(), x) }
     }
     #[inline(always)]
@@ -178,8 +180,8 @@ impl Lanes for Avx2 {
     }
     #[inline(always)]
     fn scaled(self, long: Self::B, short: Self::B) -> Scaled<Self::W> {
-        // The five leading bits of the longer decide the scale: with the first of them it is 128, a low byte, else 256 to 4096, a high
-        // byte by the others. A set high bit reads 0.
+        // The five leading bits of the longer decide the scale: with the first of them it is 128, a
+        // low byte, else 256 to 4096, a high byte by the others. A set high bit reads 0.
         let scale = avx2!({
             let table = _mm256_setr_epi8(
                 16, 8, 4, 4, 2, 2, 2, 2, 1, 1, 1, 1, 1, 1, 1, 1, //

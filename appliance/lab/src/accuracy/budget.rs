@@ -26,7 +26,8 @@ pub struct Share {
     pub systematic_p99_mm: f64,
 }
 
-/// The division, and the map of the errors without noise: mm, row-major, NaN where they are not known.
+/// The division, and the map of the errors without noise: mm, row-major, NaN where they are not
+/// known.
 pub struct Budget {
     /// The division.
     pub share: Share,

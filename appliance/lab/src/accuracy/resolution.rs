@@ -1,4 +1,5 @@
-//! Structural resolution: how much of a dent's depth is left in the measured heights, by its diameter.
+//! Structural resolution: how much of a dent's depth is left in the measured heights, by its
+//! diameter.
 
 use super::measure;
 use crate::experiment::{OpticsKind, Run, Scene};

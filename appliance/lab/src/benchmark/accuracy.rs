@@ -1,4 +1,5 @@
-//! Run time against error: processor time and height error of each implementation, sequence and bit depth on the simulated parts.
+//! Run time against error: processor time and height error of each implementation, sequence and bit
+//! depth on the simulated parts.
 
 use super::decoding::Decoding;
 use super::floor::FloorSets;

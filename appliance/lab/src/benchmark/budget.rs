@@ -19,7 +19,8 @@ use std::time::{Duration, Instant};
 const FOV_DEG: [f64; 2] = [22.28, 16.77];
 /// Longest wait for a frame.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// From the camera's start until it can be triggered, µs: the start-up delay in the overlay of the reference camera.
+/// From the camera's start until it can be triggered, µs: the start-up delay in the overlay of the
+/// reference camera.
 const START_UP_US: u64 = 500_000;
 /// Placement tolerance, mm: small enough for single levels.
 const PLACEMENT_MM: f64 = 0.5;
@@ -45,7 +46,8 @@ pub struct Budget {
     /// How the part lies, and whether its motion is measured and compensated.
     #[serde(skip)]
     pub lies: Lies,
-    /// What a cycle waits for the camera's start, ms: 0, although it takes 500 ms (the imx296 overlay's), because the camera stays on.
+    /// What a cycle waits for the camera's start, ms: 0, although it takes 500 ms (the imx296
+    /// overlay's), because the camera stays on.
     pub start_ms: f64,
     /// From the trigger to the end of the last exposure at the projector's refresh rate, ms.
     pub exposure_ms: f64,
@@ -93,8 +95,9 @@ impl Lies {
     }
 }
 
-/// Budgets of a camera of this size: with four frames of one level about the golden map, and with the full sequence; each without and
-/// with compensation of the part's motion, and with that of a part that was moved.
+/// Budgets of a camera of this size: with four frames of one level about the golden map, and with
+/// the full sequence; each without and with compensation of the part's motion, and with that of a
+/// part that was moved.
 ///
 /// # Errors
 /// If something cannot be simulated or taught.
@@ -218,8 +221,8 @@ fn budget(
     })
 }
 
-/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio. The two are timed in turn, each on more
-/// frame sets than fit into any cache.
+/// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio. The two
+/// are timed in turn, each on more frame sets than fit into any cache.
 fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64; 3], String> {
     let map = plan.production().map().to_vec();
     let mut sets = Rotation::of(FrameSet::of(frames, Some(map)), effort.bytes);

@@ -31,8 +31,8 @@ impl Counter {
     /// `exclude_kernel` and `exclude_hv`: what needs no privilege.
     const USER_ONLY: u64 = 1 << 5 | 1 << 6;
 
-    /// A running counter of instructions; `None` where there is no such counter, as on most virtual machines, or where
-    /// `/proc/sys/kernel/perf_event_paranoid` forbids it.
+    /// A running counter of instructions; `None` where there is no such counter, as on most virtual
+    /// machines, or where `/proc/sys/kernel/perf_event_paranoid` forbids it.
     pub fn instructions() -> Option<Self> {
         Self::of(INSTRUCTIONS)
     }
@@ -95,7 +95,8 @@ impl Counter {
 mod tests {
     use super::*;
 
-    /// `PERF_TYPE_SOFTWARE`, `PERF_COUNT_SW_TASK_CLOCK`: also where the processor's counters are not offered.
+    /// `PERF_TYPE_SOFTWARE`, `PERF_COUNT_SW_TASK_CLOCK`: also where the processor's counters are
+    /// not offered.
     const TASK_CLOCK: (u32, u64) = (1, 1);
 
     #[test]

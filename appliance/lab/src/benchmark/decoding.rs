@@ -19,8 +19,9 @@ pub struct Decoding {
     on_arrival: Option<OnArrival>,
 }
 
-/// The coarser levels of frame sets that are decoded in turn. All sets of a rotation have the same samples, but every set needs its
-/// own decoded levels: they were last used as long ago as the frames, so that they come from no cache either.
+/// The coarser levels of frame sets that are decoded in turn. All sets of a rotation have the same
+/// samples, but every set needs its own decoded levels: they were last used as long ago as the
+/// frames, so that they come from no cache either.
 struct OnArrival {
     /// How many are kept.
     copies: usize,
@@ -38,7 +39,8 @@ impl Decoding {
         }
     }
 
-    /// With a decoder that is timed on the last level only, for `copies` frame sets with the same samples.
+    /// With a decoder that is timed on the last level only, for `copies` frame sets with the same
+    /// samples.
     pub fn after_the_last(decoder: Decoder, copies: usize) -> Self {
         Self {
             decoder,
@@ -97,7 +99,8 @@ impl Kernel for Inspecting<'_> {
 }
 
 impl Kernel for Decoding {
-    /// Takes the decoded levels that were used least recently; the first time, decodes those of all sets.
+    /// Takes the decoded levels that were used least recently; the first time, decodes those of all
+    /// sets.
     fn prepare(&mut self, set: &mut FrameSet) {
         let Some(mut on_arrival) = self.on_arrival.take() else {
             return;

@@ -4,8 +4,8 @@ use super::frames::Buffer;
 use super::workload::{RANGE, Workload};
 use hal::npy;
 
-/// File names and contents: `frame-00.npy` and so on (8 bits), `phase.npy` (the true Φ in turns), and
-/// `sequence.json` with ratio and shift of each frame and the fringes of the finest level.
+/// File names and contents: `frame-00.npy` and so on (8 bits), `phase.npy` (the true Φ in turns),
+/// and `sequence.json` with ratio and shift of each frame and the fringes of the finest level.
 pub fn frame_files((width, height): (usize, usize)) -> Vec<(String, Vec<u8>)> {
     let workload = Workload::geometric();
     let set = workload.render((width, height));

@@ -7,7 +7,8 @@ use crate::plot::{Kind, Plot, Series};
 /// A colour for each implementation, in the order in which they first appear.
 const COLOURS: [&str; 5] = ["#9ca3af", "#c2410c", "#7c3aed", "#1f5fa8", "#0e7490"];
 const FRONT: &str = "#15803d";
-/// A point is on the front if its error is at least this much smaller than that of every faster one.
+/// A point is on the front if its error is at least this much smaller than that of every faster
+/// one.
 const SMALLER: f64 = 0.995;
 
 impl Report {

@@ -1,8 +1,9 @@
 //! The floor: a loop that only reads twelve frames of 8 bits and writes one map of 32 bits.
 //!
-//! Every decoder reads and writes at least this, so none can be faster. Times are given as multiples of the floor, which makes machines
-//! comparable. It is limited by memory: each block of pixels is the exclusive or of twelve streams, and four copies of that, each
-//! combined with another constant, are the bytes of the block's 32-bit values.
+//! Every decoder reads and writes at least this, so none can be faster. Times are given as
+//! multiples of the floor, which makes machines comparable. It is limited by memory: each block of
+//! pixels is the exclusive or of twelve streams, and four copies of that, each combined with
+//! another constant, are the bytes of the block's 32-bit values.
 
 use super::timing::Effort;
 use appliance::production::stopwatch::timed;
@@ -14,7 +15,8 @@ const FRAMES: usize = 12;
 /// Pixels of a block: one line of a cache.
 const BLOCK: usize = 64;
 
-/// Reads `frames` (of equal length) and writes `map`, a value for each pixel. Pixels after the last whole block are left out.
+/// Reads `frames` (of equal length) and writes `map`, a value for each pixel. Pixels after the last
+/// whole block are left out.
 fn floor(frames: &[&[u8]; FRAMES], map: &mut [[u8; 4]]) {
     let mut blocks = frames.map(|frame| frame.as_chunks::<BLOCK>().0.iter());
     let (out, _) = map.as_chunks_mut::<BLOCK>();

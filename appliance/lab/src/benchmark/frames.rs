@@ -1,5 +1,5 @@
-//! Sets of frames that kernels are timed on, and a rotation through copies of a set: with `Effort::FULL` more than fit into any cache,
-//! with `Effort::QUICK` one.
+//! Sets of frames that kernels are timed on, and a rotation through copies of a set: with
+//! `Effort::FULL` more than fit into any cache, with `Effort::QUICK` one.
 
 use super::placed::{LINE, Placed};
 use algo::frame::{FrameView, Samples};
@@ -8,7 +8,8 @@ use algo::pipeline::PhaseMap;
 use algo::units::{AbsolutePhase, Modulation};
 use hal::frame::Frame;
 
-/// The frames of one sequence, the phase map that they are unwrapped about if the sequence needs one, and memory for the result.
+/// The frames of one sequence, the phase map that they are unwrapped about if the sequence needs
+/// one, and memory for the result.
 #[derive(Clone)]
 pub struct FrameSet {
     width: usize,
@@ -31,8 +32,8 @@ pub enum Buffer {
 }
 
 impl FrameSet {
-    /// Packed frames of `width` × `height` samples without padding, and the map for sequences that need one. Samples beyond the
-    /// last whole frame are not used.
+    /// Packed frames of `width` × `height` samples without padding, and the map for sequences that
+    /// need one. Samples beyond the last whole frame are not used.
     pub fn new(
         (width, height): (usize, usize),
         samples: Buffer,
@@ -52,8 +53,8 @@ impl FrameSet {
         }
     }
 
-    /// The same frames as a camera delivers them: each in a mapping of its own ([`Placed::Apart`]), its rows padded to whole lines
-    /// of the cache. A set that was made by [`FrameSet::new`].
+    /// The same frames as a camera delivers them: each in a mapping of its own ([`Placed::Apart`]),
+    /// its rows padded to whole lines of the cache. A set that was made by [`FrameSet::new`].
     pub fn aligned(&self) -> Self {
         let samples_of_a_line = match &self.samples {
             Buffer::Eight(_) => LINE,
@@ -146,7 +147,8 @@ pub struct Rotation {
 }
 
 impl Rotation {
-    /// As many copies as a kernel must decode to read at least `bytes` bytes of frames and maps; at least one.
+    /// As many copies as a kernel must decode to read at least `bytes` bytes of frames and maps; at
+    /// least one.
     pub fn of(set: FrameSet, bytes: usize) -> Self {
         let copies = bytes.div_ceil(set.bytes().max(1)).max(1);
         Self {

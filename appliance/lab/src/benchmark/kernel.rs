@@ -1,4 +1,5 @@
-//! The kernel table: what a pixel costs in every variant, in ns, in instructions and in multiples of the floor.
+//! The kernel table: what a pixel costs in every variant, in ns, in instructions and in multiples
+//! of the floor.
 
 use super::floor::FloorSets;
 use super::frames::{FrameSet, Rotation};
@@ -9,7 +10,8 @@ use super::workload::Workload;
 use appliance::system::memory::give_back;
 use serde::{Serialize, Serializer};
 
-/// One row of the table. Figures that a variant does not have, or that the machine does not offer, are left out of the JSON.
+/// One row of the table. Figures that a variant does not have, or that the machine does not offer,
+/// are left out of the JSON.
 #[derive(Clone, Debug, Serialize)]
 pub struct Timing {
     /// Implementation and workload, `f32_geometric_12`.
@@ -24,7 +26,8 @@ pub struct Timing {
     /// The same for 8 rows that are in the cache, median.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hot_ns_per_px: Option<f64>,
-    /// What a row costs beside its pixels, ns, median: from hot frames of two widths and equal pixels, none of which is dark.
+    /// What a row costs beside its pixels, ns, median: from hot frames of two widths and equal
+    /// pixels, none of which is dark.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ns_per_row: Option<f64>,
     /// Instructions per pixel of one frame, median.
@@ -34,7 +37,8 @@ pub struct Timing {
     pub x_floor: f64,
     /// The least and the most of these ratios.
     pub x_floor_range: [f64; 2],
-    /// Share of the pixels with the right result: the phase within 0.05 turn, or rejected where it is dark.
+    /// Share of the pixels with the right result: the phase within 0.05 turn, or rejected where it
+    /// is dark.
     pub right: f64,
 }
 
@@ -59,7 +63,8 @@ type Variants = fn(&Workload, usize) -> Result<Vec<variants::Named<String>>, Str
 
 /// A phase is right within this many turns: seven σ of the noise that the frames have.
 const RIGHT: f64 = 0.05;
-/// A kernel is bound by memory if frames that are in no cache take it at least this many times as long as those that are.
+/// A kernel is bound by memory if frames that are in no cache take it at least this many times as
+/// long as those that are.
 const BOUND_BY_MEMORY: f64 = 1.15;
 
 impl Timing {
@@ -70,7 +75,8 @@ impl Timing {
     }
 }
 
-/// Times every variant on every workload. Frames of one workload at a time are in memory, beside those of the floor.
+/// Times every variant on every workload. Frames of one workload at a time are in memory, beside
+/// those of the floor.
 ///
 /// # Errors
 /// If a sequence cannot be decoded.
@@ -109,8 +115,8 @@ pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<Ker
     })
 }
 
-/// Every variant of a workload: the decoders on each rotation, the first of which is packed and the second aligned, and that of a quiet
-/// head and the references on the first.
+/// Every variant of a workload: the decoders on each rotation, the first of which is packed and the
+/// second aligned, and that of a quiet head and the references on the first.
 fn contenders(
     workload: &Workload,
     effort: &Effort,
@@ -163,7 +169,8 @@ fn row(name: String, workload: &Workload, right: f64, rounds: &[Round], effort: 
     // Rows per pixel of the narrow frames and of the wide ones.
     let [wide, narrow] = effort.hot_sizes().map(|(width, _)| 1.0 / width as f64);
     let of_a_row = |[of_wide, of_narrow]: [f64; 2]| (of_narrow - of_wide) / (narrow - wide);
-    // Where the part ends, a narrow row is not what a wide one is: other blocks of pixels are skipped.
+    // Where the part ends, a narrow row is not what a wide one is: other blocks of pixels are
+    // skipped.
     let all_lit = workload.lit == 1.0;
     Timing {
         name,

@@ -20,7 +20,8 @@ pub struct Machine {
     pub architecture: &'static str,
     /// Clock of the processor under load, measured with one thread.
     pub clock_ghz: f64,
-    /// Time of a read whose address is the result of the one before, from memory that is in no cache.
+    /// Time of a read whose address is the result of the one before, from memory that is in no
+    /// cache.
     pub memory_latency_ns: f64,
     /// Bytes that a copy moves per ns, each of which is read once and written once.
     pub copy_gb_per_s: f64,
@@ -59,8 +60,9 @@ impl Machine {
 #[repr(align(64))]
 struct Line(usize);
 
-/// Lines in which each names the next one of a cycle through all of them in random order (S. Sattolo, "An algorithm to generate a
-/// random cyclic permutation", Information Processing Letters 22, 1986).
+/// Lines in which each names the next one of a cycle through all of them in random order (S.
+/// Sattolo, "An algorithm to generate a random cyclic permutation", Information Processing Letters
+/// 22, 1986).
 fn cycle(count: usize) -> Vec<Line> {
     let mut lines: Vec<Line> = (0..count).map(Line).collect();
     let mut random = SplitMix64::seed_from_u64(0);
@@ -73,7 +75,8 @@ fn cycle(count: usize) -> Vec<Line> {
 /// Reads that are timed at once.
 const READS: usize = 200_000;
 
-/// Time of a read that waits for the one before. It goes on where the last call ended, at lines that were not read yet.
+/// Time of a read that waits for the one before. It goes on where the last call ended, at lines
+/// that were not read yet.
 fn latency_ns(lines: &[Line], at: &mut usize) -> f64 {
     let reads = READS.min(lines.len());
     let taken = timed(|| {
@@ -96,7 +99,8 @@ fn copy_gb_per_s(to: &mut [Line], from: &[Line]) -> f64 {
 /// Rounds of the chain of instructions from which the clock is taken.
 const CHAIN: u32 = 4_000_000;
 
-/// Clock from a chain of additions and exclusive ors, each of which takes the result of the one before and so a whole cycle.
+/// Clock from a chain of additions and exclusive ors, each of which takes the result of the one
+/// before and so a whole cycle.
 fn clock_ghz() -> f64 {
     let (mut x, plus, xor) = black_box((0_u64, 3_u64, 5_u64));
     let taken = timed(|| {

@@ -10,14 +10,15 @@ const PAGE: usize = 16 << 10;
 pub enum Placed<T: Copy + Default> {
     /// One after the other, without padding.
     Packed(Vec<T>),
-    /// Each in a mapping of its own that begins at a page of 16 KiB, as the buffers of a camera do. Equal pixels of all frames then
-    /// compete for the same sets of the first-level cache, whose size divided by its ways is 16 KiB on the processors of a
-    /// Raspberry Pi.
+    /// Each in a mapping of its own that begins at a page of 16 KiB, as the buffers of a camera do.
+    /// Equal pixels of all frames then compete for the same sets of the first-level cache, whose
+    /// size divided by its ways is 16 KiB on the processors of a Raspberry Pi.
     Apart(Vec<Mapping<T>>),
 }
 
 impl<T: Copy + Default> Placed<T> {
-    /// The frames. Packed ones have `pixels` samples each; samples after the last whole frame are left out.
+    /// The frames. Packed ones have `pixels` samples each; samples after the last whole frame are
+    /// left out.
     pub fn frames(&self, pixels: usize) -> Box<dyn Iterator<Item = &[T]> + '_> {
         match self {
             Self::Packed(all) => Box::new(all.chunks_exact(pixels.max(1))),
@@ -25,7 +26,8 @@ impl<T: Copy + Default> Placed<T> {
         }
     }
 
-    /// Packed frames of `pixels` samples in mappings of their own, rows of `width` samples `stride` apart.
+    /// Packed frames of `pixels` samples in mappings of their own, rows of `width` samples `stride`
+    /// apart.
     pub fn apart(&self, pixels: usize, width: usize, stride: usize) -> Self {
         let padded = |frame: &[T]| {
             let rows = frame.chunks(width.max(1));
@@ -41,8 +43,9 @@ impl<T: Copy + Default> Placed<T> {
 
 /// An array that begins at a multiple of [`PAGE`] bytes.
 ///
-/// The allocator maps an array of a megabyte and more by itself (`appliance::system::memory::give_back`), so one of the size of
-/// a camera's frame shares no page with another.
+/// The allocator maps an array of a megabyte and more by itself
+/// (`appliance::system::memory::give_back`), so one of the size of a camera's frame shares no page
+/// with another.
 pub struct Mapping<T: Copy + Default> {
     memory: Vec<T>,
     start: usize,

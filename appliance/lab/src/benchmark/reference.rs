@@ -1,8 +1,9 @@
-//! The reference that kernels are compared with: the textbook's formulas in floating point, one pass over whole frames per operation,
-//! as in a first implementation.
+//! The reference that kernels are compared with: the textbook's formulas in floating point, one
+//! pass over whole frames per operation, as in a first implementation.
 //!
-//! The sums S and C, atan2, modulation and the unwrapping of each level each pass over the frame and store an intermediate result of
-//! its size. The intermediate results are allocated once and reused, which favours the reference. It runs in `f64` and in `f32`.
+//! The sums S and C, atan2, modulation and the unwrapping of each level each pass over the frame
+//! and store an intermediate result of its size. The intermediate results are allocated once and
+//! reused, which favours the reference. It runs in `f64` and in `f32`.
 
 use super::frames::{Buffer, FrameSet};
 use super::real::Real;
@@ -148,7 +149,8 @@ impl<T: Real> Textbook<T> {
         }
     }
 
-    /// Relative to a map Φ₀: q = φ − frac(r Φ₀), D from the beats, then the weighted mean of the D of each level.
+    /// Relative to a map Φ₀: q = φ − frac(r Φ₀), D from the beats, then the weighted mean of the D
+    /// of each level.
     fn about(&mut self, map: &[AbsolutePhase]) {
         for (level, wrapped) in self.levels.iter().zip(&mut self.wrapped) {
             for (wrapped, map) in wrapped.iter_mut().zip(map) {
@@ -179,7 +181,8 @@ impl<T: Real> Textbook<T> {
         }
     }
 
-    /// Moves D to the mean of the levels' own, weighted by N r² B²: ratio 1 first, then coarse to fine.
+    /// Moves D to the mean of the levels' own, weighted by N r² B²: ratio 1 first, then coarse to
+    /// fine.
     fn average(&mut self) {
         let last = self.levels.len() - 1;
         self.weights.fill(T::of(0.0));

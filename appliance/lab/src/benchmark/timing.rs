@@ -9,7 +9,8 @@ use std::time::Duration;
 
 /// An implementation that computes the phases of a set of frames.
 pub trait Kernel {
-    /// What precedes the timed part for this set: nothing, or the levels that are decoded on arrival.
+    /// What precedes the timed part for this set: nothing, or the levels that are decoded on
+    /// arrival.
     fn prepare(&mut self, _: &mut FrameSet) {}
     /// Decodes a set; this is timed.
     fn run(&mut self, set: &mut FrameSet);
@@ -28,7 +29,8 @@ pub struct Effort {
     pub bytes: usize,
     /// Rounds; figures are medians over them.
     pub rounds: usize,
-    /// A time is measured over a whole rotation, or over fewer sets if these take this long already.
+    /// A time is measured over a whole rotation, or over fewer sets if these take this long
+    /// already.
     pub patience: Duration,
 }
 
@@ -60,7 +62,8 @@ impl Effort {
     }
 }
 
-/// Rows that are decoded again and again: with twelve frames and the result they fit into a second-level cache.
+/// Rows that are decoded again and again: with twelve frames and the result they fit into a
+/// second-level cache.
 const HOT_ROWS: usize = 8;
 /// Hot rows are decoded until this share of a frame's pixels has been decoded.
 const HOT_SHARE: usize = 4;
@@ -112,8 +115,8 @@ impl Round {
     }
 }
 
-/// The rounds of each kernel. In every round the floor is timed first and then each kernel in turn, so that other work
-/// on the machine affects all of them alike.
+/// The rounds of each kernel. In every round the floor is timed first and then each kernel in turn,
+/// so that other work on the machine affects all of them alike.
 pub fn interleaved(
     contenders: &mut [Contender],
     rotations: &mut [Rotation],

@@ -1,4 +1,5 @@
-//! Every variant that is timed, which is an implementation on a workload. New variants are added here.
+//! Every variant that is timed, which is an implementation on a workload. New variants are added
+//! here.
 
 use super::decoding::Decoding;
 use super::reference::Textbook;
@@ -45,8 +46,9 @@ pub fn references(
     Ok([("f64", Box::new(double)), ("f32", Box::new(single))])
 }
 
-/// The decoders of a workload, by implementation and workload: `avx2_geometric_12`, a key in JSON. Where the clock starts after the
-/// coarser levels were decoded, these are kept for `copies` frame sets in turn.
+/// The decoders of a workload, by implementation and workload: `avx2_geometric_12`, a key in JSON.
+/// Where the clock starts after the coarser levels were decoded, these are kept for `copies` frame
+/// sets in turn.
 ///
 /// # Errors
 /// If its sequence cannot be decoded.

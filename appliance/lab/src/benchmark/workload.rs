@@ -160,7 +160,8 @@ impl Workload {
         FrameSet::new(size, samples, map)
     }
 
-    /// Φ of a pixel in turns, NaN where it is dark. The part is an ellipse in the middle of the frame.
+    /// Φ of a pixel in turns, NaN where it is dark. The part is an ellipse in the middle of the
+    /// frame.
     pub fn phase(&self, at: usize, (width, height): (usize, usize)) -> f64 {
         let (x, y) = (
             ((at % width) as f64 + 0.5) / width as f64,

@@ -1,4 +1,5 @@
-//! `fringed-lab accuracy --out DIR`: what the error of a height is made of, and how fine a structure is seen.
+//! `fringed-lab accuracy --out DIR`: what the error of a height is made of, and how fine a
+//! structure is seen.
 
 use crate::accuracy::{Resolution, Share, budget, resolution};
 use crate::experiment::{OpticsKind, Scene};
@@ -11,7 +12,8 @@ use serde::Serialize;
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
-/// Divide the error of heights into noise and what remains without it, and find the smallest dents that are seen.
+/// Divide the error of heights into noise and what remains without it, and find the smallest dents
+/// that are seen.
 #[derive(Debug, clap::Args)]
 pub struct Accuracy {
     /// Folder for the maps of the errors without noise; made if it does not exist.

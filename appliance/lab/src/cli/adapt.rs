@@ -61,14 +61,15 @@ pub struct Adapt {
     /// Smallest pitch in camera pixels; if not given 2.2, and 5 for the paper's method.
     #[arg(long, value_name = "PX", value_parser = number(2.0, 128.0))]
     image_pitch: Option<f64>,
-    /// Folder for what to project and to decode it with: pictures, sequence.json, phase function, expected phase.
+    /// Folder for what to project and to decode it with: pictures, sequence.json, phase function,
+    /// expected phase.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     patterns: Option<PathBuf>,
     /// How many pictures to project.
     #[arg(long, value_name = "N", default_value_t = 12, requires = "patterns", value_parser = frames())]
     frames: usize,
-    /// What each level shows: the waveform with the most modulation for its number of shifts, or a sine. The former needs a
-    /// projector whose light is linear in the grey level within 1 %.
+    /// What each level shows: the waveform with the most modulation for its number of shifts, or a
+    /// sine. The former needs a projector whose light is linear in the grey level within 1 %.
     #[arg(long, value_enum, default_value_t = Form::Bright, requires = "patterns")]
     waveform: Form,
     #[command(flatten)]
@@ -81,7 +82,8 @@ impl Adapt {
     /// Measures the recording, makes the phase function, writes it and prints the report.
     ///
     /// # Errors
-    /// If the recording cannot be opened or lacks what the method needs, or the file cannot be written.
+    /// If the recording cannot be opened or lacks what the method needs, or the file cannot be
+    /// written.
     pub fn run(&self) -> Result<(), Failure> {
         let options = self.options()?;
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {

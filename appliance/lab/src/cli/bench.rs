@@ -1,4 +1,5 @@
-//! `fringed-lab bench`: the kernel table, run time against error, and the budget from trigger to verdict.
+//! `fringed-lab bench`: the kernel table, run time against error, and the budget from trigger to
+//! verdict.
 
 use crate::benchmark::{self, Effort, Machine, Report, Study};
 use appliance::cli::{Output, Threads, names};
@@ -18,8 +19,8 @@ pub struct Bench {
     /// Folder for tables, CSV and plot; made if it does not exist.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: Option<PathBuf>,
-    /// Write the twelve frames that the kernels are timed on to this folder, for other programs to be timed on, and
-    /// measure nothing.
+    /// Write the twelve frames that the kernels are timed on to this folder, for other programs to
+    /// be timed on, and measure nothing.
     #[arg(long, value_name = "DIR", value_parser = names::folder(), conflicts_with_all = ["what", "out", "threads", "json"])]
     frames: Option<PathBuf>,
     #[command(flatten)]
@@ -39,7 +40,8 @@ enum What {
     Budget,
 }
 
-/// Columns and rows of the cameras of the budget: the study's physical head, and the sensor that is aimed at.
+/// Columns and rows of the cameras of the budget: the study's physical head, and the sensor that is
+/// aimed at.
 const CAMERAS: [(u32, u32); 2] = [(640, 480), (1456, 1088)];
 const QUICK_CAMERAS: [(u32, u32); 1] = [(160, 120)];
 

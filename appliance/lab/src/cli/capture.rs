@@ -1,4 +1,5 @@
-//! `fringed-lab capture DIR`: pictures of white, black, fringes or files, with a head that need not be calibrated.
+//! `fringed-lab capture DIR`: pictures of white, black, fringes or files, with a head that need not
+//! be calibrated.
 
 use crate::workbench::import::{Channel, Picture};
 use appliance::cli::numbers::number;
@@ -21,10 +22,12 @@ pub struct Capture {
     /// Folder for the pictures; must not exist yet. With fringes it is a recording without models.
     #[arg(value_parser = names::folder())]
     folder: PathBuf,
-    /// What to show: white, black, vertical, horizontal, all of these, or grey PNG files of the projector's size.
+    /// What to show: white, black, vertical, horizontal, all of these, or grey PNG files of the
+    /// projector's size.
     #[arg(long, value_name = "PATTERN,...", default_value = "all", value_delimiter = ',', value_parser = Showing::parse)]
     patterns: Vec<Showing>,
-    /// Poses of a board, each in a folder of its own; before each, a line is read from standard input.
+    /// Poses of a board, each in a folder of its own; before each, a line is read from standard
+    /// input.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = number(1u8, 99))]
     poses: u8,
     /// Fringes over the projector; without it, one per 12 pixels.
@@ -86,8 +89,8 @@ impl Capture {
     /// Opens the head, takes the pictures of each pose and writes them.
     ///
     /// # Errors
-    /// If the head cannot be opened (69), a picture cannot be shown (64, 65, 66), the folder cannot be written (73), or standard input
-    /// ends before the last pose (64).
+    /// If the head cannot be opened (69), a picture cannot be shown (64, 65, 66), the folder cannot
+    /// be written (73), or standard input ends before the last pose (64).
     pub fn run(&self) -> Result<(), Failure> {
         if self.folder.exists() {
             let words = format!(

@@ -19,8 +19,9 @@ pub struct Described {
     /// Columns and rows of the projector.
     #[arg(long, value_name = "WxH", value_parser = size)]
     projector: Size,
-    /// Fringes over the projector of each level, in the order of projection; need not be whole numbers. 1,8,32/1,8,16: vertical ones,
-    /// then horizontal ones. Without fringes there is a Gray code alone.
+    /// Fringes over the projector of each level, in the order of projection; need not be whole
+    /// numbers. 1,8,32/1,8,16: vertical ones, then horizontal ones. Without fringes there is a Gray
+    /// code alone.
     #[arg(long, value_name = "F,...", conflicts_with = "pitch", value_parser = directions(1e-3, MAX_FRINGES, MAX_LEVELS))]
     fringes: Option<PerDirection<f64>>,
     /// Projector pixels per fringe of each level, instead of --fringes.
@@ -38,17 +39,20 @@ pub struct Described {
     /// Shift of each level's first frame, turns.
     #[arg(long, value_name = "TURNS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = number(-MAX_SHIFT_TURNS, MAX_SHIFT_TURNS))]
     first_shift: f64,
-    /// Direction of the fringes; both: all vertical ones, then all horizontal ones; horizontal-first: the other way round.
+    /// Direction of the fringes; both: all vertical ones, then all horizontal ones;
+    /// horizontal-first: the other way round.
     #[arg(long, default_value = "vertical")]
     direction: Direction,
     /// Bits of a Gray code beside the fringes; two numbers for the vertical and the horizontal one.
     #[arg(long, value_name = "BITS", value_parser = series(1u8, 13, 2))]
     gray: Option<Series<u8>>,
-    /// Width of the Gray code's cells, projector pixels; without it one cell per fringe of the finest level, or per pixel without fringes.
-    /// Two numbers for the vertical and the horizontal code.
+    /// Width of the Gray code's cells, projector pixels; without it one cell per fringe of the
+    /// finest level, or per pixel without fringes. Two numbers for the vertical and the horizontal
+    /// code.
     #[arg(long, value_name = "PX", value_parser = series(1.0, f64::from(MAX_SIDE), 2))]
     gray_cell: Option<Series<f64>>,
-    /// How far before the raster's edge the first cell begins, projector pixels: half a cell where edges lie in the middle of fringes.
+    /// How far before the raster's edge the first cell begins, projector pixels: half a cell where
+    /// edges lie in the middle of fringes.
     #[arg(long, value_name = "PX", value_parser = series(0.0, f64::from(MAX_SIDE), 2))]
     gray_offset: Option<Series<f64>>,
     /// Order of the Gray code's bits: most or least significant first.
@@ -83,7 +87,8 @@ impl Described {
     /// The description, with a phase function instead of straight fringes if one is given.
     ///
     /// # Errors
-    /// If neither fringes, pitches nor a Gray code are given, or a Gray code is described that there is not (64).
+    /// If neither fringes, pitches nor a Gray code are given, or a Gray code is described that
+    /// there is not (64).
     pub fn description(&self, function: Option<Vec<f64>>) -> Result<Description, Failure> {
         let fringes = match (&self.fringes, &self.pitch) {
             (Some(fringes), _) => Fringes::Count(fringes.clone()),

@@ -19,7 +19,8 @@ pub struct Experiment {
     /// Noise seeds.
     #[arg(long, value_name = "N", default_value_t = 3, value_parser = numbers::number(1_u64, 100))]
     seeds: u64,
-    /// What the better sequences show: the waveform with the most modulation for each number of shifts, or a sine.
+    /// What the better sequences show: the waveform with the most modulation for each number of
+    /// shifts, or a sine.
     #[arg(long, value_enum, default_value_t = Form::Bright)]
     waveform: Form,
     /// Folder for tables, plots and pictures; made if it does not exist.

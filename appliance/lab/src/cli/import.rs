@@ -16,7 +16,8 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("imported").args(["camera_model", "projector_model", "models"]).multiple(true))]
 pub struct Import {
-    /// Folder of PNG, BMP, TIFF or JPEG pictures, named in the order of projection; each page of a TIFF is a picture.
+    /// Folder of PNG, BMP, TIFF or JPEG pictures, named in the order of projection; each page of a
+    /// TIFF is a picture.
     folder: PathBuf,
     /// Folder for the recording; must not exist yet.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
@@ -40,10 +41,12 @@ pub struct Import {
     /// σ of one sample in counts; without it fringes need 16 of 255 counts of modulation.
     #[arg(long, value_name = "COUNTS", value_parser = number(MIN_NOISE_COUNTS, MAX_NOISE_COUNTS))]
     noise: Option<f64>,
-    /// Working range of z about the plane z = 0, mm; without it a fifth of the camera's distance to both sides.
+    /// Working range of z about the plane z = 0, mm; without it a fifth of the camera's distance to
+    /// both sides.
     #[arg(long, value_name = "LOW,HIGH", allow_hyphen_values = true, value_parser = range(MAX_RANGE_MM))]
     range: Option<[f64; 2]>,
-    /// The camera's model, written by OpenCV (YAML, XML, JSON). Without models there are phases but no heights.
+    /// The camera's model, written by OpenCV (YAML, XML, JSON). Without models there are phases but
+    /// no heights.
     #[arg(long, value_name = "FILE", requires = "projector_model")]
     camera_model: Option<PathBuf>,
     /// The projector's model.
@@ -58,8 +61,8 @@ pub struct Import {
     /// The world's z in the models' files points away from the head, as on OpenCV's boards.
     #[arg(long, requires = "imported")]
     z_away: bool,
-    /// The plane z = 0 stands across the camera's axis at this distance: for models without the pose of a plate. Without it z = 0 is
-    /// the plane that fits the measured points best.
+    /// The plane z = 0 stands across the camera's axis at this distance: for models without the
+    /// pose of a plate. Without it z = 0 is the plane that fits the measured points best.
     #[arg(long, value_name = "MM", requires = "imported", value_parser = number(1.0, MAX_RANGE_MM))]
     plane_at: Option<f64>,
     #[command(flatten)]
@@ -88,8 +91,8 @@ impl Import {
     /// Reads the pictures, writes the recording, and prints what looks wrong.
     ///
     /// # Errors
-    /// If the folder or a model is missing (66), the options contradict each other or the pictures (64, 65), or the recording
-    /// cannot be written (73).
+    /// If the folder or a model is missing (66), the options contradict each other or the pictures
+    /// (64, 65), or the recording cannot be written (73).
     pub fn run(&self) -> Result<(), Failure> {
         let taken = Taken {
             description: self.described.description(None)?,

@@ -16,7 +16,8 @@ use appliance::error::Failure;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use std::process::ExitCode;
 
-/// Benchmarks and experiments on what `fringed` is made of, recordings of other pictures, patterns for a part.
+/// Benchmarks and experiments on what `fringed` is made of, recordings of other pictures, patterns
+/// for a part.
 #[derive(Debug, Parser)]
 #[command(name = "fringed-lab", version = VERSION)]
 struct Arguments {
@@ -31,7 +32,8 @@ enum Command {
     Experiment(experiment::Experiment),
     /// Time the kernels, time against error, and trigger to verdict.
     Bench(bench::Bench),
-    /// Divide the error of heights into noise and what remains without it, and find the smallest dents that are seen.
+    /// Divide the error of heights into noise and what remains without it, and find the smallest
+    /// dents that are seen.
     Accuracy(accuracy::Accuracy),
     /// Make a pattern for the part of a preliminary recording.
     Adapt(adapt::Adapt),

@@ -36,7 +36,8 @@ fn listed<T: FromStr + PartialOrd>(
     numbers.filter(|all| all.len() <= most && all.iter().all(|number| range.contains(number)))
 }
 
-/// A series for vertical fringes and one for horizontal ones with a / between them, or one for both.
+/// A series for vertical fringes and one for horizontal ones with a / between them, or one for
+/// both.
 pub fn directions<T>(low: T, high: T, most: usize) -> impl TypedValueParser<Value = PerDirection<T>>
 where
     T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static,

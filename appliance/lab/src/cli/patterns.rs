@@ -1,4 +1,5 @@
-//! `fringed-lab patterns DIR`: the pictures to project, and the manifest of the recording that their frames will make.
+//! `fringed-lab patterns DIR`: the pictures to project, and the manifest of the recording that
+//! their frames will make.
 
 use super::described::Described;
 use super::numbers::{Size, size};
@@ -26,7 +27,8 @@ pub struct Patterns {
     folder: PathBuf,
     #[command(flatten)]
     described: Described,
-    /// Phase function of an adaptive pattern, as adapt writes it: then only the ratios of --fringes count.
+    /// Phase function of an adaptive pattern, as adapt writes it: then only the ratios of --fringes
+    /// count.
     #[arg(long, value_name = "FILE")]
     pattern: Option<PathBuf>,
     /// Columns and rows of the camera's frames.
@@ -48,7 +50,8 @@ impl Patterns {
     /// Makes the pictures and writes them.
     ///
     /// # Errors
-    /// If the options contradict each other (64), the phase function is missing or wrong (66, 65), or nothing can be written (73).
+    /// If the options contradict each other (64), the phase function is missing or wrong (66, 65),
+    /// or nothing can be written (73).
     pub fn run(&self) -> Result<(), Failure> {
         let usage =
             |error: &dyn std::fmt::Display| Failure::because(Exit::Usage, "patterns", error);

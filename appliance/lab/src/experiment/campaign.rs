@@ -30,7 +30,8 @@ pub struct Results {
 }
 
 impl Campaign {
-    /// Runs everything. `progress` is called with the share done, 0…1, and with the run that begins.
+    /// Runs everything. `progress` is called with the share done, 0…1, and with the run that
+    /// begins.
     ///
     /// # Errors
     /// If the simulated head or a pattern fails.

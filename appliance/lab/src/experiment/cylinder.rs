@@ -1,7 +1,8 @@
 //! Fits a cylinder to a point cloud by least squares.
 //!
-//! Gauss–Newton over the five parameters of a cylinder along y: its axis (x₀ + a y, y, z₀ + c y) and its radius. Outliers are left
-//! out round by round, so that wrong fringe orders do not bias the fit.
+//! Gauss–Newton over the five parameters of a cylinder along y: its axis (x₀ + a y, y, z₀ + c y)
+//! and its radius. Outliers are left out round by round, so that wrong fringe orders do not bias
+//! the fit.
 
 use algo::math::solve::Normal;
 
@@ -23,7 +24,8 @@ const ITERATIONS: usize = 12;
 /// x₀, a, z₀, c, radius.
 const UNKNOWNS: usize = 5;
 
-/// Fits a cylinder along y to points (x, y, z) in mm that lie on the side towards +z; `None` where they do not determine one.
+/// Fits a cylinder along y to points (x, y, z) in mm that lie on the side towards +z; `None` where
+/// they do not determine one.
 pub fn fit(points: &[[f64; 3]]) -> Option<Cylinder> {
     let count = points.len() as f64;
     let extent = |axis: usize| {

@@ -85,7 +85,8 @@ fn errors(rows: &[&RunRow]) -> Vec<Series> {
     series.into()
 }
 
-/// A quantity over the number of fringes, for each of the optics; adaptive patterns as horizontal lines.
+/// A quantity over the number of fringes, for each of the optics; adaptive patterns as horizontal
+/// lines.
 fn over_fringes(rows: &[&RunRow], quantity: fn(&RunRow) -> f64) -> Vec<Series> {
     let mut optics: Vec<&str> = rows.iter().map(|row| row.optics).collect();
     optics.dedup();
@@ -123,5 +124,6 @@ fn over_fringes(rows: &[&RunRow], quantity: fn(&RunRow) -> f64) -> Vec<Series> {
     series
 }
 
-/// x of the points of [`Kind::Level`], within the axis of n_F; their lines are drawn over its whole width.
+/// x of the points of [`Kind::Level`], within the axis of n_F; their lines are drawn over its whole
+/// width.
 const MIDDLE: f64 = 100.0;

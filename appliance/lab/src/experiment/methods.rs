@@ -20,7 +20,8 @@ pub enum Method {
     Better(BetterSequence),
 }
 
-/// A sequence of the better method: as many levels and shifts as [`split`] divides the frames among.
+/// A sequence of the better method: as many levels and shifts as [`split`] divides the frames
+/// among.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BetterSequence {
     /// Number of frames: 3 to 27.
@@ -37,8 +38,8 @@ pub const SHOWN_ADAPTIVE: Method = Method::Better(BetterSequence::TWELVE);
 pub const PAPER: Method = Method::Paper { image_pitch: 5 };
 
 impl Method {
-    /// The methods of a figure with these fixed patterns; the paper's pattern is among them. With `sines` the better sequences show
-    /// sines.
+    /// The methods of a figure with these fixed patterns; the paper's pattern is among them. With
+    /// `sines` the better sequences show sines.
     pub fn table(fringes: &[u32], sines: bool) -> Vec<Self> {
         let fixed = fringes.iter().map(|&fringes| Self::Fixed { fringes });
         let papers = [PAPER, Self::Paper { image_pitch: 4 }];
@@ -63,7 +64,8 @@ impl Method {
         }
     }
 
-    /// What each frame of its measurement shows. Geometric levels are the paper's: 1, n, n² with n = √(max Φ_P), N = 4.
+    /// What each frame of its measurement shows. Geometric levels are the paper's: 1, n, n² with
+    /// n = √(max Φ_P), N = 4.
     ///
     /// # Errors
     /// As [`BetterSequence::shots`].

@@ -1,7 +1,7 @@
 //! A simulated head in front of one part, and one run of each method.
 //!
-//! Preliminary maps, patterns and the golden map of the part are measured once per noise seed, and shared by the runs that need
-//! them.
+//! Preliminary maps, patterns and the golden map of the part are measured once per noise seed, and
+//! shared by the runs that need them.
 
 use super::judge::judge;
 use super::methods::{self, BetterSequence, Method};
@@ -56,7 +56,8 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 /// Pitch of the preliminary patterns, projector pixels.
 const PRELIMINARY_PITCH: f64 = paper::PROJECTOR_PITCH * paper::PRELIMINARY;
 
-/// Noise streams: each measurement of a seed has its own, so that its result does not depend on which other methods are run.
+/// Noise streams: each measurement of a seed has its own, so that its result does not depend on
+/// which other methods are run.
 const STREAMS: u64 = 1000;
 const PRELIMINARY_STREAM: u64 = 0;
 const HORIZONTAL_STREAM: u64 = 1;
@@ -110,8 +111,9 @@ impl Runner {
         })
     }
 
-    /// Measures the pattern of a method with a sequence of the caller's choice and the noise of `seed`. `shots` returns what each
-    /// frame shows, for the range of the phase function. The second result is the map that the phase was unwrapped about.
+    /// Measures the pattern of a method with a sequence of the caller's choice and the noise of
+    /// `seed`. `shots` returns what each frame shows, for the range of the phase function. The
+    /// second result is the map that the phase was unwrapped about.
     ///
     /// # Errors
     /// If the head or the pattern fails.
@@ -128,7 +130,8 @@ impl Runner {
         Ok((measured, map))
     }
 
-    /// The pattern of a method, and the map that its phase is unwrapped about if it is not absolute by itself.
+    /// The pattern of a method, and the map that its phase is unwrapped about if it is not absolute
+    /// by itself.
     fn pattern(
         &mut self,
         method: Method,
@@ -255,8 +258,8 @@ fn rig(error: impl std::fmt::Display) -> MeasureError {
 /// Smallest image pitch along u that the paper's chain resolves, camera pixels.
 const RESOLVED_PITCH: f64 = 2.5;
 
-/// The criterion of the paper's chain: rejects the pixels whose image pitch along u, by central differences of Φ, is below
-/// [`RESOLVED_PITCH`].
+/// The criterion of the paper's chain: rejects the pixels whose image pitch along u, by central
+/// differences of Φ, is below [`RESOLVED_PITCH`].
 fn reject_too_fine(phases: &mut PhaseMap) {
     let (phase, width) = (&phases.phase, phases.width);
     for (at, trust) in phases.trust.iter_mut().enumerate() {

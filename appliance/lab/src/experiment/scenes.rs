@@ -18,8 +18,8 @@ pub struct Scene {
     pub part: Part,
     /// Where it lies.
     pub placement: Placement,
-    /// Columns and rows of the camera: 512 as in the study; a smaller one sees the middle of the same
-    /// picture, with pixels of the same size.
+    /// Columns and rows of the camera: 512 as in the study; a smaller one sees the middle of the
+    /// same picture, with pixels of the same size.
     pub camera: u32,
     /// Bits of the camera: 8 in the study.
     pub bit_depth: u8,

@@ -52,7 +52,8 @@ macro_rules! quantities {
 }
 
 quantities! {
-    /// The measured quantities of a row; NaN where there is no value (an empty cell in CSV, null in JSON).
+    /// The measured quantities of a row; NaN where there is no value (an empty cell in CSV, null in
+    /// JSON).
     #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
     Values {
         /// Resolved pixels that truth calls wholly lit.

@@ -32,7 +32,8 @@ impl Axis {
         }
     }
 
-    /// Over values above zero with some space around them; low and high are then their decimal logarithms.
+    /// Over values above zero with some space around them; low and high are then their decimal
+    /// logarithms.
     pub fn decades(values: Vec<f64>, ends: [f64; 2]) -> Self {
         let logarithms = values.into_iter().filter(|value| *value > 0.0);
         let linear = Self::over(logarithms.map(f64::log10).collect(), false, ends);

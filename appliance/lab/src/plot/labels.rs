@@ -18,7 +18,8 @@ pub fn block(taken: &mut Vec<Area>, from: (f64, f64), to: (f64, f64)) {
     }
 }
 
-/// Where a label goes: the first place near its dot that is free; far from it with the end of a line to it.
+/// Where a label goes: the first place near its dot that is free; far from it with the end of a
+/// line to it.
 pub fn place(
     (x, y): (f64, f64),
     label: &str,

@@ -1,7 +1,7 @@
 //! Plots with labelled points, as SVG and PNG.
 //!
-//! No plotting library is used, because none places the labels of points clear of each other and of the lines; the rest is a frame and
-//! ticks.
+//! No plotting library is used, because none places the labels of points clear of each other and of
+//! the lines; the rest is a frame and ticks.
 
 mod axis;
 mod labels;

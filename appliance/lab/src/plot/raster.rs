@@ -1,5 +1,6 @@
-//! A plot as a picture of pixels: lines and dots with soft edges, words in the one font of all pictures, whose size is fixed (the `size`
-//! of [`Mark::Words`] is for SVG). Pixel (x, y) has its centre at the point (x, y), in SVG at (x + ½, y + ½).
+//! A plot as a picture of pixels: lines and dots with soft edges, words in the one font of all
+//! pictures, whose size is fixed (the `size` of [`Mark::Words`] is for SVG). Pixel (x, y) has its
+//! centre at the point (x, y), in SVG at (x + ½, y + ½).
 
 use super::marks::{Anchor, DASH, Mark};
 use appliance::output::canvas::{Canvas, LETTER, LINE};
@@ -42,13 +43,15 @@ pub fn render((width, height): (f64, f64), marks: &[Mark]) -> Canvas<3> {
     canvas
 }
 
-/// The colour of a CSS code with six hexadecimal digits, as all marks have; black for a code that is not hexadecimal.
+/// The colour of a CSS code with six hexadecimal digits, as all marks have; black for a code that
+/// is not hexadecimal.
 fn rgb(code: &str) -> [u8; 3] {
     let bits = u32::from_str_radix(code.trim_start_matches('#'), 16).unwrap_or(0);
     [16, 8, 0].map(|shift| (bits >> shift) as u8)
 }
 
-/// Mixes `colour` into the pixels of a box, each by the share `cover` of its centre (x, y), which is clamped to 0…1.
+/// Mixes `colour` into the pixels of a box, each by the share `cover` of its centre (x, y), which
+/// is clamped to 0…1.
 fn paint(
     canvas: &mut Canvas<3>,
     [left, top, right, bottom]: [f64; 4],
@@ -70,8 +73,8 @@ fn paint(
     }
 }
 
-/// A straight line of `width` pixels; if it is dashed, `walked` is the length in pixels of the whole line before it, so that dashes go on
-/// over its points.
+/// A straight line of `width` pixels; if it is dashed, `walked` is the length in pixels of the
+/// whole line before it, so that dashes go on over its points.
 fn line(
     canvas: &mut Canvas<3>,
     ((x0, y0), (x1, y1)): ((f64, f64), (f64, f64)),
@@ -126,8 +129,9 @@ fn words(canvas: &mut Canvas<3>, (x, y): (f64, f64), anchor: Anchor, colour: [u8
     );
 }
 
-/// Words that are read from below, with their middle at height y. They are drawn on a white canvas and copied turned by a quarter,
-/// including its background, which hides what is below. The lower edge of the line, not its base line, is at x.
+/// Words that are read from below, with their middle at height y. They are drawn on a white canvas
+/// and copied turned by a quarter, including its background, which hides what is below. The lower
+/// edge of the line, not its base line, is at x.
 fn upright(canvas: &mut Canvas<3>, (x, y): (f64, f64), colour: [u8; 3], text: &str) {
     let length = LETTER * text.chars().count();
     let mut lying = Canvas::<3>::new(length.max(1), LINE);

@@ -17,8 +17,8 @@ use std::path::Path;
 pub struct AdaptOptions {
     /// The method.
     pub method: Method,
-    /// Blur and smallest pitches. The paper's method uses only the image pitch: its projector pitch is
-    /// [`paper::PROJECTOR_PITCH`], and the blur only enters the prediction.
+    /// Blur and smallest pitches. The paper's method uses only the image pitch: its projector pitch
+    /// is [`paper::PROJECTOR_PITCH`], and the blur only enters the prediction.
     pub optics: Optics,
 }
 
@@ -37,7 +37,8 @@ pub enum Method {
 pub struct Adapted {
     /// Φ_P over the projector's raster.
     pub function: PhaseFunction,
-    /// Φ that the preliminary measurement expects in each camera pixel under this pattern, unknown where it was not resolved.
+    /// Φ that the preliminary measurement expects in each camera pixel under this pattern, unknown
+    /// where it was not resolved.
     pub expected: Vec<AbsolutePhase>,
     /// The summary.
     pub report: Report,
@@ -67,7 +68,8 @@ pub struct Report {
 /// Measures a preliminary recording and makes a phase function for its part.
 ///
 /// # Errors
-/// If it cannot be measured, lacks a pattern or a model that the method needs, or has no resolved pixels.
+/// If it cannot be measured, lacks a pattern or a model that the method needs, or has no resolved
+/// pixels.
 pub fn adapt(
     recording: &Recording,
     folder: &Path,
@@ -154,8 +156,8 @@ struct Crossed {
     pitch: [f64; 2],
 }
 
-/// Checks that a recording has the patterns that a method needs; those of the paper's method are returned. The vertical pattern is
-/// the measurement's primary one.
+/// Checks that a recording has the patterns that a method needs; those of the paper's method are
+/// returned. The vertical pattern is the measurement's primary one.
 fn crossed(recording: &Recording, method: Method) -> Result<Option<Crossed>, &'static str> {
     let projector = &recording.projector;
     let find = |pitch: &dyn Fn(&PatternSpec) -> Option<f64>| {

@@ -1,5 +1,5 @@
-//! What is projected, in which order: levels of fringes, Gray codes, white and black. `fringed-lab patterns` makes pictures of it, and
-//! `fringed-lab import` takes pictures for it.
+//! What is projected, in which order: levels of fringes, Gray codes, white and black. `fringed-lab
+//! patterns` makes pictures of it, and `fringed-lab import` takes pictures for it.
 
 use algo::chain::{Coding, GrayCode, MAX_CODE_BITS};
 use hal::bounds::MAX_FRINGES;
@@ -71,14 +71,17 @@ pub enum BitOrder {
     Lsb,
 }
 
-/// Gray codes. Lists have one element for both codes, or one for the vertical and one for the horizontal one.
+/// Gray codes. Lists have one element for both codes, or one for the vertical and one for the
+/// horizontal one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gray {
     /// Numbers of bits.
     pub bits: Vec<u8>,
-    /// Widths of cells in projector pixels; empty where a cell is a fringe of the finest level, or of a code alone a pixel.
+    /// Widths of cells in projector pixels; empty where a cell is a fringe of the finest level, or
+    /// of a code alone a pixel.
     pub cell_px: Vec<f64>,
-    /// How far before the raster's edge the first cell begins, projector pixels; empty where it begins there.
+    /// How far before the raster's edge the first cell begins, projector pixels; empty where it
+    /// begins there.
     pub offset_px: Vec<f64>,
     /// The order of the bits.
     pub order: BitOrder,
@@ -120,7 +123,8 @@ pub struct Description {
     pub gray: Option<Gray>,
     /// The order of projection.
     pub order: Vec<Section>,
-    /// A phase function instead of straight fringes, row-major, in turns: then only the ratios of `fringes` count.
+    /// A phase function instead of straight fringes, row-major, in turns: then only the ratios of
+    /// `fringes` count.
     pub function: Option<Vec<f64>>,
 }
 
@@ -306,7 +310,8 @@ impl Layout {
 }
 
 impl Description {
-    /// Checks that each section is projected as often as it must be, and that a code alone has something to be compared with.
+    /// Checks that each section is projected as often as it must be, and that a code alone has
+    /// something to be compared with.
     fn check_order(&self) -> Result<(), String> {
         let once = |section| {
             let count = self.order.iter().filter(|other| **other == section);

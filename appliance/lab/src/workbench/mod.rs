@@ -1,4 +1,5 @@
-//! Pictures of other programs and heads: what to project, a recording of what was taken, and patterns made for a part.
+//! Pictures of other programs and heads: what to project, a recording of what was taken, and
+//! patterns made for a part.
 
 pub mod adapt;
 pub mod import;

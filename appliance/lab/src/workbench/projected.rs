@@ -1,4 +1,5 @@
-//! What to project for an adapted pattern, and what to decode the frames with: the folder that `fringed-lab adapt --patterns` writes.
+//! What to project for an adapted pattern, and what to decode the frames with: the folder that
+//! `fringed-lab adapt --patterns` writes.
 
 use super::adapt::Adapted;
 use algo::pattern::{Encoder, PhaseFunction, Shot, Split, Waveforms};
@@ -11,8 +12,9 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
 
-/// Reach of a sequence that can show a wrong fringe order, turns: that of two levels of ratios 1 and 4/5. Sequences of fewer frames
-/// than two levels need are a single level, which is right within 0.40 turn of the expected phase.
+/// Reach of a sequence that can show a wrong fringe order, turns: that of two levels of ratios 1
+/// and 4/5. Sequences of fewer frames than two levels need are a single level, which is right
+/// within 0.40 turn of the expected phase.
 const REACH: f64 = 2.3;
 const REACH_OF_ONE: f64 = 0.4;
 
@@ -61,8 +63,8 @@ struct FrameFile {
 }
 
 impl<'a> Projected<'a> {
-    /// The most accurate sequence of so many frames for the pattern, about the phase that is expected of a camera with rows of
-    /// `width` pixels.
+    /// The most accurate sequence of so many frames for the pattern, about the phase that is
+    /// expected of a camera with rows of `width` pixels.
     ///
     /// # Errors
     /// In words: there is no sequence of so many frames.

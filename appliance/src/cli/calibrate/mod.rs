@@ -1,4 +1,5 @@
-//! `fringed calibrate`: makes or imports the models, measures the rest of the calibration on the head, and writes `calibration.json`.
+//! `fringed calibrate`: makes or imports the models, measures the rest of the calibration on the
+//! head, and writes `calibration.json`.
 
 mod poses;
 mod report;
@@ -22,20 +23,23 @@ use poses::Poses;
 use sim::{Part, Stage};
 use std::path::{Path, PathBuf};
 
-/// Calibrate the head: make its models from a board or import them, measure delay, stamps, grey response, noise, contrast and the reference plane.
+/// Calibrate the head: make its models from a board or import them, measure delay, stamps, grey
+/// response, noise, contrast and the reference plane.
 #[derive(Debug, clap::Args)]
 #[command(group = clap::ArgGroup::new("imported").args(["camera", "projector", "models"]).multiple(true).conflicts_with("board"))]
 pub struct Calibrate {
     /// Calibrate a simulated head of this scenario instead of the configured head.
     #[arg(long, value_name = "FILE", conflicts_with = "board")]
     scenario: Option<PathBuf>,
-    /// The camera's model, written by OpenCV (YAML, XML, JSON). Without models those of before stay.
+    /// The camera's model, written by OpenCV (YAML, XML, JSON). Without models those of before
+    /// stay.
     #[arg(long, value_name = "FILE", requires = "projector")]
     camera: Option<PathBuf>,
     /// The projector's model.
     #[arg(long, value_name = "FILE", requires = "camera")]
     projector: Option<PathBuf>,
-    /// Both models in one file, with R and T from the camera to the projector and the pose of the plate.
+    /// Both models in one file, with R and T from the camera to the projector and the pose of the
+    /// plate.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["camera", "projector"])]
     models: Option<PathBuf>,
     /// Unit of lengths in the models' files, where they do not say it.
@@ -44,13 +48,15 @@ pub struct Calibrate {
     /// The world's z in the models' files points away from the head, as on OpenCV's boards.
     #[arg(long, requires = "imported")]
     z_away: bool,
-    /// The plane z = 0 stands across the camera's axis at this distance: for models without the pose of a plate.
+    /// The plane z = 0 stands across the camera's axis at this distance: for models without the
+    /// pose of a plate.
     #[arg(long, value_name = "MM", requires = "imported", value_parser = number(1.0, MAX_RANGE_MM))]
     plane_at: Option<f64>,
     /// No flat plate lies in the plane z = 0: leave the reference plane to the models.
     #[arg(long, conflicts_with = "board")]
     no_plate: bool,
-    /// What heights go by: the models, or the projector points that are measured on the plate. By default as in the calibration before, else the models.
+    /// What heights go by: the models, or the projector points that are measured on the plate. By
+    /// default as in the calibration before, else the models.
     #[arg(long, conflicts_with_all = ["board", "no_plate"])]
     heights_by: Option<HeightsBy>,
     /// How warm the head is, °C: kept in the calibration.
@@ -72,8 +78,8 @@ impl Calibrate {
     /// Opens the head, measures it, writes the calibration and prints what was found.
     ///
     /// # Errors
-    /// If a model cannot be imported (65, 66), the head cannot be measured (69), or the calibration cannot be written (73). The
-    /// calibration before is then unchanged.
+    /// If a model cannot be imported (65, 66), the head cannot be measured (69), or the calibration
+    /// cannot be written (73). The calibration before is then unchanged.
     pub fn run(&self) -> Result<(), Failure> {
         let options = &self.measuring;
         if self.poses.given() {
@@ -89,7 +95,8 @@ impl Calibrate {
                 "calibrate: a recording carries its own calibration: configure another head or name a scenario with --scenario",
             ));
         }
-        // Locked until all is written: no station measures meanwhile with the calibration that is being replaced.
+        // Locked until all is written: no station measures meanwhile with the calibration that is
+        // being replaced.
         let state = StateFolder::open(&options.files.state_folder()?)?;
         let head = config.head_in(state.path());
         let place = Place::at(head.calibration.as_deref().unwrap_or(Path::new("")));

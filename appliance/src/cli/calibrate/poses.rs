@@ -1,4 +1,5 @@
-//! `fringed calibrate --board … --poses …`: the models of camera and projector from recordings of a checkerboard.
+//! `fringed calibrate --board … --poses …`: the models of camera and projector from recordings of a
+//! checkerboard.
 
 use super::super::names;
 use super::super::numbers::number;
@@ -27,22 +28,27 @@ const MAX_LENGTH_MM: f64 = 1e5;
 /// Models from recordings of a board.
 #[derive(Debug, clap::Args)]
 pub struct Poses {
-    /// Make the models from recordings of this board: checker:COLUMNSxROWS:MM, counted in inner corners, MM the side of a square.
+    /// Make the models from recordings of this board: checker:COLUMNSxROWS:MM, counted in inner
+    /// corners, MM the side of a square.
     #[arg(long, value_name = "BOARD", value_parser = board::parse)]
     board: Option<Board>,
-    /// Recordings of the board, each with vertical and horizontal fringes; in the last the board lies in the plane z = 0.
+    /// Recordings of the board, each with vertical and horizontal fringes; in the last the board
+    /// lies in the plane z = 0.
     #[arg(long, value_name = "RECORDING", num_args = 1..)]
     poses: Vec<PathBuf>,
     /// Write the calibration to this file instead of the station's.
     #[arg(long, value_name = "FILE", value_parser = names::file("json"))]
     pub out: Option<PathBuf>,
-    /// Write pictures to this folder: the residuals of camera and projector as arrows × 200, and where in the frame corners were seen.
+    /// Write pictures to this folder: the residuals of camera and projector as arrows × 200, and
+    /// where in the frame corners were seen.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     pictures: Option<PathBuf>,
-    /// σ of the board's scale in parts per million, as its maker or a ruler gives it; counts towards σ of heights and lengths.
+    /// σ of the board's scale in parts per million, as its maker or a ruler gives it; counts
+    /// towards σ of heights and lengths.
     #[arg(long, value_name = "PPM", value_parser = number(0.0, MAX_SIGMA_PPM))]
     board_sigma_ppm: Option<f64>,
-    /// Length on the board from its first to its last inner corner along the longer side, as measured with a ruler.
+    /// Length on the board from its first to its last inner corner along the longer side, as
+    /// measured with a ruler.
     #[arg(long, value_name = "MM", value_parser = number(1e-3, MAX_LENGTH_MM))]
     check_length: Option<f64>,
 }
@@ -58,8 +64,9 @@ impl Poses {
     /// Makes the models, writes the calibration and prints the report.
     ///
     /// # Errors
-    /// If options are missing (64), a recording is missing (66), a pose cannot be used or the poses do not fit (65), or the calibration cannot be written (73). The
-    /// calibration before is then unchanged.
+    /// If options are missing (64), a recording is missing (66), a pose cannot be used or the poses
+    /// do not fit (65), or the calibration cannot be written (73). The calibration before is then
+    /// unchanged.
     pub fn run(&self, options: &Measuring) -> Result<(), Failure> {
         let Some(board) = self.board.as_ref().filter(|_| !self.poses.is_empty()) else {
             let words = "calibrate: models are made of a board in several poses: name both with --board and --poses, or leave out --pictures, --check-length and --board-sigma-ppm";
@@ -164,7 +171,8 @@ fn is_of(file: &CalibrationFile, head: &SeenPose) -> bool {
     frames == head.frames && (projector.width, projector.height) == head.raster
 }
 
-/// The calibration with these models. What the one before has measured on the head stays, without the reference plane.
+/// The calibration with these models. What the one before has measured on the head stays, without
+/// the reference plane.
 fn file(head: &SeenPose, geometry: &Geometry, before: Option<&CalibrationFile>) -> CalibrationFile {
     let board = &geometry.file.board;
     let from = format!(

@@ -40,7 +40,8 @@ struct MeasuredPart {
 }
 
 impl Demo {
-    /// Starts the station, measures ten parts, prints the table, and on a terminal serves the page until Ctrl-C.
+    /// Starts the station, measures ten parts, prints the table, and on a terminal serves the page
+    /// until Ctrl-C.
     ///
     /// # Errors
     /// If the station cannot start or answer, or judges a part wrongly.
@@ -95,8 +96,8 @@ impl MeasuredPart {
     }
 }
 
-/// Deletes the recipe of the demonstration's own folder if it cannot be used, e.g. because another version of the program taught
-/// it: the station teaches the part again at its start.
+/// Deletes the recipe of the demonstration's own folder if it cannot be used, e.g. because another
+/// version of the program taught it: the station teaches the part again at its start.
 fn forget_unusable(state: &StateFolder, number: u16) -> Result<(), Failure> {
     let recipes = Store::of_state(state)?;
     if let Err(LoadError::Unfit { .. } | LoadError::Corrupt { .. }) = recipes.load(number) {

@@ -95,8 +95,9 @@ impl Plc {
         answer.map_err(lost)?.map_err(lost)
     }
 
-    /// Waits for READY, triggers with the token, which is also the PART_ID, and waits for the result. RECIPE_SELECT is written with
-    /// the trigger, so that no part is measured with another recipe.
+    /// Waits for READY, triggers with the token, which is also the PART_ID, and waits for the
+    /// result. RECIPE_SELECT is written with the trigger, so that no part is measured with another
+    /// recipe.
     ///
     /// # Errors
     /// If the station does not answer in time.

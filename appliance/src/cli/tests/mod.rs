@@ -1,4 +1,5 @@
-//! The command line: each command offers exactly the options that it uses, before and behind its name.
+//! The command line: each command offers exactly the options that it uses, before and behind its
+//! name.
 
 mod numbers;
 
@@ -9,8 +10,9 @@ use clap::{Arg, Command, CommandFactory as _, Parser as _};
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::OsString;
 
-/// What each shared option does in each command that offers it. A shared option that a command offers without an entry here fails the
-/// test; options of a single command are described in its help.
+/// What each shared option does in each command that offers it. A shared option that a command
+/// offers without an entry here fails the test; options of a single command are described in its
+/// help.
 const SHARED: &[(&str, &str, &str)] = &[
     ("serve", "config", "everything that is configured"),
     ("serve", "state", "where recipes, history and counter are"),

@@ -1,4 +1,5 @@
-//! Boundary values in every number of the command line: each is refused with its option and bounds, or lies within them.
+//! Boundary values in every number of the command line: each is refused with its option and bounds,
+//! or lies within them.
 
 use super::super::part::SimulatedPart;
 use super::{Arg, leaves};
@@ -33,7 +34,8 @@ enum Takes {
 }
 use Takes::{Address, Checker, Date, Defect, List, Number, Words};
 
-/// Every option and positional argument that takes neither a path nor one word of a list; `*` is every other command.
+/// Every option and positional argument that takes neither a path nor one word of a list; `*` is
+/// every other command.
 const TABLE: &[(&str, &str, Takes)] = &[
     ("*", "threads", Number(0.0, 256.0)),
     ("*", "number", Number(1.0, 9999.0)),

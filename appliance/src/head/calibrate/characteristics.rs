@@ -1,4 +1,5 @@
-//! What is measured on a head whatever its geometry: time stamps, pace, flip-to-light delay, grey response, noise and contrast.
+//! What is measured on a head whatever its geometry: time stamps, pace, flip-to-light delay, grey
+//! response, noise and contrast.
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
@@ -20,7 +21,8 @@ const ROUNDS: u32 = 24;
 const LEAST_DELAY_S: f64 = -200e-6;
 /// Refreshes that light gets to settle beyond its delay.
 const BEYOND: u32 = 2;
-/// A response that differs from the previous one by less than this many levels replaces nothing, so recipes stay valid.
+/// A response that differs from the previous one by less than this many levels replaces nothing, so
+/// recipes stay valid.
 const SAME_RESPONSE: f64 = 1.0;
 
 /// What is measured on a head whatever its geometry.
@@ -67,8 +69,9 @@ pub(super) fn scene(words: impl Into<String>) -> Failure {
     Failure::new(Exit::Unavailable, words)
 }
 
-/// Measures what does not depend on the geometry, and gives it to head and `calibration`, which says what the camera is set to. The response `before` is kept where the new one
-/// equals it within noise. `progress` gets the share done and what is measured next; `notes` remarks for the user.
+/// Measures what does not depend on the geometry, and gives it to head and `calibration`, which
+/// says what the camera is set to. The response `before` is kept where the new one equals it within
+/// noise. `progress` gets the share done and what is measured next; `notes` remarks for the user.
 ///
 /// # Errors
 /// Of a device; if too little light comes back, or too much (69).
@@ -167,7 +170,8 @@ pub fn settled(head: &Head) -> u32 {
     refreshes(head, head.timing().flip_to_light).saturating_add(BEYOND)
 }
 
-/// The refreshes per pattern at which no trigger is lost, if there are any; otherwise patterns are shown as long as before.
+/// The refreshes per pattern at which no trigger is lost, if there are any; otherwise patterns are
+/// shown as long as before.
 fn proven(tried: &[Spaced], notes: &mut Vec<String>) -> Option<u32> {
     let last = tried.last()?;
     if last.none_lost() {

@@ -16,8 +16,8 @@ pub(super) struct LaidPlate {
 }
 
 impl LaidPlate {
-    /// From what projector points on the plate are off those of z = 0, in fringes: along ξ, and along η. `None` where the rays do not meet in
-    /// front of the head.
+    /// From what projector points on the plate are off those of z = 0, in fringes: along ξ, and
+    /// along η. `None` where the rays do not meet in front of the head.
     pub fn of(calibration: &Calibration, corrections: [&FittedMap; 2]) -> Option<Self> {
         let (camera, projector) = (&calibration.camera, &calibration.projector);
         let (mut points, mut squares) = (Vec::new(), 0.0);
@@ -43,7 +43,8 @@ impl LaidPlate {
         })
     }
 
-    /// What is wrong, and what to do about it; `ground` is the pose of the board that z = 0 goes by.
+    /// What is wrong, and what to do about it; `ground` is the pose of the board that z = 0 goes
+    /// by.
     pub fn elsewhere(&self, ground: Option<&PoseFile>) -> String {
         let Self {
             tilt_degrees,

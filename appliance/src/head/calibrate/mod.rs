@@ -1,5 +1,6 @@
-//! Measures a calibration: time stamps, pace, light, flip-to-light delay, grey response, noise, contrast and reference plane, in this order, since
-//! each measurement uses the results of those before it.
+//! Measures a calibration: time stamps, pace, light, flip-to-light delay, grey response, noise,
+//! contrast and reference plane, in this order, since each measurement uses the results of those
+//! before it.
 
 mod characteristics;
 mod laid_plate;
@@ -23,8 +24,8 @@ use std::time::Duration;
 
 /// Longest wait for a flip or a frame beyond the plan.
 const TIMEOUT: Duration = Duration::from_secs(5);
-/// Largest RMS distance of the models from the measured plane, projector pixels: a millimetre of height, with devices 27° apart
-/// 600 mm away.
+/// Largest RMS distance of the models from the measured plane, projector pixels: a millimetre of
+/// height, with devices 27° apart 600 mm away.
 const MOST_OFF_PX: f64 = 2.0;
 
 /// What a calibration starts from.
@@ -64,10 +65,12 @@ fn models(words: impl Into<String>) -> Failure {
     Failure::new(Exit::Content, words)
 }
 
-/// Measures a calibration. `progress` gets the share done and what is measured next. Afterwards the head's timing is the calibrated one.
+/// Measures a calibration. `progress` gets the share done and what is measured next. Afterwards the
+/// head's timing is the calibrated one.
 ///
 /// # Errors
-/// Of a device; if too little light comes back, or too much, or there is no flat plate (69); if the models do not fit it (65).
+/// Of a device; if too little light comes back, or too much, or there is no flat plate (69); if the
+/// models do not fit it (65).
 pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Result<Made, Failure> {
     let mut basis = basis;
     let mut notes = Vec::new();
@@ -82,8 +85,8 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
     Ok(made)
 }
 
-/// Measures the reference plane, if the basis has a plate, and makes the calibration of models and characteristics, to which the head's timing
-/// must be set. `progress` is that of [`make`].
+/// Measures the reference plane, if the basis has a plate, and makes the calibration of models and
+/// characteristics, to which the head's timing must be set. `progress` is that of [`make`].
 ///
 /// # Errors
 /// Of a device; if there is no flat plate (69); if the models do not fit it (65).
@@ -136,7 +139,8 @@ pub fn complete(
     })
 }
 
-/// That parts cannot be measured well on this head, if the fringes that teaching projects, which follow the columns, run along its epipolar lines.
+/// That parts cannot be measured well on this head, if the fringes that teaching projects, which
+/// follow the columns, run along its epipolar lines.
 fn fringes_along(calibration: &Calibration) -> Option<String> {
     let (columns, rows) = calibration.raster();
     let function = PhaseFunction::vertical(columns as usize, rows as usize, 1.0).ok()?;
@@ -147,8 +151,8 @@ fn fringes_along(calibration: &Calibration) -> Option<String> {
     ))
 }
 
-/// The description of the reference phase maps; their bytes go to `maps`. `ground` is the pose that z = 0 of the models goes by, if they were
-/// made from poses.
+/// The description of the reference phase maps; their bytes go to `maps`. `ground` is the pose that
+/// z = 0 of the models goes by, if they were made from poses.
 fn reference(
     calibration: &Calibration,
     [vertical, horizontal]: [&ReferencePlane; 2],

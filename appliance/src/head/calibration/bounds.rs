@@ -1,5 +1,5 @@
-//! Bounds of the lists and texts of `calibration.json`; those of single values stand beside them in [`super::file`]. Whether the models are
-//! usable cameras is checked by the geometry.
+//! Bounds of the lists and texts of `calibration.json`; those of single values stand beside them in
+//! [`super::file`]. Whether the models are usable cameras is checked by the geometry.
 
 use super::file::{CalibrationFile, MapFile};
 use hal::bounds::{Bound, Fields, fingerprint, length};

@@ -14,7 +14,8 @@ impl Current {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = calibration;
     }
 
-    /// The calibration; none before a head is open, and for one without a calibration that can be trusted.
+    /// The calibration; none before a head is open, and for one without a calibration that can be
+    /// trusted.
     pub fn get(&self) -> Option<Arc<Calibration>> {
         let current = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         current.clone()

@@ -36,7 +36,8 @@ const MAX_NAME: usize = 255;
 const MAX_SOURCES: usize = 8192;
 /// Stands in place of the checksum while it is computed.
 const NO_CHECKSUM: &str = "0000000000000000000000000000000000000000000000000000000000000000";
-/// σ of a sample in counts where it was not measured. Nothing is measured with such a calibration ([`CalibrationFile::missing`]).
+/// σ of a sample in counts where it was not measured. Nothing is measured with such a calibration
+/// ([`CalibrationFile::missing`]).
 const NOMINAL_NOISE: f64 = 1.0;
 
 bounded! {
@@ -252,7 +253,8 @@ bounded! {
 }
 
 impl CalibrationFile {
-    /// A file that is made now and has models only. It gets its fingerprint and its checksum when it is [sealed](Self::sealed).
+    /// A file that is made now and has models only. It gets its fingerprint and its checksum when
+    /// it is [sealed](Self::sealed).
     pub fn of_models(bit_depth: u8, camera: &Pinhole, projector: &Pinhole, from: String) -> Self {
         let ((width, height), (columns, rows)) = (size(camera), size(projector));
         Self {
@@ -373,7 +375,8 @@ impl CalibrationFile {
         })
     }
 
-    /// What is still to be measured on the head before anything can be measured with it; empty if nothing is.
+    /// What is still to be measured on the head before anything can be measured with it; empty if
+    /// nothing is.
     pub fn missing(&self) -> Vec<&'static str> {
         let keys = [
             ("timing", self.timing.is_some()),

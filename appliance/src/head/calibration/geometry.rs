@@ -1,4 +1,5 @@
-//! The key `geometry` of `calibration.json`: the board and the poses that the models were made with, and how well they fit.
+//! The key `geometry` of `calibration.json`: the board and the poses that the models were made
+//! with, and how well they fit.
 
 use hal::bounded;
 use hal::bounds::{Bound, Fields, Longest, MAX_SIDE, length};
@@ -50,7 +51,8 @@ bounded! {
         pub square_mm: f64 = 1e-3..=MAX_SQUARE_MM,
         /// σ of the board's scale, parts per million; 0 if none was stated.
         pub sigma_ppm: f64 = 0.0..=MAX_SIGMA_PPM,
-        /// The bow that was found: by how much the board's surface deviates from a plane with x², y² and xy over its corners, mm.
+        /// The bow that was found: by how much the board's surface deviates from a plane with x²,
+        /// y² and xy over its corners, mm.
         pub bow_mm: [f64; 3] = -MAX_MM..=MAX_MM,
     }
 

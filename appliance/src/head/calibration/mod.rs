@@ -1,4 +1,5 @@
-//! The calibration of a head: geometry, noise and grey response; its file and where it is stored; models imported from OpenCV.
+//! The calibration of a head: geometry, noise and grey response; its file and where it is stored;
+//! models imported from OpenCV.
 
 pub mod bounds;
 mod current;
@@ -34,7 +35,8 @@ use sim::Scenario;
 pub enum HeightsBy {
     /// The models of camera and projector.
     Models,
-    /// The models, corrected by what the measured reference plane is off them (Peng & Gupta 2008, eqs. 10–11).
+    /// The models, corrected by what the measured reference plane is off them (Peng & Gupta 2008,
+    /// eqs. 10–11).
     Measured,
 }
 
@@ -61,8 +63,8 @@ pub struct Calibration {
     pub contrast: Option<ContrastFile>,
     /// The projector's measured grey response, where it is not linear.
     pub response: Option<GreyResponse>,
-    /// Whether the light is known to be linear in the grey level, by itself or with the inverse of `response`. Only then may a
-    /// waveform have harmonics.
+    /// Whether the light is known to be linear in the grey level, by itself or with the inverse of
+    /// `response`. Only then may a waveform have harmonics.
     pub linear: bool,
     /// σ of what the models make of a measurement, where they were made from a board.
     pub sigma: Option<CalibrationSigma>,
@@ -81,8 +83,8 @@ bounded! {
 }
 
 impl Calibration {
-    /// A head whose camera has frames of `(columns, rows, bits)` and whose projector a raster of `(columns, rows)`; its response
-    /// is not known, and heights go by the models.
+    /// A head whose camera has frames of `(columns, rows, bits)` and whose projector a raster of
+    /// `(columns, rows)`; its response is not known, and heights go by the models.
     ///
     /// # Errors
     /// In words: the model of the camera or of the projector is absurd, and why.
@@ -138,8 +140,8 @@ impl Calibration {
         self.exposing = Some(exposing);
     }
 
-    /// What a level of so many shifts shows on this head: the waveform with the most modulation where the light is linear, else a
-    /// sine.
+    /// What a level of so many shifts shows on this head: the waveform with the most modulation
+    /// where the light is linear, else a sine.
     pub fn waveforms(&self) -> Waveforms {
         match self.linear {
             true => Waveform::brightest,
@@ -152,7 +154,8 @@ impl Calibration {
         LeastModulation::of_noise(self.noise_counts, self.bit_depth)
     }
 
-    /// The calibration of the head that took a recording, from its models, with the noise of a sample in counts.
+    /// The calibration of the head that took a recording, from its models, with the noise of a
+    /// sample in counts.
     ///
     /// # Errors
     /// What is wrong with the recording, as a predicate: "has no camera model".
@@ -197,10 +200,12 @@ impl Calibration {
         }
     }
 
-    /// Turns the phase of a pattern into height; the working range is by default that of [`Triangulator::new`].
+    /// Turns the phase of a pattern into height; the working range is by default that of
+    /// [`Triangulator::new`].
     ///
     /// # Errors
-    /// If camera and projector do not look down at the reference plane from two different points, or the range is unusable.
+    /// If camera and projector do not look down at the reference plane from two different points,
+    /// or the range is unusable.
     pub fn triangulator(
         &self,
         function: PhaseFunction,
@@ -230,7 +235,8 @@ impl Calibration {
         size(&self.projector)
     }
 
-    /// SHA-256 over everything that heights depend on, so that a recipe made for another calibration is refused.
+    /// SHA-256 over everything that heights depend on, so that a recipe made for another
+    /// calibration is refused.
     pub fn fingerprint(&self) -> String {
         let mut hash = Sha256::new();
         let (width, height, bits) = self.frames();
@@ -253,7 +259,8 @@ impl Calibration {
                 hash.update(coefficient.to_le_bytes());
             }
         }
-        // A linear response changes nothing that is projected, so it leaves the fingerprint as it was.
+        // A linear response changes nothing that is projected, so it leaves the fingerprint as it
+        // was.
         if let Some(response) = &self.response {
             let levels: Vec<u8> = (0..=u8::MAX)
                 .map(|level| response.level_for(level))

@@ -1,4 +1,5 @@
-//! The files of a calibration: `calibration.json`, its previous generation, and the phase maps beside them.
+//! The files of a calibration: `calibration.json`, its previous generation, and the phase maps
+//! beside them.
 
 use super::file::CalibrationFile;
 use crate::error::{Exit, Failure};
@@ -81,8 +82,9 @@ impl Place {
         (format!("{name}-{}.npy", &sum[..DIGITS]), sum)
     }
 
-    /// Writes a calibration with its maps (name, bytes) and keeps the present one as the previous generation. After a loss of power at any
-    /// moment either the old one or the new one is whole: maps have names of their own, and count only once `calibration.json` names them.
+    /// Writes a calibration with its maps (name, bytes) and keeps the present one as the previous
+    /// generation. After a loss of power at any moment either the old one or the new one is whole:
+    /// maps have names of their own, and count only once `calibration.json` names them.
     ///
     /// # Errors
     /// With this remedy, if it cannot be written (73); then the calibration is unchanged.
@@ -118,7 +120,8 @@ impl Place {
             .unwrap_or(Path::new("."))
     }
 
-    /// Makes the current generation the previous one, unless it is damaged: a damaged file never pushes out a good one.
+    /// Makes the current generation the previous one, unless it is damaged: a damaged file never
+    /// pushes out a good one.
     fn keep_previous(&self) -> io::Result<()> {
         if !matches!(read(&self.path), Some(Ok(_))) {
             return Ok(());
@@ -127,7 +130,8 @@ impl Place {
         name_also(&self.path, &self.previous())
     }
 
-    /// Removes maps that no generation names, and unfinished files. A file that cannot be removed only takes room.
+    /// Removes maps that no generation names, and unfinished files. A file that cannot be removed
+    /// only takes room.
     fn forget_maps(&self) {
         let generations = [read(&self.path), read(&self.previous())];
         let named: Vec<&str> = generations

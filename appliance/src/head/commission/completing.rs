@@ -11,10 +11,12 @@ use crate::head::seam;
 use serde_json::json;
 
 impl Commissioning {
-    /// Measures the plate in the plane z = 0, makes the calibration of what the steps have found, and stores it.
+    /// Measures the plate in the plane z = 0, makes the calibration of what the steps have found,
+    /// and stores it.
     ///
     /// # Errors
-    /// Of a device; something is still to be measured, there is no flat plate, or the calibration cannot be written.
+    /// Of a device; something is still to be measured, there is no flat plate, or the calibration
+    /// cannot be written.
     pub(super) fn complete(&self, subject: &mut Subject<'_>) -> Result<Outcome, Failure> {
         let (basis, measured) = self.basis(subject)?;
         let before = subject.head.timing();
@@ -24,7 +26,8 @@ impl Commissioning {
         Ok(found(&made))
     }
 
-    /// What the calibration is made of: what the steps have found, else what the calibration before has.
+    /// What the calibration is made of: what the steps have found, else what the calibration before
+    /// has.
     fn basis(&self, subject: &Subject<'_>) -> Result<(Basis, Characteristics), Failure> {
         let missing =
             |words: &str| Failure::new(Exit::Content, format!("complete the calibration: {words}"));

@@ -52,7 +52,8 @@ pub struct Models {
 pub struct Commissioning {
     format: String,
     version: u32,
-    /// Columns, rows and bits of the camera's frames, columns and rows of the projector: of the head that the rest belongs to.
+    /// Columns, rows and bits of the camera's frames, columns and rows of the projector: of the
+    /// head that the rest belongs to.
     pub head: [u32; 5],
     /// Exposure and gain that are kept; none = as configured.
     pub exposing: Option<Exposing>,

@@ -1,4 +1,5 @@
-//! How the board lies in the poses: its tilts, and whether the last one can be z = 0. It is known about before the models are made, and well by them.
+//! How the board lies in the poses: its tilts, and whether the last one can be z = 0. It is known
+//! about before the models are made, and well by them.
 
 use super::file::{Commissioning, Models};
 use super::outcome::Outcome;

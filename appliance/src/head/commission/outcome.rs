@@ -43,7 +43,8 @@ impl Outcome {
         }
     }
 
-    /// The doctor's checks as one result: passed if all of them are, with the remedy of the first that failed.
+    /// The doctor's checks as one result: passed if all of them are, with the remedy of the first
+    /// that failed.
     pub fn of(checks: &[Check]) -> Self {
         let said = checks
             .iter()
@@ -74,7 +75,8 @@ impl From<Failure> for Outcome {
     }
 }
 
-/// What words begin with, and what follows the first colon: what is wrong, or its remedy. Without a colon both are all of them.
+/// What words begin with, and what follows the first colon: what is wrong, or its remedy. Without a
+/// colon both are all of them.
 pub(super) fn parted(words: &str) -> (&str, &str) {
     words.split_once(": ").unwrap_or((words, words))
 }

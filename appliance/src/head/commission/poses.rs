@@ -131,8 +131,8 @@ impl Commissioning {
         Outcome::passed(format!("{left} poses are kept"), json!({}))
     }
 
-    /// Takes the frames of a pose, and keeps what they show: the poses of another board are forgotten then, unless this one cannot be used. Returns
-    /// the white frame if it is kept.
+    /// Takes the frames of a pose, and keeps what they show: the poses of another board are
+    /// forgotten then, unless this one cannot be used. Returns the white frame if it is kept.
     ///
     /// # Errors
     /// Of a device.

@@ -88,7 +88,8 @@ pub struct Subject<'a> {
     pub calibration: &'a mut Calibration,
     /// Whether the calibration can be trusted.
     pub calibrated: bool,
-    /// Whether the models of the calibration are exact although none is stored: those of a simulated head.
+    /// Whether the models of the calibration are exact although none is stored: those of a
+    /// simulated head.
     pub exact: bool,
     /// The stored calibration of this head.
     pub before: Option<CalibrationFile>,
@@ -111,7 +112,8 @@ impl Step {
         }
     }
 
-    /// Carries it out and keeps how it ended in `kept`, which is not written here. Returns the white frame of a pose.
+    /// Carries it out and keeps how it ended in `kept`, which is not written here. Returns the
+    /// white frame of a pose.
     pub fn run(&self, subject: &mut Subject<'_>, kept: &mut Commissioning) -> Option<Frame> {
         let doctor = |subject: &mut Subject<'_>, names: &[&str]| {
             Outcome::of(&examine_for(

@@ -1,4 +1,5 @@
-//! The doctor's checks of the computer, which need no head: lines whose program ends, power, versions, the sensor's mode.
+//! The doctor's checks of the computer, which need no head: lines whose program ends, power,
+//! versions, the sensor's mode.
 
 use super::{Check, named};
 use crate::station::Power;
@@ -7,12 +8,14 @@ use crate::system::priority::Prompt;
 use hal::setup::{LinesSetup, TriggerSetup};
 use serde_json::json;
 
-/// The oldest kernel: since 5.7 edges of lines are stamped on the clock of the head (`CLOCK_MONOTONIC`).
+/// The oldest kernel: since 5.7 edges of lines are stamped on the clock of the head
+/// (`CLOCK_MONOTONIC`).
 const OLDEST_KERNEL: [u16; 2] = [5, 7];
 /// The versions of libcamera that the bindings know.
 const LIBCAMERA: [[u16; 2]; 2] = [[0, 4], [0, 7]];
 
-/// Checks a computer with these lines; `trigger` is that of a real head, `prompt` what the thread gets that ends its pulses. There are only checks of what is used and known.
+/// Checks a computer with these lines; `trigger` is that of a real head, `prompt` what the thread
+/// gets that ends its pulses. There are only checks of what is used and known.
 pub fn examine(
     host: &Host,
     lines: &LinesSetup,
@@ -47,7 +50,8 @@ pub fn examine(
         .collect()
 }
 
-/// The thread that ends the pulses of the trigger: the exposure lasts as long as a pulse, and decoding uses every other core.
+/// The thread that ends the pulses of the trigger: the exposure lasts as long as a pulse, and
+/// decoding uses every other core.
 fn pulses(prompt: Prompt) -> Check {
     let Prompt { real_time, core } = prompt;
     let found = format!(
@@ -78,7 +82,8 @@ fn pulses(prompt: Prompt) -> Check {
     )
 }
 
-/// A Raspberry Pi's supply and cooling: a computer that slows itself down ends pulses late, and one without voltage loses its card.
+/// A Raspberry Pi's supply and cooling: a computer that slows itself down ends pulses late, and one
+/// without voltage loses its card.
 fn power(power: Power) -> Check {
     let (now, since) = (power.now(), power.since_start());
     let words = |of: &[&str]| match of {

@@ -1,4 +1,5 @@
-//! The doctor's check of a projector's controller: it shows patterns as they are, is cool enough and reports no fault.
+//! The doctor's check of a projector's controller: it shows patterns as they are, is cool enough
+//! and reports no fault.
 
 use super::{Check, named};
 use crate::station::HOT_PROJECTOR_C;

@@ -1,4 +1,5 @@
-//! The doctor's check of how long frames need from the camera to this program: reading them from slow memory shows here.
+//! The doctor's check of how long frames need from the camera to this program: reading them from
+//! slow memory shows here.
 
 use super::time::ms;
 use super::{Check, Checked, Subject};

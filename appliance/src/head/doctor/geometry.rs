@@ -1,4 +1,5 @@
-//! The doctor's check of the geometry: camera and projector stand to each other as when they were calibrated.
+//! The doctor's check of the geometry: camera and projector stand to each other as when they were
+//! calibrated.
 
 use super::{Check, Checked, Subject};
 use crate::head::examine::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX, PATIENCE};

@@ -1,4 +1,5 @@
-//! The doctor's check of what heights go by: how far heights by the measured reference plane are from those by the models.
+//! The doctor's check of what heights go by: how far heights by the measured reference plane are
+//! from those by the models.
 
 use super::{Check, Checked, Subject};
 use crate::head::calibrate::grid;

@@ -1,4 +1,5 @@
-//! The doctor's checks of light: there is some, it is exposed well, fringes are sharp, and light is proportional to grey.
+//! The doctor's checks of light: there is some, it is exposed well, fringes are sharp, and light is
+//! proportional to grey.
 
 use super::{Check, Checked, Subject};
 use crate::head::examine::{self, SETTLE};
@@ -11,9 +12,11 @@ use serde_json::json;
 const GREYS: [u8; 7] = [32, 64, 96, 128, 160, 192, 224];
 /// The pitch whose contrast is judged, projector pixels: teaching starts with it.
 const SHARP_PITCH: u32 = 12;
-/// Least contrast at that pitch, relative to the coarsest. A blur of σ pixels leaves exp(−2 (π σ / pitch)²): 0.5 is σ = 2.2 px.
+/// Least contrast at that pitch, relative to the coarsest. A blur of σ pixels leaves exp(−2 (π σ /
+/// pitch)²): 0.5 is σ = 2.2 px.
 const LEAST_CONTRAST: f64 = 0.5;
-/// Largest deviation of light from proportionality to grey, share of white. A gamma of 1.1 deviates by 0.035.
+/// Largest deviation of light from proportionality to grey, share of white. A gamma of 1.1 deviates
+/// by 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
 
 pub(super) fn light(subject: &mut Subject<'_>) -> Checked {

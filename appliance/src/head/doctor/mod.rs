@@ -1,7 +1,8 @@
 //! The doctor: checks a head item by item, and says what is wrong and what to do about it.
 //!
-//! A check runs only if the checks that it depends on have passed, so a fault is reported once and its consequences are not. Pictures are
-//! taken long after each flip, so only the check of the flip-to-light delay depends on that delay.
+//! A check runs only if the checks that it depends on have passed, so a fault is reported once and
+//! its consequences are not. Pictures are taken long after each flip, so only the check of the
+//! flip-to-light delay depends on that delay.
 
 pub mod computer;
 pub mod controller;
@@ -116,7 +117,8 @@ impl Subject<'_> {
 /// How a check ended, or the error of the device that ended it.
 type Checked = Result<Check, Error>;
 
-/// A row of [`CHECKS`]: its name, the checks that must have passed before it, and how it measures and judges.
+/// A row of [`CHECKS`]: its name, the checks that must have passed before it, and how it measures
+/// and judges.
 type Row = (
     &'static str,
     &'static [&'static str],
@@ -159,8 +161,9 @@ const CHECKS: [Row; 15] = [
     ("heights", &[], heights::heights),
 ];
 
-/// Checks a head in front of any part, best a flat bright one. `progress` gets the share done and the name of the next check. For a head
-/// that is not `calibrated`, what the camera's time stamps mark is measured first, and the head is set accordingly.
+/// Checks a head in front of any part, best a flat bright one. `progress` gets the share done and
+/// the name of the next check. For a head that is not `calibrated`, what the camera's time stamps
+/// mark is measured first, and the head is set accordingly.
 pub fn examine(
     head: &mut Head,
     calibration: &Calibration,
@@ -170,7 +173,8 @@ pub fn examine(
     examine_for(head, calibration, calibrated, &|_| true, progress)
 }
 
-/// As [`examine`], but makes only the checks whose names are `wanted`; of those that a check needs, only wanted ones count.
+/// As [`examine`], but makes only the checks whose names are `wanted`; of those that a check needs,
+/// only wanted ones count.
 pub fn examine_for(
     head: &mut Head,
     calibration: &Calibration,

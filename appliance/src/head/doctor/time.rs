@@ -1,4 +1,5 @@
-//! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, flip-to-light delay.
+//! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers,
+//! flip-to-light delay.
 
 use super::{Check, Checked, Subject};
 use crate::head::examine::{
@@ -14,7 +15,8 @@ use std::time::Duration;
 
 /// Flips whose cadence is judged.
 const FLIPS: u32 = 60;
-/// Largest relative deviation of the period of flips from the mode's: a mode that says 60 Hz may run at 59.94.
+/// Largest relative deviation of the period of flips from the mode's: a mode that says 60 Hz may
+/// run at 59.94.
 const PERIOD_TOLERANCE: f64 = 2e-3;
 /// A start of the camera that takes longer is noticed in a cycle.
 const SLOW_START: Duration = Duration::from_millis(100);
@@ -175,7 +177,8 @@ pub(super) fn trigger(subject: &mut Subject<'_>) -> Checked {
     };
     let mut seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
     if !subject.calibrated && !seen.frames.is_empty() {
-        // The doctor runs before the head is calibrated, so it measures the stamps as calibrating will.
+        // The doctor runs before the head is calibrated, so it measures the stamps as calibrating
+        // will.
         let stamps = Stamps::measure(head)?;
         head.set_timing(stamps.timing(head.timing()));
         load_black_and_white(head)?;
@@ -249,7 +252,8 @@ fn triggered(head: &mut Head, seen: &Watched<()>) -> Checked {
     Ok(Check::new(found, remedy.as_deref(), measured))
 }
 
-/// Triggers were lost with so many refreshes per pattern: because the camera was not ready for them, or by a bad contact.
+/// Triggers were lost with so many refreshes per pattern: because the camera was not ready for
+/// them, or by a bad contact.
 fn lost(refreshes: u32, tried: &[Spaced], found: String, mut measured: Value) -> Check {
     let words = tried.iter().map(|spaced| format!("; {}", spaced.words()));
     let found = found + &words.collect::<String>();
@@ -346,7 +350,8 @@ pub(super) fn delay(subject: &mut Subject<'_>) -> Checked {
         delay * 1e3,
         believed * 1e3
     );
-    // The calibration measures the delay with more flips, so a difference below an eighth of a refresh does not show an error of it.
+    // The calibration measures the delay with more flips, so a difference below an eighth of a
+    // refresh does not show an error of it.
     let wrong = (delay - believed).abs() > (off_ms * 1e-3).max(refresh / 8.0);
     let remedy = format!(
         "the calibration is off by {:.1} refreshes: switch off the projector's picture processing, or calibrate anew",

@@ -1,15 +1,17 @@
-//! Whether the light of a grey depends on the rest of the picture: the same grey stripes between black ones and between white ones.
+//! Whether the light of a grey depends on the rest of the picture: the same grey stripes between
+//! black ones and between white ones.
 //!
-//! Projectors for video adapt gain and LED current to the content of a picture (TI: CAIC; others: dynamic contrast, eco mode). The response is
-//! measured with uniform pictures, so it would be wrong for fringes, and wrong by another amount for each pattern.
+//! Projectors for video adapt gain and LED current to the content of a picture (TI: CAIC; others:
+//! dynamic contrast, eco mode). The response is measured with uniform pictures, so it would be
+//! wrong for fringes, and wrong by another amount for each pattern.
 
 use super::pictures::{Lit, pictures};
 use hal::error::Error;
 use hal::head::Head;
 use hal::projector::Raster;
 
-/// Largest change of a grey's light with its surroundings, share. A part and a lens scatter one or two percent of the light of white
-/// surroundings; adaptation changes it by tens of percent.
+/// Largest change of a grey's light with its surroundings, share. A part and a lens scatter one or
+/// two percent of the light of white surroundings; adaptation changes it by tens of percent.
 pub const MOST_BY_CONTENT: f64 = 0.05;
 /// Stripes over the width of the projector.
 const STRIPES: u32 = 16;
@@ -20,8 +22,8 @@ const ALONE: f64 = 0.95;
 /// The fewest pixels that are compared.
 const LEAST_PIXELS: usize = 50;
 
-/// By how much more light a grey gives between white stripes than between black ones, as a share; `None` if too few pixels see a stripe
-/// alone.
+/// By how much more light a grey gives between white stripes than between black ones, as a share;
+/// `None` if too few pixels see a stripe alone.
 ///
 /// # Errors
 /// Of a device.
@@ -33,7 +35,8 @@ pub fn by_content(head: &mut Head, settle: u32, lit: &Lit) -> Result<Option<f64>
     pictures(head, settle, patterns, &mut |counts| taken.push(counts))?;
     let black: Vec<f64> = lit.levels(0.0).collect();
     let light = |picture: usize, at: usize| f64::from(taken[picture][at]) - black[at];
-    // The last two pictures have the same mean, so whatever adapts to it changes both by the same factor.
+    // The last two pictures have the same mean, so whatever adapts to it changes both by the same
+    // factor.
     let alone = |at: &&usize| light(2, **at) > ALONE * (light(2, **at) + light(3, **at));
     let pixels: Vec<usize> = lit.places().iter().filter(alone).copied().collect();
     if pixels.len() < LEAST_PIXELS {

@@ -1,7 +1,8 @@
 //! Contrast against pitch: how much blur of projector and camera weakens fringes.
 //!
-//! Contrast is the modulation B of four shifts by a quarter of a turn, B = ½ √((I₀ − I₂)² + (I₁ − I₃)²) (Creath 1988), relative to
-//! that of the coarsest pitch, so neither brightness nor the projector's response changes it.
+//! Contrast is the modulation B of four shifts by a quarter of a turn, B = ½ √((I₀ − I₂)² + (I₁ −
+//! I₃)²) (Creath 1988), relative to that of the coarsest pitch, so neither brightness nor the
+//! projector's response changes it.
 
 use super::pictures::{Lit, median, pictures};
 use crate::head::calibration::Calibration;
@@ -11,7 +12,8 @@ use hal::error::Error;
 use hal::head::Head;
 use serde_json::{Map, Value};
 
-/// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are relative to it.
+/// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are
+/// relative to it.
 pub const PITCHES: [u32; 6] = [64, 32, 24, 16, 12, 8];
 /// Shifts of each pitch, a quarter of a turn each.
 const SHIFTS: usize = 4;

@@ -1,10 +1,12 @@
-//! The flip-to-light delay, from the brightness of frames while black and white alternate at random intervals.
+//! The flip-to-light delay, from the brightness of frames while black and white alternate at random
+//! intervals.
 //!
-//! A frame exposed from s to s + T sees white for a share p(d) of its time if light comes d after its flip; p follows from the times
-//! of the flips. The frame's mean is b + a·p(d). Black b, white above black a, and d are fitted to all frames by least squares: d
-//! first by trial on a grid (intervals are random, so only one d fits), then all three by Gauss–Newton. Each change inside an
-//! exposure determines d: a relative noise ε of the mean, as a share of white, gives an error of ε·T, which falls with the square
-//! root of the number of such changes.
+//! A frame exposed from s to s + T sees white for a share p(d) of its time if light comes d after
+//! its flip; p follows from the times of the flips. The frame's mean is b + a·p(d). Black b, white
+//! above black a, and d are fitted to all frames by least squares: d first by trial on a grid
+//! (intervals are random, so only one d fits), then all three by Gauss–Newton. Each change inside
+//! an exposure determines d: a relative noise ε of the mean, as a share of white, gives an error of
+//! ε·T, which falls with the square root of the number of such changes.
 
 use super::pictures::{Lit, counts, load_black_and_white};
 use super::{PATIENCE, refreshes};
@@ -22,15 +24,18 @@ const LONGEST: u32 = 16;
 const TRIALS: f64 = 8.0;
 /// Iterations of Gauss–Newton; p is piecewise linear in d, so few are needed.
 const ITERATIONS: usize = 12;
-/// 1 σ of the delay at which measuring ends, s: 3.3 σ are half a microsecond, to which the delay is rounded.
+/// 1 σ of the delay at which measuring ends, s: 3.3 σ are half a microsecond, to which the delay is
+/// rounded.
 const GOAL_S: f64 = 0.15e-6;
-/// White must lie this many times the scatter of the means above black, else no light follows the flips.
+/// White must lie this many times the scatter of the means above black, else no light follows the
+/// flips.
 const LEAST_SIGNAL: f64 = 5.0;
 
 /// The measured delay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Delay {
-    /// From a flip to its light, s, rounded to a microsecond; negative if the time stamps of flips or frames are misinterpreted.
+    /// From a flip to its light, s, rounded to a microsecond; negative if the time stamps of flips
+    /// or frames are misinterpreted.
     pub seconds: f64,
     /// 1 σ of it, s.
     pub error: f64,
@@ -45,8 +50,9 @@ struct Round {
 }
 
 impl Delay {
-    /// Measures it in at most `rounds` of about four seconds each; none if no light follows the flips. The camera's stamps are
-    /// interpreted as the head's timing says. `progress` gets the share of the rounds done.
+    /// Measures it in at most `rounds` of about four seconds each; none if no light follows the
+    /// flips. The camera's stamps are interpreted as the head's timing says. `progress` gets the
+    /// share of the rounds done.
     ///
     /// # Errors
     /// Of a device.
@@ -120,8 +126,8 @@ impl Round {
         })
     }
 
-    /// For each frame its mean, the share p of its exposure in which white is in view if light comes `delay` after its flip, and
-    /// dp/d(delay).
+    /// For each frame its mean, the share p of its exposure in which white is in view if light
+    /// comes `delay` after its flip, and dp/d(delay).
     fn shares(&self, exposure: f64, delay: f64) -> impl Iterator<Item = (f64, f64, f64)> {
         self.frames.iter().map(move |(start, mean)| {
             let (mut share, mut slope) = (0.0, 0.0);
@@ -179,7 +185,8 @@ fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
                 delay += (inverse * right[2]).clamp(-step, step);
                 weight = Some(inverse);
             }
-            // Exposures that begin with the light of a refresh have no change inside them with the true delay, but with any other.
+            // Exposures that begin with the light of a refresh have no change inside them with the
+            // true delay, but with any other.
             None if weight.is_none() => delay += step / 2.0,
             None => {}
         }
@@ -192,7 +199,8 @@ fn fit(rounds: &[Round], exposure: f64, refresh: f64) -> Option<Delay> {
     (white > LEAST_SIGNAL * scatter).then_some(Delay { seconds, error })
 }
 
-/// The straight line of means over shares: black, white above black, and the sum of squared residuals.
+/// The straight line of means over shares: black, white above black, and the sum of squared
+/// residuals.
 fn straight(shares: impl Iterator<Item = (f64, f64, f64)>) -> Option<(f64, f64, f64)> {
     let (mut n, mut x, mut y, mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
     for (mean, share, _) in shares {

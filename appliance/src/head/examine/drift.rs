@@ -1,4 +1,5 @@
-//! Measures whether camera and projector still stand to each other as their models say: any part under vertical and horizontal fringes.
+//! Measures whether camera and projector still stand to each other as their models say: any part
+//! under vertical and horizontal fringes.
 
 use crate::head::calibration::Calibration;
 use crate::head::scan::{self, Scan};
@@ -16,8 +17,9 @@ const LEVELS: usize = 3;
 const SHIFTS: usize = 4;
 /// Pitch of both patterns, projector pixels.
 const PITCH: f64 = 16.0;
-/// Beyond this RMS distance of projector points from their epipolar lines, projector pixels, the models are not those of the head any
-/// more: a real board in poses that were not used for the calibration left 0.08 to 0.43, a camera that was turned by 0.05° leaves 1.
+/// Beyond this RMS distance of projector points from their epipolar lines, projector pixels, the
+/// models are not those of the head any more: a real board in poses that were not used for the
+/// calibration left 0.08 to 0.43, a camera that was turned by 0.05° leaves 1.
 pub const MOST_DRIFT_PX: f64 = 0.5;
 /// What to do about a head beyond that.
 pub const DRIFT_REMEDY: &str = "camera or projector was knocked or refocused since the calibration: calibrate the geometry anew";
@@ -47,7 +49,8 @@ impl CrossedFringes {
         Ok(Self([take(true)?, take(false)?]))
     }
 
-    /// Compares what they show with the models of the head; `None` if too little of the frame shows fringes.
+    /// Compares what they show with the models of the head; `None` if too little of the frame shows
+    /// fringes.
     ///
     /// # Errors
     /// If the projector is too small for the fringes.

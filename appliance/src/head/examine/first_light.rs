@@ -1,15 +1,17 @@
-//! Waits for the projector's first light: after its mode was set, a projector needs seconds to lock on to the signal, and what is measured
-//! before is the dark.
+//! Waits for the projector's first light: after its mode was set, a projector needs seconds to lock
+//! on to the signal, and what is measured before is the dark.
 
 use super::pictures::{LEAST_LIT, Lit, SETTLE};
 use hal::error::Error;
 use hal::head::Head;
 use std::time::Duration;
 
-/// Longest wait for the first light. Projectors lock within a few seconds; without a part in front of the head, no light comes back at all.
+/// Longest wait for the first light. Projectors lock within a few seconds; without a part in front
+/// of the head, no light comes back at all.
 pub const LONGEST_DARK: Duration = Duration::from_secs(15);
 
-/// Shows black and white until they differ, and returns how long that took; `None` if they are still the same after [`LONGEST_DARK`].
+/// Shows black and white until they differ, and returns how long that took; `None` if they are
+/// still the same after [`LONGEST_DARK`].
 ///
 /// # Errors
 /// Of a device, or if no frame comes.

@@ -1,8 +1,9 @@
 //! Measurements of a head: the doctor judges them, calibration stores them.
 //!
-//! Pictures are taken long after each flip ([`Lit`], [`pictures`]), so their measurements need no timing. The measurements of time
-//! itself need no calibration: what the camera's stamps mark ([`Stamps`]), how soon it can be triggered again ([`pace`]), and when the light of a
-//! flip comes ([`Delay`]).
+//! Pictures are taken long after each flip ([`Lit`], [`pictures`]), so their measurements need no
+//! timing. The measurements of time itself need no calibration: what the camera's stamps mark
+//! ([`Stamps`]), how soon it can be triggered again ([`pace`]), and when the light of a flip comes
+//! ([`Delay`]).
 
 mod content;
 mod contrast;

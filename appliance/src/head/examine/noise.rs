@@ -8,7 +8,8 @@ use hal::head::Head;
 /// Grey levels of which two pictures are taken.
 const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
 
-/// The camera's noise from two pictures of each of eight greys, with its σ at half the light of white.
+/// The camera's noise from two pictures of each of eight greys, with its σ at half the light of
+/// white.
 ///
 /// # Errors
 /// Of a device, or `Unsupported` if no level is clear of black and full scale.

@@ -1,8 +1,10 @@
-//! How many refreshes a triggered camera needs for each pattern: the fewest at which no trigger is lost.
+//! How many refreshes a triggered camera needs for each pattern: the fewest at which no trigger is
+//! lost.
 //!
-//! A camera that is still being read out loses a trigger without a sign, and its data sheet leaves out its own delays. So triggers are
-//! fired at the spacing of a sequence and their frames are counted. They are fired a little closer than the refreshes, because in a
-//! sequence a trigger may come late and the next one on time.
+//! A camera that is still being read out loses a trigger without a sign, and its data sheet leaves
+//! out its own delays. So triggers are fired at the spacing of a sequence and their frames are
+//! counted. They are fired a little closer than the refreshes, because in a sequence a trigger may
+//! come late and the next one on time.
 
 use super::{PATIENCE, load_black_and_white, refreshes};
 use hal::camera::Starts;
@@ -11,9 +13,11 @@ use hal::head::{Head, Showing, TOLERANCE};
 use std::collections::BTreeSet;
 use std::time::Duration;
 
-/// Triggers that are fired at each spacing. If one in twenty is lost, that remains unnoticed once in twenty measurements (0.95⁶⁰ = 0.046).
+/// Triggers that are fired at each spacing. If one in twenty is lost, that remains unnoticed once
+/// in twenty measurements (0.95⁶⁰ = 0.046).
 const TRIGGERS: u32 = 60;
-/// By how much triggers are fired closer than the refreshes: as late as one may be in a plan of the sequencer.
+/// By how much triggers are fired closer than the refreshes: as late as one may be in a plan of the
+/// sequencer.
 const CLOSER: Duration = Duration::from_nanos(TOLERANCE.as_nanos() as u64 / 2);
 /// Spacings that are tried beyond the shortest that the camera states, refreshes.
 const MORE: u32 = 3;
@@ -46,8 +50,9 @@ impl Spaced {
     }
 }
 
-/// Tries spacings from the shortest that the camera states on, until none of the triggers is lost. The last one tried is the last of the
-/// result, which is empty for a camera that runs by itself. A camera that the projector triggers takes one refresh in so many by itself.
+/// Tries spacings from the shortest that the camera states on, until none of the triggers is lost.
+/// The last one tried is the last of the result, which is empty for a camera that runs by itself. A
+/// camera that the projector triggers takes one refresh in so many by itself.
 ///
 /// # Errors
 /// Of a device.

@@ -1,4 +1,5 @@
-//! Pictures of patterns, each exposed after the light of its flip has settled, and the pixels that the projector lights.
+//! Pictures of patterns, each exposed after the light of its flip has settled, and the pixels that
+//! the projector lights.
 
 use super::{PATIENCE, refreshes};
 use hal::camera::Starts;
@@ -12,14 +13,16 @@ use std::cell::Cell;
 pub const LEAST_LIT: f64 = 0.01;
 /// Largest share of the lit pixels that may be saturated, by glints.
 pub const MOST_SATURATED: f64 = 0.01;
-/// Least median of white over the lit pixels, share of full scale: below it, noise is a large part of the signal.
+/// Least median of white over the lit pixels, share of full scale: below it, noise is a large part
+/// of the signal.
 pub const LEAST_BRIGHT: f64 = 0.2;
 
 /// Refreshes after which the light of a flip has come and is stable, on any head that can be used.
 pub const SETTLE: u32 = 12;
 /// Patterns that are loaded at a time: a projector's memory holds a sequence, not 256 greys.
 const BATCH: usize = 8;
-/// How often a batch is taken before giving up: a lost frame or a pulse of the wrong length loses a picture.
+/// How often a batch is taken before giving up: a lost frame or a pulse of the wrong length loses a
+/// picture.
 const ATTEMPTS: u32 = 3;
 /// A pixel is lit if white is this share of full scale above black.
 const LIT: f64 = 0.05;
@@ -39,7 +42,8 @@ fn rows<T: Copy + Into<f32>>(all: &[T], width: usize, stride: usize) -> Vec<f32>
     rows.map(|sample| (*sample).into()).collect()
 }
 
-/// Shows each pattern, waits `settle` refreshes for its light, and hands a picture of it to `keep`, in order, in counts.
+/// Shows each pattern, waits `settle` refreshes for its light, and hands a picture of it to `keep`,
+/// in order, in counts.
 ///
 /// # Errors
 /// Of a device, or `Timeout` if the picture of a pattern did not come.
@@ -87,7 +91,8 @@ fn take(
     ))
 }
 
-/// One picture of a loaded pattern; none if the frame was lost. It ends as soon as the frame of a triggered camera has arrived.
+/// One picture of a loaded pattern; none if the frame was lost. It ends as soon as the frame of a
+/// triggered camera has arrived.
 ///
 /// # Errors
 /// Of a device.
@@ -105,7 +110,8 @@ pub fn picture(head: &mut Head, index: usize, settle: u32) -> Result<Option<Fram
     Ok(settled(head, &seen, 0, settle).cloned())
 }
 
-/// A pattern, shown long enough for one whole exposure of settled light, whatever the phase of a free-running camera.
+/// A pattern, shown long enough for one whole exposure of settled light, whatever the phase of a
+/// free-running camera.
 fn showing(head: &Head, index: usize, settle: u32) -> Showing {
     let camera = head.camera_timing();
     let room = refreshes(head, camera.exposure + camera.period);
@@ -201,7 +207,8 @@ impl Lit {
         median(self.white().collect())
     }
 
-    /// Expected sample of each pixel under a light between black (0) and white (1), counts, row-major.
+    /// Expected sample of each pixel under a light between black (0) and white (1), counts,
+    /// row-major.
     pub fn levels(&self, share: f64) -> impl Iterator<Item = f64> {
         let pairs = self.black.iter().zip(&self.white);
         pairs.map(move |(black, white)| {

@@ -1,4 +1,5 @@
-//! Measures the reference phase maps: a flat plate in the plane z = 0 under vertical and horizontal fringes.
+//! Measures the reference phase maps: a flat plate in the plane z = 0 under vertical and horizontal
+//! fringes.
 
 use crate::error::{Exit, Failure};
 use crate::head::calibration::{Calibration, HeightsBy};
@@ -44,10 +45,12 @@ impl ReferencePlane {
     }
 }
 
-/// Measures the reference phase map under vertical or under horizontal fringes. The head's timing must be calibrated.
+/// Measures the reference phase map under vertical or under horizontal fringes. The head's timing
+/// must be calibrated.
 ///
 /// # Errors
-/// Of a device; if too little of the frame shows a plate (69); if the models do not look down at it (65).
+/// Of a device; if too little of the frame shows a plate (69); if the models do not look down at it
+/// (65).
 pub fn plate(
     head: &mut Head,
     calibration: &Calibration,

@@ -7,7 +7,8 @@ use hal::head::Head;
 /// Largest decrease of the response that noise can explain, share of white.
 const MOST_FALL: f64 = 0.02;
 
-/// The light of grey levels over the lit pixels: 0 is that of black, 1 that of white. `progress` gets the share done.
+/// The light of grey levels over the lit pixels: 0 is that of black, 1 that of white. `progress`
+/// gets the share done.
 ///
 /// # Errors
 /// Of a device.
@@ -29,8 +30,8 @@ pub fn lights(
 
 /// The light of all 256 grey levels on a linear scale: 0 for black, 255 for white, non-decreasing.
 ///
-/// Noise is removed by isotonic regression: the result is the non-decreasing sequence nearest to the measured one in least squares
-/// (pool adjacent violators: Ayer et al. 1955).
+/// Noise is removed by isotonic regression: the result is the non-decreasing sequence nearest to
+/// the measured one in least squares (pool adjacent violators: Ayer et al. 1955).
 ///
 /// # Errors
 /// Of a device, or if light falls where grey rises.

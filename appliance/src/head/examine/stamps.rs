@@ -1,9 +1,12 @@
-//! Which moment the camera's time stamps mark: the start of the exposure, its end, or the end of the readout.
+//! Which moment the camera's time stamps mark: the start of the exposure, its end, or the end of
+//! the readout.
 //!
-//! For a triggered camera it follows from the time between trigger and stamp. Drivers stamp in an interrupt, so stamps are later than the
-//! moment that they mark by a constant time and some jitter: the median of that time is measured, too, and subtracted from then on. For a free-running camera only the time from the stamp to the
-//! delivery of its frame is known: exposure and readout, the readout, or zero. The length of a readout is then taken as configured,
-//! and a time that fits none of the three is an error.
+//! For a triggered camera it follows from the time between trigger and stamp. Drivers stamp in an
+//! interrupt, so stamps are later than the moment that they mark by a constant time and some
+//! jitter: the median of that time is measured, too, and subtracted from then on. For a
+//! free-running camera only the time from the stamp to the delivery of its frame is known: exposure
+//! and readout, the readout, or zero. The length of a readout is then taken as configured, and a
+//! time that fits none of the three is an error.
 
 use super::{PATIENCE, refreshes};
 use hal::camera::{CameraTiming, Starts};
@@ -23,8 +26,8 @@ pub const MOST_LATE: Duration = Duration::from_micros(500);
 pub struct Stamps {
     /// The moment.
     pub stamp: Stamp,
-    /// How much later than that moment the stamps are, the median. Unknown of a camera that runs by itself, where the flip-to-light delay
-    /// contains it.
+    /// How much later than that moment the stamps are, the median. Unknown of a camera that runs by
+    /// itself, where the flip-to-light delay contains it.
     pub late: Option<Duration>,
     /// From the end of an exposure to the end of its readout, or to the delivery of its frame.
     pub readout: Duration,
@@ -73,7 +76,8 @@ impl Stamps {
     }
 }
 
-/// Showings with one or two triggers each, and then a pause longer than the camera's period, which a free-running camera does not keep.
+/// Showings with one or two triggers each, and then a pause longer than the camera's period, which
+/// a free-running camera does not keep.
 fn showings(head: &Head) -> [Showing; SHOWINGS] {
     let whole = refreshes(head, head.camera_timing().period).clamp(1, 1000);
     [Showing {
@@ -160,7 +164,8 @@ fn by_waiting(camera: &CameraTiming, frames: &[WatchedFrame<()>]) -> Result<Stam
     let (exposure, delivery) = (camera.exposure, camera.delivery);
     let waits = frames.iter().map(|frame| frame.arrived.since(frame.start));
     let wait = waits.min().unwrap_or_default();
-    // Of equal ones the first wins: with a readout of zero, the stamp marks the end of the exposure.
+    // Of equal ones the first wins: with a readout of zero, the stamp marks the end of the
+    // exposure.
     let all = [
         (Stamp::ExposureStart, exposure + delivery, exposure),
         (Stamp::ExposureEnd, delivery, Duration::ZERO),

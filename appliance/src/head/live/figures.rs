@@ -1,4 +1,5 @@
-//! What live pictures say: histogram, saturation, sharpness of edges, and the modulation of fringes over the last pictures.
+//! What live pictures say: histogram, saturation, sharpness of edges, and the modulation of fringes
+//! over the last pictures.
 
 use super::patterns::{SHIFTS, Show};
 use super::picture::Picture;
@@ -119,7 +120,8 @@ impl Fringes {
         }
     }
 
-    /// Modulation over offset, B/A, of the fringes of a pitch: the median over the lit pixels, 0…1. None until each shift was seen.
+    /// Modulation over offset, B/A, of the fringes of a pitch: the median over the lit pixels, 0…1.
+    /// None until each shift was seen.
     ///
     /// B = ½ √((I₀ − I₂)² + (I₁ − I₃)²) for shifts of a quarter of a turn (Creath 1988).
     pub fn modulation(&self, pitch: u32) -> Option<f64> {

@@ -1,4 +1,5 @@
-//! What the projector shows for a live picture: uniform light, fringes, and charts to aim and focus with.
+//! What the projector shows for a live picture: uniform light, fringes, and charts to aim and focus
+//! with.
 
 use crate::head::calibration::Calibration;
 use crate::head::rasters::fringes;
@@ -109,7 +110,8 @@ fn grey(show: Show, (x, y): (u32, u32), (columns, rows): (u32, u32)) -> bool {
     match show {
         Show::White => true,
         Show::Focus => {
-            // Four columns of fields, from fine to coarse and back in the next row, so that each is seen in every corner.
+            // Four columns of fields, from fine to coarse and back in the next row, so that each is
+            // seen in every corner.
             let (field, row) = (4 * x / columns.max(1), 4 * y / rows.max(1));
             let side = (FINEST << ((field + row) % 4)).min(COARSEST);
             (x / side + y / side).is_multiple_of(2)

@@ -13,7 +13,8 @@ const FOUND: [u8; 3] = [40, 220, 90];
 const RADIUS: i32 = 4;
 const FIRST: i32 = 8;
 
-/// Every nth pixel of every nth row of a frame. Pixels are left out and not averaged, so that saturated ones and the modulation stay as they are.
+/// Every nth pixel of every nth row of a frame. Pixels are left out and not averaged, so that
+/// saturated ones and the modulation stay as they are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// Columns.
@@ -47,7 +48,8 @@ impl Picture {
         }
     }
 
-    /// As PNG, with a circle around each of these places of the frame, u and v in its pixels; the first one is larger.
+    /// As PNG, with a circle around each of these places of the frame, u and v in its pixels; the
+    /// first one is larger.
     pub fn png(&self, marked: &[[f64; 2]]) -> Vec<u8> {
         let mut canvas = Canvas::<3>::new(self.width, self.height);
         let full = u32::from(self.full_scale.max(1));

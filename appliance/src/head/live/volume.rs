@@ -1,5 +1,5 @@
-//! The measuring volume in the camera's picture: at the lowest height, at z = 0 and at the highest one, the outline of what the projector
-//! lights and the camera sees.
+//! The measuring volume in the camera's picture: at the lowest height, at z = 0 and at the highest
+//! one, the outline of what the projector lights and the camera sees.
 
 use crate::head::calibration::Calibration;
 use algo::geometry::{HeightRange, Pinhole, Vector};
@@ -19,8 +19,8 @@ pub struct Outline {
     pub points: Vec<[f64; 2]>,
 }
 
-/// The outlines at both ends of the default working range and between them at z = 0; without those heights at which camera and projector do not see the
-/// same.
+/// The outlines at both ends of the default working range and between them at z = 0; without those
+/// heights at which camera and projector do not see the same.
 pub fn outlines(calibration: &Calibration) -> Vec<Outline> {
     let (camera, projector) = (&calibration.camera, &calibration.projector);
     let range = HeightRange::of(camera, projector);
@@ -60,8 +60,8 @@ fn outline(camera: &Pinhole, projector: &Pinhole, z: f64) -> Vec<[f64; 2]> {
     points.iter().map(|point| point.map(rounded)).collect()
 }
 
-/// The part of a polygon where `sign` times a coordinate is at least `least` (I. Sutherland, G. Hodgman, "Reentrant polygon clipping",
-/// Communications of the ACM 17, 1974).
+/// The part of a polygon where `sign` times a coordinate is at least `least` (I. Sutherland, G.
+/// Hodgman, "Reentrant polygon clipping", Communications of the ACM 17, 1974).
 fn clipped(points: &[[f64; 2]], axis: usize, sign: f64, least: f64) -> Vec<[f64; 2]> {
     let over = |point: &[f64; 2]| sign * point[axis] - least;
     let before = points.iter().cycle().skip(points.len().saturating_sub(1));

@@ -35,7 +35,8 @@ pub struct Placed {
     pub placement: Placement,
 }
 
-/// A part as clients write it: the part itself or the name of a stock part, with its placement or the number of a board's pose.
+/// A part as clients write it: the part itself or the name of a stock part, with its placement or
+/// the number of a board's pose.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PlacedFile {
@@ -121,8 +122,8 @@ impl Placed {
         }
     }
 
-    /// Replaces the part that was `asked` for by a good one of its kind, which is taught first. Answers with the one that was asked
-    /// for, which is placed afterwards.
+    /// Replaces the part that was `asked` for by a good one of its kind, which is taught first.
+    /// Answers with the one that was asked for, which is placed afterwards.
     pub fn after_teaching(asked: &mut Option<Self>) -> Option<Self> {
         let placed = asked.take()?;
         *asked = Some(placed.good());
@@ -233,7 +234,8 @@ fn seen_place(part: &Part) -> [f64; 2] {
     }
 }
 
-/// Every stock part with an example of each defect that it can have, and the recommended poses of a board.
+/// Every stock part with an example of each defect that it can have, and the recommended poses of a
+/// board.
 pub fn kinds() -> Vec<Value> {
     let offers = |part: &Part| -> Vec<Value> {
         let [x, y] = seen_place(part);

@@ -94,8 +94,8 @@ fn the_page_is_offered_every_stock_part_with_the_defects_that_it_can_have() {
     }
 }
 
-/// Pixels of the small head whose height a defect changes by more than a tenth of a millimetre; all of them must be seen by both devices,
-/// before and after.
+/// Pixels of the small head whose height a defect changes by more than a tenth of a millimetre; all
+/// of them must be seen by both devices, before and after.
 fn changed(stage: &sim::Stage, good: &Part, bad: &Part) -> usize {
     let truth = |part| {
         stage.place(part, &Placement::default()).unwrap();
@@ -130,7 +130,8 @@ fn the_example_of_a_dent_lies_where_both_devices_see_it_on_every_part() {
             }
             let mut bad = good.clone();
             add(&mut bad, dent.clone()).unwrap();
-            // A pixel sees 1.6 mm; a dent of 14 mm is deeper than 0.1 mm over a circle of 10 mm, which a wall shows foreshortened.
+            // A pixel sees 1.6 mm; a dent of 14 mm is deeper than 0.1 mm over a circle of 10 mm,
+            // which a wall shows foreshortened.
             let found = changed(&stage, &good, &bad);
             assert!(found > 10, "{found} pixels of {bad:?}");
         }

@@ -1,4 +1,5 @@
-//! Traits of real devices that data sheets leave out: the doctor names each, calibration measures it, and sequences cope with it.
+//! Traits of real devices that data sheets leave out: the doctor names each, calibration measures
+//! it, and sequences cope with it.
 
 use crate::head::calibrate::{Basis, Made, make};
 use crate::head::calibration::{Calibration, HeightsBy};
@@ -9,7 +10,8 @@ use hal::projector::Raster;
 use sim::Scenario;
 use std::time::Duration;
 
-/// A small camera in front of a plane, exposing for one refresh of 60 Hz; tests add to its section `timing`, which is the last.
+/// A small camera in front of a plane, exposing for one refresh of 60 Hz; tests add to its section
+/// `timing`, which is the last.
 const HEAD: &str = "sub_rays = 1
 part = { kind = \"plane\" }
 [rig.camera]
@@ -147,7 +149,8 @@ fn stamps_that_are_late_by_a_constant_are_named_measured_and_corrected() {
             assert_eq!(check.name, "trigger");
             assert!(check.remedy.contains("later than"), "{}", check.remedy);
         }
-        // Uncorrected, stamps at 190 µs with 40 µs of jitter are beyond the tolerance now and then, and at 300 µs always.
+        // Uncorrected, stamps at 190 µs with 40 µs of jitter are beyond the tolerance now and then,
+        // and at 300 µs always.
         let uncorrected = sequence(&mut own.0);
         match late_us {
             0 => assert_eq!(uncorrected.unwrap().unexplained, 0),

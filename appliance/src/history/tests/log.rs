@@ -48,8 +48,8 @@ impl Write for Pager<'_> {
     }
 }
 
-/// Stores so many results without a pause while a pager reads, and so many clients that ask for a list again and again; the
-/// longest that the log was, in bytes.
+/// Stores so many results without a pause while a pager reads, and so many clients that ask for a
+/// list again and again; the longest that the log was, in bytes.
 fn soak(count: u32, clients: usize) -> u64 {
     let folder = tempfile::tempdir().unwrap();
     let state = StateFolder::open(folder.path()).unwrap();

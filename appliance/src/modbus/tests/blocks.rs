@@ -152,7 +152,8 @@ async fn status_bits_are_where_the_map_says() {
         .await
         .unwrap()
         .unwrap();
-    // ONLINE, READY, RECIPE_OK, WARNING, WARMING_UP, CALIBRATION_VALID; warnings clock_unsynced and low_light.
+    // ONLINE, READY, RECIPE_OK, WARNING, WARMING_UP, CALIBRATION_VALID; warnings clock_unsynced and
+    // low_light.
     assert_eq!(
         (words[0], words[3], words[4], words[5]),
         (0xC603, 0x18, 1, 7)

@@ -1,4 +1,5 @@
-//! Boundary values in every write: each is answered as the map says, and what is refused changes nothing.
+//! Boundary values in every write: each is answered as the map says, and what is refused changes
+//! nothing.
 
 use super::*;
 use crate::modbus::map;
@@ -19,7 +20,8 @@ struct Writer {
     written: usize,
 }
 
-/// A range of registers or coils that is written: the exception for its count, then the one for its place.
+/// A range of registers or coils that is written: the exception for its count, then the one for its
+/// place.
 fn place(first: u16, count: usize, most: usize, end: u32) -> Option<u8> {
     match () {
         () if count == 0 || count > most => Some(3),
@@ -64,7 +66,8 @@ impl Writer {
             .collect()
     }
 
-    /// Sends a write that shall be refused with an exception, or carried out: then CONTROL is `wanted` of what it was.
+    /// Sends a write that shall be refused with an exception, or carried out: then CONTROL is
+    /// `wanted` of what it was.
     async fn write(&mut self, request: &[u8], refused: Option<u8>, wanted: impl Fn(&mut [u16])) {
         let before = self.plant.handle.snapshot();
         let mut control = self.block(0, 32).await;

@@ -1,4 +1,5 @@
-//! The map, word for word. If this test fails, do not change what stands in its lists: the map is append-only. What is added gets a line.
+//! The map, word for word. If this test fails, do not change what stands in its lists: the map is
+//! append-only. What is added gets a line.
 
 use crate::modbus::map::{BLOCKS, Register, VERSION, registers};
 use crate::modbus::render::{registers_csv, registers_json};
@@ -118,7 +119,8 @@ const ROWS: &str = "\
 1034 GAUGE_EXPECTED f32x16 GAUGE_UNCERTAINTY
 1066 SEQ_AGAIN u32 GAUGE_UNCERTAINTY";
 
-/// Name, first and last address of every block, and whether it can be written. All of them are served.
+/// Name, first and last address of every block, and whether it can be written. All of them are
+/// served.
 const SERVED: [(&str, u16, u16, bool); 9] = [
     ("CONTROL", 0, 31, true),
     ("STATUS", 100, 131, false),

@@ -1,4 +1,5 @@
-//! The server as a PLC sees it: `tokio-modbus`' own client, and raw bytes where that client is too well-behaved.
+//! The server as a PLC sees it: `tokio-modbus`' own client, and raw bytes where that client is too
+//! well-behaved.
 
 mod blocks;
 mod boundaries;

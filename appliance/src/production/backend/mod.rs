@@ -29,7 +29,8 @@ pub struct Opened {
     pub calibration: Calibration,
     /// Where parts are placed in front of a simulated head.
     pub stage: Option<Stage>,
-    /// Why the calibration cannot be trusted: it is nominal only, or the stored one cannot be used. Nothing may be measured then.
+    /// Why the calibration cannot be trusted: it is nominal only, or the stored one cannot be used.
+    /// Nothing may be measured then.
     pub problem: Option<String>,
     /// If the calibration is the previous generation: why the newest could not be used.
     pub fallback: Option<String>,
@@ -44,7 +45,7 @@ pub struct Opened {
 pub struct Played {
     /// What each frame of a recording shows, and of which pattern.
     shots: Vec<(PatternFile, Shot)>,
-    /// Fingerprint of the calibration that they were taken with, if a station kept them with their recipe.
+    /// Fingerprint of the calibration that they were taken with, if a station kept the recipe too.
     calibration: Option<String>,
 }
 
@@ -65,8 +66,9 @@ impl Played {
         }
     }
 
-    /// Plans a recipe to judge these recordings, with only the sequence that they show. A recording does not hold the whole
-    /// calibration, so its fingerprint is taken from the recipe that was kept with it.
+    /// Plans a recipe to judge these recordings, with only the sequence that they show. A recording
+    /// does not hold the whole calibration, so its fingerprint is taken from the recipe that was
+    /// kept with it.
     ///
     /// # Errors
     /// If the recipe was made for another calibration or does not fit the frames.
@@ -97,7 +99,8 @@ impl Opened {
         }
     }
 
-    /// Opens the head again after it was lost. It may be another one by then, so its calibration is read again.
+    /// Opens the head again after it was lost. It may be another one by then, so its calibration is
+    /// read again.
     ///
     /// # Errors
     /// If a device is not there.
@@ -145,13 +148,15 @@ impl Opened {
         });
     }
 
-    /// Whether the calibration of the back-end is nominal only: that of real devices, and of a simulated head that is to be commissioned.
+    /// Whether the calibration of the back-end is nominal only: that of real devices, and of a
+    /// simulated head that is to be commissioned.
     fn is_bare(&self, config: &HeadConfig) -> bool {
         let bare = |stage: &Stage| !stage.scenario().calibrated;
         config.backend == Backend::Rpi || self.stage.as_ref().is_some_and(bare)
     }
 
-    /// Sets exposure and gain of the camera to those of a configuration that was changed, or changed back, to `exposing`.
+    /// Sets exposure and gain of the camera to those of a configuration that was changed, or
+    /// changed back, to `exposing`.
     ///
     /// # Errors
     /// If the head cannot expose in this way, or a device is not there.
@@ -235,7 +240,8 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
     Ok(opened)
 }
 
-/// Opens the configured head even if nothing can be measured with it. `progress` is called with the share done, from any thread.
+/// Opens the configured head even if nothing can be measured with it. `progress` is called with the
+/// share done, from any thread.
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
@@ -300,7 +306,8 @@ fn unfinished(config: &HeadConfig, stored: &Loaded) -> Option<String> {
     })
 }
 
-/// Why the noise of a stored calibration is not that of the head as it is set; `None` if it is, or its setting is not known.
+/// Why the noise of a stored calibration is not that of the head as it is set; `None` if it is, or
+/// its setting is not known.
 fn set_otherwise(stored: &Loaded, now: Exposing) -> Option<String> {
     let measured = stored.file.noise.as_ref()?.exposing?;
     (!measured.agrees(&now)).then(|| {

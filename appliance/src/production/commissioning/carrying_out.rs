@@ -57,7 +57,8 @@ impl Worker {
         let mut kept = self.commission.kept();
         let head = self.head_of();
         if kept.head != head {
-            // What other devices have shown is of no use here; exposure and gain are those of this camera already.
+            // What other devices have shown is of no use here; exposure and gain are those of this
+            // camera already.
             kept = Commissioning::of(head, kept.exposing);
         }
         let before = (self.config.clone(), self.opened.exposing(&self.config));
@@ -109,7 +110,8 @@ impl Worker {
         self.tell_condition();
     }
 
-    /// Runs the step on the head. Returns the white frame of a pose, and whether a stop, the page or the PLC has ended the step.
+    /// Runs the step on the head. Returns the white frame of a pose, and whether a stop, the page
+    /// or the PLC has ended the step.
     fn step(&mut self, job: JobId, step: &Step, kept: &mut Commissioning) -> (Option<Frame>, bool) {
         let before = self.stored();
         let (station, pulse, bar) = (&self.station, &self.pulse, &self.progress);
@@ -231,7 +233,8 @@ impl Worker {
         }
     }
 
-    /// Gives a head without a calibration what the steps have measured of it, and publishes what is known of the head.
+    /// Gives a head without a calibration what the steps have measured of it, and publishes what is
+    /// known of the head.
     pub(in crate::production) fn tell_head(&mut self) {
         let kept = self.commission.kept();
         if self.opened.problem.is_some()

@@ -1,7 +1,9 @@
-//! Live pictures: taken by the measuring task while it has nothing else to do, only when somebody asks.
+//! Live pictures: taken by the measuring task while it has nothing else to do, only when somebody
+//! asks.
 //!
-//! The patterns to show are loaded once, behind those of the active recipe, so that a trigger finds its patterns in the projector. A trigger that comes
-//! ends the exposure within a refresh. Figures and PNG are worked out on the asking thread, which should have a low priority.
+//! The patterns to show are loaded once, behind those of the active recipe, so that a trigger finds
+//! its patterns in the projector. A trigger that comes ends the exposure within a refresh. Figures
+//! and PNG are worked out on the asking thread, which should have a low priority.
 
 use super::Commission;
 use crate::head::calibrate::settled;
@@ -59,7 +61,8 @@ impl Live {
         }
     }
 
-    /// Has one picture taken, and works out its PNG and figures; returns its number with the PNG. Others who ask wait.
+    /// Has one picture taken, and works out its PNG and figures; returns its number with the PNG.
+    /// Others who ask wait.
     ///
     /// # Errors
     /// The measuring task has something else to do, or the head failed.

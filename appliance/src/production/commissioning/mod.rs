@@ -1,7 +1,9 @@
-//! Commissioning on the station: steps are asked for from other threads, and the measuring task, which owns the head, carries them out.
+//! Commissioning on the station: steps are asked for from other threads, and the measuring task,
+//! which owns the head, carries them out.
 //!
-//! [`Commission`] is what both share: the step that waits, how far the one that runs has come, what the steps have found, and what is known of
-//! the open head. The station is in its state "commissioning" while a step runs, so no cycle and no change of recipe begins.
+//! [`Commission`] is what both share: the step that waits, how far the one that runs has come, what
+//! the steps have found, and what is known of the open head. The station is in its state
+//! "commissioning" while a step runs, so no cycle and no change of recipe begins.
 
 mod carrying_out;
 pub mod live;
@@ -78,7 +80,8 @@ pub struct Commission {
 }
 
 impl Commission {
-    /// With what is kept in the state folder, and complaints about what of it cannot be used and begins anew.
+    /// With what is kept in the state folder, and complaints about what of it cannot be used and
+    /// begins anew.
     pub fn open(state: &Path) -> (Self, Vec<String>) {
         let (drift, unfit) = Trend::open(state);
         let (kept, complaint) = match Commissioning::load(state) {
@@ -110,7 +113,8 @@ impl Commission {
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has the measuring task carry out a step; answers whether it does, which it does not while it has something else to do.
+    /// Has the measuring task carry out a step; answers whether it does, which it does not while it
+    /// has something else to do.
     pub fn begin(&self, station: &StationHandle, asked: Asked) -> bool {
         {
             let mut inside = self.inside();

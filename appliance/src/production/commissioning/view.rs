@@ -90,7 +90,8 @@ fn step(name: &str, outcome: Option<&Outcome>, running: bool) -> Value {
     })
 }
 
-/// The poses, and the models if there are any. What a pose has left in the models is known by its name there.
+/// The poses, and the models if there are any. What a pose has left in the models is known by its
+/// name there.
 fn geometry(inside: &Inside, head: &OpenHead) -> Value {
     let (kept, laid) = (&inside.kept, &inside.laid);
     let models = kept.models.as_ref();

@@ -5,8 +5,8 @@ const SHORTEST: u32 = 10;
 /// The same after attempts that orders have ended: about a minute.
 const LONGEST: u32 = 640;
 
-/// Counts cycles and signs of life. An attempt that an order ended is made again after twice the rest, so that a line with short pauses is
-/// not lit in each of them.
+/// Counts cycles and signs of life. An attempt that an order ended is made again after twice the
+/// rest, so that a line with short pauses is not lit in each of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Due {
     /// Cycles between two checks; 0 = there are none.
@@ -39,7 +39,8 @@ impl Due {
         self.cycles = self.cycles.saturating_add(1);
     }
 
-    /// A part was measured that a head out of adjustment would explain: the check need not wait for more cycles.
+    /// A part was measured that a head out of adjustment would explain: the check need not wait for
+    /// more cycles.
     pub fn suspect(&mut self) {
         self.cycles = self.cycles.max(self.every);
     }
@@ -49,7 +50,8 @@ impl Due {
         self.rested = 0;
     }
 
-    /// A sign of life without an order. Answers whether to check now; a doubtful result is checked again without more cycles.
+    /// A sign of life without an order. Answers whether to check now; a doubtful result is checked
+    /// again without more cycles.
     pub fn rests(&mut self, doubtful: bool) -> bool {
         self.rested = self.rested.saturating_add(1);
         self.is_on() && (doubtful || self.cycles >= self.every) && self.rested >= self.pause

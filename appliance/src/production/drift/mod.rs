@@ -1,7 +1,9 @@
-//! The check of the geometry between two cycles: whether camera and projector still stand to each other as they were calibrated.
+//! The check of the geometry between two cycles: whether camera and projector still stand to each
+//! other as they were calibrated.
 //!
-//! Its patterns are loaded behind those of the recipe, and it ends within a frame when anything else is to be done, so a trigger waits no longer
-//! than for a frame. What the frames show is worked out on a thread of its own with a low priority.
+//! Its patterns are loaded behind those of the recipe, and it ends within a frame when anything
+//! else is to be done, so a trigger waits no longer than for a frame. What the frames show is
+//! worked out on a thread of its own with a low priority.
 
 mod due;
 mod trend;
@@ -79,7 +81,8 @@ impl Report {
 }
 
 impl Worker {
-    /// Checks the geometry, if that is due and nothing else is to be done; called with each sign of life without an order.
+    /// Checks the geometry, if that is due and nothing else is to be done; called with each sign of
+    /// life without an order.
     pub(super) fn rest_and_check(&mut self, plan: Option<&Arc<Plan>>) {
         if self.watch.judging.load(Ordering::Relaxed) || !self.can_be_checked() {
             return;
@@ -195,7 +198,8 @@ impl Worker {
             .num_threads(1)
             .thread_name(|_| "checking".into())
             .start_handler(|_| priority::give_way())
-            // Without one the program would end. The message is in the log, and there are no more checks.
+            // Without one the program would end. The message is in the log, and there are no more
+            // checks.
             .panic_handler(|_| ())
             .build();
         match pool {

@@ -22,7 +22,8 @@ const MAX_BYTES: u64 = 4 << 20;
 const MOST_KEPT: usize = 256;
 /// Most checks that the page shows.
 const MOST_SHOWN: usize = 100;
-/// Checks in a row beyond the limit that make a drift: while one is made somebody may take the part away, or the press may shake.
+/// Checks in a row beyond the limit that make a drift: while one is made somebody may take the part
+/// away, or the press may shake.
 const CONFIRMED: usize = 2;
 
 /// One check. Distances in projector pixels.
@@ -102,7 +103,8 @@ pub struct Trend {
 }
 
 impl Trend {
-    /// What is kept in the state folder, and a complaint if that cannot be used: then the trend begins anew.
+    /// What is kept in the state folder, and a complaint if that cannot be used: then the trend
+    /// begins anew.
     pub fn open(state: &Path) -> (Self, Option<String>) {
         let path = state.join(FILE);
         let read = match read_whole(&path, MAX_BYTES) {

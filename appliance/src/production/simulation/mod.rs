@@ -1,7 +1,9 @@
-//! The part in front of a simulated head: shows which one it is and which there are, and replaces it by another.
+//! The part in front of a simulated head: shows which one it is and which there are, and replaces
+//! it by another.
 //!
-//! The light of a new part is computed on the caller's thread, which takes seconds, while the station measures the part before. Then
-//! the measuring task puts the part in place between two cycles, so that the frames of a cycle never show two parts.
+//! The light of a new part is computed on the caller's thread, which takes seconds, while the
+//! station measures the part before. Then the measuring task puts the part in place between two
+//! cycles, so that the frames of a cycle never show two parts.
 
 use crate::head::placed::{Placed, kinds};
 use crate::production::Order;
@@ -61,7 +63,8 @@ impl Simulation {
         }
     }
 
-    /// The part that is in place, and those that may be put there, as `GET /api/simulation/part` answers.
+    /// The part that is in place, and those that may be put there, as `GET /api/simulation/part`
+    /// answers.
     pub fn view(&self) -> Value {
         match self.stage.get() {
             None => json!({ "simulated": false }),
@@ -111,7 +114,8 @@ impl Simulation {
             waiting: waiting.clone(),
             done,
         };
-        // If the measuring task is gone, `placing` and with it the sender of the answer are dropped.
+        // If the measuring task is gone, `placing` and with it the sender of the answer are
+        // dropped.
         drop(self.orders.send(Order::Place(placing)));
         let busy = || {
             let words = "put the part in place: the measuring task is busy or its head is lost; try again when it is ready";

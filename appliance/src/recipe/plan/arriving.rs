@@ -66,8 +66,8 @@ impl Plan {
         }
     }
 
-    /// Calls `inspect` with the decoded levels and the frames of the finest one, if all levels but the finest are decoded. Their
-    /// memory goes back to the run.
+    /// Calls `inspect` with the decoded levels and the frames of the finest one, if all levels but
+    /// the finest are decoded. Their memory goes back to the run.
     pub(super) fn with_arrived<R>(
         &self,
         arriving: Arriving,

@@ -10,8 +10,9 @@ use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation, PhaseDelta};
 use rayon::prelude::*;
 
-/// The weight of each pixel's deviation, which lies by these `shares` along the normal, and the uncertainty of its taught height. The sequence
-/// has `brighter` times the modulation of golden, by which `noise` goes.
+/// The weight of each pixel's deviation, which lies by these `shares` along the normal, and the
+/// uncertainty of its taught height. The sequence has `brighter` times the modulation of golden, by
+/// which `noise` goes.
 pub(super) fn taught(
     (noise, brighter): (SampleNoise, f64),
     arrays: &Arrays,
@@ -35,7 +36,8 @@ pub(super) fn taught(
     taught.with_least_sides(arrays.smoothing.clone())
 }
 
-/// σ of a sample, the same at all pixels, with which σ_z of the compared part has the RMS that it has by `noise`; counts.
+/// σ of a sample, the same at all pixels, with which σ_z of the compared part has the RMS that it
+/// has by `noise`; counts.
 pub(super) fn even_noise(noise: SampleNoise, arrays: &Arrays) -> f64 {
     let compared = (0..arrays.valid.len()).filter(|&at| arrays.valid[at] != 0);
     let (mut sum, mut weights) = (0.0, 0.0);
@@ -53,9 +55,10 @@ pub(super) fn even_noise(noise: SampleNoise, arrays: &Arrays) -> f64 {
     }
 }
 
-/// The phase that a sequence is unwrapped about and compared with: golden's by this sequence, which is `offset` from that by the full
-/// one. Of a sequence of limited reach it is unknown where a placement could move the phase further than that. `None` if it is that
-/// of the golden surface; `base` is the offset of the sequence that this is by.
+/// The phase that a sequence is unwrapped about and compared with: golden's by this sequence, which
+/// is `offset` from that by the full one. Of a sequence of limited reach it is unknown where a
+/// placement could move the phase further than that. `None` if it is that of the golden surface;
+/// `base` is the offset of the sequence that this is by.
 pub(super) fn map(
     arrays: &Arrays,
     kind: SequenceKind,
@@ -87,8 +90,9 @@ fn delta(offset: &[i16], at: usize) -> PhaseDelta {
     PhaseDelta::from_bits(offset.get(at).copied().map_or(0, i32::from))
 }
 
-/// The surface that deviations refer to, as the sequence with this offset measured it. Where golden has none, such as in an opening, it is
-/// interpolated from the surface around: material that should not be there must be found, by the full sequence at least.
+/// The surface that deviations refer to, as the sequence with this offset measured it. Where golden
+/// has none, such as in an opening, it is interpolated from the surface around: material that
+/// should not be there must be found, by the full sequence at least.
 pub(super) fn surface(width: usize, arrays: &Arrays, offset: &[i16]) -> KnownSurface {
     let mut height = vec![Height::UNKNOWN; arrays.golden_height.len()];
     pipeline::for_each_row(&mut height, width, |v, row| {

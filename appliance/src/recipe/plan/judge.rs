@@ -11,21 +11,24 @@ use std::sync::Arc;
 
 /// Largest share of lit pixels whose levels contradict each other; silhouettes cause about 1 %.
 const CONTRADICTING: f64 = 0.03;
-/// Least fitness (taught noise over measured noise of the height); below it the noise has grown by half.
+/// Least fitness (taught noise over measured noise of the height); below it the noise has grown by
+/// half.
 const UNFIT: f64 = 0.67;
 /// Largest share of points off the taught surface: a defect covers less, wrong fringe orders more.
 const OUTLIERS: f64 = 0.2;
-/// A part lies out of place where it does so by this many errors of its way, and by this share of what is allowed: a defect pulls the part's
-/// place by that.
+/// A part lies out of place where it does so by this many errors of its way, and by this share of
+/// what is allowed: a defect pulls the part's place by that.
 const SURE: f64 = 2.0;
 const PULLED: f64 = 0.02;
-/// A part that fails with less fitness than this is INVALID: its limits were set for a quarter of the noise.
+/// A part that fails with less fitness than this is INVALID: its limits were set for a quarter of
+/// the noise.
 const LEAST_FITNESS: f64 = 0.25;
 /// What lies farther off than so many times what is allowed is another part.
 const FAR: f64 = 10.0;
 /// Turns below this are not told, degrees.
 const LEAST_TURN: f64 = 0.05;
-/// Least share of the picture's variance along golden's edges that golden explains where two frames are used.
+/// Least share of the picture's variance along golden's edges that golden explains where two frames
+/// are used.
 pub(super) const ALIKE: f64 = 0.8;
 
 /// Why a part cannot be judged.
@@ -166,13 +169,14 @@ impl Demands {
         }
     }
 
-    /// Whether the light may be why a part was measured badly: hardly anything of it is seen, or it is much noisier than as taught.
+    /// Whether the light may be why a part was measured badly: hardly anything of it is seen, or it
+    /// is much noisier than as taught.
     pub(super) fn doubts_the_light(inspection: &Inspection) -> bool {
         inspection.error_code == NOT_THE_PART || fitness(inspection) < UNFIT
     }
 
-    /// Names in the reason what is wrong with the light, where a part was measured badly because of it; a part that fails with less than
-    /// [`LEAST_FITNESS`] becomes INVALID.
+    /// Names in the reason what is wrong with the light, where a part was measured badly because of
+    /// it; a part that fails with less than [`LEAST_FITNESS`] becomes INVALID.
     pub(super) fn explain(&self, light: Option<Light>, inspection: &mut Inspection) {
         let cause = light.and_then(Light::cause);
         inspection.warnings |= cause.map_or(0, Cause::warning);
@@ -196,7 +200,8 @@ impl Demands {
         inspection.judged = Verdict::Invalid;
     }
 
-    /// Which values lie too close to a limit, and what to do; `None` if none does, or if another one lies outside its limits.
+    /// Which values lie too close to a limit, and what to do; `None` if none does, or if another
+    /// one lies outside its limits.
     fn undecided(&self, inspection: &Inspection) -> Option<String> {
         let close = |gauge: &GaugeValue| {
             let value = gauge.value?;
@@ -219,7 +224,8 @@ impl Demands {
         })
     }
 
-    /// Whether a part surely lies farther from its place than is allowed: one that lies at the tolerance does not.
+    /// Whether a part surely lies farther from its place than is allowed: one that lies at the
+    /// tolerance does not.
     fn is_off(&self, placed: &Placed) -> bool {
         placed.reach - SURE * placed.reach_sigma > (1.0 + PULLED) * self.tolerance_mm
     }

@@ -1,4 +1,5 @@
-//! Maps of a measured part for the page (height, deviation from golden, modulation), and its point cloud.
+//! Maps of a measured part for the page (height, deviation from golden, modulation), and its point
+//! cloud.
 
 use super::{Laps, Plan};
 use crate::head::seam;
@@ -90,7 +91,8 @@ impl Plan {
         })
     }
 
-    /// z in mm of each pixel from the frames of a sequence, NaN where not resolved; `None` if the frames do not fit.
+    /// z in mm of each pixel from the frames of a sequence, NaN where not resolved; `None` if the
+    /// frames do not fit.
     pub fn heights(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<f32>> {
         let mut height_mm = self.unknown();
         let maps = Maps {
@@ -154,7 +156,8 @@ impl Plan {
         Some(phases.modulation)
     }
 
-    /// The point cloud of a part as binary PLY, with its modulation as intensity; `None` as for [`Self::layers`].
+    /// The point cloud of a part as binary PLY, with its modulation as intensity; `None` as for
+    /// [`Self::layers`].
     pub fn cloud(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<u8>> {
         let height_mm = self.heights(sequence, frames)?;
         let modulation = self.modulation(sequence, frames)?;

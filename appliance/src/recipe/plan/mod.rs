@@ -1,4 +1,5 @@
-//! A recipe joined with the head's calibration. Planning can fail; judging a part with the plan always ends in an inspection.
+//! A recipe joined with the head's calibration. Planning can fail; judging a part with the plan
+//! always ends in an inspection.
 
 mod arriving;
 mod golden;
@@ -36,7 +37,8 @@ use run::{Pair, Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// A recipe joined with the head's calibration. Of the recipe's arrays only what production reads is kept.
+/// A recipe joined with the head's calibration. Of the recipe's arrays only what production reads
+/// is kept.
 #[derive(Debug)]
 pub struct Plan {
     id: RecipeId,
@@ -47,8 +49,8 @@ pub struct Plan {
     illumination: Illumination,
     /// What the rasters show, each once; those of the first run come first.
     shots: Vec<Shot>,
-    /// The sequences in the order in which they are tried; each unwraps further than the one before. Methods take the index of
-    /// one as `sequence`.
+    /// The sequences in the order in which they are tried; each unwraps further than the one
+    /// before. Methods take the index of one as `sequence`.
     runs: Vec<Run>,
     /// The buffers of an inspection, allocated once.
     strips: Mutex<Strips>,
@@ -57,9 +59,11 @@ pub struct Plan {
     simulated: bool,
 }
 
-/// A frame is inspected in this many strips: enough for four threads, with few rows that two strips both need.
+/// A frame is inspected in this many strips: enough for four threads, with few rows that two strips
+/// both need.
 pub const STRIPS: usize = 4;
-/// Heights are planned this many pixels around the taught part at least: a part that is not aligned may be displaced by that.
+/// Heights are planned this many pixels around the taught part at least: a part that is not aligned
+/// may be displaced by that.
 const AROUND: usize = 16;
 /// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
 const MAX_PATTERN_BYTES: usize = 256 << 20;
@@ -94,9 +98,10 @@ impl Plan {
         Self::again(recipe, calibration, simulated)
     }
 
-    /// As [`Self::new`], to judge a recorded part again: `calibration` is read from the recording. A recording does not hold the
-    /// projector's grey response, so the calibration's fingerprint cannot be computed from it and is not compared here;
-    /// it was compared when the part was measured. Judging frames does not use the response.
+    /// As [`Self::new`], to judge a recorded part again: `calibration` is read from the recording.
+    /// A recording does not hold the projector's grey response, so the calibration's fingerprint
+    /// cannot be computed from it and is not compared here; it was compared when the part was
+    /// measured. Judging frames does not use the response.
     ///
     /// # Errors
     /// If the recipe does not fit the frames.
@@ -147,7 +152,8 @@ impl Plan {
             window::add_compared(&mut window, &arrays.valid, size.0);
         }
         let range = triangulator.function().range();
-        // The golden surface is by the sequence that is projected first, so that deviations by that have no other error of golden's.
+        // The golden surface is by the sequence that is projected first, so that deviations by that
+        // have no other error of golden's.
         let base = sequences.first().and_then(|first| first.offset);
         let base = base.filter(|_| !arrays.sequence_offset.is_empty());
         let mut shots = Vec::new();
@@ -247,7 +253,8 @@ impl Plan {
         self.runs.len()
     }
 
-    /// Which of the plan's rasters the frames of a sequence show; empty if there is no such sequence.
+    /// Which of the plan's rasters the frames of a sequence show; empty if there is no such
+    /// sequence.
     pub fn indices(&self, sequence: usize) -> &[usize] {
         self.runs.get(sequence).map_or(&[], |run| &run.indices)
     }
@@ -273,8 +280,8 @@ impl Plan {
         self.runs.swap_remove(0).production
     }
 
-    /// Judges a part from the frames of a sequence; the times of its stages begin at `exposed`. A part that cannot be measured
-    /// is INVALID with a reason.
+    /// Judges a part from the frames of a sequence; the times of its stages begin at `exposed`. A
+    /// part that cannot be measured is INVALID with a reason.
     pub fn inspect(&self, sequence: usize, frames: &[Frame], exposed: Instant) -> Inspection {
         self.inspect_arrived(frames, Arriving::none(sequence), exposed)
     }
@@ -352,7 +359,8 @@ impl Plan {
         self.strips.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The findings from the frames of a sequence, and of two frames how much the picture is like golden's.
+    /// The findings from the frames of a sequence, and of two frames how much the picture is like
+    /// golden's.
     fn run(
         &self,
         strips: &mut Strips,

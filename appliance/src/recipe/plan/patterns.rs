@@ -13,8 +13,9 @@ use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference};
 
 impl Plan {
-    /// Keeps only the longest sequence whose frames are all among those that show these shots of its own pattern (`None` for frames of another
-    /// one): a head that plays a recording has no other frames. If there is no such sequence, nothing changes.
+    /// Keeps only the longest sequence whose frames are all among those that show these shots of
+    /// its own pattern (`None` for frames of another one): a head that plays a recording has no
+    /// other frames. If there is no such sequence, nothing changes.
     pub fn only(mut self, shown: &[Option<Shot>]) -> Self {
         let indices = |sequence| -> Option<Vec<usize>> {
             let place = |shot| shown.iter().position(|other| *other == Some(shot));

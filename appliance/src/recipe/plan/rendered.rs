@@ -1,4 +1,5 @@
-//! Cycles of a part that is not there: golden as a displaced part would be measured, judged as production would.
+//! Cycles of a part that is not there: golden as a displaced part would be measured, judged as
+//! production would.
 
 use super::{Laps, Plan, window};
 use crate::recipe::sides::Farthest;
@@ -9,8 +10,10 @@ use algo::units::Modulation;
 use std::time::Instant;
 
 impl Plan {
-    /// Judges the part as taught after a motion, by one sequence after the other as production does. `light` is golden's modulation by
-    /// each of the plan's sequences; other seeds give other noise, none gives none. `farthest` looks at the deviations. `None` for sequences of two frames.
+    /// Judges the part as taught after a motion, by one sequence after the other as production
+    /// does. `light` is golden's modulation by each of the plan's sequences; other seeds give other
+    /// noise, none gives none. `farthest` looks at the deviations. `None` for sequences of two
+    /// frames.
     pub(in crate::recipe) fn inspect_rendered(
         &self,
         motion: &Motion,

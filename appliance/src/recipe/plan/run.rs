@@ -51,14 +51,16 @@ pub(super) struct Shared {
     pub calibration: CalibrationError,
     pub good_parts: Option<GoodPartsFile>,
     pub golden: GoldenNoise,
-    /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what two frames need.
+    /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what
+    /// two frames need.
     pub picture: (Vec<f32>, f64),
 }
 
 /// The noise of golden.
 pub(super) struct GoldenNoise {
     captures: f64,
-    /// σ of the phase of a pixel of full modulation, turns per count of noise: in one capture by the full sequence.
+    /// σ of the phase of a pixel of full modulation, turns per count of noise: in one capture by
+    /// the full sequence.
     full: f64,
     /// The same by the sequence that the golden surface is by, and the offset of that.
     base: f64,
@@ -83,9 +85,11 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Prepares a sequence for phases of `range` with at least so much modulation; the recipe's arrays can be dropped then. `rasters` are
-    /// what all runs show; what only this one shows is added. `fundamental` is that of the waveform that golden's modulation was measured
-    /// with; deviations lie by `shares` along the normal; `base` is the offset of the sequence that the golden surface is by.
+    /// Prepares a sequence for phases of `range` with at least so much modulation; the recipe's
+    /// arrays can be dropped then. `rasters` are what all runs show; what only this one shows is
+    /// added. `fundamental` is that of the waveform that golden's modulation was measured with;
+    /// deviations lie by `shares` along the normal; `base` is the offset of the sequence that the
+    /// golden surface is by.
     pub fn of(
         sequence: RecipeSequence,
         (noise, fundamental): (SampleNoise, f64),
@@ -124,7 +128,8 @@ impl Prepared {
         })
     }
 
-    /// The noise of golden, where this is the full sequence, in frames of `width` columns. The golden surface is by the sequence `base`.
+    /// The noise of golden, where this is the full sequence, in frames of `width` columns. The
+    /// golden surface is by the sequence `base`.
     pub fn golden_noise(
         &self,
         base: &Self,
@@ -151,10 +156,12 @@ impl Prepared {
         self.decoder.phase_noise(full, noise)
     }
 
-    /// σ of golden's heights that deviations by this sequence have, over that of one measurement by it.
+    /// σ of golden's heights that deviations by this sequence have, over that of one measurement by
+    /// it.
     ///
-    /// Golden's phase by this sequence is what deviations are from. Where the golden surface is by another one, a displaced part
-    /// is compared with heights by that one, and the heights of both places have its noise.
+    /// Golden's phase by this sequence is what deviations are from. Where the golden surface is by
+    /// another one, a displaced part is compared with heights by that one, and the heights of both
+    /// places have its noise.
     fn noise_of_golden(&self, golden: &GoldenNoise) -> f64 {
         let own = self.phase_noise();
         let measured = self.offset.is_some() || self.kind == SequenceKind::Full;

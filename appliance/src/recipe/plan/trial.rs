@@ -9,7 +9,8 @@ use std::sync::{Mutex, PoisonError};
 static ONE: Mutex<()> = Mutex::new(());
 
 impl Plan {
-    /// Plans a recipe on one thread of its own, so that the computing threads are left to the measurement.
+    /// Plans a recipe on one thread of its own, so that the computing threads are left to the
+    /// measurement.
     ///
     /// # Errors
     /// As [`Plan::new`].

@@ -5,8 +5,9 @@ use algo::inspect::Gauge;
 use algo::units::Height;
 use std::ops::Range;
 
-/// The columns of each row of a frame of (width, height) that some gauge needs: its region, half of its smoothing square and
-/// `away` pixels around it, by which the part may be displaced. Nothing outside is computed.
+/// The columns of each row of a frame of (width, height) that some gauge needs: its region, half of
+/// its smoothing square and `away` pixels around it, by which the part may be displaced. Nothing
+/// outside is computed.
 pub(super) fn of(
     gauges: &[Gauge],
     (width, height): (usize, usize),
@@ -32,7 +33,8 @@ pub(super) fn of(
     window
 }
 
-/// Widens the window to all pixels that are compared, those that are `valid`: the part's motion is estimated from all of them.
+/// Widens the window to all pixels that are compared, those that are `valid`: the part's motion is
+/// estimated from all of them.
 pub(super) fn add_compared(window: &mut [Range<usize>], valid: &[u8], width: usize) {
     for (columns, valid) in window.iter_mut().zip(valid.chunks(width.max(1))) {
         let first = valid.iter().position(|&valid| valid != 0);

@@ -1,10 +1,12 @@
-//! Counts of the daemon's starts with a state folder, and of those that followed an end without a stop.
+//! Counts of the daemon's starts with a state folder, and of those that followed an end without a
+//! stop.
 
 use crate::storage::folder::{read_whole, write_whole};
 use std::io;
 use std::path::Path;
 
-/// The file: starts, unclean starts, the daemon's condition, and starts after it hung, e.g. `12 1 running 0`.
+/// The file: starts, unclean starts, the daemon's condition, and starts after it hung, e.g. `12 1
+/// running 0`.
 const FILE: &str = "boots";
 
 /// Longest file, bytes.
@@ -18,7 +20,8 @@ pub enum Condition {
     Stopped,
     /// It runs.
     Running,
-    /// It runs, but its measuring task has missed its deadlines for so long that a watchdog will end it.
+    /// It runs, but its measuring task has missed its deadlines for so long that a watchdog will
+    /// end it.
     Hanging,
 }
 
@@ -48,7 +51,8 @@ pub struct Boots {
 }
 
 impl Boots {
-    /// The counts including this start. They begin at zero if the file is damaged: no decision depends on them.
+    /// The counts including this start. They begin at zero if the file is damaged: no decision
+    /// depends on them.
     pub fn begin(folder: &Path) -> Self {
         let text = read_whole(&folder.join(FILE), MAX_BYTES).unwrap_or_default();
         let text = String::from_utf8(text).unwrap_or_default();

@@ -1,4 +1,5 @@
-//! The survey: load, memory, storage, temperature, power, versions, stored recipes and Modbus clients, once a second.
+//! The survey: load, memory, storage, temperature, power, versions, stored recipes and Modbus
+//! clients, once a second.
 //!
 //! It has its own thread, so that a storage that hangs delays neither sockets nor measuring.
 
@@ -18,8 +19,8 @@ use std::time::Duration;
 
 /// Time between two surveys.
 const PERIOD: Duration = Duration::from_secs(1);
-/// A measuring task that missed its deadlines in this many surveys in a row hangs. Opening a lost head again takes less time, so
-/// that it does not cause writes to the card.
+/// A measuring task that missed its deadlines in this many surveys in a row hangs. Opening a lost
+/// head again takes less time, so that it does not cause writes to the card.
 const HANGING: u32 = 10;
 
 /// What is surveyed.
@@ -46,7 +47,8 @@ impl Survey {
         survey
     }
 
-    /// Sends a survey to the station once a second until `stopped` receives a message or is closed; then counts a clean end.
+    /// Sends a survey to the station once a second until `stopped` receives a message or is closed;
+    /// then counts a clean end.
     pub fn run(mut self, station: &StationHandle, stopped: &Receiver<()>) {
         let mut processors = system::Processors::default();
         let mut late = 0_u32;

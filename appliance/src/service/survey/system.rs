@@ -26,7 +26,8 @@ impl Processors {
 /// Busy and total ticks of all processors: proc_stat(5), first line.
 fn busy_and_whole(stat: &str) -> Option<(u64, u64)> {
     let line = stat.lines().next()?.strip_prefix("cpu ")?;
-    // user nice system idle iowait irq softirq steal; the fields after them are contained in the first two.
+    // user nice system idle iowait irq softirq steal; the fields after them are contained in the
+    // first two.
     let ticks: Vec<u64> = line
         .split_whitespace()
         .take(8)

@@ -2,7 +2,8 @@
 
 use super::*;
 
-/// A trigger is rejected with reason 6 however it is given, counted as missed, and ends in no result.
+/// A trigger is rejected with reason 6 however it is given, counted as missed, and ends in no
+/// result.
 fn no_trigger_is_accepted(bench: &mut Bench) {
     let before = bench.station.snapshot();
     assert!(!before.is(status::READY), "{:?}", before.refusal_words());

@@ -1,4 +1,5 @@
-//! Every state × every event: the next state is defined, nothing panics, and an event out of place changes nothing.
+//! Every state × every event: the next state is defined, nothing panics, and an event out of place
+//! changes nothing.
 
 use std::sync::Arc;
 
@@ -8,7 +9,8 @@ use crate::station::*;
 
 /// The states by their numbers in register 104; a fault once for each way in which it is cleared.
 const STATES: [u16; 13] = [0, 1, 2, 3, 4, 5, 6, 7, 7, 7, 7, 8, 9];
-/// Columns of the table that are faults: a lost device, a missed deadline, storage, an idle worker's silence.
+/// Columns of the table that are faults: a lost device, a missed deadline, storage, an idle
+/// worker's silence.
 const LOST: usize = 7;
 const LATE: usize = 8;
 const FULL: usize = 9;
@@ -320,7 +322,8 @@ fn an_answer_of_another_job_changes_no_state() {
                 let only_logged = effects
                     .iter()
                     .all(|effect| matches!(effect, Effect::Log(_) | Effect::Alarm(_)));
-                // It counts only as a sign of life, which ends the fault of an idle worker's silence.
+                // It counts only as a sign of life, which ends the fault of an idle worker's
+                // silence.
                 let as_before = station.state == bench.station.state || state == SILENT;
                 assert!(as_before && only_logged, "state {state}, {event:?}");
             }
@@ -347,8 +350,8 @@ fn time_that_runs_backwards_or_to_its_end_is_survived() {
     }
 }
 
-/// Takes every order of `left` events from `station` on. Each trigger has one result, or its cycle is in flight; none is after the
-/// worker's last word, a missed deadline or a second stop.
+/// Takes every order of `left` events from `station` on. Each trigger has one result, or its cycle
+/// is in flight; none is after the worker's last word, a missed deadline or a second stop.
 fn follow(station: &Station, now: Micros, left: u32) {
     let stopping = matches!(station.state, State::Stopping { .. });
     for (event, _) in events(station.worker.last_job) {

@@ -154,7 +154,8 @@ fn a_hundred_thousand_random_events_break_no_promise() {
     let mut next_seq = settings.next_seq;
     let mut station = Station::new(settings, Micros(0));
     let (mut now, mut measures, mut results, mut most) = (Micros(0), 0_u32, 0_u32, 0);
-    // While the storage is broken no number is stored; the answer comes before anything else happens.
+    // While the storage is broken no number is stored; the answer comes before anything else
+    // happens.
     let (mut broken, mut answers) = (false, Vec::new());
     for count in 0..EVENTS {
         // Now and then long enough for a deadline.

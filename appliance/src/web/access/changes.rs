@@ -1,4 +1,5 @@
-//! The record of changes: from which address what was changed and when, as JSON lines, of limited size.
+//! The record of changes: from which address what was changed and when, as JSON lines, of limited
+//! size.
 
 use serde::Serialize;
 use serde_json::{Value, json};

@@ -1,9 +1,11 @@
-//! Access control: the device's secret, sessions, limits on wrong guesses, and the record of changes.
+//! Access control: the device's secret, sessions, limits on wrong guesses, and the record of
+//! changes.
 //!
-//! Reading needs no login. A change needs a session, which [`Access::sign_in`] opens for the device's secret: the one that was
-//! configured, else the one that was made and shown once at the first start. The folder `access` of the state folder holds `secret`, the
-//! argon2id hash, and `changes.jsonl`, the record. If `secret` is deleted, the next start makes a new one; only the owner of the device
-//! can delete it.
+//! Reading needs no login. A change needs a session, which [`Access::sign_in`] opens for the
+//! device's secret: the one that was configured, else the one that was made and shown once at the
+//! first start. The folder `access` of the state folder holds `secret`, the argon2id hash, and
+//! `changes.jsonl`, the record. If `secret` is deleted, the next start makes a new one; only the
+//! owner of the device can delete it.
 
 mod changes;
 mod patience;
@@ -58,11 +60,13 @@ pub enum Refused {
 }
 
 impl Access {
-    /// Opens the folder, creating it where it does not exist. The secret is that of the file `given`, if it exists. Otherwise the first
-    /// start, or one that finds the stored hash damaged, makes one and answers with it: it must be shown, because only its hash is stored.
+    /// Opens the folder, creating it where it does not exist. The secret is that of the file
+    /// `given`, if it exists. Otherwise the first start, or one that finds the stored hash damaged,
+    /// makes one and answers with it: it must be shown, because only its hash is stored.
     ///
     /// # Errors
-    /// If the folder cannot be read or written (exit code 73), or the given secret cannot be used (78).
+    /// If the folder cannot be read or written (exit code 73), or the given secret cannot be used
+    /// (78).
     pub fn open(folder: &Path, given: Option<&Path>) -> Result<(Self, Option<NewSecret>), Failure> {
         let failed = |error: String| {
             let what = format!("open {}", folder.display());
@@ -85,7 +89,8 @@ impl Access {
         Ok((Self(Arc::new(inside)), shown))
     }
 
-    /// Opens a session for the secret. It takes some ten milliseconds of a core, so the socket thread must not call it.
+    /// Opens a session for the secret. It takes some ten milliseconds of a core, so the socket
+    /// thread must not call it.
     ///
     /// # Errors
     /// The secret is wrong, or this address guessed too often.

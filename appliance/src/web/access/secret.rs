@@ -20,7 +20,8 @@ const MOST: u64 = 4096;
 /// Letters and digits of the shortest secret that may be given: 60 bits where they are random.
 const SHORTEST: usize = 12;
 
-/// The hash of the secret in this file, which holds it in plain text or as an argon2id hash; none if there is no such file.
+/// The hash of the secret in this file, which holds it in plain text or as an argon2id hash; none
+/// if there is no such file.
 ///
 /// # Errors
 /// In words, with the remedy.
@@ -125,8 +126,8 @@ fn hash(secret: &str) -> Result<String, String> {
         .map_err(|error| error.to_string())
 }
 
-/// The form that is hashed: only letters and digits, in capitals, with the letters that Crockford's digits leave out replaced by the
-/// digits that they look like.
+/// The form that is hashed: only letters and digits, in capitals, with the letters that Crockford's
+/// digits leave out replaced by the digits that they look like.
 fn plain(typed: &str) -> String {
     let kept = typed.chars().filter(char::is_ascii_alphanumeric);
     kept.map(|digit| match digit.to_ascii_uppercase() {

@@ -1,4 +1,5 @@
-//! Boundary values in every request: each is refused by its key and changes nothing, or what it makes can be used.
+//! Boundary values in every request: each is refused by its key and changes nothing, or what it
+//! makes can be used.
 
 use super::*;
 use crate::history::{Bounds, Numbering};

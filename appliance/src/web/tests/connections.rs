@@ -152,7 +152,8 @@ async fn one_address_holds_at_most_sixteen_connections_and_a_proxy_more() {
         assert!(ended.is_err(), "fewer than 16 are left");
     }
     assert_eq!(silent.len(), 16);
-    // A proxy's followers hold their places while they are answered, also above the share of an address.
+    // A proxy's followers hold their places while they are answered, also above the share of an
+    // address.
     let proxy = |request| connect_from(&served, [127, 9, 9, 9], request);
     let mut through = Vec::new();
     for _ in 0..site::MAX_FOLLOWERS {

@@ -108,7 +108,8 @@ impl Answer {
 }
 
 impl Served {
-    /// Sends one request with these header lines; the Host is this device's address unless they name one.
+    /// Sends one request with these header lines; the Host is this device's address unless they
+    /// name one.
     async fn ask(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
         let mut stream = TcpStream::connect(self.address).await.unwrap();
         let mut text = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");

@@ -9,8 +9,8 @@ use hal::bounded;
 
 /// What black squares reflect of the light that white ones do.
 const BLACK: f64 = 0.08;
-/// Width over which the print changes from black to white, mm. It is wider than the distance of two sub-rays, so that edges along
-/// the camera's rows do not jump from one sub-ray to the next.
+/// Width over which the print changes from black to white, mm. It is wider than the distance of two
+/// sub-rays, so that edges along the camera's rows do not jump from one sub-ray to the next.
 const EDGE_MM: f64 = 0.2;
 /// Width of the white margin, in squares.
 const MARGIN: f64 = 1.0;
@@ -46,8 +46,8 @@ impl Default for Board {
 }
 
 impl Board {
-    /// Poses of the default board which calibrate the default head: tilted to all sides, near and far, all over the picture. In the
-    /// last one the board lies in z = 0.
+    /// Poses of the default board which calibrate the default head: tilted to all sides, near and
+    /// far, all over the picture. In the last one the board lies in z = 0.
     pub const POSES: [Placement; 10] = [
         pose([28.0, 6.0], 0.0, [-42.0, 10.0, 10.0]),
         pose([-28.0, 6.0], 0.0, [50.0, -10.0, 10.0]),
@@ -82,7 +82,8 @@ impl Board {
         inner(self.columns).hypot(inner(self.rows))
     }
 
-    /// −1 … 1 across an edge between two squares, with alternating sign from square to square; `at` is a coordinate, mm.
+    /// −1 … 1 across an edge between two squares, with alternating sign from square to square; `at`
+    /// is a coordinate, mm.
     fn across(&self, at: f64, corners: usize) -> f64 {
         let squares = (at + self.half(corners)) / self.side();
         // The distance to the nearest edge in squares, positive in odd squares.

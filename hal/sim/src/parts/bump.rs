@@ -1,6 +1,7 @@
 //! A smooth, round elevation: the profile of dents and beads.
 
-/// cos² from 1 at distance 0 to 0 at `half_width`, smooth at both; its slope is at most π / (2 · half_width).
+/// cos² from 1 at distance 0 to 0 at `half_width`, smooth at both; its slope is at most π / (2 ·
+/// half_width).
 pub(super) fn bump(distance: f64, half_width: f64) -> f64 {
     if distance >= half_width {
         return 0.0;

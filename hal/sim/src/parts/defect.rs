@@ -1,4 +1,5 @@
-//! Defects of parts: dents, which every part with a surface of its own can have, and those of the sheet metal alone.
+//! Defects of parts: dents, which every part with a surface of its own can have, and those of the
+//! sheet metal alone.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +8,8 @@ use hal::bounds::{length, within};
 /// Most defects of a scenario.
 const MAX_DEFECTS: usize = 64;
 
-/// One defect of a part. The sheet metal can have all of them, a printed board none, and the other parts dents.
+/// One defect of a part. The sheet metal can have all of them, a printed board none, and the other
+/// parts dents.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Defect {
@@ -35,7 +37,8 @@ pub enum Defect {
 }
 
 impl Defect {
-    /// Checks the number of defects and the measures of the dents; the error names the key and its range.
+    /// Checks the number of defects and the measures of the dents; the error names the key and its
+    /// range.
     pub(super) fn check(defects: &[Self]) -> Result<(), String> {
         length("part.defects", defects.len(), 0, MAX_DEFECTS)?;
         for defect in defects {

@@ -1,7 +1,8 @@
 //! A surface with round, smooth dents along its normal, also where the surface is steep.
 //!
-//! A dent of depth d and diameter D at the point c of the surface lowers z by d/n_z · cos²(π/2 · r / (D/2)), where r is the distance in
-//! space from c to the undented surface, and n the unit normal at c: d is measured along the normal, and D across the surface.
+//! A dent of depth d and diameter D at the point c of the surface lowers z by d/n_z · cos²(π/2 · r
+//! / (D/2)), where r is the distance in space from c to the undented surface, and n the unit normal
+//! at c: d is measured along the normal, and D across the surface.
 
 use super::bump::{BUMP_SLOPE, bump};
 use super::{Defect, Surface};

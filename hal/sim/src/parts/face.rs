@@ -1,7 +1,8 @@
 //! A face: the subject of the paper's Fig. 18, in a design of this project.
 //!
-//! 136 mm wide, 192 mm high and 75 mm deep, in front of z = 0 by half of that: forehead, brows, eyes in their sockets, nose, cheeks, lips
-//! and chin on an oval, each a smooth swell (`relief`). Its steepest places are the flanks of the nose.
+//! 136 mm wide, 192 mm high and 75 mm deep, in front of z = 0 by half of that: forehead, brows,
+//! eyes in their sockets, nose, cheeks, lips and chin on an oval, each a smooth swell (`relief`).
+//! Its steepest places are the flanks of the nose.
 
 use serde::{Deserialize, Serialize};
 
@@ -52,7 +53,8 @@ impl Face {
             Swell::along([[17.0, 22.0], [36.0, 21.5]], [0.0, 6.0], -1.2),
             Swell::along([[8.0, -17.0], [9.5, -19.0]], [0.0, 12.0], 5.5),
             Swell::along([[36.0, -4.0], [46.0, 4.0]], [0.0, 38.0], 8.0),
-            // The hollow of the cheek, the fold from the nose to the mouth, and the corner of the mouth.
+            // The hollow of the cheek, the fold from the nose to the mouth, and the corner of the
+            // mouth.
             Swell::along([[48.0, -38.0], [40.0, -56.0]], [0.0, 34.0], -4.5),
             Swell::along([[17.0, -22.0], [27.0, -42.0]], [0.0, 11.0], -2.2),
             Swell::round([21.0, -46.0], [0.0, 10.0], -1.8),

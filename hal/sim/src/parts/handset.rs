@@ -1,7 +1,9 @@
-//! The base of a telephone's handset: the subject of the paper's Fig. 19, in a design of this project.
+//! The base of a telephone's handset: the subject of the paper's Fig. 19, in a design of this
+//! project.
 //!
-//! 84 mm wide, 196 mm long along y and 30 mm deep, about z = 0: a rounded shell with an ear piece and a mouth piece, the cradle's hollow
-//! between them, a ridge along the grip, and flat panels, each a plateau with smooth flanks (`relief`).
+//! 84 mm wide, 196 mm long along y and 30 mm deep, about z = 0: a rounded shell with an ear piece
+//! and a mouth piece, the cradle's hollow between them, a ridge along the grip, and flat panels,
+//! each a plateau with smooth flanks (`relief`).
 
 use serde::{Deserialize, Serialize};
 

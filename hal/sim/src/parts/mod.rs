@@ -1,7 +1,8 @@
-//! The parts that can be measured: thin surfaces z(x, y) of bounded slope, with nothing behind them.
+//! The parts that can be measured: thin surfaces z(x, y) of bounded slope, with nothing behind
+//! them.
 //!
-//! Default sizes are those of the parts in Peng & Gupta's study (2008; docs/measurement.md, *The study's head and parts*); a scenario may
-//! change them.
+//! Default sizes are those of the parts in Peng & Gupta's study (2008; docs/measurement.md, *The
+//! study's head and parts*); a scenario may change them.
 
 mod board;
 mod bump;
@@ -65,8 +66,8 @@ impl Default for Part {
 
 /// A thin surface z(x, y) in the part's own coordinates, mm.
 ///
-/// `height` is defined and has bounded slope everywhere, also where the part is not `present` (outside its
-/// outline, in its holes), where a ray passes through.
+/// `height` is defined and has bounded slope everywhere, also where the part is not `present`
+/// (outside its outline, in its holes), where a ray passes through.
 pub(crate) trait Surface: Send + Sync {
     /// z at (x, y).
     fn height(&self, x: f64, y: f64) -> f64;
@@ -106,7 +107,8 @@ impl Part {
         ]
     }
 
-    /// Checks the measures of the part and of its defects; the error names the first key that is out of its range, and the range.
+    /// Checks the measures of the part and of its defects; the error names the first key that is
+    /// out of its range, and the range.
     pub(crate) fn check(&self) -> Result<(), String> {
         Defect::check(self.defects())?;
         self.defects()
@@ -118,14 +120,16 @@ impl Part {
             Self::Sawtooth(part) => Fields.check("part", part),
             Self::Sphere(part) => {
                 Fields.check("part", part)?;
-                // Lower than a tenth of the radius above the centre, the surface is too steep for a height field.
+                // Lower than a tenth of the radius above the centre, the surface is too steep for a
+                // height field.
                 let low = part.centre_z + 0.1 * part.radius;
                 within("part.cut", part.cut, low, part.centre_z + part.radius)
             }
             Self::Tube(part) => Fields.check("part", part),
             Self::Flowerpot(part) => {
                 Fields.check("part", part)?;
-                // The wall leans outwards by at least 0.025 mm per mm of depth: a height field has no upright walls.
+                // The wall leans outwards by at least 0.025 mm per mm of depth: a height field has
+                // no upright walls.
                 let least = part.bottom_diameter + 0.05 * part.depth;
                 within("part.rim_diameter", part.rim_diameter, least, 1000.0)
             }

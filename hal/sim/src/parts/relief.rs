@@ -1,8 +1,9 @@
 //! A free-form surface as a sum of smooth swells, and its outline.
 //!
-//! A swell of height h about a segment is h · s(t) with s(t) = t³(10 − 15t + 6t²) and t = (reach − d) / (reach − flat), clamped to 0…1,
-//! where d is the distance from the segment: a plateau up to `flat`, and nothing beyond `reach`. With w = reach − flat its slope is at most
-//! 1.875 |h| / w; its second derivative is at most 10/√3 |h| / w² along d, and at most 40/9 |h| / w² across it.
+//! A swell of height h about a segment is h · s(t) with s(t) = t³(10 − 15t + 6t²) and t = (reach −
+//! d) / (reach − flat), clamped to 0…1, where d is the distance from the segment: a plateau up to
+//! `flat`, and nothing beyond `reach`. With w = reach − flat its slope is at most 1.875 |h| / w;
+//! its second derivative is at most 10/√3 |h| / w² along d, and at most 40/9 |h| / w² across it.
 
 use super::Surface;
 use crate::optics::Vector;
@@ -70,8 +71,8 @@ impl Swell {
         [x - share * dx, y - share * dy]
     }
 
-    /// t at a square of the distance, and that distance; none where the swell has ended. Most points are there, and are spared the square
-    /// root.
+    /// t at a square of the distance, and that distance; none where the swell has ended. Most
+    /// points are there, and are spared the square root.
     fn share(&self, squared: f64) -> Option<(f64, f64)> {
         if squared >= self.reach * self.reach {
             return None;
@@ -113,15 +114,16 @@ pub(super) struct Relief {
     rim: f64,
     slope: f64,
     bounds: [Vector; 2],
-    /// Lowest x and y of the cells, how many there are along x, and for each of them, row by row, the swells that rise in it, as bits: a
-    /// point is near few of all swells.
+    /// Lowest x and y of the cells, how many there are along x, and for each of them, row by row,
+    /// the swells that rise in it, as bits: a point is near few of all swells.
     corner: [f64; 2],
     columns: usize,
     cells: Vec<u32>,
 }
 
 impl Relief {
-    /// The surface of these swells, at most 32, whose first one makes the outline at the distance `rim`.
+    /// The surface of these swells, at most 32, whose first one makes the outline at the distance
+    /// `rim`.
     pub fn new(swells: Vec<Swell>, base: f64, rim: f64) -> Self {
         let mut relief = Self {
             swells,
@@ -165,8 +167,9 @@ impl Relief {
         self.cells = (0..self.columns * count(bottom, top)).map(near).collect();
     }
 
-    /// Bounds slopes and heights by those on a grid, no point being farther than half its diagonal from one of the grid: slopes change over
-    /// this distance by at most the curvature times the distance, heights by the slope times the distance.
+    /// Bounds slopes and heights by those on a grid, no point being farther than half its diagonal
+    /// from one of the grid: slopes change over this distance by at most the curvature times the
+    /// distance, heights by the slope times the distance.
     fn measure(&mut self, [[left, right], [bottom, top]]: [[f64; 2]; 2]) {
         let half = GRID_MM * std::f64::consts::FRAC_1_SQRT_2;
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);

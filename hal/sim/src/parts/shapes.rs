@@ -11,11 +11,13 @@ use hal::bounded;
 const MEASURE: RangeInclusive<f64> = 1e-3..=1000.0;
 /// Bounds of a coordinate, mm.
 const COORDINATE: RangeInclusive<f64> = -1000.0..=1000.0;
-/// Largest slope of the tube: a lying cylinder is vertical at its sides, so its steeper parts are cut off.
+/// Largest slope of the tube: a lying cylinder is vertical at its sides, so its steeper parts are
+/// cut off.
 const TUBE_SLOPE: f64 = 6.0;
 
 bounded! {
-    /// A square block with a cone-shaped hole: z = top, and within the radius z = top − depth · (1 − r / radius).
+    /// A square block with a cone-shaped hole: z = top, and within the radius z = top − depth · (1
+    /// − r / radius).
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Cone {
@@ -67,7 +69,8 @@ impl Surface for Cone {
 }
 
 bounded! {
-    /// Ridges along y: with f = frac((x − x0) / period), z rises from lo to hi over f < rise and falls after.
+    /// Ridges along y: with f = frac((x − x0) / period), z rises from lo to hi over f < rise and
+    /// falls after.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Sawtooth {
@@ -235,7 +238,8 @@ impl Surface for Tube {
 }
 
 bounded! {
-    /// The wall of an open truncated cone, wider at the rim; its axis is along z, and half its depth lies above z = 0.
+    /// The wall of an open truncated cone, wider at the rim; its axis is along z, and half its
+    /// depth lies above z = 0.
     #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
     #[serde(default, deny_unknown_fields)]
     pub struct Flowerpot {

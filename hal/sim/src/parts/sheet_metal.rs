@@ -1,7 +1,8 @@
 //! The default part: a stamped sheet-metal bracket with holes, a slot, a bead, a flange.
 //!
-//! 150 × 110 mm seen from above, upper side of the plate at z = 8 mm: three round holes and a slot, a raised
-//! bead, drawn edges, and the +x edge bent down as a flange. The measures are made up for this project.
+//! 150 × 110 mm seen from above, upper side of the plate at z = 8 mm: three round holes and a slot,
+//! a raised bead, drawn edges, and the +x edge bent down as a flange. The measures are made up for
+//! this project.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +13,8 @@ use hal::bounds::within;
 
 /// z of the plate's upper side.
 const PLATE_Z: f64 = 8.0;
-/// The plate's outline without the flange: x from −75 to the bend line and |y| ≤ 55, corners rounded.
+/// The plate's outline without the flange: x from −75 to the bend line and |y| ≤ 55, corners
+/// rounded.
 const LEFT: f64 = -75.0;
 const BEND_LINE: f64 = 50.0;
 const HALF_HEIGHT: f64 = 55.0;
@@ -74,8 +76,8 @@ struct Run {
 }
 
 impl Run {
-    /// Distance from the feature's centre line, at most the half-width. Most rays are farther away, and a square root for each of them
-    /// would take a third of the time of a scene.
+    /// Distance from the feature's centre line, at most the half-width. Most rays are farther away,
+    /// and a square root for each of them would take a third of the time of a scene.
     fn distance(&self, x: f64, y: f64) -> f64 {
         let (along, across) = (x - x.clamp(self.from, self.to), y - self.y);
         match along.abs().max(across.abs()) < self.half_width {
@@ -161,7 +163,8 @@ impl Surface for Stamping {
     }
 
     fn slope_bound(&self) -> f64 {
-        // The bead ends before the bend and away from the drawn edges, so its slope and theirs never add up.
+        // The bead ends before the bend and away from the drawn edges, so its slope and theirs
+        // never add up.
         let bead = BEAD_HEIGHT * BUMP_SLOPE / BEAD.half_width;
         let edge = 2.0 * EDGE_DROP / EDGE_WIDTH;
         (self.sin / self.cos + edge).max(bead)

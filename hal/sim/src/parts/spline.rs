@@ -45,7 +45,8 @@ impl Spline {
         Ok(())
     }
 
-    /// The index of the first of the four control values that contribute at `x`, and the four weights.
+    /// The index of the first of the four control values that contribute at `x`, and the four
+    /// weights.
     fn weights(&self, x: f64) -> (usize, [f64; 4]) {
         let u = ((x / self.half_size + 1.0) * PATCHES / 2.0).clamp(0.0, PATCHES);
         let first = u.floor().min(PATCHES - 1.0);
@@ -84,8 +85,8 @@ impl Surface for Spline {
         in_square(self.half_size, x, y)
     }
 
-    /// The derivative of a uniform B-spline is a weighted mean of the differences of neighbouring control values, so their largest
-    /// difference bounds it.
+    /// The derivative of a uniform B-spline is a weighted mean of the differences of neighbouring
+    /// control values, so their largest difference bounds it.
     fn slope_bound(&self) -> f64 {
         let spacing = 2.0 * self.half_size / PATCHES;
         let along_x = self

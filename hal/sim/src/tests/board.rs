@@ -1,4 +1,5 @@
-//! The board: what its squares reflect, its shape, and whether both devices see all of it in every recommended pose.
+//! The board: what its squares reflect, its shape, and whether both devices see all of it in every
+//! recommended pose.
 
 use super::{counts, frames, small};
 use crate::optics::{Lens, plus, turned};

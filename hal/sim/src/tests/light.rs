@@ -242,8 +242,9 @@ fn gain_and_exposure_make_frames_brighter_until_they_are_set_again() {
     assert!((light(&mut head) - plain).abs() <= 1.0);
 }
 
-/// RMS of the periodic error of the phase, turns: fringes of 6 projector pixels in four shifts on a plane, in a camera of small pixels
-/// without noise, against the phase at the point of the projector plane that each pixel's ray meets.
+/// RMS of the periodic error of the phase, turns: fringes of 6 projector pixels in four shifts on a
+/// plane, in a camera of small pixels without noise, against the phase at the point of the
+/// projector plane that each pixel's ray meets.
 fn periodic_error(projector_blur_px: f64) -> f64 {
     const PITCH: f64 = 6.0;
     let mut scenario = small(Part::Plane(Plane::default()));
@@ -288,11 +289,13 @@ fn periodic_error(projector_blur_px: f64) -> f64 {
 
 #[test]
 fn fringes_through_a_lens_keep_no_replica_of_the_projectors_pixels() {
-    // σ = 1 px leaves 2e-6 of the replicas, and the error is that of a raster of 8 bits: 2.8e-4 by direct summation in f64. Samples
-    // between which light is interpolated linearly would make it 1.8e-3.
+    // σ = 1 px leaves 2e-6 of the replicas, and the error is that of a raster of 8 bits: 2.8e-4 by
+    // direct summation in f64. Samples between which light is interpolated linearly would make it
+    // 1.8e-3.
     let found = [0.5, 1.0, 1.6].map(periodic_error);
     assert!((found[1] - 2.8e-4).abs() < 5e-5, "{found:?}");
     assert!(found[2] < 3.5e-4, "{found:?}");
-    // A sharp lens lets replicas of 0.0077 through. Their error with that of the raster is 9.2e-4 by direct summation.
+    // A sharp lens lets replicas of 0.0077 through. Their error with that of the raster is 9.2e-4
+    // by direct summation.
     assert!((found[0] - 9.2e-4).abs() < 1e-4, "{found:?}");
 }

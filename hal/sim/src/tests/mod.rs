@@ -1,4 +1,5 @@
-//! Promises of the simulated head: the contract, any number of threads, scenarios, speed; the submodules have the other topics.
+//! Promises of the simulated head: the contract, any number of threads, scenarios, speed; the
+//! submodules have the other topics.
 
 mod board;
 mod cables;
@@ -29,7 +30,8 @@ fn small(part: Part) -> Scenario {
     scenario
 }
 
-/// Every stock part, and every one that can have dents with a dent and a bump; the sheet metal has its other defects too.
+/// Every stock part, and every one that can have dents with a dent and a bump; the sheet metal has
+/// its other defects too.
 fn all_parts() -> Vec<Part> {
     let stock = Part::stock().map(|part| match part {
         Part::Board(board) => Part::Board(Board {

@@ -89,7 +89,8 @@ fn a_placed_part_is_shifted_and_turned_as_its_placement_says() {
         )
         .unwrap();
     assert!(stage.truth().height.iter().all(|z| (z - 7.5).abs() < 1e-4));
-    // Tilted about x, +y goes up; +y is up in the picture too, so its first row is higher than its last.
+    // Tilted about x, +y goes up; +y is up in the picture too, so its first row is higher than its
+    // last.
     stage
         .place(
             &part,

@@ -1,4 +1,5 @@
-//! Surfaces and rays: slopes and material stay within their bounds, and traced rays meet the surface where a march in small steps does.
+//! Surfaces and rays: slopes and material stay within their bounds, and traced rays meet the
+//! surface where a march in small steps does.
 
 use super::all_parts;
 use crate::optics::{Lens, Vector, along};
@@ -43,8 +44,9 @@ fn no_slope_is_above_its_bound_and_no_material_outside_of_its_box() {
     }
 }
 
-/// What a dent of 0.4 mm depth and 8 mm diameter, centred at the point of the surface above (x, y), removes along the normal there: in
-/// steps of 1 mm across the surface, along the steepest direction and perpendicular to it, from −5 to 5 mm.
+/// What a dent of 0.4 mm depth and 8 mm diameter, centred at the point of the surface above (x, y),
+/// removes along the normal there: in steps of 1 mm across the surface, along the steepest
+/// direction and perpendicular to it, from −5 to 5 mm.
 fn removed(part: &Part, [x, y]: [f64; 2]) -> [Vec<f64>; 2] {
     let good = part.surface().unwrap();
     let mut part = part.clone();
@@ -90,7 +92,8 @@ fn a_dent_is_as_deep_along_the_normal_and_as_wide_across_the_surface_as_it_says_
         for profile in removed(&part, [x, y]) {
             assert!((profile[5] - 0.4).abs() < 1e-6, "{part:?}: {profile:?}");
             for (mm, found) in (-5_i32..).zip(profile) {
-                // Places that are as far apart across a curved surface are nearer or farther in space, hence the tolerance.
+                // Places that are as far apart across a curved surface are nearer or farther in
+                // space, hence the tolerance.
                 let off = (found - expected(f64::from(mm.abs()))).abs();
                 assert!(off < 0.02, "{part:?} at {mm} mm: {found}");
             }

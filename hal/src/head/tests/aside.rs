@@ -5,7 +5,8 @@ use crate::error::ErrorKind;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 const START_UP: Duration = Duration::from_millis(500);
-/// Longest time from the end to the head's return: the frame that was triggered is exposed and delivered.
+/// Longest time from the end to the head's return: the frame that was triggered is exposed and
+/// delivered.
 const A_FRAME: Duration = Duration::from_millis(4 * 17);
 
 fn rasters(count: usize) -> Vec<Raster> {

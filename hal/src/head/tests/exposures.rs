@@ -3,8 +3,8 @@
 use super::*;
 use crate::error::ErrorKind;
 
-/// By how much all frames of a sequence were exposed too long, as a share of the exposure that the camera is set to, and how long
-/// the camera took to start.
+/// By how much all frames of a sequence were exposed too long, as a share of the exposure that the
+/// camera is set to, and how long the camera took to start.
 fn longer(head: &mut Head) -> (f32, Duration) {
     let (frames, result) = take(head, &[0, 1]);
     let exposure = result.unwrap();

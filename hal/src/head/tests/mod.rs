@@ -1,4 +1,5 @@
-//! Promises of the head: each frame that it returns shows the pattern that the frame names, whatever the devices do.
+//! Promises of the head: each frame that it returns shows the pattern that the frame names,
+//! whatever the devices do.
 
 mod aside;
 mod exposures;
@@ -21,9 +22,11 @@ const SHARES: f32 = 65535.0;
 /// How much longer than planned an exposure may be, plus the rounding of a label.
 const HALF_A_PERCENT: f32 = 0.005 + 1.0 / SHARES;
 
-/// A scene whose samples state which pattern a frame shows, how much of others, and how much too long it was exposed.
+/// A scene whose samples state which pattern a frame shows, how much of others, and how much too
+/// long it was exposed.
 ///
-/// They are computed from the light alone, so they judge the sequencer independently of its stamps and counts.
+/// They are computed from the light alone, so they judge the sequencer independently of its stamps
+/// and counts.
 #[derive(Default)]
 struct Labels {
     loaded: usize,

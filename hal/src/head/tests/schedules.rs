@@ -1,4 +1,5 @@
-//! Thousands of seeded fault schedules: no frame is assigned to a wrong pattern or was exposed by a spoiled pulse, and each sequence ends in time.
+//! Thousands of seeded fault schedules: no frame is assigned to a wrong pattern or was exposed by a
+//! spoiled pulse, and each sequence ends in time.
 
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -80,7 +81,8 @@ fn schedule(seed: u64) -> (Mechanics, usize) {
         lost_trigger: draw.chance(0.2),
         trigger_jitter_us: draw.below(2) * draw.below(100),
         long_pulse: draw.chance(0.3),
-        // About the error that is tolerated, the tolerance of stamps, one exposure, and several exposures.
+        // About the error that is tolerated, the tolerance of stamps, one exposure, and several
+        // exposures.
         long_pulse_us: {
             let longest = [150, 400, 20_000, 80_000][draw.below(4) as usize];
             draw.below(longest)
@@ -136,7 +138,8 @@ fn run(seed: u64, tally: &mut Tally) {
     let (mechanics, patterns) = schedule(seed);
     let exposure = mechanics.exposure;
     let jitter = mechanics.faults.flip_jitter_us + mechanics.faults.stamp_jitter_us;
-    // By its stamps, an exposure may reach beyond its pattern's view by the tolerance at both ends; stamps are off by the jitter.
+    // By its stamps, an exposure may reach beyond its pattern's view by the tolerance at both ends;
+    // stamps are off by the jitter.
     let others = (2 * TOLERANCE.min(exposure / 4) + Duration::from_micros(2 * jitter))
         .as_secs_f32()
         / exposure.as_secs_f32()

@@ -5,7 +5,8 @@ use crate::error::ErrorKind;
 
 const COUNT: usize = 12;
 
-/// Takes a sequence and checks that each pattern gives a frame, in order, that shows only this pattern.
+/// Takes a sequence and checks that each pattern gives a frame, in order, that shows only this
+/// pattern.
 fn all_right(head: &mut Head) -> Exposure {
     let indices: Vec<usize> = (0..COUNT).collect();
     let (frames, result) = take(head, &indices);
@@ -22,7 +23,8 @@ fn all_right(head: &mut Head) -> Exposure {
     result.unwrap()
 }
 
-/// As [`all_right`], but tolerates pulses of the trigger that are off by less than what spoils a frame.
+/// As [`all_right`], but tolerates pulses of the trigger that are off by less than what spoils a
+/// frame.
 fn all_but_half_a_percent(head: &mut Head) -> Exposure {
     let indices: Vec<usize> = (0..COUNT).collect();
     let (frames, result) = take(head, &indices);
@@ -111,8 +113,8 @@ fn a_camera_that_runs_by_itself_is_followed_from_any_phase() {
                 ..plain()
             };
             let exposure = all_right(&mut labelled(mechanics, COUNT));
-            // Two refreshes each, and up to four more until the first frame shows the camera's phase. When the phase drifts past a
-            // flip, one frame may have to be taken again.
+            // Two refreshes each, and up to four more until the first frame shows the camera's
+            // phase. When the phase drifts past a flip, one frame may have to be taken again.
             assert!(
                 refreshes(&exposure) < 26.1 && exposure.retaken <= 1,
                 "{phase_us} {drift_ppm} {exposure:?}"

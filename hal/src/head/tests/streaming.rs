@@ -1,4 +1,5 @@
-//! A triggered camera stays on between sequences, and no frame of one sequence is taken for one of the next.
+//! A triggered camera stays on between sequences, and no frame of one sequence is taken for one of
+//! the next.
 
 use super::*;
 

@@ -1,4 +1,5 @@
-//! Pixel formats of cameras: which one to use, which to refuse and why, and how samples are stored in a buffer.
+//! Pixel formats of cameras: which one to use, which to refuse and why, and how samples are stored
+//! in a buffer.
 //!
 //! The code here does not use the library; formats are known by its names for them ("R16", "NV12").
 
@@ -11,7 +12,8 @@ pub enum Reading {
     /// The raw counts of a monochrome sensor, or of one of the two green planes of a colour sensor.
     #[default]
     Raw,
-    /// Raw counts if available, else the luma plane of a YUV format, which an image processor has computed.
+    /// Raw counts if available, else the luma plane of a YUV format, which an image processor has
+    /// computed.
     Luma,
     /// The green samples of an RGB format. For trials with a camera that has nothing else.
     Green,
@@ -56,9 +58,10 @@ const fn readable(name: &'static str, reading: Reading, layout: Layout, bits: u8
     }
 }
 
-/// The raw formats of a colour sensor whose green pixels are in this column of the even rows. Green sees most of white light, and has
-/// twice as many pixels as red and blue; those of the odd rows are not read, as a picture that is made of both planes would be sampled
-/// unevenly, and interpolated samples are no counts.
+/// The raw formats of a colour sensor whose green pixels are in this column of the even rows. Green
+/// sees most of white light, and has twice as many pixels as red and blue; those of the odd rows
+/// are not read, as a picture that is made of both planes would be sampled unevenly, and
+/// interpolated samples are no counts.
 macro_rules! bayer {
     ($order:literal, $column:literal) => {
         [
@@ -88,7 +91,8 @@ const BAYER: [[Readable; 7]; 4] = [
     bayer!("SGBRG", 0),
 ];
 
-/// Every format of monochrome and processed pictures that can be read, the best of each reading first: more bits, then those that need no unpacking.
+/// Every format of monochrome and processed pictures that can be read, the best of each reading
+/// first: more bits, then those that need no unpacking.
 const FORMATS: [Readable; 19] = [
     readable("R16", Reading::Raw, Layout::Words, 16),
     readable("R14", Reading::Raw, Layout::Words, 14),
@@ -125,7 +129,8 @@ pub(crate) struct Granted {
     pub size: (u32, u32),
 }
 
-/// The formats to ask a camera for. It may grant a different one, so all are asked for before one is chosen.
+/// The formats to ask a camera for. It may grant a different one, so all are asked for before one
+/// is chosen.
 pub(crate) fn worth_asking(reading: Reading) -> impl Iterator<Item = &'static Readable> {
     formats().filter(move |f| reading.takes(f.reading))
 }
@@ -133,7 +138,8 @@ pub(crate) fn worth_asking(reading: Reading) -> impl Iterator<Item = &'static Re
 /// The index in `granted` of the best format, and how to read it.
 ///
 /// # Errors
-/// `Unsupported` if no format can be read, or none has the wanted size; the message says what is wrong with each.
+/// `Unsupported` if no format can be read, or none has the wanted size; the message says what is
+/// wrong with each.
 pub(crate) fn choose(
     camera: &str,
     reading: Reading,
@@ -169,8 +175,9 @@ pub(crate) fn choose(
     })
 }
 
-/// The bits of a sensor in pictures of `size`, from the raw formats that its camera lists with their sizes: those of the
-/// deepest mode of that size, which a camera uses when it is asked for 16 bits.
+/// The bits of a sensor in pictures of `size`, from the raw formats that its camera lists with
+/// their sizes: those of the deepest mode of that size, which a camera uses when it is asked for 16
+/// bits.
 pub(crate) fn sensor_bits(listed: &[(String, Vec<(u32, u32)>)], size: (u32, u32)) -> Option<u8> {
     let format = |name: &str| formats().find(|f| f.name == name && f.reading == Reading::Raw);
     let modes = listed.iter().filter(|(_, sizes)| sizes.contains(&size));
@@ -218,8 +225,9 @@ impl Readable {
         }
     }
 
-    /// The same format for a sensor of `bits`. If a format has more bits (R16 of a Pi 5), the sensor's are the upper ones. They must be
-    /// shifted down: otherwise full scale would not be 2^bits − 1, and saturated pixels would not be recognised.
+    /// The same format for a sensor of `bits`. If a format has more bits (R16 of a Pi 5), the
+    /// sensor's are the upper ones. They must be shifted down: otherwise full scale would not be
+    /// 2^bits − 1, and saturated pixels would not be recognised.
     pub fn of_sensor(self, bits: Option<u8>) -> Self {
         match (self.layout, bits) {
             (Layout::Words, Some(bits)) if (8..self.bits).contains(&bits) => Self {
@@ -231,11 +239,13 @@ impl Readable {
         }
     }
 
-    /// The format of frames from buffers of pictures of this size with `stride` bytes per row, and the number of bytes of a picture in a
-    /// buffer. A plane of a colour sensor has half the columns and rows of its pictures.
+    /// The format of frames from buffers of pictures of this size with `stride` bytes per row, and
+    /// the number of bytes of a picture in a buffer. A plane of a colour sensor has half the
+    /// columns and rows of its pictures.
     ///
     /// # Errors
-    /// `Protocol` if a row does not fit into `stride` bytes or `stride` holds no whole number of samples.
+    /// `Protocol` if a row does not fit into `stride` bytes or `stride` holds no whole number of
+    /// samples.
     pub fn frames(
         &self,
         (width, height): (u32, u32),
@@ -361,8 +371,8 @@ fn words(row: &[u8], into: &mut [u16], unused: u32) {
     }
 }
 
-/// Unpacks groups of `BYTES` bytes: one upper byte per sample, then one byte with the lower `bits` of each sample, those of the first
-/// sample in the lowest bits (MIPI CSI-2, "RAW10" and "RAW12").
+/// Unpacks groups of `BYTES` bytes: one upper byte per sample, then one byte with the lower `bits`
+/// of each sample, those of the first sample in the lowest bits (MIPI CSI-2, "RAW10" and "RAW12").
 fn unpack<const BYTES: usize>(row: &[u8], into: &mut [u16], bits: usize) {
     for (group, into) in row.chunks_exact(BYTES).zip(into.chunks_mut(BYTES - 1)) {
         let lower = u16::from(group[BYTES - 1]);

@@ -158,7 +158,8 @@ fn rows_that_do_not_fit_their_stride_are_refused() {
 #[test]
 fn the_upper_bits_of_a_wider_format_are_the_sensors() {
     let format = |name| *FORMATS.iter().find(|f| f.name == name).unwrap();
-    // As a Pi 5 lists them for an OV9281, an IMX296, and a colour sensor; and for one whose largest mode has 8 bits only.
+    // As a Pi 5 lists them for an OV9281, an IMX296, and a colour sensor; and for one whose largest
+    // mode has 8 bits only.
     let (small, large) = ((640, 400), (1280, 800));
     let bits = |listed: &[(&str, &[(u32, u32)])], size| {
         let listed: Vec<_> = listed
@@ -220,7 +221,8 @@ fn a_colour_sensor_is_read_through_one_green_plane_where_there_is_no_monochrome_
     let said = "one green plane of SRGGB10, with half its columns and rows";
     assert_eq!(plane.describe(), said);
 
-    // A picture whose sample is 100 × row + column, of which green is at other places in each order.
+    // A picture whose sample is 100 × row + column, of which green is at other places in each
+    // order.
     let format = |name: &str| *formats().find(|format| format.name == name).unwrap();
     let size = (8, 4);
     let sample = |row: u16, column: u16| 100 * row + column;

@@ -1,15 +1,18 @@
 //! The displacements of a block of pixels, linear in column and quadratic in height.
 //!
 //! # Equations
-//! In column i of a block and at height z, du = a + b i + c z + e z²; dv and dz likewise. a and b follow from the nodes left and right of the
-//! block; c and e, which differ by about 1 % from node to node, are those of the block's middle. From a row of nodes to the next, all are
-//! interpolated. A shift is seen by the more pixels the nearer a point is to the camera, so the displacement goes by 1/(distance − z): of
-//! a part that reaches 75 mm from its middle height at 600 mm, e makes 1.6 % of it, which on a steep wall were tens of micrometres.
+//! In column i of a block and at height z, du = a + b i + c z + e z²; dv and dz likewise. a and b
+//! follow from the nodes left and right of the block; c and e, which differ by about 1 % from node
+//! to node, are those of the block's middle. From a row of nodes to the next, all are interpolated.
+//! A shift is seen by the more pixels the nearer a point is to the camera, so the displacement goes
+//! by 1/(distance − z): of a part that reaches 75 mm from its middle height at 600 mm, e makes 1.6
+//! % of it, which on a steep wall were tens of micrometres.
 //!
 //! # Accuracy
-//! c is off by at most a quarter of its difference: below 0.001 pixels for a turn by half a degree and heights within 5 mm of the
-//! middle one, less than between nodes ([`SPACING`](crate::inspect::strips::pose)). The cubic term, a further eighth of the quadratic one, is
-//! left out.
+//! c is off by at most a quarter of its difference: below 0.001 pixels for a turn by half a degree
+//! and heights within 5 mm of the middle one, less than between nodes
+//! ([`SPACING`](crate::inspect::strips::pose)). The cubic term, a further eighth of the quadratic
+//! one, is left out.
 
 use crate::math::nearest::{nearest, whole};
 use crate::simd::{Lanes, back_end_entry};
@@ -21,18 +24,19 @@ pub const VALUES: usize = 3;
 /// Larger displacements, pixels, are taken as not known.
 const MAX_AWAY: f32 = 4096.0;
 
-/// The displacement that a pixel has at the middle height, its change per mm of height, and what of that is quadratic, per mm².
+/// The displacement that a pixel has at the middle height, its change per mm of height, and what of
+/// that is quadratic, per mm².
 pub type Node = [[f64; VALUES]; 3];
 
-/// The numbers of a block: a, b, c and e of the three values (pixels and nm, heights in nm), du and dv of its middle, and two 0: a
-/// multiple of a vector's length.
+/// The numbers of a block: a, b, c and e of the three values (pixels and nm, heights in nm), du and
+/// dv of its middle, and two 0: a multiple of a vector's length.
 pub type BlockNumbers = [f32; 16];
 
 /// Where du and dv of a block's middle are in its numbers.
 const MIDDLE: usize = 4 * VALUES;
 
-/// The numbers of the block that begins `column` pixels after the first of two nodes, which are `pixels` apart; `middle` is the middle
-/// height, mm.
+/// The numbers of the block that begins `column` pixels after the first of two nodes, which are
+/// `pixels` apart; `middle` is the middle height, mm.
 pub fn between([from, to]: [&Node; 2], pixels: usize, column: usize, middle: f64) -> BlockNumbers {
     let unit = 1.0 / pixels.max(1) as f64;
     let first = column as f64 * unit;
@@ -58,7 +62,8 @@ pub fn between([from, to]: [&Node; 2], pixels: usize, column: usize, middle: f64
 }
 
 back_end_entry! {
-    /// Interpolates the numbers of the blocks of a row between two rows of nodes; `share` is the way from the one above.
+    /// Interpolates the numbers of the blocks of a row between two rows of nodes; `share` is the
+    /// way from the one above.
     fn interpolate [] = interpolate_row(
         above: &[BlockNumbers],
         below: &[BlockNumbers],
@@ -115,8 +120,8 @@ impl Whole {
         fits
     }
 
-    /// −1 where the displacement of the middle is nearer to this than to one pixel more, else 0: pixels with another whole
-    /// displacement mostly lie between this and two more.
+    /// −1 where the displacement of the middle is nearer to this than to one pixel more, else 0:
+    /// pixels with another whole displacement mostly lie between this and two more.
     #[inline(always)]
     pub fn lower(self, numbers: &BlockNumbers) -> [i32; 2] {
         let nearer = |i: usize| -i32::from(numbers[MIDDLE + i] - self.0[i] < 0.5);

@@ -1,19 +1,23 @@
 //! Stage 3, align: taught coordinates of a displaced row and its deviations from golden there.
 //!
 //! # Idea
-//! The pose field gives the displacement of each pixel; inside a block it is linear in column and quadratic in height (`linear`). Golden's
-//! height between four pixels is bilinear. Neighbouring blocks whose pixels have one whole displacement are worked on together for as
-//! long as that holds (`same`); of a block whose pixels have one of four neighbouring ones, each pixel picks its four heights
-//! from nine (`next`). In both ways golden is read along rows, many pixels at a time, and each pixel is checked. All other blocks go pixel
-//! by pixel (`block`). Plain loops over slices, compiled for each back-end's instructions.
+//! The pose field gives the displacement of each pixel; inside a block it is linear in column and
+//! quadratic in height (`linear`). Golden's height between four pixels is bilinear. Neighbouring
+//! blocks whose pixels have one whole displacement are worked on together for as long as that holds
+//! (`same`); of a block whose pixels have one of four neighbouring ones, each pixel picks its four
+//! heights from nine (`next`). In both ways golden is read along rows, many pixels at a time, and
+//! each pixel is checked. All other blocks go pixel by pixel (`block`). Plain loops over slices,
+//! compiled for each back-end's instructions.
 //!
 //! # Equations
-//! With the displacement (du, dv, dz) at height z, a pixel's deviation in height is (z + dz) − G(u + du, v + dv), G golden's height. That along
-//! the normal is the same times the factor of the first of the four pixels.
+//! With the displacement (du, dv, dz) at height z, a pixel's deviation in height is (z + dz) −
+//! G(u + du, v + dv), G golden's height. That along the normal is the same times the factor of the
+//! first of the four pixels.
 //!
 //! # Accuracy
-//! The three ways have the same bits (`blocks_have_the_bits_of_one_pixel_after_the_other`); the deviation is within 50 nm of one of
-//! whole maps (`strips_weigh_deviations_as_the_comparison_of_whole_maps_does`).
+//! The three ways have the same bits (`blocks_have_the_bits_of_one_pixel_after_the_other`); the
+//! deviation is within 50 nm of one of whole maps
+//! (`strips_weigh_deviations_as_the_comparison_of_whole_maps_does`).
 
 mod block;
 mod linear;
@@ -87,8 +91,8 @@ back_end_entry! {
 }
 
 impl GoldenMap<'_> {
-    /// The place of a pixel after a whole displacement, and how many pixels the map has from there to the end of the row; none if
-    /// it has not so many rows.
+    /// The place of a pixel after a whole displacement, and how many pixels the map has from there
+    /// to the end of the row; none if it has not so many rows.
     #[inline(always)]
     fn inside(
         &self,
@@ -109,8 +113,8 @@ impl GoldenMap<'_> {
     }
 }
 
-/// Aligns columns of a row: writes their deviations from golden at the taught coordinates, and whether one is too large for sums in 32
-/// bits ([`super::squares::narrow`]).
+/// Aligns columns of a row: writes their deviations from golden at the taught coordinates, and
+/// whether one is too large for sums in 32 bits ([`super::squares::narrow`]).
 pub(super) fn align_row(
     backend: Backend,
     golden: GoldenMap<'_>,

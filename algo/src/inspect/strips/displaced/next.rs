@@ -10,8 +10,8 @@ use crate::simd::{Lanes, back_end_entry};
 use core::hint::black_box;
 
 back_end_entry! {
-    /// Aligns a whole block whose pixels have one of four neighbouring whole displacements. `done` becomes false if they have not, or
-    /// if some deviation is not small.
+    /// Aligns a whole block whose pixels have one of four neighbouring whole displacements. `done`
+    /// becomes false if they have not, or if some deviation is not small.
     fn align_next [] = next(
         golden: GoldenMap<'_>,
         block: &Block<'_>,
@@ -97,8 +97,9 @@ fn next<V: Lanes>(
     *done = refused == 0;
 }
 
-/// The elements at the places of a block from the first on, and those one and two places to the right. The compiler does not see that
-/// these overlap: it would hand elements on from pixel to pixel, instead of working on many pixels at a time.
+/// The elements at the places of a block from the first on, and those one and two places to the
+/// right. The compiler does not see that these overlap: it would hand elements on from pixel to
+/// pixel, instead of working on many pixels at a time.
 #[inline(always)]
 fn neighbours<T>(map: &[T], place: usize) -> Option<[&[T; BLOCK]; 3]> {
     let all = map.get(place..place + BLOCK + 2)?;

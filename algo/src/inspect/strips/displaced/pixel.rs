@@ -12,8 +12,9 @@ pub fn height(base: Height, offset: i32) -> i32 {
     base.wrapping_add(offset)
 }
 
-/// How far a pixel at height `z` that moves up by `rise` lies above golden, nm. It lies between four corners (left and right, above and
-/// below), at these shares of the way from the first one along and down.
+/// How far a pixel at height `z` that moves up by `rise` lies above golden, nm. It lies between
+/// four corners (left and right, above and below), at these shares of the way from the first one
+/// along and down.
 #[inline(always)]
 pub fn deviation_of((z, rise): (i32, f32), (along, down): (f32, f32), corners: [i32; 4]) -> f32 {
     let [first, right, under, both] = corners;
@@ -41,8 +42,8 @@ pub fn is_small(nm: f32) -> bool {
 /// Shifts [`SQUARE`] to the sign of 32 bits.
 const TO_SIGN: u32 = SQUARE.leading_zeros() + 16;
 
-/// All bits if the part is compared at the four pixels from a taught one on, else none; in as many bits as heights have, because narrower
-/// masks would have to be widened.
+/// All bits if the part is compared at the four pixels from a taught one on, else none; in as many
+/// bits as heights have, because narrower masks would have to be widened.
 #[inline(always)]
 pub fn square(taught: i32) -> i32 {
     (taught << TO_SIGN) >> 31

@@ -10,8 +10,8 @@ use crate::simd::{Lanes, back_end_entry};
 use core::ops::Range;
 
 back_end_entry! {
-    /// Aligns whole blocks from the first column on, as long as all their pixels have the whole displacement of the first block's
-    /// middle, and small deviations. `done` becomes their number.
+    /// Aligns whole blocks from the first column on, as long as all their pixels have the whole
+    /// displacement of the first block's middle, and small deviations. `done` becomes their number.
     fn align_same [] = same(
         golden: GoldenMap<'_>,
         row: OffsetRow<'_>,
@@ -106,7 +106,8 @@ fn chunks<T>(map: &[T], place: usize, pixels: usize) -> core::slice::Iter<'_, [T
     map[place..][..pixels].as_chunks::<BLOCK>().0.iter()
 }
 
-/// The bits of a number: from 0 up in the order of the numbers; those of negative ones and NaN are larger than all others.
+/// The bits of a number: from 0 up in the order of the numbers; those of negative ones and NaN are
+/// larger than all others.
 #[inline(always)]
 fn order(number: f32) -> u32 {
     number.to_bits()

@@ -1,13 +1,16 @@
 //! The phase that each pixel would have if the part were golden and lay displaced.
 //!
 //! # Idea
-//! A pixel that sees height z sees the part's point p; with the motion taken back, p lies at the taught coordinates (u, v) + (du, dv)
-//! and dz higher (`pose.rs`). So z = G(u + du, v + dv) − dz with golden's heights G. As du, dv and dz hardly change with z, two
-//! rounds find it, and the inverse of the pixel's cubic gives its phase. Displacements are those of `displaced`: linear in a block of
-//! pixels, many of which are worked on at a time; only golden's heights are looked up one by one.
+//! A pixel that sees height z sees the part's point p; with the motion taken back, p lies at the
+//! taught coordinates (u, v) + (du, dv) and dz higher (`pose.rs`). So z = G(u + du, v + dv) − dz
+//! with golden's heights G. As du, dv and dz hardly change with z, two rounds find it, and the
+//! inverse of the pixel's cubic gives its phase. Displacements are those of `displaced`: linear in
+//! a block of pixels, many of which are worked on at a time; only golden's heights are looked up
+//! one by one.
 //!
 //! # Accuracy
-//! Within 2⁻¹⁵ turn of the same in double precision: `expected_phases_are_those_of_double_precision`.
+//! Within 2⁻¹⁵ turn of the same in double precision:
+//! `expected_phases_are_those_of_double_precision`.
 
 use super::super::Production;
 use super::super::displaced::{BLOCK, BlockNumbers, Linear, Whole, floor, is_near};
@@ -54,8 +57,8 @@ pub(super) struct Sought {
 }
 
 impl Production {
-    /// The phases of row `v` for a part that lies as in the field. Around the part and in its openings golden's surface is
-    /// interpolated ([`super::super::Parts::cubics`]).
+    /// The phases of row `v` for a part that lies as in the field. Around the part and in its
+    /// openings golden's surface is interpolated ([`super::super::Parts::cubics`]).
     pub(super) fn expect(
         &self,
         pose: &PoseField,
@@ -123,7 +126,8 @@ impl Production {
 }
 
 back_end_entry! {
-    /// The phases of a block of pixels, and whether golden is compared where they look; left as they are where nothing is known of it.
+    /// The phases of a block of pixels, and whether golden is compared where they look; left as
+    /// they are where nothing is known of it.
     fn expect_block [] = expect_pixels(
         golden: Golden<'_>,
         pixels: Pixels<'_>,
@@ -277,7 +281,8 @@ mod tests {
         }
     }
 
-    /// z − z₀ in nm and the place that golden is compared at, in double precision; none where golden is not known.
+    /// z − z₀ in nm and the place that golden is compared at, in double precision; none where
+    /// golden is not known.
     fn sought(
         heights: &[Height],
         at: usize,

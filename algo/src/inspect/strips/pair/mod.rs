@@ -1,14 +1,18 @@
 //! Measuring with a pair of frames, the fringe and its complement, about the golden part.
 //!
-//! 1. **picture** (`picture`): the mean of both frames has no fringes; its edges tell where the part lies.
+//! 1. **picture** (`picture`): the mean of both frames has no fringes; its edges tell where the
+//!    part lies.
 //! 2. **expected** (`expected`): the phase that golden would have there.
-//! 3. **window** (`window`): half the difference is the fringe alone; fitted in a window about each pixel, it gives the phase.
-//! 4. The part's motion is found from these phases as from those of any sequence, in all six components; those that the shape does
-//!    not determine keep what the picture has found. Then stages 2 and 3 are repeated with it, and their map goes through the
-//!    ordinary inspection ([`Input::Phases`]).
+//! 3. **window** (`window`): half the difference is the fringe alone; fitted in a window about each
+//!    pixel, it gives the phase.
+//! 4. The part's motion is found from these phases as from those of any sequence, in all six
+//!    components; those that the shape does not determine keep what the picture has found. Then
+//!    stages 2 and 3 are repeated with it, and their map goes through the ordinary inspection
+//!    ([`Input::Phases`]).
 //!
-//! Neighbouring phases share pixels. Their σ is therefore that of the two samples of the pixel alone, which is right for means over
-//! areas that are large against the window; means over smaller squares are less noisy (`shared`).
+//! Neighbouring phases share pixels. Their σ is therefore that of the two samples of the pixel
+//! alone, which is right for means over areas that are large against the window; means over smaller
+//! squares are less noisy (`shared`).
 
 mod coarse;
 mod expected;
@@ -78,8 +82,8 @@ impl Production {
         }
     }
 
-    /// Golden's picture, from its modulation in counts (row-major), for parts within `tolerance_px` pixels. None where parts are not
-    /// aligned, or the picture has no edges.
+    /// Golden's picture, from its modulation in counts (row-major), for parts within `tolerance_px`
+    /// pixels. None where parts are not aligned, or the picture has no edges.
     pub fn picture(&self, modulation: &[f32], tolerance_px: f64) -> Option<Picture> {
         let centre = self.alignment.as_ref()?.centre;
         let surface = self.cubics.surface();
@@ -131,8 +135,8 @@ impl Production {
         Ok(PairPlaced { found, placed })
     }
 
-    /// Measures the phases of a part that lies as in a field, as taught if none: in all rows, or only in those that its motion is found
-    /// from.
+    /// Measures the phases of a part that lies as in a field, as taught if none: in all rows, or
+    /// only in those that its motion is found from.
     fn fit_pair(
         &self,
         frames: [FrameView<'_>; 2],

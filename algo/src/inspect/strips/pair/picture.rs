@@ -1,12 +1,15 @@
-//! Where a part lies in the picture: shift and turn about z, from the picture without fringes alone.
+//! Where a part lies in the picture: shift and turn about z, from the picture without fringes
+//! alone.
 //!
 //! # Idea
-//! The mean of a pair has no fringes. Golden's modulation is what golden's picture without the ambient light looks like. Both are
-//! compared from coarse to fine along the edges of the template, whose points lie on golden's surface (B. D. Lucas, T. Kanade, 1981,
-//! with the motion of a rigid body in space in place of one in the picture). No phase is used, so no fringe order is needed.
+//! The mean of a pair has no fringes. Golden's modulation is what golden's picture without the
+//! ambient light looks like. Both are compared from coarse to fine along the edges of the template,
+//! whose points lie on golden's surface (B. D. Lucas, T. Kanade, 1981, with the motion of a rigid
+//! body in space in place of one in the picture). No phase is used, so no fringe order is needed.
 //!
 //! # Equation
-//! At the place π(M P) where the motion M takes a point P of the template, with brightness T and gradient ∇T,
+//! At the place π(M P) where the motion M takes a point P of the template, with brightness T and
+//! gradient ∇T,
 //!
 //! ```text
 //! A(π(M P)) = g T + o + g ∇T · ∂π/∂p · (p − p_true)      p = x, y, z, turn about z
@@ -14,8 +17,8 @@
 //!
 //! which is linear in g, o and g (p − p_true).
 //!
-//! z is found by the scale of the picture, so to fractions of a mm: less than half a fringe, which proves the fringe order.
-//! Tilts are taken as 0: they are found by the phases.
+//! z is found by the scale of the picture, so to fractions of a mm: less than half a fringe, which
+//! proves the fringe order. Tilts are taken as 0: they are found by the phases.
 
 use super::coarse::Coarse;
 use crate::frame::FrameView;
@@ -74,7 +77,8 @@ pub struct Found {
 }
 
 impl Picture {
-    /// Of golden's modulation in counts (row-major), for parts that lie up to `tolerance_px` pixels off. None without edges.
+    /// Of golden's modulation in counts (row-major), for parts that lie up to `tolerance_px` pixels
+    /// off. None without edges.
     pub fn new(
         triangulator: &Triangulator,
         surface: &KnownSurface,
@@ -218,7 +222,8 @@ impl Scale {
         let (mut sum, mut squares, mut count) = (0.0, 0.0, 0.0);
         for point in &self.points {
             let seen = triangulator.camera().project(motion.apply(point.at));
-            // The template is that of the coarse pixel's middle, half a pixel after the one that its point lies on.
+            // The template is that of the coarse pixel's middle, half a pixel after the one that
+            // its point lies on.
             let coarse = |at: f64| (at + 1.0) / self.pixels as f64 - 0.5;
             let Some(value) = seen.and_then(|(u, v)| picture.at(coarse(u), coarse(v))) else {
                 continue;

@@ -1,7 +1,8 @@
 //! From the sums over windows to phases: a block of pixels at a time, in single precision.
 //!
 //! # Equations
-//! Those of `window.rs`. Where the determinant is [`LEAST_DETERMINED`] of its largest value, rounding changes δ by 10⁻⁶ rad.
+//! Those of `window.rs`. Where the determinant is [`LEAST_DETERMINED`] of its largest value,
+//! rounding changes δ by 10⁻⁶ rad.
 
 use super::sums::{BLOCK, SUMS, sum_up};
 use super::window::{FAINT, PIXELS};
@@ -10,7 +11,8 @@ use crate::phase::{LeastModulation, Trust};
 use crate::simd::{Lanes, back_end_entry};
 use crate::units::{AbsolutePhase, Modulation};
 
-/// The determinant of the normal equations over its largest value; less than half a fringe in the window has less.
+/// The determinant of the normal equations over its largest value; less than half a fringe in the
+/// window has less.
 const LEAST_DETERMINED: f32 = 0.2;
 /// Largest share of the light's change, beyond its noise, that the fit may leave.
 const MOST_LEFT: f32 = 0.15;
@@ -45,8 +47,8 @@ impl Default for Solved {
 }
 
 impl Solver {
-    /// For samples with σ = `noise` counts, up to `full_scale`, trusted from a modulation of `least` on; `unit` is a count in the unit of
-    /// the sums.
+    /// For samples with σ = `noise` counts, up to `full_scale`, trusted from a modulation of
+    /// `least` on; `unit` is a count in the unit of the sums.
     pub fn new(unit: f64, full_scale: f64, noise: f64, least: LeastModulation) -> Self {
         let least = 2.0 * least.eight_bit() / 255.0 * full_scale * unit;
         Self {
@@ -59,8 +61,8 @@ impl Solver {
 }
 
 back_end_entry! {
-    /// Solves the windows around the pixels of a block, from the sums of their columns, with what the pixels are expected to see and their
-    /// light ([`super::window::Terms`]).
+    /// Solves the windows around the pixels of a block, from the sums of their columns, with what
+    /// the pixels are expected to see and their light ([`super::window::Terms`]).
     fn solve_block [] = solve(
         solver: &Solver,
         columns: [&[i32]; SUMS],
@@ -132,7 +134,8 @@ fn solve<V: Lanes>(
     }
 }
 
-/// The angle of (x, y) in 1/65536 turn, to 1e-5 rad: 4.4.47 of M. Abramowitz, I. A. Stegun, *Handbook of Mathematical Functions*.
+/// The angle of (x, y) in 1/65536 turn, to 1e-5 rad: 4.4.47 of M. Abramowitz, I. A.
+/// Stegun, *Handbook of Mathematical Functions*.
 #[inline(always)]
 fn turns(y: f32, x: f32) -> i32 {
     let (across, along) = (y.abs(), x.abs());
@@ -159,8 +162,8 @@ fn turns(y: f32, x: f32) -> i32 {
     whole(angle)
 }
 
-/// √x to 10⁻⁶ of it, by Newton's method from the number with half the exponent; 0 for numbers below 0. The same on every machine, many at a
-/// time.
+/// √x to 10⁻⁶ of it, by Newton's method from the number with half the exponent; 0 for numbers
+/// below 0. The same on every machine, many at a time.
 #[inline(always)]
 fn root(x: f32) -> f32 {
     let x = if x > 0.0 { x } else { 0.0 };

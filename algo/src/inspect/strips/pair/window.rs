@@ -1,28 +1,33 @@
-//! The fit of a known carrier in a window: half the difference of a pair → change of phase, modulation and trust of each pixel.
+//! The fit of a known carrier in a window: half the difference of a pair → change of phase,
+//! modulation and trust of each pixel.
 //!
 //! # Equations
-//! The frames of a pair are I₁ = A + B sin 2πΦ and I₂ = A − B sin 2πΦ. With the expected phase Φ₀, and B = κ A with a contrast κ that
-//! changes little over a window, each pixel i of the window around a pixel gives
+//! The frames of a pair are I₁ = A + B sin 2πΦ and I₂ = A − B sin 2πΦ. With the expected phase Φ₀,
+//! and B = κ A with a contrast κ that changes little over a window, each pixel i of the window
+//! around a pixel gives
 //!
 //! ```text
 //! I₁ − I₂ = a s_i + b c_i     s_i = (I₁ + I₂) sin 2πΦ₀,  c_i = (I₁ + I₂) cos 2πΦ₀,  a = κ cos 2πδ,  b = κ sin 2πδ
 //! ```
 //!
-//! By least squares [Σs² Σsc; Σsc Σc²] (a, b) = (Σds, Σdc), and Φ = Φ₀ + δ. The sum of the frames carries the part's texture, so a
-//! change of texture or oil on it changes neither phase nor contrast, and dark pixels have no weight. Where the carrier is not the
-//! expected one, the fit leaves more than its noise.
+//! By least squares [Σs² Σsc; Σsc Σc²] (a, b) = (Σds, Σdc), and Φ = Φ₀ + δ. The sum of the frames
+//! carries the part's texture, so a change of texture or oil on it changes neither phase nor
+//! contrast, and dark pixels have no weight. Where the carrier is not the expected one, the fit
+//! leaves more than its noise.
 //!
 //! # Noise
-//! Fisher's information of a window of n pixels is n B² / σ_I², so σ_δ = σ_I / (2π B √n): that of n independent pixels of two
-//! shifts each. Neighbouring results share pixels (`shared.rs`).
+//! Fisher's information of a window of n pixels is n B² / σ_I², so σ_δ = σ_I / (2π B √n): that of n
+//! independent pixels of two shifts each. Neighbouring results share pixels (`shared.rs`).
 //!
 //! # Shapes and units
-//! Sums are exact: samples as 12 bits, sines as Q15, products as 24 bits, 81 of them in 32 bits. So the result depends neither on
-//! bands nor on threads. A row enters the sums down the columns as another one leaves them (`sums.rs`); from these follow the sums over
-//! windows and the phases (`solve.rs`), many pixels at a time.
+//! Sums are exact: samples as 12 bits, sines as Q15, products as 24 bits, 81 of them in 32 bits. So
+//! the result depends neither on bands nor on threads. A row enters the sums down the columns as
+//! another one leaves them (`sums.rs`); from these follow the sums over windows and the phases
+//! (`solve.rs`), many pixels at a time.
 //!
 //! # Accuracy
-//! `the_noise_of_a_fitted_phase_is_that_of_theory`, `the_phase_of_a_pair_has_next_to_no_periodic_error`.
+//! `the_noise_of_a_fitted_phase_is_that_of_theory`,
+//! `the_phase_of_a_pair_has_next_to_no_periodic_error`.
 
 use super::solve::{Solved, Solver, solve_block};
 use super::sums::{BLOCK, Columns};
@@ -62,7 +67,8 @@ pub(super) struct ExpectedRow<'a> {
     pub compared: &'a mut [bool],
 }
 
-/// A row as the fit needs it. Whole blocks of pixels; those behind the row are 0, and nothing is expected there.
+/// A row as the fit needs it. Whole blocks of pixels; those behind the row are 0, and nothing is
+/// expected there.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Terms {
     pub phase: Vec<AbsolutePhase>,
@@ -113,11 +119,13 @@ impl Band {
     }
 }
 
-/// By so many bits the terms of pixels are smaller where golden is not compared: beside the others they hardly count.
+/// By so many bits the terms of pixels are smaller where golden is not compared: beside the others
+/// they hardly count.
 pub(super) const FAINT: u8 = 3;
 
 impl Windows {
-    /// For samples of `bit_depth` bits with σ = `noise` counts, trusted from a modulation of `least` on.
+    /// For samples of `bit_depth` bits with σ = `noise` counts, trusted from a modulation of
+    /// `least` on.
     pub fn new(backend: Backend, bit_depth: u8, noise: f64, least: LeastModulation) -> Self {
         let sine = |at: usize| {
             let turns = (at as f64 + 0.5) / TURN as f64;
@@ -133,8 +141,9 @@ impl Windows {
         }
     }
 
-    /// Fits the windows around the pixels of some rows, the first of which is row `top`. `expect` tells what a row is expected to show;
-    /// it is asked for these rows and for those that their windows reach into, from the top row down.
+    /// Fits the windows around the pixels of some rows, the first of which is row `top`. `expect`
+    /// tells what a row is expected to show; it is asked for these rows and for those that their
+    /// windows reach into, from the top row down.
     pub(super) fn fit(
         &self,
         frames: [FrameView<'_>; 2],

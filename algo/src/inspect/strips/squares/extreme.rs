@@ -51,7 +51,8 @@ pub(in super::super) struct SquareRow<'a> {
 }
 
 impl SquareRow<'_> {
-    /// Searches the squares around the compared pixels of a span for the largest mean. Of equal ones the last counts.
+    /// Searches the squares around the compared pixels of a span for the largest mean. Of equal
+    /// ones the last counts.
     pub fn search(&self, largest: &mut Option<Extreme>, span: Range<usize>) {
         let least = least_support(self.side);
         let mut floor = floor_of(*largest, least);

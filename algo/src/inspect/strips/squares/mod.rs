@@ -1,8 +1,9 @@
 //! Stage 4, accumulate: the square of largest mean weighted deviation about the pixels of each row.
 //!
-//! Sums down the columns slide from row to row: the row that enters the squares is added, the one that leaves them is taken out.
-//! Sums over squares follow from these along the row: in 32 bits where all deviations are small ([`narrow`]), to find the few
-//! places where the largest may be, and exactly there ([`extreme`]). What deviates elsewhere is kept, too ([`rivals`]).
+//! Sums down the columns slide from row to row: the row that enters the squares is added, the one
+//! that leaves them is taken out. Sums over squares follow from these along the row: in 32 bits
+//! where all deviations are small ([`narrow`]), to find the few places where the largest may be,
+//! and exactly there ([`extreme`]). What deviates elsewhere is kept, too ([`rivals`]).
 
 pub(super) mod extreme;
 pub(super) mod narrow;
@@ -29,7 +30,8 @@ pub(super) struct Squares {
     /// For each side the packed sums down the columns, with half a side of padding at both ends.
     columns: Vec<Vec<i64>>,
     narrow: NarrowSums,
-    /// The deviations of a row about whose pixels squares have the side that is looked at; of plans with several sides.
+    /// The deviations of a row about whose pixels squares have the side that is looked at; of plans
+    /// with several sides.
     centres: Vec<i32>,
     /// The largest of the plan's squares.
     pub extremes: Vec<Extremes>,
@@ -59,8 +61,9 @@ impl Squares {
         self.extremes.iter_mut().for_each(Extremes::clear);
     }
 
-    /// Slides the sums of each side down to row `v`, and looks at the squares that are complete with it and whose middle is one
-    /// of the strip's `own` rows. `written` are the rows that there are deviations of.
+    /// Slides the sums of each side down to row `v`, and looks at the squares that are complete
+    /// with it and whose middle is one of the strip's `own` rows. `written` are the rows that there
+    /// are deviations of.
     pub fn slide(
         &mut self,
         plan: &Production,

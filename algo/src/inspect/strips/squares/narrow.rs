@@ -1,4 +1,5 @@
-//! Sums over squares in 32 bits, many pixels at a time: they tell where in a row the largest deviation may be.
+//! Sums over squares in 32 bits, many pixels at a time: they tell where in a row the largest
+//! deviation may be.
 
 use super::COUNT_BIT;
 use super::extreme::{Extreme, SquareRow, floor_of, least_support, strength};
@@ -41,7 +42,8 @@ impl NarrowSums {
         (side | 1) * (side | 1) < MAX_PIXELS
     }
 
-    /// Sums over the squares around some columns, from packed sums down the columns with half a side of padding.
+    /// Sums over the squares around some columns, from packed sums down the columns with half a
+    /// side of padding.
     pub fn add(&mut self, backend: Backend, sums: &[i64], side: usize, around: Range<usize>) {
         self.first = around.start;
         let sums = &sums[around.start..around.end + side / 2 * 2];
@@ -55,8 +57,8 @@ impl NarrowSums {
         if bits == 0 {
             all[..length].copy_from_slice(&columns[..length]);
         }
-        // Sums over `wide` neighbouring columns, from the highest bit of the side down: doubled, and one column more where the bit
-        // is set.
+        // Sums over `wide` neighbouring columns, from the highest bit of the side down: doubled,
+        // and one column more where the bit is set.
         let mut wide = 1;
         for bit in (0..bits).rev() {
             core::mem::swap(all, some);
@@ -73,7 +75,8 @@ impl NarrowSums {
         }
     }
 
-    /// Searches some squares for the largest deviation and for the largest sum: exactly, where the sums are large enough.
+    /// Searches some squares for the largest deviation and for the largest sum: exactly, where the
+    /// sums are large enough.
     pub fn search(
         &self,
         backend: Backend,
@@ -87,7 +90,8 @@ impl NarrowSums {
         greatest_sum(backend, sums, centres, &mut greatest);
         let sum = i64::from(greatest);
         if sum >= floor_of(*largest, least_support(row.side)) {
-            // A larger floor, as no square of the span has fewer deviations than the least count allows.
+            // A larger floor, as no square of the span has fewer deviations than the least count
+            // allows.
             let reach = row.side / 2 * 2;
             let columns = &row.sums[span.start..span.end + reach];
             let mut least = i64::MAX;
@@ -209,7 +213,8 @@ mod tests {
 
     const WIDTH: usize = 200;
 
-    /// Packed sums of the deviations down each column of squares of `side` pixels, with padding; and the deviations of a row.
+    /// Packed sums of the deviations down each column of squares of `side` pixels, with padding;
+    /// and the deviations of a row.
     fn columns(side: usize, random: &mut SplitMix64) -> (Vec<i64>, Vec<i32>) {
         let mut draw = |below: usize| (random.next_u64() % below as u64) as i64;
         let mut sums = vec![0; WIDTH + side / 2 * 2];

@@ -1,5 +1,5 @@
-//! The squares that come near the largest deviation: where several do, noise decides which of them is found, and the reading
-//! scatters less than any of them.
+//! The squares that come near the largest deviation: where several do, noise decides which of them
+//! is found, and the reading scatters less than any of them.
 
 use super::common;
 use super::extreme::{Extreme, strength};
@@ -46,7 +46,8 @@ impl Extremes {
         self.largest = None;
     }
 
-    /// Looks for larger ones about the pixels of a span of a row, tile by tile: `search` gets the largest and the tile's.
+    /// Looks for larger ones about the pixels of a span of a row, tile by tile: `search` gets the
+    /// largest and the tile's.
     pub fn update(
         &mut self,
         row: usize,
@@ -75,8 +76,8 @@ impl Extremes {
     }
 }
 
-/// The largest of strips that are joined, and the largest of other tiles that share no pixel with a larger one: those with at least half of
-/// its deviation, in falling order.
+/// The largest of strips that are joined, and the largest of other tiles that share no pixel with a
+/// larger one: those with at least half of its deviation, in falling order.
 pub(in super::super) fn rivals<'a>(
     strips: impl Iterator<Item = &'a Extremes> + Clone,
 ) -> heapless::Vec<Extreme, RIVALS> {

@@ -7,8 +7,8 @@ use clap::error::ErrorKind;
 use clap::{CommandFactory as _, Parser as _};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What each option that the programs share does in each command that offers it; the options that one command has for itself say so in
-/// its help. A pair that is not here is refused.
+/// What each option that the programs share does in each command that offers it; the options that
+/// one command has for itself say so in its help. A pair that is not here is refused.
 const SHARED: [(&str, &str, &str); 21] = [
     ("accuracy", "threads", "of everything"),
     ("accuracy", "quiet", "no progress, no tables"),

@@ -1,4 +1,5 @@
-//! Boundary values in every number of the command line: each is refused with its option and bounds, or lies within them.
+//! Boundary values in every number of the command line: each is refused with its option and bounds,
+//! or lies within them.
 
 use super::super::numbers::{Series as Numbers, Size};
 use super::Arguments;
@@ -27,7 +28,8 @@ enum Takes {
 }
 use Takes::{Directions, Number, Range, Series, Sides, Words};
 
-/// Every option and positional argument that takes neither a path nor one word of a list; `*` is every other command.
+/// Every option and positional argument that takes neither a path nor one word of a list; `*` is
+/// every other command.
 const TABLE: &[(&str, &str, Takes)] = &[
     ("*", "threads", Number(0.0, 256.0)),
     ("experiment", "part", Words),

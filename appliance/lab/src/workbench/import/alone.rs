@@ -14,14 +14,16 @@ const LIT: f64 = 0.01;
 const DOUBT: f64 = 0.4;
 /// Distance of the pixels that are compared, as a share of the frame.
 const APART: usize = 16;
-/// Least excess of pairs whose cells rise over those whose cells fall, or the other way round, as a share of both: a code that is read
-/// in another order or form has at most 0.4, a right one nearly 1, but for the edges of parts.
+/// Least excess of pairs whose cells rise over those whose cells fall, or the other way round, as a
+/// share of both: a code that is read in another order or form has at most 0.4, a right one nearly
+/// 1, but for the edges of parts.
 const ONE_WAY: f64 = 0.7;
 
 /// The remedy where no other reading of the pictures fits.
 const REMEDY: &str = "check the order of the pictures, --gray, --gray-cell, --gray-order, --gray-binary, --gray-invert and --order";
 
-/// What looks wrong, in words with remedies: the options of another reading of the pictures, if one fits.
+/// What looks wrong, in words with remedies: the options of another reading of the pictures, if one
+/// fits.
 ///
 /// # Errors
 /// In words: the pictures form no code.

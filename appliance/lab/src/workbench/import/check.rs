@@ -1,5 +1,5 @@
-//! What looks wrong with an imported recording: its levels are unwrapped as stated and under the other conventions, and the
-//! frames of each level are compared with a sine.
+//! What looks wrong with an imported recording: its levels are unwrapped as stated and under the
+//! other conventions, and the frames of each level are compared with a sine.
 
 use super::{code, shifts};
 use crate::workbench::layout::{Convention, Description, Shifts};
@@ -15,13 +15,15 @@ use hal::replay::recording::PatternSpec;
 
 /// Rows that conventions are compared on.
 const ROWS: usize = 128;
-/// Largest residual of levels that agree, in turns: unrelated phases agree in 40 % of the pixels per step.
+/// Largest residual of levels that agree, in turns: unrelated phases agree in 40 % of the pixels
+/// per step.
 const CLOSE: f64 = 0.2;
 /// Share of the pixels whose levels must agree.
 const AGREE: f64 = 0.6;
 /// By how much another convention must agree better.
 const BETTER: f64 = 0.3;
-/// Half the height of a ripple of two levels' difference that is named, turns: most of what may be between levels that agree.
+/// Half the height of a ripple of two levels' difference that is named, turns: most of what may be
+/// between levels that agree.
 const RIPPLE: f64 = 0.1;
 /// Share of the rows in which a convention may jump by most of a turn of its coarsest level.
 const JUMPS: f64 = 0.5;
@@ -184,7 +186,8 @@ struct Agreement {
 }
 
 impl Agreement {
-    /// In clearly more pixels; else with a rising phase, since a reversed shift agrees as well; else with fewer jumps.
+    /// In clearly more pixels; else with a rising phase, since a reversed shift agrees as well;
+    /// else with fewer jumps.
     fn betters(self, other: Self) -> bool {
         if (self.share - other.share).abs() > 0.05 {
             return self.share > other.share;
@@ -221,7 +224,8 @@ impl Rows {
         chain.unwrap(&self.levels, self.code.as_deref())
     }
 
-    /// The rows as they would be decoded under another convention: each phase φ becomes ± φ + `offset`.
+    /// The rows as they would be decoded under another convention: each phase φ becomes ± φ +
+    /// `offset`.
     fn under(&self, reversed: bool, offset: f64) -> Self {
         let turn = |map: &PhaseMap| {
             let phase = map.phase.iter().map(|phase| {
@@ -281,11 +285,12 @@ impl Rows {
     }
 }
 
-/// Compares the stated convention of shifts with the others, of a sine or a cosine, rising or falling, from the stated first shift or
-/// half a turn more; returns whether another one is named.
+/// Compares the stated convention of shifts with the others, of a sine or a cosine, rising or
+/// falling, from the stated first shift or half a turn more; returns whether another one is named.
 ///
-/// Frames with the shifts s_k = ± k/N + t (t the first shift, and ¼ for a cosine) that are decoded with the shifts of another
-/// convention, t', give, instead of φ, the phase φ + t − t' where the sign is the same, and ½ − φ − t − t' where it is reversed.
+/// Frames with the shifts s_k = ± k/N + t (t the first shift, and ¼ for a cosine) that are decoded
+/// with the shifts of another convention, t', give, instead of φ, the phase φ + t − t' where the
+/// sign is the same, and ½ − φ − t − t' where it is reversed.
 fn conventions(
     channel: &Channel<'_>,
     chain: &Chain,
@@ -364,7 +369,8 @@ fn conventions(
     true
 }
 
-/// Half the height in turns of the ripple that a response which is not linear makes between two levels, and their number of shifts.
+/// Half the height in turns of the ripple that a response which is not linear makes between two
+/// levels, and their number of shifts.
 fn response(channel: &Channel<'_>, rows: &Rows) -> Option<(f64, usize)> {
     let levels = channel.scan.sequence.levels();
     let span = channel.function.range().span();

@@ -1,4 +1,5 @@
-//! What looks wrong with a Gray code: its cells end within the fringes where the options say, or an option is named with which they do.
+//! What looks wrong with a Gray code: its cells end within the fringes where the options say, or an
+//! option is named with which they do.
 
 use super::shifts::usual;
 use crate::workbench::layout::{BitOrder, Description, Direction, Gray, of_direction};
@@ -20,10 +21,12 @@ const APART: f64 = 0.15;
 const WHOLE: f64 = 0.004;
 /// How near an offset must be to quarters of a cell to be meant by them, cells.
 const NEAR_QUARTER: f64 = 0.0625;
-/// Share of a cell by which a code may begin before the raster, so that it is not a matter of the shifts.
+/// Share of a cell by which a code may begin before the raster, so that it is not a matter of the
+/// shifts.
 const WITHIN_CELL: std::ops::Range<f64> = 0.1..0.9;
 
-/// What is wrong with the code beside the finest level of a pattern, in words with remedies; `None` where there is too little to tell.
+/// What is wrong with the code beside the finest level of a pattern, in words with remedies; `None`
+/// where there is too little to tell.
 ///
 /// # Errors
 /// In words: the pictures do not form a code.
@@ -86,8 +89,8 @@ struct Reading {
     coding: Coding,
 }
 
-/// The other ways to read the pictures of a code: whether the order of its bits is reversed, and its coding. One change, then two,
-/// then all three.
+/// The other ways to read the pictures of a code: whether the order of its bits is reversed, and
+/// its coding. One change, then two, then all three.
 pub(super) fn otherwise(stated: Coding) -> impl Iterator<Item = (bool, Coding)> {
     [1_u8, 2, 4, 3, 5, 6, 7].into_iter().map(move |changes| {
         let coding = Coding {
@@ -122,7 +125,8 @@ pub(super) fn options(reversed: bool, coding: Coding, gray: &Gray) -> String {
     options.join(" ")
 }
 
-/// The reading with the fewest changes that brings clearly more cells together than the stated one, if there is one.
+/// The reading with the fewest changes that brings clearly more cells together than the stated one,
+/// if there is one.
 fn coding(
     finest: &PhaseMap,
     seen: &[Seen],
@@ -158,7 +162,8 @@ fn coding(
 /// A code beside the fringes of a pattern, and where its cells end within them.
 struct Beside<'a> {
     edges: &'a Edges,
-    /// Phase of the finest level at the beginning of the first cell, and width of a cell in its turns, as stated.
+    /// Phase of the finest level at the beginning of the first cell, and width of a cell in its
+    /// turns, as stated.
     origin: f64,
     turns: f64,
     binary: bool,
@@ -292,7 +297,8 @@ impl Beside<'_> {
         })
     }
 
-    /// A number for this code, beside that of the other one if there is another: that of the columns first.
+    /// A number for this code, beside that of the other one if there is another: that of the
+    /// columns first.
     fn of_both(&self, stated: &[f64], own: f64) -> String {
         let both = matches!(
             self.description.direction,

@@ -1,5 +1,5 @@
-//! Whether fringes run the way that they are said to: pictures whose names begin with H and V lie in the other order than pictures of
-//! columns and rows.
+//! Whether fringes run the way that they are said to: pictures whose names begin with H and V lie
+//! in the other order than pictures of columns and rows.
 
 use super::phases::coarsest;
 use algo::pipeline::PhaseMap;
@@ -56,7 +56,8 @@ pub(super) fn notes(recording: &Recording) -> Option<String> {
     ))
 }
 
-/// Mean change of the phase from column to column and from row to row, in turns, without its sign; the phase `wraps` at whole turns, or does not.
+/// Mean change of the phase from column to column and from row to row, in turns, without its sign;
+/// the phase `wraps` at whole turns, or does not.
 fn slopes(map: &PhaseMap, wraps: bool) -> [f64; 2] {
     let width = map.width.max(1);
     [1, width].map(|step| {

@@ -35,11 +35,12 @@ impl Place {
     }
 }
 
-/// The `expected` pictures of a folder whose names fit `pattern`, in the order of the numbers in their names, a file of several pages
-/// in the order of its pages.
+/// The `expected` pictures of a folder whose names fit `pattern`, in the order of the numbers in
+/// their names, a file of several pages in the order of its pages.
 ///
 /// # Errors
-/// If the folder is missing (66); if a file cannot be read, or there is another number of pictures (65).
+/// If the folder is missing (66); if a file cannot be read, or there is another number of pictures
+/// (65).
 pub fn pictures(folder: &Path, pattern: &str, expected: usize) -> Result<Vec<Place>, Failure> {
     let files = files(folder, pattern)?;
     let mut found = Vec::new();
@@ -90,7 +91,8 @@ fn files(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>, Failure> {
             known.any(|known| known.eq_ignore_ascii_case(ending))
         });
         let name = name(path);
-        // Hidden files are none of the camera's: macOS puts a "._" companion beside each picture that it copies.
+        // Hidden files are none of the camera's: macOS puts a "._" companion beside each picture
+        // that it copies.
         known && !name.starts_with('.') && fits(&name, pattern) && path.is_file()
     };
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
@@ -112,8 +114,8 @@ fn has_wildcards(pattern: &str) -> bool {
     pattern.contains(['*', '?'])
 }
 
-/// Whether a file's name, with or without its ending, fits a pattern of * (any text) and ? (any letter), or begins with a text without
-/// them.
+/// Whether a file's name, with or without its ending, fits a pattern of * (any text) and ? (any
+/// letter), or begins with a text without them.
 fn fits(name: &str, pattern: &str) -> bool {
     match has_wildcards(pattern) {
         true => matches(name, pattern) || matches(&stem(name), pattern),
@@ -152,7 +154,8 @@ fn matches(name: &str, pattern: &str) -> bool {
 /// Most cameras that are told apart by names.
 const MAX_CAMERAS: usize = 8;
 
-/// Patterns that divide the names into cameras of `expected` pictures each: names that differ in one word or number.
+/// Patterns that divide the names into cameras of `expected` pictures each: names that differ in
+/// one word or number.
 fn cameras(names: &[String], expected: usize) -> Option<Vec<String>> {
     let count = names.len() / expected.max(1);
     if count * expected != names.len() || !(2..=MAX_CAMERAS).contains(&count) {

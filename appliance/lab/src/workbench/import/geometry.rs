@@ -1,4 +1,5 @@
-//! The models of an imported recording: whether heights can be measured with them, and whether they fit what was measured.
+//! The models of an imported recording: whether heights can be measured with them, and whether they
+//! fit what was measured.
 
 use super::phases::absolute;
 use super::{content, plane};
@@ -14,12 +15,13 @@ use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 use std::path::Path;
 
-/// Largest RMS distance of projector points from their epipolar lines that nothing is said about, projector pixels.
+/// Largest RMS distance of projector points from their epipolar lines that nothing is said about,
+/// projector pixels.
 const OFF: f64 = 1.0;
 /// Another reading of the models is named if it leaves less than this share of the distance.
 const BETTER: f64 = 0.3;
-/// Shares of the projector's columns and rows at each end that are not compared: the phase of what is lit from beyond the raster, as in
-/// rendered pictures, is that of its other end.
+/// Shares of the projector's columns and rows at each end that are not compared: the phase of what
+/// is lit from beyond the raster, as in rendered pictures, is that of its other end.
 const EDGE: f64 = 0.125;
 /// Where a camera's principal point lies, as shares of its frame.
 const MIDDLE: std::ops::Range<f64> = 0.3..0.7;
@@ -189,7 +191,8 @@ fn distance(
     rms.is_finite().then_some(rms)
 }
 
-/// The same models as they would be if they had been written down in another way, with the words that say how to mend that.
+/// The same models as they would be if they had been written down in another way, with the words
+/// that say how to mend that.
 fn readings((camera, projector): &Pair) -> Vec<(String, Pair)> {
     let mut readings = vec![(
         "R and T are from the projector to the camera: give the inverse, R transposed and −Rᵀ T"

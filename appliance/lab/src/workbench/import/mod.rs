@@ -43,11 +43,13 @@ pub struct Taken {
     pub range_mm: Option<[f64; 2]>,
 }
 
-/// Reads the pictures of a folder in the order of the numbers in their names. `models` gives the models for frames of this size. The
-/// recording's notes say what looks wrong with it, in words with remedies.
+/// Reads the pictures of a folder in the order of the numbers in their names. `models` gives the
+/// models for frames of this size. The recording's notes say what looks wrong with it, in words
+/// with remedies.
 ///
 /// # Errors
-/// If the folder is missing (66), the description contradicts itself (64), or a picture is missing or wrong (65).
+/// If the folder is missing (66), the description contradicts itself (64), or a picture is missing
+/// or wrong (65).
 pub fn import(
     folder: &Path,
     taken: &Taken,

@@ -23,8 +23,8 @@ const FITS: usize = 12;
 /// What is far: so many times the median distance.
 const FAR: f64 = 4.0;
 
-/// Moves the world of a recording's models, whose camera stands at the origin and looks along −z, so that the plane that fits the
-/// measured points best is z = 0, and says where that is.
+/// Moves the world of a recording's models, whose camera stands at the origin and looks along −z,
+/// so that the plane that fits the measured points best is z = 0, and says where that is.
 ///
 /// # Errors
 /// In words: there are no absolute phases or too few points in front of both devices.
@@ -111,7 +111,8 @@ fn points(recording: &Recording) -> Result<Vec<Vector>, String> {
     }
 }
 
-/// By how many pixels the projector's column or row changes along the ray of the frame's middle, from a few baselines to twice as far.
+/// By how many pixels the projector's column or row changes along the ray of the frame's middle,
+/// from a few baselines to twice as far.
 fn change(camera: &Pinhole, projector: &Pinhole, vertical: bool) -> Option<f64> {
     let (width, height) = (camera.width() as f64, camera.height() as f64);
     let (centre, ray) = (camera.centre(), camera.ray(width / 2.0, height / 2.0)?);
@@ -128,7 +129,8 @@ fn change(camera: &Pinhole, projector: &Pinhole, vertical: bool) -> Option<f64> 
     Some(change.abs())
 }
 
-/// The point of a pixel's ray that the projector sees in this column or row; `None` if it is not in front of both.
+/// The point of a pixel's ray that the projector sees in this column or row; `None` if it is not in
+/// front of both.
 fn point(
     camera: &Pinhole,
     projector: &Pinhole,
@@ -141,7 +143,8 @@ fn point(
         let (xi, eta) = projector.project(centre + ray * depth)?;
         Some(if vertical { xi } else { eta } - place)
     };
-    // In 1 / depth, in which a projector's coordinate is nearly linear; from a depth of a few baselines.
+    // In 1 / depth, in which a projector's coordinate is nearly linear; from a depth of a few
+    // baselines.
     let mut near = 1.0 / (BASELINES * beside);
     for _ in 0..STEPS {
         let step = SHARE * near;

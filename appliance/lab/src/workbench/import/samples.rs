@@ -1,19 +1,22 @@
-//! What the samples of a camera's pictures mean: how many bits they have, and above what they are clipped.
+//! What the samples of a camera's pictures mean: how many bits they have, and above what they are
+//! clipped.
 
 use crate::workbench::layout::Shown;
 use hal::frame::FrameFormat;
 
-/// How often the largest sample must occur beside any other that is as bright: the crest of a sine alone makes it 2.4 times as
-/// often at most, where noise does not smooth it.
+/// How often the largest sample must occur beside any other that is as bright: the crest of a sine
+/// alone makes it 2.4 times as often at most, where noise does not smooth it.
 const PLATEAU: usize = 4;
 /// Share of the largest sample within which others are as bright.
 const AS_BRIGHT: u16 = 32;
-/// Fewest samples as bright that tell whether the largest is one of many values or one of few, in all and as a share of its own.
+/// Fewest samples as bright that tell whether the largest is one of many values or one of few, in
+/// all and as a share of its own.
 const FEWEST: usize = 8;
 const SPARSE: usize = 512;
 
-/// Brings samples of 16 bits that stand in the upper bits, as some cameras write 10 and 12 bits, to the lower ones, and returns how
-/// many bits they have: those that are stated, else those of the files.
+/// Brings samples of 16 bits that stand in the upper bits, as some cameras write 10 and 12 bits, to
+/// the lower ones, and returns how many bits they have: those that are stated, else those of the
+/// files.
 pub(super) fn right_justify(pictures: &mut [Vec<u16>], stated: Option<u8>, file: u8) -> u8 {
     let used = pictures
         .iter()
@@ -34,8 +37,9 @@ pub(super) fn right_justify(pictures: &mut [Vec<u16>], stated: Option<u8>, file:
     bits
 }
 
-/// Finds samples of fringes that are clipped below full scale, as where the range of a picture is limited to 235, and sets them to
-/// full scale, so that their pixels count as saturated. Returns the remedy in words if there are any.
+/// Finds samples of fringes that are clipped below full scale, as where the range of a picture is
+/// limited to 235, and sets them to full scale, so that their pixels count as saturated. Returns
+/// the remedy in words if there are any.
 pub(super) fn mark_clipped(
     pictures: &mut [Vec<u16>],
     shown: &[Shown],

@@ -1,11 +1,13 @@
-//! The convention of the shifts in the words of the options, and what a response that is not linear does to levels.
+//! The convention of the shifts in the words of the options, and what a response that is not linear
+//! does to levels.
 
 use crate::workbench::layout::{Convention, ShiftSign, Shifts};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use std::f64::consts::TAU;
 
-/// Parts of a turn by which first shifts differ, and how near to them one must be to be meant by it, turns.
+/// Parts of a turn by which first shifts differ, and how near to them one must be to be meant by
+/// it, turns.
 const USUAL: [(f64, f64); 2] = [(4.0, 0.0625), (3.0, 0.04)];
 /// Parts of a period that a ripple is looked at in.
 const BINS: usize = 32;
@@ -20,8 +22,8 @@ impl Shifts {
         self.first + self.convention.turns()
     }
 
-    /// These shifts with another one of the sine in the first frame; in the convention in which the first shift is none, the stated
-    /// one, or half a turn.
+    /// These shifts with another one of the sine in the first frame; in the convention in which the
+    /// first shift is none, the stated one, or half a turn.
     pub(super) fn with_total(self, sign: ShiftSign, total: f64) -> Self {
         let total = match usual(total - self.total()) {
             Some(turns) => self.total() + turns,
@@ -85,8 +87,9 @@ impl ShiftSign {
     }
 }
 
-/// The ripple of the difference of two levels, `factor` φ_coarse − φ_fine, that a response which is not linear makes: of so many periods
-/// per fringe as there are shifts. Half its height in turns, if the difference is nothing but that.
+/// The ripple of the difference of two levels, `factor` φ_coarse − φ_fine, that a response which is
+/// not linear makes: of so many periods per fringe as there are shifts. Half its height in turns,
+/// if the difference is nothing but that.
 pub(super) fn ripple(
     coarse: &PhaseMap,
     fine: &PhaseMap,

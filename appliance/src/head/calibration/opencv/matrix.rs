@@ -18,7 +18,8 @@ impl Matrix {
     /// Reads one; `name` is only for messages.
     ///
     /// # Errors
-    /// In words: it is not a matrix, its number of elements contradicts its shape, or one is not finite.
+    /// In words: it is not a matrix, its number of elements contradicts its shape, or one is not
+    /// finite.
     pub fn read(name: &str, node: &Node) -> Result<Self, String> {
         let no_matrix = || format!("{name} is not a matrix: write it as one with cv2.FileStorage");
         let (shape, elements) = match node {

@@ -1,8 +1,9 @@
 //! Imports camera and projector models that were made with OpenCV.
 //!
-//! Two layouts are read. Either each device has a file of its own with its pose in the world (X_device = R·X_world + t); or
-//! one file has both, with R and T from the camera to the projector as `stereoCalibrate` gives them, and perhaps the pose of the plate
-//! that lies in the reference plane as `solvePnP` gives it. docs/calibration.md lists the names.
+//! Two layouts are read. Either each device has a file of its own with its pose in the world
+//! (X_device = R·X_world + t); or one file has both, with R and T from the camera to the projector
+//! as `stereoCalibrate` gives them, and perhaps the pose of the plate that lies in the reference
+//! plane as `solvePnP` gives it. docs/calibration.md lists the names.
 
 mod matrix;
 mod names;
@@ -24,9 +25,11 @@ use tree::Node;
 pub struct Declared {
     /// The unit of lengths; none: a node `unit` says it.
     pub unit: Option<Unit>,
-    /// Whether the world's z points away from the head, as on OpenCV's boards: then it is turned round.
+    /// Whether the world's z points away from the head, as on OpenCV's boards: then it is turned
+    /// round.
     pub z_away: bool,
-    /// Distance of the plane z = 0 from the camera along its axis, mm, where the files state no plane.
+    /// Distance of the plane z = 0 from the camera along its axis, mm, where the files state no
+    /// plane.
     pub plane_at: Option<f64>,
 }
 
@@ -70,7 +73,8 @@ pub struct Models {
     pub camera: DeviceModel,
     /// The projector.
     pub projector: DeviceModel,
-    /// Whether the plane z = 0 is known. If not, the camera stands at the origin and looks along −z.
+    /// Whether the plane z = 0 is known. If not, the camera stands at the origin and looks along
+    /// −z.
     pub has_plane: bool,
     /// What was corrected, in words.
     pub notes: Vec<String>,
@@ -177,7 +181,8 @@ struct World {
 }
 
 impl World {
-    /// That of the stated pose of the camera; else the plane stands across the camera's axis, at the declared distance or nowhere yet.
+    /// That of the stated pose of the camera; else the plane stands across the camera's axis, at
+    /// the declared distance or nowhere yet.
     fn of(stated: Option<Pose>, declared: Declared) -> Result<Self, String> {
         let across = |distance| Pose {
             translation_mm: [0.0, 0.0, distance],

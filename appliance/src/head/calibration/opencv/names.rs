@@ -1,4 +1,5 @@
-//! The names of nodes: one table for each thing that is looked for. OpenCV prescribes none, so programs differ.
+//! The names of nodes: one table for each thing that is looked for. OpenCV prescribes none, so
+//! programs differ.
 
 use super::tree::Node;
 
@@ -6,9 +7,11 @@ use super::tree::Node;
 pub struct Device {
     /// For messages.
     pub name: &'static str,
-    /// Names of its matrix, each with those of the distortion beside it. The first matrix that is there is read.
+    /// Names of its matrix, each with those of the distortion beside it. The first matrix that is
+    /// there is read.
     pub rows: &'static [Row],
-    /// Names of a node that holds all of the device's nodes, in lower case and without spaces, hyphens and underscores.
+    /// Names of a node that holds all of the device's nodes, in lower case and without spaces,
+    /// hyphens and underscores.
     pub nested: &'static [&'static str],
 }
 
@@ -56,7 +59,8 @@ pub const CAMERA: Device = Device {
     nested: &["camera", "camera0", "cam", "cam0"],
 };
 
-/// The projector in a file of both. A file with four matrices is one of two cameras, a third one, and the projector.
+/// The projector in a file of both. A file with four matrices is one of two cameras, a third one,
+/// and the projector.
 pub const PROJECTOR: Device = Device {
     name: "projector",
     rows: &[
@@ -80,7 +84,8 @@ pub const PROJECTOR: Device = Device {
 };
 
 const TRANSLATION: &[&str] = &["T", "t", "translation", "translation_vector", "tvec"];
-/// Names of a rotation, each with those of the translation beside it. "roration" is what one of the programs writes.
+/// Names of a rotation, each with those of the translation beside it. "roration" is what one of the
+/// programs writes.
 pub const POSE: &[Row] = &[
     ("Rlp", &["Tlp"]),
     ("R", TRANSLATION),

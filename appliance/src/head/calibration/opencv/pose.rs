@@ -6,7 +6,8 @@ use super::tree::Node;
 
 /// Largest element of R·Rᵀ − 1: a rotation matrix that was rounded to six digits has less.
 const TOLERANCE: f64 = 1e-4;
-/// Largest element of R less the nearest rotation, for R to be taken as that: rounding to three digits leaves half of it.
+/// Largest element of R less the nearest rotation, for R to be taken as that: rounding to three
+/// digits leaves half of it.
 const ROUNDED: f64 = 1e-3;
 
 /// X_to = R · X_from + t.
@@ -27,8 +28,9 @@ impl Pose {
         }
     }
 
-    /// Reads a pose; `rows` are the accepted names of the nodes of the rotation, each with those of the translation. A unit of length
-    /// in the file is `mm_per_unit` millimetres. `notes` gets what was corrected.
+    /// Reads a pose; `rows` are the accepted names of the nodes of the rotation, each with those of
+    /// the translation. A unit of length in the file is `mm_per_unit` millimetres. `notes` gets
+    /// what was corrected.
     ///
     /// # Errors
     /// In words: a node is missing or has another shape, R is not a rotation, or it mirrors.
@@ -70,7 +72,8 @@ impl Pose {
         }
     }
 
-    /// The same pose with respect to a world turned by half a turn about its x axis: y and z point the other way.
+    /// The same pose with respect to a world turned by half a turn about its x axis: y and z point
+    /// the other way.
     pub fn about_x(&self) -> Self {
         let half_turn = [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0];
         Self {
@@ -100,7 +103,8 @@ fn apart(a: &[f64; 9], b: &[f64; 9]) -> f64 {
     apart.fold(0.0, |most, apart| if most > apart { most } else { apart })
 }
 
-/// The rotation that a file states: as it is, or the nearest one where it was rounded to few digits.
+/// The rotation that a file states: as it is, or the nearest one where it was rounded to few
+/// digits.
 fn checked(name: &str, r: [f64; 9], notes: &mut Vec<String>) -> Result<[f64; 9], String> {
     let transposed = std::array::from_fn(|at| r[at % 3 * 3 + at / 3]);
     let off = apart(&product(&r, &transposed), &UNIT);
@@ -135,7 +139,8 @@ fn determinant(r: &[f64; 9]) -> f64 {
         + r[2] * (r[3] * r[7] - r[4] * r[6])
 }
 
-/// The orthogonal matrix nearest to `r`: the mean of a matrix and its transposed inverse converges to it (Higham 1986).
+/// The orthogonal matrix nearest to `r`: the mean of a matrix and its transposed inverse converges
+/// to it (Higham 1986).
 fn nearest(mut r: [f64; 9]) -> [f64; 9] {
     for _ in 0..20 {
         let determinant = determinant(&r);

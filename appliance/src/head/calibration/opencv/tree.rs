@@ -1,7 +1,8 @@
 //! The tree of names and values in a file of OpenCV's FileStorage, written in YAML, XML or JSON.
 //!
-//! JSON is read as YAML, which includes it, so that the `.Nan` that OpenCV writes into JSON is read too. Aliases of YAML and document
-//! types of XML are refused: OpenCV writes none, and with them a few lines expand to gigabytes.
+//! JSON is read as YAML, which includes it, so that the `.Nan` that OpenCV writes into JSON is read
+//! too. Aliases of YAML and document types of XML are refused: OpenCV writes none, and with them a
+//! few lines expand to gigabytes.
 
 use saphyr_parser::{Event, Parser};
 

@@ -75,7 +75,8 @@ fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<(), Failure> 
     Err(Failure::new(Exit::Configuration, message))
 }
 
-/// Opens camera, projector and trigger. Their calibration is nominal, so nothing may be measured with it.
+/// Opens camera, projector and trigger. Their calibration is nominal, so nothing may be measured
+/// with it.
 ///
 /// # Errors
 /// If this build has no such devices (78), or one of them is not there (69).
@@ -118,7 +119,8 @@ fn trigger(_: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
     Ok(Box::new(NoTrigger))
 }
 
-/// A placeholder until the head is calibrated: lenses and poses like those of the reference head. No height may be computed with it.
+/// A placeholder until the head is calibrated: lenses and poses like those of the reference head.
+/// No height may be computed with it.
 pub(super) fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration, Failure> {
     let model = |width: u32, height: u32, aside_mm: f64| DeviceModel {
         fx: 1.6 * f64::from(width),
@@ -157,7 +159,8 @@ pub fn lines(setup: &LinesSetup) -> Result<Wires, Failure> {
     wired(setup)
 }
 
-/// Leaves every line that the station drives at its idle level: no trigger pulse, busy and ok off, fault on. All of them are tried.
+/// Leaves every line that the station drives at its idle level: no trigger pulse, busy and ok off,
+/// fault on. All of them are tried.
 ///
 /// # Errors
 /// If this build has no lines (78), or some of them cannot be used (69).

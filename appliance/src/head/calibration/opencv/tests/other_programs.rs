@@ -1,9 +1,11 @@
-//! Models as other programs than OpenCV write them: other names, nested nodes, lists of rows, no plate, few digits.
+//! Models as other programs than OpenCV write them: other names, nested nodes, lists of rows, no
+//! plate, few digits.
 
 use super::super::{Declared, Unit, from_one};
 use super::{SIZES, written};
 
-/// What Python programs write of K, distortion, R and T of a projector at (−100, 0, 0) of its camera, in metres.
+/// What Python programs write of K, distortion, R and T of a projector at (−100, 0, 0) of its
+/// camera, in metres.
 const NESTED: &str = "{\"Camera 0\": {\"K\": [[900, 0, 320], [0, 900, 240], [0, 0, 1]], \"dist\": [[0.1, 0, 0, 0, 0]]},
     \"Projector\": {\"mtx\": [[800, 0, 300], [0, 800, 200], [0, 0, 1]], \"dist\": [0, 0, 0, 0], \"rvec\": [[0], [0], [0]],
     \"tvec\": [[0.1], [0], [0]]}}";
