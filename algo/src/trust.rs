@@ -10,18 +10,18 @@ pub const NOISE_OVER_LEAST: f64 = 0.23;
 pub struct LeastModulation(f64);
 
 impl LeastModulation {
-    /// Lowest and highest that can be decoded: with less, what rounds to whole counts is no noise
-    /// any more; no sample has more than half of full scale.
+    /// The lowest and the highest least modulation that can be decoded with: below, rounding to
+    /// whole counts is not like noise any more; and no modulation is above half of full scale.
     pub const BOUNDS: [f64; 2] = [4.0, 127.5];
 
-    /// That of so many counts of an 8-bit sample; `None` out of [`Self::BOUNDS`].
+    /// The least modulation of so many counts of an 8-bit sample; `None` out of [`Self::BOUNDS`].
     pub fn new(counts: f64) -> Option<Self> {
         let [low, high] = Self::BOUNDS;
         (low..=high).contains(&counts).then_some(Self(counts))
     }
 
-    /// That of samples of so many bits with σ = `noise` counts: σ / [`NOISE_OVER_LEAST`] = 4.3 σ,
-    /// within [`Self::BOUNDS`]; the default if σ is not a number.
+    /// The least modulation for samples of so many bits with σ = `noise` counts: σ /
+    /// [`NOISE_OVER_LEAST`] = 4.3 σ, within [`Self::BOUNDS`]; the default if σ is not a number.
     pub fn of_noise(noise: f64, bit_depth: u8) -> Self {
         let full_scale = (1_u32 << bit_depth.min(16)) - 1;
         let counts = noise * 255.0 / f64::from(full_scale) / NOISE_OVER_LEAST;
@@ -65,7 +65,7 @@ pub enum Trust {
     Residual = 4,
     /// No height in the working range has this phase, or more than one has.
     OutOfRange = 5,
-    /// The map that the levels are unwrapped about has no phase here: not decoded.
+    /// The map that the levels are unwrapped about has no phase here, so the pixel was not decoded.
     Unexpected = 6,
 }
 

@@ -43,7 +43,8 @@ pub struct Received {
 }
 
 impl Received {
-    /// From samples of a sine that is shifted by a quarter turn from each to the next.
+    /// The light of a pixel from its samples of a sine that is shifted by a quarter turn from each
+    /// sample to the next.
     pub fn of([a, b, c, d]: [f64; 4]) -> Self {
         let white = match [a, b, c, d].iter().any(|sample| *sample >= 1.0) {
             true => f64::INFINITY,
@@ -65,8 +66,8 @@ impl Received {
     }
 }
 
-/// The most projector pixels by which a point of the surface moves there with a part that is
-/// displaced by up to `tolerance` mm.
+/// The largest distance, in projector pixels, between the projector points that light a point of
+/// the surface before and after the part is displaced by up to `tolerance` mm.
 pub fn reach(triangulator: &Triangulator, heights: &HeightMap, tolerance: f64) -> f64 {
     let width = heights.width.max(1);
     let rows = heights.height.len() / width;
@@ -74,7 +75,8 @@ pub fn reach(triangulator: &Triangulator, heights: &HeightMap, tolerance: f64) -
     let at = |u: usize, v: usize| {
         let point = triangulator.point(u, v, heights.height[v * width + u])?;
         let (xi, eta) = triangulator.projector_point(point)?;
-        // Per mm along each axis: together at least what any direction gives.
+        // The way for 1 mm along each axis; the root of the sum of squares is at least that along
+        // any direction.
         let moved = axes.iter().filter_map(|&[x, y, z]| {
             let (across, down) = triangulator.projector_point(point + Vector { x, y, z })?;
             Some((across - xi) * (across - xi) + (down - eta) * (down - eta))
@@ -124,8 +126,8 @@ pub fn amplitude(
     amplitude.iter().map(level).collect()
 }
 
-/// The projector point of the pixel `u` of a row; of one that is not known, on the line between the
-/// known ones left and right of it.
+/// The projector point of the pixel `u` of a row; where it is not known, a point on the line
+/// between the known points left and right of it.
 fn between(points: &[[f64; 2]], u: usize) -> [f64; 2] {
     let known = |&at: &usize| !points[at][0].is_nan();
     let left = (0..=u).rev().find(known);
@@ -139,7 +141,7 @@ fn between(points: &[[f64; 2]], u: usize) -> [f64; 2] {
     }
 }
 
-/// The least value in the square of `reach` pixels around each.
+/// The least value in the square of `reach` pixels around each pixel.
 fn least_around(values: &[f32], (columns, rows): (usize, usize), reach: usize) -> Vec<f32> {
     let least = |values: &[f32]| values.iter().fold(1.0_f32, |least, here| least.min(*here));
     let mut across = vec![1.0; values.len()];
@@ -161,7 +163,7 @@ fn least_around(values: &[f32], (columns, rows): (usize, usize), reach: usize) -
     all
 }
 
-/// Lowers values until none is larger than a neighbour's by more than [`SLOPE`], relative to it:
+/// Lowers values until none is larger than a neighbour's by more than [`SLOPE`] of the neighbour's:
 /// from the left and above, then from the right and below.
 fn rise_slowly(values: &mut [f32], columns: usize) {
     let last = values.len().saturating_sub(1);

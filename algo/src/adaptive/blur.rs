@@ -8,8 +8,8 @@
 //! the pixels' squares falls by exp(−2π²(f² − c²)(σ_P² + |J|²σ_C²)): the logarithm is a straight
 //! line over |J|². Its two numbers are a least-squares fit through the medians of [`GROUPS`] groups
 //! of pixels of about the same slope, because medians ignore edges and noise. What calibration
-//! measured on a plate counts as much as all groups. Where all slopes are alike, the blur is put on
-//! the projector.
+//! measured on a plate counts as much as all groups together. Where all slopes are alike, the blur
+//! is put on the projector.
 
 use super::contrast::{Blur, contrast};
 use alloc::vec::Vec;
@@ -47,7 +47,7 @@ impl Spread {
 
 impl Blur {
     /// The blur of both lenses from the pixels of a part, and from a plate, if one was measured.
-    /// `None` without any.
+    /// `None` if there are neither pixels nor a plate.
     pub fn fit(mut part: Vec<Spread>, plate: Option<Spread>) -> Option<Self> {
         part.sort_unstable_by(|a, b| a.steepness.total_cmp(&b.steepness));
         let size = part.len().div_ceil(GROUPS).max(1);

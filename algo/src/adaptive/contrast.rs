@@ -9,7 +9,7 @@
 //! M(g) = sinc g · exp(−2π²σ_P²g²) · sinc a · sinc b · exp(−2π²σ_C²(a² + b²))        sinc x = sin πx / πx
 //! ```
 //!
-//! The squares also show it at the frequencies 1 − g and 1 + g ([`replicas`]).
+//! The squares also show the sine at the frequencies 1 − g and 1 + g ([`replicas`]).
 
 use core::f64::consts::PI;
 
@@ -27,9 +27,9 @@ pub struct Optics {
 /// Gaussian blur of both lenses, beside the squares of the pixels themselves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Blur {
-    /// σ of the projector's, projector pixels.
+    /// σ of the projector's lens, projector pixels.
     pub projector: f64,
-    /// σ of the camera's, camera pixels.
+    /// σ of the camera's lens, camera pixels.
     pub camera: f64,
 }
 
@@ -44,9 +44,9 @@ pub fn contrast(blur: &Blur, g: f64, [a, b]: [f64; 2]) -> f64 {
 /// turns per pixel, where the camera sees the slope `[ju, jv]` (projector pixels per camera pixel).
 ///
 /// Shifting the sine shifts these replicas in step, so demodulation takes them for the sine: the
-/// phase is off by up to this share of the contrast, in radian, once per projector pixel. Of the
-/// camera's box the envelope counts, 1/πx instead of |sinc x|: where the box is blind depends on
-/// more than the slope.
+/// phase is off by up to this share of the contrast, in radian, once per projector pixel. For the
+/// camera's square the envelope 1/πx is taken instead of |sinc x|, because where the square is
+/// blind depends on more than the slope.
 pub fn replicas(blur: &Blur, g: f64, [ju, jv]: [f64; 2]) -> f64 {
     let slope = libm::sqrt(ju * ju + jv * jv);
     let at = |f: f64| {

@@ -90,7 +90,7 @@ impl Field {
         }
     }
 
-    /// Gives unknown cells the value of the nearest known one within `reach` pixels (chessboard
+    /// Gives unknown cells the value of the nearest known cell within `reach` pixels (chessboard
     /// steps, the left and upper neighbour first).
     pub fn fill_near(&mut self, reach: usize) {
         let (columns, rows) = (self.columns, self.rows());

@@ -1,9 +1,9 @@
 //! Patterns made for a part: curved fringes of varying pitch.
 //!
-//! [`paper`] is the method of Peng & Gupta (2008), eqs. 2–9, unchanged: the baseline. [`noise`] is
-//! the better one: on every part of the surface the local frequency that gives the least error for
-//! the light of the part and the contrast that projector and camera have. Both compute a field of
-//! frequencies over the projector's raster ([`Field`]) from the projector point of each camera
+//! [`paper`] is the method of Peng & Gupta (2008), eqs. 2–9, unchanged: the baseline. [`noise`] has
+//! less error: on every part of the surface it takes the local frequency that gives the least error
+//! with the light of the part and the contrast that projector and camera have. Both compute a field
+//! of frequencies over the projector's raster ([`Field`]) from the projector point of each camera
 //! pixel ([`ProjectorMap`]) and integrate it to a phase function.
 
 pub mod amplitude;

@@ -43,13 +43,13 @@ pub const MAX_SLOPE: f64 = 6.0;
 const FILL: usize = 8;
 /// Reach of the minimum filter to each side, projector pixels.
 const MINIMUM_REACH: usize = 1;
-/// σ of the smoothing after it along and across the rows, projector pixels. Across the rows it is
-/// larger, because rows whose pitches differ shear against each other, and a shear that changes
-/// from row to row falsifies the phase where blur mixes them: with 3 px, the rows that pass the tip
-/// of the study's cone were off by 30 µm without noise.
+/// σ of the smoothing after the minimum filter, along and across the rows, projector pixels. Across
+/// the rows it is larger, because rows whose pitches differ shear against each other, and a shear
+/// that changes from row to row falsifies the phase where blur mixes them: with 3 px, the rows that
+/// pass the tip of the study's cone were off by 30 µm without noise.
 const SMOOTHING: [f64; 2] = [3.0, 6.0];
-/// Share of the largest worth that is enough. The maximum is flat: the last 0.2 % would cost 4 % of
-/// the contrast.
+/// Share of the largest worth (the expression that is maximised) that is enough. The maximum is
+/// flat: the last 0.2 % would cost 4 % of the contrast.
 const ENOUGH: f64 = 0.998;
 /// Frequencies that are tried between the coarsest and the finest, in geometric progression.
 const STEPS: usize = 160;
@@ -59,14 +59,15 @@ const TWELVE_FRAMES: f64 = 0.36;
 /// nothing.
 const LEAST_NOISE: f64 = 3e-3;
 /// By how many σ of a sample the modulation of sines stays above the least that is trusted. With
-/// the waveforms of 3 to 9 shifts, it is at least 15 % larger, and three times its own σ above.
+/// the waveforms of 3 to 9 shifts the modulation is at least 15 % larger, and then three times its
+/// own σ above the least.
 const SAFE: f64 = 1.0;
 /// Reach to each side of the median by which light is found, camera pixels: pixels that are lit in
 /// part, along shadows and silhouettes, ask for nothing, because a narrow line of coarse fringes
 /// would shear the rows beside it.
 const LIGHT_REACH: usize = 5;
-/// No more contrast than this is asked for: less light than it needs cannot be helped by a coarser
-/// pitch.
+/// No more contrast than this is asked for: where the light would need more, a coarser pitch does
+/// not help.
 const MOST_CONTRAST: f64 = 0.9;
 
 /// The light of each camera pixel.
@@ -76,7 +77,8 @@ pub struct Light {
     pub modulation: Vec<f64>,
     /// σ of a sample, counts.
     pub noise: f64,
-    /// The least modulation that is trusted, counts: the decoder's, or the noise's if that is more.
+    /// The least modulation that is trusted, counts: the decoder's, or that which follows from the
+    /// noise if it is larger.
     pub least: f64,
 }
 
@@ -178,8 +180,8 @@ fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked) -> f64 {
     frequency(first(peak, |i| worth(i) >= enough))
 }
 
-/// The first of 0…`last` for which `holds` is true, given that it is true for all after it; `last`
-/// if it is for none before.
+/// The first of 0…`last` for which `holds` is true, given that it is true for all numbers after the
+/// first; `last` if it is true for none before.
 fn first(last: usize, holds: impl Fn(usize) -> bool) -> usize {
     let (mut low, mut high) = (0, last);
     while low < high {

@@ -17,7 +17,7 @@ pub const PROJECTOR_PITCH: f64 = 8.0;
 /// c: the preliminary patterns' pitch is this many times p_P.
 pub const PRELIMINARY: f64 = 2.5;
 /// p_I, the smallest image pitch, in camera pixels. The paper does not state it; the baseline uses
-/// this.
+/// this value.
 pub const IMAGE_PITCH: f64 = 5.0;
 /// Largest local pitch, projector pixels.
 const MAX_PITCH: f64 = 128.0;

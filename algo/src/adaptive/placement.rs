@@ -1,8 +1,8 @@
 //! How far a part's placement can change the phase of each pixel.
 //!
-//! A single level cannot prove its fringe order: it is right only where the phase stays within half
-//! a turn of the golden map. Two dense levels reach further. The golden
-//! surface and the declared tolerance of placement decide which pixels are safe.
+//! A single level cannot prove its fringe order: the order is right only where the phase stays
+//! within half a turn of the golden map. Two dense levels reach further. The golden surface and the
+//! declared tolerance of placement decide which pixels are safe.
 //!
 //! # Equation
 //! A part that is moved by at most T lies inside its own dilation by a ball of radius T (J.
@@ -19,9 +19,9 @@
 //! the two ends, as Φ is monotonic along a ray.
 //!
 //! # Cost
-//! About 4 (T/s)² maxima of a pixel, at most [`MAX_CELLS`] squared times 3: where T is more than
-//! that many pixels, ρ is dilated by a square first and q goes over every second pixel, every third
-//! and so on, with the square's half diagonal in place of the pixel's.
+//! About 4 (T/s)² maxima per pixel, at most 3 times the square of [`MAX_CELLS`]: where T is more
+//! than [`MAX_CELLS`] pixels, ρ is dilated by a square first and q goes over every second pixel,
+//! every third and so on, with the square's half diagonal in place of the pixel's.
 
 use crate::geometry::{Triangulator, Vector};
 use crate::math::around;
@@ -73,7 +73,7 @@ pub fn phase_reach(triangulator: &Triangulator, golden: &KnownSurface, tolerance
                 let phase = triangulator.function().at(xi, eta);
                 Some(libm::fabs(phase - golden.phase[at].turns()) as f32)
             };
-            // A point that the projector cannot light may come from anywhere.
+            // Where the projector cannot light one of the two ends, the change is not known.
             let ends = change(near[at]).zip(change(far[at]));
             *reach = ends.map_or(f32::INFINITY, |(near, far)| near.max(far));
         }
@@ -116,7 +116,7 @@ impl Ball {
     fn new(tolerance: f64, spacing: f64) -> Self {
         let radius = tolerance / spacing;
         let stride = (libm::ceil(radius) as usize).div_ceil(MAX_CELLS).max(1);
-        // Half the diagonal of what a q stands for.
+        // Half the diagonal of the square of pixels that a q stands for.
         let half = stride as f64 * core::f64::consts::FRAC_1_SQRT_2;
         let cells = libm::floor((radius + half) / stride as f64) as isize;
         let all = (-cells..=cells).flat_map(|dv| (-cells..=cells).map(move |du| (dv, du)));
@@ -132,7 +132,8 @@ impl Ball {
         }
     }
 
-    /// The nearest and the farthest distance of each pixel; NaN is unknown.
+    /// The nearest and the farthest distance of the dilated surface at each pixel; NaN among
+    /// `distances` is unknown.
     fn dilated(&self, distances: &[f32], width: usize) -> (Vec<f32>, Vec<f32>) {
         let rows = distances.len() / width;
         let half = self.stride / 2;
@@ -143,7 +144,7 @@ impl Ball {
             });
             largest_around(values.collect(), width, half)
         };
-        // The nearest are the farthest of the negative distances.
+        // The nearest distances are the largest of the negative ones.
         let (nearest, farthest) = (spread(-1.0), spread(1.0));
         let mut near = vec![f32::NEG_INFINITY; distances.len()];
         let mut far = vec![f32::NEG_INFINITY; distances.len()];
@@ -182,7 +183,7 @@ fn raise(out: &mut [f32], line: &[f32], aside: isize, rise: f32) {
     }
 }
 
-/// The largest value within `half` pixels of each, along rows and columns.
+/// The largest value within `half` pixels of each pixel, along rows and columns.
 fn largest_around(values: Vec<f32>, width: usize, half: usize) -> Vec<f32> {
     if half == 0 {
         return values;

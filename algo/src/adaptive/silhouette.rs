@@ -18,8 +18,8 @@ const MOST_SHIFT: f64 = 0.5;
 const REACH: u32 = 64;
 
 impl ProjectorMap {
-    /// Without the pixels at silhouettes whose light comes from more than half a projector pixel
-    /// beside them, for a camera whose blur has this σ, camera pixels.
+    /// The map without the pixels at silhouettes whose light comes from more than half a projector
+    /// pixel beside them, for a camera whose blur has this σ, camera pixels.
     pub fn without_blurred_silhouettes(&self, camera_blur: f64) -> Self {
         let inwards = inwards(camera_blur);
         let points = (0..self.points.len()).map(|place| {
@@ -44,7 +44,7 @@ impl ProjectorMap {
         let (mut largest, mut beside) = (0.0_f64, false);
         for (du, dv) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
             beside |= self.is_inside(u + du, v + dv) && self.at(u + du, v + dv).is_none();
-            // The next one may be too dark to be known.
+            // The next pixel may be too dark to be known.
             for far in 1..=2 {
                 if let Some([xi, _]) = self.at(u + far * du, v + far * dv) {
                     largest = largest.max(libm::fabs(xi - here) / far as f64);

@@ -39,7 +39,7 @@ pub struct View {
     pub nodes: Vec<Node>,
 }
 
-/// What the camera's corners and the projector's nodes have left, two-dimensional.
+/// The residuals of corners in the camera or of nodes in the projector; each has two components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Residuals {
     /// Sum of squared distances, px².
@@ -54,7 +54,7 @@ impl Residuals {
         libm::sqrt(self.squares / self.points.max(1) as f64)
     }
 
-    /// Of both together.
+    /// The residuals of both together.
     #[must_use]
     pub fn and(&self, other: &Self) -> Self {
         Self {
@@ -141,7 +141,7 @@ struct ScaledNormal {
     /// The lower triangle, row-major.
     matrix: Vec<f64>,
     right: Vec<f64>,
-    /// 1/√ of the diagonal before: the unknowns are the solution times these.
+    /// 1/√ of the diagonal before it was scaled: the unknowns are the solution times these factors.
     scale: Vec<f64>,
 }
 

@@ -49,9 +49,9 @@ pub enum BoardError {
         "only {located} of {all} corners could be located: show the board sharp, in even light without reflections"
     )]
     Few {
-        /// How many could.
+        /// Corners that could be located.
         located: usize,
-        /// How many the board has.
+        /// Corners of the board.
         all: usize,
     },
 }
@@ -83,7 +83,8 @@ impl Board {
     }
 
     /// Finds the board in a picture under even light. x runs along the columns, y such that the
-    /// board's z points to the camera; of the two ways round, that with x to the right, or down.
+    /// board's z points to the camera; of the two orders of the corners that are left, the one with
+    /// x to the right, or down.
     ///
     /// # Errors
     /// If there is no grid of corners, one of another size, or too few of its corners can be
@@ -237,7 +238,7 @@ fn edges(grid: &Grid, (column, row): (i32, i32)) -> (Option<[(f64, f64); 2]>, f6
     (edges, shortest)
 }
 
-/// The error that says more.
+/// Of two errors, the one that says more.
 fn worse(before: Result<FoundBoard, BoardError>, now: BoardError) -> BoardError {
     match (before, now) {
         (Err(before @ BoardError::Few { .. }), _) => before,

@@ -1,11 +1,12 @@
 //! Places that look like the inner corner of a checkerboard, to a pixel.
 //!
-//! On a ring of 16 samples I₀ … I₁₅ of radius 5 px about a corner, opposite samples are equal and
-//! those a quarter further are of the other colour. Response R = Σ|(I_n + I_{n+8}) − (I_{n+4} +
-//! I_{n+12})| − Σ|I_n − I_{n+8}| − 16·|mean of ring − mean of centre|: large at a corner, and not
-//! above 0 at edges and in even areas. Source: S. Bennett, J. Lasenby, "ChESS – quick and robust
-//! detection of chess-board features", Computer Vision and Image Understanding 118, 2014. Here of
-//! the picture's logarithm, so that a corner in little light responds as much as a bright one.
+//! On a ring of 16 samples I₀ … I₁₅ of radius 5 px about a corner, opposite samples are equal, and
+//! the samples a quarter of the ring further on are of the other colour. Response R = Σ|(I_n +
+//! I_{n+8}) − (I_{n+4} + I_{n+12})| − Σ|I_n − I_{n+8}| − 16·|mean of ring − mean of centre|: large
+//! at a corner, and not above 0 at edges and in even areas. Source: S. Bennett, J. Lasenby, "ChESS
+//! – quick and robust detection of chess-board features", Computer Vision and Image Understanding
+//! 118, 2014. Here it is computed of the picture's logarithm, so that a corner in little light
+//! responds as much as a bright one.
 
 use super::picture::Picture;
 use alloc::vec::Vec;
@@ -51,8 +52,8 @@ pub(super) struct Candidate {
 }
 
 impl Candidate {
-    /// Cosine of the angle between the harmonics: 1 of the same colours, −1 with black and white
-    /// exchanged.
+    /// Cosine of the angle between the harmonics of two candidates: 1 for the same colours, −1 with
+    /// black and white exchanged.
     pub fn alike(&self, other: &Self) -> f64 {
         let ((a, b), (c, d)) = (self.harmonic, other.harmonic);
         let lengths = libm::hypot(a, b) * libm::hypot(c, d);
@@ -122,7 +123,7 @@ fn response(picture: &Picture, u: usize, v: usize) -> f32 {
     sum - difference - 16.0 * (mean - centre / 5.0).abs()
 }
 
-/// Whether no response nearby is larger, and none before it equal.
+/// Whether no response nearby is larger, and none before this place, row by row, is equal.
 fn largest(responses: &Picture, u: usize, v: usize) -> bool {
     let here = responses.at(u, v);
     let rows = v.saturating_sub(APART)..(v + APART + 1).min(responses.height);

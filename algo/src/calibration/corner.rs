@@ -66,7 +66,7 @@ pub(super) fn locate(
         let mut next = fit;
         next.iter_mut().zip(&step).for_each(|(x, dx)| *x += dx);
         next[4] = next[4].clamp(SHARPEST, radius / 2.0);
-        // A step to another corner is too long, as one that raises the cost.
+        // A step that leads to another corner is taken back, as one that raises the cost.
         let near = libm::hypot(next[0] - u, next[1] - v) <= radius / 2.0;
         let found = window.cost(&next);
         if near && found <= cost {
@@ -232,7 +232,7 @@ impl Model {
         let by_first = b * first.slope * second.step;
         let by_second = b * first.step * second.slope;
         let [(sin1, cos1), (sin2, cos2)] = self.edges;
-        // Of the colour with the pixel's place.
+        // Derivatives of the colour with the pixel's place.
         let across = -by_first * sin1 - by_second * sin2;
         let down = by_first * cos1 + by_second * cos2;
         let slopes = [

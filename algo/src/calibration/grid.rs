@@ -1,11 +1,12 @@
 //! Candidates put in rows and columns, from one corner to its neighbours.
 //!
 //! Along an edge of the board the next corner has black and white exchanged, and lies about as far
-//! as the one before. A seed is a candidate with such a neighbour in each of the four directions of
-//! its edges; from there the grid grows by prediction (from two corners in line, or from a step
-//! beside), as long as a candidate of the right colours lies within a quarter of a step. Growing by
-//! neighbours holds for any perspective and distortion: A. Geiger et al., "Automatic camera and
-//! range sensor calibration using a single shot", ICRA 2012, grow with an energy instead.
+//! away as the corner before it. A seed is a candidate with such a neighbour in each of the four
+//! directions of its edges; from there the grid grows by prediction (from two corners in line, or
+//! from the step between two corners beside it), as long as a candidate of the right colours lies
+//! within a quarter of a step. Growing by neighbours holds for any perspective and distortion: A.
+//! Geiger et al., "Automatic camera and range sensor calibration using a single shot", ICRA 2012,
+//! grow with an energy instead.
 
 use super::candidates::Candidate;
 use alloc::collections::BTreeMap;
@@ -28,7 +29,7 @@ pub(super) type Grid = BTreeMap<(i32, i32), Candidate>;
 pub(super) fn grown(candidates: &[Candidate], enough: usize) -> Grid {
     let mut best = Grid::new();
     for seed in candidates.iter().take(SEEDS) {
-        // A candidate of a grid before would make the same grid again.
+        // A candidate that an earlier grid contains would make the same grid again.
         let known = best
             .values()
             .any(|known| (known.u, known.v) == (seed.u, seed.v));
@@ -107,8 +108,8 @@ fn grow(grid: &mut Grid, candidates: &[Candidate]) {
 }
 
 /// Where a corner that is not in the grid should lie, and the length of a step there: from the
-/// neighbours on each side, with the step behind them, or where there is none with that of a line
-/// beside.
+/// neighbours on each side, with the step behind them, or, where there is none, with the step in a
+/// line beside it.
 pub(super) fn predicted(grid: &Grid, (column, row): (i32, i32)) -> Option<((f64, f64), f64)> {
     let at = |right: i32, down: i32| {
         let corner = grid.get(&(column + right, row + down));

@@ -88,7 +88,8 @@ pub(super) fn camera(
     Some((lens, poses.collect()))
 }
 
-/// What makes a mirrored projector one that is not, without a turn of more than 45° about its axis.
+/// How the raster of a mirrored projector becomes one that is not mirrored, without a turn of more
+/// than 45° about its axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Mirrored {
     /// One axis is reversed.

@@ -49,7 +49,7 @@ pub enum PoseError {
     /// The projector does not light all of the board, or its fringes cannot be decoded there.
     #[error("only {:.0} % of the board's bright squares have a phase under both patterns: move the board into the projector's light, without shadow or reflection", share * 100.0)]
     OffFringes {
-        /// Share of the bright squares that have.
+        /// Share of the bright squares that have a projector point.
         share: f64,
     },
 }
@@ -65,7 +65,7 @@ pub fn look(board: &Board, levels: &[Picture], fringes: &Fringes<'_>) -> Result<
     }
     let found = mean(&each).ok_or(BoardError::None)?;
     board.enough(&found.corners)?;
-    // First of all: what is blurred seems to move as well.
+    // Blur comes first: a board that is blurred seems to move as well.
     let (blur, most) = (found.blur(), MOST_BLUR * found.step);
     if blur > most {
         return Err(PoseError::Blurred { blur, most });
@@ -121,7 +121,8 @@ fn mean(each: &[FoundBoard]) -> Option<FoundBoard> {
     })
 }
 
-/// RMS distance between the corners that both have, px; infinite if there is none.
+/// RMS distance between the corners that were located in both pictures, px; infinite if there are
+/// none.
 fn apart(a: &FoundBoard, b: &FoundBoard) -> f64 {
     let pairs = a.corners.iter().zip(&b.corners);
     let (mut squares, mut n) = (0.0, 0.0);
@@ -136,8 +137,8 @@ fn apart(a: &FoundBoard, b: &FoundBoard) -> f64 {
     }
 }
 
-/// Share of the squares between inner corners, of the colour of which more have a node, that have
-/// one.
+/// Share of the bright squares between inner corners that have a node. Bright are the squares of
+/// the colour of which more have one.
 fn covered(board: &Board, squares: &[(usize, usize)]) -> f64 {
     let (columns, rows) = (board.columns - 1, board.rows - 1);
     let share = |colour: usize| {

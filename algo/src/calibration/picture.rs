@@ -1,5 +1,5 @@
-//! The offset of a level's frames as singles: what the scene looks like under even light, with less
-//! noise than one frame.
+//! The offset of a level's frames in single precision: what the scene looks like under even light,
+//! with less noise than one frame.
 
 use crate::frame::{FrameView, Samples};
 use alloc::vec;

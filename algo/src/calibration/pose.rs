@@ -44,7 +44,7 @@ impl Pose {
         }
     }
 
-    /// First `first`, then this one.
+    /// The motion that consists of `first` and then of this one.
     #[must_use]
     pub fn after(&self, first: &Self) -> Self {
         // Row i of R·F is Fᵀ applied to row i of R.
@@ -89,7 +89,7 @@ impl Pose {
     pub(super) fn from_axes(x: Vector, y: Vector, shift: Vector) -> Self {
         let x = x * (1.0 / x.length());
         let y = y * (1.0 / y.length());
-        // Both are turned by the same angle until they are at right angles.
+        // Both axes are turned by the same angle until they are at right angles.
         let (sum, difference) = (x + y, x - y);
         let sum = sum * (core::f64::consts::FRAC_1_SQRT_2 / sum.length());
         let difference = difference * (core::f64::consts::FRAC_1_SQRT_2 / difference.length());

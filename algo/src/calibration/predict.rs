@@ -178,7 +178,7 @@ impl Rig {
                 }
             }
         }
-        // The sums need no more than some dozens.
+        // About 48 pairs are enough for the sums.
         let every = (pairs.len() / 48).max(1);
         pairs.into_iter().step_by(every).collect()
     }

@@ -134,8 +134,8 @@ impl Problem<'_> {
             noise += (xx + yy) / determinant;
         }
         let coordinates = 2.0 * corners.len() as f64;
-        // Of the coordinates of all displacements, as many as the numbers that all poses share and
-        // a pose's look like changes of these.
+        // Of the coordinates of all displacements, as many look like changes of the adjusted
+        // numbers as all poses share, and one pose has, of these numbers.
         let shared = self.free.iter().filter(|&&at| at < SHARED + POSE).count() as f64;
         let left = 1.0 - (shared / coordinates).min(0.75);
         (found / left - noise) / coordinates

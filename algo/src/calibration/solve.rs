@@ -81,7 +81,7 @@ pub enum CalibrationError {
         "the residuals are {camera:.2} camera px and {projector:.2} projector px, largest in this pose: check focus, that frames and patterns belong together, and that the board is flat"
     )]
     Residual {
-        /// The pose with the largest.
+        /// The pose with the largest residuals.
         pose: usize,
         /// RMS in the camera, px.
         camera: f64,

@@ -4,8 +4,9 @@
 use super::rig::Rig;
 use crate::geometry::Vector;
 
-/// A normal that is farther than this out of the plane of both lines of sight, or that much outside
-/// of both within it, is hardly that of the plane z = 0 of a head, rad.
+/// A normal that is inclined by more than this to the plane of both lines of sight, or lies within
+/// that plane but by more than this outside the angle between the lines, is hardly that of the
+/// plane z = 0 of a head, rad.
 const MOST_ASIDE: f64 = 10.0 / 180.0 * core::f64::consts::PI;
 
 /// Angles of the board's normal to the lines from its centre to the devices, rad.

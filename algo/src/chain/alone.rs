@@ -36,8 +36,8 @@ struct Pixel {
 impl CodePictures<'_> {
     /// The phase of every pixel of a code of these cells, which lie along the projector's rows
     /// (`vertical` fringes) or columns. Pixels are trusted from a modulation of `least` on; samples
-    /// have this full scale. A pixel is a `Residual` where two bits are undecided, or the cell is
-    /// none of the projector's.
+    /// have this full scale. A pixel is a `Residual` where two bits are undecided, or the cell lies
+    /// outside the projector's raster.
     ///
     /// # Errors
     /// If the pictures do not form a code.
@@ -87,7 +87,8 @@ impl CodePictures<'_> {
         }
     }
 
-    /// The places of all pixels, between the borders of their cells where both are seen.
+    /// The places of all pixels, interpolated between the borders of their cells where both borders
+    /// are seen.
     fn refined(
         &self,
         pixels: &[Pixel],
@@ -141,7 +142,7 @@ impl CodePictures<'_> {
     }
 
     /// Where between a pixel and the next one along the cells the border of their cells lies, as a
-    /// share of the way, and its place in cells; `None` if they are not neighbours.
+    /// share of the way, and its place in cells; `None` if the two cells are not neighbours.
     fn border(
         &self,
         cells: &Cells,
@@ -165,7 +166,8 @@ impl CodePictures<'_> {
 }
 
 impl Pixel {
-    /// From the contrast of each bit, the most significant first, of a code of these cells.
+    /// What a pixel sees, from the contrast of each bit of a code of these cells, the most
+    /// significant bit first.
     fn of(contrasts: &[f64], cells: &Cells, least: f64) -> Self {
         let most = contrasts.iter().copied().map(libm::fabs);
         let modulation = most.fold(0.0, f64::max);
@@ -201,13 +203,13 @@ impl Cells {
         self.coding.word(u32::from(cell), self.bits)
     }
 
-    /// The cell that shows these bits, and that in which the undecided ones are the other way
+    /// The cell that shows these bits, and the cell in which the undecided bits are the other way
     /// round.
     fn around(&self, seen: u16, undecided: u16) -> (u16, u16) {
         let mut own = seen;
         if self.coding.binary {
-            // On the border of two cells the lowest bits are 0111 and 1000; what the lowest of them
-            // is tells the own ones.
+            // On the border of two cells the lowest bits are 0111 on one side and 1000 on the
+            // other; the lowest bit tells on which side the pixel lies.
             let low = undecided >> 1 & undecided;
             let settled = match (low ^ seen) & 1 {
                 0 => low,

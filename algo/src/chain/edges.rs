@@ -35,12 +35,12 @@ const SOUGHT: f64 = 0.05;
 pub struct Edges {
     /// Neighbouring pixels in different cells.
     changes: usize,
-    /// Those of them whose cells are as near to each other as the phase says.
+    /// Of these pairs, those whose cells are as near to each other as the phase says.
     smooth: usize,
-    /// Those of them whose edge is located well enough.
+    /// Of those, the pairs whose edge is located well enough.
     located: usize,
-    /// Σ exp(2πi φ) at them, by the sum of the numbers of both cells and 1, which is twice the
-    /// edge's.
+    /// Σ exp(2πi φ) at located edges. The index is the sum of the numbers of both cells and 1,
+    /// which is twice the number of the edge.
     sums: Vec<[f64; 2]>,
     /// Along rows and along columns, what the phase advances by in turns, and the code in cells.
     advances: [(f64, f64); 2],
@@ -103,11 +103,12 @@ impl Edges {
         }
     }
 
-    /// Adds two pixels, with the phase of the first and what it advances by to the second.
+    /// Adds a pair of pixels, with the phase of the first and what the phase advances by up to the
+    /// second.
     fn pair(&mut self, cells: (i32, i32), phase: f64, advance: f64, turns: f64, axis: usize) {
         let change = cells.1 - cells.0;
         self.changes += usize::from(change != 0);
-        // Two points x apart have less than one cell more than x between them.
+        // The numbers of the cells of two points that are x cells apart differ by less than x + 1.
         if f64::from(change.abs()) > libm::fabs(advance) / turns + 1.0 + NOISE {
             return;
         }

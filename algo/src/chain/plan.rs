@@ -42,7 +42,7 @@ pub struct Cells {
     pub count: u32,
     /// Number of bits of the code.
     pub bits: u8,
-    /// How the numbers of cells are written in them.
+    /// How the numbers of cells are written in the bits.
     pub coding: Coding,
 }
 
@@ -94,12 +94,12 @@ struct Way {
     /// Half a turn less what is uncertain by the code, over the noise, of the least safe step.
     safety: f64,
     steps: usize,
-    /// The candidate before.
+    /// The candidate from which this one is unwrapped.
     before: Option<usize>,
 }
 
 impl Way {
-    /// Safer by more than rounding, or as safe in fewer steps.
+    /// Whether it is safer by more than rounding, or as safe in fewer steps.
     fn betters(&self, other: &Self) -> bool {
         let margin = 1e-9 * other.safety.min(1e9);
         self.safety > other.safety + margin

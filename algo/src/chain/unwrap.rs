@@ -28,13 +28,13 @@ impl Chain {
     ///
     /// The modulation is the finest level's. A pixel is `Dark` or of `LowModulation` where a level
     /// that takes part is, the former if it is the coarsest of them; its phase is a `Residual`
-    /// where a fringe order would be a guess or the cell is none of the projector's.
+    /// where a fringe order would be a guess or the cell lies outside the projector's raster.
     pub fn unwrap(&self, wrapped: &[PhaseMap], code: Option<&[Seen]>) -> PhaseMap {
         self.unwrap_within(MAX_RESIDUAL, wrapped, code)
     }
 
     /// As [`Self::unwrap`] for a chain that starts about a map: Φ in turns, row-major. A pixel is
-    /// `Unexpected` where that is unknown.
+    /// `Unexpected` where the map is unknown.
     pub fn unwrap_about(&self, wrapped: &[PhaseMap], map: &[AbsolutePhase]) -> PhaseMap {
         self.unwrap_from(MAX_RESIDUAL, wrapped, &Given::Map(map))
     }
@@ -136,7 +136,7 @@ impl Chain {
     /// there.
     ///
     /// # Errors
-    /// If the cell is none of the projector's.
+    /// If the cell lies outside the projector's raster.
     fn first(
         &self,
         cells: &Cells,

@@ -41,8 +41,8 @@ impl SampleNoise {
         libm::sqrt(self.read + self.shot * light)
     }
 
-    /// The same by another measure of the light: nothing of that is `offset` counts of this one,
-    /// and a count more is `slope` more.
+    /// The noise as a function of another measure of the light: 0 counts of that measure are
+    /// `offset` counts of the present one, and each further count is `slope` counts.
     #[must_use]
     pub fn by(self, [offset, slope]: [f64; 2]) -> Self {
         Self {

@@ -5,8 +5,9 @@ use super::{Reference, Triangulator, Vector};
 /// The line of sight of one pixel, prepared once for any number of heights: its point at height z
 /// is start + z · rise.
 ///
-/// With a reference from the device models both are in the projector's coordinates, from its
-/// centre: a point's projector pixel then needs the lens model only. Else they are in the world's.
+/// With a reference from the device models, start and rise are in the projector's coordinates, from
+/// its centre: a point's projector pixel then needs the lens model only. Else they are in the
+/// world's coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Sight<'a> {
     triangulator: &'a Triangulator,

@@ -16,8 +16,8 @@
 //! σ² = (Σ w² σ_p² + (Σ w)² σ_m²) / n²
 //! ```
 //!
-//! σ_p is that of a pixel's deviation (√(golden² + measurement²)), σ_m what an error of the motion
-//! does to it, which moves all pixels of a square together. Where the square about a pixel has a
+//! σ_p is σ of a pixel's deviation by noise (√(golden² + measurement²)), σ_m that by the error of
+//! the motion, which moves all pixels of a square together. Where the square about a pixel has a
 //! higher σ than the limit allows, the pixel's weight is about the ratio of the two, else 1: with
 //! weights, no square is noisier than the limit allows.
 //!
@@ -211,7 +211,7 @@ fn carry<'a>(values: impl Iterator<Item = &'a mut f32>) {
 /// The distribution of the largest |deviation| of good parts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LargestDeviation {
-    /// Of the squares of each side.
+    /// The squares of each side.
     fields: Vec<Field>,
 }
 
@@ -240,8 +240,8 @@ fn sigma_of(bin: usize) -> f64 {
 }
 
 impl LargestDeviation {
-    /// Of squares of `side` pixels with these σ, mm, in a frame of `width` columns; places with NaN
-    /// have no square.
+    /// The distribution over squares of `side` pixels with these σ, mm, in a frame of `width`
+    /// columns; places with NaN have no square.
     pub fn new(sigmas: &[f32], width: usize, side: usize) -> Self {
         let mut bins = [(); 3].map(|()| vec![0; BINS]);
         let width = width.max(1);
@@ -272,7 +272,7 @@ impl LargestDeviation {
         Self { fields }
     }
 
-    /// Together with squares of another side.
+    /// Adds the squares of another side.
     pub fn add(&mut self, other: Self) {
         self.fields.extend(other.fields);
     }
@@ -333,7 +333,8 @@ impl LargestDeviation {
 }
 
 /// Clumps above t > 0 of a square of `side` pixels that lies inside its run along so many `axes`: 2
-/// φ(t)/t with a factor θ(t) for each of these, at least those of one independent square in side².
+/// φ(t)/t times θ(t) for each of these axes, and at least as many as if one square in side² were
+/// independent.
 fn clumps_per_square(t: f64, side: f64, axes: i32) -> f64 {
     let half = t * libm::sqrt(2.0 / side) / 2.0;
     let below = 0.5 * libm::erfc(-half / SQRT_2);

@@ -2,12 +2,13 @@
 //! deviation of any part is.
 //!
 //! # Idea
-//! The largest of many noisy means is not 0 on a good part, and scatters much less than one of
-//! them: over 10³ independent squares of error σ it reads 3.5 σ with a scatter of 0.3 σ. On a part
-//! with a defect that is far larger than that, it is the mean over one square and has its error. In
-//! between, the largest deviation is the greater of two: that of noise alone, M, and that of what
-//! does deviate, X. Where several places deviate by nearly as much, as edges of a displaced part
-//! do, X is the greatest of them, which scatters less than each.
+//! The largest of many noisy means is not 0 on a good part, and scatters much less than one mean:
+//! over 10³ independent squares of error σ it reads 3.5 σ with a scatter of 0.3 σ. On a part with a
+//! defect that is far larger than that, the largest deviation is the mean over one square and has
+//! the error of that mean. In between, it is the greater of two numbers: M, the largest deviation
+//! by noise alone, and X, that of the place that does deviate. Where several places deviate by
+//! nearly as much, as edges of a displaced part do, X is the greatest of their deviations, which
+//! scatters less than each.
 //!
 //! # Equations
 //! M has the mean e and the scatter s of [`LargestDeviation`]. X is normal with a mean m and a
@@ -40,9 +41,9 @@ use core::f64::consts::{PI, SQRT_2};
 /// Mean and standard deviation of the largest |deviation| of good parts, mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Largest {
-    /// Over parts and goldens.
+    /// The mean over parts and goldens.
     pub mean: f64,
-    /// See above.
+    /// The standard deviation over parts and goldens.
     pub scatter: f64,
 }
 
@@ -55,7 +56,7 @@ pub(super) struct Uncertain {
     pub defect: f64,
 }
 
-/// So many scatters above the mean are taken as noise.
+/// Deviations up to so many scatters above the mean are taken as noise.
 const NOISE: f64 = 2.0;
 /// Halvings of the interval in which m lies: 1e-9 of it is left.
 const HALVINGS: usize = 30;
@@ -63,9 +64,9 @@ const HALVINGS: usize = 30;
 const FAR: f64 = 8.0;
 
 impl Largest {
-    /// Of the squares about the pixels of a region, of `side` pixels or what is needed more, where
-    /// deviations have the noise of the `taught` heights alone; with `times` the noise it is
-    /// [`Self::times`] as large. `width` is that of the frame.
+    /// The largest deviation of the squares about the pixels of a region, where deviations have the
+    /// noise of the `taught` heights alone. Squares have `side` pixels, or the larger side that a
+    /// place was taught to need. `width` is that of the frame.
     pub fn of(taught: &Taught, width: usize, region: &Region, side: usize) -> Self {
         let pixels = taught.pixels().len();
         let variance = |place| {
@@ -95,7 +96,7 @@ impl Largest {
         Self { mean, scatter }
     }
 
-    /// With so many times the noise.
+    /// The largest deviation with `factor` times the noise.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self {
@@ -142,13 +143,13 @@ impl Largest {
 }
 
 /// Mean and variance of the greater of two normal numbers with these means and variances, and how
-/// often it is the first. At least one variance is not 0.
+/// often the first number is the greater. At least one variance is not 0.
 fn greater([m, u]: [f64; 2], [e, v]: [f64; 2]) -> ([f64; 2], f64) {
     let spread = libm::sqrt(u + v);
     let alpha = (m - e) / spread;
     let chance = 0.5 * libm::erfc(-alpha / SQRT_2);
     let both = spread * libm::exp(-alpha * alpha / 2.0) / libm::sqrt(2.0 * PI);
-    // About e, so that little is lost in the difference.
+    // Moments about e, so that little is lost in the difference.
     let first = (m - e) * chance + both;
     let second = ((m - e) * (m - e) + u) * chance + v * (1.0 - chance) + (m - e) * both;
     ([e + first, (second - first * first).max(0.0)], chance)

@@ -16,7 +16,7 @@ pub struct Region {
 struct Spans {
     /// Row and columns.
     all: Vec<(usize, Range<usize>)>,
-    /// The first of each row of the frame, and the end.
+    /// The index of the first span of each row of the frame, and the number of spans.
     firsts: Vec<usize>,
 }
 
@@ -25,7 +25,7 @@ struct Spans {
 pub(super) struct CrossedEdge {
     from: (f64, f64),
     way: (f64, f64),
-    /// The column where it is crossed.
+    /// The column where the row crosses it.
     u: f64,
 }
 
@@ -135,7 +135,7 @@ pub fn polygon_spans(
 }
 
 impl Spans {
-    /// Becomes those of a polygon in a frame (width, height); `crossed` is a buffer.
+    /// Becomes the spans of a polygon in a frame (width, height); `crossed` is a buffer.
     fn fill(
         &mut self,
         corners: &[(f64, f64)],

@@ -5,8 +5,8 @@
 //! sequences their difference has that error, and noise. Noise is not the same in two such
 //! differences, the error is: so the mean product of both is the variance of the error alone.
 //!
-//! It is not the same everywhere: where its period is near a whole number of pixels, a mean over a
-//! square does not take it out. What counts is where it is largest.
+//! The error is not the same everywhere: where its period is near a whole number of pixels, a mean
+//! over a square does not take it out. The largest value over the part counts.
 //!
 //! **Equation.** With ā and b̄ the means of both differences over the square of L × L pixels about
 //! a pixel, and ⟨⟩ the mean over patches of 4 L × 4 L pixels,
@@ -16,8 +16,8 @@
 //! ```
 //!
 //! ⟨(ā − b̄)²⟩ / 2 is the variance of the noise of ā. A patch has 16 independent squares, so the
-//! mean of the products of noises has a fourth of that as its error, of which three times are taken
-//! off.
+//! mean of the products of noises has an error of a fourth of that variance; three such errors are
+//! subtracted.
 //!
 //! **Shapes and units.** Maps are row-major; the ripple has the unit of the maps.
 //!
@@ -34,9 +34,9 @@ const NOISE: f64 = 3.0 / PATCH as f64 / 2.0;
 const FILLED: f64 = 0.5;
 
 /// What the means of two maps over squares of `side` pixels have in common, RMS over the patch
-/// where that is largest, in frames of `width` columns with so many `pixels`. `values` are those of
-/// a pixel in both; pixels without values are left out, and squares and patches with too few. 0 if
-/// there is no patch.
+/// where that is largest, in frames of `width` columns with so many `pixels`. `values` gives the
+/// values of a pixel in both maps; pixels without values are left out, and so are squares and
+/// patches with too few pixels. 0 if there is no patch.
 pub fn ripple(
     (width, pixels): (usize, usize),
     side: usize,

@@ -14,7 +14,8 @@ pub(super) struct IntegralTable<const N: usize> {
 }
 
 impl<const N: usize> IntegralTable<N> {
-    /// Of a row-major map of `pixels` pixels in rows of `width`; pixels without values add nothing.
+    /// The table of a row-major map of `pixels` pixels in rows of `width`; pixels without values
+    /// add nothing.
     pub fn new(width: usize, pixels: usize, values: impl Fn(usize) -> Option<[f64; N]>) -> Self {
         let rows = pixels / width.max(1);
         let stride = width + 1;

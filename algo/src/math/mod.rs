@@ -5,7 +5,7 @@ pub mod solve;
 
 use core::ops::Range;
 
-/// The columns or rows within `reach` of one, in a frame that has `end` of them.
+/// The columns (or rows) within `reach` of one column, in a frame of `end` columns.
 pub(crate) fn around(at: usize, reach: usize, end: usize) -> Range<usize> {
     at.saturating_sub(reach)..(at + reach + 1).min(end)
 }

@@ -19,7 +19,7 @@ impl<const N: usize> Default for Normal<N> {
 }
 
 impl<const N: usize> Normal<N> {
-    /// Of these observations, added in their order.
+    /// The equations of these observations, added in their order.
     pub fn of(observations: impl IntoIterator<Item = ([f64; N], f64)>) -> Self {
         let mut normal = Self::default();
         for (a, b) in observations {

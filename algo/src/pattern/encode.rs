@@ -36,7 +36,7 @@ pub struct ResponseError {
 }
 
 impl GreyResponse {
-    /// From the light measured at each of the 256 grey levels, in any linear unit.
+    /// The inverse, from the light measured at each of the 256 grey levels, in any linear unit.
     ///
     /// # Errors
     /// If a value is not finite, falls below its predecessor, or nothing rises at all.
@@ -87,7 +87,7 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Prepared for the waveforms of `shots`. With a `response` grey levels pass through its
+    /// An encoder for the waveforms of `shots`. With a `response` grey levels pass through its
     /// inverse.
     pub fn new<'a>(
         response: Option<&GreyResponse>,

@@ -116,7 +116,7 @@ impl PhaseFunction {
         })
     }
 
-    /// From one value in turns per projector pixel, row-major.
+    /// A sampled function, from one value in turns for each projector pixel, row-major.
     ///
     /// # Errors
     /// If the size does not fit the samples, is smaller than 2 × 2, or a sample is not usable.

@@ -25,8 +25,8 @@ fn anywhere(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64
     down.interpolate(lines)
 }
 
-/// The same where all 16 samples around a point lie on the raster, as they do nearly everywhere; by
-/// weights, which is faster.
+/// The value where all 16 samples around a point lie on the raster, as they do nearly everywhere;
+/// computed by weights, which is faster.
 #[inline]
 fn inside(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64)) -> Option<f64> {
     let fits = |x: f64, count: usize| x >= 1.0 && x < (count - 2) as f64;

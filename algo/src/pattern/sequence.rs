@@ -141,7 +141,7 @@ pub enum SequenceError {
 }
 
 impl Sequence {
-    /// From what each frame shows, in the order of the frames.
+    /// The sequence of what each frame shows, in the order of the frames.
     ///
     /// Frames of equal ratio form a level; within it the shifts may come in any order and start
     /// anywhere.

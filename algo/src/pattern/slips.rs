@@ -3,10 +3,9 @@
 //!
 //! **Idea.** A step of unwrapping rounds a number of turns. If noise takes that over 1/2 turn, the
 //! order is wrong. What is then left as a residual is one turn less that noise, so above 0.60 turn
-//! it is below the limit of 0.40 again. About a map there is a second way: the first of the steps
-//! is unambiguous only over some turns either way of the map. A phase near this edge, at which a
-//! displaced part may have it, is taken over it by less noise, and then no level contradicts
-//! another.
+//! it is below the limit of 0.40 again. About a map there is a second way: the first step is
+//! unambiguous only within some turns of the map. The phase of a displaced part may lie near this
+//! edge; then little noise takes it over the edge, and no level contradicts another.
 //!
 //! **Equation.** With σ_I the noise of a sample, B the modulation that a sine has, and the
 //! fundamentals b_i of the levels' waveforms ([`super::Waveform`]), a level's wrapped phase has the
@@ -45,7 +44,7 @@ pub struct Slips {
 }
 
 impl Slips {
-    /// Of a sequence of a phase function with this range.
+    /// The slips of a sequence of a phase function with this range.
     ///
     /// # Errors
     /// If the levels are of no known form.

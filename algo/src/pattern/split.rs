@@ -40,9 +40,9 @@ pub struct Split {
 }
 
 impl Split {
-    /// The most accurate one of so many frames whose reach is at least `reach` turns and whose rate
-    /// of unseen wrong orders is at most 2e-4; the one with the lowest rate if none has that.
-    /// `None` if so many frames have no such reach.
+    /// The most accurate split of so many frames whose reach is at least `reach` turns and whose
+    /// rate of unseen wrong orders is at most 2e-4; if no split has so low a rate, the one with the
+    /// lowest. `None` if no split of so many frames has this reach.
     pub fn best(frames: usize, reach: f64, waveforms: Waveforms) -> Option<Self> {
         let fundamentals: [f64; MAX_LEVEL_SHIFTS + 1] =
             core::array::from_fn(|shifts| waveforms(shifts).fundamental());

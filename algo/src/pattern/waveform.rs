@@ -57,8 +57,8 @@ impl Waveform {
         Self::SINE
     }
 
-    /// With these harmonics: order, from 2 to [`MAX_ORDER`], and share of the fundamental's
-    /// amplitude. Others are left out: files that name them are refused before.
+    /// A waveform with these harmonics: order, from 2 to [`MAX_ORDER`], and share of the
+    /// fundamental's amplitude. Other orders are left out: files that name them are refused before.
     pub const fn of(harmonics: &[(u8, f64)]) -> Self {
         let mut shares = [0.0; MAX_ORDER as usize + 1];
         shares[1] = 1.0;
@@ -73,8 +73,8 @@ impl Waveform {
         Self { shares }
     }
 
-    /// The one with the largest fundamental that `shifts` shifts demodulate like a sine; a sine for
-    /// 4 and for more than 9 shifts.
+    /// The waveform with the largest fundamental that `shifts` shifts demodulate like a sine; a
+    /// sine for 4 and for more than 9 shifts.
     pub const fn brightest(shifts: usize) -> Self {
         match shifts {
             3 | 6 => Self::of(&[(3, 1.0 / 6.0)]),
@@ -104,7 +104,7 @@ impl Waveform {
         }
     }
 
-    /// The harmonics that it has: order and share of the fundamental's amplitude, in ascending
+    /// The harmonics of the waveform: order and share of the fundamental's amplitude, in ascending
     /// order.
     pub fn harmonics(&self) -> impl Iterator<Item = (u8, f64)> + '_ {
         let orders = (0..).zip(self.shares).skip(2);

@@ -19,8 +19,8 @@
 //! D   = D_f − Σ p_i e_i,    p_i = N_i r_i / Σ N r²
 //! ```
 //!
-//! The last line is the mean of D_i = D_f − e_i / r_i with weights N_i r_i². It gives the orders
-//! that adding one level after the other to the mean gives, because they are the same. A **single**
+//! The last line is the mean of D_i = D_f − e_i / r_i with weights N_i r_i². Adding one level after
+//! the other to the mean would give the same fringe orders, and so the same mean. A **single**
 //! level has D = wrap(q_f) / r_f: it is right only within half a turn of the map.
 //!
 //! **Shapes and units.** Half a block of pixels; wrapped phases and residuals in words of 1/65536
@@ -158,7 +158,7 @@ impl<V: Lanes> FixedRatioLanes<V> {
         }
     }
 
-    /// frac(r · x) in 1/65536 turn.
+    /// frac(r · x) in 1/65536 turn, for any ratio.
     #[inline(always)]
     fn fraction_of(&self, v: V, x: Turns<V>) -> V::W {
         if self.plan.one {
@@ -171,7 +171,7 @@ impl<V: Lanes> FixedRatioLanes<V> {
         v.add(product, v.mul_low(x.phase, self.whole))
     }
 
-    /// The same for a ratio below 1.
+    /// frac(r · x) in 1/65536 turn, for a ratio below 1.
     #[inline(always)]
     fn fraction_below_one(&self, v: V, x: Turns<V>) -> V::W {
         let order = x.nearest_order(v);

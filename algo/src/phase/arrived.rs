@@ -39,13 +39,13 @@ pub(crate) struct Layout {
 /// A row of what has arrived, borrowed as words `W` and bytes `B`.
 #[derive(Debug)]
 pub(crate) enum ArrivedRow<W, B> {
-    /// Of geometric levels: what they predict for the next.
+    /// Of geometric levels: what they predict for the next level.
     Expected(Expected<W, B>),
     /// Of levels about a known map.
     Wrapped {
         /// All levels but the finest, coarse to fine, one after the other.
         levels: Wrapped<W, B>,
-        /// Pixels of each.
+        /// Pixels of each level.
         pixels: usize,
     },
 }
@@ -262,7 +262,8 @@ impl WrappedRow<'_> {
 
 impl WrappedRowMut<'_> {
     /// Of several levels of `pixels` each: the coarsest, if it has arrived before, and level `at`
-    /// to be written. `None` if there is no room for it, which there is not for the finest.
+    /// to be written. `None` if there is no room for level `at`; there is none for the finest
+    /// level.
     pub fn level(
         &mut self,
         at: usize,

@@ -44,12 +44,12 @@ pub(super) struct Folded<V: Lanes> {
     pub sign: [V::W; 2],
     /// The axis that the angle is measured from, 1/65536 turn.
     pub axis: [V::W; 2],
-    /// In words, where that takes fewer operations: the angle is this less the octant's (0 or a
-    /// quarter of a turn, 1/65536 turn).
+    /// Folded in words, where that takes fewer operations: the angle is this angle less the one in
+    /// the octant (0 or a quarter of a turn, 1/65536 turn).
     pub base: Option<[V::W; 2]>,
     /// Mask: the modulation is at least the trusted minimum.
     pub strong: V::B,
-    /// Whether that is set nowhere.
+    /// Whether `strong` is set nowhere.
     pub dark: bool,
     /// 255 where a sample is at full scale and the level does not tolerate that.
     pub brightest: V::B,
@@ -88,7 +88,7 @@ pub(super) fn fold_four<V: Lanes>(
     let (s_down, c_down) = (v.eq8(even, i2), v.eq8(odd, i3));
     let (long, short) = (v.max8(s, c), v.min8(s, c));
     let steep = v.eq8(long, s);
-    // Before what is not needed of the background.
+    // Compared first: nothing that follows is needed of dark background.
     let (strong, dark) = strong_four(v, level, long, short);
     let backwards = v.xor8(v.xor8(s_down, c_down), steep);
     let axis = v.quarters8(steep, s_down, c_down);

@@ -29,8 +29,8 @@ pub(super) const FAINT: i16 = 1 << 10;
 /// Largest bit depth of the forms that subtract samples: four of them must fit a word.
 const WORD_FORM_BITS: u8 = 12;
 /// The largest S or C where its unit is chosen to fill a word, with room for roundings. With this
-/// one the rounded weights of N = 5, 7, 8 and 9 turn the pointer by at most 2.4e-7 turn; with
-/// others by up to 3e-6.
+/// value the rounded weights of N = 5, 7, 8 and 9 turn the pointer by at most 2.4e-7 turn; with
+/// other values by up to 3e-6.
 const LARGEST: f64 = 32_694.0;
 
 /// A level prepared for demodulation at one bit depth.
@@ -61,7 +61,7 @@ pub(crate) struct Level {
     long_enough: i16,
     /// Whether a pixel whose pointer is [`FAINT`] can be trusted.
     pub faint: bool,
-    /// The same for four shifts of 8 bits, folded in bytes.
+    /// The least modulation for four shifts of 8 bits, which are folded in bytes.
     four: LeastOfFour,
     /// Coefficients of √(1 + t²), scaled so that the product with a length is a modulation.
     hypotenuse: [i16; 3],
@@ -78,7 +78,7 @@ struct LeastOfFour {
     power: u16,
     /// The least |S| or |C| that is enough by itself.
     long_enough: u8,
-    /// The largest that is too short even where both are so long.
+    /// The largest |S| and |C| that are too short even together.
     too_short: u8,
 }
 
@@ -87,7 +87,7 @@ struct LeastOfFour {
 pub(crate) enum Samples {
     /// N = 4: differences of opposite shifts.
     Four,
-    /// The same of more than 12 bits.
+    /// N = 4 with samples of more than 12 bits.
     WideFour,
     /// N = 3 and 6: sums and differences, and one product.
     Thirds,

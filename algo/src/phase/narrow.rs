@@ -36,13 +36,13 @@ impl RowSample for u16 {
     }
 }
 
-/// A block of columns around fewer; the whole row if it is narrower than a block.
+/// A block of columns around fewer columns; the whole row if it is narrower than a block.
 pub(super) fn near(columns: &Range<usize>, width: usize) -> Range<usize> {
     let start = columns.start.min(width.saturating_sub(MAX_PIXELS));
     start..(start + MAX_PIXELS).min(width)
 }
 
-/// Padded copies of rows that are narrower than a block, none of others.
+/// Padded copies of the rows if these are narrower than a block; else none.
 pub(super) fn padded_rows<T: RowSample>(
     rows: &[&[T]],
     near: &Range<usize>,

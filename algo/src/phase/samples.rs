@@ -20,7 +20,7 @@ pub(crate) trait BlockSample: Sample {
     -> Self::Block<V>;
     /// As words, moved up to 16 bits and counted from the middle of their range.
     fn centred<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>) -> [V::W; 2];
-    /// The same of samples of 16 bits.
+    /// Samples of 16 bits as words, counted from the middle of their range.
     fn centred_16<V: Lanes>(v: V, block: Self::Block<V>) -> [V::W; 2];
     /// a + b, of at most 15 bits.
     fn sum<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> [V::W; 2];
@@ -29,7 +29,7 @@ pub(crate) trait BlockSample: Sample {
     /// Bits by which differences of N = 3, 4 or 6 samples are shifted left to fill words, less one,
     /// and as they are.
     fn lift<V: Lanes, const N: usize>(v: V, level: &LevelLanes<'_, V>) -> [V::Count; 2];
-    /// The brighter of two.
+    /// The brighter of two samples.
     fn brighter<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> Self::Block<V>;
     /// S or C from a sum of products ([`super::level::Samples::Terms`]).
     fn rounded<V: Lanes>(v: V, level: &LevelLanes<'_, V>, sum: [V::D; 2]) -> V::W;

@@ -52,18 +52,18 @@ pub(crate) trait Frames: Copy {
 /// Which block of a cache line is folded.
 #[derive(Clone, Copy)]
 pub(crate) enum Place {
-    /// The first: the others are kept.
+    /// The first block: the other blocks of the line are kept.
     First,
-    /// One of the others, 1 for the second.
+    /// Another block of the line, 1 for the second.
     Other(usize),
-    /// Any, without those around it.
+    /// A block by itself, without those around it.
     Alone,
 }
 
 impl<const N: usize> Frames for [&[u8]; N] {
     const DOUBLED: bool = false;
     const LINES: bool = true;
-    /// Of each block but the first.
+    /// The samples of each block of a line but the first.
     type Kept<V: Lanes> = [[V::B; N]; 3];
 
     #[inline(always)]

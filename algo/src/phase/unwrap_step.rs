@@ -22,9 +22,9 @@
 //! one turn it is within 2/65536 turn; that gives the residual. Its whole turns are needed only
 //! within ± 0.1 turn, because a residual above 0.40 is rejected anyway; they come from a
 //! fixed-point product with as many fractional bits as fit beside the largest number of turns. The
-//! coarse phase that it is taken of is in one word ([`Absolute`]): its whole turns and the leading
-//! bits of its fraction, with the fractional bits of the step before, whose order and fraction are
-//! then merged by a mask.
+//! coarse phase in this product is one word ([`Absolute`]): its whole turns and the leading bits of
+//! its fraction, with the fractional bits of the step before, whose order and fraction are then
+//! merged by a mask.
 //!
 //! **Accuracy.** No fringe order differs from the exact one:
 //! `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`,
@@ -282,7 +282,7 @@ impl<V: Lanes> UnwrapStepLanes<V> {
         ]
     }
 
-    /// The same by expected phases.
+    /// Unwraps `wrapped` by expected phases.
     #[inline(always)]
     pub fn unwrap_expected(
         &self,

@@ -2,8 +2,8 @@
 //!
 //! Φ_R^V and Φ_R^H (Peng & Gupta 2008, eqs. 10–11) give the projector point that lights each camera
 //! pixel's point of the plane: ξ = pitch · Φ_R^V, η = pitch · Φ_R^H. The measured phases are noisy,
-//! so what they are off those that the models predict is fitted by a polynomial of degree 6, which
-//! has a hundredth of their noise.
+//! so their difference from the phases that the models predict is fitted by a polynomial of degree
+//! 6, which has a hundredth of the noise.
 
 use super::PhaseMap;
 use crate::geometry::{FittedMap, ReferenceError, fit_map};
@@ -43,7 +43,7 @@ pub enum PlateError {
         filled * 100.0
     )]
     Small {
-        /// The share that is.
+        /// The share that is resolved.
         filled: f64,
     },
     /// The resolved pixels do not determine the fit.

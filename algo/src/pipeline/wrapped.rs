@@ -1,4 +1,4 @@
-//! The wrapped phase of one level, without any other.
+//! The wrapped phase of one level, without any other level.
 
 use super::{PhaseMap, decode};
 use crate::frame::FrameView;

@@ -39,8 +39,8 @@ pub(crate) trait Lanes: Copy + Debug {
     const LIFTS_FAINT: bool = true;
     /// How many samples ahead of their use rows are prefetched.
     const AHEAD: usize;
-    /// The same where the rows of several levels are read: a sample then takes longer, and fewer
-    /// lines wait that displace one another.
+    /// The distance where the rows of several levels are read: a sample then takes longer, and
+    /// fewer waiting lines displace each other in the cache.
     const AHEAD_OF_MANY: usize = Self::AHEAD / 2;
     /// A byte per pixel of a block.
     type B: Copy;
@@ -73,8 +73,8 @@ pub(crate) trait Lanes: Copy + Debug {
         }
         blocks
     }
-    /// Prefetches what lies `after` samples behind the block at `at`. That is [`Self::AHEAD`] or
-    /// [`Self::AHEAD_OF_MANY`] where whole rows are read, because rows follow one another in
+    /// Prefetches the samples `after` samples behind the block at `at`. `after` is [`Self::AHEAD`]
+    /// or [`Self::AHEAD_OF_MANY`] where whole rows are read, because rows follow one another in
     /// memory; where only some columns of each row are read it is the length of a row, so that the
     /// same columns of the next row are prefetched.
     fn fetch<T>(self, row: &[T], at: usize, after: usize);
@@ -106,8 +106,8 @@ pub(crate) trait Lanes: Copy + Debug {
     fn excess8(self, a: Self::B, b: Self::B) -> Self::B {
         self.sub8(self.max8(a, b), b)
     }
-    /// 128 where s is set, of pixels where the first mask is set, or c of others; and 64 more where
-    /// the first mask is set. All are masks.
+    /// The sum of 128 where `s` (or `c`, for pixels where `mask` is not set) is set, and of 64
+    /// where `mask` is set. All three are masks.
     #[inline(always)]
     fn quarters8(self, mask: Self::B, s: Self::B, c: Self::B) -> Self::B {
         let half = self.and8(self.pick8(mask, s, c), self.splat8(128));

@@ -1,11 +1,12 @@
-//! What the back-ends of x86-64 share: prefetching, and an operation that both compose in the same
-//! way.
+//! What the two back-ends of x86-64 share: prefetching, and an operation that both compose of the
+//! same instructions.
 
 use super::lanes::{Lanes, Scaled};
 use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
-/// Rows of a single level are prefetched this many samples ahead, about 350 ns of work with AVX2;
-/// so is half of it of several.
+/// Rows of a single level are prefetched this many samples ahead, which is about 350 ns of work
+/// with AVX2; rows of several levels half as far, which takes as long. docs/design.md has what
+/// other distances cost.
 pub(super) const AHEAD: usize = 512;
 /// Bytes of a cache line.
 const LINE: usize = 64;

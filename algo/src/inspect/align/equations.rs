@@ -13,9 +13,10 @@ use alloc::vec::Vec;
 /// The equation of a point in the linear problem.
 #[derive(Debug)]
 pub(super) struct Equation {
-    /// At the motion about which the problem is linear, mm.
+    /// The residual at the motion about which the problem is linear, mm.
     pub residual: f64,
-    /// What a further motion takes off it, see [`Facet::jacobian`](super::Facet::jacobian).
+    /// What a further motion takes off the residual, see
+    /// [`Facet::jacobian`](super::Facet::jacobian).
     pub jacobian: [f64; 6],
     /// Error of the x and y of the facet's lift (1 σ).
     pub lift_noise: f64,
@@ -23,7 +24,7 @@ pub(super) struct Equation {
     pub lever: Vector,
     /// Variance of the point's height, mm².
     pub variance: f64,
-    /// The same, with the variance of the surface's height, mm².
+    /// Variance of the point's height and of the surface's, mm².
     pub both: f64,
 }
 
@@ -88,7 +89,7 @@ impl Equations {
         self.points
     }
 
-    /// How many residuals are smaller.
+    /// How many residuals are smaller than a size.
     pub fn agreeing(&self, limit: f64) -> usize {
         let residuals = self.all.iter().flat_map(|four| four.residual);
         let small = residuals.take(self.points).filter(|r| r.abs() < limit);
@@ -100,8 +101,8 @@ impl Equations {
         libm::sqrt(self.both / self.points as f64)
     }
 
-    /// Weighs the points by their residuals after a further motion. σ of the residuals is that of
-    /// their median, at least `least`; the answer.
+    /// Weighs the points by their residuals after a further motion. Returns σ of the residuals:
+    /// that which follows from their median, at least `least`.
     pub fn weigh(
         &mut self,
         backend: Backend,

@@ -95,7 +95,7 @@ const CORNERS: usize = 8;
 const HALVINGS: usize = 10;
 /// With a larger share of outliers a bent part may have been taken for a moved one.
 const SUSPICIOUS: f64 = 0.05;
-/// Buffers of a fit, which the next one uses again.
+/// Buffers of a fit, which the next fit uses again.
 #[derive(Debug, Default)]
 pub struct FitBuffers {
     equations: Equations,
@@ -106,10 +106,10 @@ pub struct FitBuffers {
 pub struct Fitting<'a> {
     /// The surface to be met.
     pub golden: GoldenSurface<'a>,
-    /// Where it is looked at, and the point that is turned about.
+    /// At which spots the surface is measured, and the point that motions turn about.
     pub plan: &'a Alignment,
-    /// The motion to begin with; directions that the shape does not determine keep it. None: none
-    /// at all.
+    /// The motion to begin with; along directions that the shape does not determine it is kept.
+    /// `None` begins without a motion.
     pub from: Option<Motion>,
     pub(super) backend: Backend,
 }
@@ -157,7 +157,7 @@ impl Fitting<'_> {
         Some(found.placed)
     }
 
-    /// The motion that is found from the first one, beginning with these weights.
+    /// The motion that is found from the motion to begin with, beginning with these weights.
     fn descend(
         &self,
         mut weights: WeightFunction,
@@ -194,7 +194,7 @@ impl Fitting<'_> {
         None
     }
 
-    /// A motion with a further one on top.
+    /// A motion followed by a further one.
     fn then(&self, motion: &Motion, further: &[f64; 6]) -> Motion {
         let [x, y, z, a, b, c] = *further;
         let turn = Vector::new(a, b, c) * (1.0 / self.plan.radius);
@@ -270,7 +270,8 @@ impl Fitting<'_> {
         form(&jacobian, &placed.covariance, &jacobian).max(0.0)
     }
 
-    /// The linear problem about a motion; `still` if that is none, where facets are planned.
+    /// The linear problem about a motion; `still` if the part lies as taught, for which facets are
+    /// planned.
     fn linearise(
         &self,
         samples: &[Sample],

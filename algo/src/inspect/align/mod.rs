@@ -39,13 +39,13 @@ pub struct Spot {
 pub struct Alignment {
     /// The point that is turned about: the mean of the surface's points, mm.
     pub centre: Vector,
-    /// RMS distance of the points from it, mm.
+    /// RMS distance of the surface's points from the centre, mm.
     pub radius: f64,
     /// Components of the motion that the shape does not determine.
     pub left_out: [bool; 6],
     /// Corners of a box around the part.
     corners: Vec<Vector>,
-    /// From the top row down.
+    /// The spots, from the top row down.
     spots: Vec<Spot>,
     pixels_per_spot: f64,
 }
@@ -59,11 +59,11 @@ const POINTS: usize = 1800;
 /// the number of points is doubled, up to this factor, until no spot is lifted by more than
 /// [`MOST_LIFT_MM`].
 const MORE_POINTS: usize = 8;
-/// Largest error of a spot's height by that of the motion, mm (1 σ).
+/// Largest error of a spot's height that the error of the motion causes, mm (1 σ).
 const MOST_LIFT_MM: f64 = 0.01;
 
 impl Alignment {
-    /// Plans it; none if the surface inside the window has too few points.
+    /// Plans an alignment; `None` if the surface inside the window has too few points.
     pub fn new(golden: GoldenSurface<'_>, window: Window<'_>) -> Option<Self> {
         let mut points = POINTS;
         loop {
@@ -78,8 +78,8 @@ impl Alignment {
         }
     }
 
-    /// Plans it with about so many points. The second value is how a part that lies as taught is
-    /// then found to lie.
+    /// Plans an alignment with about so many points. The second value is how a part that lies as
+    /// taught is then found to lie.
     fn of_points(
         points: usize,
         golden: GoldenSurface<'_>,
@@ -124,7 +124,7 @@ impl Alignment {
         Some((alignment, placed))
     }
 
-    /// How a part that lies as taught is found to lie, with the noise of golden; none if the
+    /// How a part that lies as taught is found to lie, with the noise of golden; `None` if the
     /// surface has too few points.
     pub fn still(&self, golden: GoldenSurface<'_>) -> Option<Placed> {
         let still = |(at, spot): (usize, &Spot)| Sample {

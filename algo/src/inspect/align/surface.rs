@@ -10,9 +10,9 @@ use core::ops::Range;
 pub struct GoldenSurface<'a> {
     /// The camera's geometry.
     pub triangulator: &'a Triangulator,
-    /// Its heights.
+    /// The taught heights.
     pub surface: &'a KnownSurface,
-    /// Where they are compared.
+    /// Where the heights are compared.
     pub taught: &'a Taught,
 }
 
@@ -24,18 +24,18 @@ pub struct Facet {
     pub lift: Vector,
     /// The area in x and y that a pixel sees, mm².
     pub area: f64,
-    /// Error of m's x and y, 1 σ: that by the noise of the heights of one measurement. Golden may
-    /// be the mean of several, but the errors of slopes by pattern, blur and lenses, which no mean
-    /// lowers, remain: on a body that can turn about its axis they would else be taken for a shape
-    /// that determines this turn.
+    /// Error of m's x and y, 1 σ: the one that follows from the noise of the heights of one
+    /// measurement. Golden may be the mean of several measurements, but errors of slopes that
+    /// pattern, blur and lenses cause are not lowered by a mean: on a body that can turn about its
+    /// axis they would be taken for a shape that determines this turn.
     pub lift_noise: f64,
-    /// Error of a height by the noise of one measurement, mm (1 σ).
+    /// Error of a height that follows from the noise of one measurement, mm (1 σ).
     pub sigma: f64,
 }
 
 impl Facet {
     /// −∂r/∂x at a point, r its height above the surface: what a shift in mm and a turn about
-    /// `centre`, as the way in mm of a point at `radius`, take off it where they are taken back.
+    /// `centre`, as the way in mm of a point at `radius`, take off r when they are taken back.
     pub fn jacobian(&self, point: Vector, (centre, radius): (Vector, f64)) -> [f64; 6] {
         let turning = (point - centre).cross(self.lift) * (1.0 / radius);
         let lift = self.lift;
@@ -53,7 +53,7 @@ const REACH: usize = 2;
 /// Distance over which the camera's derivatives are taken, mm: small against the working distance,
 /// large against rounding.
 const DELTA_MM: f64 = 0.01;
-/// Σ i² over that square.
+/// Σ i² over the square of a facet.
 const SQUARES: f64 = 50.0;
 
 impl GoldenSurface<'_> {
@@ -80,12 +80,12 @@ impl GoldenSurface<'_> {
     }
 
     /// The facet about the pixel next to where `point` is `seen`: where the camera projects it.
-    /// None unless all pixels of its square are compared.
+    /// `None` unless all pixels of its square are compared.
     pub fn facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
         self.facet_of(point, seen, Taught::all_compared)
     }
 
-    /// As [`Self::facet`]; none unless all pixels of its square count in full.
+    /// As [`Self::facet`]; `None` unless all pixels of its square count in full.
     pub(super) fn quiet_facet(&self, point: Vector, seen: (f64, f64)) -> Option<Facet> {
         self.facet_of(point, seen, Taught::all_full)
     }

@@ -23,13 +23,13 @@ pub struct Grid {
 pub struct TooFine {
     /// Side of a cell in pixels.
     pub side: usize,
-    /// How many there would be.
+    /// How many cells there would be.
     pub cells: usize,
 }
 
 /// Cells of a region: 3 MB.
 const MAX_CELLS: usize = 1 << 16;
-/// A gauge that leaves the side of its cells to the grid has about so many.
+/// A gauge that leaves the side of its cells to the grid has about so many cells.
 const CELLS: usize = 1024;
 /// A cell with fewer than this share of its square's pixels is left out, if the gauge asks for a
 /// side.
@@ -40,7 +40,7 @@ const MIN_SIDE: usize = 4;
 const MIN_SHARE: f64 = 0.5;
 
 impl Grid {
-    /// Over a region's pixels; with a side of 0 the grid chooses one.
+    /// The grid over a region's pixels; with a side of 0 it chooses the side.
     ///
     /// # Errors
     /// If there are too many cells.
@@ -82,7 +82,7 @@ impl Grid {
         self.side
     }
 
-    /// Cells of a row.
+    /// Cells in a row of the grid.
     pub fn columns(&self) -> usize {
         self.columns
     }
@@ -93,7 +93,7 @@ impl Grid {
         libm::ceil(MIN_SUPPORT * side * side) as i64
     }
 
-    /// The cell of a pixel of golden's frame; the nearest one for pixels beside the box.
+    /// The cell of a pixel of golden's frame; for pixels beside the box the nearest cell.
     #[inline(always)]
     pub fn cell(&self, u: i32, v: i32) -> usize {
         let along = (u.max(self.left as i32) as usize - self.left) / self.side;
@@ -112,7 +112,7 @@ pub struct Sum {
 }
 
 impl Sum {
-    /// Adds another's pixels.
+    /// Adds the pixels of another sum.
     pub fn add(&mut self, other: &Self) {
         self.count += other.count;
         self.deviation += other.deviation;
@@ -124,7 +124,7 @@ impl Sum {
 pub struct Cell {
     /// Its number in the [`Grid`].
     pub at: usize,
-    /// Pixels whose noise makes its error.
+    /// How many pixels' noise its error follows from.
     pub pixels: f64,
     /// Height, mm: as taught plus the mean deviation, so that it does not depend on which pixels of
     /// the cell were measured.
@@ -135,10 +135,10 @@ pub struct Cell {
     pub taught: TaughtCell,
 }
 
-/// Appends the cells of a region to `out`; none if less than half of the pixels that it had as
-/// taught were measured. With `least`, only cells with at least so many measured pixels. Without,
-/// all cells that it had as taught: one without a measured pixel gets the mean deviation of the
-/// others.
+/// Appends the cells of a region to `out`, but none if less than half of the pixels that the region
+/// had as taught were measured. With `least`, these are the cells with at least so many measured
+/// pixels; without it, all cells that the region had as taught, where a cell without a measured
+/// pixel gets the mean deviation of the others.
 pub fn cells(sums: &[Sum], taught: &[TaughtCell], least: Option<i64>, out: &mut Vec<Cell>) {
     let had: u64 = taught.iter().map(|cell| u64::from(cell.pixels)).sum();
     let has: i64 = sums.iter().map(|sum| sum.count).sum();

@@ -1,7 +1,7 @@
 //! What gauges that are not linear in height share: models of the errors of extremes and shares.
 //!
-//! Cells do not share pixels, so the errors of their means are independent, with σ² = σ_z² / side²
-//! each. The models need the cells' values only; `tests/suite/precision.rs` compares them with
+//! Cells do not share pixels, so the errors of their means are independent; each has σ² = σ_z² /
+//! side². The models need the cells' values only; `tests/suite/precision.rs` compares them with
 //! simulation.
 
 use super::{Cell, Found};
@@ -40,8 +40,8 @@ pub(super) fn motion(g: &[f64; 6], placed: Option<&Placed>) -> f64 {
     placed.map_or(0.0, |placed| form(g, &placed.covariance, g).max(0.0))
 }
 
-/// Rounds in which the scatter of values is found without those that lie more than [`CLIP`] times
-/// of it off their mean.
+/// Rounds in which the scatter of values is found without values that lie more than [`CLIP`]
+/// scatters off the mean.
 const ROUNDS: usize = 4;
 const CLIP: f64 = 3.0;
 /// The largest of all values belongs to a defect, not to noise, where it lies more than this many
@@ -49,8 +49,8 @@ const CLIP: f64 = 3.0;
 const DEFECT: f64 = 5.0;
 
 /// Estimates of true values: the measured ones, moved towards their mean until their scatter is
-/// less by σ², so that the scatter that the errors make does not count twice. Those of a defect
-/// stay where they are.
+/// less by σ², so that the scatter that the errors make does not count twice. The values of a
+/// defect stay where they are.
 pub(super) struct Drawn {
     mean: f64,
     scatter: f64,
@@ -58,7 +58,7 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    /// Of values with an error of `sigma` each.
+    /// The estimates for values of which each has an error of `sigma`.
     pub fn of(values: impl Iterator<Item = f64> + Clone, sigma: f64) -> Self {
         let (mut mean, mut scatter) = (0.0, f64::INFINITY);
         for _ in 0..ROUNDS {
@@ -97,8 +97,8 @@ impl Drawn {
 const BINS_PER_SIGMA: f64 = 4.0;
 const BINS: usize = 40;
 
-/// Standard deviation, over repeated measurements, of the largest of values with an error of
-/// `sigma` each, from its distribution F(x) = Π Φ((x − mᵢ)/σ), m the true values ([`Drawn`]).
+/// Standard deviation, over repeated measurements, of the largest of values of which each has an
+/// error of `sigma`, from its distribution F(x) = Π Φ((x − mᵢ)/σ), m the true values ([`Drawn`]).
 fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
     if !(sigma > 0.0) {
         return 0.0;

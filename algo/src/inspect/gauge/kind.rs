@@ -27,7 +27,7 @@ pub enum Basis {
 }
 
 impl Basis {
-    /// The side of its squares or cells, if it states one.
+    /// The side of the squares or cells, if the gauge states one.
     pub fn side(self) -> Option<usize> {
         match self {
             Self::Squares(side) | Self::Cells(side) => Some(side),
@@ -35,7 +35,7 @@ impl Basis {
         }
     }
 
-    /// The side of its squares.
+    /// The side of the squares.
     pub fn square_side(self) -> Option<usize> {
         match self {
             Self::Squares(side) => Some(side),
@@ -43,7 +43,7 @@ impl Basis {
         }
     }
 
-    /// The side of its cells, if it is worked out from cells; 0 if the grid may choose it.
+    /// The side of the cells, if the value is worked out from cells; 0 if the grid may choose it.
     pub(in crate::inspect) fn cell_side(self) -> Option<usize> {
         match self {
             Self::Cells(side) => Some(side.max(1)),
@@ -67,13 +67,13 @@ pub struct Facts {
     pub compares: bool,
     /// Whether no part can have a value below 0, which the unit does not say.
     pub never_negative: bool,
-    /// The deviation or height that the noise of a square or cell must stay below; without it the
-    /// gauge's limits are.
+    /// The deviation or height that the noise of a square or cell must stay below; without it, the
+    /// gauge's limits are taken.
     pub noise_limit: Option<f64>,
 }
 
 impl Facts {
-    /// Of a value that is made of heights and may be negative.
+    /// The facts of a value that is made of heights and may be negative.
     pub(super) fn new(unit: Unit, basis: Basis, words: &'static str) -> Self {
         Self {
             unit,
@@ -96,7 +96,7 @@ pub trait Kind {
         Vec::new()
     }
 
-    /// The name of the region that it compares its own with.
+    /// The name of the second region, with which it compares its own.
     fn from(&self) -> Option<&str> {
         None
     }
@@ -109,7 +109,8 @@ pub trait Kind {
         Ok(())
     }
 
-    /// Its value, of a kind that is worked out from cells; none where there was nothing to measure.
+    /// The value of a gauge that is worked out from cells; `None` where there was nothing to
+    /// measure.
     fn find(&self, _: Evidence<'_>) -> Option<Found> {
         None
     }
@@ -142,11 +143,11 @@ pub(super) use kind;
 /// The cells of a gauge's regions as they were measured. Those of a kind that compares are along
 /// golden's normal.
 pub struct Evidence<'a> {
-    /// The cells of its region, then those of the one that it is compared with.
+    /// The cells of the gauge's region, then those of the region that it is compared with.
     pub all: &'a [Cell],
-    /// How many are of its region.
+    /// How many of the cells are of the gauge's region.
     pub count: usize,
-    /// Columns of the grid of its region.
+    /// Columns of the grid of the gauge's region.
     pub columns: usize,
     /// σ of a cell's mean, mm.
     pub sigma: f64,
@@ -154,12 +155,12 @@ pub struct Evidence<'a> {
     pub variances: [f64; 2],
     /// How the part lies.
     pub placed: Option<&'a Placed>,
-    /// Empty, with room for a value per cell.
+    /// An empty buffer with room for a value per cell.
     pub room: &'a mut Vec<f64>,
 }
 
 impl<'a> Evidence<'a> {
-    /// The cells of its region.
+    /// The cells of the gauge's region.
     pub fn cells(&self) -> &'a [Cell] {
         &self.all[..self.count]
     }
@@ -170,10 +171,10 @@ impl<'a> Evidence<'a> {
     }
 
     /// A value that is linear in height, whose derivatives w over the heights of the cells are in
-    /// the room: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g. n are a cell's pixels, σ_z² is the variance of one
-    /// of them, g = Σ wᵢ jᵢ is the derivative of the value over the motion, j a cell's Jacobian,
-    /// and C the motion's covariance. The two terms are taken as independent: the pixels that the
-    /// motion is found from are one in some dozens of the gauge's.
+    /// the buffer: σ² = Σ wᵢ² σ_z² / nᵢ + gᵀ C g. n is the number of a cell's pixels, σ_z² the
+    /// variance of the height of one pixel, g = Σ wᵢ jᵢ is the derivative of the value over the
+    /// motion, j a cell's Jacobian, and C the motion's covariance. The two terms are taken as
+    /// independent: the pixels that the motion is found from are one in some dozens of the gauge's.
     pub fn linear(&self, value: f64) -> Found {
         let (mut pixels, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
         for (at, (w, cell)) in self.room.iter().zip(self.all).enumerate() {

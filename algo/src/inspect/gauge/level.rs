@@ -4,12 +4,13 @@
 use super::Cell;
 use alloc::vec::Vec;
 
-/// The weight of a cell: its pixels as taught, so that it is the same in every measurement.
+/// The weight of a cell: the number of its pixels as taught, so that it is the same in every
+/// measurement.
 pub(super) fn weight(cell: &Cell) -> f64 {
     f64::from(cell.taught.pixels)
 }
 
-/// The mean height over the pixels as taught, mm. Its weights are appended to `out`.
+/// The mean height over the pixels as taught, mm. The weights of the cells are appended to `out`.
 pub(super) fn mean(cells: &[Cell], out: &mut Vec<f64>) -> Option<f64> {
     let all: f64 = cells.iter().map(weight).sum();
     let sum: f64 = cells.iter().map(|cell| weight(cell) * cell.height).sum();
@@ -20,8 +21,8 @@ pub(super) fn mean(cells: &[Cell], out: &mut Vec<f64>) -> Option<f64> {
     Some(sum / all)
 }
 
-/// The least-squares plane z = z₀ + p·(x − x₀) + q·(y − y₀) of cells, each weighing as its pixels
-/// as taught.
+/// The least-squares plane z = z₀ + p·(x − x₀) + q·(y − y₀) of cells; a cell's weight is the number
+/// of its pixels as taught.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Plane {
     pub centre: [f64; 3],
@@ -32,7 +33,7 @@ pub(super) struct Plane {
 }
 
 impl Plane {
-    /// None where the cells lie on a line.
+    /// `None` where the cells lie on a line.
     pub fn of(cells: &[Cell]) -> Option<Self> {
         let pixels: f64 = cells.iter().map(weight).sum();
         let mean = |value: fn(&Cell) -> f64| {
@@ -70,7 +71,7 @@ impl Plane {
         })
     }
 
-    /// How far a cell lies above it along its normal, mm.
+    /// How far a cell lies above the plane along the plane's normal, mm.
     pub fn above(&self, cell: &Cell) -> f64 {
         let (dx, dy) = (
             cell.taught.x - self.centre[0],

@@ -2,9 +2,9 @@
 //!
 //! A region is divided into square cells of pixels in golden's frame. A strip adds each measured
 //! pixel to the cell that holds its taught coordinates. The height of a cell is its taught height
-//! plus its pixels' mean deviation, so on a slope too it does not depend on which of them were
-//! measured. The values of all gauges but coverage, deviation and placement are worked out from
-//! these heights and deviations.
+//! plus its pixels' mean deviation, so on a slope too it does not depend on which pixels of the
+//! cell were measured. The values of all gauges but coverage, deviation and placement are worked
+//! out from these heights and deviations.
 
 mod cells;
 mod coverage;
@@ -43,13 +43,13 @@ pub struct Reading {
     /// Its error over repeated measurements of the same part, 1 σ, where the noise is known.
     /// Golden's own noise adds the same error every time and is not in it.
     pub sigma: Option<f64>,
-    /// What its magnitude is expected to be on a good part with this noise: of a deviation, which
-    /// is an extreme, and so not 0.
+    /// Of a deviation, the magnitude that is expected on a good part with this noise: as an extreme
+    /// it is not 0.
     pub expected: Option<f64>,
-    /// What is the same in every measurement and so not in σ, 1 σ: the effect of golden's noise and
-    /// of the calibration's error.
+    /// The error that is the same in every measurement, and so not in σ (1 σ): the effect of
+    /// golden's noise and of the calibration's error.
     pub systematic: f64,
-    /// Where the value is, of a deviation.
+    /// Of a deviation, the square that the value is the mean of.
     pub square: Option<Square>,
 }
 
@@ -107,7 +107,7 @@ macro_rules! kinds {
                 Vec::from([$(kinds::$kind { $($field: $value),* }.into(),)*])
             }
 
-            /// What it says of itself.
+            /// What the gauge says of itself.
             pub fn facts(&self) -> Facts {
                 self.kind().facts()
             }

@@ -6,8 +6,8 @@ use super::kind::*;
 /// Cells further than this many σ from the tolerance lie on the same side of it in every
 /// measurement.
 const SURE: f64 = 8.0;
-/// Where all are counted, any one that lies more than this many times the scatter off belongs to
-/// the rim of a defect: of noise it is one in 2000.
+/// Where all cells are counted, one that lies more than this many scatters off the mean belongs to
+/// the rim of a defect: by noise alone one cell in 2000 does.
 const RIM: f64 = 3.5;
 
 kind! {
@@ -46,8 +46,8 @@ impl Kind for OutOfTolerance {
     /// Share of the cells that deviate by more than `tolerance` mm. A cell of true deviation m lies
     /// outside with p = Q((T − m)/σ) + Q((T + m)/σ), Q the upper tail of the normal distribution,
     /// so σ² = Σ p(1 − p) / n² + gᵀ C g: the error of the motion moves all cells together, g = Σ p′
-    /// j / n. True deviations are drawn as `Drawn`; those of the rim of a defect, whose true ones
-    /// scatter more than those of the rest, by themselves.
+    /// j / n. True deviations are estimated by `Drawn`; the cells of the rim of a defect, whose
+    /// true deviations scatter more than those of the rest, by an estimate of their own.
     fn find(&self, of: Evidence<'_>) -> Option<Found> {
         let (cells, sigma, tolerance) = (of.cells(), of.sigma, self.tolerance_mm);
         let (columns, room) = (of.columns, of.room);
@@ -92,8 +92,8 @@ impl Kind for OutOfTolerance {
     }
 }
 
-/// Marks by 1, of all others by 0, the cells that have one of a defect beside them, in a grid of so
-/// many columns.
+/// Marks by 1 the cells that have a cell of a defect beside them, and all others by 0, in a grid of
+/// so many columns.
 fn mark_beside(
     (cells, columns): (&[Cell], usize),
     is_defect: impl Fn(&Cell) -> bool,

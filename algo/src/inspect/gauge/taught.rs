@@ -11,7 +11,7 @@ use alloc::vec::Vec;
 /// A cell as taught.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TaughtCell {
-    /// Pixels that are compared.
+    /// Number of pixels that are compared.
     pub pixels: u32,
     /// Their mean height, mm.
     pub height: f64,
@@ -21,8 +21,8 @@ pub struct TaughtCell {
     pub y: f64,
     /// Their area in x and y, mm².
     pub area: f64,
-    /// −∂z/∂x of its height over the components x of the motion that is taken back: shifts in mm,
-    /// turns as the way of a point at the radius in mm
+    /// −∂z/∂x, the derivative of the cell's height over the components x of the motion that is
+    /// taken back: shifts in mm, turns as the way of a point at the radius in mm
     /// ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)).
     pub jacobian: [f64; 6],
     /// Σ of the variances of its pixels' heights, mm².
@@ -33,7 +33,7 @@ pub struct TaughtCell {
 }
 
 impl TaughtCell {
-    /// The same cell, along the normal instead of in height.
+    /// The same cell, with deviations along the normal instead of in height.
     #[must_use]
     pub fn along_normal(mut self) -> Self {
         self.jacobian = self.jacobian.map(|value| value * self.normal);
@@ -42,7 +42,7 @@ impl TaughtCell {
     }
 }
 
-/// Facets of a cell that are averaged, in each direction.
+/// How many facets of a cell are averaged in each direction.
 const FACETS: usize = 4;
 
 /// The cells of a region; turns are `about` this centre, as ways at this radius.
@@ -91,8 +91,7 @@ pub(in crate::inspect) fn taught_cells(
     }
     let all: f64 = facets.iter().sum();
     let total = cells.iter().map(|cell| cell.area).sum::<f64>();
-    // A cell without a facet is taken to have pixels as large as those of the others, and to be
-    // flat.
+    // A cell without a facet is taken to be flat, with pixels as large as those of the other cells.
     let (mean, flat) = (total / all.max(1.0), [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
     for (cell, facets) in cells.iter_mut().zip(facets) {
         let pixels = f64::from(cell.pixels);

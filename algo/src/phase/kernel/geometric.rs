@@ -158,8 +158,8 @@ back_end_entry! {
 }
 
 back_end_entry! {
-    /// Two or three levels in one pass over the frames of all. These are not copied on the way: a
-    /// copy in vectors of what has just been written in words would wait for it.
+    /// Two or three levels in one pass over the frames of all. The rows are not copied on the way:
+    /// a copy in vectors of a list that has just been written in words would wait for the writes.
     fn one_pass [S: Frames, const BETWEEN: usize] = one_pass_columns(
         plan: &Geometric,
         levels: &[Level],
@@ -250,8 +250,8 @@ fn one_pass_columns<V: Lanes, S: Frames, const BETWEEN: usize>(
                     block += 1;
                 }
             } else {
-                // The others of the line are read one by one. The part does not fill the row, and
-                // the next row has about the same lit columns: prefetch those from now on.
+                // The other blocks of the line are decoded one by one. The part does not fill the
+                // row, and the next row has about the same lit columns: prefetch those from now on.
                 start = at + V::PIXELS;
                 after = width;
                 ahead = at + after;
@@ -278,9 +278,9 @@ struct OnePass<'a, V: Lanes, S: Frames, const BETWEEN: usize> {
 }
 
 impl<V: Lanes, S: Frames, const BETWEEN: usize> OnePass<'_, V, S, BETWEEN> {
-    /// Decodes a block. False if it is dark, which may not be asked of the others of a line: then
-    /// only the coarsest level was read. The line of the sample `ahead` is prefetched at finer
-    /// levels.
+    /// Decodes a block. False if it is dark: then only the coarsest level was read. Where there are
+    /// registers enough, the later blocks of a line are not checked for this. The line of the
+    /// sample `ahead` is prefetched at finer levels.
     #[inline(always)]
     fn block(
         &self,
@@ -301,8 +301,8 @@ impl<V: Lanes, S: Frames, const BETWEEN: usize> OnePass<'_, V, S, BETWEEN> {
             kept_coarsest,
         );
         let lit = folded.strong;
-        // The line of a lit block is lit nearly everywhere. With few registers the question costs
-        // less than a longer stretch without a branch, whose instructions the compiler mixes.
+        // The line of a lit block is lit nearly everywhere. With few registers the check costs less
+        // than a longer stretch without a branch, whose instructions the compiler mixes.
         let asked = V::FEW_REGISTERS || !matches!(place, Place::Other(_));
         if asked && folded.dark {
             out.store_unknown(v, at, v.splat8(Trust::Dark as u8));

@@ -13,7 +13,7 @@ use crate::units::AbsolutePhase;
 pub(super) struct KnownBlock<V: Lanes> {
     /// Φ₀, 1/65536 turn.
     phase: [[V::D; 2]; 2],
-    /// The same as fringe orders and fractions.
+    /// Φ₀ as fringe orders and fractions.
     turns: [Turns<V>; 2],
     /// Mask: Φ₀ is not known.
     pub unknown: V::B,

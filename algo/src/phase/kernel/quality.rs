@@ -21,7 +21,7 @@ pub(crate) struct Quality<V: Lanes> {
 }
 
 impl<V: Lanes> Quality<V> {
-    /// Before any level, of pixels where this mask is set.
+    /// The state before any level, for pixels where this mask is set.
     #[inline(always)]
     pub fn new(v: V, strong: V::B) -> Self {
         Self {

@@ -64,7 +64,7 @@ impl<V: Lanes> GeometricLanes<V> {
 
     /// Stores a block at the finest level: absolute phase and modulation of resolved pixels, the
     /// reason of others. `before` are the reasons of coarser levels; the mask `clear` is set where
-    /// there is none, or where `unwrapped` has one, too.
+    /// there is no such reason, or where `unwrapped` has one, too.
     #[inline(always)]
     #[allow(clippy::too_many_arguments)]
     pub fn store(

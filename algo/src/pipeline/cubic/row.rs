@@ -13,15 +13,16 @@ use core::ops::Range;
 
 /// The bit of a taught pixel that says that the part is compared there.
 pub(crate) const COMPARED: u16 = 1 << 15;
-/// The bit that says that it is compared at the pixels to the right, below and right below as well.
+/// The bit that says that the part is compared at the pixels to the right, below and right below as
+/// well.
 pub(crate) const SQUARE: u16 = 1 << 14;
 /// Bits of [`CubicInput::taught`]: σ of golden's height.
 pub(crate) const SIGMA: u16 = SQUARE - 1;
 /// Variances are summed in units of the square of this many nm, each rounded to nearest.
 pub(crate) const VARIANCE_UNIT_NM: f64 = 512.0;
-/// Standard deviations of the known heights are given in 1/16 of that.
+/// Standard deviations of the known heights are given in 1/16 of [`VARIANCE_UNIT_NM`].
 const SIGMAS_PER_UNIT_BITS: u32 = 4;
-/// Half of the square of [`VARIANCE_UNIT_NM`], in squares of these.
+/// Half of the square of [`VARIANCE_UNIT_NM`], in squares of that sixteenth.
 const HALF: u32 = 1 << (2 * SIGMAS_PER_UNIT_BITS - 1);
 /// Larger variances count as this, about (1 mm)², so that no sum over a block exceeds 32 bits.
 const MAX_VARIANCE: f32 = 4_000_000.0;
@@ -48,7 +49,7 @@ pub(crate) struct CubicRow<'a> {
 }
 
 impl CubicRow<'_> {
-    /// Those of some columns.
+    /// The cubics of some columns.
     pub fn part(&self, columns: Range<usize>) -> Self {
         Self {
             base: &self.base[columns.clone()],
@@ -87,7 +88,7 @@ pub(crate) struct CubicInput<'a> {
 pub(crate) struct CubicOutput<'a> {
     /// z − z₀ in nm, [`NO_OFFSET`] where the cubic does not reach.
     pub offset: &'a mut [i32],
-    /// The same where the part is compared, [`NO_OFFSET`] elsewhere.
+    /// z − z₀ in nm where the part is compared, [`NO_OFFSET`] elsewhere.
     pub deviation: &'a mut [i32],
     /// Sums.
     pub tally: &'a mut HeightTally,
@@ -106,11 +107,12 @@ pub(crate) struct HeightTally {
     pub compared: u64,
     /// Compared pixels of the rows whose variances are summed.
     pub summed: u64,
-    /// Σ of their σ_z².
+    /// Σ of σ_z² of these pixels.
     pub variance: u64,
-    /// Pixels of these rows with a height whose golden σ is known.
+    /// Pixels with a height, in the rows whose variances are summed, where σ of golden's height is
+    /// known.
     pub taught: u64,
-    /// Σ of the square of that σ.
+    /// Σ of the squares of σ of golden's height at these pixels.
     pub taught_variance: u64,
 }
 
