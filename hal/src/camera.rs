@@ -18,7 +18,7 @@ pub enum Starts {
     ByItself,
 }
 
-/// How a running camera takes its frames. Nothing changes while it takes some.
+/// How a running camera takes its frames. None of this changes while it runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CameraTiming {
     /// Who starts an exposure.
@@ -33,7 +33,8 @@ pub struct CameraTiming {
 }
 
 impl CameraTiming {
-    /// The same with exposures `times` as long; the time between two of them stays as it is.
+    /// The timing with exposures `times` as long; the time from the end of one exposure to the
+    /// start of the next stays as it is.
     #[must_use]
     pub fn exposed(self, times: u32) -> Self {
         let exposure = self.exposure.saturating_mul(times);
@@ -72,8 +73,8 @@ pub trait Camera: Send {
     fn timing(&self) -> CameraTiming;
 
     /// Makes each exposure `times` as long as it is set to, from the camera's next start on;
-    /// [`Camera::timing`] says so at once. The device is not asked: what it makes of that, its
-    /// start or its frames say.
+    /// [`Camera::timing`] says so at once. The device is not asked: if it cannot, its start fails
+    /// or its frames show it.
     ///
     /// # Errors
     /// `Unsupported` if this back-end can only expose as it is set to.
@@ -93,7 +94,8 @@ pub trait Camera: Send {
         Duration::ZERO
     }
 
-    /// The temperature of its sensor as of the last frame, °C; none if it does not say.
+    /// The temperature of its sensor as of the last frame, °C; `None` if the camera does not report
+    /// it.
     fn temperature_c(&self) -> Option<f64> {
         None
     }

@@ -53,8 +53,8 @@ impl Bound<PlaneModel> for Fields {
 }
 
 impl DeviceModel {
-    /// The geometry of a picture of every second column and row, from these on: one plane of a
-    /// colour sensor.
+    /// The geometry of a picture of every second column and row, from `column` and `row` on: one
+    /// plane of a colour sensor.
     #[must_use]
     pub fn every_second(&self, column: u32, row: u32) -> Self {
         Self {

@@ -108,8 +108,8 @@ bounded! {
         pub controller: ControllerKind,
         /// Device file of the controller's I²C bus.
         pub controller_bus: PathBuf = Longest(MAX_PATH),
-        /// The controller's address on it, 7 bits. The others are reserved (I²C-bus specification,
-        /// UM10204, section 3.1.12).
+        /// The controller's address on the bus, 7 bits. Addresses outside these bounds are reserved
+        /// (I²C-bus specification, UM10204, section 3.1.12).
         pub controller_address: u8 = 8..=119,
         /// The LED that patterns are shown with.
         pub led: Led,

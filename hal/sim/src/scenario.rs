@@ -139,9 +139,9 @@ bounded! {
         pub gamma: f64 = 0.1..=10.0,
         /// The camera's gain: counts at full scale for 1 / gain of the light, 0…100.
         pub gain: f64 = 0.0..=100.0,
-        /// By how much more light than its grey asks for a picture gets whose mean light is almost
-        /// 0, as a share, −1…10; one of mean 1 gets none, and others in proportion. So do
-        /// projectors that adapt their LEDs to the content of a picture.
+        /// How much more light than its grey levels ask for a picture gets whose mean light is
+        /// almost 0, as a share, −1…10; a picture of mean 1 gets no more, others in proportion.
+        /// Projectors that adapt their LEDs to the content of a picture do this.
         pub content_gain: f64 = -1.0..=10.0,
     }
 
@@ -367,7 +367,7 @@ impl Scenario {
         }
     }
 
-    /// Of one value per pixel of the sensor, row by row, those of the pixels in a frame.
+    /// The values of the pixels in a frame, of the values of all pixels of the sensor, row by row.
     pub(super) fn in_frame<T: Copy>(&self, sensor: &[T]) -> Vec<T> {
         if !self.colour {
             return sensor.to_vec();

@@ -57,7 +57,8 @@ bounded! {
         pub stamp: Stamp,
         /// From the moment that they mark to the stamps, 0…1 000 000 µs.
         pub stamp_late_us: u64,
-        /// The same according to the head's calibration; if left out, the true one.
+        /// From that moment to the stamps according to the head's calibration; if left out, the
+        /// true time.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub calibrated_stamp_late_us: Option<u64>,
     }

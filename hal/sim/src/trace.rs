@@ -36,7 +36,7 @@ pub(super) struct Hit {
     pub point: Vector,
     /// The unit normal, on the side from which the ray came.
     pub normal: Vector,
-    /// Share of the light that the material reflects, of what white would.
+    /// The light that the material reflects, as a share of what white would reflect.
     pub albedo: f64,
 }
 

@@ -192,7 +192,7 @@ impl Transport {
     }
 }
 
-/// What tracing a row needs.
+/// What the tracing of a row needs.
 struct Tracer<'a> {
     scenario: &'a Scenario,
     camera: &'a Lens,
@@ -252,9 +252,9 @@ struct Lit {
 /// Memory for the weights of one pixel.
 #[derive(Default)]
 struct Weights {
-    /// Along ξ and along η, of one point.
+    /// The weights along ξ and along η, of one point.
     axes: [Vec<f32>; 2],
-    /// Row by row, of all projector pixels in a rectangle.
+    /// The sums of weights of all projector pixels in a rectangle, row by row.
     sums: Vec<f32>,
 }
 

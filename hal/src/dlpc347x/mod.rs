@@ -65,9 +65,9 @@ impl<I: I2c> Controller<I> {
         Ok(found)
     }
 
-    /// Sets it up for patterns: CAIC and LABB off, one LED, its current if there is one, both
-    /// trigger outputs, one pattern of 8 bit per refresh that is exposed as long as the controller
-    /// allows. Each setting is read back.
+    /// Sets the controller up for patterns: CAIC and LABB off, one LED, with this `current` if one
+    /// is given, both trigger outputs, one pattern of 8 bit per refresh that is exposed as long as
+    /// the controller allows. Each setting is read back.
     ///
     /// # Errors
     /// `Disconnected` if it does not answer, `Unsupported` if the current or the refresh is beyond
@@ -140,8 +140,8 @@ impl<I: I2c> Controller<I> {
     }
 
     /// The longest illumination of one pattern per refresh, and the dark times before and after,
-    /// µs. The controller says how long it must be dark for an illumination time; what is left of
-    /// the refresh is asked for next.
+    /// µs. The controller says how long it must be dark for an illumination time; the rest of the
+    /// refresh is the illumination time that it is asked about next.
     fn exposure(&mut self, refresh: Duration) -> Result<(u32, [u32; 2]), Error> {
         let refresh_us = u32::try_from(refresh.as_micros()).unwrap_or(u32::MAX);
         let mut asked = refresh_us;

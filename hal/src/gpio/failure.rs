@@ -42,7 +42,7 @@ pub enum LineError {
         chip: String,
         /// The line asked for.
         line: String,
-        /// How many.
+        /// How many lines have it.
         lines: usize,
     },
     /// Another program or a kernel driver holds the line.

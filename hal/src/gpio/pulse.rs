@@ -36,7 +36,7 @@ type Put = dyn Fn(bool) -> Result<(), LineError> + Send + Sync;
 /// The line and the state that both threads share.
 struct Pulsed {
     put: Box<Put>,
-    /// Of a pulse for one exposure as the camera is set.
+    /// The width of a pulse for one exposure of the length that the camera is set to.
     width: Duration,
     /// Locked from before an edge until its times are stored, so that a thread that locks it later
     /// knows them.
@@ -45,7 +45,7 @@ struct Pulsed {
 }
 
 struct State {
-    /// Of the pulses that it makes now.
+    /// The width of the pulses that are made now.
     width: Duration,
     /// Times before and after the rising edge of the pulse that is on.
     rise: Option<(Timestamp, Timestamp)>,
@@ -205,8 +205,8 @@ mod tests {
     /// How long an edge is interrupted.
     const STALL: Duration = Duration::from_millis(5);
 
-    /// Fires one pulse on a line whose edges take so long; its time, and the report of it if it was
-    /// spoiled, fetched as soon as its falling edge has begun.
+    /// Fires one pulse on a line whose edges take so long. Returns its time, and the report of it
+    /// if it was spoiled, fetched as soon as its falling edge has begun.
     fn first(rise: Duration, fall: Duration) -> (Timestamp, Option<Spoiled>) {
         let (ends, ended) = std::sync::mpsc::channel();
         let put = move |on: bool| {

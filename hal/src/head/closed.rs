@@ -40,7 +40,7 @@ impl Head {
             Box::new(Monotonic::default()),
             self.timing(),
         );
-        // Its timing is that of so many.
+        // The camera's timing is that of so many exposures.
         closed.devices.exposures = self.devices.exposures;
         closed
     }

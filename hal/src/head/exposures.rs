@@ -1,8 +1,8 @@
 //! Patterns that are exposed several times as long as the camera is set to.
 //!
 //! A digital micromirror device makes grey levels over whole refreshes, so a longer exposure is a
-//! whole number of those that the camera is set to. What follows from the exposure (period of the
-//! camera, pulse of the trigger, times of patterns, time-outs) follows from
+//! whole number of those that the camera is set to. What depends on the exposure (period of the
+//! camera, pulse of the trigger, times of patterns, time-outs) is computed from
 //! [`Camera::timing`](crate::camera::Camera::timing).
 
 use super::{Devices, Head};

@@ -63,7 +63,7 @@ impl Pacing {
     pub fn new(refresh: Duration, camera: &CameraTiming, timing: &Timing) -> Self {
         let refresh = refresh.max(Duration::from_nanos(1));
         let period = match camera.starts {
-            // With the first refresh for which the camera is ready.
+            // The exposure starts with the first refresh for which the camera is ready.
             Starts::ByProjector => {
                 let refreshes = camera.period.as_nanos().div_ceil(refresh.as_nanos());
                 refresh.saturating_mul(u32::try_from(refreshes).unwrap_or(u32::MAX))

@@ -37,8 +37,8 @@ pub struct Timing {
     pub flip_to_light: Duration,
     /// What the camera's stamps mark.
     pub stamp: Stamp,
-    /// From the moment that they mark to the stamp itself: a driver that stamps in an interrupt is
-    /// late by a constant time.
+    /// From the moment that a stamp marks to the stamp itself: a driver that stamps in an interrupt
+    /// is late by a constant time.
     pub stamp_late: Duration,
     /// From the end of an exposure to the end of its readout; used only where stamps mark the end
     /// of the readout.

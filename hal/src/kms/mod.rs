@@ -38,7 +38,8 @@ const PATIENCE: u32 = 10;
 pub struct Display {
     output: Output,
     black: Canvas,
-    /// In the order of the patterns; there may be more, from a longer sequence before.
+    /// Canvases in the order of the patterns; there may be more canvases than patterns, from a
+    /// longer sequence before.
     canvases: Vec<Canvas>,
     loaded: usize,
     shown: Picture,

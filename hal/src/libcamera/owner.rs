@@ -146,7 +146,7 @@ fn ring(ready: &OwnedFd) {
 struct Owner<'a> {
     opened: Opened,
     copies: Pool,
-    /// As it was started.
+    /// The settings that the camera was started with.
     exposing: Exposing,
     wires: &'a Wires,
     running: bool,

@@ -11,7 +11,8 @@ use crate::units::Timestamp;
 const GAIN_INCREMENT: f32 = 0.035;
 /// Metadata has whole microseconds.
 const MICROSECOND: Duration = Duration::from_micros(1);
-/// No frame can be older when it is fetched: libcamera would have given the camera up before.
+/// No frame can be older than this when it is fetched: libcamera would have given the camera up
+/// before.
 const OLDEST: Duration = Duration::from_secs(60);
 
 /// The exposure settings of a camera. They are set before it starts and do not change until it
@@ -123,8 +124,8 @@ impl Clocks {
 /// drivers stamp with `CLOCK_MONOTONIC`.
 ///
 /// A frame is stamped before it is fetched, so a stamp later than the monotonic clock must be from
-/// the boot-time clock. The other way round this holds if the computer was suspended for longer
-/// than the frame is old: after a shorter time, if that happened, the stamp would be taken as
+/// the boot-time clock. A stamp of the boot-time clock is later than that only if the computer was
+/// suspended for longer than the frame is old; after a shorter suspension it would be taken as
 /// monotonic, and be late by the time of suspension. `clocks` is read when the frame is fetched.
 ///
 /// # Errors

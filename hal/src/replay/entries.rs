@@ -9,7 +9,7 @@ use crate::frame::Frame;
 /// The names of the files of frames.
 #[derive(Clone, Copy)]
 pub(super) enum Names {
-    /// By what the frame is: a recording's.
+    /// By the level and shift, or the bit, that the frame shows: the names of a recording.
     Kinds,
     /// By the frame's `count`.
     Counts,

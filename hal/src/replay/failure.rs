@@ -51,7 +51,7 @@ impl Wrong {
         }
     }
 
-    /// The same, naming the key of the manifest that is concerned.
+    /// This problem, naming the key of the manifest that is concerned.
     pub(crate) fn of(self, key: &str) -> Self {
         Self {
             problem: format!("{key}: {}", self.problem),

@@ -137,7 +137,7 @@ impl CodeEntry {
 }
 
 impl Manifest {
-    /// The first version that has what it holds.
+    /// The first version of the format that has what this manifest holds.
     pub fn least_version(&self) -> u64 {
         let later = !self.notes.is_empty() || !self.codes.iter().all(CodeEntry::is_plain);
         match (later, self.pictures().next()) {

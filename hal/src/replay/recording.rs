@@ -87,7 +87,7 @@ pub struct RecordedCode {
     pub inverted: bool,
     /// One picture per bit, the most significant first.
     pub bits: Vec<Frame>,
-    /// The inverse of each, or none.
+    /// The inverse picture of each bit, or none.
     pub inverse: Vec<Frame>,
 }
 
@@ -132,14 +132,15 @@ pub struct Recording {
     /// The recipe that it was measured with.
     pub recipe: Option<RecipeReference>,
     /// True z in mm on each pixel's central ray, row by row; NaN where camera and projector do not
-    /// both see.
+    /// both see the part.
     pub truth_height: Option<Vec<f32>>,
     /// 0 unseen, 1 pixel centre lit, 2 whole pixel lit and no depth edge inside; row by row.
     pub truth_class: Option<Vec<u8>>,
 }
 
 impl Recording {
-    /// One of frames of this format in front of this projector, of which nothing else is known yet.
+    /// A recording of frames of this format in front of this projector, of which nothing else is
+    /// known yet.
     pub fn new(format: FrameFormat, projector: RecordedProjector) -> Self {
         Self {
             width: format.width,

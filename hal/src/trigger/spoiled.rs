@@ -29,7 +29,7 @@ use crate::units::Timestamp;
 
 /// The width of a pulse divided by this is how much the pulse may be off: 0.5 %.
 const WIDTH_DIVISOR: u32 = 200;
-/// It may be off by this in any case: even on an idle computer two edges are not known better (a
+/// Every pulse may be off by this much: even on an idle computer two edges are not known better (a
 /// system call for each takes some µs). This is more than 0.5 % of pulses below 4 ms, but a pulse
 /// that lasts a refresh of a projector that shows grey levels is longer.
 const LEAST: Duration = Duration::from_micros(20);

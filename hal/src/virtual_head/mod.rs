@@ -77,7 +77,7 @@ pub trait Scene: Send {
 /// The scene and the state of the devices in front of it.
 struct Bench<S> {
     scene: S,
-    /// With the exposure and the period of so many [`Bench::exposures`].
+    /// The times of the devices; exposure and period are those of so many [`Bench::exposures`].
     mechanics: Mechanics,
     exposures: u32,
     dice: Dice,
@@ -121,7 +121,8 @@ impl<S: Scene + 'static> Control<S> {
         lock(&self.bench).own_exposure()
     }
 
-    /// Replaces it; the scene is told by its owner how much brighter that is.
+    /// Replaces the exposure that the camera is set to; how much brighter frames are then, the
+    /// owner of the scene tells the scene.
     pub fn set_exposure(&self, exposure: Duration) {
         let mut bench = lock(&self.bench);
         bench.mechanics.exposure = exposure * bench.exposures;

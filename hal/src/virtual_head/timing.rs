@@ -47,7 +47,7 @@ pub struct Mechanics {
     pub stamp: Stamp,
     /// From the moment that they mark to the stamps.
     pub stamp_late: Duration,
-    /// The same according to the head's calibration.
+    /// From the moment that they mark to the stamps, according to the head's calibration.
     pub calibrated_stamp_late: Duration,
     /// What goes wrong.
     pub faults: Faults,

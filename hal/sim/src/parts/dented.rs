@@ -19,7 +19,7 @@ pub(super) struct Dented {
 
 struct Dent {
     centre: Vector,
-    /// Its depth in z.
+    /// The depth of the dent along z.
     drop: f64,
     half_width: f64,
 }

@@ -22,7 +22,7 @@ const BASE: f64 = -37.0;
 const RIM: f64 = 68.0;
 
 impl Face {
-    /// The surface of a good one.
+    /// The surface of a good face.
     pub(super) fn surface() -> Relief {
         let one = [
             // The oval, first: its outline.

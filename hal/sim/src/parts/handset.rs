@@ -23,7 +23,7 @@ const BASE: f64 = -16.0;
 const RIM: f64 = 42.0;
 
 impl Handset {
-    /// The surface of a good one.
+    /// The surface of a good handset.
     pub(super) fn surface() -> Relief {
         let swells = vec![
             // The shell, first: its outline.

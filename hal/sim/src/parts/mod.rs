@@ -75,7 +75,7 @@ pub(crate) trait Surface: Send + Sync {
     /// Whether there is material at (x, y).
     fn present(&self, x: f64, y: f64) -> bool;
 
-    /// Share of the light that the material reflects at (x, y), of what white would.
+    /// The light that the material reflects at (x, y), as a share of what white would reflect.
     fn albedo(&self, _x: f64, _y: f64) -> f64 {
         1.0
     }
@@ -137,7 +137,7 @@ impl Part {
             Self::Plane(part) => Fields.check("part", part),
             Self::Board(part) => Fields.check("part", part),
             Self::SheetMetal(part) => part.check(),
-            // Their measures are given.
+            // The measures of these parts are fixed.
             Self::Face(_) | Self::Handset(_) | Self::Empty {} => Ok(()),
         }
     }
@@ -180,7 +180,7 @@ impl Part {
     /// Whether it can have a defect of this kind.
     ///
     /// # Errors
-    /// If it cannot: which ones it can have.
+    /// If it cannot; the message says which defects it can have.
     pub fn can_have(&self, defect: &Defect) -> Result<(), &'static str> {
         match (self, defect) {
             (Self::Board(_) | Self::Empty {}, _) => Err("it can have no defects"),

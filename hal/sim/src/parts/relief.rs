@@ -23,7 +23,7 @@ pub(super) struct Swell {
 }
 
 impl Swell {
-    /// About the segment between two points.
+    /// A swell about the segment between two points.
     pub fn along(ends: [[f64; 2]; 2], [flat, reach]: [f64; 2], height: f64) -> Self {
         Self {
             ends,
@@ -33,12 +33,12 @@ impl Swell {
         }
     }
 
-    /// About a point.
+    /// A swell about a point.
     pub fn round(at: [f64; 2], [flat, reach]: [f64; 2], height: f64) -> Self {
         Self::along([at, at], [flat, reach], height)
     }
 
-    /// The same on the other side of x = 0.
+    /// The swell mirrored at x = 0.
     pub fn mirrored(&self) -> Self {
         Self {
             ends: self.ends.map(|[x, y]| [-x, y]),
@@ -58,7 +58,7 @@ impl Swell {
         x > left - reach && x < right + reach && y > bottom - reach && y < top + reach
     }
 
-    /// From the nearest point of the segment to (x, y).
+    /// The vector from the nearest point of the segment to (x, y).
     fn off(&self, x: f64, y: f64) -> [f64; 2] {
         let [[from_x, from_y], [to_x, to_y]] = self.ends;
         let [dx, dy] = [to_x - from_x, to_y - from_y];

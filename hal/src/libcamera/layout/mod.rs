@@ -225,9 +225,9 @@ impl Readable {
         }
     }
 
-    /// The same format for a sensor of `bits`. If a format has more bits (R16 of a Pi 5), the
-    /// sensor's are the upper ones. They must be shifted down: otherwise full scale would not be
-    /// 2^bits − 1, and saturated pixels would not be recognised.
+    /// This format for a sensor of `bits`. If a format has more bits (R16 of a Pi 5), the sensor's
+    /// are the upper ones. They must be shifted down: otherwise full scale would not be 2^bits − 1,
+    /// and saturated pixels would not be recognised.
     pub fn of_sensor(self, bits: Option<u8>) -> Self {
         match (self.layout, bits) {
             (Layout::Words, Some(bits)) if (8..self.bits).contains(&bits) => Self {
