@@ -124,8 +124,8 @@ mod tests {
         }
     }
 
-    /// What [`Config::check`] says if one key is `value`; none if it takes it, or the type of the
-    /// key does not.
+    /// What [`Config::check`] says if one key is `value`; `None` if it accepts the value, or if the
+    /// type of the key does not.
     fn refusal(key: &str, value: f64) -> Option<String> {
         let (section, name) = key.rsplit_once('.').unwrap_or_default();
         // A width and a height are written both or neither.

@@ -32,11 +32,11 @@ pub trait Expected {
     /// Its name for reports.
     fn name(&self) -> &'static str;
 
-    /// Φ of each pixel, row-major, for levels that are unwrapped in this way; unknown where it is
-    /// not safe for them.
+    /// Φ of each pixel, row-major, for levels that are unwrapped in this way; unknown where their
+    /// unwrapping is not safe.
     fn map(&self, unwrapping: pattern::Unwrapping) -> Vec<AbsolutePhase>;
 
-    /// The same for levels that are right within so many turns of it.
+    /// Φ of each pixel for levels that are unwrapped rightly within so many turns of it.
     fn within(&self, turns: f64) -> Vec<AbsolutePhase>;
 }
 

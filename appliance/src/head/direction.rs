@@ -23,8 +23,8 @@ pub struct Sensitivity {
 }
 
 impl Sensitivity {
-    /// Of a rig and a phase function; `None` if the projector lights nothing of z = 0 that the
-    /// camera sees.
+    /// What a phase function tells of heights with a rig; `None` if the projector lights nothing of
+    /// z = 0 that the camera sees.
     pub fn of(triangulator: &Triangulator) -> Option<Self> {
         let (camera, function) = (triangulator.camera(), triangulator.function());
         let inside = |at: f64, size: usize| (0.0..size as f64).contains(&at);

@@ -76,14 +76,14 @@ impl SeenPose {
         })
     }
 
-    /// The first of some poses in which the board lies where it lies in this one.
+    /// The first of some poses in which the board lies where it lies in this pose.
     pub fn again_in<'a>(&self, others: impl IntoIterator<Item = &'a Self>) -> Option<&'a Self> {
         let same = |other: &&Self| self.view.found.lies_as_in(&other.view.found);
         others.into_iter().find(same)
     }
 }
 
-/// What is wrong with a pose that is another one again.
+/// What is wrong with a pose in which the board lies where it lies in another one.
 pub fn same_place(other: &str) -> String {
     format!("the board lies where it lies in {other}")
 }

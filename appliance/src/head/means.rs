@@ -7,17 +7,17 @@ use hal::head::Head;
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Captures that a mean is of.
+/// Number of captures that are averaged.
 pub const CAPTURES: usize = 4;
-/// Bits of the samples that are summed; those of a camera with more lose their last ones. Four of
-/// them are less than [`SATURATED`].
+/// Bits of the samples that are summed; the samples of a camera with more bits lose their last
+/// ones. The sum of four samples is less than [`SATURATED`].
 const BITS: u8 = 14;
 /// The sum where one of the samples was at full scale.
 const SATURATED: u16 = u16::MAX;
 
 /// Takes [`CAPTURES`] frames of each of the loaded patterns, and gives their means. Where one of
-/// the samples of a pixel was at full scale its mean is. `progress` gets the share of the frames
-/// taken; it may end the captures by `false`, and then there are no means.
+/// the samples of a pixel was at full scale, so is its mean. `progress` gets the share of the
+/// frames taken; it may end the captures by `false`, and then there are no means.
 ///
 /// # Errors
 /// Of the device that failed.
@@ -44,7 +44,7 @@ pub fn take(
 
 /// The sum of the frames of a pattern.
 struct Sum {
-    /// Without padding between the rows.
+    /// The sums, without padding between the rows.
     samples: Vec<u16>,
     first: Frame,
 }

@@ -118,7 +118,7 @@ impl<'a> Scan<'a> {
         })
     }
 
-    /// The same, trusting modulations from `least` on instead of that of unknown noise.
+    /// This scan, trusting modulations from `least` on instead of the least one for unknown noise.
     pub fn trusting(self, least: LeastModulation) -> Self {
         Self {
             decoder: self.decoder.with_least_modulation(least),

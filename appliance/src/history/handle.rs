@@ -126,7 +126,8 @@ impl History {
         if let Some(spool) = &self.spool
             && spool.put(&entry).is_err()
         {
-            // Without the newest result it would bring back its number.
+            // Without the newest result the spool would have the next start give out its number
+            // again.
             spool.remove();
         }
         let message = Message::Result(Box::new(entry));
@@ -136,8 +137,8 @@ impl History {
     }
 
     /// Hands over the frames of a part, made by `part`, if it did not pass; after its result. Where
-    /// those of another are still being written these are not kept, and the history says so: the
-    /// line goes on.
+    /// the frames of another part are still being written, these are not kept, and the history says
+    /// so: the line goes on.
     pub fn keep(&self, record: &ResultRecord, part: impl FnOnce() -> JudgedPart) {
         let failed = matches!(record.verdict, Verdict::Fail | Verdict::Invalid);
         if failed && let Err(why) = self.keeper.keep(part) {
@@ -148,7 +149,7 @@ impl History {
     }
 
     /// Stores when this start of the daemon, BOOT_ID, was by the clock of a signed-in user's
-    /// browser; waits until that is done and answers whether it is.
+    /// browser; waits until the time is stored and answers whether it is.
     pub fn date(&self, boot_id: u32, utc_us: u64) -> bool {
         let (stored, done) = sync_channel(1);
         let dated = Message::Dated {
@@ -164,8 +165,9 @@ impl History {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// Ends the threads once they have stored what they can; `last_seq` is the last of all. Answers
-    /// whether they will: not while a card that hangs has filled the queue.
+    /// Ends the threads once they have stored what they can; `last_seq` is the last SEQ of all.
+    /// Answers whether the threads will end: they do not while a card that hangs has filled the
+    /// queue.
     pub fn stop(&self, last_seq: u32) -> bool {
         // A thread that is gone has stopped.
         let stop = self.queue.try_send(Message::Stop { last_seq });

@@ -27,7 +27,7 @@ pub struct Numbering {
     pub counted: Result<Counted, String>,
     /// The counter on the card.
     pub counter: Counter,
-    /// The device's.
+    /// The serial of the device.
     pub serial: String,
     /// This start of the daemon: random, not 0.
     pub run: u32,

@@ -63,7 +63,8 @@ impl Spool {
         self.begun(run).map(|last| self.since(last))
     }
 
-    /// The same of whichever run was the last, for when the card does not name one.
+    /// The last SEQ that the last run has shown, whichever run that was, and the results that are
+    /// here: for when the card names no run.
     pub fn of_any_run(&self) -> Option<(u32, Vec<Entry>)> {
         self.numbers(0).map(|[_, _, last]| self.since(last))
     }

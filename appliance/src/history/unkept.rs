@@ -12,7 +12,7 @@ pub enum Unkept {
     /// Recordings are switched off.
     #[error("off")]
     Off,
-    /// Those of another part were being written.
+    /// The frames of another part were being written.
     #[error("busy")]
     Busy,
     /// Removed, because all together were over the quota.

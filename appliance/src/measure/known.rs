@@ -34,7 +34,7 @@ impl Expected for Known {
         self.name
     }
 
-    /// For levels of limited reach it is unknown outside of their safe mask.
+    /// For levels of limited reach the map is unknown outside of their safe mask.
     fn map(&self, unwrapping: Unwrapping) -> Vec<AbsolutePhase> {
         let limit = match unwrapping {
             Unwrapping::Single => SequenceKind::SingleLevel.reach(),
@@ -59,7 +59,7 @@ impl Known {
     /// The phase that the recording's pattern has on the surface of a preliminary measurement.
     ///
     /// # Errors
-    /// If that has frames of another size.
+    /// If the preliminary measurement has frames of another size.
     pub fn expected(preliminary: &ProjectorMap, recording: &Recording) -> Result<Self, AnyError> {
         let (width, height) = (recording.width as usize, recording.height as usize);
         let given = (preliminary.width, preliminary.height());

@@ -41,13 +41,13 @@ pub struct Measurement {
     pub wrapped: Vec<PhaseMap>,
     /// For each pattern why it has no absolute phase; `None` if it has one.
     pub wrapped_only: Vec<Option<String>>,
-    /// Which of them the height comes from.
+    /// Which of the patterns the height comes from.
     pub primary: usize,
     /// Height and σ_z, or why there is none.
     pub heights: Result<Surface, String>,
     /// How the primary pattern was decoded; none of a Gray code alone.
     pub decoder: Option<Decoder>,
-    /// What those of its frames show that this decoder takes.
+    /// What the frames of the primary pattern show that this decoder takes.
     pub shots: Vec<Shot>,
     /// Largest sample.
     pub full_scale: u16,
@@ -275,7 +275,8 @@ pub struct Geometry {
 }
 
 impl Geometry {
-    /// Of this recording; the working range is the recipe's where the recording has none.
+    /// The devices of this recording; the working range is the recipe's where the recording has
+    /// none.
     ///
     /// # Errors
     /// In words: a model is absurd.

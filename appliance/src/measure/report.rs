@@ -39,7 +39,7 @@ pub struct Report {
     pub lit: usize,
     /// Lit pixels whose phase and, where there is geometry, height are valid.
     pub resolved: usize,
-    /// The others, by their first failing reason.
+    /// Lit pixels that are not resolved, by their first failing reason.
     pub unresolved: BTreeMap<&'static str, usize>,
     /// Pixels that were not decoded, because the expected map is unknown there.
     pub skipped: usize,

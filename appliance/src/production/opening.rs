@@ -68,7 +68,7 @@ impl Opening<'_> {
                     };
                     return Some((head, event));
                 }
-                // Once it is waited for, errors of its files are waited out as well.
+                // Once the head is waited for, errors of its files are waited out as well.
                 Err(failure)
                     if self.patient
                         && (failure.exit == Exit::Unavailable || !reported.is_empty()) =>

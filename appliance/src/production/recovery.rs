@@ -83,7 +83,7 @@ impl Worker {
 /// doubled after each attempt.
 #[derive(Default)]
 pub(super) struct Pause {
-    /// Of the last pause.
+    /// Signs of life of the last pause.
     signs: u32,
 }
 

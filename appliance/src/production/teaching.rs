@@ -110,7 +110,7 @@ impl Worker {
         failed
     }
 
-    /// Stores a recipe. `kept` is the one whose gauges it has taken over. It must still be the
+    /// Stores a recipe. `kept` is the recipe whose gauges it has taken over. It must still be the
     /// stored one: an edit that was stored meanwhile must not be lost.
     fn store(&self, taught: &TaughtRecipe, kept: Option<RecipeFile>) -> Result<(), (u16, String)> {
         for reason in &taught.choice.reasons {

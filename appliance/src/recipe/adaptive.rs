@@ -16,7 +16,7 @@ use algo::units::{AbsolutePhase, Height};
 const PRELIMINARY_PITCH_PX: f64 = 20.0;
 /// Levels of the preliminary sequence.
 const LEVELS: usize = 3;
-/// Shifts of each.
+/// Shifts of each level.
 pub(super) const SHIFTS: usize = 4;
 
 /// What is projected first, on a part of which nothing is known.
@@ -33,15 +33,15 @@ pub struct Preliminary {
 pub struct AdaptivePattern {
     /// Φ_P over the projector's raster.
     pub function: PhaseFunction,
-    /// Φ of each camera pixel under it, by the preliminary measurement.
+    /// Φ of each camera pixel under this pattern, by the preliminary measurement.
     pub expected: Vec<AbsolutePhase>,
 }
 
 impl Preliminary {
-    /// For a projector of so many columns and rows.
+    /// The preliminary pattern for a projector of so many columns and rows.
     ///
     /// # Errors
-    /// If it is too small.
+    /// If the projector is too small.
     pub fn new((columns, rows): (usize, usize)) -> Result<Self, TeachError> {
         let fringes = columns as f64 / PRELIMINARY_PITCH_PX;
         let function = PhaseFunction::vertical(columns, rows, fringes)

@@ -44,8 +44,9 @@ impl GoldenPart<'_> {
         for (sequence, offsets) in sequences.iter_mut().zip(self.offsets) {
             sequence.ripple_mm = Some(self.ripple(offsets, arrays));
         }
-        // The others are known against the full one alone, whose own is less than any of them: it
-        // is the mean of three levels.
+        // Each other sequence's periodic error is measured against the full sequence, whose own is
+        // not known. It is less than any of these, as the full sequence is the mean of three
+        // levels: the least of them stands for it.
         let known = sequences.iter().filter_map(|sequence| sequence.ripple_mm);
         let least = known.reduce(f64::min);
         if let Some(full) = sequences.last_mut() {
@@ -77,8 +78,8 @@ impl GoldenPart<'_> {
         // Of a geometric sequence only the finest level contributes to the accuracy.
         let absolute = !self.decoder.unwrapping().needs_map() && kind == SequenceKind::Full;
         let carries = |ratio: f64| !absolute || ratio >= 0.999;
-        // The modulation as taught is that of golden's finest level, which is the full sequence's;
-        // other waveforms have another share of it.
+        // The modulation as taught is that of the finest level of the full sequence; a level with
+        // another waveform has another share of it.
         let taught = finest_waveform(self.full).fundamental();
         let squares = frames
             .iter()

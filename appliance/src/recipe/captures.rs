@@ -27,22 +27,22 @@ const MEANS: usize = 2;
 /// All captures.
 pub const CAPTURES: usize = MEANS * means::CAPTURES;
 
-/// For each pixel the phase by a sequence less that by the full one, 1/65536 turn: of each mean. 0
-/// where one of both is not resolved.
+/// For each mean, the phase of each pixel by a sequence less its phase by the full sequence,
+/// 1/65536 turn; 0 where one of both phases is not resolved.
 pub type Offsets = [Vec<i16>; MEANS];
 
 /// The part by all captures.
 #[derive(Debug)]
 pub struct Captured {
-    /// By the full sequence.
+    /// Phases by the full sequence.
     pub phases: PhaseMap,
-    /// With σ as of one capture.
+    /// Heights by the full sequence, with σ as of one capture.
     pub heights: HeightMap,
     /// The decoder of one capture of the full sequence.
     pub decoder: Decoder,
     /// The geometry with its phase function.
     pub triangulator: Triangulator,
-    /// Of all sequences but the full one.
+    /// Offsets of all sequences but the full one.
     pub offsets: Vec<Offsets>,
     /// The noise of a sample by the modulation of its pixel, by the full sequence.
     pub noise: SampleNoise,
@@ -52,8 +52,8 @@ pub struct Captured {
 
 impl Captured {
     /// Measures the part in this light with sequences of a phase function; the last is the full
-    /// one, which is unwrapped about `expected`, the others are about that. `progress` gets the
-    /// share of the frames taken and may end it by `false`.
+    /// one. That is unwrapped about `expected`, the others about its result. `progress` gets the
+    /// share of the frames taken and may end the measurement by `false`.
     ///
     /// # Errors
     /// As of [`super::teach::teach`].
@@ -133,7 +133,7 @@ impl Captured {
     }
 }
 
-/// What the sequences show, each once.
+/// The shots of all sequences, each shot once.
 fn distinct(sequences: &[&[Shot]]) -> Vec<Shot> {
     let mut shots: Vec<Shot> = Vec::new();
     for shot in sequences.iter().copied().flatten() {

@@ -95,7 +95,8 @@ pub struct RecipeSequence {
     pub shots: Vec<Shot>,
     /// Its levels.
     pub levels: Sequence,
-    /// Which part of `sequence_offset.npy` is its own; the full one and the two frames have none.
+    /// Which part of `sequence_offset.npy` belongs to the sequence; the full sequence and the two
+    /// frames have none.
     pub offset: Option<usize>,
     /// RMS of the periodic error of mean heights, mm.
     pub ripple_mm: f64,
@@ -282,8 +283,8 @@ impl From<&RecipeFile> for RecipeId {
 }
 
 impl Conditions {
-    /// What the recipe was taught with and what the head is set to, where they are not the same:
-    /// then its noise is not the head's.
+    /// The exposure and gain that the recipe was taught with and those that the head is set to, if
+    /// they differ: then the recipe's noise is not the head's.
     pub fn set_otherwise(&self, head: &Calibration) -> Option<[Exposing; 2]> {
         let (taught, present) = self.exposing.zip(head.exposing)?;
         (!taught.agrees(&present)).then_some([taught, present])

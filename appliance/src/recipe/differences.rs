@@ -4,8 +4,8 @@ use super::file::{GaugeFile, RecipeFile};
 use hal::bounds::clipped;
 
 impl RecipeFile {
-    /// How it differs from the one `before`: each limit with both of its values; "nothing" if it
-    /// does not.
+    /// How the recipe differs from the one `before`: each limit with both of its values; "nothing"
+    /// if it does not.
     pub fn differences(&self, before: &Self) -> String {
         let mut words = Vec::new();
         let mut text = |what: &str, from: &str, to: &str| {

@@ -70,10 +70,10 @@ pub fn edit(
     file.guard_k = edit.guard_k.unwrap_or(file.guard_k);
     file.regions = edit.regions.unwrap_or(file.regions);
     file.gauges = edit.gauges.unwrap_or(file.gauges);
-    // Limits that are added end it.
+    // Limits that are added end that it judges nothing.
     file.judges_nothing =
         edit.judges_nothing.unwrap_or(file.judges_nothing) && file.is_without_limits();
-    // Of gauges that were changed nothing is known.
+    // It is not known how gauges that were changed judge good parts.
     let of = |gauges: &[GaugeFile], name: &str| {
         let gauge = gauges.iter().find(|gauge| gauge.name == name);
         gauge.cloned()

@@ -61,8 +61,8 @@ bounded! {
         pub pattern: PatternFile,
         /// The sequences that the part can be measured with, from the cheapest to the full one.
         pub sequences: Vec<SequenceFile>,
-        /// Which of them is projected first in production, counted from 0; longer ones may follow
-        /// in the same cycle.
+        /// Which of these sequences is projected first in production, counted from 0; longer ones
+        /// may follow in the same cycle.
         pub production: usize,
         /// Whether a cycle begins with the fringe and its complement at ratio 1, before the
         /// sequence for production.
@@ -94,10 +94,12 @@ bounded! {
         pub golden_captures: usize = 1..=MAX_CAPTURES,
         /// The least modulation that is trusted, in counts of an 8-bit sample.
         pub least_modulation: f64 = LEAST_MODULATION,
-        /// σ by the uncertainty of that calibration; `None` where it is not known.
+        /// σ by the uncertainty of the calibration that the recipe was made for; `None` where it is
+        /// not known.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub calibration_sigma: Option<CalibrationSigma> = Fields,
-        /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and `height_curvature.npy` give the height accurately.
+        /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and
+        /// `height_curvature.npy` give the height accurately.
         pub expansion_range_turns: f64 = 1e-3..=MAX_FRINGES,
         /// Least share of the golden pixels that must be resolved, else the verdict is INVALID.
         pub min_coverage: f64 = 0.0..=1.0,
@@ -129,7 +131,8 @@ bounded! {
     pub struct TriedFile {
         /// Its name.
         pub gauge: String,
-        /// The share of such parts that it would let pass, as predicted from those that were tried.
+        /// The share of good parts that the gauge would let pass, as predicted from those that were
+        /// tried.
         pub passes: f64 = 0.0..=1.0,
     }
 }
@@ -189,7 +192,7 @@ pub enum PatternFile {
 }
 
 impl PatternFile {
-    /// That of a recording.
+    /// The phase function of a recording's pattern.
     pub fn of(pattern: &PatternSpec) -> Self {
         match *pattern {
             PatternSpec::Vertical { fringes } => Self::Vertical { fringes },
@@ -215,8 +218,9 @@ bounded! {
         /// Share of the golden surface whose phase stays within the sequence's reach for every
         /// placement inside the tolerance.
         pub safe_share: f64 = 0.0..=1.0,
-        /// RMS of the periodic error of the mean height over a square of 9 × 9 pixels by it, where
-        /// it is largest, mm; `None` where it was taught from a recording.
+        /// RMS of the periodic error that this sequence leaves in the mean height over a square of
+        /// 9 × 9 pixels, where that is largest, mm; `None` where the recipe was taught from a
+        /// recording.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub ripple_mm: Option<f64> = 0.0..=MAX_SIGMA_MM,
         /// How often it gets a fringe order wrong unseen; `None` where it cannot be unwrapped.

@@ -60,8 +60,8 @@ impl TryFrom<GaugeText> for GaugeFile {
     }
 }
 
-/// All kinds, for programs that show or edit recipes: an example of each, or one for each value of
-/// the field that its unit depends on.
+/// All kinds of gauges, for programs that show or edit recipes: an example of each kind, or, if its
+/// unit depends on a field, one for each value of that field.
 pub fn kinds() -> Value {
     let row = |measures: Measure| {
         let Facts {
@@ -153,7 +153,7 @@ impl GaugeFile {
         }
     }
 
-    /// Whether a part can miss one of its limits: those at the ends of what its unit can have are
+    /// Whether a part can miss one of its limits: limits at the ends of what its unit can have are
     /// kept by every part.
     pub(super) fn can_fail(&self) -> bool {
         let facts = self.measures.facts();

@@ -76,14 +76,15 @@ pub struct GoldenPart<'a> {
     pub phases: &'a PhaseMap,
     /// Golden height of each camera pixel, with the σ of one capture.
     pub heights: &'a HeightMap,
-    /// The difference from this phase by each of the other sequences, in their order; none if they
-    /// were not measured.
+    /// For each of the other sequences, in their order, its phase less `phases`; empty if they were
+    /// not measured.
     pub offsets: &'a [Offsets],
     /// The noise of a sample by the modulation of its pixel in one capture.
     pub noise: SampleNoise,
-    /// Median of the mean samples of its pixels, counts; none where it was not measured.
+    /// Median of the mean samples of the part's pixels, counts; `None` where it was not measured.
     pub offset_counts: Option<f64>,
-    /// Captures that all of this is the mean of; σ is that of one.
+    /// Number of captures that `phases` and `heights` are the mean of; their σ is that of one
+    /// capture.
     pub captures: usize,
     /// Fixed against adaptive pattern, if a fixed one was measured as well.
     pub comparison: Option<ComparisonFile>,

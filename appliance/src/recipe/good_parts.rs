@@ -30,13 +30,13 @@ pub(super) const DEVIATION_MM: f64 = 0.15;
 /// At most this share of the compared pixels counts with less weight or not at all; else the limit
 /// is wider.
 const WEIGHED: f64 = 0.05;
-/// Squares have at most a σ of the limit by this: of a part with 10⁴ squares of just this σ, one in
-/// 10⁶ exceeds the limit.
+/// The σ of a square is at most the limit divided by this: of parts with 10⁴ squares of just this
+/// σ, one in 10⁶ exceeds the limit.
 pub(super) const SIGMAS: f64 = 6.5;
 /// At most this share of good parts is predicted to exceed the limit.
 const BEYOND: f64 = 1e-6;
-/// Sides of squares in camera pixels, the smallest first. A single pixel may be a wild one. In the
-/// largest a dent of 8 mm is still seen at half its depth by 0.4 mm per pixel.
+/// Sides of squares in camera pixels, the smallest first. A single pixel may be wrong. In the
+/// largest square a dent of 8 mm is still seen at half its depth, at 0.4 mm per pixel.
 pub(super) const SIDES: [usize; 4] = [3, 5, 7, 9];
 /// The largest deviation of good parts is to stay below this share of the limit.
 pub(super) const ROOM: f64 = 1.0 / 3.0;
@@ -51,8 +51,8 @@ fn length() -> RangeInclusive<f64> {
     0.0..=Unit::Length.range()[1]
 }
 
-/// Diameter of a dent of which a mean over a square has nine tenths of the depth, over the square's
-/// side: of a depth that falls as cos²(πr/D) the mean over side a is 1 − (π²/6) a²/D².
+/// Diameter of a dent, over the side of a square whose mean has nine tenths of the dent's depth: of
+/// a depth that falls as cos²(πr/D) the mean over side a is 1 − (π²/6) a²/D².
 pub(super) const DENT: f64 = 4.06;
 
 bounded! {
@@ -78,12 +78,12 @@ bounded! {
         pub weighed: f64 = 0.0..=1.0,
         /// The least of these weights; 1 where there are none.
         pub least_weight: f64 = 1.0 / 256.0..=1.0,
-        /// The side of the squares that all of this is of, pixels.
+        /// The side of the squares that these figures are of, pixels.
         pub smoothing_px: usize = 1..=usize::from(u16::MAX),
-        /// The largest side of the squares about the pixels where that would be too noisy; 0 where
-        /// there are none.
+        /// The largest side of the squares about pixels where squares of `smoothing_px` would be
+        /// too noisy; 0 if there are no such pixels.
         pub wider_px: usize = 0..=usize::from(u8::MAX),
-        /// Share of the compared pixels that these are about.
+        /// Share of the compared pixels with squares larger than `smoothing_px`.
         pub wider: f64 = 0.0..=1.0,
         /// Diameter of a dent that is seen at nine tenths of its depth in squares of `smoothing_px`
         /// where the part faces the camera, mm; 0 if not known. U says nothing of narrower ones.
@@ -104,7 +104,7 @@ pub(super) struct Noise<'a> {
     pub surface: KnownSurface,
     /// σ_z² of pixels in production, mm².
     pub production: Vec<f32>,
-    /// The variance of golden's noise, as a share of that.
+    /// The variance of golden's noise, as a share of `production`.
     pub golden: f64,
 }
 
@@ -139,8 +139,8 @@ impl Noise<'_> {
         let full: Vec<Weight> = valid.iter().copied().map(Weight::from).collect();
         let whole = self.taught(&full);
         let whole = self.golden_surface(&whole);
-        // The motion is found from what counts in full, and what does depends on the motion: once
-        // each.
+        // The motion is found from pixels that count in full, and which do depends on the motion:
+        // each is worked out once.
         let (_, weights) = limited(&noise, &valid, tolerance_mm);
         let taught = self.taught(&weights);
         let window = vec![0..width; valid.len() / width.max(1)];
@@ -191,13 +191,13 @@ impl Noise<'_> {
         }
         weighed
     }
-    /// Golden with these weights, and the noise with which production takes it ([`Taught`]).
+    /// Golden with these weights, and with the noise that production takes it to have ([`Taught`]).
     fn taught(&self, weights: &[Weight]) -> Taught {
         let sigmas = self
             .production
             .iter()
             .map(|variance| f64::from(*variance).sqrt());
-        // Only the motion is found from it, which goes by heights.
+        // Only the motion is found from this, and the motion is found from heights.
         let pixels = weights.iter().copied().zip(sigmas);
         Taught::new(pixels.map(|(weight, sigma)| (weight, 1.0, sigma)))
     }

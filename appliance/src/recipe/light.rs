@@ -50,15 +50,15 @@ pub(super) struct Light {
 pub(super) enum Cause {
     /// Nothing of the pattern comes back.
     Nothing,
-    /// So little of golden's light.
+    /// So small a share of golden's light comes back.
     Dark(f64),
-    /// The finest fringes have so little of golden's contrast.
+    /// The finest fringes have so small a share of golden's contrast.
     Blurred(f64),
     /// So many pixels are at full scale.
     Saturated {
-        /// Their share.
+        /// The share of the pixels at full scale.
         share: f64,
-        /// Whether it is not the pattern's light that has grown.
+        /// Whether other light than the pattern's has grown.
         foreign: bool,
     },
 }
@@ -83,7 +83,7 @@ impl Cause {
         }
     }
 
-    /// What it is, and the remedy.
+    /// The cause in words, and the remedy.
     pub fn words(self) -> String {
         match self {
             Self::Nothing => {
@@ -111,7 +111,7 @@ impl Cause {
 }
 
 impl GoldenLight {
-    /// Of a recipe's arrays; `offset` is the recipe's.
+    /// Golden's light by a recipe's arrays; `offset` is the recipe's `golden_offset_counts`.
     pub fn of(arrays: &Arrays, offset: Option<f64>) -> Self {
         let compared = |at: &usize| arrays.valid[*at] != 0 && arrays.modulation[*at] > 0.0;
         let count = (0..arrays.valid.len()).filter(compared).count();
@@ -160,9 +160,8 @@ impl Light {
             saturated,
         } = self;
         let foreign = offset.is_some_and(|offset| offset > modulation.max(1.0) + FOREIGN);
-        // Foreign light raises the offset, so contrast is that of no more light than golden's;
-        // where the pattern's light has fallen, what is left of the offset is foreign to a larger
-        // part.
+        // Foreign light raises the offset, so the contrast is worked out for an offset of at most
+        // golden's; where the pattern's light has fallen, a larger part of the offset is foreign.
         let contrast = offset.map_or(1.0, |offset| modulation / offset.min(1.0));
         let least = match offset.is_some_and(|offset| offset < LOW) {
             true => LOW * LOW,

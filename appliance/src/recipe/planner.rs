@@ -10,13 +10,13 @@ pub(super) const SIGMAS: f64 = 6.0;
 /// Share of the golden surface that must be safe for a sequence that is not full.
 const SAFE_SHARE: f64 = 0.98;
 
-/// Rates below this are as good as none.
+/// Rates of wrong orders below this count as zero.
 const LEAST_RATE: f64 = 1e-12;
 
 /// The chosen sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choice {
-    /// Its index.
+    /// The index of the sequence.
     pub production: usize,
     /// One line per sequence, cheapest first: its noise, its safe share and how often its fringe
     /// orders are wrong unseen, and why it was chosen or not.

@@ -2,9 +2,8 @@
 //! wherever else it may lie.
 //!
 //! Limits are predicted from noise; what noise does not explain is found here, where nothing is at
-//! stake yet. Each cycle is that of a
-//! [`Plan`]: the same sequences, limits and guard band. A limit that would refuse the recipe's own part is moved until it holds, and teaching
-//! says so.
+//! stake yet. Each cycle is that of a [`Plan`]: the same sequences, limits and guard band. A limit
+//! that would refuse the recipe's own part is moved until it holds, and teaching says so.
 
 use super::archive::Arrays;
 use super::file::TriedFile;
@@ -77,8 +76,8 @@ impl Proof {
     }
 
     /// The part as taught, judged at places within the recipe's placement tolerance; none where
-    /// parts are not aligned, or if cycles begin with two frames. `farthest` gets what it deviates
-    /// by in squares of all sides; then there is no noise.
+    /// parts are not aligned, or if cycles begin with two frames. If `farthest` is given, it gets
+    /// what the part deviates by in squares of all sides, and the cycles have no noise.
     pub fn displaced(&self, mut farthest: Option<&mut Farthest>) -> Vec<Inspection> {
         let judged = (1..).zip(&self.places);
         let judged = judged.map_while(|(seed, motion)| {
@@ -220,7 +219,7 @@ pub(super) fn hold(manifest: &mut RecipeFile, judged: &[Inspection]) -> Vec<Stri
         let is_share = gauge.measures.facts().unit == Unit::Share;
         let wider = |limit: f64, value: f64, sign: f64| match is_share {
             true => (value + sign * COVERAGE_CHANGE).clamp(0.0, 1.0),
-            // Hundredths print as such.
+            // A division by 100 prints as hundredths.
             false => sign * (value.abs().max(limit.abs()) * FARTHER * 100.0).ceil() / 100.0,
         };
         let before = (gauge.low, gauge.high);
@@ -327,11 +326,12 @@ pub(super) struct Magnitudes {
 
 /// Median distance of normal numbers from their median, over their standard deviation.
 const MEDIAN_DISTANCE: f64 = 0.674_5;
-/// Values that are farther than this many spreads from the middle were worked out wrong.
+/// Values that are farther than this many spreads from the middle are taken to have been worked out
+/// wrong.
 const WRONG: f64 = 8.0;
 
 impl Magnitudes {
-    /// Of a gauge; none if it has no values.
+    /// Middle and spread of a gauge's values; `None` if it has none.
     pub fn of(judged: &[Inspection], gauge: usize) -> Option<Self> {
         let values = judged
             .iter()

@@ -71,8 +71,8 @@ pub fn no_gauges(number: u16) -> String {
 /// Checks that the gauges of a recipe can be kept on a head with frames of (width, height).
 ///
 /// # Errors
-/// In words: the frames have another size (regions are polygons in camera pixels), or it cannot
-/// judge.
+/// In words: the frames have another size (regions are polygons in camera pixels), or the recipe
+/// cannot judge.
 pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<(), String> {
     let camera = &replaced.camera;
     if (camera.width, camera.height) == (width, height) {

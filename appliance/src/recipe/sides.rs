@@ -17,14 +17,14 @@ pub(super) struct Sides {
     pub least: Vec<u8>,
 }
 
-/// The side about pixels that no smaller one is good enough for.
+/// The side of squares about pixels for which no smaller square is good enough.
 const LARGEST: usize = SIDES[SIDES.len() - 1];
-/// What placements that are worked out without noise deviate by is to stay below this share of the
-/// limit: beside creases parts deviate by twice as much, as golden knows only what its pixels see
-/// of a crease, and noise comes on top.
+/// The deviations of displaced golden, worked out without noise, are to stay below this share of
+/// the limit: beside creases parts deviate by twice as much, as golden knows only what its pixels
+/// see of a crease, and noise comes on top.
 const PLACED: f64 = 0.1;
-/// At least this share of the compared pixels has a side beside the largest: looking at each takes
-/// time.
+/// A side other than the largest is used only if at least this share of the compared pixels has it:
+/// each side takes time in every cycle.
 const WORTH: f64 = 0.01;
 
 /// The two largest |means| over the squares of each of [`SIDES`] about each pixel, over placements
@@ -33,7 +33,7 @@ const WORTH: f64 = 0.01;
 pub(super) struct Farthest([Vec<[f32; 2]>; SIDES.len()]);
 
 impl Farthest {
-    /// Looks at what was inspected last in these strips.
+    /// Takes in the deviations that were inspected last in these strips.
     pub fn look(&mut self, production: &Production, strips: &Strips, deviation: &[f32]) {
         for (side, farthest) in SIDES.into_iter().zip(&mut self.0) {
             farthest.resize(deviation.len(), [0.0; 2]);
@@ -50,7 +50,7 @@ impl Farthest {
         }
     }
 
-    /// What one placement at least reaches beside the farthest: a single one can be worked out
+    /// The second largest deviation over all placements: a single placement can be worked out
     /// wrong.
     fn at(&self, side: usize, place: usize) -> f64 {
         let second = self.0[side].get(place).map_or(0.0, |[_, second]| *second);
@@ -59,7 +59,7 @@ impl Farthest {
 }
 
 impl Sides {
-    /// The largest everywhere.
+    /// The largest side everywhere.
     pub fn largest() -> Self {
         Self {
             smallest: LARGEST,
@@ -67,10 +67,10 @@ impl Sides {
         }
     }
 
-    /// As small as they may be for a limit in mm, in a frame of `width` columns: `sigmas` are σ of
-    /// the means over squares of each of [`SIDES`] in mm, NaN where there is none. Only pixels that
-    /// count in full, as `full` says, have smaller ones than the largest; the image of a part moves
-    /// by up to `away` pixels.
+    /// Sides as small as they may be for a limit in mm, in a frame of `width` columns: `sigmas` are
+    /// σ of the means over squares of each of [`SIDES`] in mm, NaN where there is no square. Only
+    /// pixels that count in full, as `full` says, have smaller sides than the largest; the image of
+    /// a part moves by up to `away` pixels.
     pub fn new(
         (sigmas, farthest): (&[Vec<f32>; SIDES.len()], &Farthest),
         full: impl Fn(usize) -> Option<bool>,
@@ -95,7 +95,7 @@ impl Sides {
         Self::worth_it(dilated(&least, width, away))
     }
 
-    /// Without sides that hardly any pixel has: the next larger ones serve these.
+    /// These sides without those that hardly any pixel has: such pixels get the next larger side.
     fn worth_it(mut least: Vec<u8>) -> Self {
         let all = least.iter().filter(|side| **side > 0).count() as f64;
         for sides in SIDES.windows(2) {
@@ -126,7 +126,7 @@ impl Sides {
         self.smallest.max(usize::from(least))
     }
 
-    /// The most that placements which are worked out without noise deviate by in these squares, mm.
+    /// The largest deviation of displaced golden, worked out without noise, in these squares, mm.
     pub fn bend(&self, farthest: &Farthest) -> f64 {
         let most = SIDES.iter().enumerate().map(|(at, side)| {
             let places = 0..farthest.0[at].len();

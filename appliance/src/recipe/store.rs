@@ -34,7 +34,7 @@ pub enum LoadError {
     Unfit {
         /// The newer file.
         path: PathBuf,
-        /// Why, with the remedy.
+        /// Why it cannot be used, with the remedy.
         reason: String,
     },
     /// Several recipes have the part number, so it selects none of them.
@@ -67,7 +67,7 @@ pub enum ChangeError {
     Taken {
         /// The number.
         number: u16,
-        /// What it has, how to replace it, and a number that is free.
+        /// Which recipe has the number, how to replace it, and a number that is free.
         words: String,
     },
     /// Another change was stored since the recipe that is edited was read.

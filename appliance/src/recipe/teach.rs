@@ -85,7 +85,7 @@ impl From<AdaptError> for TeachError {
 }
 
 /// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern,
-/// measures it again and again with that one by every sequence that production may use, makes the
+/// measures it several times with that pattern by every sequence that production may use, makes the
 /// recipe, and tries it on the part; nothing is stored here. The part must not move meanwhile.
 /// `progress` gets the share done and the current stage in words.
 ///

@@ -70,7 +70,7 @@ pub struct Daemon {
     sockets: watch::Sender<bool>,
     /// Ends the survey's thread once it is dropped.
     survey: mpsc::Sender<()>,
-    /// Those that measure, serve sockets, survey and serve lines.
+    /// The threads that measure, serve sockets, survey and serve lines.
     threads: [JoinHandle<()>; 4],
     /// The thread of the history.
     writing: JoinHandle<()>,

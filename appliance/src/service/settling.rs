@@ -16,7 +16,7 @@ impl Daemon {
         runtime()?.block_on(self.settled())
     }
 
-    /// The same as a future.
+    /// As [`Daemon::wait_until_ready`], as a future.
     ///
     /// # Errors
     /// As [`Daemon::wait_until_ready`].

@@ -13,8 +13,8 @@ use super::state::State;
 use std::sync::Arc;
 
 impl Station {
-    /// RECIPE_LOAD: a load that is refused is one that failed, because the PLC may trigger without
-    /// looking at the answer.
+    /// RECIPE_LOAD: a load that is refused counts as one that failed, because the PLC may trigger
+    /// without looking at the answer.
     pub(super) fn plc_load(&mut self, effects: &mut Effects) {
         let select = self.plc.registers.recipe_select;
         let key = match select {

@@ -70,10 +70,10 @@ pub enum Event {
     Finished {
         /// Quoted.
         job: JobId,
-        /// Its gauges, verdict and times.
+        /// The inspection's gauges, verdict and times.
         inspection: Arc<Inspection>,
     },
-    /// A measurement ended without one.
+    /// A measurement ended without an inspection.
     MeasureFailed {
         /// Quoted.
         job: JobId,
@@ -165,7 +165,7 @@ pub enum Event {
     Stored {
         /// Which.
         seq: u32,
-        /// Why it is not.
+        /// Why it is not stored.
         failed: Option<Unstored>,
     },
     /// The worker's sign of life.

@@ -31,7 +31,7 @@ mod power {
 pub struct Power(u16);
 
 impl Power {
-    /// From the bits of `get_throttled`: 0–3 now, 16–19 the same since the computer's start
+    /// Power from the bits of `get_throttled`: 0–3 now, 16–19 the same since the computer's start
     /// (Raspberry Pi documentation, *vcgencmd*, get_throttled). Reading may reset the latter, so
     /// those of the reading `before` stay.
     pub fn of(firmware: u32, before: Option<Self>) -> Self {
@@ -45,12 +45,12 @@ impl Power {
         self.0
     }
 
-    /// What is so now.
+    /// The conditions that hold now, in words.
     pub fn now(self) -> Vec<&'static str> {
         power::words(self.0).collect()
     }
 
-    /// What has been so since the computer's start.
+    /// The conditions that have held since the computer's start, in words.
     pub fn since_start(self) -> Vec<&'static str> {
         power::words(self.0 >> 4).collect()
     }
@@ -68,7 +68,7 @@ pub struct ProjectorHealth {
     /// Its faults, as bits.
     #[serde(skip)]
     pub faults: Option<u16>,
-    /// The same in words.
+    /// The faults in words.
     #[serde(rename = "projector_faults")]
     pub fault_words: Option<Vec<&'static str>>,
 }
@@ -102,7 +102,7 @@ pub struct System {
     /// Open Modbus connections.
     #[serde(rename = "modbus_clients")]
     pub clients: u16,
-    /// Whether one of them may write.
+    /// Whether one of the connections may write.
     pub writer_connected: bool,
     /// Numbers of the stored recipes, ascending.
     #[serde(skip)]
@@ -161,7 +161,7 @@ pub struct Health {
     pub drift: Option<Drift>,
     /// Processing of the last cycle that was measured, µs: all stages but waiting and exposure.
     pub processing_us: u32,
-    /// The longest of them since the start, µs.
+    /// The longest processing of a cycle since the start, µs.
     pub processing_max_us: u32,
     /// Writes that failed since the start.
     pub storage_errors: u32,

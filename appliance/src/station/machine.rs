@@ -32,7 +32,7 @@ pub struct Limits {
     pub teaching: Micros,
     /// The worker's signs of life while it waits for orders.
     pub idle: Micros,
-    /// The same, before its silence is a fault.
+    /// The worker's silence while it waits for orders, before that is a fault.
     pub silent: Micros,
     /// PLC_HEARTBEAT may stand still for this long.
     pub plc: Micros,
@@ -136,8 +136,8 @@ impl Station {
         self.clock.now().after(limit)
     }
 
-    /// Whether the worker meets its deadlines: that of the wait it is in, else a sign of life now
-    /// and then.
+    /// Whether the worker meets its deadlines: the deadline of the order that the station waits
+    /// for; without an order, that of its signs of life.
     pub(super) fn worker_is_in_time(&self) -> bool {
         let now = self.clock.now();
         match self.state.deadline() {

@@ -119,8 +119,8 @@ pub struct Inspection {
     /// 0, or why it is INVALID as a code.
     #[serde(skip)]
     pub error_code: u16,
-    /// What its frames show of the head: WARNING bits `LOW_LIGHT`, `SATURATION`, `PATTERN_UNFIT`,
-    /// `FRAME_SLIP`.
+    /// What the part's frames show of the head: WARNING bits `LOW_LIGHT`, `SATURATION`,
+    /// `PATTERN_UNFIT`, `FRAME_SLIP`.
     #[serde(skip)]
     pub warnings: u16,
     /// The recipe's gauges, in its order.
@@ -148,7 +148,8 @@ pub struct Inspection {
     pub cpu_us: u32,
     /// The part's pose, if it was aligned.
     pub placement: Option<Placement>,
-    /// Why the part should be measured again with the next longer sequence, where there is one.
+    /// Why the part should be measured again with the next longer sequence, if it should and there
+    /// is one.
     #[serde(skip)]
     pub step_up: Option<&'static str>,
 }

@@ -40,7 +40,7 @@ pub(super) struct Results {
     pub(super) last_seq: u32,
     /// Whether `last_seq` still has to be stored. Until then no trigger is accepted.
     pub(super) unstored: bool,
-    /// How many there were.
+    /// How many results there were.
     pub(super) counts: Counts,
     /// The last result.
     pub(super) latest: Option<Arc<ResultRecord>>,

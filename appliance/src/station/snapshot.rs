@@ -78,7 +78,7 @@ pub mod warning {
         GEOMETRY = 9, "geometry";
     }
 
-    /// Those that the frames of a part show.
+    /// The warnings that the frames of a part show.
     pub const OF_A_PART: u16 = LOW_LIGHT | SATURATION | PATTERN_UNFIT | FRAME_SLIP;
 }
 

@@ -43,7 +43,7 @@ pub enum State {
     Loading {
         /// What the worker quotes in its answer.
         job: JobId,
-        /// Which recipe.
+        /// Which recipe is loaded.
         key: RecipeKey,
         /// It must be ready by then.
         deadline: Micros,

@@ -10,7 +10,7 @@ const NICE: libc::c_int = 10;
 #[cfg(target_os = "linux")]
 const PROMPT: libc::c_int = 20;
 
-/// What a thread got that must not be late.
+/// What the system granted to a thread that must not be late.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Prompt {
     /// A real-time priority.

@@ -120,7 +120,7 @@ fn words(shown: &Shown) -> String {
     format!("deviation from golden {DIRECTION}, {motion}, {mean}; {colours}")
 }
 
-/// The same for programs.
+/// What a map of deviations shows, for programs.
 fn described(shown: &Shown) -> Value {
     let Shown {
         side,

@@ -62,8 +62,8 @@ impl Table {
         longest.min().map(|(_, number)| number)
     }
 
-    /// The newest slot of the address with most slots, if those are more than one that holds `held`
-    /// now would have with another.
+    /// The newest slot of the address with most slots, if it has more slots than an address with
+    /// `held` slots would have with one more.
     fn of_the_largest(&self, held: usize) -> Option<u64> {
         let counted = self.taken.iter().map(|taken| self.held_by(taken.holder));
         let (most, at) = counted.zip(0..).max()?;

@@ -40,7 +40,7 @@ pub struct Characteristics {
 }
 
 impl Characteristics {
-    /// Those of a calibration that has all of them.
+    /// The characteristics in a calibration, if it has all of them.
     pub fn of(file: &CalibrationFile) -> Option<Self> {
         Some(Self {
             timing: file.timing.clone()?,

@@ -16,8 +16,8 @@ pub(super) struct LaidPlate {
 }
 
 impl LaidPlate {
-    /// From what projector points on the plate are off those of z = 0, in fringes: along ξ, and
-    /// along η. `None` where the rays do not meet in front of the head.
+    /// Where the plate lies, by how far the projector points on it are off those of z = 0, in
+    /// fringes along ξ and along η. `None` where the rays do not meet in front of the head.
     pub fn of(calibration: &Calibration, corrections: [&FittedMap; 2]) -> Option<Self> {
         let (camera, projector) = (&calibration.camera, &calibration.projector);
         let (mut points, mut squares) = (Vec::new(), 0.0);

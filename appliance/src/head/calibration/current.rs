@@ -8,14 +8,15 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub struct Current(Arc<Mutex<Option<Arc<Calibration>>>>);
 
 impl Current {
-    /// Sets that of the head that was just opened; none if it has none that can be trusted.
+    /// Sets the calibration of the head that was just opened; `None` if the head has no calibration
+    /// that can be trusted.
     pub fn set(&self, calibration: Option<&Calibration>) {
         let calibration = calibration.cloned().map(Arc::new);
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = calibration;
     }
 
-    /// The calibration; none before a head is open, and for one without a calibration that can be
-    /// trusted.
+    /// The calibration; `None` before a head is open, and if the head has no calibration that can
+    /// be trusted.
     pub fn get(&self) -> Option<Arc<Calibration>> {
         let current = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         current.clone()

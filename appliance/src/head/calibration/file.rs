@@ -120,7 +120,7 @@ bounded! {
     pub struct TimingFile {
         /// From a flip to its light.
         pub flip_to_light_ns: u64 = 0..=MAX_TIME_NS,
-        /// 1 σ of that.
+        /// σ of the delay.
         pub sigma_ns: u64 = 0..=MAX_TIME_NS,
         /// What the camera's stamps mark.
         pub stamp: Stamp,
@@ -287,7 +287,7 @@ impl CalibrationFile {
         }
     }
 
-    /// Reads and checks one.
+    /// Reads and checks the bytes of a file.
     ///
     /// # Errors
     /// In words: what is wrong, and what to do.

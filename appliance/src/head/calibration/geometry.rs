@@ -33,7 +33,8 @@ bounded! {
         pub projector_px: f64 = 0.0..=f64::from(MAX_SIDE),
         /// σ of a height by the uncertainty of the models, RMS over the volume of all poses, mm.
         pub height_sigma_mm: f64 = 0.0..=MAX_MM,
-        /// σ of a length of 100 mm by the same, mm.
+        /// σ of a length of 100 mm by the uncertainty of the models, RMS over the volume of all
+        /// poses, mm.
         pub length_sigma_mm: f64 = 0.0..=MAX_MM,
         /// The poses, the last in the plane z = 0.
         pub poses: Vec<PoseFile> = Fields,

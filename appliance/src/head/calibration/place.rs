@@ -10,7 +10,7 @@ use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// Its path in a state folder.
+/// The path of the file in a state folder.
 pub const IN_STATE: &str = "calibration/calibration.json";
 /// Longest file, bytes.
 const MAX_BYTES: u64 = 64 << 20;

@@ -26,14 +26,14 @@ use std::time::Duration;
 pub enum Verdict {
     /// What was checked is as it must be.
     Pass,
-    /// It is not.
+    /// What was checked is not as it must be.
     Fail,
     /// A check that this one depends on has not passed.
     Skipped,
 }
 
 impl Verdict {
-    /// The word for it.
+    /// The word for the verdict.
     pub fn word(self) -> &'static str {
         match self {
             Self::Pass => "pass",

@@ -37,7 +37,7 @@ pub struct Delay {
     /// From a flip to its light, s, rounded to a microsecond; negative if the time stamps of flips
     /// or frames are misinterpreted.
     pub seconds: f64,
-    /// 1 σ of it, s.
+    /// σ of the delay, s.
     pub error: f64,
 }
 
@@ -50,9 +50,9 @@ struct Round {
 }
 
 impl Delay {
-    /// Measures it in at most `rounds` of about four seconds each; none if no light follows the
-    /// flips. The camera's stamps are interpreted as the head's timing says. `progress` gets the
-    /// share of the rounds done.
+    /// Measures the delay in at most `rounds` of about four seconds each; `None` if no light
+    /// follows the flips. The camera's stamps are interpreted as the head's timing says. `progress`
+    /// gets the share of the rounds done.
     ///
     /// # Errors
     /// Of a device.
@@ -78,7 +78,7 @@ impl Delay {
         Ok(fitted)
     }
 
-    /// As a duration; zero if it is negative.
+    /// The delay as a duration; zero if it is negative.
     pub fn duration(&self) -> Duration {
         Duration::from_micros((self.seconds * 1e6).round().max(0.0) as u64)
     }

@@ -21,14 +21,15 @@ const PITCH: f64 = 16.0;
 /// models are not those of the head any more: a real board in poses that were not used for the
 /// calibration left 0.08 to 0.43, a camera that was turned by 0.05° leaves 1.
 pub const MOST_DRIFT_PX: f64 = 0.5;
-/// What to do about a head beyond that.
+/// What to do about a head beyond that limit.
 pub const DRIFT_REMEDY: &str = "camera or projector was knocked or refocused since the calibration: calibrate the geometry anew";
 
 /// Frames of a part under vertical and then under horizontal fringes.
 pub struct CrossedFringes([(PhaseRange, Vec<Shot>, Vec<Frame>); 2]);
 
 impl CrossedFringes {
-    /// Takes them. The head's timing must be calibrated. `progress` is called after each frame.
+    /// Takes the frames. The head's timing must be calibrated. `progress` is called after each
+    /// frame.
     ///
     /// # Errors
     /// Of a device, or if the projector is too small for the fringes.
@@ -49,8 +50,8 @@ impl CrossedFringes {
         Ok(Self([take(true)?, take(false)?]))
     }
 
-    /// Compares what they show with the models of the head; `None` if too little of the frame shows
-    /// fringes.
+    /// Compares what the frames show with the models of the head; `None` if too little of the frame
+    /// shows fringes.
     ///
     /// # Errors
     /// If the projector is too small for the fringes.

@@ -87,7 +87,7 @@ fn showings(head: &Head) -> [Showing; SHOWINGS] {
     }; SHOWINGS]
 }
 
-/// From the times between triggers and stamps.
+/// What the stamps mark, by the times between triggers and stamps.
 fn by_triggers(
     camera: &CameraTiming,
     triggers: &[Timestamp],
@@ -159,13 +159,13 @@ fn nanoseconds(time: Duration) -> i128 {
     i128::try_from(time.as_nanos()).unwrap_or(i128::MAX)
 }
 
-/// From the time between the stamp of a frame and its delivery.
+/// What the stamps mark, by the time between the stamp of a frame and its delivery.
 fn by_waiting(camera: &CameraTiming, frames: &[WatchedFrame<()>]) -> Result<Stamps, Error> {
     let (exposure, delivery) = (camera.exposure, camera.delivery);
     let waits = frames.iter().map(|frame| frame.arrived.since(frame.start));
     let wait = waits.min().unwrap_or_default();
-    // Of equal ones the first wins: with a readout of zero, the stamp marks the end of the
-    // exposure.
+    // Of meanings that fit equally well the first is taken: with a readout of zero, the stamp marks
+    // the end of the exposure.
     let all = [
         (Stamp::ExposureStart, exposure + delivery, exposure),
         (Stamp::ExposureEnd, delivery, Duration::ZERO),

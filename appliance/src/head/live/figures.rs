@@ -30,7 +30,7 @@ pub struct Figures {
 }
 
 impl Figures {
-    /// Of a picture.
+    /// The figures of a picture.
     pub fn of(picture: &Picture) -> Self {
         let full = f64::from(picture.full_scale.max(1));
         let mut histogram = vec![0; BINS];

@@ -45,7 +45,7 @@ impl Show {
         Self::Fringes12,
     ];
 
-    /// The word for it.
+    /// The word for the pattern.
     pub fn word(self) -> &'static str {
         match self {
             Self::White => "white",
@@ -58,7 +58,7 @@ impl Show {
         }
     }
 
-    /// What a word stands for.
+    /// The pattern that a word stands for.
     pub fn parse(word: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|show| show.word() == word)
     }

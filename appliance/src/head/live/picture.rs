@@ -21,7 +21,7 @@ pub struct Picture {
     pub width: usize,
     /// Rows.
     pub height: usize,
-    /// Every which pixel of the frame it has.
+    /// The n: along both axes, one of so many pixels of the frame is in the picture.
     pub every: usize,
     /// The samples, row-major.
     pub counts: Vec<u16>,
@@ -30,7 +30,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// Of a frame.
+    /// The picture of a frame.
     pub fn of(frame: &Frame) -> Self {
         let format = frame.format();
         let (columns, rows) = (format.width as usize, format.height as usize);
@@ -48,8 +48,8 @@ impl Picture {
         }
     }
 
-    /// As PNG, with a circle around each of these places of the frame, u and v in its pixels; the
-    /// first one is larger.
+    /// The picture as PNG, with a circle around each of these places of the frame, u and v in its
+    /// pixels; the first circle is larger.
     pub fn png(&self, marked: &[[f64; 2]]) -> Vec<u8> {
         let mut canvas = Canvas::<3>::new(self.width, self.height);
         let full = u32::from(self.full_scale.max(1));

@@ -51,7 +51,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// Of the head whose measuring task takes these orders.
+    /// Live pictures of the head whose measuring task takes these orders.
     pub fn new(orders: Sender<Order>, commission: Commission) -> Self {
         Self {
             orders,

@@ -80,8 +80,8 @@ pub struct Commission {
 }
 
 impl Commission {
-    /// With what is kept in the state folder, and complaints about what of it cannot be used and
-    /// begins anew.
+    /// Commissioning with what is kept in the state folder, and complaints about files that cannot
+    /// be used and begin anew.
     pub fn open(state: &Path) -> (Self, Vec<String>) {
         let (drift, unfit) = Trend::open(state);
         let (kept, complaint) = match Commissioning::load(state) {

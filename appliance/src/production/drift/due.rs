@@ -2,7 +2,8 @@
 
 /// Signs of life without an order before the first attempt: a second.
 const SHORTEST: u32 = 10;
-/// The same after attempts that orders have ended: about a minute.
+/// Signs of life without an order before an attempt, at most, after orders have ended attempts:
+/// about a minute.
 const LONGEST: u32 = 640;
 
 /// Counts cycles and signs of life. An attempt that an order ended is made again after twice the
@@ -14,7 +15,7 @@ pub struct Due {
     cycles: u32,
     /// Signs of life since the last order.
     rested: u32,
-    /// How many of them there must be.
+    /// How many signs of life there must be before an attempt.
     pause: u32,
 }
 

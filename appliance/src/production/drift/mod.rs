@@ -26,9 +26,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What the measuring task remembers of its checks.
 pub struct Watch {
-    /// When the next one is due.
+    /// When the next check is due.
     pub due: Due,
-    /// Whether the frames of the last one are being worked out.
+    /// Whether the frames of the last check are being worked out.
     judging: Arc<AtomicBool>,
 }
 

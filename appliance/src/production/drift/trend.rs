@@ -78,14 +78,15 @@ impl Checks {
         Ok(file)
     }
 
-    /// Those that were compared with this calibration, the newest first.
+    /// The checks that were compared with this calibration, the newest first.
     fn newest<'a>(&'a self, calibration: &str) -> impl Iterator<Item = &'a Checked> {
         let of = calibration.to_owned();
         let all = self.checks.iter().rev();
         all.filter(move |check| check.calibration == of)
     }
 
-    /// How many of the newest, at most as many as make a drift, are beyond the limit.
+    /// How many of the newest checks in a row, at most as many as make a drift, are beyond the
+    /// limit.
     fn beyond(&self, calibration: &str) -> usize {
         let newest = self.newest(calibration).take(CONFIRMED);
         newest.take_while(|check| check.is_beyond()).count()

@@ -11,8 +11,8 @@ use algo::units::{AbsolutePhase, Height, Modulation, PhaseDelta};
 use rayon::prelude::*;
 
 /// The weight of each pixel's deviation, which lies by these `shares` along the normal, and the
-/// uncertainty of its taught height. The sequence has `brighter` times the modulation of golden, by
-/// which `noise` goes.
+/// uncertainty of its taught height. The sequence has `brighter` times the modulation of golden;
+/// `noise` is a function of golden's modulation.
 pub(super) fn taught(
     (noise, brighter): (SampleNoise, f64),
     arrays: &Arrays,
@@ -55,10 +55,10 @@ pub(super) fn even_noise(noise: SampleNoise, arrays: &Arrays) -> f64 {
     }
 }
 
-/// The phase that a sequence is unwrapped about and compared with: golden's by this sequence, which
-/// is `offset` from that by the full one. Of a sequence of limited reach it is unknown where a
-/// placement could move the phase further than that. `None` if it is that of the golden surface;
-/// `base` is the offset of the sequence that this is by.
+/// The phase that a sequence is unwrapped about and compared with: golden's phase by this sequence,
+/// which is `offset` more than that by the full sequence. For a sequence of limited reach it is
+/// unknown where a placement could move the phase further than the reach. `None` if it is the phase
+/// of the golden surface, which is that by the sequence with the offset `base`.
 pub(super) fn map(
     arrays: &Arrays,
     kind: SequenceKind,
@@ -70,7 +70,7 @@ pub(super) fn map(
     }
 }
 
-/// What golden's phase by a sequence is off that by the full one; empty if nothing.
+/// Golden's phase by a sequence less that by the full one; empty if they are the same.
 pub(super) fn offset(arrays: &Arrays, at: Option<usize>) -> &[i16] {
     let pixels = arrays.golden_phase.len();
     at.map_or(&[], |at| &arrays.sequence_offset[at * pixels..][..pixels])

@@ -16,14 +16,14 @@ const CONTRADICTING: f64 = 0.03;
 const UNFIT: f64 = 0.67;
 /// Largest share of points off the taught surface: a defect covers less, wrong fringe orders more.
 const OUTLIERS: f64 = 0.2;
-/// A part lies out of place where it does so by this many errors of its way, and by this share of
-/// what is allowed: a defect pulls the part's place by that.
+/// A part is out of place if it lies beyond the tolerance by this many σ of its way and by this
+/// share of the tolerance: a defect pulls the place that is found by so much.
 const SURE: f64 = 2.0;
 const PULLED: f64 = 0.02;
-/// A part that fails with less fitness than this is INVALID: its limits were set for a quarter of
-/// the noise.
+/// A part that fails with less fitness than this is INVALID: it is measured with four times the
+/// noise that its limits were set for.
 const LEAST_FITNESS: f64 = 0.25;
-/// What lies farther off than so many times what is allowed is another part.
+/// What lies farther from its place than so many times the tolerance is another part.
 const FAR: f64 = 10.0;
 /// Turns below this are not told, degrees.
 const LEAST_TURN: f64 = 0.05;
@@ -137,7 +137,8 @@ impl Demands {
         )
     }
 
-    /// Of a part that lies off its place: so far that it is another one, or to be put in place.
+    /// Why a part that lies off its place cannot be judged: so far off, it is another part; else it
+    /// must be put in place.
     fn off(&self, placed: &Placed) -> Reason {
         let [x, y, z, turns @ ..] = placed.motion.values();
         let degrees = turns
@@ -200,8 +201,8 @@ impl Demands {
         inspection.judged = Verdict::Invalid;
     }
 
-    /// Which values lie too close to a limit, and what to do; `None` if none does, or if another
-    /// one lies outside its limits.
+    /// Which values lie too close to a limit, and what to do; `None` if no value does, or if
+    /// another value lies outside its limits.
     fn undecided(&self, inspection: &Inspection) -> Option<String> {
         let close = |gauge: &GaugeValue| {
             let value = gauge.value?;
@@ -224,8 +225,8 @@ impl Demands {
         })
     }
 
-    /// Whether a part surely lies farther from its place than is allowed: one that lies at the
-    /// tolerance does not.
+    /// Whether a part surely lies farther from its place than is allowed: a part that lies just at
+    /// the tolerance does not.
     fn is_off(&self, placed: &Placed) -> bool {
         placed.reach - SURE * placed.reach_sigma > (1.0 + PULLED) * self.tolerance_mm
     }

@@ -21,7 +21,7 @@ pub struct Layers {
     pub height_mm: Vec<f32>,
     /// Deviation from golden in mm as [`Self::shown`] says, NaN where the part is not compared.
     pub deviation_mm: Vec<f32>,
-    /// Which deviation that is.
+    /// Which deviation the map shows.
     pub shown: Shown,
     /// Modulation of the finest level in counts.
     pub modulation: Vec<f32>,
@@ -34,9 +34,9 @@ pub struct Shown {
     pub side: usize,
     /// Whether the recipe has the part's motion taken back.
     pub aligned: bool,
-    /// Whether it was found, and taken back.
+    /// Whether the motion was found, and taken back.
     pub placed: bool,
-    /// The gauge; none if the recipe has none of the deviation.
+    /// The gauge; `None` if the recipe has no gauge of the deviation.
     pub gauge: Option<ShownGauge>,
 }
 

@@ -47,7 +47,7 @@ pub struct Plan {
     demands: Demands,
     /// The light of its patterns.
     illumination: Illumination,
-    /// What the rasters show, each once; those of the first run come first.
+    /// What the rasters show, each shot once; those of the first sequence come first.
     shots: Vec<Shot>,
     /// The sequences in the order in which they are tried; each unwraps further than the one
     /// before. Methods take the index of one as `sequence`.
@@ -152,8 +152,8 @@ impl Plan {
             window::add_compared(&mut window, &arrays.valid, size.0);
         }
         let range = triangulator.function().range();
-        // The golden surface is by the sequence that is projected first, so that deviations by that
-        // have no other error of golden's.
+        // The golden surface is measured by the sequence that is projected first, so that
+        // deviations by this sequence have no error of another sequence in golden.
         let base = sequences.first().and_then(|first| first.offset);
         let base = base.filter(|_| !arrays.sequence_offset.is_empty());
         let mut shots = Vec::new();
@@ -275,7 +275,7 @@ impl Plan {
         &self.runs[0].production
     }
 
-    /// The same by value.
+    /// The production of the first sequence, by value.
     pub fn into_production(mut self) -> Production {
         self.runs.swap_remove(0).production
     }

@@ -35,7 +35,8 @@ impl Plan {
         self
     }
 
-    /// The rasters of all sequences; those of the first come first, in the order of its frames.
+    /// The rasters of all sequences; those of the first sequence come first, in the order of its
+    /// frames.
     pub fn rasters(&self, calibration: &Calibration) -> Result<Vec<Raster>, hal::error::Error> {
         let function = self.production().triangulator().function();
         self.illumination

@@ -23,15 +23,15 @@ pub(super) struct Run {
     /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
-    /// Of two frames.
+    /// What a run of two frames needs; `None` for other sequences.
     pub pair: Option<Pair>,
     /// Memory for the levels that are decoded on arrival, allocated by the first cycle.
     pub arrived: Mutex<Option<Arrived>>,
-    /// Bytes of its maps.
+    /// Bytes of the run's maps.
     pub bytes: usize,
 }
 
-/// What a run of two frames has beside the others.
+/// What a run of two frames has beside what every run has.
 #[derive(Debug)]
 pub(super) struct Pair {
     /// Golden's picture; none if it has no edges, and then every cycle falls back.
@@ -62,10 +62,12 @@ pub(super) struct GoldenNoise {
     /// σ of the phase of a pixel of full modulation, turns per count of noise: in one capture by
     /// the full sequence.
     full: f64,
-    /// The same by the sequence that the golden surface is by, and the offset of that.
+    /// σ of the phase in one capture by the sequence that the golden surface is measured by, in the
+    /// same unit.
     base: f64,
     offset: Option<usize>,
-    /// Per gauge, what the noise of one capture by the full sequence makes of it.
+    /// For each gauge, the largest deviation that the noise of one capture by the full sequence
+    /// causes.
     largest: Vec<Largest>,
 }
 
@@ -76,9 +78,9 @@ pub(super) struct Prepared {
     decoder: Decoder,
     taught: Taught,
     map: Option<Vec<AbsolutePhase>>,
-    /// Its modulation over that of golden.
+    /// The sequence's modulation over that of golden.
     brighter: f64,
-    /// Which offset from the full sequence golden has by this one.
+    /// The index of golden's offset by this sequence; `None` where there is no offset.
     offset: Option<usize>,
     /// RMS of the periodic error of mean heights, mm.
     ripple_mm: f64,
@@ -86,10 +88,10 @@ pub(super) struct Prepared {
 
 impl Prepared {
     /// Prepares a sequence for phases of `range` with at least so much modulation; the recipe's
-    /// arrays can be dropped then. `rasters` are what all runs show; what only this one shows is
+    /// arrays can be dropped then. `rasters` are what all runs show; what only this run shows is
     /// added. `fundamental` is that of the waveform that golden's modulation was measured with;
-    /// deviations lie by `shares` along the normal; `base` is the offset of the sequence that the
-    /// golden surface is by.
+    /// `shares` of deviations lie along the normal; `base` is the offset of the sequence that the
+    /// golden surface is measured by.
     pub fn of(
         sequence: RecipeSequence,
         (noise, fundamental): (SampleNoise, f64),
@@ -128,8 +130,8 @@ impl Prepared {
         })
     }
 
-    /// The noise of golden, where this is the full sequence, in frames of `width` columns. The
-    /// golden surface is by the sequence `base`.
+    /// The noise of golden in frames of `width` columns; `self` is the full sequence, and the
+    /// golden surface is measured by the sequence `base`.
     pub fn golden_noise(
         &self,
         base: &Self,
@@ -156,12 +158,12 @@ impl Prepared {
         self.decoder.phase_noise(full, noise)
     }
 
-    /// σ of golden's heights that deviations by this sequence have, over that of one measurement by
-    /// it.
+    /// σ of golden's heights in deviations by this sequence, over σ of the heights of one
+    /// measurement by it.
     ///
-    /// Golden's phase by this sequence is what deviations are from. Where the golden surface is by
-    /// another one, a displaced part is compared with heights by that one, and the heights of both
-    /// places have its noise.
+    /// Deviations are from golden's phase by this sequence. Where the golden surface is measured by
+    /// another sequence, a displaced part is compared with heights by that sequence, and the
+    /// heights at both places have its noise.
     fn noise_of_golden(&self, golden: &GoldenNoise) -> f64 {
         let own = self.phase_noise();
         let measured = self.offset.is_some() || self.kind == SequenceKind::Full;
@@ -173,7 +175,7 @@ impl Prepared {
         (variance / golden.captures).sqrt() / own
     }
 
-    /// Joins it with what all sequences share.
+    /// Joins the sequence with what all sequences share.
     pub fn join(self, shared: &Shared) -> Result<Run, String> {
         let golden_noise = self.noise_of_golden(&shared.golden);
         let over_full = golden_noise * self.phase_noise() / shared.golden.full;

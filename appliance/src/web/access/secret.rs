@@ -52,7 +52,7 @@ pub(super) fn given(file: &Path) -> Result<Option<String>, String> {
 pub struct NewSecret {
     /// The secret.
     pub secret: String,
-    /// What was wrong with the stored hash of the one before, if there was one.
+    /// What was wrong with the stored hash of the previous secret, if there was one.
     pub complaint: Option<String>,
 }
 

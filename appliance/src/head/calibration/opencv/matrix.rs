@@ -15,7 +15,7 @@ pub struct Matrix {
 }
 
 impl Matrix {
-    /// Reads one; `name` is only for messages.
+    /// Reads a matrix; `name` is only for messages.
     ///
     /// # Errors
     /// In words: it is not a matrix, its number of elements contradicts its shape, or one is not

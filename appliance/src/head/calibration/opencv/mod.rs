@@ -60,9 +60,9 @@ impl Unit {
 /// Columns and rows of camera and projector; a size that a file states must be the same.
 #[derive(Clone, Copy, Debug)]
 pub struct Sizes {
-    /// Of the camera.
+    /// Size of the camera's frames.
     pub camera: (u32, u32),
-    /// Of the projector.
+    /// Size of the projector's raster.
     pub projector: (u32, u32),
 }
 
@@ -176,13 +176,13 @@ struct World {
     camera: Pose,
     /// Whether the plane z = 0 is known.
     has_plane: bool,
-    /// Whether the files state it.
+    /// Whether the files state the plane.
     is_stated: bool,
 }
 
 impl World {
-    /// That of the stated pose of the camera; else the plane stands across the camera's axis, at
-    /// the declared distance or nowhere yet.
+    /// The world of the stated pose of the camera; without a pose, one whose plane z = 0 stands
+    /// across the camera's axis, at the declared distance or nowhere yet.
     fn of(stated: Option<Pose>, declared: Declared) -> Result<Self, String> {
         let across = |distance| Pose {
             translation_mm: [0.0, 0.0, distance],

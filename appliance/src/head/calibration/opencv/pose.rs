@@ -6,8 +6,8 @@ use super::tree::Node;
 
 /// Largest element of R·Rᵀ − 1: a rotation matrix that was rounded to six digits has less.
 const TOLERANCE: f64 = 1e-4;
-/// Largest element of R less the nearest rotation, for R to be taken as that: rounding to three
-/// digits leaves half of it.
+/// Largest element of the difference of R and the nearest rotation up to which R is replaced by
+/// that rotation: rounding to three digits causes half as much.
 const ROUNDED: f64 = 1e-3;
 
 /// X_to = R · X_from + t.
@@ -20,7 +20,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// That of a device in its own frame.
+    /// The pose of a device in its own frame of coordinates.
     pub fn identity() -> Self {
         Self {
             rotation: UNIT,
