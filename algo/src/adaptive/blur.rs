@@ -30,9 +30,9 @@ pub struct Spread {
 }
 
 impl Spread {
-    /// From the modulation at `fine` as a share of that at `coarse` (turns per projector pixel) on
-    /// a surface of slope `[ju, jv]`. `None` if they tell nothing, for example because one of them
-    /// is unknown.
+    /// The point of the modulation at `fine` as a share of that at `coarse` (turns per projector
+    /// pixel) on a surface of slope `[ju, jv]`. `None` if they tell nothing, for example because
+    /// one of them is unknown.
     pub fn new([ju, jv]: [f64; 2], share: f64, [fine, coarse]: [f64; 2]) -> Option<Self> {
         let pixels = |g: f64| contrast(&Blur::default(), g, [g * ju, g * jv]);
         let lost = -libm::log(share * pixels(coarse) / pixels(fine));

@@ -22,7 +22,7 @@ pub struct ProjectorMap {
 pub(super) const UNKNOWN: [f64; 2] = [f64::NAN; 2];
 
 impl ProjectorMap {
-    /// From the heights of a preliminary measurement with vertical fringes: η follows from
+    /// The map from the heights of a preliminary measurement with vertical fringes: η follows from
     /// projecting the point. As camera and projector lie beside each other, an error of the height
     /// hardly changes η, and horizontal fringes are not needed.
     pub fn from_heights(triangulator: &Triangulator, heights: &HeightMap) -> Self {
@@ -41,9 +41,9 @@ impl ProjectorMap {
         Self { width, points }
     }
 
-    /// From preliminary measurements with vertical and horizontal fringes: ξ = `across` × vertical
-    /// phase, η = `down` × horizontal phase, where `across` and `down` are their pitches in
-    /// projector pixels (Peng & Gupta 2008, eqs. 3 and 4).
+    /// The map from preliminary measurements with vertical and horizontal fringes: ξ = `across` ×
+    /// vertical phase, η = `down` × horizontal phase, where `across` and `down` are their pitches
+    /// in projector pixels (Peng & Gupta 2008, eqs. 3 and 4).
     pub fn from_phases(
         [vertical, horizontal]: [&[AbsolutePhase]; 2],
         [across, down]: [f64; 2],

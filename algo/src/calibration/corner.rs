@@ -184,7 +184,7 @@ struct Model {
 struct Edge {
     /// erf(s/√2σ).
     step: f64,
-    /// Its derivative with s.
+    /// The derivative of that with s.
     slope: f64,
     /// s.
     side: f64,

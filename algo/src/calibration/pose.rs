@@ -55,8 +55,8 @@ impl Pose {
         }
     }
 
-    /// With a small turn (rotation vector, rad) after R and a shift added to t, as one list: turn,
-    /// then shift.
+    /// This pose with a small turn (rotation vector, rad) after R and a shift added to t, given as
+    /// one list: turn, then shift.
     #[must_use]
     pub fn moved(&self, by: &[f64]) -> Self {
         let turn = Vector::new(by[0], by[1], by[2]);

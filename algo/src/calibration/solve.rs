@@ -39,7 +39,7 @@ pub enum CalibrationError {
         "{given} poses are given, at least {LEAST_POSES} are needed and 6 to 10 are recommended: take more, tilted to all sides"
     )]
     Few {
-        /// How many there are.
+        /// How many poses there are.
         given: usize,
     },
     /// The board lies parallel in all poses.

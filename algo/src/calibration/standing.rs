@@ -23,7 +23,8 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// Of a board with this normal, from whose centre the lines to camera and projector begin.
+    /// The angles of a board with this normal, from whose centre the lines to camera and projector
+    /// begin.
     pub fn new(normal: Vector, camera: Vector, projector: Vector) -> Self {
         let angle = |a: Vector, b: Vector| libm::atan2(a.cross(b).length(), a.dot(b));
         let across = camera.cross(projector);
@@ -35,8 +36,8 @@ impl Standing {
         }
     }
 
-    /// Whether it is hardly the plane z = 0 of a head, whose normal passes between camera and
-    /// projector.
+    /// Whether the board hardly lies in the plane z = 0 of a head, whose normal passes between
+    /// camera and projector.
     pub fn is_doubtful(&self) -> bool {
         self.aside > MOST_ASIDE || self.camera + self.projector > self.between + 2.0 * MOST_ASIDE
     }

@@ -41,7 +41,7 @@ impl Weight {
         self != Self::NONE
     }
 
-    /// Whether it counts, with a weight below 1.
+    /// Whether the pixel counts with a weight below 1.
     pub fn partial(self) -> bool {
         self.0 > 1
     }
@@ -83,7 +83,7 @@ impl Factor {
 }
 
 impl From<bool> for Weight {
-    /// In full if it is compared.
+    /// Full weight if the pixel is compared, else none.
     fn from(compared: bool) -> Self {
         match compared {
             true => Self::FULL,

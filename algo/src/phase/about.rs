@@ -63,7 +63,8 @@ struct Dense {
     /// p_c and p_m (0 without a middle level). With a middle level p_c includes p_m · `mean_gain`,
     /// because the kernel takes e_m about the mean of finest and coarse level.
     weights: [f64; 2],
-    /// By how much e_m is smaller about that mean than about the finest level, as a share of e_c.
+    /// By how much e_m about the mean of finest and coarse level is smaller than about the finest
+    /// level, as a share of e_c.
     mean_gain: f64,
 }
 

@@ -35,7 +35,7 @@ use core::hint::black_box;
 
 /// 1/(2x) in Q15 for x = (3 + d)/4, −1 ≤ d < 1, coefficients of d⁰ to d²: relative error 1 %.
 const RECIPROCAL: [i16; 3] = [21_826, -7_914, 2_710];
-/// The same with d³: relative error 0.2 %.
+/// 1/(2x) with coefficients of d⁰ to d³: relative error 0.2 %.
 const ROUGH_RECIPROCAL: [i16; 4] = [21_817, -7_271, 2_724, -914];
 /// atan(t)/2π on 0 ≤ t ≤ 1 in 1/131072 turn, coefficients of t to t⁵: error 4e-6 turn.
 const ARCTANGENT: [i16; 5] = [20_831, 439, -9_260, 5_342, -967];

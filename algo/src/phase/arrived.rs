@@ -56,7 +56,7 @@ pub(crate) enum ArrivedRow<W, B> {
 pub(crate) struct Expected<W, B> {
     /// Modulo one turn, 1/65536 turn.
     pub fraction: W,
-    /// Its turns, in the fixed point of the step to the next level.
+    /// The whole turns of that phase, in the fixed point of the step to the next level.
     pub turns: W,
     /// The first [`crate::trust::Trust`] that rejects the pixel, or [`NO_REASON`].
     pub reason: B,

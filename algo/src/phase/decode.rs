@@ -42,7 +42,7 @@ pub struct PhaseRow<'a> {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum DecodeError {
-    /// Its levels are of no known form.
+    /// The levels of the sequence are of no known form.
     Sequence(SequenceError),
     /// Samples of fewer than 8 or more than 16 bits.
     BitDepth(u8),
@@ -64,9 +64,9 @@ pub enum DecodeError {
     },
     /// The number of levels that have arrived does not fit the call.
     Level {
-        /// How many have arrived.
+        /// Levels that have arrived.
         arrived: usize,
-        /// How many the sequence has.
+        /// Levels of the sequence.
         levels: usize,
     },
     /// A frame's samples are not of the width that the bit depth needs.

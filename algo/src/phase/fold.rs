@@ -163,7 +163,8 @@ pub(super) fn fold<V: Lanes>(
         high = lifted(v, level, length[1], short[1]);
     }
     if !V::FEW_REGISTERS {
-        // The same, but compared here, where one instruction can take the bits of its inverse.
+        // `flat` as above, but compared here, where one instruction can take the bits of its
+        // inverse.
         flat = [v.gt(length[0], along[0]), v.gt(length[1], along[1])];
     }
     let low = octant(v, [s[0], c[0]], flat[0], low);

@@ -65,7 +65,8 @@ pub(crate) struct Level {
     four: LeastOfFour,
     /// Coefficients of √(1 + t²), scaled so that the product with a length is a modulation.
     hypotenuse: [i16; 3],
-    /// Whether that product is half of the modulation, because the coefficients would not fit Q15.
+    /// Whether the product of these coefficients and a length is half of the modulation, because
+    /// they would not fit Q15 else.
     doubled: bool,
     /// Whether a sample at full scale rejects its pixel.
     pub saturates: bool,

@@ -8,7 +8,7 @@ use crate::simd::Lanes;
 
 /// Largest rounding residual of an unwrapping step, in turns.
 pub(super) const MAX_RESIDUAL: f64 = 0.40;
-/// The same in 1/65536 turn.
+/// Largest rounding residual of an unwrapping step, in 1/65536 turn.
 pub(super) const MAX_RESIDUAL_BITS: i16 = (MAX_RESIDUAL * 65_536.0) as i16;
 
 /// How the levels of a pixel become one absolute phase; prepared once per plan.

@@ -254,7 +254,7 @@ pub(crate) trait Lanes: Copy + Debug {
     /// x / 2ⁿ rounded to nearest, signed and kept inside a word; n below 31, and x + 2ⁿ⁻¹ must not
     /// overflow.
     fn narrow_rounded(self, x: [Self::D; 2], n: u8) -> Self::W;
-    /// The same for a fixed n from 1 to 16.
+    /// As [`Self::narrow_rounded`], for a fixed n from 1 to 16.
     #[inline(always)]
     fn narrow_rounded_by<const N: i32>(self, x: [Self::D; 2]) -> Self::W {
         self.narrow_rounded(x, N as u8)

@@ -63,7 +63,7 @@ impl<'a> Results<'a> {
         self.store_others(v, at, modulation, trust);
     }
 
-    /// The same from the fractions and the fringe orders of the phases.
+    /// Stores a block, given by the fractions and the fringe orders of the phases.
     #[inline(always)]
     pub fn store_turns<V: Lanes>(
         &mut self,

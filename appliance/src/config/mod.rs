@@ -272,7 +272,7 @@ impl Config {
         let mut head = self.head.clone();
         head.calibration.get_or_insert_with(|| state.join(IN_STATE));
         let kept = Commissioning::kept_exposing(state);
-        // Those of another camera are of no use.
+        // Exposure and gain of another camera are of no use.
         if let Some(kept) = kept.filter(|kept| kept.check(head.least_gain()).is_ok()) {
             head.expose(kept);
         }

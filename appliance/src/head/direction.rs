@@ -56,7 +56,7 @@ impl Sensitivity {
         })
     }
 
-    /// That these fringes tell little of heights, if they do.
+    /// A note that these fringes tell little of heights, if they do.
     pub fn poor(&self) -> Option<String> {
         (self.share < LEAST_SHARE).then(|| {
             format!(

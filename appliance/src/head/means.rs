@@ -20,7 +20,7 @@ const SATURATED: u16 = u16::MAX;
 /// frames taken; it may end the captures by `false`, and then there are no means.
 ///
 /// # Errors
-/// Of the device that failed.
+/// The error of the device that failed.
 pub fn take(
     head: &mut Head,
     patterns: usize,

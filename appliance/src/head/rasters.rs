@@ -32,7 +32,7 @@ impl Illumination {
     /// Loads the shots of a phase function, to be exposed in this way.
     ///
     /// # Errors
-    /// Of the projector, or if the head cannot expose for longer.
+    /// The error of the projector, or if the head cannot expose for longer.
     pub fn load(
         &self,
         head: &mut Head,

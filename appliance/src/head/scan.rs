@@ -18,7 +18,7 @@ use std::time::Duration;
 /// gets the share of the frames taken.
 ///
 /// # Errors
-/// Of the device that failed.
+/// The error of the device that failed.
 pub fn take(
     head: &mut Head,
     calibration: &Calibration,
@@ -35,7 +35,7 @@ pub fn take(
 /// frames taken.
 ///
 /// # Errors
-/// Of the device that failed.
+/// The error of the device that failed.
 pub fn take_loaded(
     head: &mut Head,
     patterns: usize,

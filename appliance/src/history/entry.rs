@@ -14,7 +14,7 @@ columns! {
         time_utc_us: Option<u64> = Some(record.time_utc_us).filter(|&time| time != 0), "INTEGER";
         /// Trigger time since the start of the daemon, s.
         uptime_s: u32 = record.uptime_s, "INTEGER NOT NULL";
-        /// Which start that was: BOOT_ID as 8 hexadecimal digits.
+        /// The start of the daemon during which the trigger came: BOOT_ID as 8 hexadecimal digits.
         boot_id: String = format!("{:08x}", record.boot_id), "TEXT NOT NULL";
         /// Recipe number.
         recipe: u16 = record.recipe, "INTEGER NOT NULL";
@@ -98,20 +98,20 @@ columns! {
 /// Which results: all conditions hold together. The default asks for the newest hundred.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Filter {
-    /// Of this recipe.
+    /// Results of this recipe only.
     pub recipe: Option<u16>,
-    /// With this verdict.
+    /// Results with this verdict only.
     pub verdict: Option<Verdict>,
-    /// Of this PART_ID.
+    /// Results of this PART_ID only.
     pub part_id: Option<u32>,
-    /// Triggered at or after this time, µs since 1970 UTC. Results without a time are then left
-    /// out.
+    /// Results that were triggered at or after this time, µs since 1970 UTC. Results without a time
+    /// are then left out.
     pub since_us: Option<u64>,
-    /// Triggered before this time.
+    /// Results that were triggered before this time, µs since 1970 UTC.
     pub until_us: Option<u64>,
-    /// Stored before the result of this SEQ: the next page of a list.
+    /// Results that were stored before the result of this SEQ: the next page of a list.
     pub before_seq: Option<u32>,
-    /// At most this many, the newest.
+    /// At most this many results, the newest.
     pub limit: usize,
 }
 

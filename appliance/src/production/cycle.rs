@@ -19,9 +19,9 @@ use std::time::{Duration, Instant};
 /// The sequence that a part was judged by.
 #[derive(Default)]
 pub(super) struct JudgedBy {
-    /// Which of the recipe's sequences.
+    /// Index among the recipe's sequences.
     pub sequence: usize,
-    /// Its frames; empty if the part was not judged.
+    /// The frames of the sequence; empty if the part was not judged.
     pub frames: Vec<Frame>,
 }
 

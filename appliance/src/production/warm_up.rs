@@ -12,7 +12,7 @@ const STEADY_C: f64 = 1.0;
 /// taken to be warm.
 #[derive(Debug, Default)]
 pub struct WarmUp {
-    /// Of the camera and of the projector.
+    /// The temperatures of the camera and of the projector.
     devices: [Option<Steady>; 2],
     under_way: bool,
 }

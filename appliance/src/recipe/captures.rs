@@ -56,7 +56,7 @@ impl Captured {
     /// share of the frames taken and may end the measurement by `false`.
     ///
     /// # Errors
-    /// As of [`super::teach::teach`].
+    /// As [`super::teach::teach`].
     pub fn take(
         CalibratedHead {
             head,

@@ -93,7 +93,7 @@ pub struct RecipeSequence {
     pub kind: SequenceKind,
     /// What each frame shows.
     pub shots: Vec<Shot>,
-    /// Its levels.
+    /// The levels of these shots.
     pub levels: Sequence,
     /// Which part of `sequence_offset.npy` belongs to the sequence; the full sequence and the two
     /// frames have none.
@@ -161,7 +161,7 @@ impl Recipe {
         file.check_bounds()?;
         let (width, height) = (file.camera.width as usize, file.camera.height as usize);
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
-        // Those of the projector's size are checked below.
+        // Arrays of the projector's size are checked below.
         let of_projector = ["phase_function", "amplitude"];
         let lengths = arrays.lengths().into_iter();
         for (name, length) in lengths.filter(|(name, _)| !of_projector.contains(name)) {

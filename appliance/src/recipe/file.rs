@@ -106,7 +106,7 @@ bounded! {
         /// A value inside its limits but nearer to one than this many times its uncertainty u is
         /// neither PASS nor FAIL.
         pub guard_k: f64 = 0.0..=MAX_GUARD_K,
-        /// Whether it only measures: no gauge has a limit that a part can miss.
+        /// Whether the recipe only measures: no gauge has a limit that a part can miss.
         pub judges_nothing: bool,
         /// Polygons in camera pixels.
         pub regions: Vec<RegionFile>,
@@ -223,7 +223,8 @@ bounded! {
         /// recording.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub ripple_mm: Option<f64> = 0.0..=MAX_SIGMA_MM,
-        /// How often it gets a fringe order wrong unseen; `None` where it cannot be unwrapped.
+        /// How often the sequence gets a fringe order wrong unseen; `None` where it cannot be
+        /// unwrapped.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub unseen_orders: Option<UnseenFile> = Fields,
     }
@@ -236,7 +237,7 @@ bounded! {
         /// Mean over the golden surface where the sequence is safe, by the modulation and the phase
         /// reach of each pixel.
         pub part: f64 = 0.0..=1.0,
-        /// Of pixels of the least trusted modulation, where the phase reach is largest.
+        /// Rate among pixels of the least trusted modulation, where the phase reach is largest.
         pub darkest: f64 = 0.0..=1.0,
     }
 }

@@ -39,7 +39,7 @@ impl GoldenPart<'_> {
         for gauge in &mut manifest.gauges {
             match gauge.measures.facts().basis {
                 Basis::Squares(_) => set_deviation(gauge, &weighed.found),
-                // Of the whole frame; openings have an upper limit.
+                // The coverage of the whole frame; that of openings has an upper limit.
                 Basis::Pixels => gauge.low = gauge.low.map(|_| coverage.max(0.0)),
                 _ => {}
             }

@@ -1,6 +1,7 @@
 //! The median of some numbers.
 
-/// Of an even number of values the mean of both in the middle; none without values.
+/// The median; of an even number of values the mean of the two in the middle, `None` without
+/// values.
 pub(super) fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let upper = values.len() / 2;

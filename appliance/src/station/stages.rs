@@ -21,7 +21,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// How many there are.
+    /// Number of stages.
     pub const COUNT: usize = 6;
 
     /// What it is called in JSON, CSV and metrics.

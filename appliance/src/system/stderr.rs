@@ -89,7 +89,7 @@ struct Waiting {
     bar: Option<Bar>,
     /// What was handed over so far.
     handed: u64,
-    /// How much of it is done.
+    /// How much of what was handed over is done.
     done: u64,
     /// Whether nobody waits.
     detached: bool,

@@ -82,7 +82,7 @@ const REST: Duration = Duration::from_secs(5);
 /// What the station does with a recipe of which another version was stored.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reload {
-    /// Whether it is the active one.
+    /// Whether the recipe is the active one.
     pub active: bool,
     /// Whether the stored version is being loaded; if not, the station keeps using the one before.
     pub loading: bool,

@@ -80,7 +80,8 @@ pub struct Registers {
 }
 
 impl Default for Registers {
-    /// As after power-on: a DLPC3478 that shows video and adapts its brightness.
+    /// The registers after power-on: those of a DLPC3478 that shows video and adapts its
+    /// brightness.
     fn default() -> Self {
         Self {
             id: 0x0B,
@@ -133,7 +134,7 @@ impl ControllerBus {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Its registers now.
+    /// The controller's registers now.
     pub fn registers(&self) -> Registers {
         self.lock().registers.clone()
     }

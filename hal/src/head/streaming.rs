@@ -43,7 +43,7 @@ impl Head {
     /// How long the camera takes to start.
     ///
     /// # Errors
-    /// Of the camera.
+    /// The error of the camera.
     pub fn start_up(&mut self) -> Result<Duration, Error> {
         let devices = &mut self.devices;
         devices.streaming.since = None;

@@ -104,10 +104,10 @@ pub(crate) struct Clocks {
 }
 
 impl Clocks {
-    /// From readings of the monotonic clock, the boot-time clock, and the monotonic clock again.
-    /// The reading thread may be interrupted in between, so `suspended` is from the reading with
-    /// the shortest time between its two monotonic times, and too long by at most that time.
-    /// `monotonic` is the very last time that was read.
+    /// The clocks from readings of the monotonic clock, the boot-time clock, and the monotonic
+    /// clock again. The reading thread may be interrupted in between, so `suspended` is from the
+    /// reading with the shortest time between its two monotonic times, and too long by at most that
+    /// time. `monotonic` is the very last time that was read.
     pub fn of(readings: &[(Timestamp, Timestamp, Timestamp)]) -> Self {
         let spread = |(before, _, after): &&(Timestamp, Timestamp, Timestamp)| after.since(*before);
         let closest = readings.iter().min_by_key(spread);

@@ -29,7 +29,7 @@ pub enum RecordingError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{problem}: {remedy}")]
 pub struct Wrong {
-    /// With the numbers.
+    /// What is wrong, with the numbers.
     problem: String,
     /// What to do about it.
     remedy: String,

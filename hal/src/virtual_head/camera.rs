@@ -33,7 +33,7 @@ pub(super) struct Sensor {
     count: u64,
     /// When the copying of the latest frame ends.
     copied: Timestamp,
-    /// In the order in which their frames arrive.
+    /// The exposures in the order in which their frames arrive.
     exposures: VecDeque<PendingExposure>,
     /// The last frame, if it is to arrive a second time.
     again: Option<Frame>,

@@ -79,8 +79,8 @@ const LARGEST_SIGMA_MM: f64 = 0.05;
 const SHARE: f64 = 0.5;
 
 impl Directions {
-    /// Of a normal matrix Σ j jᵀ of rows in mm per mm. `noise` is what errors of the normals add to
-    /// it, `sigma_mm` the error of a residual, 1 σ.
+    /// The directions of a normal matrix Σ j jᵀ of rows in mm per mm. `noise` is what errors of the
+    /// normals add to the matrix, `sigma_mm` the error of a residual, 1 σ.
     pub fn of(normal: &Matrix6, noise: &Matrix6, sigma_mm: f64) -> Self {
         let (values, vectors) = eigen(normal);
         let (mut kept, mut free) = (heapless::Vec::new(), heapless::Vec::new());

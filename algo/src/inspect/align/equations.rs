@@ -54,7 +54,7 @@ pub(super) struct Equations {
     sizes: Vec<f64>,
 }
 
-/// From the median of absolute deviations to σ of a normal distribution.
+/// σ of a normal distribution over its median absolute deviation.
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
 impl Equations {

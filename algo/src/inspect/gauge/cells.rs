@@ -122,9 +122,9 @@ impl Sum {
 /// The means of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cell {
-    /// Its number in the [`Grid`].
+    /// The number of the cell in the [`Grid`].
     pub at: usize,
-    /// How many pixels' noise its error follows from.
+    /// Number of pixels from whose noise the error of the cell follows.
     pub pixels: f64,
     /// Height, mm: as taught plus the mean deviation, so that it does not depend on which pixels of
     /// the cell were measured.

@@ -15,7 +15,7 @@ kind! {
     OutOfTolerance {
         /// Side of the cells, pixels.
         smoothing_px: usize,
-        /// In mm.
+        /// The tolerance, mm.
         tolerance_mm: f64,
     }
 }

@@ -1,5 +1,5 @@
-//! What the error of a height is made of (`fringed-lab accuracy`): noise, what remains without any,
-//! and how fine a structure is seen.
+//! What the error of a height is made of (`fringed-lab accuracy`): noise, what remains without
+//! noise, and how fine a structure is seen.
 
 mod budget;
 mod resolution;

@@ -15,9 +15,9 @@ pub struct Resolution {
     pub optics: &'static str,
     /// Diameter of the dent, mm.
     pub diameter_mm: f64,
-    /// Of the height of a pixel.
+    /// What is left in the height of a single pixel.
     pub of_pixel: f64,
-    /// Of the mean of 9 × 9 pixels.
+    /// What is left in the mean of 9 × 9 pixels.
     pub of_mean: f64,
 }
 

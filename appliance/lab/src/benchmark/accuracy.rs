@@ -24,11 +24,11 @@ use std::time::Duration;
 pub struct Study {
     /// Names of the simulated parts.
     pub parts: Vec<&'static str>,
-    /// Columns and rows of their camera.
+    /// Columns and rows of the simulated camera.
     pub camera: u32,
-    /// Bits of it.
+    /// Bits of the camera's samples.
     pub bit_depths: Vec<u8>,
-    /// How long times are measured; its size is that of the floor.
+    /// How long times are measured; the size that it states is used for the floor.
     pub effort: Effort,
 }
 
@@ -90,7 +90,8 @@ impl Study {
             parts: vec!["cone", "sawtooth", "sphere", "spline"],
             camera: 512,
             bit_depths: vec![8, 10, 12],
-            // Shorter for each: ten sequences of three depths on four parts.
+            // Shorter for each than the kernels' effort: there are ten sequences of three depths on
+            // four parts.
             effort: Effort {
                 rounds: 5,
                 patience: Duration::from_millis(15),

@@ -37,7 +37,7 @@ pub struct Budget {
     /// Columns of the camera.
     #[serde(skip)]
     pub width: u32,
-    /// Rows of it.
+    /// Rows of the camera.
     #[serde(skip)]
     pub height: u32,
     /// Frames of the production sequence.

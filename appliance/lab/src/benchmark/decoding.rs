@@ -23,14 +23,14 @@ pub struct Decoding {
 /// samples, but every set needs its own decoded levels: they were last used as long ago as the
 /// frames, so that they come from no cache either.
 struct OnArrival {
-    /// How many are kept.
+    /// How many sets' levels are kept.
     copies: usize,
     /// The levels of each set, with those of the current one in front.
     levels: VecDeque<Arrived>,
 }
 
 impl Decoding {
-    /// With a decoder; rows without a column in `window` are left out.
+    /// Decoding by a decoder; rows without a column in `window` are left out.
     pub fn new(decoder: Decoder, window: Option<Vec<Range<usize>>>) -> Self {
         Self {
             decoder,
@@ -39,8 +39,8 @@ impl Decoding {
         }
     }
 
-    /// With a decoder that is timed on the last level only, for `copies` frame sets with the same
-    /// samples.
+    /// Decoding by a decoder that is timed on the last level only, for `copies` frame sets with the
+    /// same samples.
     pub fn after_the_last(decoder: Decoder, copies: usize) -> Self {
         Self {
             decoder,
@@ -74,7 +74,7 @@ pub struct Inspecting<'a> {
 }
 
 impl<'a> Inspecting<'a> {
-    /// With strips as high as those of a plan.
+    /// Production with strips as high as those of a plan.
     pub fn new(production: &'a Production) -> Self {
         let rows = production.window().len();
         Self {

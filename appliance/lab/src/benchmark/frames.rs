@@ -53,8 +53,8 @@ impl FrameSet {
         }
     }
 
-    /// The same frames as a camera delivers them: each in a mapping of its own ([`Placed::Apart`]),
-    /// its rows padded to whole lines of the cache. A set that was made by [`FrameSet::new`].
+    /// This set as a camera delivers frames: each in a mapping of its own ([`Placed::Apart`]), its
+    /// rows padded to whole lines of the cache. This set must have been made by [`FrameSet::new`].
     pub fn aligned(&self) -> Self {
         let samples_of_a_line = match &self.samples {
             Buffer::Eight(_) => LINE,
@@ -72,7 +72,7 @@ impl FrameSet {
         }
     }
 
-    /// From a head's frames, which have equal format, without the padding of their rows.
+    /// A set of a head's frames, which have equal format, without the padding of their rows.
     pub fn of(frames: &[Frame], map: Option<Vec<AbsolutePhase>>) -> Self {
         let (mut eight, mut sixteen) = (Vec::new(), Vec::new());
         let mut size = (0, 0);

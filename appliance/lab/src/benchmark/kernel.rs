@@ -21,9 +21,9 @@ pub struct Timing {
     pub frames: usize,
     /// Processor time per pixel of one frame, median.
     pub ns_per_px: f64,
-    /// The least of it.
+    /// Processor time per pixel of one frame, least.
     pub least_ns_per_px: f64,
-    /// The same for 8 rows that are in the cache, median.
+    /// Processor time per pixel for 8 rows that are in the cache, median.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hot_ns_per_px: Option<f64>,
     /// What a row costs beside its pixels, ns, median: from hot frames of two widths and equal
@@ -47,7 +47,7 @@ pub struct Timing {
 pub struct KernelTable {
     /// Processor time of the floor per pixel, median over all rounds.
     pub floor_ns_per_px: f64,
-    /// The least and the most of it.
+    /// Least and most processor time of the floor per pixel.
     pub floor_range: [f64; 2],
     /// A row for each variant.
     #[serde(flatten, serialize_with = "by_name")]
@@ -116,7 +116,7 @@ pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<Ker
 }
 
 /// Every variant of a workload: the decoders on each rotation, the first of which is packed and the
-/// second aligned, and that of a quiet head and the references on the first.
+/// second aligned; the decoder of a quiet head and the references on the first.
 fn contenders(
     workload: &Workload,
     effort: &Effort,

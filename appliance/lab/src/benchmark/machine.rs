@@ -28,7 +28,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This one, measured on as much memory and as often as the effort says.
+    /// This machine, measured on as much memory and as often as the effort says.
     pub fn this(effort: &Effort) -> Self {
         let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let board = fs::read_to_string("/proc/device-tree/model").unwrap_or_default();

@@ -22,7 +22,7 @@ pub struct Point {
     pub skipping: bool,
     /// Processor time of the decoding per pixel of a frame.
     pub ns_per_px: f64,
-    /// The same in floors.
+    /// Processor time of the decoding, in floors.
     pub x_floor: f64,
     /// Processor time of the decoding of a set, ms.
     pub ms_per_set: f64,
@@ -35,7 +35,7 @@ pub struct Point {
 }
 
 impl Point {
-    /// Whether both are of the same pattern, frames and depth.
+    /// Whether both points are of the same pattern, frames and depth.
     pub fn same_frames(&self, other: &Self) -> bool {
         (self.sequence, self.frames, self.shifts, self.bits)
             == (other.sequence, other.frames, other.shifts, other.bits)

@@ -60,7 +60,8 @@ impl<T: Real> LevelWeights<T> {
 }
 
 impl<T: Real> Textbook<T> {
-    /// For a sequence of a phase function with this range, and frames of `pixels` samples.
+    /// A decoder for a sequence of a phase function with this range, and frames of `pixels`
+    /// samples.
     ///
     /// # Errors
     /// If the ratios of the levels have none of the forms that can be unwrapped.
@@ -181,8 +182,8 @@ impl<T: Real> Textbook<T> {
         }
     }
 
-    /// Moves D to the mean of the levels' own, weighted by N r² B²: ratio 1 first, then coarse to
-    /// fine.
+    /// Moves D to the mean of the D of each level, weighted by N r² B²: ratio 1 first, then coarse
+    /// to fine.
     fn average(&mut self) {
         let last = self.levels.len() - 1;
         self.weights.fill(T::of(0.0));
@@ -236,7 +237,7 @@ fn order<T: Real>(turns: T) -> (T, bool) {
     (order, left * left <= T::of(MAX_RESIDUAL * MAX_RESIDUAL))
 }
 
-/// The same angle in turns, −½ ≤ x < ½.
+/// An angle in turns, brought to −½ ≤ x < ½ by whole turns.
 fn wrap<T: Real>(turns: T) -> T {
     turns - (turns + T::of(0.5)).floor()
 }

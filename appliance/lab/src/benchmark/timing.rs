@@ -74,7 +74,7 @@ pub struct Contender {
     pub kernel: Box<dyn Kernel>,
     /// The rotation that it takes its frames from.
     pub rotation: usize,
-    /// The same kernel on the sizes of [`Effort::hot_sizes`].
+    /// The kernel on frames of the sizes of [`Effort::hot_sizes`].
     pub hot: Option<[(Box<dyn Kernel>, FrameSet); 2]>,
 }
 

@@ -59,7 +59,7 @@ pub fn decoding(workload: &Workload, copies: usize) -> Result<Vec<Named<String>>
     Ok(named.collect())
 }
 
-/// The fastest of them with the least modulation of a quiet head: `avx2_geometric_12_quiet`.
+/// The fastest decoder with the least modulation of a quiet head: `avx2_geometric_12_quiet`.
 ///
 /// # Errors
 /// If its sequence cannot be decoded.

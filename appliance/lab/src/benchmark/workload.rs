@@ -64,7 +64,7 @@ impl Workload {
         }
     }
 
-    /// The first one: twelve frames of three geometric levels, all pixels lit.
+    /// The first workload: twelve frames of three geometric levels, all pixels lit.
     pub fn geometric() -> Self {
         Self {
             has_references: true,

@@ -22,7 +22,7 @@ const GAP: usize = 8;
 const LEVELS: u8 = 16;
 
 impl View {
-    /// Of a run.
+    /// The view of a run.
     pub fn of(method: Method, run: &Run) -> Self {
         let shot = Shot::sine(1.0, 0.0);
         let raster = Encoder::new(None, &[]).raster(&run.function, shot);

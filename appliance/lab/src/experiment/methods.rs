@@ -47,7 +47,7 @@ impl Method {
         fixed.chain(papers).chain(better).collect()
     }
 
-    /// Its name in tables: `fixed-49`, `paper-5`, `better-12`.
+    /// The method's name in tables: `fixed-49`, `paper-5`, `better-12`.
     pub fn name(self) -> String {
         match self {
             Self::Fixed { fringes } => format!("fixed-{fringes}"),
@@ -56,7 +56,8 @@ impl Method {
         }
     }
 
-    /// Frames of its measurement, without the preliminary ones that are measured once per part.
+    /// Frames of a measurement by the method, without the preliminary frames that are taken once
+    /// per part.
     pub fn frame_count(self) -> usize {
         match self {
             Self::Fixed { .. } | Self::Paper { .. } => 12,
@@ -64,8 +65,8 @@ impl Method {
         }
     }
 
-    /// What each frame of its measurement shows. Geometric levels are the paper's: 1, n, n² with
-    /// n = √(max Φ_P), N = 4.
+    /// What each frame of a measurement by the method shows. Geometric levels are the paper's: 1,
+    /// n, n² with n = √(max Φ_P), N = 4.
     ///
     /// # Errors
     /// As [`BetterSequence::shots`].
@@ -89,19 +90,19 @@ impl BetterSequence {
     /// 4 frames.
     pub const FOUR: Self = Self::new(4);
 
-    /// Of so many frames, with the brightest waveforms.
+    /// The sequence of so many frames, with the brightest waveforms.
     pub const fn new(frames: usize) -> Self {
         let sines = false;
         Self { frames, sines }
     }
 
-    /// All that are compared with the paper's pattern.
+    /// All sequences that are compared with the paper's pattern.
     fn all(sines: bool) -> impl Iterator<Item = Self> {
         let counts = [24, 12, 9, 6, 5, 4, 3].into_iter();
         counts.map(move |frames| Self { frames, sines })
     }
 
-    /// Whether it is unwrapped about the golden map, not about the preliminary one.
+    /// Whether the sequence is unwrapped about the golden map, not about the preliminary map.
     pub fn needs_golden(self) -> bool {
         self.frames < 9
     }

@@ -42,7 +42,7 @@ struct Learnt {
 
 /// A run: its measurement and how good it is.
 pub struct Run {
-    /// Against truth.
+    /// Errors against the truth.
     pub values: Values,
     /// Frames, phases and heights.
     pub measured: Measured,

@@ -53,13 +53,13 @@ pub const PARTS: [&str; 9] = [
 
 /// Columns and rows of the study's camera.
 const CAMERA: u32 = 512;
-/// Bits of it.
+/// Bits of the study's camera.
 const BIT_DEPTH: u8 = 8;
 /// The paper's tilt about y, degrees.
 const TILT: f64 = 7.0;
 
 impl Scene {
-    /// The part of a name.
+    /// The part with this name.
     pub fn named(name: &str) -> Option<Self> {
         let name = *PARTS.iter().find(|known| **known == name)?;
         let (figure, part) = match name {

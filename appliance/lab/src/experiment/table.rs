@@ -60,7 +60,7 @@ quantities! {
         scored_px,
         /// Pixels that truth calls wholly lit.
         lit_px,
-        /// Those that are not resolved.
+        /// Pixels that truth calls wholly lit and that are not resolved.
         unresolved_px,
         /// Errors above 1 mm.
         gross_px,
@@ -86,7 +86,7 @@ quantities! {
 }
 
 impl RunRow {
-    /// Of one run.
+    /// The row of one run.
     pub fn new(
         scene: &Scene,
         optics: OpticsKind,

@@ -10,7 +10,7 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// Over values with some space around them, drawn between the ends (pixels).
+    /// An axis over values with some space around them, drawn between the ends (pixels).
     pub fn over(values: Vec<f64>, from_zero: bool, ends: [f64; 2]) -> Self {
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         let most = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
@@ -32,8 +32,8 @@ impl Axis {
         }
     }
 
-    /// Over values above zero with some space around them; low and high are then their decimal
-    /// logarithms.
+    /// A logarithmic axis over values above zero with some space around them; low and high are then
+    /// decimal logarithms.
     pub fn decades(values: Vec<f64>, ends: [f64; 2]) -> Self {
         let logarithms = values.into_iter().filter(|value| *value > 0.0);
         let linear = Self::over(logarithms.map(f64::log10).collect(), false, ends);

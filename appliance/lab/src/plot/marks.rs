@@ -42,7 +42,7 @@ pub enum Mark {
     Words {
         /// Their place, on the base line.
         at: (f64, f64),
-        /// How they stand to it.
+        /// How the words stand to their place.
         anchor: Anchor,
         /// CSS colour, six digits.
         colour: &'static str,

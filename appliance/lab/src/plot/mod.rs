@@ -36,7 +36,7 @@ pub struct Series {
     pub colour: &'static str,
     /// How they are drawn.
     pub kind: Kind,
-    /// x, y and label; an empty one is left out.
+    /// x, y and label of each point; an empty label is left out.
     pub points: Vec<(f64, f64, String)>,
 }
 

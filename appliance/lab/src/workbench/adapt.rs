@@ -47,7 +47,7 @@ pub struct Adapted {
 /// The summary of an adaptation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Report {
-    /// How it was made.
+    /// The method by which the phase function was made.
     pub method: Method,
     /// Rows and columns of the phase function: the projector's.
     pub shape: [usize; 2],
@@ -60,7 +60,8 @@ pub struct Report {
     /// RMS of the preliminary measurement's σ_z, mm; `None` if the noise is not known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub preliminary_sigma_mm: Option<f64>,
-    /// The same with the preliminary sequence's levels and shifts of the new phase function.
+    /// RMS of σ_z that is predicted for the new phase function with the levels and shifts of the
+    /// preliminary sequence, mm.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub predicted_sigma_mm: Option<f64>,
 }

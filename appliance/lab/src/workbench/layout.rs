@@ -85,7 +85,7 @@ pub struct Gray {
     pub offset_px: Vec<f64>,
     /// The order of the bits.
     pub order: BitOrder,
-    /// How the numbers of cells are written in them.
+    /// How the numbers of cells are written in the bits.
     pub coding: Coding,
     /// Whether each picture is followed by its inverse.
     pub inverse: bool,
@@ -102,7 +102,7 @@ pub enum Fringes {
     Count(PerDirection<f64>),
     /// Projector pixels per fringe.
     Pitch(PerDirection<f64>),
-    /// None: a Gray code alone.
+    /// No fringes: a Gray code alone.
     None,
 }
 

@@ -33,7 +33,7 @@ pub fn split(frames: usize, waveforms: Waveforms) -> Option<Split> {
 /// A sequence of an adapted pattern.
 pub struct Projected<'a> {
     function: &'a PhaseFunction,
-    /// Of each camera pixel, row-major in rows of `width`.
+    /// The expected phase of each camera pixel, row-major in rows of `width`.
     expected: &'a [AbsolutePhase],
     width: usize,
     split: Split,

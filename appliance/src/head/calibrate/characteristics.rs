@@ -74,7 +74,7 @@ pub(super) fn scene(words: impl Into<String>) -> Failure {
 /// noise. `progress` gets the share done and what is measured next; `notes` remarks for the user.
 ///
 /// # Errors
-/// Of a device; if too little light comes back, or too much (69).
+/// The error of a device; if too little light comes back, or too much (69).
 pub fn characterise(
     head: &mut Head,
     calibration: &mut Calibration,

@@ -69,8 +69,8 @@ fn models(words: impl Into<String>) -> Failure {
 /// head's timing is the calibrated one.
 ///
 /// # Errors
-/// Of a device; if too little light comes back, or too much, or there is no flat plate (69); if the
-/// models do not fit it (65).
+/// The error of a device; if too little light comes back, or too much, or there is no flat plate
+/// (69); if the models do not fit it (65).
 pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Result<Made, Failure> {
     let mut basis = basis;
     let mut notes = Vec::new();
@@ -89,7 +89,7 @@ pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Resu
 /// characteristics, to which the head's timing must be set. `progress` is that of [`make`].
 ///
 /// # Errors
-/// Of a device; if there is no flat plate (69); if the models do not fit it (65).
+/// The error of a device; if there is no flat plate (69); if the models do not fit it (65).
 pub fn complete(
     head: &mut Head,
     measured: &Characteristics,
@@ -139,8 +139,8 @@ pub fn complete(
     })
 }
 
-/// That parts cannot be measured well on this head, if the fringes that teaching projects, which
-/// follow the columns, run along its epipolar lines.
+/// A note that parts cannot be measured well on this head, if the fringes that teaching projects,
+/// which follow the columns, run along its epipolar lines.
 fn fringes_along(calibration: &Calibration) -> Option<String> {
     let (columns, rows) = calibration.raster();
     let function = PhaseFunction::vertical(columns as usize, rows as usize, 1.0).ok()?;

@@ -295,7 +295,7 @@ fn by_projector(head: &mut Head, seen: &Watched<()>) -> Checked {
             json!({}),
         ));
     }
-    // Its period must be that of so many refreshes, or something else triggers it.
+    // The period of the camera must be so many refreshes, or something else triggers it.
     Ok(by_itself(seen, refresh * needed.refreshes))
 }
 

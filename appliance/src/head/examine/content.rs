@@ -26,7 +26,7 @@ const LEAST_PIXELS: usize = 50;
 /// `None` if too few pixels see a stripe alone.
 ///
 /// # Errors
-/// Of a device.
+/// The error of a device.
 pub fn by_content(head: &mut Head, settle: u32, lit: &Lit) -> Result<Option<f64>, Error> {
     let size = head.projector_size();
     let shown = [(GREY, 0), (GREY, u8::MAX), (u8::MAX, 0), (0, u8::MAX)];

@@ -29,7 +29,7 @@ pub fn by_pitch(contrast: &ContrastFile) -> Map<String, Value> {
 /// The contrast of each of [`PITCHES`] by the median modulation over the lit pixels.
 ///
 /// # Errors
-/// Of a device, or if the projector is too small for a pitch.
+/// The error of a device, or if the projector is too small for a pitch.
 pub fn contrast(
     head: &mut Head,
     calibration: &Calibration,

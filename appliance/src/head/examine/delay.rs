@@ -55,7 +55,7 @@ impl Delay {
     /// gets the share of the rounds done.
     ///
     /// # Errors
-    /// Of a device.
+    /// The error of a device.
     pub fn measure(
         head: &mut Head,
         lit: &Lit,

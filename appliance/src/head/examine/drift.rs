@@ -32,7 +32,7 @@ impl CrossedFringes {
     /// frame.
     ///
     /// # Errors
-    /// Of a device, or if the projector is too small for the fringes.
+    /// The error of a device, or if the projector is too small for the fringes.
     pub fn take(
         head: &mut Head,
         calibration: &Calibration,

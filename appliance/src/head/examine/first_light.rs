@@ -14,7 +14,7 @@ pub const LONGEST_DARK: Duration = Duration::from_secs(15);
 /// still the same after [`LONGEST_DARK`].
 ///
 /// # Errors
-/// Of a device, or if no frame comes.
+/// The error of a device, or if no frame comes.
 pub fn first_light(head: &mut Head) -> Result<Option<Duration>, Error> {
     let begun = head.now();
     loop {

@@ -12,7 +12,7 @@ const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
 /// white.
 ///
 /// # Errors
-/// Of a device, or `Unsupported` if no level is clear of black and full scale.
+/// The error of a device, or `Unsupported` if no level is clear of black and full scale.
 pub fn noise(head: &mut Head, settle: u32, lit: &Lit) -> Result<Noise, Error> {
     let levels = GREYS.iter().flat_map(|grey| [*grey, *grey]);
     let full_scale = lit.full_scale();

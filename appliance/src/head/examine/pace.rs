@@ -55,7 +55,7 @@ impl Spaced {
 /// camera that the projector triggers takes one refresh in so many by itself.
 ///
 /// # Errors
-/// Of a device.
+/// The error of a device.
 pub fn pace(head: &mut Head) -> Result<Vec<Spaced>, Error> {
     let (camera, refresh) = (head.camera_timing(), head.refresh());
     let mut tried = Vec::new();

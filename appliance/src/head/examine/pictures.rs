@@ -46,7 +46,7 @@ fn rows<T: Copy + Into<f32>>(all: &[T], width: usize, stride: usize) -> Vec<f32>
 /// in order, in counts.
 ///
 /// # Errors
-/// Of a device, or `Timeout` if the picture of a pattern did not come.
+/// The error of a device, or `Timeout` if the picture of a pattern did not come.
 pub fn pictures(
     head: &mut Head,
     settle: u32,
@@ -95,7 +95,7 @@ fn take(
 /// triggered camera has arrived.
 ///
 /// # Errors
-/// Of a device.
+/// The error of a device.
 pub fn picture(head: &mut Head, index: usize, settle: u32) -> Result<Option<Frame>, Error> {
     // A camera that runs by itself has frames of before the light has settled.
     let triggered = head.camera_timing().starts == Starts::OnTrigger;
@@ -236,7 +236,7 @@ impl Lit {
 /// Loads black and white, in this order.
 ///
 /// # Errors
-/// Of the projector.
+/// The error of the projector.
 pub fn load_black_and_white(head: &mut Head) -> Result<(), Error> {
     let patterns = greys(head.projector_size(), [0, u8::MAX]);
     head.load(patterns.collect::<Result<_, _>>()?)

@@ -49,8 +49,8 @@ impl ReferencePlane {
 /// must be calibrated.
 ///
 /// # Errors
-/// Of a device; if too little of the frame shows a plate (69); if the models do not look down at it
-/// (65).
+/// The error of a device; if too little of the frame shows a plate (69); if the models do not look
+/// down at it (65).
 pub fn plate(
     head: &mut Head,
     calibration: &Calibration,

@@ -11,7 +11,7 @@ const MOST_FALL: f64 = 0.02;
 /// gets the share done.
 ///
 /// # Errors
-/// Of a device.
+/// The error of a device.
 pub fn lights(
     head: &mut Head,
     settle: u32,
@@ -34,7 +34,7 @@ pub fn lights(
 /// the measured one in least squares (pool adjacent violators: Ayer et al. 1955).
 ///
 /// # Errors
-/// Of a device, or if light falls where grey rises.
+/// The error of a device, or if light falls where grey rises.
 pub fn response(
     head: &mut Head,
     settle: u32,

@@ -48,7 +48,7 @@ impl Stamps {
     /// Takes frames of any scene. The head's timing is not used, and is as before afterwards.
     ///
     /// # Errors
-    /// Of a device; `Protocol` if no frame comes or no meaning explains the stamps.
+    /// The error of a device; `Protocol` if no frame comes or no meaning explains the stamps.
     pub fn measure(head: &mut Head) -> Result<Self, Error> {
         let (columns, rows) = head.projector_size();
         head.load(vec![Raster::uniform(columns, rows, u8::MAX)?])?;

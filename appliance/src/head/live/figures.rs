@@ -121,7 +121,7 @@ impl Fringes {
     }
 
     /// Modulation over offset, B/A, of the fringes of a pitch: the median over the lit pixels, 0…1.
-    /// None until each shift was seen.
+    /// `None` until each shift was seen.
     ///
     /// B = ½ √((I₀ − I₂)² + (I₁ − I₃)²) for shifts of a quarter of a turn (Creath 1988).
     pub fn modulation(&self, pitch: u32) -> Option<f64> {

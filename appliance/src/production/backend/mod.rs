@@ -34,7 +34,7 @@ pub struct Opened {
     pub problem: Option<String>,
     /// If the calibration is the previous generation: why the newest could not be used.
     pub fallback: Option<String>,
-    /// That the projector's light did not come after the head was opened.
+    /// A note if the projector's light did not come after the head was opened.
     pub dark: Option<String>,
     /// The recordings of a replay head.
     pub played: Option<Played>,

@@ -35,7 +35,7 @@ pub(super) const ALIKE: f64 = 0.8;
 struct Reason {
     /// ERROR_CODE.
     code: u16,
-    /// With the remedy.
+    /// The reason in words, with the remedy.
     words: String,
 }
 
@@ -264,7 +264,7 @@ fn fitness(inspection: &Inspection) -> f64 {
     f64::from(inspection.fitness_permille) / 1000.0
 }
 
-/// Whether it is a share below its limit.
+/// Whether the value is a share below its lower limit.
 fn is_low_share(gauge: &GaugeValue) -> bool {
     gauge.unit == Unit::Share && gauge.decision.low
 }

@@ -43,9 +43,9 @@ pub struct Shown {
 /// The gauge that a map of deviations is of: of several, the one that uses most of its limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShownGauge {
-    /// Its name in the recipe.
+    /// The gauge's name in the recipe.
     pub name: Arc<str>,
-    /// Its value in mm; none if it could not be measured.
+    /// The gauge's value in mm; `None` if it could not be measured.
     pub value: Option<f64>,
     /// Where the value is.
     pub square: Option<Square>,

@@ -46,7 +46,7 @@ impl Plan {
     /// Loads these rasters into a head, which exposes them for as long as the recipe says.
     ///
     /// # Errors
-    /// Of the projector, or if the head cannot expose for so long.
+    /// The error of the projector, or if the head cannot expose for so long.
     pub fn load(
         &self,
         head: &mut Head,

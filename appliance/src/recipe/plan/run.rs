@@ -20,7 +20,7 @@ use std::sync::{Arc, Mutex};
 #[derive(Debug)]
 pub(super) struct Run {
     pub kind: SequenceKind,
-    /// Which of the plan's rasters its frames show.
+    /// Which of the plan's rasters the frames of the sequence show.
     pub indices: Vec<usize>,
     pub production: Production,
     /// What a run of two frames needs; `None` for other sequences.

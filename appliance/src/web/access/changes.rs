@@ -17,9 +17,9 @@ const SHOWN_BYTES: u64 = 64 << 10;
 /// One change, done or refused.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Change<'a> {
-    /// When, in µs since 1970 UTC; none if the clock is not synchronised.
+    /// Time of the change in µs since 1970 UTC; `None` if the clock is not synchronised.
     pub utc_us: Option<u64>,
-    /// When, in s since the start of the daemon.
+    /// Time of the change in s since the start of the daemon.
     pub uptime_s: u32,
     /// BOOT_ID of that start.
     pub boot_id: u32,

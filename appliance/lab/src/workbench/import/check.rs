@@ -186,8 +186,8 @@ struct Agreement {
 }
 
 impl Agreement {
-    /// In clearly more pixels; else with a rising phase, since a reversed shift agrees as well;
-    /// else with fewer jumps.
+    /// Whether this convention agrees better: in clearly more pixels; else with a rising phase,
+    /// since a reversed shift agrees as well; else with fewer jumps.
     fn betters(self, other: Self) -> bool {
         if (self.share - other.share).abs() > 0.05 {
             return self.share > other.share;

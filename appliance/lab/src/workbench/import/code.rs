@@ -9,17 +9,17 @@ use appliance::head::channel::Channel;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 
-/// Share of the neighbouring cells that every coding but the right one brings together at most.
+/// Largest smoothness (`Edges::smoothness`) of the cells by a wrong coding.
 const DOUBTFUL: f64 = 0.9;
-/// By how much larger a share of the neighbouring cells another coding must bring together.
+/// By how much more smoothness another coding must have.
 const BETTER: f64 = 0.2;
-/// Share of the neighbouring cells that a coding brings together that is meant.
+/// Least smoothness of a coding that is named.
 const MEANT: f64 = 0.6;
 /// How far cells of another width must be off at one end of what is seen, turns.
 const APART: f64 = 0.15;
-/// How near a number must be to a whole one to be meant by it, as a share of it.
+/// How near a number must be to a whole number to stand for it, as a share of that.
 const WHOLE: f64 = 0.004;
-/// How near an offset must be to quarters of a cell to be meant by them, cells.
+/// How near an offset must be to a whole number of quarters of a cell to stand for it, cells.
 const NEAR_QUARTER: f64 = 0.0625;
 /// Share of a cell by which a code may begin before the raster, so that it is not a matter of the
 /// shifts.
@@ -101,7 +101,7 @@ pub(super) fn otherwise(stated: Coding) -> impl Iterator<Item = (bool, Coding)> 
     })
 }
 
-/// The options that say so.
+/// The options of the command line that state this order and coding.
 pub(super) fn options(reversed: bool, coding: Coding, gray: &Gray) -> String {
     let mut options = Vec::new();
     if reversed {

@@ -191,8 +191,8 @@ fn distance(
     rms.is_finite().then_some(rms)
 }
 
-/// The same models as they would be if they had been written down in another way, with the words
-/// that say how to mend that.
+/// The models as they would be if they had been written down in another way, with the words that
+/// say how to mend that.
 fn readings((camera, projector): &Pair) -> Vec<(String, Pair)> {
     let mut readings = vec![(
         "R and T are from the projector to the camera: give the inverse, R transposed and −Rᵀ T"

@@ -20,7 +20,7 @@ const STEPS: usize = 6;
 const SHARE: f64 = 1e-5;
 /// Fits of the plane; each leaves out the points that were far off the one before.
 const FITS: usize = 12;
-/// What is far: so many times the median distance.
+/// Points are far off if their distance is so many times the median distance.
 const FAR: f64 = 4.0;
 
 /// Moves the world of a recording's models, whose camera stands at the origin and looks along −z,
@@ -53,7 +53,7 @@ pub(super) fn fit(recording: &mut Recording) -> Result<String, String> {
     ))
 }
 
-/// The same device in a world with these axes and this origin.
+/// The device in a world with these axes and this origin.
 fn move_world(model: &mut DeviceModel, axes: [Vector; 3], origin: Vector) {
     let rows: [Vector; 3] = std::array::from_fn(|row| {
         let [x, y, z] = std::array::from_fn(|column| model.rotation[3 * row + column]);

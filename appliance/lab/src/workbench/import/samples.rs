@@ -4,10 +4,10 @@
 use crate::workbench::layout::Shown;
 use hal::frame::FrameFormat;
 
-/// How often the largest sample must occur beside any other that is as bright: the crest of a sine
-/// alone makes it 2.4 times as often at most, where noise does not smooth it.
+/// How many times as often as any other bright sample the largest one must occur: the crest of a
+/// sine alone makes it 2.4 times as often at most, where noise does not smooth it.
 const PLATEAU: usize = 4;
-/// Share of the largest sample within which others are as bright.
+/// Samples are bright if they are within the largest sample divided by this of it.
 const AS_BRIGHT: u16 = 32;
 /// Fewest samples as bright that tell whether the largest is one of many values or one of few, in
 /// all and as a share of its own.

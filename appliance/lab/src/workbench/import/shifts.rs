@@ -6,8 +6,8 @@ use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use std::f64::consts::TAU;
 
-/// Parts of a turn by which first shifts differ, and how near to them one must be to be meant by
-/// it, turns.
+/// Parts of a turn by which first shifts differ, and how near to one of them a shift must be to
+/// stand for it, turns.
 const USUAL: [(f64, f64); 2] = [(4.0, 0.0625), (3.0, 0.04)];
 /// Parts of a period that a ripple is looked at in.
 const BINS: usize = 32;

@@ -19,7 +19,7 @@ use std::time::Duration;
 /// Opens camera and projector. The times between them are set later, from the calibration.
 ///
 /// # Errors
-/// That of the device that is not there.
+/// The error of the device that is not there.
 pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Error> {
     let starts = config.trigger.starts();
     let settings = Settings {

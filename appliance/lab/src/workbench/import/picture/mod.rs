@@ -100,7 +100,7 @@ impl Picture {
         }
     }
 
-    /// The same, if it has the samples of its size.
+    /// This picture, if it has the samples of its size.
     fn complete(self) -> Result<Self, String> {
         let (width, height) = self.size;
         let expected = width as usize * height as usize * self.channels;
