@@ -19,10 +19,10 @@ use sim::{Part, Placement, Scenario};
 use std::fs;
 use std::time::Instant;
 
-/// Largest error of mean heights: 8-bit rounding without other noise is below 0.01 mm per pixel,
-/// and golden has the same.
+/// Largest error of mean heights: 8-bit rounding without other noise is below 0.01 mm per pixel, in
+/// the part and in golden.
 const EXACT_MM: f64 = 0.01;
-/// The same after a motion was taken back; includes the error of the motion.
+/// Largest error of mean heights after a motion was taken back; includes the error of the motion.
 const ALIGNED_MM: f64 = 0.015;
 
 /// A region on the plate and one on the bead, in pixels of 256 × 256.

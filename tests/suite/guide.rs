@@ -13,7 +13,7 @@ fn first_cells(heading: &str) -> Vec<String> {
     first_cells_of("operations.md", heading)
 }
 
-/// The same for any document in `docs`.
+/// The first cell of each table row below a heading of any document in `docs`.
 fn first_cells_of(document: &str, heading: &str) -> Vec<String> {
     let text = fs::read_to_string(root().join("docs").join(document)).unwrap();
     let (_, below) = text.split_once(&format!("\n## {heading}\n")).unwrap();

@@ -44,7 +44,7 @@ fn scenario(kind: &str, seed: u64) -> Scenario {
     Scenario::from_toml(&text, kind).unwrap()
 }
 
-/// The same with a quarter of the pixels, and a quarter of the rays of each.
+/// The scenario with a quarter of the pixels, and a quarter of the rays of each.
 fn small(kind: &str, seed: u64) -> Scenario {
     let mut scenario = scenario(kind, seed);
     (scenario.rig.camera.width, scenario.rig.camera.height) = (256, 256);

@@ -18,9 +18,9 @@ use tests::random::Random;
 /// Scatter / σ of a gauge: RMS over all placements of the scatter about the mean of each placement,
 /// over that of the predicted σ.
 const SCATTER: std::ops::Range<f64> = 0.8..1.2;
-/// The same of deviations: on a displaced part several places compete, where interpolation between
-/// pixels is off by more than the noise, and the largest of them scatters less than the one that
-/// was found. Those that share pixels, or a tile of the search, count as one place, so what is
+/// Scatter / σ of deviations: on a displaced part several places compete, where interpolation
+/// between pixels is off by more than the noise, and the largest of them scatters less than the one
+/// that was found. Those that share pixels, or a tile of the search, count as one place, so what is
 /// predicted is too much rather than too little.
 const COMPETING: std::ops::Range<f64> = 0.75..1.2;
 /// RMS of error / σ_z of pixels. The error is that against the truth, so it holds what noise does
@@ -146,7 +146,7 @@ fn repeats(noise: fn(&mut Scenario), dent: bool, placements: usize, repeats: usi
     repeats_by(noise, dent, placements, repeats, false);
 }
 
-/// The same, by the first sequence of a recipe with or without two frames.
+/// As [`repeats`], by the first sequence of a recipe with or without two frames.
 fn repeats_by(
     noise: fn(&mut Scenario),
     dent: bool,

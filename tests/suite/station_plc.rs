@@ -111,7 +111,7 @@ impl Daemon {
         Self::of(command(place))
     }
 
-    /// The same with a changed command.
+    /// Starts a changed command, and waits until it prints its addresses.
     pub fn of(mut command: Command) -> Self {
         let mut child = command.stderr(Stdio::piped()).spawn().unwrap();
         // A thread reads the log, so the daemon can continue to log and nothing waits for ever.

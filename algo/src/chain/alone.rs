@@ -25,7 +25,7 @@ pub const SIGMA_CELLS: f64 = 0.288_675_134_594_812_9;
 struct Pixel {
     /// Its cell.
     cell: u16,
-    /// Coordinate in cells, counted from the beginning of the first one.
+    /// Coordinate in cells, counted from the beginning of the first cell.
     place: f64,
     /// Half the difference of bright and dark, counts.
     modulation: f64,

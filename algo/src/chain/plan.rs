@@ -2,13 +2,13 @@
 //!
 //! A beat of two levels a, b has phase φ_a − φ_b, ratio r_a − r_b and the noise of both (Cheng &
 //! Wyant 1985, for wavelengths; Reich, Ritter & Thesing 1997 and Towers, Towers & Jones 2003, for
-//! fringes); a beat of beats likewise. A beat, or a level, that spans at most one turn of the
-//! pattern is absolute by itself, as 2 φ_b − φ_a of 13 and 7 fringes; a Gray code is absolute
-//! within half a cell. From an absolute phase of ratio r_a the next level b gets its fringe order
-//! k = round(r_b Φ − φ_b). With a = Σ m_i φ_i and b = Σ n_i φ_i its argument has the error Σ (m_i
-//! r_b / r_a − n_i) e_i, where e_i is the noise of φ_i, which falls with √N_i. Of all chains of
-//! levels, beats and beats of beats the one is taken whose least safe step is the safest: (½ turn −
-//! what is uncertain by the code's cell) / noise.
+//! fringes); a beat of two beats is computed in the same way. A beat, or a level, that spans at
+//! most one turn of the pattern is absolute by itself, as 2 φ_b − φ_a of 13 and 7 fringes; a Gray
+//! code is absolute within half a cell. From an absolute phase of ratio r_a the next level b gets
+//! its fringe order k = round(r_b Φ − φ_b). With a = Σ m_i φ_i and b = Σ n_i φ_i its argument has
+//! the error Σ (m_i r_b / r_a − n_i) e_i, where e_i is the noise of φ_i, which falls with √N_i. Of
+//! all chains of levels, beats and beats of beats the one is taken whose least safe step is the
+//! safest: (½ turn − what is uncertain by the code's cell) / noise.
 
 use super::Coding;
 use crate::pattern::{Level, MAX_LEVELS, PhaseRange};

@@ -101,7 +101,8 @@ const ROTATION_TOLERANCE: f64 = 1e-4;
 const MAX_DISTANCE: f64 = 1e6;
 /// Radii up to which the distortion is checked, as multiples of the radius at the frame's border:
 /// the reference phase map is evaluated up to 15 % outside. The largest radius up to which the
-/// distortion is one-to-one is used; that of a usable model reaches at least the last of these.
+/// distortion is one-to-one is used; the distortion of a usable model is one-to-one at least up to
+/// the last of them.
 const REACHES: [f64; 4] = [1.3, 1.2, 1.1, 1.02];
 
 impl Pinhole {

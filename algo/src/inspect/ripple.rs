@@ -2,8 +2,8 @@
 //!
 //! **Idea.** An imperfect response gives phases an error that depends on where in a fringe a pixel
 //! lies, and on the sequence of shifts and levels. Where the same scene is measured by two
-//! sequences their difference has that error, and noise. Noise is not the same in two such
-//! differences, the error is: so the mean product of both is the variance of the error alone.
+//! sequences their difference has that error, and noise. Two such differences have the same error
+//! but not the same noise: so the mean of their product is the variance of the error alone.
 //!
 //! The error is not the same everywhere: where its period is near a whole number of pixels, a mean
 //! over a square does not take it out. The largest value over the part counts.

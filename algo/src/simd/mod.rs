@@ -98,8 +98,8 @@ impl Backend {
 }
 
 /// Makes the compiler align the stack of the function that this is inlined into to a line of the
-/// cache. It would not do so for vectors that it later finds no register for; where one of these
-/// lies across the border of two pages, a kernel takes twice as long.
+/// cache. By itself it does not align the stack for vectors that it later finds no register for;
+/// where such a vector lies across the border of two pages, a kernel takes twice as long.
 #[cfg(target_arch = "x86_64")]
 #[inline(always)]
 pub(crate) fn align_stack() {

@@ -34,7 +34,7 @@ struct Chosen {
     recipe: Recipe,
     /// Where it comes from, in words.
     from: String,
-    /// Whether the part was judged by it before.
+    /// Whether the part was judged by this recipe before.
     original: bool,
 }
 

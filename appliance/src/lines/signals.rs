@@ -111,7 +111,7 @@ mod tests {
         }
     }
 
-    /// What is said after each of these, from a station that has just become ready.
+    /// What is said after each of these snapshots, by a station that has just become ready.
     fn said(snapshots: &[Snapshot]) -> Vec<Signals> {
         let (mut follower, first) = Follower::new(&snapshot(READY, 7, Verdict::Pass, 0));
         assert_eq!(first, NOT_OK, "an earlier result does not count");

@@ -23,7 +23,7 @@ pub struct Edit {
     pub min_coverage: Option<f64>,
     /// Width of the guard bands, in multiples of u.
     pub guard_k: Option<f64>,
-    /// Whether the recipe may be without any limit. One that has limits then judges all the same.
+    /// Whether the recipe may be without any limit. A recipe that has limits judges nevertheless.
     pub judges_nothing: Option<bool>,
     /// All regions.
     pub regions: Option<Vec<RegionFile>>,

@@ -225,7 +225,7 @@ mod tests {
     #[test]
     fn light_that_is_low_blurred_or_too_bright_is_told_apart() {
         assert_eq!(cause(0.9, Some(0.9), 0.0), None);
-        // A lamp at 15 %, and the same with some foreign light.
+        // A lamp at 15 %, without and with some foreign light.
         for offset in [0.2, 0.25, 0.35] {
             let dark = cause(0.15, Some(offset), 0.0);
             assert_eq!(dark, Some(Cause::Dark(0.15)), "{offset}");

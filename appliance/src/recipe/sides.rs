@@ -206,7 +206,7 @@ mod tests {
         assert_eq!(new(&quiet, &farthest, 0), all);
         farthest.0.iter_mut().for_each(|side| side[0] = [0.6, 0.05]);
         assert_eq!(new(&quiet, &farthest, 0).all(), [3, 9]);
-        // All the same, but too noisy.
+        // All pixels are alike, and too noisy.
         let everywhere = new(&sigmas(|_| 0.1), &none, 0);
         assert_eq!(everywhere, Sides::largest());
     }

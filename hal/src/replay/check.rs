@@ -208,7 +208,7 @@ fn codes(manifest: &Manifest) -> Result<(), Wrong> {
             );
         }
         let cells = ((f64::from(length) + offset_px) / cell_px - 1e-9).ceil();
-        // One more Gray cell than the bits number: the last two show the same.
+        // One more Gray cell than the bits number: the last two show the same bits.
         let doubled = u32::from(*offset_px > 0.0 && !binary);
         if cells > f64::from((1_u32 << count) + doubled) {
             return wrong(

@@ -99,7 +99,7 @@ fn views(random: &mut Random, rig: &Rig) -> Vec<View> {
     printed(random, rig, &exact)
 }
 
-/// The same of a board whose corners are printed off their places, mm.
+/// What the head sees, with noise, of a board whose corners are printed `off` their places, mm.
 fn printed(random: &mut Random, rig: &Rig, off: &[(f64, f64)]) -> Vec<View> {
     let board = &rig.board;
     let view = |pose: &Pose| {

@@ -12,7 +12,7 @@ use std::vec::Vec;
 /// polynomial for √(1 + t²) (6.5e-4), half a unit again (1.7e-4), and half a unit in the modulation
 /// at its least (2.4e-4).
 const BOUND: [f64; 3] = [2.5e-5 + 3.75e-5, 1.1e-5, 1.1e-3];
-/// The same at the least length of N = 4 of more than 12 bits, 2056.
+/// The bounds at the least length of N = 4 of more than 12 bits, 2056.
 const COARSE: [f64; 3] = [2.5e-5 + 5.5e-5, 1.3e-5, 1.4e-3];
 /// Least modulations in counts of 255; the bounds are those of the first, and what is not the
 /// arctangent's or the polynomial's share is larger where less is trusted.

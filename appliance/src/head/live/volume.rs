@@ -19,8 +19,8 @@ pub struct Outline {
     pub points: Vec<[f64; 2]>,
 }
 
-/// The outlines at both ends of the default working range and between them at z = 0; without those
-/// heights at which camera and projector do not see the same.
+/// The outlines at both ends of the default working range and between them at z = 0; heights at
+/// which camera and projector see no common region are left out.
 pub fn outlines(calibration: &Calibration) -> Vec<Outline> {
     let (camera, projector) = (&calibration.camera, &calibration.projector);
     let range = HeightRange::of(camera, projector);

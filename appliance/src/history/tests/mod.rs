@@ -518,7 +518,7 @@ fn a_history_of_another_version_is_set_aside_whole_and_a_new_one_with_an_id_of_i
     let digits =
         |id: &String| id.len() == 32 && id.bytes().all(|b| b"0123456789abcdef".contains(&b));
     assert!(ids.iter().all(digits), "{ids:?}");
-    // The same at every start, and for no two databases.
+    // A database keeps its id at every start, and no two databases have the same id.
     drop(open_writer(folder.path()));
     assert_eq!(&reader.id().unwrap(), ids.last().unwrap());
     ids.sort();

@@ -133,7 +133,7 @@ impl Worker {
             Ok(fringes) => fringes,
             Err(Error::Ended { .. }) => return Err(TeachError::Ended),
             Err(error) if recovery::is_lost(&error) => return Err(TeachError::Device(error)),
-            // The recipe is good all the same.
+            // The recipe is good even if its geometry could not be checked.
             Err(error) => {
                 self.progress.warn(&format!("check the geometry: {error}"));
                 return Ok(());

@@ -159,7 +159,7 @@ impl Prepared {
     }
 
     /// σ of golden's heights in deviations by this sequence, over σ of the heights of one
-    /// measurement by it.
+    /// measurement by this sequence.
     ///
     /// Deviations are from golden's phase by this sequence. Where the golden surface is measured by
     /// another sequence, a displaced part is compared with heights by that sequence, and the

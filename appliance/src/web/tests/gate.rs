@@ -211,7 +211,7 @@ async fn a_request_that_names_two_hosts_is_refused() {
             .await;
         assert_eq!(answer.status, status, "{target}: {answer:?}");
     }
-    // The same of the page that a change comes from.
+    // Two Origin headers are refused as two Host headers are.
     let origin = served.origin();
     let two = [("Origin", &*origin), ("Origin", "http://evil.example")];
     let answer = served.ask("POST", "/api/session", &two, "{}").await;
