@@ -1,5 +1,4 @@
-//! Measurement in strips, as in production, compared with exact triangulation and with the
-//! comparison of whole maps.
+//! Measurement in strips compared with exact triangulation and with the comparison of whole maps.
 
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::whole_maps::{Comparison, Golden, factors};
@@ -30,8 +29,7 @@ const SINGLE_MM: f64 = 1.6e-5;
 /// exact solution. This limits the time, not the error. The sawtooth has the smallest share, 0.798
 /// through a lens with a blur of 0.5 px.
 const REACHED: f64 = 0.79;
-/// The taught σ is stored in units of 32 nm; σ here is above 10 µm, and the σ of a mean has the
-/// same relative error.
+/// The taught σ is stored in units of 32 nm, and σ here is above 10 µm; that of a mean is no worse.
 const SIGMA_SHARE: f64 = 2e-3;
 
 pub(crate) fn parts() -> [(&'static str, Part); 3] {
