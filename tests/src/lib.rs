@@ -9,11 +9,13 @@
 //!   planes.
 //! - [`random`]: a seeded generator.
 //! - [`fuzz`]: functions of bytes that must not panic.
+//! - [`imports`]: which files of a crate name each other.
 //! - [`power`]: a model of what a loss of power leaves of a folder.
 
 pub mod board;
 pub mod files;
 pub mod fuzz;
+pub mod imports;
 pub mod oracle;
 pub mod plane;
 pub mod power;

@@ -3,6 +3,7 @@
 use std::fs;
 use std::path::Path;
 use tests::files;
+use tests::imports::circles;
 use tests::shared::root;
 
 /// Longest file, in lines without tests. Files have 100–300 lines and one concept each; at this
@@ -226,10 +227,75 @@ fn imports_inside_algo_only_go_backwards_along_the_flow() {
     }
 }
 
+#[test]
+fn no_files_name_each_other_in_a_circle() {
+    let rule = "No circles of files: what two files need of each other goes to a third (mostly a small one of \
+                types and bounds), or a method to the file that calls it. What a mod.rs re-exports counts as \
+                the file's that has it; what files name of a module above them does not count.";
+    let mut found = Vec::new();
+    for folder in [
+        "algo/src",
+        "hal/src",
+        "hal/sim/src",
+        "appliance/src",
+        "appliance/lab/src",
+        "tests/src",
+    ] {
+        let own = sources(folder).into_iter();
+        // A program beside a library is a crate of its own.
+        let own = own.filter(|source| !is_of_tests(source) && !source.name.ends_with("/main.rs"));
+        let below = |source: Source| (source.name[folder.len() + 1..].to_owned(), source.text);
+        let circles = circles(&own.map(below).collect::<Vec<_>>());
+        found.extend(circles.iter().map(|circle| format!("{folder}:\n{circle}")));
+    }
+    assert!(found.is_empty(), "{rule}\n{}", found.join("\n\n"));
+}
+
+#[test]
+fn a_circle_of_files_is_found_behind_a_mod_rs() {
+    let found = |files: &[(&str, &str)]| {
+        let files = files.iter();
+        let files = files.map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
+        circles(&files.collect::<Vec<_>>())
+    };
+    let mut files = [
+        ("lib.rs", "pub mod a;\nmod b;\nmod c;\n"),
+        (
+            "a/mod.rs",
+            "mod x;\nmod y;\npub use {x::{Left, One as Other}, y::Right};\npub const SHARED: u8 = 1;\n",
+        ),
+        (
+            "a/x.rs",
+            "use super::{Right, SHARED};\npub struct Left;\npub struct One;\n",
+        ),
+        (
+            "a/y.rs",
+            "pub struct Right;\n// super::Left\n\n#[cfg(test)]\nmod tests {\n    use super::super::Left;\n}\n",
+        ),
+        (
+            "b.rs",
+            "use crate::c;\nfn go() { c::run(crate::a::SHARED) }\n",
+        ),
+        ("c.rs", "pub fn run(_: u8) {}\n"),
+    ];
+    assert_eq!(found(&files), [""; 0]);
+    files[3].1 = "mod inside { fn go() -> super::super::Other { todo() } }\npub struct Right;\n";
+    files[5].1 = "pub fn run() { crate::b::go() }\n";
+    let expected = [
+        "a/x.rs names super::Right of a/y.rs\na/y.rs names super::super::Other of a/x.rs",
+        "b.rs names crate::c of c.rs\nc.rs names crate::b::go of b.rs",
+    ];
+    assert_eq!(found(&files), expected);
+}
+
+/// Whether a file has nothing but tests.
+fn is_of_tests(source: &Source) -> bool {
+    source.name.ends_with("tests.rs") || source.name.contains("/tests/")
+}
+
 /// Number of lines before the tests of a file.
 fn untested_lines(source: &Source) -> usize {
-    let test_file = source.name.ends_with("tests.rs") || source.name.contains("/tests/");
-    if test_file {
+    if is_of_tests(source) {
         return 0;
     }
     let lines = source.text.lines();

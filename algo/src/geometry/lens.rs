@@ -7,8 +7,6 @@
 //! u = f_x x_d + c_x, v = f_y y_d + c_y.
 //! Source: D. C. Brown, "Decentering distortion of lenses", 1966, as in OpenCV's calib3d.
 
-use super::PinholeModel;
-
 /// Newton iterations after which the undistortion must have converged; real lenses take 4.
 const NEWTON_STEPS: usize = 25;
 
@@ -28,25 +26,6 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// The lens of a device.
-    pub fn of(model: &PinholeModel) -> Self {
-        let &PinholeModel {
-            fx,
-            fy,
-            cx,
-            cy,
-            distortion,
-            ..
-        } = model;
-        Self {
-            fx,
-            fy,
-            cx,
-            cy,
-            distortion,
-        }
-    }
-
     /// The pixel of the direction (x, y, 1).
     #[inline]
     pub fn pixel(&self, x: f64, y: f64) -> (f64, f64) {

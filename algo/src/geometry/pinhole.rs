@@ -143,7 +143,13 @@ impl Pinhole {
         let centre = (rows[0] * a + rows[1] * b + rows[2] * c) * -1.0;
         let pinhole = Self {
             model,
-            lens: Lens::of(&model),
+            lens: Lens {
+                fx,
+                fy,
+                cx,
+                cy,
+                distortion: model.distortion,
+            },
             width,
             height,
             centre,

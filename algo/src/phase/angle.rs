@@ -30,6 +30,7 @@
 //! one by at most 3.2e-4 (`every_rough_angle_is_within_the_bound`).
 
 use super::fold::Folded;
+use super::level::{Demodulated, LevelLanes};
 use crate::simd::Lanes;
 use core::hint::black_box;
 
@@ -41,8 +42,6 @@ const ROUGH_RECIPROCAL: [i16; 4] = [21_817, -7_271, 2_724, -914];
 const ARCTANGENT: [i16; 5] = [20_831, 439, -9_260, 5_342, -967];
 /// atan(2h)/2π on 0 ≤ h ≤ ½ in 1/65536 turn, coefficients of h to h³: error 1.9e-4 turn.
 const ROUGH_ARCTANGENT: [i16; 3] = [21_455, -7_158, -6_092];
-/// √(1 + t²) on 0 ≤ t ≤ 1, coefficients of 1, t² and t⁴: relative error 6.5e-4.
-pub(super) const LENGTH: [f64; 3] = [1.000_644, 0.484_927, -0.072_269];
 
 /// The constants in all lanes, for both halves of a block.
 pub(super) struct AngleLanes<V: Lanes> {
@@ -84,6 +83,39 @@ impl<V: Lanes> AngleLanes<V> {
         let h = v.mul_q15(folded.short[half], reciprocal);
         let angle = v.mul_q15(h, polynomial(v, self.rough_arctangent[half], h));
         folded.unfold(v, half, angle)
+    }
+}
+
+impl<V: Lanes> LevelLanes<'_, V> {
+    /// Wrapped phase of a folded block, and modulation in units of full scale / 32767.5 (not
+    /// meaningful where it is below the trusted minimum). `doubled` is
+    /// [`super::source::Frames::DOUBLED`]: whether the plan's `doubled` can be set at all.
+    #[inline(always)]
+    pub fn fine(
+        &self,
+        v: V,
+        angle: &AngleLanes<V>,
+        folded: &Folded<V>,
+        doubled: bool,
+    ) -> (Demodulated<V>, [V::W; 2]) {
+        let (low, t_low) = angle.fine(v, folded, 0);
+        let (high, t_high) = angle.fine(v, folded, 1);
+        let mut modulation = [
+            hypotenuse(v, folded.length[0], t_low, self.hypotenuse),
+            hypotenuse(v, folded.length[1], t_high, self.hypotenuse),
+        ];
+        if doubled {
+            modulation = [
+                v.shl_by(modulation[0], self.doubled),
+                v.shl_by(modulation[1], self.doubled),
+            ];
+        }
+        let block = Demodulated {
+            phase: [low, high],
+            strong: folded.strong,
+            brightest: folded.brightest,
+        };
+        (block, modulation)
     }
 }
 
@@ -129,6 +161,6 @@ fn polynomial<V: Lanes, const N: usize>(v: V, coefficients: [V::W; N], x: V::W) 
 
 /// length · √(1 + t²) · (what `coefficients` have been multiplied by).
 #[inline(always)]
-pub(super) fn hypotenuse<V: Lanes>(v: V, length: V::W, t: V::W, coefficients: [V::W; 3]) -> V::W {
+fn hypotenuse<V: Lanes>(v: V, length: V::W, t: V::W, coefficients: [V::W; 3]) -> V::W {
     v.mul_q15(length, polynomial(v, coefficients, v.mul_q15(t, t)))
 }

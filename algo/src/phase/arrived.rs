@@ -6,8 +6,7 @@
 //! need no copies of them.
 
 use super::level::Demodulated;
-use super::narrow::MAX_PIXELS;
-use crate::simd::Lanes;
+use crate::simd::{Lanes, MAX_PIXELS};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;

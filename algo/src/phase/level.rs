@@ -1,5 +1,4 @@
-//! The plan of a level's demodulation, and demodulation itself: samples → wrapped phase and
-//! modulation.
+//! The plan of a level's demodulation: samples → wrapped phase and modulation.
 //!
 //! [`super::terms`] has the equations of S and C, [`super::angle`] those of phase and length. This
 //! file chooses, per number of shifts and bit depth, how S and C are computed, their scaling, and
@@ -8,8 +7,6 @@
 //! Modulations come out as shares of full scale in units of full scale / 32767.5, that is half of a
 //! [`crate::units::Modulation`]; the stores double them.
 
-use super::angle::{AngleLanes, LENGTH, hypotenuse};
-use super::fold::Folded;
 use crate::pattern::{self, Waveform};
 use crate::simd::Lanes;
 use crate::trust::LeastModulation;
@@ -32,6 +29,8 @@ const WORD_FORM_BITS: u8 = 12;
 /// value the rounded weights of N = 5, 7, 8 and 9 turn the pointer by at most 2.4e-7 turn; with
 /// other values by up to 3e-6.
 const LARGEST: f64 = 32_694.0;
+/// √(1 + t²) on 0 ≤ t ≤ 1, coefficients of 1, t² and t⁴: relative error 6.5e-4.
+const LENGTH: [f64; 3] = [1.000_644, 0.484_927, -0.072_269];
 
 /// A level prepared for demodulation at one bit depth.
 #[derive(Clone, Debug)]
@@ -217,8 +216,8 @@ pub(super) struct LevelLanes<'a, V: Lanes> {
     pub full_scale: V::W,
     /// Full scale less one count, with its sign bit inverted.
     pub below_full_scale: V::W,
-    hypotenuse: [V::W; 3],
-    doubled: V::Count,
+    pub hypotenuse: [V::W; 3],
+    pub doubled: V::Count,
     pub four: LeastOfFourLanes<V>,
 }
 
@@ -258,37 +257,6 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
                 too_short: v.bound(plan.four.too_short),
             },
         }
-    }
-
-    /// Wrapped phase of a folded block, and modulation in units of full scale / 32767.5 (not
-    /// meaningful where it is below the trusted minimum). `doubled` is
-    /// [`super::source::Frames::DOUBLED`]: whether the plan's `doubled` can be set at all.
-    #[inline(always)]
-    pub fn fine(
-        &self,
-        v: V,
-        angle: &AngleLanes<V>,
-        folded: &Folded<V>,
-        doubled: bool,
-    ) -> (Demodulated<V>, [V::W; 2]) {
-        let (low, t_low) = angle.fine(v, folded, 0);
-        let (high, t_high) = angle.fine(v, folded, 1);
-        let mut modulation = [
-            hypotenuse(v, folded.length[0], t_low, self.hypotenuse),
-            hypotenuse(v, folded.length[1], t_high, self.hypotenuse),
-        ];
-        if doubled {
-            modulation = [
-                v.shl_by(modulation[0], self.doubled),
-                v.shl_by(modulation[1], self.doubled),
-            ];
-        }
-        let block = Demodulated {
-            phase: [low, high],
-            strong: folded.strong,
-            brightest: folded.brightest,
-        };
-        (block, modulation)
     }
 }
 

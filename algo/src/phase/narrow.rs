@@ -4,13 +4,11 @@
 use super::PhaseRow;
 use super::samples::BlockSample;
 use crate::frame::{FrameView, Samples};
+use crate::simd::MAX_PIXELS;
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
 use alloc::vec::Vec;
 use core::ops::Range;
-
-/// Pixels of the widest block of any back-end, or more.
-pub(super) const MAX_PIXELS: usize = 64;
 
 /// A sample type whose rows can be taken out of a frame.
 pub(super) trait RowSample: BlockSample + Default {

@@ -5,14 +5,12 @@
 
 use super::arrived::{Arrived, ArrivedRow, WrappedRow};
 use super::kernel::{about, geometric, on_arrival};
-use super::narrow::{
-    MAX_PIXELS, ResultColumns, RowSample, near, near_known, near_rows, padded_rows,
-};
+use super::narrow::{ResultColumns, RowSample, near, near_known, near_rows, padded_rows};
 use super::unwrap::Unwrapper;
 use super::{Decoder, PhaseRow};
 use crate::frame::FrameView;
 use crate::pattern::{MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS};
-use crate::simd::Results;
+use crate::simd::{MAX_PIXELS, Results};
 use crate::units::AbsolutePhase;
 use core::ops::Range;
 

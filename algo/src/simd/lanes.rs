@@ -14,6 +14,9 @@ use core::fmt::Debug;
 /// Bytes of a cache line.
 pub(crate) const LINE: usize = 64;
 
+/// Pixels of the widest block of any back-end, or more.
+pub(crate) const MAX_PIXELS: usize = 64;
+
 /// The components of the pointers of a block, scaled by a power of two (see [`Lanes::scaled`]).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Scaled<W> {

@@ -30,7 +30,7 @@ mod x86;
 
 #[cfg(target_arch = "x86_64")]
 pub(crate) use avx2::Avx2;
-pub(crate) use lanes::{LINE, Lanes};
+pub(crate) use lanes::{LINE, Lanes, MAX_PIXELS};
 #[cfg(target_arch = "aarch64")]
 pub(crate) use neon::Neon;
 pub(crate) use portable::Portable;

@@ -10,7 +10,7 @@ use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, Opened};
-use crate::recipe::bounds::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
+use crate::recipe::file::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
 use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe};
 use crate::recipe::replace;
 use crate::recipe::teach::{TeachError, teach};

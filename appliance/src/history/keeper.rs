@@ -1,8 +1,8 @@
 //! The thread `recordings`: writes the frames of failed parts. It is not the history's thread,
 //! because a recording takes as long as many results.
 
+use super::message::Message;
 use super::recordings::{JudgedPart, Recordings};
-use super::task::Message;
 use super::unkept::Unkept;
 use crate::recipe::Store;
 use std::path::Path;

@@ -24,6 +24,8 @@ pub mod entry;
 mod handle;
 mod keeper;
 pub mod kept;
+mod message;
+mod open;
 pub mod reader;
 mod recordings;
 pub mod schema;
@@ -38,7 +40,8 @@ pub mod writer;
 mod tests;
 
 pub use entry::{Entry, Filter, GaugeEntry, difference};
-pub use handle::{History, open};
+pub use handle::History;
+pub use open::open;
 pub use reader::{Reader, Trend, TrendPoint};
 pub use recordings::{JudgedPart, RECIPE, name_of, seq_of};
 pub use seqs::Numbering;

@@ -5,20 +5,18 @@ use super::HistoryError;
 use super::entry::Entry;
 use super::handle::History;
 use super::keeper::Keeping;
+use super::message::{MAX_WAITING, Message};
 use super::recordings::seq_of;
-use super::spool::SLOTS;
 use super::unkept::Unkept;
 use super::writer::Writer;
 use crate::station::{Event, StationHandle};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::Receiver;
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// Results that may wait for the card before some are lost to the history.
-pub(super) const MAX_WAITING: usize = SLOTS as usize;
 /// When nothing has come for this long, the log is brought into the database, and a card that
 /// refused is asked again.
 const PAUSE: Duration = Duration::from_secs(1);
@@ -29,34 +27,6 @@ const STRETCH: u64 = 4 << 20;
 const TOO_LONG: u64 = 32 << 20;
 /// When the daemon ends, a recording that is being written has this long.
 const LAST_PART: Duration = Duration::from_secs(1);
-
-/// What reaches the thread: from the station, from a sign-in, from the thread that writes
-/// recordings.
-pub(super) enum Message {
-    Result(Box<Entry>),
-    /// The name under which the frames of a result are kept, or why they are not.
-    Frames {
-        seq: u32,
-        kept: Result<String, Unkept>,
-    },
-    /// A recording was removed.
-    Removed {
-        name: String,
-        why: Unkept,
-    },
-    /// When a start of the daemon was, by a browser's clock.
-    Dated {
-        boot_id: String,
-        utc_us: u64,
-        /// Gets a message when it is stored.
-        stored: SyncSender<()>,
-    },
-    Stop {
-        last_seq: u32,
-    },
-    /// The thread that writes recordings has ended.
-    RecordingsEnded,
-}
 
 /// The thread's own side.
 pub struct Task {

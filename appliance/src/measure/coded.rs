@@ -1,6 +1,6 @@
 //! Measures a recording of Gray codes without fringes.
 
-use super::{Geometry, Manner, Measurement, Report, Truth, least_modulation, primary_of};
+use super::{Geometry, Manner, Measurement, Report, Stages, Truth, least_modulation, primary_of};
 use crate::head::code::CodeAlone;
 use crate::head::direction::Sensitivity;
 use crate::head::seam;
@@ -9,8 +9,6 @@ use algo::chain::SIGMA_CELLS;
 use algo::pipeline::{PhaseMap, triangulate_with};
 use algo::units::{AbsolutePhase, WrappedPhase};
 use hal::replay::Recording;
-use std::collections::BTreeMap;
-use std::time::Instant;
 
 /// Measures every code; the one whose place changes most with the height gives it.
 ///
@@ -18,21 +16,16 @@ use std::time::Instant;
 /// In words: a code cannot be decoded, or a model is absurd.
 pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
     let least = least_modulation(recording);
-    let mut stage_us = BTreeMap::new();
-    let mut stage_ended = |stage, started: Instant| {
-        let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
-        stage_us.insert(stage, us);
-    };
-    let started = Instant::now();
+    let mut stages = Stages::default();
     let mut codes = Vec::new();
-    for pattern in 0..recording.patterns.len() {
-        let code = CodeAlone::of(recording, pattern)?;
-        codes.push(code.ok_or("it has neither fringes nor a Gray code: record one of both")?);
-    }
-    let phases = codes.iter().map(|code| code.phases(least));
-    let mut phases: Vec<PhaseMap> = phases.collect::<Result<_, _>>()?;
-    stage_ended("phase", started);
-    let started = Instant::now();
+    let mut phases: Vec<PhaseMap> = stages.time("phase", || {
+        for pattern in 0..recording.patterns.len() {
+            let code = CodeAlone::of(recording, pattern)?;
+            codes.push(code.ok_or("it has neither fringes nor a Gray code: record one of both")?);
+        }
+        let phases = codes.iter().map(|code| code.phases(least));
+        phases.collect::<Result<_, String>>()
+    })?;
     let devices = Geometry::of(recording, None)?;
     let raster = &recording.projector;
     let (columns, rows) = (raster.width as usize, raster.height as usize);
@@ -51,11 +44,12 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
     let code = codes.get(primary).ok_or("the recording has no pattern")?;
     let geometry = geometries.swap_remove(primary);
     let sigma = SIGMA_CELLS * code.cells.width;
-    let heights = geometry.map(|triangulator| Surface {
-        map: triangulate_with(&triangulator, &mut phases[primary], |_| Some(sigma)),
-        triangulator,
+    let heights = stages.time("height", || {
+        geometry.map(|triangulator| Surface {
+            map: triangulate_with(&triangulator, &mut phases[primary], |_| Some(sigma)),
+            triangulator,
+        })
     });
-    stage_ended("height", started);
     let report = Report::new(
         &phases[primary],
         &heights,
@@ -68,7 +62,7 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
         },
         recording.noise_counts,
         &Truth::of(recording),
-        stage_us,
+        stages.0,
     );
     let full_scale = recording.format().full_scale();
     Ok(Measurement {

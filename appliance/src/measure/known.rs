@@ -1,6 +1,7 @@
 //! The phase that is expected in a recording: a recipe's golden map, the prediction from a
 //! preliminary measurement, or a map from a file.
 
+use super::AnyError;
 use crate::head::channel::Expected;
 use crate::head::seam;
 use crate::recipe::{Recipe, SequenceKind, safe};
@@ -9,8 +10,6 @@ use algo::pattern::{PhaseFunction, Unwrapping};
 use algo::units::AbsolutePhase;
 use hal::npy::Array;
 use hal::replay::Recording;
-
-type AnyError = Box<dyn std::error::Error>;
 
 /// Phase functions that differ by no more than this are the same, in turns: files hold `f64`.
 const SAME: f64 = 1e-9;

@@ -10,7 +10,7 @@ pub use report::{Manner, Report};
 pub use score::{GROSS_MM, Score, Truth};
 
 use crate::error::{Exit, Failure};
-use crate::head::channel::{Channel, Expected};
+use crate::head::channel::{Channel, Expected, Unwrapping};
 use crate::head::direction::Sensitivity;
 use crate::head::scan::Scan;
 use crate::head::seam;
@@ -29,6 +29,8 @@ use known::Known;
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
+
+type AnyError = Box<dyn std::error::Error>;
 
 /// A measured recording.
 #[derive(Debug)]
@@ -125,88 +127,135 @@ fn measure_about(
     recipe: Option<&Recipe>,
     known: Option<Known>,
 ) -> Result<Measurement, Failure> {
-    let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
-    if recording.frames.is_empty() {
-        return match known {
-            None => coded::measure(recording).map_err(|error| wrong(&error)),
-            Some(_) => Err(wrong(
-                &"it has a Gray code without fringes, which needs no expected phase: measure without one",
-            )),
-        };
-    }
-    let devices = Geometry::of(recording, recipe).map_err(|error| wrong(&error))?;
-    let mut stage_us = BTreeMap::new();
-    let mut stage_ended = |stage, started: Instant| {
-        let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
-        *stage_us.entry(stage).or_default() += us;
+    let measured = match (recording.frames.is_empty(), &known) {
+        (false, _) => of_fringes(recording, recipe, known.as_ref()),
+        (true, None) => coded::measure(recording).map_err(AnyError::from),
+        (true, Some(_)) => Err(
+            "it has a Gray code without fringes, which needs no expected phase: measure without one".into(),
+        ),
     };
+    measured.map_err(|error| wrong(folder, &*error))
+}
+
+/// How long the stages of a measurement take, µs.
+#[derive(Default)]
+struct Stages(BTreeMap<&'static str, u64>);
+
+impl Stages {
+    /// Carries out one part of a stage.
+    fn time<T>(&mut self, stage: &'static str, part: impl FnOnce() -> T) -> T {
+        let started = Instant::now();
+        let done = part();
+        let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
+        *self.0.entry(stage).or_default() += us;
+        done
+    }
+}
+
+/// One pattern of a recording: its frames, what makes heights of it, and how it is unwrapped.
+struct Pattern<'a> {
+    channel: Channel<'a>,
+    geometry: Result<Triangulator, String>,
+    unwrapping: Unwrapping,
+}
+
+impl<'a> Pattern<'a> {
+    fn new(
+        channel: Channel<'a>,
+        devices: &Geometry,
+        known: Option<&Known>,
+    ) -> Result<Self, AnyError> {
+        let geometry = devices.triangulator(&channel.function)?;
+        let known = known.map(|known| known as &dyn Expected);
+        let unwrapping = channel.unwrapping(known, &geometry)?;
+        Ok(Self {
+            channel,
+            geometry,
+            unwrapping,
+        })
+    }
+
+    /// How its phase changes with the height, where there are both.
+    fn sensitivity(&self) -> Option<Sensitivity> {
+        match self.unwrapping.missing() {
+            None => Sensitivity::of(self.geometry.as_ref().ok()?),
+            Some(_) => None,
+        }
+    }
+
+    /// σ of a sample in counts, as stated or as the frames show it, and by light.
+    fn noise(
+        &self,
+        recording: &Recording,
+        recipe: Option<&Recipe>,
+        phases: &PhaseMap,
+    ) -> (Option<f64>, Option<SampleNoise>) {
+        let stated = recording.noise_counts;
+        let stated = stated.or_else(|| recipe.map(|recipe| recipe.conditions.noise_counts));
+        let noise = stated.or_else(|| {
+            let Scan {
+                sequence, frames, ..
+            } = &self.channel.scan;
+            pipeline::sample_noise(sequence, frames, &phases.trust)
+        });
+        let by_light = match (recording.noise_counts, recipe) {
+            (None, Some(recipe)) => Some(recipe.conditions.noise),
+            _ => noise.map(SampleNoise::constant),
+        };
+        (noise, by_light)
+    }
+}
+
+fn of_fringes(
+    recording: &Recording,
+    recipe: Option<&Recipe>,
+    known: Option<&Known>,
+) -> Result<Measurement, AnyError> {
+    let devices = Geometry::of(recording, recipe)?;
+    let mut stages = Stages::default();
     let least = recipe.map(|recipe| recipe.conditions.least_modulation);
     let least = least.unwrap_or_else(|| least_modulation(recording));
-    let (mut phases, mut wrapped, mut wrapped_only) = (Vec::new(), Vec::new(), Vec::new());
-    let mut channels = Vec::new();
+    let (mut patterns, mut phases, mut wrapped) = (Vec::new(), Vec::new(), Vec::new());
     for at in 0..recording.patterns.len() {
-        let channel = Channel::new(recording, at, least).map_err(|error| wrong(&error))?;
-        let started = Instant::now();
-        let geometry = devices.triangulator(&channel.function);
-        let geometry = geometry.map_err(|error| wrong(&error))?;
-        let golden = known.as_ref().filter(|known| known.pattern == at);
-        let golden = golden.map(|known| known as &dyn Expected);
-        let unwrapping = channel.unwrapping(golden, &geometry);
-        let unwrapping = unwrapping.map_err(|error| wrong(&error))?;
-        stage_ended("map", started);
-        let started = Instant::now();
-        let decoded = channel.decode(&unwrapping).map_err(|error| wrong(&error))?;
-        stage_ended("phase", started);
+        let channel = Channel::new(recording, at, least)?;
+        let known = known.filter(|known| known.pattern == at);
+        let pattern = stages.time("map", || Pattern::new(channel, &devices, known))?;
+        let decoded = stages.time("phase", || pattern.channel.decode(&pattern.unwrapping))?;
         phases.push(decoded.absolute);
         wrapped.push(decoded.wrapped);
-        wrapped_only.push(unwrapping.missing().map(str::to_owned));
-        channels.push((channel, geometry, unwrapping));
+        patterns.push(pattern);
     }
-    let sensitivities: Vec<Option<Sensitivity>> = channels
-        .iter()
-        .map(|(_, geometry, unwrapping)| match unwrapping.missing() {
-            None => Sensitivity::of(geometry.as_ref().ok()?),
-            Some(_) => None,
-        })
-        .collect();
-    let primary = match &known {
+    let missing = |pattern: &Pattern<'_>| pattern.unwrapping.missing().map(str::to_owned);
+    let wrapped_only: Vec<_> = patterns.iter().map(missing).collect();
+    let sensitivities: Vec<_> = patterns.iter().map(Pattern::sensitivity).collect();
+    let primary = match known {
         Some(known) => known.pattern,
         None => primary_of(recording, &sensitivities),
     };
-    if channels.len() <= primary {
-        return Err(wrong(&"the recording has no pattern"));
+    if patterns.len() <= primary {
+        return Err("the recording has no pattern".into());
     }
-    let (channel, geometry, unwrapping) = channels.swap_remove(primary);
-    let started = Instant::now();
-    let stated = recording.noise_counts;
-    let stated = stated.or_else(|| recipe.map(|recipe| recipe.conditions.noise_counts));
-    let noise = stated.or_else(|| {
-        let Scan {
-            sequence, frames, ..
-        } = &channel.scan;
-        pipeline::sample_noise(sequence, frames, &phases[primary].trust)
-    });
-    let by_light = match (recording.noise_counts, recipe) {
-        (None, Some(recipe)) => Some(recipe.conditions.noise),
-        _ => noise.map(SampleNoise::constant),
-    };
-    stage_ended("noise", started);
-    let started = Instant::now();
-    let no_phase = wrapped_only[primary].as_ref();
+    let pattern = patterns.swap_remove(primary);
+    let map = &mut phases[primary];
+    let (noise, by_light) = stages.time("noise", || pattern.noise(recording, recipe, map));
+    let Pattern {
+        channel,
+        geometry,
+        unwrapping,
+    } = pattern;
     let ambiguous = unwrapping.ambiguity(&channel, &geometry);
-    let geometry = match (geometry, no_phase) {
+    let geometry = match (geometry, unwrapping.missing()) {
         (Ok(_), Some(_)) => Err("there is no absolute phase".into()),
         (geometry, _) => geometry,
     };
-    let heights = geometry.map(|triangulator| Surface {
-        map: channel
-            .scan
-            .heights(&triangulator, by_light, &mut phases[primary]),
-        triangulator,
+    let heights = stages.time("height", || {
+        geometry.map(|triangulator| Surface {
+            map: channel.scan.heights(&triangulator, by_light, map),
+            triangulator,
+        })
     });
-    stage_ended("height", started);
     let report = Report::new(
-        &phases[primary],
+        map,
         &heights,
         Manner {
             kind: unwrapping.kind(&channel),
@@ -220,10 +269,10 @@ fn measure_about(
         },
         noise,
         &Truth::of(recording),
-        stage_us,
+        stages.0,
     );
     let report = Report {
-        no_phase: no_phase.cloned(),
+        no_phase: wrapped_only[primary].clone(),
         notes: recording.notes.clone(),
         ambiguous,
         ..report.by(recording, primary, sensitivities[primary])

@@ -1,10 +1,8 @@
-//! From a snapshot to the 16-bit words of each block. Which value a register has is in the table of
-//! [`map`].
+//! From values to the 16-bit words of registers. Which value a register has is in the table of
+//! [`super::map`].
 
-use super::map::{self, Block};
 use crate::config::WordOrder;
-use crate::station::{Decision, GaugeValue, MAX_GAUGES, ResultRecord, Snapshot};
-use std::sync::Arc;
+use crate::station::{Decision, GaugeValue, MAX_GAUGES, ResultRecord};
 
 /// `i32` of a missing value.
 pub const INVALID_I32: u32 = 0x8000_0000;
@@ -19,9 +17,9 @@ pub const MAGIC: u32 = 0x4652_4E47;
 
 /// The words of one block, addressed as in the map.
 pub(super) struct Words {
-    first: u16,
-    words: Vec<u16>,
-    order: WordOrder,
+    pub(super) first: u16,
+    pub(super) words: Vec<u16>,
+    pub(super) order: WordOrder,
 }
 
 impl Words {
@@ -97,37 +95,6 @@ impl Item for &str {
             .collect();
         words.put(address, &*ascii);
     }
-}
-
-/// The words of a block, `block.last - block.first + 1` of them; zeros for a block that is not
-/// served.
-pub fn block_words(snapshot: &Snapshot, block: &Block, order: WordOrder) -> Vec<u16> {
-    let mut words = Words {
-        first: block.first,
-        words: vec![0; usize::from(block.last - block.first) + 1],
-        order,
-    };
-    // Without a result the block shows an empty one, all of whose gauges are invalid.
-    let shown = |record: &Option<Arc<ResultRecord>>| record.clone().unwrap_or_default();
-    match *block {
-        map::CONTROL => map::control(&mut words, snapshot),
-        map::STATUS => map::status(&mut words, snapshot),
-        map::RESULT => map::result(&mut words, &shown(&snapshot.result)),
-        map::OLDEST => {
-            // The same layout: written at RESULT's addresses, read at its own.
-            words.first = map::RESULT.first;
-            map::result(&mut words, &shown(&snapshot.oldest));
-        }
-        map::GAUGE_DETAIL => map::gauge_detail(&mut words, &shown(&snapshot.result)),
-        map::GAUGE_UNCERTAINTY => {
-            map::gauge_uncertainty(&mut words, &shown(&snapshot.result));
-        }
-        map::HEALTH => map::health(&mut words, snapshot),
-        map::RECIPE_DIRECTORY => map::recipe_directory(&mut words, snapshot),
-        map::IDENTITY => map::identity(&mut words, snapshot),
-        _ => {}
-    }
-    words.words
 }
 
 /// The item of each gauge of a result, and `missing` where there is no gauge.

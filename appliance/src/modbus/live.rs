@@ -1,6 +1,6 @@
 //! The registers with their present values, as a PLC reads them: for the page.
 
-use super::encode::block_words;
+use super::blocks::block_words;
 use super::map::{Kind, Register, registers};
 use crate::config::WordOrder;
 use crate::station::Snapshot;

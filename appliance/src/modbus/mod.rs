@@ -20,6 +20,7 @@
 //!   only contradicts itself (byte count, length, coil value) gets exception 3; `tokio-modbus`
 //!   alone would close the connection or panic, so the guard checks first.
 
+pub mod blocks;
 pub mod decode;
 pub mod encode;
 pub mod guard;

@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use tokio_modbus::server::Service;
 use tokio_modbus::{ExceptionCode, Request, Response, SlaveRequest};
 
+use super::blocks::block_words;
 use super::decode::{coil_write, control_write};
-use super::encode::block_words;
 use super::map;
 use super::refusals::{Refusals, Refused};
 use crate::config::WordOrder;

@@ -1,6 +1,6 @@
 //! The adaptive pattern of a part, from its preliminary measurement.
 
-use super::teach::TeachError;
+use super::failure::TeachError;
 use crate::head::calibrated::Measured;
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::ContrastFile;

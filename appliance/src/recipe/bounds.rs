@@ -3,28 +3,22 @@
 //!
 //! The same bounds hold for files that are read and for edits; `docs/formats.md` lists them.
 
-use super::check::MAX_REGIONS;
-use super::file::{PatternFile, RecipeFile, RegionFile, SequenceFile};
+use super::file::{LONGEST_NAME, PatternFile, RecipeFile, RegionFile, SequenceFile};
+use super::gauge::GaugeFile;
 use crate::station::MAX_GAUGES;
+use algo::inspect::{Basis, Facts};
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
-    Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, MAX_SIDE, RATIOS, length, within,
+    Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, MAX_SIDE, RATIOS, length, text,
+    within,
 };
 
-/// The longest name of a recipe, region or gauge, in characters.
-pub const LONGEST_NAME: usize = 64;
-/// The longest part number: the registers of PART_NUMBER.
-pub const LONGEST_PART_NUMBER: usize = 32;
 /// Sequences that a part can be measured with; teaching makes four.
 const MAX_SEQUENCES: usize = 8;
+/// Regions of a recipe.
+const MAX_REGIONS: usize = 32;
 /// Corners of a region.
 const MAX_CORNERS: usize = 256;
-/// Farthest that a part may lie from where it was taught, mm.
-pub const MAX_TOLERANCE_MM: f64 = 20.0;
-/// Most exposures of a frame: with more, the amplitude of bright places has too few grey levels.
-pub const MAX_EXPOSURES: u32 = 4;
-/// Widest guard band, in multiples of u.
-pub const MAX_GUARD_K: f64 = 10.0;
 
 impl RecipeFile {
     /// Checks each value by itself; [`Recipe::check`](super::Recipe::check) checks that they fit
@@ -96,6 +90,31 @@ impl SequenceFile {
         Sequence::from_frames(&self.frames)
             .map(drop)
             .map_err(|error| format!("frames: {error}"))
+    }
+}
+
+impl GaugeFile {
+    /// Checks each value by itself, for frames whose longer side has `largest` pixels.
+    ///
+    /// # Errors
+    /// In words that name the key, the value and the bounds.
+    fn check_bounds(&self, largest: usize) -> Result<(), String> {
+        text("name", &self.name, LONGEST_NAME)?;
+        text("region", &self.region, LONGEST_NAME)?;
+        let kind = self.measures.kind();
+        if let Some(from) = kind.from() {
+            text("measures.from", from, LONGEST_NAME)?;
+        }
+        let Facts { basis, .. } = kind.facts();
+        if let Some(side) = basis.side() {
+            within("measures.smoothing_px", side, 1, largest)?;
+            if basis == Basis::Squares(side) && side % 2 == 0 {
+                return Err(format!(
+                    "measures.smoothing_px is {side}: write an odd number, the square has a middle pixel"
+                ));
+            }
+        }
+        kind.check()
     }
 }
 

@@ -4,7 +4,7 @@
 use super::archive::Arrays;
 use super::captures::Offsets;
 use super::golden::GoldenPart;
-use super::good_parts::SIDES;
+use super::sides::SIDES;
 use super::{SequenceFile, SequenceKind, UnseenFile};
 use algo::inspect::ripple;
 use algo::pattern::{Sequence, Shot, Slips, Waveform, Waveforms};

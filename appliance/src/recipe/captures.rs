@@ -8,8 +8,8 @@
 //!
 //! The captures are averaged as two means, from which follows what of that difference is noise.
 
+use super::failure::TeachError;
 use super::light;
-use super::teach::TeachError;
 use crate::head::calibrated::CalibratedHead;
 use crate::head::means;
 use crate::head::rasters::Illumination;

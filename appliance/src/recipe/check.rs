@@ -2,16 +2,17 @@
 
 use super::archive::{Arrays, short, unpack};
 use super::demands::Demands;
-use super::file::{PatternFile, RecipeFile, SequenceKind};
-use super::gauge::gauges;
+use super::file::{PatternFile, RecipeFile, RegionFile, SequenceKind};
+use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
-use algo::inspect::{CalibrationError, Gauge};
+use algo::inspect::{Basis, CalibrationError, Gauge, Region};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
+use std::collections::HashMap;
 use std::io::{Cursor, Read, Seek};
 
 /// Most different sides of squares of one recipe, with 0 where any will do: each takes time in
@@ -109,9 +110,6 @@ impl RecipeSequence {
         finest.map_or(1.0, |level| level.waveform.fundamental())
     }
 }
-
-/// Regions of a recipe.
-pub const MAX_REGIONS: usize = 32;
 
 impl Recipe {
     /// Reads and checks a recipe file's bytes.
@@ -261,6 +259,43 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
         }
     }
     Ok(chain)
+}
+
+/// The gauges that are computed, for frames of (width, height) pixels.
+///
+/// # Errors
+/// Naming the gauge or region that cannot be used, and why.
+fn gauges(
+    regions: &[RegionFile],
+    gauges: &[GaugeFile],
+    (width, height): (usize, usize),
+) -> Result<Vec<Gauge>, String> {
+    let mut named = HashMap::new();
+    for region in regions {
+        let corners: Vec<_> = region.polygon.iter().map(|&[u, v]| (u, v)).collect();
+        let pixels = Region::polygon(&corners, width, height)
+            .map_err(|error| format!("region {:?}: {error}", region.name))?;
+        named.insert(region.name.as_str(), pixels);
+    }
+    let gauge = |gauge: &GaugeFile| {
+        let name = &gauge.name;
+        let find = |region: &str| {
+            let found = named.get(region).cloned();
+            found.ok_or_else(|| {
+                format!("gauge {name:?} names a region {region:?} that is not there")
+            })
+        };
+        let placement = matches!(gauge.measures.facts().basis, Basis::Motion(_));
+        Ok(Gauge {
+            region: match placement && gauge.region.is_empty() {
+                true => Region::default(),
+                false => find(&gauge.region)?,
+            },
+            from: gauge.measures.kind().from().map(find).transpose()?,
+            measure: gauge.measures.clone(),
+        })
+    };
+    gauges.iter().map(gauge).collect()
 }
 
 impl RecipeId {

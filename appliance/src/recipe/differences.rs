@@ -1,6 +1,7 @@
 //! What a change does to a recipe, in words, for the record of changes.
 
-use super::file::{GaugeFile, RecipeFile};
+use super::file::RecipeFile;
+use super::gauge::GaugeFile;
 use hal::bounds::clipped;
 
 impl RecipeFile {

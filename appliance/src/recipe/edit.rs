@@ -1,6 +1,6 @@
 //! Edits a taught recipe: names, regions, gauges, guard band and least coverage.
 
-use super::bounds::LONGEST_NAME;
+use super::file::LONGEST_NAME;
 use super::golden::TaughtRecipe;
 use super::judging::check_unique;
 use super::store::LoadedRecipe;

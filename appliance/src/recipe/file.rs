@@ -1,13 +1,10 @@
 //! The manifest `recipe.json` of a recipe, version 2. Frozen: see `docs/formats.md`.
 
-use super::bounds::{
-    LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_GUARD_K, MAX_TOLERANCE_MM,
-};
 use super::comparison::ComparisonFile;
+use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::CalibrationSigma;
 use crate::head::exposing::Exposing;
-use algo::inspect::Measure;
 use algo::pattern::Shot;
 use algo::phase::LeastModulation;
 use algo::units::AbsolutePhase;
@@ -24,6 +21,16 @@ use std::ops::RangeInclusive;
 pub const FORMAT: &str = "fringed-recipe";
 /// The version that this program writes, and the only one that it reads.
 pub const VERSION: u32 = 2;
+/// The longest name of a recipe, region or gauge, in characters.
+pub const LONGEST_NAME: usize = 64;
+/// The longest part number: the registers of PART_NUMBER.
+pub const LONGEST_PART_NUMBER: usize = 32;
+/// Farthest that a part may lie from where it was taught, mm.
+pub const MAX_TOLERANCE_MM: f64 = 20.0;
+/// Most exposures of a frame: with more, the amplitude of bright places has too few grey levels.
+pub const MAX_EXPOSURES: u32 = 4;
+/// Widest guard band, in multiples of u.
+pub const MAX_GUARD_K: f64 = 10.0;
 /// Bounds of the least modulation.
 const LEAST_MODULATION: RangeInclusive<f64> =
     LeastModulation::BOUNDS[0]..=LeastModulation::BOUNDS[1];
@@ -299,25 +306,6 @@ bounded! {
         /// Corners [u, v] in camera pixels of the golden measurement.
         pub polygon: Vec<[f64; 2]>,
     }
-}
-
-/// A gauge and its limits.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "super::gauge::GaugeText")]
-pub struct GaugeFile {
-    /// Its name.
-    pub name: String,
-    /// The name of its region; only a placement needs none.
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub region: String,
-    /// What it measures; `docs/formats.md` has the definitions.
-    pub measures: Measure,
-    /// Lower limit, inclusive, in mm, degrees, mm³ or as a share from 0 to 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub low: Option<f64>,
-    /// Upper limit, inclusive.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub high: Option<f64>,
 }
 
 /// How a part's motion against the taught one is compensated before it is gauged.

@@ -1,22 +1,38 @@
-//! The gauges of a recipe: from the file form to what is computed, and which values are refused.
+//! The gauges of a recipe in its file, and which limits are refused.
 
-use super::bounds::LONGEST_NAME;
-use super::file::{GaugeFile, RegionFile};
 use crate::station::Unit;
-use algo::inspect::{Basis, Facts, Gauge, Measure, Region};
-use hal::bounds::{clipped, text, within};
-use serde::Deserialize;
+use algo::inspect::{Facts, Measure};
+use hal::bounds::clipped;
+use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
-use std::collections::HashMap;
 use std::fmt::Display;
+
+/// A gauge and its limits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "GaugeText")]
+pub struct GaugeFile {
+    /// Its name.
+    pub name: String,
+    /// The name of its region; only a placement needs none.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub region: String,
+    /// What it measures; `docs/formats.md` has the definitions.
+    pub measures: Measure,
+    /// Lower limit, inclusive, in mm, degrees, mm³ or as a share from 0 to 1.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub low: Option<f64>,
+    /// Upper limit, inclusive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub high: Option<f64>,
+}
 
 /// A gauge as it is written. Its limits are parsed once its name and unit are known, so that a
 /// refusal can name the gauge and its bounds; the parser's message would only give the line and
 /// column.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct GaugeText {
+struct GaugeText {
     name: String,
     #[serde(default)]
     region: String,
@@ -99,29 +115,6 @@ fn spaced(unit: Unit) -> String {
 }
 
 impl GaugeFile {
-    /// Checks each value by itself, for frames whose longer side has `largest` pixels.
-    ///
-    /// # Errors
-    /// In words that name the key, the value and the bounds.
-    pub(super) fn check_bounds(&self, largest: usize) -> Result<(), String> {
-        text("name", &self.name, LONGEST_NAME)?;
-        text("region", &self.region, LONGEST_NAME)?;
-        let kind = self.measures.kind();
-        if let Some(from) = kind.from() {
-            text("measures.from", from, LONGEST_NAME)?;
-        }
-        let Facts { basis, .. } = kind.facts();
-        if let Some(side) = basis.side() {
-            within("measures.smoothing_px", side, 1, largest)?;
-            if basis == Basis::Squares(side) && side % 2 == 0 {
-                return Err(format!(
-                    "measures.smoothing_px is {side}: write an odd number, the square has a middle pixel"
-                ));
-            }
-        }
-        kind.check()
-    }
-
     /// Refuses limits that no part can keep, and those that its unit cannot have.
     ///
     /// # Errors
@@ -166,48 +159,12 @@ impl GaugeFile {
     }
 }
 
-/// The gauges that are computed, for frames of (width, height) pixels.
-///
-/// # Errors
-/// Naming the gauge or region that cannot be used, and why.
-pub(super) fn gauges(
-    regions: &[RegionFile],
-    gauges: &[GaugeFile],
-    (width, height): (usize, usize),
-) -> Result<Vec<Gauge>, String> {
-    let mut named = HashMap::new();
-    for region in regions {
-        let corners: Vec<_> = region.polygon.iter().map(|&[u, v]| (u, v)).collect();
-        let pixels = Region::polygon(&corners, width, height)
-            .map_err(|error| format!("region {:?}: {error}", region.name))?;
-        named.insert(region.name.as_str(), pixels);
-    }
-    let gauge = |gauge: &GaugeFile| {
-        let name = &gauge.name;
-        let find = |region: &str| {
-            let found = named.get(region).cloned();
-            found.ok_or_else(|| {
-                format!("gauge {name:?} names a region {region:?} that is not there")
-            })
-        };
-        let placement = matches!(gauge.measures.facts().basis, Basis::Motion(_));
-        Ok(Gauge {
-            region: match placement && gauge.region.is_empty() {
-                true => Region::default(),
-                false => find(&gauge.region)?,
-            },
-            from: gauge.measures.kind().from().map(find).transpose()?,
-            measure: gauge.measures.clone(),
-        })
-    };
-    gauges.iter().map(gauge).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use algo::inspect::Kind;
     use algo::inspect::kinds::*;
+    use std::collections::HashMap;
 
     fn gauge(measures: &Measure, low: Option<f64>, high: Option<f64>) -> GaugeFile {
         GaugeFile {

@@ -14,7 +14,7 @@
 //! Leaving such pixels out instead misses nearly all dents among them
 //! (`dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_pixels`).
 
-use super::sides::{Farthest, Sides};
+use super::sides::{Farthest, SIDES, SIGMAS, Sides};
 use crate::station::Unit;
 use algo::geometry::Triangulator;
 use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_variance};
@@ -30,16 +30,8 @@ pub(super) const DEVIATION_MM: f64 = 0.15;
 /// At most this share of the compared pixels counts with less weight or not at all; else the limit
 /// is wider.
 const WEIGHED: f64 = 0.05;
-/// The σ of a square is at most the limit divided by this: of parts with 10⁴ squares of just this
-/// σ, one in 10⁶ exceeds the limit.
-pub(super) const SIGMAS: f64 = 6.5;
 /// At most this share of good parts is predicted to exceed the limit.
 const BEYOND: f64 = 1e-6;
-/// Sides of squares in camera pixels, the smallest first. A single pixel may be wrong. In the
-/// largest square a dent of 8 mm is still seen at half its depth, at 0.4 mm per pixel.
-pub(super) const SIDES: [usize; 4] = [3, 5, 7, 9];
-/// The largest deviation of good parts is to stay below this share of the limit.
-pub(super) const ROOM: f64 = 1.0 / 3.0;
 /// Limits wider than the tolerance are rounded up to a multiple of this, mm; each is wider than the
 /// one before by this factor, and at most so many times the tolerance.
 const STEP_MM: f64 = 0.01;

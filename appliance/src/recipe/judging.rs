@@ -4,7 +4,8 @@
 //! Without this a part of any shape passes, and nobody sees why. It is checked whenever a recipe is
 //! taught, imported, edited or loaded.
 
-use super::file::{GaugeFile, RecipeFile};
+use super::file::RecipeFile;
+use super::gauge::GaugeFile;
 use std::collections::HashSet;
 
 impl RecipeFile {

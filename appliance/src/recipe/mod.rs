@@ -1,7 +1,7 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
-//! - On disk: [`mod@file`] is the manifest, [`bounds`] the bounds of its values, [`archive`] the
-//!   ZIP with its fingerprint.
+//! - On disk: [`mod@file`] is the manifest, `gauge` its gauges, [`bounds`] the bounds of lists and of
+//!   values that depend on others, [`archive`] the ZIP with its fingerprint.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot
 //!   judge, [`plan`] joins that with the head's calibration; `light` tells bad light from bad
 //!   parts.
@@ -26,6 +26,7 @@ mod demands;
 mod differences;
 pub mod edit;
 pub mod exchange;
+mod failure;
 pub mod file;
 mod gauge;
 pub mod generations;
@@ -50,8 +51,8 @@ pub use archive::short;
 pub use check::{Conditions, Recipe, RecipeId, RecipeSequence};
 pub use demands::Demands;
 pub use file::{
-    AlignmentKind, GaugeFile, PatternFile, RecipeFile, RegionFile, SequenceFile, SequenceKind,
-    UnseenFile, safe,
+    AlignmentKind, PatternFile, RecipeFile, RegionFile, SequenceFile, SequenceKind, UnseenFile,
+    safe,
 };
-pub use gauge::kinds;
+pub use gauge::{GaugeFile, kinds};
 pub use store::{ChangeError, LoadError, Store};

@@ -6,11 +6,11 @@
 //! that would refuse the recipe's own part is moved until it holds, and teaching says so.
 
 use super::archive::Arrays;
+use super::failure::TeachError;
 use super::file::TriedFile;
 use super::median::median;
 use super::plan::Plan;
 use super::sides::Farthest;
-use super::teach::TeachError;
 use super::{GaugeFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, Unit, Verdict};

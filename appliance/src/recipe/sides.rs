@@ -6,8 +6,16 @@
 //! only larger squares keep good parts inside the limits. Both differ from place to place, so the
 //! side does: on a cone squares are large at its tip and its rim alone.
 
-use super::good_parts::{ROOM, SIDES, SIGMAS};
 use algo::inspect::{Production, Strips};
+
+/// Sides of squares in camera pixels, the smallest first. A single pixel may be a wild one. In the
+/// largest a dent of 8 mm is still seen at half its depth by 0.4 mm per pixel.
+pub(super) const SIDES: [usize; 4] = [3, 5, 7, 9];
+/// The largest deviation of good parts is to stay below this share of the limit.
+pub(super) const ROOM: f64 = 1.0 / 3.0;
+/// Squares have at most a σ of the limit by this: of a part with 10⁴ squares of just this σ, one in
+/// 10⁶ exceeds the limit.
+pub(super) const SIGMAS: f64 = 6.5;
 
 /// The side that squares have where nothing asks for a larger one, and the least side about each
 /// pixel, 0 where no part is compared; empty where all have the smallest.

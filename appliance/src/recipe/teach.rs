@@ -1,5 +1,6 @@
 //! Teaching: from a good part in front of the head to a recipe.
 
+pub use super::failure::TeachError;
 pub use super::golden::{Naming, TaughtRecipe};
 
 use super::PatternFile;
@@ -10,13 +11,10 @@ use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use super::plan::Plan;
 use super::proof;
-use crate::error::code_of;
-use crate::head::calibrated::{CalibratedHead, MeasureError};
+use crate::head::calibrated::CalibratedHead;
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
-use crate::station::error_code;
 use crate::system::computing::Computing;
-use algo::adaptive::AdaptError;
 use algo::pattern::{Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
@@ -29,60 +27,6 @@ const SHIFTS: usize = 4;
 const DENSE_N: f64 = 4.0;
 /// A scene cannot be taught if less than this share of the frame is resolved.
 const LEAST_RESOLVED: f64 = 0.005;
-
-/// A part that could not be taught.
-#[derive(Debug, thiserror::Error)]
-pub enum TeachError {
-    /// A device failed.
-    #[error("teach: {0}")]
-    Device(hal::error::Error),
-    /// No recipe can be made of this scene.
-    #[error("teach: {0}")]
-    Scene(String),
-    /// The geometry or the pattern is impossible.
-    #[error("teach: {0}")]
-    Rig(String),
-    /// The head's calibration cannot be used.
-    #[error("teach: {0}")]
-    NotCalibrated(String),
-    /// The progress callback asked for the end.
-    #[error("teach: it was ended early")]
-    Ended,
-}
-
-impl TeachError {
-    /// The value of register ERROR_CODE.
-    pub fn code(&self) -> u16 {
-        match self {
-            Self::Device(error) => code_of(error),
-            Self::Scene(_) => error_code::NOTHING_TO_TEACH,
-            Self::Rig(_) => error_code::RIG,
-            Self::NotCalibrated(_) => error_code::NOT_CALIBRATED,
-            Self::Ended => error_code::ABORTED,
-        }
-    }
-}
-
-impl From<hal::error::Error> for TeachError {
-    fn from(error: hal::error::Error) -> Self {
-        Self::Device(error)
-    }
-}
-
-impl From<MeasureError> for TeachError {
-    fn from(error: MeasureError) -> Self {
-        match error {
-            MeasureError::Device(error) => Self::Device(error),
-            MeasureError::Impossible(error) => Self::Rig(error),
-        }
-    }
-}
-
-impl From<AdaptError> for TeachError {
-    fn from(error: AdaptError) -> Self {
-        Self::Scene(error.to_string())
-    }
-}
 
 /// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern,
 /// measures it several times with that pattern by every sequence that production may use, makes the

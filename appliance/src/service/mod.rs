@@ -5,6 +5,7 @@
 //! station through its handle.
 
 mod caller;
+mod rooms;
 mod serving;
 mod settling;
 mod stopping;
@@ -12,24 +13,19 @@ pub mod survey;
 
 use crate::recipe::Store;
 pub use caller::Caller;
-use serving::{PlcSide, serve};
+use rooms::Rooms;
 
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Failure};
 use crate::head::calibration::Current;
-use crate::head::placed::Placed;
-use crate::history::{self, Bounds, History, Numbering, Reader};
+use crate::history::{self, Bounds, History, Numbering};
+use crate::modbus;
 use crate::production::backend;
 use crate::production::commissioning::Commission;
 use crate::production::commissioning::live::Live;
-use crate::production::drift::Watch;
 use crate::production::latest::LastCycleRequests;
-use crate::production::opening::Opening;
-use crate::production::shelf::Shelf;
 use crate::production::simulation::Simulation;
-use crate::production::warm_up::WarmUp;
-use crate::production::{Aborts, Order, Worker};
-use crate::service::survey::Survey;
+use crate::production::{Aborts, Order};
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
 };
@@ -37,9 +33,9 @@ use crate::storage::state::{StateFolder, random};
 use crate::system::computing::Computing;
 use crate::system::journal::{self, Severity};
 use crate::system::progress::Progress;
+use crate::system::stop_signal::StopSignal;
 use crate::system::{runtime, socket, stderr};
 use crate::web::access::{Access, NewSecret};
-use crate::{lines, modbus, web};
 use sim::Stage;
 use std::net::SocketAddr;
 use std::path::Path;
@@ -125,120 +121,36 @@ impl Daemon {
         );
         let settings = station(config, &state, next_seq)?;
         let station = StationHandle::new(settings, Instant::now(), sink);
-        let writing = {
-            let station = station.clone();
-            spawn("history", move || task.run(&station))?
-        };
-        let last_cycle = LastCycleRequests::default();
-        let calibration = Current::default();
-        let simulation = Simulation::new(orders.clone());
         let (commission, complaints) = Commission::open(&path);
         for complaint in complaints {
             progress.warn(&complaint);
         }
-        let live = Live::new(orders.clone(), commission.clone());
-        let computing = Computing::default();
         let (sockets, stopped) = watch::channel(false);
-        let wiring = {
-            let (station, progress, stopped) = (station.clone(), progress.clone(), stopped.clone());
-            let setup = config.lines.clone();
-            let open: lines::Open = Box::new(move || backend::lines(&setup));
-            spawn("lines", move || {
-                if let Err(failure) = lines::serve(wires, &open, &station, &progress, stopped) {
-                    progress.warn(&failure.message);
-                }
-            })?
+        let rooms = Rooms {
+            config,
+            path: &path,
+            station: station.clone(),
+            recipes,
+            history: history.clone(),
+            progress: progress.clone(),
+            calibration: Current::default(),
+            last_cycle: LastCycleRequests::default(),
+            simulation: Simulation::new(orders.clone()),
+            live: Live::new(orders.clone(), commission.clone()),
+            commission,
+            computing: Computing::default(),
+            clients: modbus::Clients::new(usize::from(config.modbus.connections)),
+            stopped,
         };
-        let clients = modbus::Clients::new(usize::from(config.modbus.connections));
-        let serving = {
-            let (dating, boot_id) = (history.clone(), station.snapshot().boot_id);
-            let site = web::Site::new(web::Parts {
-                station: station.clone(),
-                access,
-                recipes: recipes.clone(),
-                calibration: calibration.clone(),
-                last_cycle: last_cycle.clone(),
-                simulation: simulation.clone(),
-                commission: commission.clone(),
-                live,
-                history: Reader::of(&path),
-                date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
-                log: progress.logbook().clone(),
-                registers: modbus::live,
-                configuration: toml::to_string(config).unwrap_or_default(),
-                hosts: config.http.hosts.clone(),
-                proxies: config.http.proxies.clone(),
-            });
-            let (station, config) = (station.clone(), config.clone());
-            let plc = PlcSide {
-                listener: plc,
-                clients: clients.clone(),
-                refusals: modbus::Refusals::new(progress.clone()),
-            };
-            let serve = move || {
-                runtime.block_on(serve(plc, page, station, site, &config, stopped));
-            };
-            spawn("sockets", serve)?
-        };
-        let (survey, surveyed) = mpsc::channel();
-        let surveying = {
-            let station = station.clone();
-            let survey = Survey::new(&path, recipes.clone(), clients, progress.clone());
-            spawn("survey", move || survey.run(&station, &surveyed))?
-        };
-        let (opened, opening) = mpsc::channel();
-        let simulated = config.head.backend == Backend::Sim;
-        let first = first_request(config, simulated, &recipes);
+        let computing = rooms.computing.clone();
+        let writing = rooms.history(task)?;
+        let wiring = rooms.lines(wires)?;
+        let serving = rooms.sockets(runtime, plc, page, access)?;
+        let (survey, surveying) = rooms.survey()?;
+        let first = first_request(config, &rooms.recipes);
         let awaited = first.is_some();
-        let checks = config.station.geometry_check_cycles;
-        let measuring = {
-            let (station, recipes) = (station.clone(), recipes.clone());
-            let (mut config, progress, history) =
-                (config.head_in(&path), progress.clone(), history.clone());
-            let waiting = match first {
-                Some(Request::Teach { .. }) => Placed::after_teaching(&mut config.part),
-                _ => None,
-            };
-            let computing = computing.clone();
-            let (patient, pulse) = (caller.notify.is_connected(), caller.notify.pulse());
-            spawn("measuring", move || {
-                let opening = Opening {
-                    config: &config,
-                    pool: &pool,
-                    progress: &progress,
-                    station: &station,
-                    pulse: &pulse,
-                    patient,
-                    computing: &computing,
-                };
-                let Some((head, begin)) = opening.run(&inbox, &opened) else {
-                    return;
-                };
-                simulation.opened(head.stage.as_ref());
-                let worker = Worker {
-                    opened: head,
-                    calibration,
-                    pool,
-                    recipes,
-                    station,
-                    last_cycle,
-                    history,
-                    progress,
-                    config,
-                    aborts,
-                    lost: None,
-                    shelf: Shelf::default(),
-                    pulse,
-                    computing,
-                    waiting,
-                    commission,
-                    live: false,
-                    watch: Watch::every(checks),
-                    warm_up: WarmUp::default(),
-                };
-                worker.run(&inbox, begin, first);
-            })?
-        };
+        let (opened, opening) = mpsc::channel();
+        let measuring = rooms.measuring(pool, caller, (inbox, aborts), first, opened)?;
         let daemon = Self {
             station,
             modbus,
@@ -255,27 +167,30 @@ impl Daemon {
             computing,
             _state: state,
         };
-        let gone = || {
-            Failure::new(
-                Exit::Software,
-                "the measuring task ended before its head was open",
-            )
-        };
-        let outcome = loop {
-            match opening.recv_timeout(POLLING) {
-                Ok(outcome) => break outcome,
-                Err(mpsc::RecvTimeoutError::Timeout) if caller.stop.has_arrived() => {
-                    break Ok(None);
-                }
-                Err(mpsc::RecvTimeoutError::Timeout) => {}
-                Err(mpsc::RecvTimeoutError::Disconnected) => break Err(gone()),
-            }
-        };
-        match outcome {
+        match opened_head(&opening, &caller.stop) {
             Ok(stage) => Ok(Self { stage, ..daemon }),
             Err(failure) => {
                 daemon.end();
                 Err(failure)
+            }
+        }
+    }
+}
+
+/// Waits for the measuring task's head, or for the stop signal: where parts are placed in front of
+/// a simulated head.
+fn opened_head(
+    opening: &mpsc::Receiver<Result<Option<Stage>, Failure>>,
+    stop: &StopSignal,
+) -> Result<Option<Stage>, Failure> {
+    loop {
+        match opening.recv_timeout(POLLING) {
+            Ok(outcome) => return outcome,
+            Err(mpsc::RecvTimeoutError::Timeout) if stop.has_arrived() => return Ok(None),
+            Err(mpsc::RecvTimeoutError::Timeout) => {}
+            Err(mpsc::RecvTimeoutError::Disconnected) => {
+                let message = "the measuring task ended before its head was open";
+                return Err(Failure::new(Exit::Software, message));
             }
         }
     }
@@ -303,15 +218,6 @@ fn open_access(state: &StateFolder, progress: &Progress) -> Result<Access, Failu
         journal::write(Severity::Notice, &words);
     }
     Ok(access)
-}
-
-fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Result<JoinHandle<()>, Failure> {
-    std::thread::Builder::new()
-        .name(name.into())
-        .spawn(run)
-        .map_err(|error| {
-            Failure::because(Exit::Software, format!("start the thread {name}"), error)
-        })
 }
 
 async fn listen(config: &Config) -> Result<(TcpListener, TcpListener), Failure> {
@@ -400,11 +306,12 @@ fn effects(
 
 /// The station's first request: to load its recipe. Without one, a simulated head teaches the part
 /// in front of it.
-fn first_request(config: &Config, simulated: bool, recipes: &Store) -> Option<Request> {
+fn first_request(config: &Config, recipes: &Store) -> Option<Request> {
     let number = config.station.recipe;
     if recipes.numbers().contains(&number) {
         Some(Request::Load(RecipeKey::Number(number)))
     } else {
+        let simulated = config.head.backend == Backend::Sim;
         simulated.then_some(Request::Teach {
             number,
             keep_gauges: false,

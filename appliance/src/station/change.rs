@@ -8,8 +8,7 @@ use super::fault::Failure;
 use super::machine::{Station, log, push};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::refusal::reject;
-use super::snapshot::TeachProgress;
-use super::state::State;
+use super::state::{State, TeachProgress};
 use std::sync::Arc;
 
 impl Station {

@@ -3,6 +3,8 @@
 
 use std::sync::Arc;
 
+use serde::Serialize;
+
 use super::clock::{Clock, Micros};
 use super::control;
 use super::event::{Condition, Effect, Effects, JobId, MAX_EFFECTS};
@@ -12,7 +14,6 @@ use super::plc::Plc;
 use super::recipes::Recipes;
 use super::requests::Requests;
 use super::results::Results;
-use super::snapshot::Identity;
 use super::state::State;
 use super::turns::Turns;
 use super::worker::Worker;
@@ -51,6 +52,20 @@ impl Default for Limits {
             plc: Micros::from_millis(5_000),
         }
     }
+}
+
+/// Names of this device.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Identity {
+    /// For FC43/14.
+    #[serde(skip)]
+    pub vendor: String,
+    /// For FC43/14.
+    pub product: String,
+    /// At most 32 ASCII characters are shown.
+    pub serial: String,
+    /// At most 32 ASCII characters are shown.
+    pub version: String,
 }
 
 /// What does not change after the start.

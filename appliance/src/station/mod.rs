@@ -83,6 +83,7 @@ mod plc;
 mod requests;
 mod watch;
 mod worker;
+mod write;
 
 #[cfg(test)]
 mod tests;
@@ -96,12 +97,12 @@ pub use handle::{StationHandle, tick};
 pub use health::{
     Drift, FULL_STORAGE_MIB, HOT_PROJECTOR_C, Health, Pace, Power, ProjectorHealth, System,
 };
-pub use machine::{Limits, Settings, Station};
+pub use machine::{Identity, Limits, Settings, Station};
 pub use recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};
 pub use results::Counts;
-pub use snapshot::{Identity, Snapshot, TeachProgress};
+pub use snapshot::Snapshot;
 pub use stages::{Stage, StageTime, Stages};
-pub use state::{Cycle, State};
+pub use state::{Cycle, State, TeachProgress};
 pub use step::step;
 pub use turns::Client;

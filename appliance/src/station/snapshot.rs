@@ -3,17 +3,15 @@
 
 use std::sync::Arc;
 
-use serde::Serialize;
-
 use super::clock::Micros;
 use super::control::{self, ControlRegisters};
 use super::fault::Fault;
 use super::health::Health;
-use super::machine::Station;
+use super::machine::{Identity, Station};
 use super::recipes::{ActiveRecipe, RecipeResult};
 use super::result::ResultRecord;
 use super::results::Counts;
-use super::state::State;
+use super::state::{State, TeachProgress};
 
 /// STATUS bits, register 100.
 pub mod status {
@@ -80,31 +78,6 @@ pub mod warning {
 
     /// The warnings that the frames of a part show.
     pub const OF_A_PART: u16 = LOW_LIGHT | SATURATION | PATTERN_UNFIT | FRAME_SLIP;
-}
-
-/// Names of this device.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Identity {
-    /// For FC43/14.
-    #[serde(skip)]
-    pub vendor: String,
-    /// For FC43/14.
-    pub product: String,
-    /// At most 32 ASCII characters are shown.
-    pub serial: String,
-    /// At most 32 ASCII characters are shown.
-    pub version: String,
-}
-
-/// How far teaching has come.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TeachProgress {
-    /// The recipe being taught.
-    pub number: u16,
-    /// 0…1.
-    pub fraction: f32,
-    /// The present stage of teaching, for people.
-    pub words: Arc<str>,
 }
 
 /// Everything that Modbus and the page show.

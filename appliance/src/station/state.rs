@@ -1,10 +1,13 @@
 //! The states of the station, each with the data that it needs.
 
+use std::sync::Arc;
+
+use serde::Serialize;
+
 use super::clock::Micros;
 use super::event::{Job, JobId};
 use super::fault::Fault;
 use super::recipes::RecipeKey;
-use super::snapshot::TeachProgress;
 
 /// One accepted trigger on its way to a verdict.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -13,6 +16,17 @@ pub struct Cycle {
     pub order: Job,
     /// When the last frame was exposed, as far as known.
     pub exposed: Option<Micros>,
+}
+
+/// How far teaching has come.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TeachProgress {
+    /// The recipe being taught.
+    pub number: u16,
+    /// 0…1.
+    pub fraction: f32,
+    /// The present stage of teaching, for people.
+    pub words: Arc<str>,
 }
 
 /// What the station is doing. The numbers of register 104 are in [`State::named`].

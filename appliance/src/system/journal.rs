@@ -1,22 +1,10 @@
-//! Lines on stderr: with the program's name in front for people, with a priority for a journal,
-//! which adds name and time itself.
+//! Lines of the log on stderr.
 
+pub use super::prefix::Severity;
+
+use super::prefix::{form_of, form_of_own};
 use super::stderr;
 use std::backtrace::{Backtrace, BacktraceStatus};
-use std::sync::OnceLock;
-
-/// How much a line matters, as syslog numbers it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    /// Nothing is measured until its cause is removed.
-    Error = 3,
-    /// Measuring goes on, but something needs attention.
-    Warning = 4,
-    /// Rare and worth finding again: the device's secret, a start, a stop.
-    Notice = 5,
-    /// Normal operation.
-    Info = 6,
-}
 
 /// Writes one or more lines in the daemon's name.
 pub fn write(severity: Severity, words: &str) {
@@ -25,12 +13,7 @@ pub fn write(severity: Severity, words: &str) {
 
 /// Writes one or more lines in the name of `program`.
 pub fn write_of(program: &str, severity: Severity, words: &str) {
-    stderr::write(&form(program, is_read_by_a_journal(), severity, words));
-}
-
-/// Lines in the daemon's name, as they are written.
-pub(super) fn form_of_own(severity: Severity, words: &str) -> String {
-    form("fringed", is_read_by_a_journal(), severity, words)
+    stderr::write(&form_of(program, severity, words));
 }
 
 /// Writes panics as lines of the log, too: the system's own way is to wait for stderr in the thread
@@ -52,56 +35,4 @@ pub fn take_panics() {
             stderr::end();
         }
     }));
-}
-
-fn is_read_by_a_journal() -> bool {
-    static JOURNAL: OnceLock<bool> = OnceLock::new();
-    *JOURNAL.get_or_init(stderr_is_a_journal)
-}
-
-/// The lines with their prefix.
-fn form(program: &str, journal: bool, severity: Severity, words: &str) -> String {
-    let lines = words.lines().map(|line| match journal {
-        true => format!("<{}>{line}\n", severity as u8),
-        false => format!("{program}: {line}\n"),
-    });
-    lines.collect()
-}
-
-/// Whether stderr is the stream that systemd.exec(5) describes.
-fn stderr_is_a_journal() -> bool {
-    let named = std::env::var("JOURNAL_STREAM").unwrap_or_default();
-    rustix::fs::fstat(std::io::stderr())
-        .is_ok_and(|stream| is_named(&named, stream.st_dev, stream.st_ino))
-}
-
-/// Whether the text names this file as `device:inode`.
-fn is_named(text: &str, device: u64, inode: u64) -> bool {
-    let number = |text: &str| text.parse().ok();
-    let named = text
-        .split_once(':')
-        .map(|(device, inode)| (number(device), number(inode)));
-    named == Some((Some(device), Some(inode)))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_journal_gets_the_priority_of_every_line_and_people_get_none() {
-        let words = "fault 101: gone\nplug it in";
-        let journal = form("fringed", true, Severity::Error, words);
-        assert_eq!(journal, "<3>fault 101: gone\n<3>plug it in\n");
-        let people = form("fringed", false, Severity::Error, words);
-        assert_eq!(people, "fringed: fault 101: gone\nfringed: plug it in\n");
-    }
-
-    #[test]
-    fn only_the_stream_that_is_named_is_a_journal() {
-        assert!(is_named("8:15", 8, 15));
-        for other in ["8:16", "9:15", "", "8", "8:", ":15", "8:15:1", "x:y"] {
-            assert!(!is_named(other, 8, 15), "{other}");
-        }
-    }
 }

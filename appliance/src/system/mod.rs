@@ -10,6 +10,7 @@ pub mod journal;
 pub mod logbook;
 pub mod memory;
 pub mod notify;
+mod prefix;
 pub mod priority;
 pub mod progress;
 pub mod socket;

@@ -10,7 +10,7 @@
 //! A command waits until its lines are written, so that they stand in order with what it prints. A
 //! daemon does not, after [`detach`].
 
-use super::journal::{self, Severity};
+use super::prefix::{Severity, form_of_own};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::{self, Write};
 use std::mem::take;
@@ -236,7 +236,7 @@ fn report(out: &mut impl Write, lost: u64) -> u64 {
     let words = format!(
         "{lost} lines of the log are lost here: stderr was not read, or could not be written; the page has the last 200 of all lines"
     );
-    let line = journal::form_of_own(Severity::Warning, &words);
+    let line = form_of_own(Severity::Warning, &words);
     match out.write_all(line.as_bytes()) {
         Ok(()) => 0,
         Err(_) => lost,

@@ -18,10 +18,6 @@ use crate::history::why_no_frames;
 use crate::station::result::flag;
 use crate::system::priority;
 
-/// The pictures that were computed last, height, deviation, modulation, and the SEQ of their
-/// result.
-pub(super) type LastKept = Option<(u32, [Map; 3])>;
-
 pub(super) async fn one(
     State(site): State<Site>,
     Path(seq): Path<u32>,

@@ -7,7 +7,7 @@ use ipnet::IpNet;
 use serde_json::Value;
 use tokio::sync::{Mutex, Semaphore, oneshot};
 
-use super::kept::LastKept;
+use super::map::Map;
 use super::problem::Problem;
 use super::slots::Slots;
 use crate::head::calibration::Current;
@@ -36,6 +36,10 @@ const MAX_CHANGES: usize = 2;
 const MAX_ARRIVING: usize = 2;
 /// The most files that are sent at a time: each is in memory until its client has received it.
 const MAX_FILES: usize = 4;
+
+/// The pictures that were computed last, height, deviation, modulation, and the SEQ of their
+/// result.
+pub(super) type LastKept = Option<(u32, [Map; 3])>;
 
 /// What the daemon hands to the page.
 pub struct Parts {

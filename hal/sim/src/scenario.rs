@@ -6,12 +6,13 @@
 
 use serde::{Deserialize, Deserializer, Serialize};
 
-use super::material::Material;
+use super::material::{Lighting, Material};
 use super::optics::{Lens, turn, turned};
 use super::parts::Part;
+use super::placement::Placement;
 use super::timing::Timing;
 use hal::bounded;
-use hal::bounds::{Fields, MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, shortened};
+use hal::bounds::{Fields, shortened};
 use hal::model::DeviceModel;
 use hal::virtual_head::Faults;
 
@@ -88,23 +89,6 @@ bounded! {
         pub knocked_deg: [f64; 3] = -10.0..=10.0,
     }
 
-    /// Phong's model: I = ambient + pattern/255 · (diffuse · max(0, n·l) + specular · max(0,
-    /// r·v)^shininess), 1 = full scale. n is the surface's normal, l the direction to the
-    /// projector, v that to the camera, and r is l mirrored about n.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Lighting {
-        /// Light that does not come from the projector.
-        pub ambient: f64 = 0.0..=100.0,
-        /// Share of the projector's light that a surface reflects which faces the projector.
-        pub diffuse: f64 = 0.0..=100.0,
-        /// Share of the projector's light that a surface reflects which mirrors the projector into
-        /// the camera, 0…4.
-        pub specular: f64 = 0.0..=4.0,
-        /// How narrow the highlight is: the exponent of its cosine, 1…500.
-        pub shininess: f64 = 1.0..=500.0,
-    }
-
     /// Noise of the camera. The defaults are what public photon models state of cameras with Sony's
     /// IMX296: saturation capacity 10 636 e⁻, temporal dark noise 4.81 e⁻ (with an ADC of 10 bits).
     /// No data sheet says so, and the spread of responses is an assumption: a head's calibration
@@ -143,18 +127,6 @@ bounded! {
         /// almost 0, as a share, −1…10; a picture of mean 1 gets no more, others in proportion.
         /// Projectors that adapt their LEDs to the content of a picture do this.
         pub content_gain: f64 = -1.0..=10.0,
-    }
-
-    /// How a part lies: rotated about x, then y (tilt), then z (rotation), then shifted.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Placement {
-        /// Shift x, y, z in mm.
-        pub shift_mm: [f64; 3] = -MAX_PLACEMENT_MM..=MAX_PLACEMENT_MM,
-        /// Tilt about x and about y, degrees.
-        pub tilt_deg: [f64; 2] = -MAX_TILT_DEG..=MAX_TILT_DEG,
-        /// Rotation about z, degrees.
-        pub rotation_deg: f64 = -MAX_ROTATION_DEG..=MAX_ROTATION_DEG,
     }
 }
 
@@ -200,17 +172,6 @@ impl Default for Rig {
                 distortion: [-0.05, 0.03, -3e-4, 2e-4, 0.0],
                 knocked_deg: [0.0; 3],
             },
-        }
-    }
-}
-
-impl Default for Lighting {
-    fn default() -> Self {
-        Self {
-            ambient: 0.04,
-            diffuse: 0.86,
-            specular: 0.0,
-            shininess: 1.0,
         }
     }
 }

@@ -9,7 +9,7 @@ use super::blur;
 use super::scenario::Scenario;
 use super::sensor::Sensor;
 use super::spread;
-use super::stage::Staged;
+use super::staged::Staged;
 use super::transport::PADDING;
 use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Pool};

@@ -5,9 +5,11 @@ use std::time::Duration;
 
 use super::material::Material;
 use super::parts::Part;
-use super::scenario::{Placement, Scenario};
+use super::placement::Placement;
+use super::scenario::Scenario;
 use super::scene::SimScene;
-use super::transport::{Transport, Truth};
+use super::staged::Staged;
+use super::transport::Truth;
 use hal::bounds::{Bound, Fields, within};
 use hal::error::{DeviceKind, Error};
 use hal::head::Head;
@@ -25,33 +27,6 @@ pub struct Stage {
     /// Light transports of the last placed parts; the most recent is the last.
     remembered: Arc<Mutex<Vec<Staged>>>,
     gain: Arc<Mutex<f64>>,
-}
-
-/// A placed part with its light transport, ready to be put in place.
-#[derive(Clone, Debug)]
-pub struct Staged {
-    part: Part,
-    material: Option<Material>,
-    placement: Placement,
-    pub(super) transport: Arc<Transport>,
-}
-
-impl Staged {
-    fn new(
-        scenario: &Scenario,
-        part: &Part,
-        material: Option<Material>,
-        placement: &Placement,
-        progress: &(dyn Fn(f64) + Sync),
-    ) -> Self {
-        let transport = Transport::build(scenario, part, material, placement, progress);
-        Self {
-            part: part.clone(),
-            material,
-            placement: *placement,
-            transport: Arc::new(transport),
-        }
-    }
 }
 
 /// A simulated head in front of the scenario's part, and the stage to place others on.

@@ -15,10 +15,12 @@
 
 use rayon::prelude::*;
 
+use super::material::Lighting;
 use super::material::Material;
 use super::optics::{Lens, Vector, dot, minus, normalised, plus, turn, turned, turned_back};
 use super::parts::Part;
-use super::scenario::{Lighting, Placement, Scenario};
+use super::placement::Placement;
+use super::scenario::Scenario;
 use super::spread::{self, Spread};
 use super::trace::{Hit, Traced, facing};
 

@@ -2,21 +2,10 @@
 
 use super::demodulate::demodulate;
 use super::unwrap::{Form, recognise};
-use super::{Pattern, PixelTwin, Reason, Rig, Scale};
+use super::{Level, Pattern, PixelTwin, Reason, Rig, Scale, levels_of};
 use hal::frame::Samples;
 use hal::replay::Recording;
 use rayon::prelude::*;
-
-/// All frames of one ratio.
-#[derive(Clone, Debug)]
-pub struct Level {
-    /// The ratio r.
-    pub ratio: f64,
-    /// The shift of each frame, turns.
-    pub shifts: Vec<f64>,
-    /// The index of each frame in the recording.
-    pub frames: Vec<usize>,
-}
 
 /// Absolute phase of one pattern of a recording, row-major.
 #[derive(Clone, Debug)]
@@ -32,33 +21,6 @@ pub struct PhaseTwin {
     pub reason: Vec<Reason>,
     /// Whether a level's modulation is exactly at the threshold, to rounding.
     pub tie: Vec<bool>,
-}
-
-/// The levels of pattern `at`, from coarse to fine.
-pub fn levels_of(recording: &Recording, at: usize) -> Vec<Level> {
-    let frames = recording.frames.iter().enumerate();
-    let own = frames.filter(|(_, frame)| frame.pattern == at);
-    levels_from(own.map(|(place, frame)| (place, frame.ratio, frame.shift_turns)))
-}
-
-/// The levels of frames given as place, ratio and shift, from coarse to fine.
-pub fn levels_from(frames: impl Iterator<Item = (usize, f64, f64)>) -> Vec<Level> {
-    let mut levels: Vec<Level> = Vec::new();
-    for (place, ratio, shift) in frames {
-        if !levels.iter().any(|level| level.ratio == ratio) {
-            levels.push(Level {
-                ratio,
-                shifts: Vec::new(),
-                frames: Vec::new(),
-            });
-        }
-        for level in levels.iter_mut().filter(|level| level.ratio == ratio) {
-            level.shifts.push(shift);
-            level.frames.push(place);
-        }
-    }
-    levels.sort_by(|a, b| a.ratio.total_cmp(&b.ratio));
-    levels
 }
 
 /// Decodes pattern `at` of a recording; dense and single levels are unwrapped about the reference

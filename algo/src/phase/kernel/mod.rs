@@ -18,9 +18,8 @@ pub(super) mod on_arrival;
 mod quality;
 mod temporal;
 
-use super::narrow::MAX_PIXELS;
 use crate::pattern::MAX_SHIFTS;
-use crate::simd::Lanes;
+use crate::simd::{Lanes, MAX_PIXELS};
 use core::ops::Range;
 
 /// The start of the next block of `columns`, which are at least a block long. The last block is

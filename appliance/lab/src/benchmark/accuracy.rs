@@ -2,11 +2,12 @@
 //! depth on the simulated parts.
 
 use super::decoding::Decoding;
+use super::effort::Effort;
 use super::floor::FloorSets;
 use super::frames::{FrameSet, Rotation};
 use super::median::median;
 use super::point::Point;
-use super::timing::{Contender, Effort, Round, interleaved};
+use super::timing::{Contender, Round, interleaved};
 use super::variants::{decoders, references};
 use super::words;
 use crate::experiment::{BetterSequence, Method, OpticsKind, Runner, Scene};

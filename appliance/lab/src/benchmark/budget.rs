@@ -1,9 +1,10 @@
 //! From trigger to verdict: how long each stage takes on a simulated head with a taught recipe.
 
 use super::decoding::{Decoding, Inspecting};
+use super::effort::Effort;
 use super::frames::{FrameSet, Rotation};
 use super::median::median;
-use super::timing::{Effort, Kernel, rotate};
+use super::timing::{Kernel, rotate};
 use super::words;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;

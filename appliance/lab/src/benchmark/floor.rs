@@ -5,7 +5,7 @@
 //! pixels is the exclusive or of twelve streams, and four copies of that, each combined with
 //! another constant, are the bytes of the block's 32-bit values.
 
-use super::timing::Effort;
+use super::effort::Effort;
 use appliance::production::stopwatch::timed;
 use std::hint::black_box;
 

@@ -1,10 +1,11 @@
 //! The kernel table: what a pixel costs in every variant, in ns, in instructions and in multiples
 //! of the floor.
 
+use super::effort::Effort;
 use super::floor::FloorSets;
 use super::frames::{FrameSet, Rotation};
 use super::median::median;
-use super::timing::{Contender, Effort, Kernel, Round, interleaved};
+use super::timing::{Contender, Kernel, Round, interleaved};
 use super::variants;
 use super::workload::Workload;
 use appliance::system::memory::give_back;

@@ -1,7 +1,7 @@
 //! The machine on which times are measured, and how fast its processor and its memory are.
 
+use super::effort::Effort;
 use super::median::median;
-use super::timing::Effort;
 use appliance::production::stopwatch::timed;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};

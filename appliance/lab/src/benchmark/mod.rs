@@ -4,6 +4,7 @@ mod accuracy;
 mod budget;
 mod counter;
 mod decoding;
+mod effort;
 mod export;
 mod figure;
 mod floor;
@@ -22,13 +23,13 @@ mod workload;
 
 pub use accuracy::Study;
 pub use budget::{Budget, budgets};
+pub use effort::Effort;
 pub use export::frame_files;
 pub use kernel::{KernelTable, Timing, kernel_table};
 pub use machine::Machine;
 pub use median::median;
 pub use point::{Point, means};
 pub use report::{HEADER, Report};
-pub use timing::Effort;
 
 /// An error in words.
 fn words(error: impl std::fmt::Display) -> String {

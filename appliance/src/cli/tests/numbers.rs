@@ -5,7 +5,7 @@ use super::super::part::SimulatedPart;
 use super::{Arg, leaves};
 use crate::config::HeadConfig;
 use crate::error::Exit;
-use crate::head::calibration::bounds::{COLDEST_C, HOTTEST_C};
+use crate::head::calibration::file::{COLDEST_C, HOTTEST_C};
 use algo::calibration::Board;
 use clap::error::ErrorKind;
 use clap::{ArgMatches, FromArgMatches as _};

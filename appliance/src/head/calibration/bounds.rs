@@ -4,10 +4,6 @@
 use super::file::{CalibrationFile, MapFile};
 use hal::bounds::{Bound, Fields, fingerprint, length};
 
-/// Lowest temperature of a head, °C.
-pub const COLDEST_C: f64 = -100.0;
-/// Highest temperature of a head, °C.
-pub const HOTTEST_C: f64 = 200.0;
 /// Most levels of noise and pitches of contrast.
 const MAX_LEVELS: usize = 256;
 

@@ -1,7 +1,6 @@
 //! `calibration.json`, version 2: its keys, its checks, its fingerprint and its checksum.
 
 use super::CalibrationSigma;
-use super::bounds::{COLDEST_C, HOTTEST_C};
 use super::geometry::GeometryFile;
 use super::{Calibration, HeightsBy, size};
 use crate::head::exposing::Exposing;
@@ -26,6 +25,10 @@ use std::time::Duration;
 pub const FORMAT: &str = "fringed-calibration";
 /// The version that this program writes, and the only one that it reads.
 pub const VERSION: u32 = 2;
+/// Lowest temperature of a head, °C.
+pub const COLDEST_C: f64 = -100.0;
+/// Highest temperature of a head, °C.
+pub const HOTTEST_C: f64 = 200.0;
 /// Longest delay, standard deviation of it, and readout, ns.
 const MAX_TIME_NS: u64 = 10_000_000_000;
 /// Most refreshes per pattern.

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Surface;
 use crate::optics::Vector;
-use crate::scenario::Placement;
+use crate::placement::Placement;
 use hal::bounded;
 
 /// What black squares reflect of the light that white ones do.

@@ -1,0 +1,60 @@
+//! Why a part could not be taught.
+
+use crate::error::code_of;
+use crate::head::calibrated::MeasureError;
+use crate::station::error_code;
+use algo::adaptive::AdaptError;
+
+/// A part that could not be taught.
+#[derive(Debug, thiserror::Error)]
+pub enum TeachError {
+    /// A device failed.
+    #[error("teach: {0}")]
+    Device(hal::error::Error),
+    /// No recipe can be made of this scene.
+    #[error("teach: {0}")]
+    Scene(String),
+    /// The geometry or the pattern is impossible.
+    #[error("teach: {0}")]
+    Rig(String),
+    /// The head's calibration cannot be used.
+    #[error("teach: {0}")]
+    NotCalibrated(String),
+    /// The progress callback asked for the end.
+    #[error("teach: it was ended early")]
+    Ended,
+}
+
+impl TeachError {
+    /// The value of register ERROR_CODE.
+    pub fn code(&self) -> u16 {
+        match self {
+            Self::Device(error) => code_of(error),
+            Self::Scene(_) => error_code::NOTHING_TO_TEACH,
+            Self::Rig(_) => error_code::RIG,
+            Self::NotCalibrated(_) => error_code::NOT_CALIBRATED,
+            Self::Ended => error_code::ABORTED,
+        }
+    }
+}
+
+impl From<hal::error::Error> for TeachError {
+    fn from(error: hal::error::Error) -> Self {
+        Self::Device(error)
+    }
+}
+
+impl From<MeasureError> for TeachError {
+    fn from(error: MeasureError) -> Self {
+        match error {
+            MeasureError::Device(error) => Self::Device(error),
+            MeasureError::Impossible(error) => Self::Rig(error),
+        }
+    }
+}
+
+impl From<AdaptError> for TeachError {
+    fn from(error: AdaptError) -> Self {
+        Self::Scene(error.to_string())
+    }
+}

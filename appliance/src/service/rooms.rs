@@ -1,0 +1,200 @@
+//! The threads of the daemon, one for each room that waits or works by itself.
+
+use super::caller::Caller;
+use super::serving::{PlcSide, serve};
+use super::survey::Survey;
+use crate::config::Config;
+use crate::error::{Exit, Failure};
+use crate::head::calibration::Current;
+use crate::head::placed::Placed;
+use crate::history::{History, Reader, Task};
+use crate::production::backend::{self, Wires};
+use crate::production::commissioning::Commission;
+use crate::production::commissioning::live::Live;
+use crate::production::drift::Watch;
+use crate::production::latest::LastCycleRequests;
+use crate::production::opening::Opening;
+use crate::production::shelf::Shelf;
+use crate::production::simulation::Simulation;
+use crate::production::warm_up::WarmUp;
+use crate::production::{Aborts, Order, Worker};
+use crate::recipe::Store;
+use crate::station::{Request, StationHandle};
+use crate::system::computing::Computing;
+use crate::system::progress::Progress;
+use crate::web::access::Access;
+use crate::{lines, modbus, web};
+use sim::Stage;
+use std::path::Path;
+use std::sync::mpsc::{self, Receiver, Sender};
+use std::thread::{Builder, JoinHandle};
+use tokio::net::TcpListener;
+use tokio::runtime::Runtime;
+use tokio::sync::watch;
+
+/// What the rooms share.
+pub(super) struct Rooms<'a> {
+    pub config: &'a Config,
+    /// The state folder.
+    pub path: &'a Path,
+    pub station: StationHandle,
+    pub recipes: Store,
+    pub history: History,
+    pub progress: Progress,
+    pub calibration: Current,
+    pub last_cycle: LastCycleRequests,
+    pub simulation: Simulation,
+    pub commission: Commission,
+    pub live: Live,
+    pub computing: Computing,
+    pub clients: modbus::Clients,
+    /// Ends sockets and lines.
+    pub stopped: watch::Receiver<bool>,
+}
+
+/// A room's thread.
+type Room = Result<JoinHandle<()>, Failure>;
+
+impl Rooms<'_> {
+    /// Stores results.
+    pub fn history(&self, task: Task) -> Room {
+        let station = self.station.clone();
+        spawn("history", move || task.run(&station))
+    }
+
+    /// Serves the lines.
+    pub fn lines(&self, wires: Wires) -> Room {
+        let (station, progress) = (self.station.clone(), self.progress.clone());
+        let (setup, stopped) = (self.config.lines.clone(), self.stopped.clone());
+        let open: lines::Open = Box::new(move || backend::lines(&setup));
+        spawn("lines", move || {
+            if let Err(failure) = lines::serve(wires, &open, &station, &progress, stopped) {
+                progress.warn(&failure.message);
+            }
+        })
+    }
+
+    /// Serves Modbus and the page.
+    pub fn sockets(
+        &self,
+        runtime: Runtime,
+        plc: TcpListener,
+        page: TcpListener,
+        access: Access,
+    ) -> Room {
+        let (config, station) = (self.config.clone(), self.station.clone());
+        let (dating, boot_id) = (self.history.clone(), station.snapshot().boot_id);
+        let site = web::Site::new(web::Parts {
+            station: station.clone(),
+            access,
+            recipes: self.recipes.clone(),
+            calibration: self.calibration.clone(),
+            last_cycle: self.last_cycle.clone(),
+            simulation: self.simulation.clone(),
+            commission: self.commission.clone(),
+            live: self.live.clone(),
+            history: Reader::of(self.path),
+            date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
+            log: self.progress.logbook().clone(),
+            registers: modbus::live,
+            configuration: toml::to_string(&config).unwrap_or_default(),
+            hosts: config.http.hosts.clone(),
+            proxies: config.http.proxies.clone(),
+        });
+        let plc = PlcSide {
+            listener: plc,
+            clients: self.clients.clone(),
+            refusals: modbus::Refusals::new(self.progress.clone()),
+        };
+        let stopped = self.stopped.clone();
+        spawn("sockets", move || {
+            runtime.block_on(serve(plc, page, station, site, &config, stopped));
+        })
+    }
+
+    /// Surveys the machine, until what this returns with the thread is dropped.
+    pub fn survey(&self) -> Result<(Sender<()>, JoinHandle<()>), Failure> {
+        let (end, ended) = mpsc::channel();
+        let (clients, progress) = (self.clients.clone(), self.progress.clone());
+        let survey = Survey::new(self.path, self.recipes.clone(), clients, progress);
+        let station = self.station.clone();
+        let thread = spawn("survey", move || survey.run(&station, &ended))?;
+        Ok((end, thread))
+    }
+
+    /// Opens the head, of which `opened` hears, and measures.
+    pub fn measuring(
+        self,
+        pool: rayon::ThreadPool,
+        caller: &Caller,
+        (inbox, aborts): (Receiver<Order>, Aborts),
+        first: Option<Request>,
+        opened: Sender<Result<Option<Stage>, Failure>>,
+    ) -> Room {
+        let mut config = self.config.head_in(self.path);
+        let waiting = match first {
+            Some(Request::Teach { .. }) => Placed::after_teaching(&mut config.part),
+            _ => None,
+        };
+        let watch = Watch::every(self.config.station.geometry_check_cycles);
+        let (patient, pulse) = (caller.notify.is_connected(), caller.notify.pulse());
+        let Self {
+            station,
+            recipes,
+            history,
+            progress,
+            calibration,
+            last_cycle,
+            simulation,
+            commission,
+            computing,
+            ..
+        } = self;
+        spawn("measuring", move || {
+            let opening = Opening {
+                config: &config,
+                pool: &pool,
+                progress: &progress,
+                station: &station,
+                pulse: &pulse,
+                patient,
+                computing: &computing,
+            };
+            let Some((head, begin)) = opening.run(&inbox, &opened) else {
+                return;
+            };
+            simulation.opened(head.stage.as_ref());
+            let worker = Worker {
+                opened: head,
+                calibration,
+                pool,
+                recipes,
+                station,
+                last_cycle,
+                history,
+                progress,
+                config,
+                aborts,
+                lost: None,
+                shelf: Shelf::default(),
+                pulse,
+                computing,
+                waiting,
+                commission,
+                live: false,
+                watch,
+                warm_up: WarmUp::default(),
+            };
+            worker.run(&inbox, begin, first);
+        })
+    }
+}
+
+fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Room {
+    Builder::new()
+        .name(name.into())
+        .spawn(run)
+        .map_err(|error| {
+            Failure::because(Exit::Software, format!("start the thread {name}"), error)
+        })
+}
