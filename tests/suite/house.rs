@@ -226,6 +226,108 @@ fn imports_inside_algo_only_go_backwards_along_the_flow() {
     }
 }
 
+/// The module of a file of `algo`, by the names of its path from the root of the crate.
+fn module(file: &str) -> Vec<&str> {
+    let file = file.trim_start_matches("algo/src/");
+    let file = file.trim_end_matches(".rs").trim_end_matches("/mod");
+    file.split('/').collect()
+}
+
+/// Appends the paths that a text begins with, those in braces one by one, and returns the rest.
+fn paths<'a>(mut text: &'a str, mut path: Vec<&'a str>, all: &mut Vec<Vec<&'a str>>) -> &'a str {
+    loop {
+        let end = text.find(|c: char| !c.is_alphanumeric() && c != '_');
+        let (name, rest) = text.split_at(end.unwrap_or(text.len()));
+        if let Some(mut parts) = text.strip_prefix('{') {
+            loop {
+                parts = parts.trim_start_matches([',', ' ', '\n']);
+                match parts.strip_prefix('}') {
+                    Some(rest) => return rest,
+                    None => parts = paths(parts, path.clone(), all),
+                }
+            }
+        }
+        if name.is_empty() {
+            // `*`
+            all.push(path);
+            let mut rest = text.chars();
+            rest.next();
+            return rest.as_str();
+        }
+        path.push(name);
+        let Some(rest) = rest.strip_prefix("::") else {
+            all.push(path);
+            return rest;
+        };
+        text = rest;
+    }
+}
+
+/// The paths in the code of `module` that lead to an item of a module that it lies in. An item is
+/// that of the last of `modules` on the way to it.
+fn upwards(module: &[&str], code: &str, modules: &[Vec<&str>]) -> Vec<String> {
+    let mut all = Vec::new();
+    for start in ["crate::", "self::", "super::"] {
+        for (at, _) in code.match_indices(start) {
+            let before = &code[..at];
+            let inside = before.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == ':');
+            // `pub(in …)` names a module and none of its items.
+            if !inside && !before.ends_with("(in ") {
+                paths(&code[at..], Vec::new(), &mut all);
+            }
+        }
+    }
+    all.retain(|path| {
+        let supers = path.iter().filter(|name| **name == "super").count();
+        let from = match path[0] {
+            "crate" => &module[..0],
+            _ => &module[..module.len() - supers.min(module.len())],
+        };
+        let names = path
+            .iter()
+            .filter(|name| !["crate", "self", "super"].contains(name));
+        let path: Vec<&str> = from.iter().chain(names).copied().collect();
+        let on_the_way = modules.iter().filter(|module| path.starts_with(module));
+        let owner = on_the_way.max_by_key(|module| module.len());
+        owner.is_some_and(|owner| owner.len() < module.len() && module.starts_with(owner))
+    });
+    all.iter().map(|path| path.join("::")).collect()
+}
+
+#[test]
+fn no_file_of_inspect_names_an_item_of_a_module_that_it_lies_in() {
+    let rule = "algo/src/inspect is stages with a plan of their own. A file names its siblings, what lies \
+                in them, and other folders; never an item of a module that it lies in itself, whether \
+                defined or only re-exported there, by super:: or by crate::. What several files share \
+                has a file of its own; a mod.rs lists its parts and is the facade for those outside.";
+    let all = sources("algo/src/inspect");
+    let modules: Vec<_> = all.iter().map(|source| module(&source.name)).collect();
+    let mut broken = Vec::new();
+    for (source, module) in all.iter().zip(&modules) {
+        let code = code(&source.text).take(untested_lines(source));
+        let code: Vec<&str> = code.map(|(_, text)| text).collect();
+        for path in upwards(module, &code.join("\n"), &modules) {
+            broken.push(format!("{} names {path}", source.name));
+        }
+    }
+    assert!(broken.is_empty(), "{rule}\n{}", broken.join("\n"));
+    // What breaks the rule, and what does not.
+    let height = module("algo/src/inspect/strips/height.rs");
+    let found = |code: &str| upwards(&height, code, &modules);
+    assert_eq!(found("use super::Production;"), ["super::Production"]);
+    assert_eq!(
+        found("let z: crate::inspect::Taught;"),
+        ["crate::inspect::Taught"]
+    );
+    assert_eq!(
+        found("use crate::inspect::{\n    Weight,\n    gauge::{Cell, Sum},\n    strips::*,\n};"),
+        ["crate::inspect::Weight", "crate::inspect::strips"]
+    );
+    let fine = "use super::plan::{Parts, Production};\npub(in crate::inspect) fn f();\n\
+                use crate::inspect::gauge::Cell;\nuse self::a;\nuse crate::units::Height;";
+    assert_eq!(found(fine), [""; 0]);
+}
+
 /// Number of lines before the tests of a file.
 fn untested_lines(source: &Source) -> usize {
     let test_file = source.name.ends_with("tests.rs") || source.name.contains("/tests/");
