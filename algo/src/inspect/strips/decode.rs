@@ -35,17 +35,15 @@ pub struct PhasePlan {
 impl PhasePlan {
     /// Checks number and size of the frames.
     pub fn check(&self, input: Input<'_>, expected: (usize, usize)) -> Result<(), DecodeError> {
-        let frames = match input {
-            Input::Frames(frames) => self.decoder.check(frames).map(|()| frames)?,
+        let size = |frames: &[FrameView<'_>]| (frames[0].width(), frames[0].height());
+        let given = match input {
+            Input::Frames(frames) => self.decoder.check(frames).map(|()| size(frames)),
             Input::Finest(arrived, frames) => {
-                self.decoder.check_last(frames, arrived).map(|()| frames)?
+                let checked = self.decoder.check_last(frames, arrived);
+                checked.map(|()| size(frames))
             }
-            Input::Phases(_) => &[],
-        };
-        let given = match (input, frames) {
-            (Input::Phases(map), _) => (map.width, map.phase.len() / map.width.max(1)),
-            (_, frames) => (frames[0].width(), frames[0].height()),
-        };
+            Input::Phases(map) => Ok((map.width, map.phase.len() / map.width.max(1))),
+        }?;
         match given == expected {
             true => Ok(()),
             false => Err(DecodeError::FrameSize {

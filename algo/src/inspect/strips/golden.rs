@@ -75,6 +75,15 @@ impl Golden {
         self.triangulator.point(u, v, Height::from_mm(z))
     }
 
+    /// Its height at a place, mm; the middle one where that is not known.
+    pub fn height_mm(&self, place: usize) -> f64 {
+        let height = self.cubics.surface().height[place];
+        match height.is_known() {
+            true => height.mm(),
+            false => self.levels.0,
+        }
+    }
+
     /// What a pixel in the middle of the frame sees of a surface at the middle height, mm.
     pub fn pixel_mm(&self) -> f64 {
         let (width, rows) = self.size();

@@ -186,14 +186,9 @@ fn moved(golden: &Golden, motion: &Motion, (u, v): (f64, f64)) -> (f64, f64) {
     let (width, height) = golden.size();
     let column = libm::rint(u.clamp(0.0, (width - 1) as f64));
     let row = libm::rint(v.clamp(0.0, (height - 1) as f64));
-    let taught = golden.cubics.surface().height[row as usize * width + column as usize];
-    let z = if taught.is_known() {
-        taught.mm()
-    } else {
-        golden.levels.0
-    };
+    let (u0, v0) = (column as usize, row as usize);
     let to = golden
-        .seen(column as usize, row as usize, z)
+        .seen(u0, v0, golden.height_mm(v0 * width + u0))
         .and_then(|point| golden.triangulator.camera().project(motion.apply(point)));
     to.map_or((u, v), |to| (u + to.0 - column, v + to.1 - row))
 }

@@ -9,6 +9,7 @@ use super::maps::Maps;
 use super::plan::Production;
 use super::pose::PoseField;
 use super::recent::RecentRows;
+use super::spans::common;
 use super::squares::Squares;
 use super::squares::extreme::Extreme;
 use crate::inspect::align::{Alignment, FitBuffers, Sample};
@@ -168,48 +169,32 @@ impl Strip {
         square: &Extreme,
         side: usize,
     ) -> SquareNoise {
+        let (golden, with) = (&plan.golden, plan.comparison(pose));
         let half = side / 2;
-        let bottom = (square.row + half + 1).min(plan.golden.window.len());
+        let bottom = (square.row + half + 1).min(golden.window.len());
         let mut noise = SquareNoise::new(side);
         for v in square.row.saturating_sub(half)..bottom {
-            let window = &plan.golden.window[v];
-            let left = square.column.saturating_sub(half).max(window.start);
-            let right = (square.column + half + 1).min(window.end);
-            if left < right {
-                self.measure(plan, input, v, left..right);
-                self.add_noise(plan, plan.comparison(pose), v, left..right, &mut noise);
+            let left = square.column.saturating_sub(half);
+            let columns = common(&(left..square.column + half + 1), &golden.window[v]);
+            if columns.is_empty() {
+                continue;
             }
-        }
-        noise
-    }
-
-    /// Adds the pixels of row `v` inside `columns`, which were measured last, to the noise of a
-    /// square.
-    fn add_noise(
-        &mut self,
-        plan: &Production,
-        with: Comparison<'_>,
-        v: usize,
-        columns: Range<usize>,
-        noise: &mut SquareNoise,
-    ) {
-        self.align(with, v, columns.clone());
-        self.coordinates
-            .find(with, v, columns.clone(), &self.heights);
-        let deviation = self.recent.row(v);
-        for u in columns {
-            if deviation[u] != NO_OFFSET {
-                let slope = plan.golden.slope((u, v), self.decoded.phase[u]);
-                let factor = self.coordinates.factor(&plan.golden, u);
+            self.measure(plan, input, v, columns.clone());
+            self.align(with, v, columns.clone());
+            self.coordinates
+                .find(with, v, columns.clone(), &self.heights);
+            let deviation = self.recent.row(v);
+            for u in columns.filter(|u| deviation[*u] != NO_OFFSET) {
+                let slope = golden.slope((u, v), self.decoded.phase[u]);
+                let factor = self.coordinates.factor(golden, u);
                 let sigma = plan.phase.sigma_nm(self.decoded.modulation[u], slope);
                 let lift = noise.is_sampled(u, v).then(|| {
-                    let (alignment, placed) =
-                        (plan.alignment.as_ref()?, with.pose.placed.as_ref()?);
-                    let offset = self.heights.offset[u];
-                    plan.golden.lift(alignment, placed, (u, v), offset)
+                    let (alignment, placed) = (plan.alignment.as_ref()?, pose.placed.as_ref()?);
+                    golden.lift(alignment, placed, (u, v), self.heights.offset[u])
                 });
                 noise.add(factor, sigma * 1e-6, lift.flatten());
             }
         }
+        noise
     }
 }
