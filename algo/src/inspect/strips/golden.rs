@@ -132,6 +132,7 @@ impl Golden {
 }
 
 /// z₀ that offsets count from: golden's height, 0 where that is not known.
+#[inline]
 pub fn base_nm(golden: Height) -> i32 {
     if golden.is_known() { golden.nm() } else { 0 }
 }

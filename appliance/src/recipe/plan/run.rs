@@ -2,19 +2,19 @@
 
 use super::golden;
 use crate::recipe::archive::Arrays;
-use crate::recipe::good_parts::GoodPartsFile;
-use crate::recipe::{RecipeSequence, SequenceKind};
+use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
-use algo::inspect::{
-    Basis, CalibrationError, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught,
-};
+use algo::inspect::{Basis, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught};
 use algo::pattern::{PhaseRange, Shot};
-use algo::phase::{Arrived, Decoder, LeastModulation};
+use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
 use algo::units::{AbsolutePhase, Modulation};
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
+
+/// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
+const MAX_PATTERN_BYTES: usize = 256 << 20;
 
 /// A sequence that the part can be measured with.
 #[derive(Debug)]
@@ -40,16 +40,14 @@ pub(super) struct Pair {
 }
 
 /// What all runs of a recipe share.
-pub(super) struct Shared {
+pub(super) struct Shared<'a> {
+    pub conditions: &'a Conditions,
     pub aligned: bool,
     pub triangulator: Arc<Triangulator>,
     pub cubics: Arc<HeightCubics>,
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
-    pub noise: SampleNoise,
     pub noise_counts: f64,
-    pub calibration: CalibrationError,
-    pub good_parts: Option<GoodPartsFile>,
     pub golden: GoldenNoise,
     /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what
     /// two frames need.
@@ -85,19 +83,48 @@ pub(super) struct Prepared {
 }
 
 impl Prepared {
-    /// Prepares a sequence for phases of `range` with at least so much modulation; the recipe's
-    /// arrays can be dropped then. `rasters` are what all runs show; what only this one shows is
-    /// added. `fundamental` is that of the waveform that golden's modulation was measured with;
-    /// deviations lie by `shares` along the normal; `base` is the offset of the sequence that the
-    /// golden surface is by.
-    pub fn of(
+    /// Prepares all sequences for phases of `range`; the recipe's arrays can be dropped then.
+    /// Deviations lie by `shares` along the normal; `base` is the offset of the sequence that the
+    /// golden surface is by. The second value is what all of them show, each raster once.
+    pub fn all(
+        sequences: Vec<RecipeSequence>,
+        conditions: &Conditions,
+        golden: (&Arrays, &[f32], Option<usize>),
+        range: PhaseRange,
+    ) -> Result<(Vec<Self>, Vec<Shot>), String> {
+        let mut shots = Vec::new();
+        // Golden was measured with the full sequence, the last.
+        let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
+        let prepared = sequences
+            .into_iter()
+            .map(|sequence| {
+                let brighter = sequence.fundamental() / taught;
+                Self::of(sequence, conditions, brighter, golden, range, &mut shots)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let (columns, rows) = conditions.raster;
+        let patterns = shots.len() * columns as usize * rows as usize;
+        if patterns > MAX_PATTERN_BYTES {
+            return Err(format!(
+                "its sequences show {} patterns of {} MiB together, at most {} are held: teach it with fewer frames",
+                shots.len(),
+                patterns >> 20,
+                MAX_PATTERN_BYTES >> 20
+            ));
+        }
+        Ok((prepared, shots))
+    }
+
+    /// Prepares a sequence with `brighter` times golden's modulation. What it shows and `rasters`
+    /// do not have is added to them.
+    fn of(
         sequence: RecipeSequence,
-        (noise, fundamental): (SampleNoise, f64),
+        conditions: &Conditions,
+        brighter: f64,
         (arrays, shares, base): (&Arrays, &[f32], Option<usize>),
-        (range, bit_depth, least): (PhaseRange, u8, LeastModulation),
+        range: PhaseRange,
         rasters: &mut Vec<Shot>,
     ) -> Result<Self, String> {
-        let brighter = sequence.fundamental() / fundamental;
         let RecipeSequence {
             kind,
             shots,
@@ -107,8 +134,9 @@ impl Prepared {
         } = sequence;
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
         let offsets = (golden::offset(arrays, offset), golden::offset(arrays, base));
-        let decoder = Decoder::new(&levels, range, bit_depth).map_err(|error| error.to_string())?;
-        let decoder = decoder.with_least_modulation(least);
+        let decoder = Decoder::new(&levels, range, conditions.camera.2);
+        let decoder = decoder.map_err(|error| error.to_string())?;
+        let decoder = decoder.with_least_modulation(conditions.least_modulation);
         let indices = shots.into_iter().map(|shot| {
             let shown = rasters.iter().position(|known| *known == shot);
             shown.unwrap_or_else(|| {
@@ -119,7 +147,7 @@ impl Prepared {
         Ok(Self {
             kind,
             indices: indices.collect(),
-            taught: golden::taught((noise, brighter), arrays, shares, &decoder),
+            taught: golden::taught((conditions.noise, brighter), arrays, shares, &decoder),
             map: golden::map(arrays, kind, offsets),
             decoder,
             brighter,
@@ -174,7 +202,7 @@ impl Prepared {
     }
 
     /// Joins it with what all sequences share.
-    pub fn join(self, shared: &Shared) -> Result<Run, String> {
+    pub fn join(self, shared: &Shared<'_>) -> Result<Run, String> {
         let golden_noise = self.noise_of_golden(&shared.golden);
         let over_full = golden_noise * self.phase_noise() / shared.golden.full;
         let largest = shared.golden.largest.iter();
@@ -190,7 +218,7 @@ impl Prepared {
         } = self;
         let displaced = |gauge: &Gauge| {
             let side = gauge.measure.facts().basis.square_side()?;
-            shared.good_parts?.displaced(side)
+            shared.conditions.good_parts?.displaced(side)
         };
         let bytes = size_of_val(map.as_deref().unwrap_or(&[])) + taught.bytes();
         let production = Production::new(Parts {
@@ -201,13 +229,13 @@ impl Prepared {
             taught,
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
-            noise: shared.noise.by([0.0, 1.0 / brighter]),
+            noise: shared.conditions.noise.by([0.0, 1.0 / brighter]),
             noise_counts: shared.noise_counts,
             aligned: shared.aligned,
             golden_noise,
             largest: largest.map(|largest| largest.times(over_full)).collect(),
             displaced: shared.gauges.iter().map(displaced).collect(),
-            calibration: shared.calibration,
+            calibration: shared.conditions.calibration,
             ripple: ripple_mm,
         });
         let production = production.map_err(|error| error.to_string())?;

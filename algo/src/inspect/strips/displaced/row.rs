@@ -49,6 +49,7 @@ pub struct Deviations<'a> {
 }
 
 impl Deviations<'_> {
+    #[inline]
     pub fn of(&mut self, columns: Range<usize>) -> Deviations<'_> {
         Deviations {
             height: &mut self.height[columns.clone()],
@@ -56,6 +57,7 @@ impl Deviations<'_> {
         }
     }
 
+    #[inline]
     pub fn leave_open(&mut self) {
         self.height.fill(NO_OFFSET);
         self.normal.fill(NO_OFFSET);
