@@ -27,13 +27,7 @@ struct Crate<'a> {
 /// The circles among files, given by their path below `src` and their text: of each circle which
 /// file names what of which other.
 pub fn circles(files: &[(String, String)]) -> Vec<String> {
-    let mut all = Crate::default();
-    for (name, _) in files {
-        all.files.insert(module_of(name), name);
-    }
-    for (name, text) in files {
-        all.read(&module_of(name), &tokens(untested(text)));
-    }
+    let all = Crate::of(files);
     let named = all.named();
     let mut steps = BTreeMap::<&Names, Vec<&Names>>::new();
     for (from, to) in named.keys() {
@@ -59,6 +53,28 @@ pub fn circles(files: &[(String, String)]) -> Vec<String> {
         }
     }
     circles
+}
+
+/// Where files below a module name an item of a module that they lie in, whether it is defined or
+/// only re-exported there.
+pub fn upwards(files: &[(String, String)], below: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    let all = Crate::of(files);
+    for (here, path) in &all.paths {
+        let Some(own) = all.module_in(here) else {
+            continue;
+        };
+        let Some(full) = all.absolute(here, path) else {
+            continue;
+        };
+        let owner = all.module_in(&full).unwrap_or_default();
+        let is_item = full.len() > owner.len();
+        let above = own.starts_with(owner) && own != owner;
+        if is_item && above && owner.first().is_some_and(|first| first == below) {
+            found.push(format!("{} names {}", all.files[own], path.join("::")));
+        }
+    }
+    found
 }
 
 /// The modules that are reached from one, over any number of others.
@@ -122,7 +138,25 @@ fn begins(after: Option<&str>) -> bool {
     after.is_none_or(|token| [";", "{", "}", "]", ")", "pub"].contains(&token))
 }
 
-impl Crate<'_> {
+impl<'a> Crate<'a> {
+    /// The crate of files that are given by their path below `src` and their text.
+    fn of(files: &'a [(String, String)]) -> Self {
+        let mut all = Self::default();
+        for (name, _) in files {
+            all.files.insert(module_of(name), name);
+        }
+        for (name, text) in files {
+            all.read(&module_of(name), &tokens(untested(text)));
+        }
+        all
+    }
+
+    /// The longest beginning of a path that is a module with a file of its own.
+    fn module_in<'p>(&self, path: &'p [String]) -> Option<&'p [String]> {
+        let mut shorter = (0..=path.len()).rev().map(|n| &path[..n]);
+        shorter.find(|module| self.files.contains_key(*module))
+    }
+
     /// Collects the imports and paths of a file.
     fn read(&mut self, file: &Names, tokens: &[&str]) {
         let mut here = file.clone();
@@ -240,10 +274,7 @@ impl Crate<'_> {
         let mut path = path.to_vec();
         // Two modules may import a name of each other that neither has.
         for _ in 0..16 {
-            let known = (0..=path.len())
-                .rev()
-                .find(|&n| self.files.contains_key(&path[..n]))?;
-            let (module, rest) = path.split_at(known);
+            let (module, rest) = path.split_at(self.module_in(&path)?.len());
             let imports = self.imports.get(module);
             match rest
                 .split_first()
@@ -262,9 +293,7 @@ impl Crate<'_> {
         for (here, path) in &self.paths {
             let owner = self.absolute(here, path).and_then(|path| self.owner(&path));
             // A module in a file is no file of its own.
-            let mut above = (0..=here.len()).rev().map(|n| &here[..n]);
-            let own = above.find(|above| self.files.contains_key(*above));
-            if let (Some(own), Some(owner)) = (own, owner)
+            if let (Some(own), Some(owner)) = (self.module_in(here), owner)
                 && !own.starts_with(&owner)
             {
                 named
@@ -273,5 +302,76 @@ impl Crate<'_> {
             }
         }
         named
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_circle_of_files_is_found_behind_a_mod_rs() {
+        let found = |files: &[(&str, &str)]| {
+            let files = files.iter();
+            let files = files.map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
+            circles(&files.collect::<Vec<_>>())
+        };
+        let mut files = [
+            ("lib.rs", "pub mod a;\nmod b;\nmod c;\n"),
+            (
+                "a/mod.rs",
+                "mod x;\nmod y;\npub use {x::{Left, One as Other}, y::Right};\npub const SHARED: u8 = 1;\n",
+            ),
+            (
+                "a/x.rs",
+                "use super::{Right, SHARED};\npub struct Left;\npub struct One;\n",
+            ),
+            (
+                "a/y.rs",
+                "pub struct Right;\n// super::Left\n\n#[cfg(test)]\nmod tests {\n    use super::super::Left;\n}\n",
+            ),
+            (
+                "b.rs",
+                "use crate::c;\nfn go() { c::run(crate::a::SHARED) }\n",
+            ),
+            ("c.rs", "pub fn run(_: u8) {}\n"),
+        ];
+        assert_eq!(found(&files), [""; 0]);
+        files[3].1 =
+            "mod inside { fn go() -> super::super::Other { todo() } }\npub struct Right;\n";
+        files[5].1 = "pub fn run() { crate::b::go() }\n";
+        let expected = [
+            "a/x.rs names super::Right of a/y.rs\na/y.rs names super::super::Other of a/x.rs",
+            "b.rs names crate::c of c.rs\nc.rs names crate::b::go of b.rs",
+        ];
+        assert_eq!(found(&files), expected);
+    }
+
+    #[test]
+    fn an_item_of_a_module_above_is_found_by_every_way_to_name_it() {
+        let found = |code: &str| {
+            let files = [
+                ("lib.rs", "mod stages;\nmod units;\n"),
+                ("units.rs", "pub struct Height;\n"),
+                ("stages/mod.rs", "mod a;\nmod b;\npub use a::Plan;\n"),
+                ("stages/a.rs", "pub struct Plan;\n"),
+                ("stages/b.rs", code),
+            ];
+            let files = files.map(|(name, text)| (name.to_owned(), text.to_owned()));
+            upwards(&files, "stages")
+        };
+        for code in [
+            "use super::Plan;",
+            "use crate::stages::Plan;",
+            "use crate::{\n    stages::{a::Other, Plan},\n};",
+            "fn f(plan: super::Plan) {}",
+            "mod inside { use super::super::Plan; }",
+        ] {
+            assert_eq!(found(code).len(), 1, "{code}: {:?}", found(code));
+        }
+        let fine = "use super::a::Plan;\npub(in crate::stages) fn f();\nuse crate::stages::a;\n\
+                    use crate::units::Height;\nuse self::inside::One;\nmod inside { pub struct One; }\n\
+                    #[cfg(test)]\nmod tests {\n    use super::super::Plan;\n}\n";
+        assert_eq!(found(fine), [""; 0]);
     }
 }

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 use tests::files;
-use tests::imports::circles;
+use tests::imports::{circles, upwards};
 use tests::shared::root;
 
 /// Longest file, in lines without tests. Files have 100–300 lines and one concept each; at this
@@ -241,51 +241,29 @@ fn no_files_name_each_other_in_a_circle() {
         "appliance/lab/src",
         "tests/src",
     ] {
-        let own = sources(folder).into_iter();
-        // A program beside a library is a crate of its own.
-        let own = own.filter(|source| !is_of_tests(source) && !source.name.ends_with("/main.rs"));
-        let below = |source: Source| (source.name[folder.len() + 1..].to_owned(), source.text);
-        let circles = circles(&own.map(below).collect::<Vec<_>>());
+        let circles = circles(&files_of(folder));
         found.extend(circles.iter().map(|circle| format!("{folder}:\n{circle}")));
     }
     assert!(found.is_empty(), "{rule}\n{}", found.join("\n\n"));
 }
 
 #[test]
-fn a_circle_of_files_is_found_behind_a_mod_rs() {
-    let found = |files: &[(&str, &str)]| {
-        let files = files.iter();
-        let files = files.map(|(name, text)| ((*name).to_owned(), (*text).to_owned()));
-        circles(&files.collect::<Vec<_>>())
-    };
-    let mut files = [
-        ("lib.rs", "pub mod a;\nmod b;\nmod c;\n"),
-        (
-            "a/mod.rs",
-            "mod x;\nmod y;\npub use {x::{Left, One as Other}, y::Right};\npub const SHARED: u8 = 1;\n",
-        ),
-        (
-            "a/x.rs",
-            "use super::{Right, SHARED};\npub struct Left;\npub struct One;\n",
-        ),
-        (
-            "a/y.rs",
-            "pub struct Right;\n// super::Left\n\n#[cfg(test)]\nmod tests {\n    use super::super::Left;\n}\n",
-        ),
-        (
-            "b.rs",
-            "use crate::c;\nfn go() { c::run(crate::a::SHARED) }\n",
-        ),
-        ("c.rs", "pub fn run(_: u8) {}\n"),
-    ];
-    assert_eq!(found(&files), [""; 0]);
-    files[3].1 = "mod inside { fn go() -> super::super::Other { todo() } }\npub struct Right;\n";
-    files[5].1 = "pub fn run() { crate::b::go() }\n";
-    let expected = [
-        "a/x.rs names super::Right of a/y.rs\na/y.rs names super::super::Other of a/x.rs",
-        "b.rs names crate::c of c.rs\nc.rs names crate::b::go of b.rs",
-    ];
-    assert_eq!(found(&files), expected);
+fn no_file_of_inspect_names_an_item_of_a_module_that_it_lies_in() {
+    let rule = "algo/src/inspect is stages with a plan of their own. A file names its siblings, what lies \
+                in them, and other folders; never an item of a module that it lies in itself, whether \
+                defined or only re-exported there, by super:: or by crate::. What several files share \
+                has a file of its own; a mod.rs lists its parts and is the facade for those outside.";
+    let broken = upwards(&files_of("algo/src"), "inspect");
+    assert!(broken.is_empty(), "{rule}\n{}", broken.join("\n"));
+}
+
+/// The files of a crate without those of tests: their paths below its folder, and their texts.
+fn files_of(folder: &str) -> Vec<(String, String)> {
+    let own = sources(folder).into_iter();
+    // A program beside a library is a crate of its own.
+    let own = own.filter(|source| !is_of_tests(source) && !source.name.ends_with("/main.rs"));
+    own.map(|source| (source.name[folder.len() + 1..].to_owned(), source.text))
+        .collect()
 }
 
 /// Whether a file has nothing but tests.

@@ -48,10 +48,10 @@
 //! a half (`the_largest_of_simulated_squares_is_as_predicted`); on parts in front of the simulated
 //! head in `tests/suite/limits.rs`.
 
-use super::Weight;
 use super::align::{Alignment, Facet, GoldenSurface};
 use super::gauge::MIN_SUPPORT;
 use super::table::IntegralTable;
+use super::weight::Weight;
 use crate::geometry::Vector;
 use crate::math::around;
 use crate::pipeline::for_each_row;

@@ -33,7 +33,9 @@
 //! head in `tests/suite/repeatability.rs`.
 
 use super::good::{DeviationNoise, LargestDeviation};
-use super::{Region, Taught, Weight};
+use super::region::Region;
+use super::taught::Taught;
+use super::weight::Weight;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::f64::consts::{PI, SQRT_2};

@@ -11,6 +11,7 @@ mod region;
 mod ripple;
 mod strips;
 mod table;
+mod taught;
 mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
@@ -24,6 +25,7 @@ pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
 pub use strips::{
     CalibrationError, Findings, Found, Gauge, Input, MAX_GAUGES, Maps, PairBuffers, PairPlaced,
-    Parts, Picture, Production, Skipped, Strips, Taught, Unmeasurable,
+    Parts, Picture, Production, Skipped, Strips, Unmeasurable,
 };
+pub use taught::Taught;
 pub use weight::{Factor, Weight};

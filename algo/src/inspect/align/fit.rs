@@ -22,10 +22,10 @@
 //! `a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components`,
 //! `a_dent_over_a_tenth_of_the_part_does_not_pull_it`.
 
-use super::Alignment;
 use super::directions::{Directions, Matrix6, form};
 use super::equations::{Equation, Equations};
 use super::motion::Motion;
+use super::spots::Alignment;
 use super::surface::{Facet, GoldenSurface};
 use super::weight::{TUKEY, WeightFunction};
 use crate::geometry::Vector;

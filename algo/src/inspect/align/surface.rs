@@ -1,7 +1,7 @@
 //! The golden surface between pixels: heights, and the planes through them.
 
 use crate::geometry::{Triangulator, Vector};
-use crate::inspect::Taught;
+use crate::inspect::taught::Taught;
 use crate::pipeline::KnownSurface;
 use core::ops::Range;
 

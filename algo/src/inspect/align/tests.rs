@@ -1,11 +1,12 @@
 //! Alignment on a made surface that is moved exactly.
 
+use super::plan::{MOST_LIFT_MM, POINTS};
 use super::*;
-use crate::geometry::{Pinhole, PinholeModel, Reference, Triangulator};
+use crate::geometry::{Pinhole, PinholeModel, Reference, Triangulator, Vector};
 use crate::inspect::{Taught, Weight, normal_shares};
 use crate::pattern::PhaseFunction;
 use crate::pipeline::KnownSurface;
-use crate::units::AbsolutePhase;
+use crate::units::{AbsolutePhase, Height};
 use std::vec;
 use std::vec::Vec;
 

@@ -4,7 +4,8 @@
 //! side². The models need the cells' values only; `tests/suite/precision.rs` compares them with
 //! simulation.
 
-use super::{Cell, Found};
+use super::cells::Cell;
+use super::reading::Found;
 use crate::inspect::align::{Placed, form};
 use core::f64::consts::{PI, SQRT_2};
 

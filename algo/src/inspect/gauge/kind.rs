@@ -1,11 +1,12 @@
 //! What a kind of gauge states of itself, and what it works out its value from.
 
-use super::Measure;
+use super::component::Component;
 use super::extreme::motion;
-use super::kinds::Component;
 use crate::inspect::align::Placed;
 
-pub(super) use super::{Cell, Found, Unit};
+pub(super) use super::cells::Cell;
+pub(super) use super::reading::Found;
+pub(super) use super::unit::Unit;
 pub(super) use alloc::format;
 pub(super) use alloc::string::String;
 pub(super) use alloc::vec::Vec;
@@ -92,7 +93,10 @@ pub trait Kind {
     fn facts(&self) -> Facts;
 
     /// The same kind with the other values of the field that its unit depends on.
-    fn others(&self) -> Vec<Measure> {
+    fn others(&self) -> Vec<Self>
+    where
+        Self: Sized,
+    {
         Vec::new()
     }
 

@@ -1,7 +1,7 @@
 //! What gauges that are linear in height share: their errors follow exactly from those of the
 //! pixels ([`Evidence::linear`](super::Evidence::linear)).
 
-use super::Cell;
+use super::cells::Cell;
 use alloc::vec::Vec;
 
 /// The weight of a cell: the number of its pixels as taught, so that it is the same in every

@@ -2,21 +2,24 @@
 //!
 //! A region is divided into square cells of pixels in golden's frame. A strip adds each measured
 //! pixel to the cell that holds its taught coordinates. The height of a cell is its taught height
-//! plus its pixels' mean deviation, so on a slope too it does not depend on which pixels of the
-//! cell were measured. The values of all gauges but coverage, deviation and placement are worked
-//! out from these heights and deviations.
+//! plus its pixels' mean deviation, so on a slope too it does not depend on which of them were
+//! measured. The values of all gauges but coverage, deviation and placement are worked out from
+//! these heights and deviations.
 
 mod cells;
+mod component;
 mod coverage;
 mod deviation;
 mod extreme;
 mod flatness;
+mod grid;
 mod kind;
 mod level;
 mod mean_height;
 mod out_of_tolerance;
 mod peak_to_valley;
 mod placement;
+mod reading;
 mod rms_deviation;
 mod step;
 mod taught;
@@ -24,59 +27,16 @@ mod tilt;
 mod unit;
 mod volume;
 
-pub use cells::{Cell, Grid, Sum, TooFine, cells};
+pub use cells::{Cell, Sum, cells};
+pub use grid::{Grid, TooFine};
 pub use kind::{Basis, Evidence, Facts, Kind};
+pub(super) use reading::MIN_SUPPORT;
+pub use reading::{Found, Reading, Square};
 pub use taught::TaughtCell;
 pub(super) use taught::taught_cells;
 pub use unit::Unit;
 
 use alloc::vec::Vec;
-
-/// A mean over a square needs at least this share of its pixels.
-pub(super) const MIN_SUPPORT: f64 = 0.5;
-
-/// What a gauge found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Reading {
-    /// The value in mm or as a share.
-    pub value: f64,
-    /// Its error over repeated measurements of the same part, 1 σ, where the noise is known.
-    /// Golden's own noise adds the same error every time and is not in it.
-    pub sigma: Option<f64>,
-    /// Of a deviation, the magnitude that is expected on a good part with this noise: as an extreme
-    /// it is not 0.
-    pub expected: Option<f64>,
-    /// The error that is the same in every measurement, and so not in σ (1 σ): the effect of
-    /// golden's noise and of the calibration's error.
-    pub systematic: f64,
-    /// Of a deviation, the square that the value is the mean of.
-    pub square: Option<Square>,
-}
-
-/// A square of camera pixels of the measured frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Square {
-    /// The column of its middle.
-    pub column: usize,
-    /// The row of its middle.
-    pub row: usize,
-    /// Pixels along each side.
-    pub side: usize,
-}
-
-/// A value with the parts of its error.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Found {
-    /// The value.
-    pub value: f64,
-    /// Variance by the noise of its pixels.
-    pub pixels: f64,
-    /// Variance by the error of the part's motion.
-    pub motion: f64,
-    /// By how much errors of all heights of 1 mm, each with the sign that does most, change the
-    /// value.
-    pub lever: f64,
-}
 
 /// The table of all kinds. A row is the file of a kind and an example; the struct's name in snake
 /// case is that of the kind in recipes.
@@ -84,9 +44,9 @@ macro_rules! kinds {
     ($($file:ident: $kind:ident { $($field:ident: $value:expr),* },)*) => {
         /// Every kind of gauge, each in its own file.
         pub mod kinds {
-            pub use super::placement::Component;
-            pub use super::tilt::Axis;
-            $(pub use super::$file::$kind;)*
+            pub use crate::inspect::gauge::component::Component;
+            pub use crate::inspect::gauge::tilt::Axis;
+            $(pub use crate::inspect::gauge::$file::$kind;)*
         }
 
         /// What a gauge measures. Heights are z of the part after its motion was taken back.
@@ -107,7 +67,14 @@ macro_rules! kinds {
                 Vec::from([$(kinds::$kind { $($field: $value),* }.into(),)*])
             }
 
-            /// What the gauge says of itself.
+            /// The same kind with the other values of the field that its unit depends on.
+            pub fn others(&self) -> Vec<Self> {
+                match self {
+                    $(Self::$kind(kind) => kind.others().into_iter().map(Self::from).collect(),)*
+                }
+            }
+
+            /// What it says of itself.
             pub fn facts(&self) -> Facts {
                 self.kind().facts()
             }

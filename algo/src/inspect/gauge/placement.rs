@@ -1,30 +1,8 @@
 //! How the part lies.
 
-use super::Measure;
+use super::component::Component;
 use super::kind::*;
 use Component::{AboutX, AboutY, AboutZ, X, Y, Z};
-
-/// A component of a part's motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-pub enum Component {
-    /// Translation along x, mm.
-    X,
-    /// Translation along y, mm.
-    Y,
-    /// Translation along z, mm.
-    Z,
-    /// Rotation about x, degrees.
-    AboutX,
-    /// Rotation about y, degrees.
-    AboutY,
-    /// Rotation about z, degrees.
-    AboutZ,
-}
 
 kind! {
     /// A component of the part's motion, mm or degrees.
@@ -47,9 +25,9 @@ impl Kind for Placement {
         Facts::new(unit, Basis::Motion(self.component), words)
     }
 
-    fn others(&self) -> Vec<Measure> {
+    fn others(&self) -> Vec<Self> {
         let all = [X, Y, Z, AboutX, AboutY, AboutZ].into_iter();
         let others = all.filter(|component| *component != self.component);
-        others.map(|component| Self { component }.into()).collect()
+        others.map(|component| Self { component }).collect()
     }
 }

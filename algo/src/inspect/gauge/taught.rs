@@ -1,10 +1,10 @@
 //! The cells of a region as they were taught: place, size, and how their heights change with a
 //! motion of the part.
 
-use super::Grid;
+use super::grid::Grid;
 use crate::geometry::Vector;
-use crate::inspect::Region;
 use crate::inspect::align::GoldenSurface;
+use crate::inspect::region::Region;
 use alloc::vec;
 use alloc::vec::Vec;
 

@@ -198,7 +198,7 @@ fn the_motion_moves_a_mean_as_a_whole_and_leaves_a_step_alone() {
 fn a_region_with_too_many_cells_is_refused_and_others_hold_every_pixel() {
     let side = 300.0;
     let corners = [(0.0, 0.0), (side, 0.0), (side, side), (0.0, side)];
-    let region = crate::inspect::Region::polygon(&corners, 300, 300).unwrap();
+    let region = crate::inspect::region::Region::polygon(&corners, 300, 300).unwrap();
     assert_eq!(
         Grid::over(&region, 1),
         Err(TooFine {

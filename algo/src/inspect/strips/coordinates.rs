@@ -1,40 +1,62 @@
 //! Stage 3, align: the taught coordinates of a row's pixels, and how far they deviate from golden
 //! there: in height, for cells, and along the normal, for squares.
 
-use super::Production;
 use super::displaced::{
     BlockNumbers, Deviations, GoldenMap, OffsetRow, align_row, mask, pick, scaled,
     taught_coordinates,
 };
+use super::golden::Golden;
 use super::height::HeightRow;
-use super::pose::PoseField;
+use super::pose::{PoseField, blocks_of_row};
 use super::recent::RecentRows;
-use super::{common, pose};
-use crate::inspect::Factor;
+use super::spans::common;
 use crate::inspect::gauge::{Grid, Sum};
+use crate::inspect::weight::Factor;
 use crate::math::nearest::whole;
 use crate::pipeline::NO_OFFSET;
-use crate::simd::{Lanes, back_end_entry};
+use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
+/// What parts are compared with, and how this one lies.
+#[derive(Clone, Copy)]
+pub struct Comparison<'a> {
+    pub backend: Backend,
+    pub golden: &'a Golden,
+    pub pose: &'a PoseField,
+}
+
+impl<'a> Comparison<'a> {
+    fn map(self) -> GoldenMap<'a> {
+        GoldenMap {
+            height: &self.golden.cubics.surface().height,
+            taught: self.golden.taught.pixels(),
+            factor: self.golden.taught.factors(),
+            width: self.golden.size().0,
+        }
+    }
+}
+
 /// For each pixel of a row the pixel of golden's frame that saw the same point of the part.
 #[derive(Debug)]
-pub(super) struct TaughtCoordinates {
+pub struct TaughtCoordinates {
     /// Displacements along the row.
     blocks: Vec<BlockNumbers>,
     column: Vec<i32>,
     row: Vec<i32>,
     /// Deviations in height, nm; [`NO_OFFSET`] where the part is not compared.
     deviation: Vec<i32>,
+    /// Whether coordinates are found of every row.
+    cells: bool,
 }
 
 impl TaughtCoordinates {
-    /// Of `width` pixels.
-    pub fn new(width: usize) -> Self {
+    /// Of `width` pixels; with coordinates of every row if there are cells that ask for them.
+    pub fn new(width: usize, cells: bool) -> Self {
         Self {
-            blocks: pose::blocks_of_row(width),
+            cells,
+            blocks: blocks_of_row(width),
             column: vec![0; width],
             row: vec![0; width],
             deviation: vec![NO_OFFSET; width],
@@ -42,60 +64,63 @@ impl TaughtCoordinates {
     }
 
     /// Takes the part's motion back in row `v`, whose heights were found last: its deviations
-    /// become those from golden at the taught coordinates, along the normal. Coordinates are found
-    /// for cells only.
+    /// become those from golden at the taught coordinates, along the normal.
     pub fn align(
         &mut self,
-        plan: &Production,
-        pose: &PoseField,
+        with: Comparison<'_>,
         v: usize,
         columns: Range<usize>,
-        (heights, recent): (&HeightRow, &mut RecentRows),
+        heights: &HeightRow,
+        recent: &mut RecentRows,
     ) {
-        let backend = plan.decoder.backend();
+        let Comparison {
+            backend,
+            golden,
+            pose,
+        } = with;
+        let (width, rows) = golden.size();
         match pose.placed {
             Some(_) => {
                 let columns = common(&columns, &recent.extent(v));
                 if columns.is_empty() {
                     return;
                 }
-                pose.row(backend, (v, plan.size().1), &columns, &mut self.blocks);
-                let (golden, row) = (golden_map(plan), offset_row(v, heights, &self.blocks));
+                pose.row(backend, (v, rows), &columns, &mut self.blocks);
+                let (map, row) = (with.map(), offset_row(v, heights, &self.blocks));
                 let mut overflow = false;
                 let out = Deviations {
                     height: &mut self.deviation,
                     normal: recent.row_mut(v).0,
                 };
-                align_row(backend, golden, row, columns.clone(), out, &mut overflow);
+                align_row(backend, map, row, columns.clone(), out, &mut overflow);
                 if overflow {
                     recent.overflow = Some(v);
                 }
             }
             None => {
                 let normal = &mut recent.row_mut(v).0[columns.clone()];
-                let factors = &plan.taught.factors()[v * plan.size().0..][columns.clone()];
+                let factors = &golden.taught.factors()[v * width..][columns.clone()];
                 self.deviation[columns.clone()].copy_from_slice(normal);
                 turn_to_normal(backend, factors, normal);
             }
         }
-        if !plan.gauges.patches.is_empty() {
-            self.find(plan, pose, v, columns, heights);
+        if self.cells {
+            self.find(with, v, columns, heights);
         }
     }
 
     /// Finds the taught coordinates of columns of row `v`, which was aligned last.
     pub fn find(
         &mut self,
-        plan: &Production,
-        pose: &PoseField,
+        with: Comparison<'_>,
         v: usize,
         columns: Range<usize>,
         heights: &HeightRow,
     ) {
         let taught = (&mut *self.column, &mut *self.row);
-        if pose.placed.is_some() {
-            let (golden, row) = (golden_map(plan), offset_row(v, heights, &self.blocks));
-            taught_coordinates(plan.decoder.backend(), golden, row, columns, taught);
+        if with.pose.placed.is_some() {
+            let row = offset_row(v, heights, &self.blocks);
+            taught_coordinates(with.backend, with.map(), row, columns, taught);
         } else {
             taught.1[columns.clone()].fill(v as i32);
             for u in columns {
@@ -106,9 +131,9 @@ impl TaughtCoordinates {
 
     /// What the height difference at pixel `u`, whose coordinates were found last, was multiplied
     /// by.
-    pub fn factor(&self, plan: &Production, u: usize) -> f64 {
-        let place = self.row[u] as usize * plan.size().0 + self.column[u] as usize;
-        plan.taught.factor(place)
+    pub fn factor(&self, golden: &Golden, u: usize) -> f64 {
+        let place = self.row[u] as usize * golden.size().0 + self.column[u] as usize;
+        golden.taught.factor(place)
     }
 
     /// Adds the compared pixels of a span to the cells that hold their taught coordinates.
@@ -122,15 +147,6 @@ impl TaughtCoordinates {
             cell.count += 1;
             cell.deviation += i64::from(deviation);
         }
-    }
-}
-
-fn golden_map(plan: &Production) -> GoldenMap<'_> {
-    GoldenMap {
-        height: &plan.cubics.surface().height,
-        taught: plan.taught.pixels(),
-        factor: plan.taught.factors(),
-        width: plan.size().0,
     }
 }
 

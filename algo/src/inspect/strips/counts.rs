@@ -1,11 +1,11 @@
 //! Stage 4, accumulate: what the rows of a strip count: pixels of each trust, heights, coverage,
 //! and cells of gauges.
 
-use super::coordinates::TaughtCoordinates;
+use super::coordinates::{Comparison, TaughtCoordinates};
 use super::coverage::{add_variances, count_known};
+use super::gauges::Gauges;
 use super::height::HeightRow;
-use super::pose::PoseField;
-use super::{Production, common};
+use super::spans::common;
 use crate::inspect::gauge::{Basis, Sum};
 use crate::phase::Trust;
 use crate::pipeline::{HeightTally, PhaseMap};
@@ -16,7 +16,7 @@ use core::ops::Range;
 
 /// Sums over the rows of a strip. Whole numbers, so that the order of summation does not matter.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Counts {
+pub struct Counts {
     /// Heights and their variances.
     pub tally: HeightTally,
     /// Pixels of each trust.
@@ -32,12 +32,11 @@ pub(super) struct Counts {
 }
 
 impl Counts {
-    pub fn new(plan: &Production) -> Self {
-        let (gauges, patches) = (plan.gauges.list.len(), &plan.gauges.patches);
-        let cells = patches.iter();
+    pub fn new(gauges: &Gauges) -> Self {
+        let cells = gauges.patches.iter();
         Self {
-            covered: vec![0; gauges],
-            variance: vec![0; gauges],
+            covered: vec![0; gauges.list.len()],
+            variance: vec![0; gauges.list.len()],
             cells: cells
                 .map(|patch| vec![Sum::default(); patch.grid.len()])
                 .collect(),
@@ -59,32 +58,36 @@ impl Counts {
     /// Adds row `v`, which was aligned last.
     pub fn add(
         &mut self,
-        plan: &Production,
-        pose: &PoseField,
+        with: Comparison<'_>,
+        gauges: &Gauges,
         v: usize,
         (decoded, heights): (&PhaseMap, &HeightRow),
         (coordinates, extent): (&TaughtCoordinates, Range<usize>),
     ) {
-        let backend = plan.decoder.backend();
+        let Comparison {
+            backend,
+            golden,
+            pose,
+        } = with;
         self.tally.add(&heights.tally);
         self.exact += heights.exact;
-        let trusts = &decoded.trust[plan.window[v].clone()];
+        let trusts = &decoded.trust[golden.window[v].clone()];
         count_trusts(backend, trusts, &mut self.trusts);
-        for (at, gauge) in plan.gauges.list.iter().enumerate() {
+        for (at, gauge) in gauges.list.iter().enumerate() {
             if gauge.measure.facts().basis != Basis::Pixels {
                 continue;
             }
-            for (_, columns) in pose.region(plan, at).row(v) {
+            for (_, columns) in pose.region(&gauges.regions, at).row(v) {
                 let span = common(columns, &extent);
                 let offsets = &heights.offset[span.clone()];
                 let modulations = &decoded.modulation[span];
                 count_known(backend, offsets, &mut self.covered[at]);
-                let (threshold, variance) = (&plan.gauges.threshold, &mut self.variance[at]);
+                let (threshold, variance) = (&gauges.threshold, &mut self.variance[at]);
                 add_variances(backend, threshold, offsets, modulations, variance);
             }
         }
-        for (patch, cells) in plan.gauges.patches.iter().zip(&mut self.cells) {
-            for (_, columns) in pose.region(plan, patch.region).row(v) {
+        for (patch, cells) in gauges.patches.iter().zip(&mut self.cells) {
+            for (_, columns) in pose.region(&gauges.regions, patch.region).row(v) {
                 let span = common(columns, &extent);
                 coordinates.add_to_cells(&patch.grid, span, cells);
             }
@@ -93,7 +96,7 @@ impl Counts {
 }
 
 /// Number of trusts.
-pub(super) const TRUSTS: usize = Trust::REASONS.len() + 1;
+pub const TRUSTS: usize = Trust::REASONS.len() + 1;
 /// All of them, the frequent ones first.
 const ORDER: [Trust; TRUSTS] = [
     Trust::Resolved,

@@ -32,7 +32,7 @@ use crate::units::Modulation;
 /// The modulations at which it is uncertain whether a pixel is resolved, in units of full scale
 /// / 65535.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Threshold {
+pub struct Threshold {
     least: f64,
     sigma: f64,
     /// The variance that a density of one pixel per σ at the threshold makes.
@@ -142,6 +142,6 @@ fn variances<V: Lanes>(
 
 /// σ of the share of `pixels` pixels that are resolved, from the sum of what they say of its
 /// variance: of a few pixels that may be negative by chance.
-pub(super) fn sigma(variance: i64, pixels: usize) -> f64 {
+pub fn sigma(variance: i64, pixels: usize) -> f64 {
     libm::sqrt(variance.max(0) as f64 / ONE) / pixels.max(1) as f64
 }

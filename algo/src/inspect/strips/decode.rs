@@ -1,15 +1,63 @@
 //! Stage 1, decode: a row of all frames → absolute phase, modulation and trust of its pixels.
 
-use super::{Input, Production};
-use crate::phase::PhaseRow;
+use super::golden::Golden;
+use crate::frame::{FrameView, SampleNoise};
+use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow};
 use crate::pipeline::PhaseMap;
-use crate::units::AbsolutePhase;
+use crate::units::{AbsolutePhase, Modulation};
 use core::ops::Range;
 
-impl Production {
+/// What a part is inspected from; either form gives the same bits.
+#[derive(Clone, Copy, Debug)]
+pub enum Input<'a> {
+    /// All frames of the sequence.
+    Frames(&'a [FrameView<'a>]),
+    /// What was decoded of all other levels when they arrived ([`crate::pipeline::arrive`]), and
+    /// the frames of the finest level.
+    Finest(&'a Arrived, &'a [FrameView<'a>]),
+    /// The phases of the whole frame, as a pair gives them
+    /// ([`place_pair`](crate::inspect::Production::place_pair)).
+    Phases(&'a PhaseMap),
+}
+
+/// How frames become phases, and how noisy these are.
+#[derive(Debug)]
+pub struct PhasePlan {
+    pub decoder: Decoder,
+    /// The noise of one sample, and σ in counts with which σ_z of the compared part as taught has
+    /// the same RMS.
+    pub noise: SampleNoise,
+    pub noise_counts: f64,
+    /// The same as [`crate::pipeline::CubicInput::noise`].
+    pub variance_scale: f32,
+}
+
+impl PhasePlan {
+    /// Checks number and size of the frames.
+    pub fn check(&self, input: Input<'_>, expected: (usize, usize)) -> Result<(), DecodeError> {
+        let size = |frames: &[FrameView<'_>]| (frames[0].width(), frames[0].height());
+        let given = match input {
+            Input::Frames(frames) => self.decoder.check(frames).map(|()| size(frames)),
+            Input::Finest(arrived, frames) => {
+                let checked = self.decoder.check_last(frames, arrived);
+                checked.map(|()| size(frames))
+            }
+            Input::Phases(map) => Ok((map.width, map.phase.len() / map.width.max(1))),
+        }?;
+        match given == expected {
+            true => Ok(()),
+            false => Err(DecodeError::FrameSize {
+                frame: 0,
+                expected,
+                given,
+            }),
+        }
+    }
+
     /// Decodes columns of row `v` into a map of one row; the others keep what they had.
-    pub(super) fn decode(
+    pub fn decode(
         &self,
+        golden: &Golden,
         input: Input<'_>,
         v: usize,
         columns: Range<usize>,
@@ -20,7 +68,7 @@ impl Production {
             modulation: &mut row.modulation,
             trust: &mut row.trust,
         };
-        let (decoder, map) = (&self.decoder, self.map_row(v));
+        let (decoder, map) = (&self.decoder, self.map_row(golden, v));
         match input {
             Input::Frames(frames) => decoder.row(frames, v, map, columns, out),
             Input::Finest(arrived, frames) => {
@@ -35,18 +83,19 @@ impl Production {
         }
     }
 
-    /// The map that phases are unwrapped about, row-major.
-    pub fn map(&self) -> &[AbsolutePhase] {
-        self.map.as_ref().unwrap_or(&self.cubics.surface().phase)
+    /// The row of the map that phases are unwrapped about; empty if the sequence needs none.
+    pub fn map_row<'a>(&self, golden: &'a Golden, v: usize) -> &'a [AbsolutePhase] {
+        let width = golden.size().0;
+        match self.decoder.unwrapping().needs_map() {
+            true => &golden.map()[v * width..(v + 1) * width],
+            false => &[],
+        }
     }
 
-    /// The row of the map that phases are unwrapped about; empty if the sequence needs none.
-    pub(super) fn map_row(&self, v: usize) -> &[AbsolutePhase] {
-        let width = self.cubics.surface().width;
-        if self.decoder.unwrapping().needs_map() {
-            &self.map()[v * width..(v + 1) * width]
-        } else {
-            &[]
-        }
+    /// σ_z in nm of a pixel with this modulation and ∂z/∂Φ; of a pair that of the pixel's own
+    /// samples, without its window.
+    pub fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
+        let turns = self.decoder.phase_noise(modulation, self.noise);
+        libm::fabs(turns * slope) * 1e6
     }
 }

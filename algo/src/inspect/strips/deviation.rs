@@ -15,20 +15,18 @@
 //! ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)); it changes little over a square,
 //! so its mean over some pixels is taken.
 
-use super::height::base_nm;
-use super::pose::PoseField;
 use super::squares::extreme::Extreme;
-use super::{Input, Production, Strip};
+use super::uncertainty::ErrorBudget;
 use crate::inspect::align::{Placed, form};
-use crate::inspect::{Largest, Reading, Square};
-use crate::units::Height;
+use crate::inspect::gauge::{Reading, Square};
+use crate::inspect::largest::Largest;
 
 /// Pixels of a square whose Jacobians are averaged, in each direction.
 const SAMPLES: usize = 4;
 
 /// Sums over the pixels of a square, from which the error of its mean follows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SquareNoise {
+pub struct SquareNoise {
     /// Every so many columns and rows a pixel's Jacobian is taken.
     stride: usize,
     /// Σ w² σ_p², mm².
@@ -42,7 +40,7 @@ pub(super) struct SquareNoise {
 
 impl SquareNoise {
     /// Of a square of `side` pixels.
-    fn new(side: usize) -> Self {
+    pub fn new(side: usize) -> Self {
         Self {
             stride: (side / SAMPLES).max(1),
             variance: 0.0,
@@ -84,24 +82,21 @@ impl SquareNoise {
     }
 }
 
-impl Production {
+impl ErrorBudget {
     /// The reading of the first of the squares of `side` pixels that were found, in falling order;
-    /// none if there is none. σ_z is `noisier` times the taught σ. The errors of the squares are
-    /// worked out here, for these few alone.
-    pub(super) fn deviation(
+    /// none if there is none. σ_z is `noisier` times the taught σ. The noise of the squares is
+    /// asked for here, for these few alone.
+    pub fn deviation(
         &self,
         (found, side): (&[Extreme], usize),
-        input: Input<'_>,
-        pose: &PoseField,
-        strip: &mut Strip,
+        mut noise_of: impl FnMut(&Extreme) -> SquareNoise,
+        placed: Option<&Placed>,
         (gauge, noisier): (usize, f64),
     ) -> Option<Reading> {
         let best = found.first()?;
         let smoothed = self.square_variance(side);
         let mut variances = found.iter().map(|square| {
-            let noise = self.noise_of(square, side, input, pose, strip);
-            let (pixels, motion, lever) =
-                noise.variances(square.count as f64, pose.placed.as_ref());
+            let (pixels, motion, lever) = noise_of(square).variances(square.count as f64, placed);
             (pixels * smoothed, motion, lever)
         });
         let (pixels, motion, lever) = variances.next()?;
@@ -112,7 +107,7 @@ impl Production {
         let golden = self.golden_variance(noisier) / smoothed;
         let largest = self.largest.get(gauge).copied().unwrap_or_default();
         let largest = largest.times(libm::sqrt(1.0 + 1.0 / golden));
-        let largest = self.of_displaced(largest, gauge, pose.placed.as_ref());
+        let largest = self.of_displaced(largest, gauge, placed);
         let extreme = largest.uncertain([magnitude(best), pixels + motion], others);
         let sigma = libm::sqrt(extreme.variance + (1.0 - extreme.defect) * motion);
         Some(Reading {
@@ -125,7 +120,7 @@ impl Production {
                 libm::sqrt(
                     golden * (extreme.defect * pixels + motion * smoothed / self.spot_variance()),
                 ),
-                libm::hypot(self.displaced(pose.placed.as_ref()), self.rippled() * lever),
+                libm::hypot(self.displaced(placed), self.rippled() * lever),
             ),
             square: Some(Square {
                 column: best.column,
@@ -148,46 +143,6 @@ impl Production {
             mean: between(noise.mean, displaced.mean),
             scatter: between(noise.scatter, displaced.scatter),
         }
-    }
-
-    /// The noise of the pixels of a square.
-    fn noise_of(
-        &self,
-        square: &Extreme,
-        side: usize,
-        input: Input<'_>,
-        pose: &PoseField,
-        strip: &mut Strip,
-    ) -> SquareNoise {
-        let half = side / 2;
-        let bottom = (square.row + half + 1).min(self.window.len());
-        let mut noise = SquareNoise::new(side);
-        for v in square.row.saturating_sub(half)..bottom {
-            let window = &self.window[v];
-            let left = square.column.saturating_sub(half).max(window.start);
-            let right = (square.column + half + 1).min(window.end);
-            if left < right {
-                strip.add_noise(self, pose, input, v, left..right, &mut noise);
-            }
-        }
-        noise
-    }
-
-    /// The Jacobian, over the motion, of the height of what a pixel sees `offset_nm` above golden;
-    /// none where the surface there has no facet.
-    pub(super) fn lift(
-        &self,
-        placed: &Placed,
-        (u, v): (usize, usize),
-        offset_nm: i32,
-    ) -> Option<[f64; 6]> {
-        let alignment = self.alignment.as_ref()?;
-        let base = base_nm(self.cubics.surface().height[v * self.size().0 + u]);
-        let height = Height::from_nm(base.saturating_add(offset_nm));
-        let point = placed.motion.undo(self.triangulator.point(u, v, height)?);
-        let seen = self.triangulator.camera().project(point)?;
-        let facet = self.golden().facet(point, seen)?;
-        Some(facet.jacobian(point, (alignment.centre, alignment.radius)))
     }
 }
 

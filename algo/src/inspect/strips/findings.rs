@@ -2,13 +2,16 @@
 
 use super::counts::TRUSTS;
 use super::coverage;
+use super::decode::Input;
+use super::gauges::MAX_GAUGES;
+use super::plan::Production;
 use super::pose::PoseField;
+use super::squares::extreme::Extreme;
 use super::squares::rivals::rivals;
+use super::strip::{CellBuffers, Strip, Strips};
 use super::uncertainty::Made;
-use super::{CellBuffers, Input, MAX_GAUGES, Production, Strip, Strips};
-use crate::inspect::Reading;
 use crate::inspect::align::Placed;
-use crate::inspect::gauge::{Basis, Evidence, Facts, Sum, TaughtCell, cells};
+use crate::inspect::gauge::{Basis, Evidence, Facts, Reading, Sum, TaughtCell, cells};
 use crate::phase::Trust;
 use crate::pipeline::VARIANCE_UNIT_NM;
 
@@ -60,7 +63,7 @@ impl Production {
             }
         }
         let seen: u64 = trusts.iter().sum();
-        let pixels = self.cubics.surface().phase.len() as u64;
+        let pixels = self.golden.cubics.surface().phase.len() as u64;
         let rms_mm = |sum: u64, count: u64| {
             libm::sqrt(sum as f64 / count.max(1) as f64) * VARIANCE_UNIT_NM * 1e-6
         };
@@ -71,7 +74,7 @@ impl Production {
         // The ratio of σ_z to that as taught.
         let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
         // From the noise of independent pixels to that of the map.
-        let windows = libm::sqrt(self.square_variance(1));
+        let windows = libm::sqrt(self.budget.square_variance(1));
         let readings = (0..self.gauges.list.len())
             .map(|gauge| self.reading(gauge, input, noisier, strips))
             .collect();
@@ -80,7 +83,7 @@ impl Production {
         Findings {
             readings,
             resolved: trusts[Trust::Resolved as usize],
-            coverage: tally.compared as f64 / self.compared.max(1) as f64,
+            coverage: tally.compared as f64 / self.golden.compared.max(1) as f64,
             height_noise_mm: height_noise_mm * windows,
             taught_noise_mm: taught_noise_mm * windows,
             contradicting: contradicting as f64
@@ -111,7 +114,7 @@ impl Production {
         } = strips;
         match self.gauges.list[gauge].measure.facts().basis {
             Basis::Pixels => {
-                let pixels = pose.region(self, gauge).len();
+                let pixels = pose.region(&self.gauges.regions, gauge).len();
                 let (mut covered, mut variance) = (0, 0);
                 for strip in strips {
                     covered += strip.counts.covered[gauge];
@@ -136,7 +139,10 @@ impl Production {
                     }
                     let found = rivals(strips.iter().map(|strip| &strip.squares.extremes[at]));
                     let (found, strip) = ((&found[..], squares.side), strips.first_mut()?);
-                    let next = self.deviation(found, input, pose, strip, (gauge, noisier));
+                    let noise_of =
+                        |square: &Extreme| strip.noise_of(self, pose, input, square, squares.side);
+                    let (placed, gauge) = (pose.placed.as_ref(), (gauge, noisier));
+                    let next = self.budget.deviation(found, noise_of, placed, gauge);
                     let less = |next: &Reading| {
                         largest.is_some_and(|of| libm::fabs(next.value) < libm::fabs(of.value))
                     };
@@ -146,13 +152,15 @@ impl Production {
             }
             Basis::Motion(component) => {
                 let (value, sigma) = pose.placed.as_ref()?.component(component as usize)?;
+                let budget = &self.budget;
                 Some(Reading {
                     value,
                     sigma: Some(sigma),
                     expected: None,
                     systematic: libm::hypot(
-                        sigma * libm::sqrt(self.golden_variance(noisier) / self.spot_variance()),
-                        value * self.calibration.length,
+                        sigma
+                            * libm::sqrt(budget.golden_variance(noisier) / budget.spot_variance()),
+                        value * budget.calibration.length,
                     ),
                     square: None,
                 })
@@ -195,7 +203,7 @@ impl Production {
         }
         let pixels = |taught: &[TaughtCell]| taught.iter().map(|cell| cell.pixels).sum::<u32>();
         // A region without cells as a square of its area.
-        let smoothed = self.square_variance(match side {
+        let smoothed = self.budget.square_variance(match side {
             0 => pixels(taught).isqrt() as usize,
             side => side,
         });
@@ -225,12 +233,15 @@ impl Production {
         })?;
         let made = match compares {
             true => {
-                found.pixels *= self.cells_together(side);
+                found.pixels *= self.budget.cells_together(side);
                 Made::OfDeviations
             }
             false => Made::OfHeights,
         };
-        Some(self.reading_of(found, made, (noisier, smoothed), placed))
+        Some(
+            self.budget
+                .reading_of(found, made, (noisier, smoothed), placed),
+        )
     }
 
     /// Appends the cells of a patch.

@@ -1,11 +1,12 @@
 //! The gauges of a production: where each measures what, and what is planned of that beforehand.
 
 use super::coverage::Threshold;
+use super::spans::hull;
 use super::squares::extreme;
 use crate::geometry::Vector;
-use crate::inspect::Region;
 use crate::inspect::align::{Alignment, GoldenSurface};
 use crate::inspect::gauge::{Grid, Measure, TaughtCell, TooFine, taught_cells};
+use crate::inspect::region::Region;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -46,7 +47,7 @@ pub enum Unmeasurable {
 
 /// The cells of a gauge's region.
 #[derive(Debug)]
-pub(super) struct Patch {
+pub struct Patch {
     /// Which of the regions.
     pub region: usize,
     pub grid: Grid,
@@ -55,7 +56,7 @@ pub(super) struct Patch {
 
 /// The squares of one side that a gauge of deviation looks at.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct SquaresOf {
+pub struct SquaresOf {
     /// Which gauge.
     pub gauge: usize,
     /// The side of its squares where it may be the smallest.
@@ -67,7 +68,7 @@ pub(super) struct SquaresOf {
 
 /// A side of squares, and where there are some of this side: the box around their middles.
 #[derive(Clone, Debug)]
-pub(super) struct Side {
+pub struct Side {
     pub side: usize,
     pub rows: Range<usize>,
     pub columns: Range<usize>,
@@ -82,18 +83,14 @@ impl Side {
 
     /// Includes another box.
     fn widen(&mut self, rows: Range<usize>, columns: Range<usize>) {
-        let hull = |a: &Range<usize>, b: Range<usize>| match a.is_empty() {
-            true => b,
-            false => a.start.min(b.start)..a.end.max(b.end),
-        };
-        self.rows = hull(&self.rows, rows);
-        self.columns = hull(&self.columns, columns);
+        self.rows = hull(self.rows.clone(), rows);
+        self.columns = hull(self.columns.clone(), columns);
     }
 }
 
 /// All gauges, and what was planned of them.
 #[derive(Debug)]
-pub(super) struct Gauges {
+pub struct Gauges {
     pub list: Vec<Gauge>,
     /// One per gauge, then those that steps start from.
     pub regions: Vec<Region>,

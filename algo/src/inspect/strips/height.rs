@@ -4,24 +4,24 @@
 //! A cubic per pixel gives the offset ([`HeightCubics`](crate::pipeline::HeightCubics)); what it
 //! does not reach is triangulated exactly.
 
-use super::Production;
+use super::decode::PhasePlan;
+use super::golden::{Golden, base_nm};
 use super::recent::RecentRows;
 use super::squares::narrow::MAX_NARROW_NM;
 use crate::frame::SampleNoise;
-use crate::geometry::Solution;
 use crate::phase::Trust;
 use crate::pipeline::{
     CubicInput, CubicOutput, HeightTally, NO_OFFSET, PhaseMap, VARIANCE_UNIT_NM, offset_row,
     sum_variances,
 };
-use crate::units::{AbsolutePhase, Height, Modulation};
+use crate::units::Height;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
 /// The heights of the row that a strip works on.
 #[derive(Debug)]
-pub(super) struct HeightRow {
+pub struct HeightRow {
     /// z − z₀ in nm; [`NO_OFFSET`] where there is no height.
     pub offset: Vec<i32>,
     /// Counts and variances of the row.
@@ -49,7 +49,8 @@ impl HeightRow {
     /// compared, the offset is the deviation of a part that lies as taught.
     pub fn find(
         &mut self,
-        plan: &Production,
+        golden: &Golden,
+        phase: &PhasePlan,
         decoded: &mut PhaseMap,
         v: usize,
         columns: Range<usize>,
@@ -70,8 +71,8 @@ impl HeightRow {
             phase: &decoded.phase,
             modulation: &decoded.modulation,
             trust: &decoded.trust,
-            taught: plan.taught.row(v, width),
-            noise: plan.variance_scale,
+            taught: golden.taught.row(v, width),
+            noise: phase.variance_scale,
         };
         let output = CubicOutput {
             offset: &mut self.offset,
@@ -79,9 +80,9 @@ impl HeightRow {
             tally: &mut self.tally,
             extent,
         };
-        let backend = plan.decoder.backend();
-        let mut cubics = plan.cubics.row(v);
-        let map = plan.map_row(v);
+        let backend = phase.decoder.backend();
+        let mut cubics = golden.cubics.row(v);
+        let map = phase.map_row(golden, v);
         if !map.is_empty() {
             // Golden's phase by this sequence, and already in the cache.
             cubics.base = map;
@@ -99,14 +100,15 @@ impl HeightRow {
             );
         }
         if self.tally.resolved != self.tally.measured {
-            self.triangulate(plan, decoded, v, columns, recent);
+            self.triangulate(golden, phase, decoded, v, columns, recent);
         }
     }
 
     /// Triangulates what the cubics do not reach.
     fn triangulate(
         &mut self,
-        plan: &Production,
+        golden: &Golden,
+        phase: &PhasePlan,
         decoded: &mut PhaseMap,
         v: usize,
         columns: Range<usize>,
@@ -124,34 +126,34 @@ impl HeightRow {
             }
             *exact += 1;
             let place = v * width + u;
-            let Some(solution) = plan.solve((u, v), decoded.phase[u]) else {
+            let Some(solution) = golden.solve((u, v), decoded.phase[u]) else {
                 decoded.trust[u] = Trust::OutOfRange;
                 tally.resolved -= 1;
                 continue;
             };
             let height = Height::from_mm(solution.point.z).nm();
             // One above the value for "no offset".
-            let base = base_nm(plan.cubics.surface().height[place]);
+            let base = base_nm(golden.cubics.surface().height[place]);
             let nm = height.saturating_sub(base).max(NO_OFFSET + 1);
             if nm.unsigned_abs() > MAX_NARROW_NM {
                 recent.overflow = Some(v);
             }
             offset[u] = nm;
             tally.measured += 1;
-            let compared = plan.taught.compared(place);
+            let compared = golden.taught.compared(place);
             if compared {
                 recent.row_mut(v).0[u] = nm;
                 tally.compared += 1;
             }
             if sums_variances(v) {
-                let taught = u64::from(plan.taught.sigma(place));
+                let taught = u64::from(golden.taught.sigma(place));
                 tally.taught += u64::from(taught != 0);
                 tally.taught_variance += (taught * taught + 128) >> 8;
             }
             if sums_variances(v) && compared {
                 tally.summed += 1;
-                let noise = SampleNoise::constant(plan.noise_counts);
-                let turns = plan.decoder.phase_noise(decoded.modulation[u], noise);
+                let noise = SampleNoise::constant(phase.noise_counts);
+                let turns = phase.decoder.phase_noise(decoded.modulation[u], noise);
                 let units = turns / solution.slope * 1e6 / VARIANCE_UNIT_NM;
                 tally.variance += libm::rint((units * units).min(MAX_VARIANCE)) as u64;
             }
@@ -159,8 +161,8 @@ impl HeightRow {
     }
 
     /// Writes z of row `v`, which was found last, in mm; NaN where there is no height.
-    pub fn store(&self, plan: &Production, v: usize, heights: &mut [f32]) {
-        let golden = &plan.cubics.surface().height[v * self.offset.len()..];
+    pub fn store(&self, golden: &Golden, v: usize, heights: &mut [f32]) {
+        let golden = &golden.cubics.surface().height[v * self.offset.len()..];
         for ((mm, &nm), &golden) in heights.iter_mut().zip(&self.offset).zip(golden) {
             *mm = if nm == NO_OFFSET {
                 f32::NAN
@@ -174,39 +176,4 @@ impl HeightRow {
 /// Whether the variances of row `v` are summed.
 fn sums_variances(v: usize) -> bool {
     v.is_multiple_of(VARIANCE_ROWS)
-}
-
-/// z₀ that offsets count from: golden's height, 0 where that is not known.
-pub(super) fn base_nm(golden: Height) -> i32 {
-    if golden.is_known() { golden.nm() } else { 0 }
-}
-
-impl Production {
-    /// The exact height of a phase.
-    fn solve(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> Option<Solution> {
-        let (column, row) = (u as f64, v as f64);
-        let place = v * self.cubics.surface().width + u;
-        match self.cubics.near(place, phase) {
-            Some(near) => self
-                .triangulator
-                .solve_near(column, row, phase.turns(), near),
-            None => self.triangulator.solve(column, row, phase.turns()),
-        }
-    }
-
-    /// ∂z/∂Φ in mm per turn.
-    pub(super) fn slope(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> f64 {
-        let place = v * self.cubics.surface().width + u;
-        self.cubics.slope(place, phase).unwrap_or_else(|| {
-            self.solve((u, v), phase)
-                .map_or(0.0, |solution| 1.0 / solution.slope)
-        })
-    }
-
-    /// σ_z in nm of a pixel with this modulation and ∂z/∂Φ; of a pair that of the pixel's own
-    /// samples, without its window.
-    pub(super) fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
-        let turns = self.decoder.phase_noise(modulation, self.noise);
-        libm::fabs(turns * slope) * 1e6
-    }
 }

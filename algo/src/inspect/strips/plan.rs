@@ -1,17 +1,21 @@
 //! What inspecting parts needs, worked out once.
 
+use super::coordinates::Comparison;
 use super::coverage::Threshold;
+use super::decode::PhasePlan;
 use super::gauges::{Gauge, Gauges, Unmeasurable};
-use super::taught::Taught;
-use super::uncertainty::CalibrationError;
+use super::golden::Golden;
+use super::pose::PoseField;
+use super::uncertainty::{CalibrationError, ErrorBudget};
 use crate::frame::SampleNoise;
 use crate::geometry::{Triangulator, Vector};
-use crate::inspect::Largest;
-use crate::inspect::align::{Alignment, GoldenSurface, levels};
+use crate::inspect::align::Alignment;
+use crate::inspect::largest::Largest;
+use crate::inspect::taught::Taught;
 use crate::phase::Decoder;
 use crate::pipeline::{HeightCubics, VARIANCE_UNIT_NM};
 use crate::simd::Backend;
-use crate::units::{AbsolutePhase, Height, Modulation};
+use crate::units::{AbsolutePhase, Modulation};
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -58,37 +62,15 @@ pub struct Parts {
     pub ripple: f64,
 }
 
-/// Everything that inspecting parts needs, worked out once.
+/// Everything that inspecting parts needs, worked out once: the plan of each stage.
 #[derive(Debug)]
 pub struct Production {
-    pub(super) decoder: Decoder,
-    /// Φ₀ that phases are unwrapped about, where it is not that of the cubics.
-    pub(super) map: Option<Vec<AbsolutePhase>>,
-    pub(super) triangulator: Arc<Triangulator>,
-    pub(super) cubics: Arc<HeightCubics>,
-    pub(super) taught: Taught,
-    /// Columns of each row that are looked at.
-    pub(super) window: Vec<Range<usize>>,
-    /// Pixels inside the window that are compared.
-    pub(super) compared: u64,
-    /// See [`Parts`].
-    pub(super) noise: SampleNoise,
-    pub(super) noise_counts: f64,
-    /// The same as [`crate::pipeline::CubicInput::noise`].
-    pub(super) variance_scale: f32,
+    pub(super) golden: Golden,
+    pub(super) phase: PhasePlan,
     /// None where parts are taken to lie as taught.
     pub(super) alignment: Option<Alignment>,
-    /// The middle of golden's heights and half their span, mm.
-    pub(super) levels: (f64, f64),
     pub(super) gauges: Gauges,
-    /// See [`Parts`].
-    pub(super) golden_noise: f64,
-    pub(super) largest: Vec<Largest>,
-    pub(super) displaced: Vec<Option<Largest>>,
-    /// What a pixel in the middle of the frame sees of a surface at the middle height, mm.
-    pub(super) pixel_mm: f64,
-    pub(super) calibration: CalibrationError,
-    pub(super) ripple: f64,
+    pub(super) budget: ErrorBudget,
 }
 
 impl Production {
@@ -103,7 +85,7 @@ impl Production {
             triangulator,
             cubics,
             map,
-            mut taught,
+            taught,
             gauges,
             window,
             noise,
@@ -115,75 +97,56 @@ impl Production {
             calibration,
             ripple,
         } = parts;
-        let width = cubics.surface().width;
-        taught.mark_squares(width.max(1));
-        let compared = window.iter().enumerate().map(|(v, columns)| {
-            let row = v * width + columns.start..v * width + columns.end;
-            row.filter(|&place| taught.compared(place)).count() as u64
-        });
-        let compared = compared.sum();
         let turns = decoder.phase_noise(
             Modulation::from_bits(1),
             SampleNoise::constant(noise_counts),
         ) / cubics.range();
-        let golden = GoldenSurface {
-            triangulator: &triangulator,
-            surface: cubics.surface(),
-            taught: &taught,
-        };
+        let golden = Golden::new(triangulator, cubics, map, taught, window);
         let alignment = match aligned {
-            true => Alignment::new(golden, &window),
+            true => Alignment::new(golden.surface(), &golden.window),
             false => None,
         };
-        let range = triangulator.range();
+        let range = golden.triangulator.range();
         let span_nm = (range.high - range.low) * 1e6;
         let threshold = Threshold::new(&decoder, noise);
-        let gauges = Gauges::new(gauges, golden, alignment.as_ref(), span_nm, threshold)?;
-        let levels = levels(&cubics.surface().height, width, &window);
-        let height = Height::from_mm(levels.0);
-        let middle = (width / 2, window.len() / 2);
-        let sees = |u: usize| triangulator.point(u, middle.1, height);
-        let pixel = sees(middle.0).zip(sees(middle.0 + 1));
+        let surface = golden.surface();
+        let gauges = Gauges::new(gauges, surface, alignment.as_ref(), span_nm, threshold)?;
         Ok(Self {
-            levels,
-            pixel_mm: pixel.map_or(0.0, |(one, next)| (next - one).length()),
-            variance_scale: ((turns / VARIANCE_UNIT_NM) * (turns / VARIANCE_UNIT_NM)) as f32,
-            decoder,
-            map,
-            triangulator,
-            cubics,
-            taught,
-            window,
-            compared,
-            noise,
-            noise_counts,
+            budget: ErrorBudget {
+                golden_noise,
+                largest,
+                displaced,
+                pixel_mm: golden.pixel_mm(),
+                calibration,
+                ripple,
+                shared: decoder.is_pair(),
+                pixels_per_spot: alignment.as_ref().map_or(1.0, Alignment::pixels_per_spot),
+            },
+            phase: PhasePlan {
+                decoder,
+                noise,
+                noise_counts,
+                variance_scale: ((turns / VARIANCE_UNIT_NM) * (turns / VARIANCE_UNIT_NM)) as f32,
+            },
+            golden,
             alignment,
             gauges,
-            golden_noise,
-            largest,
-            displaced,
-            calibration,
-            ripple,
         })
     }
 
-    /// Columns and rows of the frame.
-    pub(super) fn size(&self) -> (usize, usize) {
-        (self.cubics.surface().width, self.window.len())
-    }
-
-    pub(super) fn golden(&self) -> GoldenSurface<'_> {
-        GoldenSurface {
-            triangulator: &self.triangulator,
-            surface: self.cubics.surface(),
-            taught: &self.taught,
+    /// What stage 3 compares parts with that lie as in a field.
+    pub(super) fn comparison<'a>(&'a self, pose: &'a PoseField) -> Comparison<'a> {
+        Comparison {
+            backend: self.phase.decoder.backend(),
+            golden: &self.golden,
+            pose,
         }
     }
 
     /// The same on another back-end of this machine, with the same bits.
-    pub fn with_backend(self, backend: Backend) -> Self {
-        let decoder = self.decoder.with_backend(backend);
-        Self { decoder, ..self }
+    pub fn with_backend(mut self, backend: Backend) -> Self {
+        self.phase.decoder = self.phase.decoder.with_backend(backend);
+        self
     }
 
     /// Corners of the box around the part as taught, mm; none if parts are not aligned.
@@ -193,7 +156,7 @@ impl Production {
 
     /// The columns of each row that are looked at.
     pub fn window(&self) -> &[Range<usize>] {
-        &self.window
+        &self.golden.window
     }
 
     /// The gauges, in the order of their readings.
@@ -203,16 +166,21 @@ impl Production {
 
     /// How phases become heights.
     pub fn cubics(&self) -> &HeightCubics {
-        &self.cubics
+        &self.golden.cubics
     }
 
     /// How frames become phases.
     pub fn decoder(&self) -> &Decoder {
-        &self.decoder
+        &self.phase.decoder
     }
 
     /// Exact heights.
     pub fn triangulator(&self) -> &Triangulator {
-        &self.triangulator
+        &self.golden.triangulator
+    }
+
+    /// The map that phases are unwrapped about, row-major.
+    pub fn map(&self) -> &[AbsolutePhase] {
+        self.golden.map()
     }
 }

@@ -5,12 +5,11 @@
 //! each, and interpolated between: over the distance of two nodes they are linear and over the
 //! heights of a part quadratic in good approximation (0.003 pixels, see [`SPACING`]).
 
-use super::Production;
 use super::displaced::{BLOCK, BlockNumbers, Node, between, interpolate};
+use super::golden::Golden;
 use crate::geometry::Vector;
-use crate::inspect::Region;
 use crate::inspect::align::{Motion, Placed};
-use crate::inspect::region::CrossedEdge;
+use crate::inspect::region::{CrossedEdge, Region};
 use crate::pipeline::for_each_row;
 use crate::simd::Backend;
 use alloc::vec;
@@ -27,7 +26,7 @@ type Sight = [Vector; 3];
 
 /// How the part of a cycle lies, and what that does to every pixel.
 #[derive(Debug)]
-pub(super) struct PoseField {
+pub struct PoseField {
     /// None if the part is taken to lie as taught; then regions and blocks are not used.
     pub placed: Option<Placed>,
     /// The regions of the gauges, moved with the part.
@@ -42,20 +41,20 @@ pub(super) struct PoseField {
 }
 
 impl PoseField {
-    /// Of a part that lies as taught.
-    pub fn new(plan: &Production) -> Self {
-        let (width, height) = plan.size();
+    /// Of a part that lies as taught; for others, too, if parts are `aligned`.
+    pub fn new(golden: &Golden, regions: &[Region], aligned: bool) -> Self {
+        let (width, height) = golden.size();
         let across = width.div_ceil(BLOCK);
-        let (regions, sights, blocks) = match plan.alignment {
-            Some(_) => {
+        let (regions, sights, blocks) = match aligned {
+            true => {
                 let sights: Vec<_> = nodes(height)
-                    .flat_map(|v| nodes(width).map(move |u| plan.sight((u, v))))
+                    .flat_map(|v| nodes(width).map(move |u| sight(golden, (u, v))))
                     .collect();
                 let rows = nodes(height).count();
                 let blocks = vec![BlockNumbers::default(); across * rows];
-                (plan.gauges.regions.clone(), sights, blocks)
+                (regions.to_vec(), sights, blocks)
             }
-            None => Default::default(),
+            false => Default::default(),
         };
         Self {
             placed: None,
@@ -67,36 +66,41 @@ impl PoseField {
         }
     }
 
-    /// Takes the part to lie so; as taught if none.
-    pub fn set(&mut self, plan: &Production, placed: Option<Placed>) {
-        let (width, height) = plan.size();
-        // Without an alignment parts are taken to lie as taught.
-        self.placed = placed.filter(|_| plan.alignment.is_some());
+    /// Takes the part with these regions to lie so; as taught if none.
+    pub fn set(&mut self, golden: &Golden, regions: &[Region], placed: Option<Placed>) {
+        // Parts that are not aligned are taken to lie as taught.
+        self.placed = placed.filter(|_| !self.sights.is_empty());
         if let Some(Placed { motion, .. }) = self.placed {
             let motion = &motion;
-            self.displace(plan, motion);
-            for (region, taught) in self.regions.iter_mut().zip(&plan.gauges.regions) {
-                let to = |at| plan.moved(motion, at);
-                region.become_moved(taught, (width, height), to, &mut self.crossed);
+            self.displace(golden, motion);
+            for (region, taught) in self.regions.iter_mut().zip(regions) {
+                let to = |at| moved(golden, motion, at);
+                region.become_moved(taught, golden.size(), to, &mut self.crossed);
             }
         }
     }
 
     /// Finds the displacements by a motion, without the regions of gauges.
-    pub fn displace(&mut self, plan: &Production, motion: &Motion) {
-        let width = plan.size().0;
+    pub fn displace(&mut self, golden: &Golden, motion: &Motion) {
+        let width = golden.size().0;
         let (sights, columns) = (&self.sights, nodes(width).count());
         for_each_row(&mut self.blocks, self.across, |row, blocks| {
             let sights = &sights[row * columns..][..columns];
-            plan.displace(motion, nodes(width).zip(sights), row * SPACING, blocks);
+            displace(
+                golden,
+                motion,
+                nodes(width).zip(sights),
+                row * SPACING,
+                blocks,
+            );
         });
     }
 
-    /// A region of the plan, moved with the part.
-    pub fn region<'a>(&'a self, plan: &'a Production, at: usize) -> &'a Region {
+    /// One of the regions, moved with the part.
+    pub fn region<'a>(&'a self, regions: &'a [Region], at: usize) -> &'a Region {
         match self.placed {
             Some(_) => &self.regions[at],
-            None => &plan.gauges.regions[at],
+            None => &regions[at],
         }
     }
 
@@ -128,76 +132,63 @@ fn nodes(pixels: usize) -> impl Iterator<Item = usize> {
 }
 
 /// Displacements for the blocks of a row of `width` pixels.
-pub(super) fn blocks_of_row(width: usize) -> Vec<BlockNumbers> {
+pub fn blocks_of_row(width: usize) -> Vec<BlockNumbers> {
     vec![BlockNumbers::default(); width.div_ceil(BLOCK)]
 }
 
-impl Production {
-    /// What the node at pixel (u, v) sees.
-    fn sight(&self, (u, v): (usize, usize)) -> Sight {
-        let (middle, half) = self.levels;
-        let nothing = Vector::new(f64::NAN, f64::NAN, f64::NAN);
-        [middle - half, middle, middle + half].map(|z| self.seen(u, v, z).unwrap_or(nothing))
-    }
+/// What the node at pixel (u, v) sees.
+fn sight(golden: &Golden, (u, v): (usize, usize)) -> Sight {
+    let (middle, half) = golden.levels;
+    let nothing = Vector::new(f64::NAN, f64::NAN, f64::NAN);
+    [middle - half, middle, middle + half].map(|z| golden.seen(u, v, z).unwrap_or(nothing))
+}
 
-    /// The displacements by a motion of the blocks between nodes along row `v`, given with their
-    /// columns; NaN where one sees nothing.
-    fn displace<'a>(
-        &self,
-        motion: &Motion,
-        nodes: impl Iterator<Item = (usize, &'a Sight)>,
-        v: usize,
-        blocks: &mut [BlockNumbers],
-    ) {
-        let v = v.min(self.size().1 - 1);
-        let mut left: Option<(usize, Node)> = None;
-        for (u, sight) in nodes {
-            let node = self.node(motion, (u, v), sight);
-            let (start, from) = left.unwrap_or((u, node));
-            let here = &mut blocks[start / BLOCK..u / BLOCK + 1];
-            for (at, block) in here.iter_mut().enumerate() {
-                *block = between([&from, &node], u - start, at * BLOCK, self.levels.0);
-            }
-            left = Some((u, node));
+/// The displacements by a motion of the blocks between nodes along row `v`, given with their
+/// columns; NaN where one sees nothing.
+fn displace<'a>(
+    golden: &Golden,
+    motion: &Motion,
+    nodes: impl Iterator<Item = (usize, &'a Sight)>,
+    v: usize,
+    blocks: &mut [BlockNumbers],
+) {
+    let v = v.min(golden.size().1 - 1);
+    let mut left: Option<(usize, Node)> = None;
+    for (u, sight) in nodes {
+        let node = node(golden, motion, (u, v), sight);
+        let (start, from) = left.unwrap_or((u, node));
+        let here = &mut blocks[start / BLOCK..u / BLOCK + 1];
+        for (at, block) in here.iter_mut().enumerate() {
+            *block = between([&from, &node], u - start, at * BLOCK, golden.levels.0);
         }
+        left = Some((u, node));
     }
+}
 
-    /// The displacement by a motion of what the node at pixel (u, v) sees.
-    fn node(&self, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
-        let at = |point: Vector| {
-            let back = motion.undo(point);
-            let to = self.triangulator.camera().project(back);
-            let (column, row) = to.unwrap_or((f64::NAN, f64::NAN));
-            [column - u as f64, row - v as f64, back.z - point.z]
-        };
-        let ([low, middle, high], half) = (sight.map(at), self.levels.1);
-        [
-            middle,
-            core::array::from_fn(|i| (high[i] - low[i]) / (2.0 * half)),
-            core::array::from_fn(|i| (high[i] - 2.0 * middle[i] + low[i]) / (2.0 * half * half)),
-        ]
-    }
+/// The displacement by a motion of what the node at pixel (u, v) sees.
+fn node(golden: &Golden, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
+    let at = |point: Vector| {
+        let back = motion.undo(point);
+        let to = golden.triangulator.camera().project(back);
+        let (column, row) = to.unwrap_or((f64::NAN, f64::NAN));
+        [column - u as f64, row - v as f64, back.z - point.z]
+    };
+    let ([low, middle, high], half) = (sight.map(at), golden.levels.1);
+    [
+        middle,
+        core::array::from_fn(|i| (high[i] - low[i]) / (2.0 * half)),
+        core::array::from_fn(|i| (high[i] - 2.0 * middle[i] + low[i]) / (2.0 * half * half)),
+    ]
+}
 
-    /// The point at height `z` that pixel (u, v) sees.
-    pub(super) fn seen(&self, u: usize, v: usize, z: f64) -> Option<Vector> {
-        self.triangulator
-            .point(u, v, crate::units::Height::from_mm(z))
-    }
-
-    /// Where the point of the part that was seen at (u, v) when it was taught is seen now.
-    fn moved(&self, motion: &Motion, (u, v): (f64, f64)) -> (f64, f64) {
-        let (width, height) = self.size();
-        let column = libm::rint(u.clamp(0.0, (width - 1) as f64));
-        let row = libm::rint(v.clamp(0.0, (height - 1) as f64));
-        let taught = self.cubics.surface().height[row as usize * width + column as usize];
-        let z = if taught.is_known() {
-            taught.mm()
-        } else {
-            self.levels.0
-        };
-        let to = self
-            .seen(column as usize, row as usize, z)
-            .and_then(|point| self.triangulator.camera().project(motion.apply(point)));
-        to.map_or((u, v), |to| (u + to.0 - column, v + to.1 - row))
-    }
+/// Where the point of the part that was seen at (u, v) when it was taught is seen now.
+fn moved(golden: &Golden, motion: &Motion, (u, v): (f64, f64)) -> (f64, f64) {
+    let (width, height) = golden.size();
+    let column = libm::rint(u.clamp(0.0, (width - 1) as f64));
+    let row = libm::rint(v.clamp(0.0, (height - 1) as f64));
+    let (u0, v0) = (column as usize, row as usize);
+    let to = golden
+        .seen(u0, v0, golden.height_mm(v0 * width + u0))
+        .and_then(|point| golden.triangulator.camera().project(motion.apply(point)));
+    to.map_or((u, v), |to| (u + to.0 - column, v + to.1 - row))
 }

@@ -8,7 +8,7 @@ use core::ops::Range;
 
 /// A ring of rows: row v lies at v modulo their number.
 #[derive(Debug)]
-pub(super) struct RecentRows {
+pub struct RecentRows {
     width: usize,
     rows: usize,
     /// Deviations from golden along the normal in nm, weighted; [`NO_OFFSET`] where the part is not

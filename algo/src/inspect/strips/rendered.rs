@@ -20,7 +20,7 @@
 //! taught. Deviations of parts in front of the simulated head are compared with it in
 //! `tests/suite/every_part.rs`.
 
-use super::Production;
+use super::plan::Production;
 use crate::inspect::align::Motion;
 use crate::phase::Trust;
 use crate::pipeline::{PhaseMap, for_each_row};
@@ -41,7 +41,7 @@ impl Production {
         modulation: &[Modulation],
         seed: Option<u64>,
     ) -> PhaseMap {
-        let (width, height) = self.size();
+        let (width, height) = self.golden.size();
         let map = self.map();
         let mut rows = vec![None; width * height];
         for_each_row(&mut rows, width, |v, row| {
@@ -74,18 +74,14 @@ impl Production {
         (u, v): (usize, usize),
         seed: Option<u64>,
     ) -> Option<(AbsolutePhase, Modulation)> {
-        let (width, height) = self.size();
+        let Self { golden, phase, .. } = self;
+        let (width, height) = golden.size();
         let place = v * width + u;
-        let golden = self.cubics.surface().height[place];
-        let mut z = if golden.is_known() {
-            golden.mm()
-        } else {
-            self.levels.0
-        };
+        let mut z = golden.height_mm(place);
         let (mut step, mut seen) = (f64::INFINITY, (0.0, 0.0));
         for _ in 0..STEPS {
-            let back = motion.undo(self.seen(u, v, z)?);
-            seen = self.triangulator.camera().project(back)?;
+            let back = motion.undo(golden.seen(u, v, z)?);
+            seen = golden.triangulator.camera().project(back)?;
             step = self.golden_height(seen)? - back.z;
             z += step;
             if libm::fabs(step) <= LAST_STEP_MM {
@@ -98,42 +94,32 @@ impl Production {
         }
         let draw = |seed: u64| normal((seed << 32) ^ place as u64);
         let [first, second] = seed.map_or([0.0; 2], draw);
-        let full = f64::from(u16::MAX);
-        let noise = |of: Modulation| {
-            self.noise
-                .at(f64::from(of.to_bits()) / full * self.counts())
-        };
+        let decoder = &phase.decoder;
+        let (full, most) = (f64::from(u16::MAX), decoder.full_scale());
+        let counts = |light: Modulation| f64::from(light.to_bits()) / full * f64::from(most);
         let light = modulation[row * width + column];
-        let scatter = self.decoder.modulation_noise(noise(light)) * full / self.counts();
+        let noise = phase.noise.at(counts(light));
+        let scatter = decoder.modulation_noise(noise) * full / f64::from(most);
         let bits = f64::from(light.to_bits()) + scatter * first;
         let light = Modulation::from_bits(libm::rint(bits.clamp(0.0, full)) as u16);
-        let least = self
-            .decoder
-            .least_modulation()
-            .counts(self.decoder.full_scale());
-        if f64::from(light.to_bits()) / full * self.counts() < least {
+        if counts(light) < decoder.least_modulation().counts(most) {
             return None;
         }
-        let phase = self.triangulator.sight(u as f64, v as f64)?.phase(z)?;
-        let turns = self.decoder.phase_noise(light, self.noise) * second;
-        let phase = AbsolutePhase::from_turns(phase + turns);
+        let turns = golden.triangulator.sight(u as f64, v as f64)?.phase(z)?;
+        let noise = decoder.phase_noise(light, phase.noise) * second;
+        let phase = AbsolutePhase::from_turns(turns + noise);
         phase.is_known().then_some((phase, light))
-    }
-
-    /// Samples at full scale.
-    fn counts(&self) -> f64 {
-        f64::from(self.decoder.full_scale())
     }
 
     /// Golden's height between pixels, mm, by a cubic in each direction; none where one of the
     /// sixteen pixels is not known.
     fn golden_height(&self, (u, v): (f64, f64)) -> Option<f64> {
-        let (width, height) = self.size();
+        let (width, height) = self.golden.size();
         let (left, top) = (libm::floor(u), libm::floor(v));
         if left < 1.0 || top < 1.0 || left + 2.0 >= width as f64 || top + 2.0 >= height as f64 {
             return None;
         }
-        let surface = self.cubics.surface();
+        let surface = self.golden.cubics.surface();
         let (along, down) = (cubic(u - left), cubic(v - top));
         let first = (top as usize - 1) * width + left as usize - 1;
         let mut sum = 0.0;

@@ -1,21 +1,48 @@
-//! One strip: its rows, through the stages one after the other.
+//! The strips of a frame, each of which takes its rows through the stages one after the other.
 
-use super::coordinates::TaughtCoordinates;
+use super::coordinates::{Comparison, TaughtCoordinates};
 use super::counts::Counts;
+use super::decode::Input;
 use super::deviation::SquareNoise;
 use super::height::HeightRow;
+use super::maps::Maps;
+use super::plan::Production;
 use super::pose::PoseField;
 use super::recent::RecentRows;
+use super::spans::common;
 use super::squares::Squares;
-use super::{Input, Maps, Production};
-use crate::inspect::align::{Alignment, Sample};
+use super::squares::extreme::Extreme;
+use crate::inspect::align::{Alignment, FitBuffers, Sample};
+use crate::inspect::gauge::{Cell, Sum};
 use crate::pipeline::{NO_OFFSET, PhaseMap};
 use alloc::vec::Vec;
 use core::ops::Range;
 
+/// The strips of a frame, with the buffers of an inspection. Reused from cycle to cycle, so that a
+/// cycle allocates nothing.
+#[derive(Debug)]
+pub struct Strips {
+    pub(super) strips: Vec<Strip>,
+    /// Rows of each strip; the last may have fewer.
+    pub(super) rows: usize,
+    pub(super) pose: PoseField,
+    /// Points of all strips that the part's motion is found from.
+    pub(super) samples: Vec<Sample>,
+    pub(super) fitting: FitBuffers,
+    pub(super) cells: CellBuffers,
+}
+
+/// Buffers for the cells of one gauge after the other.
+#[derive(Debug, Default)]
+pub struct CellBuffers {
+    pub sums: Vec<Sum>,
+    pub cells: Vec<Cell>,
+    pub weights: Vec<f64>,
+}
+
 /// A strip of rows: the state of each stage, and what it found.
 #[derive(Debug)]
-pub(super) struct Strip {
+pub struct Strip {
     rows: Range<usize>,
     /// Of the row that it works on.
     decoded: PhaseMap,
@@ -31,14 +58,14 @@ pub(super) struct Strip {
 impl Strip {
     /// Of these rows.
     pub fn new(plan: &Production, rows: Range<usize>) -> Self {
-        let width = plan.size().0;
+        let (width, gauges) = (plan.golden.size().0, &plan.gauges);
         Self {
             decoded: PhaseMap::new(width, 1),
             heights: HeightRow::new(width),
-            coordinates: TaughtCoordinates::new(width),
-            recent: RecentRows::new(width, plan.gauges.largest_side()),
-            counts: Counts::new(plan),
-            squares: Squares::new(plan, &rows),
+            coordinates: TaughtCoordinates::new(width, !gauges.patches.is_empty()),
+            recent: RecentRows::new(width, gauges.largest_side()),
+            counts: Counts::new(gauges),
+            squares: Squares::new(gauges, width, &rows),
             samples: Vec::new(),
             rows,
         }
@@ -56,22 +83,25 @@ impl Strip {
         self.recent.overflow = None;
         self.counts.clear();
         self.squares.clear();
-        let width = plan.size().0;
-        let halo = plan.gauges.largest_side().map_or(0, |side| side / 2);
+        let (golden, gauges) = (&plan.golden, &plan.gauges);
+        let with = plan.comparison(pose);
+        let width = golden.size().0;
+        let halo = gauges.largest_side().map_or(0, |side| side / 2);
         let rows = self.rows.start.saturating_sub(halo)..self.rows.end + halo;
-        let written = rows.start..plan.window.len();
+        let written = rows.start..golden.window.len();
         for v in rows {
             if written.contains(&v) {
-                let columns = plan.window[v].clone();
+                let columns = golden.window[v].clone();
                 self.measure(plan, input, v, columns.clone());
-                self.align(plan, pose, v, columns);
+                self.align(with, v, columns);
                 if self.rows.contains(&v) {
                     let measured = (&self.decoded, &self.heights);
                     let aligned = (&self.coordinates, self.recent.extent(v));
-                    self.counts.add(plan, pose, v, measured, aligned);
+                    self.counts.add(with, gauges, v, measured, aligned);
                     if let Some(heights) = &mut maps.heights {
                         let row = (v - self.rows.start) * width;
-                        self.heights.store(plan, v, &mut heights[row..row + width]);
+                        self.heights
+                            .store(golden, v, &mut heights[row..row + width]);
                     }
                 }
                 if let Some(deviation) = &mut maps.deviation
@@ -82,30 +112,32 @@ impl Strip {
                 }
             }
             let rows = (&self.rows, &written);
-            self.squares.slide(plan, pose, v, &self.recent, rows);
+            self.squares.slide(with, gauges, v, &self.recent, rows);
         }
     }
 
     /// Stages 1 and 2 of columns of row `v`.
     fn measure(&mut self, plan: &Production, input: Input<'_>, v: usize, columns: Range<usize>) {
-        if !columns.is_empty() {
-            plan.decode(input, v, columns.clone(), &mut self.decoded);
-        }
+        let (golden, phase) = (&plan.golden, &plan.phase);
         let (decoded, recent) = (&mut self.decoded, &mut self.recent);
-        self.heights.find(plan, decoded, v, columns, recent);
+        if !columns.is_empty() {
+            phase.decode(golden, input, v, columns.clone(), decoded);
+        }
+        self.heights
+            .find(golden, phase, decoded, v, columns, recent);
     }
 
     /// Stage 3 of columns of row `v`.
-    fn align(&mut self, plan: &Production, pose: &PoseField, v: usize, columns: Range<usize>) {
-        let rows = (&self.heights, &mut self.recent);
-        self.coordinates.align(plan, pose, v, columns, rows);
+    fn align(&mut self, with: Comparison<'_>, v: usize, columns: Range<usize>) {
+        let (heights, recent) = (&self.heights, &mut self.recent);
+        self.coordinates.align(with, v, columns, heights, recent);
     }
 
     /// Keeps the points of its rows that the part's motion is found from.
     pub fn sample(&mut self, plan: &Production, alignment: &Alignment, input: Input<'_>) {
         self.samples.clear();
         // The windows of a pair's spots share pixels where the spots are dense.
-        let share = libm::sqrt(plan.spot_variance()) * 1e-6;
+        let share = libm::sqrt(plan.budget.spot_variance()) * 1e-6;
         let (first, spots) = alignment.spots(self.rows.clone());
         let mut at = first;
         for row in spots.chunk_by(|a, b| a.v == b.v) {
@@ -114,12 +146,12 @@ impl Strip {
             for spot in row {
                 let offset = self.heights.offset[spot.u];
                 if offset != NO_OFFSET {
-                    let slope = plan.slope((spot.u, v), self.decoded.phase[spot.u]);
+                    let slope = plan.golden.slope((spot.u, v), self.decoded.phase[spot.u]);
                     let modulation = self.decoded.modulation[spot.u];
                     let above = f64::from(offset) * 1e-6;
                     self.samples.push(Sample {
-                        point: plan.triangulator.higher(spot.point, above),
-                        sigma: plan.sigma_nm(modulation, slope) * share,
+                        point: plan.golden.triangulator.higher(spot.point, above),
+                        sigma: plan.phase.sigma_nm(modulation, slope) * share,
                         over: Some((at, above)),
                     });
                 }
@@ -128,32 +160,41 @@ impl Strip {
         }
     }
 
-    /// Adds the pixels of row `v` inside `columns` to the noise of a square.
-    pub fn add_noise(
+    /// The noise of the pixels of a square of `side` pixels.
+    pub fn noise_of(
         &mut self,
         plan: &Production,
         pose: &PoseField,
         input: Input<'_>,
-        v: usize,
-        columns: Range<usize>,
-        noise: &mut SquareNoise,
-    ) {
-        self.measure(plan, input, v, columns.clone());
-        self.align(plan, pose, v, columns.clone());
-        self.coordinates
-            .find(plan, pose, v, columns.clone(), &self.heights);
-        let deviation = self.recent.row(v);
-        for u in columns {
-            if deviation[u] != NO_OFFSET {
-                let slope = plan.slope((u, v), self.decoded.phase[u]);
-                let factor = self.coordinates.factor(plan, u);
-                let sigma = plan.sigma_nm(self.decoded.modulation[u], slope);
+        square: &Extreme,
+        side: usize,
+    ) -> SquareNoise {
+        let (golden, with) = (&plan.golden, plan.comparison(pose));
+        let half = side / 2;
+        let bottom = (square.row + half + 1).min(golden.window.len());
+        let mut noise = SquareNoise::new(side);
+        for v in square.row.saturating_sub(half)..bottom {
+            let left = square.column.saturating_sub(half);
+            let columns = common(&(left..square.column + half + 1), &golden.window[v]);
+            if columns.is_empty() {
+                continue;
+            }
+            self.measure(plan, input, v, columns.clone());
+            self.align(with, v, columns.clone());
+            self.coordinates
+                .find(with, v, columns.clone(), &self.heights);
+            let deviation = self.recent.row(v);
+            for u in columns.filter(|u| deviation[*u] != NO_OFFSET) {
+                let slope = golden.slope((u, v), self.decoded.phase[u]);
+                let factor = self.coordinates.factor(golden, u);
+                let sigma = plan.phase.sigma_nm(self.decoded.modulation[u], slope);
                 let lift = noise.is_sampled(u, v).then(|| {
-                    let offset = self.heights.offset[u];
-                    plan.lift(pose.placed.as_ref()?, (u, v), offset)
+                    let (alignment, placed) = (plan.alignment.as_ref()?, pose.placed.as_ref()?);
+                    golden.lift(alignment, placed, (u, v), self.heights.offset[u])
                 });
                 noise.add(factor, sigma * 1e-6, lift.flatten());
             }
         }
+        noise
     }
 }

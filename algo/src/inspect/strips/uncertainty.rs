@@ -16,11 +16,11 @@
 //!   differ. ρ is that of the place where it is largest, and taken to have the sign that does most
 //!   everywhere.
 
-use super::Production;
-use super::pair::{correlated, smoothed};
-use crate::inspect::Reading;
-use crate::inspect::align::{Alignment, Placed};
-use crate::inspect::gauge::Found;
+use super::pair::shared::{correlated, smoothed};
+use crate::inspect::align::Placed;
+use crate::inspect::gauge::{Found, Reading};
+use crate::inspect::largest::Largest;
+use alloc::vec::Vec;
 
 /// σ by the error of the calibration; 0 where it is not known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,17 +36,37 @@ const LEAST_NOISE: f64 = 0.01;
 
 /// What a value is made of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Made {
+pub enum Made {
     /// Heights.
     OfHeights,
     /// Deviations from golden.
     OfDeviations,
 }
 
-impl Production {
+/// What the errors of readings are made of, besides the noise of the part that is measured.
+#[derive(Debug)]
+pub struct ErrorBudget {
+    /// σ of golden's heights, as a multiple of the taught σ.
+    pub golden_noise: f64,
+    /// Per gauge, what a deviation is on good parts whose only noise is golden's, and on those that
+    /// lie elsewhere than golden.
+    pub largest: Vec<Largest>,
+    pub displaced: Vec<Option<Largest>>,
+    /// What a pixel in the middle of the frame sees, mm.
+    pub pixel_mm: f64,
+    pub calibration: CalibrationError,
+    /// RMS of the periodic error of a mean height, mm.
+    pub ripple: f64,
+    /// Whether neighbouring phases share pixels: those of a pair.
+    pub shared: bool,
+    /// About how many pixels there are to each spot of the alignment.
+    pub pixels_per_spot: f64,
+}
+
+impl ErrorBudget {
     /// A reading; σ_z is `noisier` times the taught σ, and the variances of pixels were multiplied
     /// by `smoothed`.
-    pub(super) fn reading_of(
+    pub fn reading_of(
         &self,
         found: Found,
         made: Made,
@@ -77,15 +97,15 @@ impl Production {
     }
 
     /// Variance of golden's heights over that of the measured ones.
-    pub(super) fn golden_variance(&self, noisier: f64) -> f64 {
+    pub fn golden_variance(&self, noisier: f64) -> f64 {
         let ratio = self.golden_noise / noisier.max(LEAST_NOISE);
         ratio * ratio
     }
 
     /// The variance of the mean over a square of `side` pixels, over that of the mean of as many
     /// independent pixels ([`smoothed`]): 1 but for a pair.
-    pub(super) fn square_variance(&self, side: usize) -> f64 {
-        match self.decoder.is_pair() {
+    pub fn square_variance(&self, side: usize) -> f64 {
+        match self.shared {
             true => smoothed(side),
             false => 1.0,
         }
@@ -93,8 +113,8 @@ impl Production {
 
     /// What neighbouring cells of `side` pixels add to the variance of a sum over the squares of
     /// all ([`correlated`]): 1 but for a pair.
-    pub(super) fn cells_together(&self, side: usize) -> f64 {
-        match self.decoder.is_pair() {
+    pub fn cells_together(&self, side: usize) -> f64 {
+        match self.shared {
             true => correlated(side),
             false => 1.0,
         }
@@ -102,21 +122,18 @@ impl Production {
 
     /// The variance of a spot of the alignment, over that of an independent pixel: 1 but for a
     /// pair, whose windows share pixels where the spots are dense.
-    pub(super) fn spot_variance(&self) -> f64 {
-        let apart = self
-            .alignment
-            .as_ref()
-            .map_or(1.0, Alignment::pixels_per_spot);
-        self.square_variance(1).max(1.0 / apart.max(1.0)).min(1.0)
+    pub fn spot_variance(&self) -> f64 {
+        let apart = self.pixels_per_spot.max(1.0);
+        self.square_variance(1).max(1.0 / apart).min(1.0)
     }
 
     /// What the periodic errors of golden and of a displaced part make of a deviation, mm.
-    pub(super) fn rippled(&self) -> f64 {
+    pub fn rippled(&self) -> f64 {
         core::f64::consts::SQRT_2 * self.ripple
     }
 
     /// By how much a length as long as the part's displacement is wrong, mm.
-    pub(super) fn displaced(&self, placed: Option<&Placed>) -> f64 {
+    pub fn displaced(&self, placed: Option<&Placed>) -> f64 {
         placed.map_or(0.0, |placed| placed.reach * self.calibration.length)
     }
 }

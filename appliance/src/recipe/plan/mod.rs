@@ -20,7 +20,7 @@ use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::head::seam;
 use crate::recipe::light::{GoldenLight, Light};
-use crate::recipe::{Conditions, Demands, Recipe, RecipeId, RecipeSequence, SequenceKind};
+use crate::recipe::{Conditions, Demands, Recipe, RecipeId, SequenceKind};
 use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{
     FULL_SEQUENCE, JUDGES_NOTHING, SIMULATED, SINGLE_LEVEL, TWO_LEVELS,
@@ -47,7 +47,7 @@ pub struct Plan {
     demands: Demands,
     /// The light of its patterns.
     illumination: Illumination,
-    /// What the rasters show, each shot once; those of the first sequence come first.
+    /// What the rasters show, each once; those of the first run come first.
     shots: Vec<Shot>,
     /// The sequences in the order in which they are tried; each unwraps further than the one
     /// before. Methods take the index of one as `sequence`.
@@ -65,8 +65,6 @@ pub const STRIPS: usize = 4;
 /// Heights are planned this many pixels around the taught part at least: a part that is not aligned
 /// may be displaced by that.
 const AROUND: usize = 16;
-/// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
-const MAX_PATTERN_BYTES: usize = 256 << 20;
 
 impl Plan {
     /// Joins a recipe and a calibration.
@@ -137,48 +135,22 @@ impl Plan {
             amplitude: std::mem::take(&mut arrays.amplitude),
         };
         arrays.height_curvature = Vec::new();
-        let (camera, raster) = (conditions.camera, conditions.raster);
-        let size = (camera.0 as usize, camera.1 as usize);
+        let (columns, rows, _) = conditions.camera;
+        let size = (columns as usize, rows as usize);
         let [low, high] = conditions.range_mm;
         let triangulator = calibration.triangulator(function, Some(HeightRange { low, high }));
         let triangulator = triangulator.map_err(|error| error.to_string())?;
-        let aligned = demands.aligned;
-        let away = match aligned {
-            true => window::pixels(&triangulator, demands.tolerance_mm),
-            false => 0,
-        };
-        let mut window = window::of(&gauges, size, (away, arrays.widest()));
-        if aligned {
-            window::add_compared(&mut window, &arrays.valid, size.0);
-        }
-        let range = triangulator.function().range();
-        // The golden surface is measured by the sequence that is projected first, so that
-        // deviations by this sequence have no error of another sequence in golden.
+        let (window, away) = window::of(&gauges, size, &triangulator, &demands, &arrays);
+        // The golden surface is by the sequence that is projected first, so that deviations by that
+        // have no other error of golden's.
         let base = sequences.first().and_then(|first| first.offset);
         let base = base.filter(|_| !arrays.sequence_offset.is_empty());
-        let mut shots = Vec::new();
         let surface = golden::surface(size.0, &arrays, golden::offset(&arrays, base));
         let shares = normal_shares(&triangulator, &surface);
-        let prepared = {
-            let noise = conditions.noise;
-            let range = (range, camera.2, conditions.least_modulation);
-            // Golden was measured with the full sequence, the last.
-            let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
-            let runs = sequences.into_iter();
-            let golden = (&arrays, &shares[..], base);
-            runs.map(|sequence| Prepared::of(sequence, (noise, taught), golden, range, &mut shots))
-                .collect::<Result<Vec<_>, _>>()?
-        };
+        let range = triangulator.function().range();
+        let golden = (&arrays, &shares[..], base);
+        let (prepared, shots) = Prepared::all(sequences, &conditions, golden, range)?;
         drop(shares);
-        let patterns = shots.len() * raster.0 as usize * raster.1 as usize;
-        if patterns > MAX_PATTERN_BYTES {
-            return Err(format!(
-                "its sequences show {} patterns of {} MiB together, at most {} are held: teach it with fewer frames",
-                shots.len(),
-                patterns >> 20,
-                MAX_PATTERN_BYTES >> 20
-            ));
-        }
         let golden_light = GoldenLight::of(&arrays, conditions.golden_offset_counts);
         let noise_counts = golden::even_noise(conditions.noise, &arrays);
         let modulation = match two_frames {
@@ -194,15 +166,13 @@ impl Plan {
         let range = conditions.expansion_range_turns;
         let cubics = HeightCubics::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {
-            aligned,
+            conditions: &conditions,
+            aligned: demands.aligned,
             triangulator: Arc::new(triangulator),
             cubics: Arc::new(cubics),
             gauges,
             window,
-            noise: conditions.noise,
             noise_counts,
-            calibration: conditions.calibration,
-            good_parts: conditions.good_parts,
             golden,
             picture: (modulation, away as f64),
         };
@@ -275,7 +245,7 @@ impl Plan {
         &self.runs[0].production
     }
 
-    /// The production of the first sequence, by value.
+    /// The same by value.
     pub fn into_production(mut self) -> Production {
         self.runs.swap_remove(0).production
     }

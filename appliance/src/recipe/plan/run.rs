@@ -2,36 +2,36 @@
 
 use super::golden;
 use crate::recipe::archive::Arrays;
-use crate::recipe::good_parts::GoodPartsFile;
-use crate::recipe::{RecipeSequence, SequenceKind};
+use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
-use algo::inspect::{
-    Basis, CalibrationError, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught,
-};
+use algo::inspect::{Basis, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught};
 use algo::pattern::{PhaseRange, Shot};
-use algo::phase::{Arrived, Decoder, LeastModulation};
+use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
 use algo::units::{AbsolutePhase, Modulation};
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
+/// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
+const MAX_PATTERN_BYTES: usize = 256 << 20;
+
 /// A sequence that the part can be measured with.
 #[derive(Debug)]
 pub(super) struct Run {
     pub kind: SequenceKind,
-    /// Which of the plan's rasters the frames of the sequence show.
+    /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
-    /// What a run of two frames needs; `None` for other sequences.
+    /// Of two frames.
     pub pair: Option<Pair>,
     /// Memory for the levels that are decoded on arrival, allocated by the first cycle.
     pub arrived: Mutex<Option<Arrived>>,
-    /// Bytes of the run's maps.
+    /// Bytes of its maps.
     pub bytes: usize,
 }
 
-/// What a run of two frames has beside what every run has.
+/// What a run of two frames has beside the others.
 #[derive(Debug)]
 pub(super) struct Pair {
     /// Golden's picture; none if it has no edges, and then every cycle falls back.
@@ -40,16 +40,14 @@ pub(super) struct Pair {
 }
 
 /// What all runs of a recipe share.
-pub(super) struct Shared {
+pub(super) struct Shared<'a> {
+    pub conditions: &'a Conditions,
     pub aligned: bool,
     pub triangulator: Arc<Triangulator>,
     pub cubics: Arc<HeightCubics>,
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
-    pub noise: SampleNoise,
     pub noise_counts: f64,
-    pub calibration: CalibrationError,
-    pub good_parts: Option<GoodPartsFile>,
     pub golden: GoldenNoise,
     /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what
     /// two frames need.
@@ -62,12 +60,10 @@ pub(super) struct GoldenNoise {
     /// σ of the phase of a pixel of full modulation, turns per count of noise: in one capture by
     /// the full sequence.
     full: f64,
-    /// σ of the phase in one capture by the sequence that the golden surface is measured by, in the
-    /// same unit.
+    /// The same by the sequence that the golden surface is by, and the offset of that.
     base: f64,
     offset: Option<usize>,
-    /// For each gauge, the largest deviation that the noise of one capture by the full sequence
-    /// causes.
+    /// Per gauge, what the noise of one capture by the full sequence makes of it.
     largest: Vec<Largest>,
 }
 
@@ -78,28 +74,57 @@ pub(super) struct Prepared {
     decoder: Decoder,
     taught: Taught,
     map: Option<Vec<AbsolutePhase>>,
-    /// The sequence's modulation over that of golden.
+    /// Its modulation over that of golden.
     brighter: f64,
-    /// The index of golden's offset by this sequence; `None` where there is no offset.
+    /// Which offset from the full sequence golden has by this one.
     offset: Option<usize>,
     /// RMS of the periodic error of mean heights, mm.
     ripple_mm: f64,
 }
 
 impl Prepared {
-    /// Prepares a sequence for phases of `range` with at least so much modulation; the recipe's
-    /// arrays can be dropped then. `rasters` are what all runs show; what only this run shows is
-    /// added. `fundamental` is that of the waveform that golden's modulation was measured with;
-    /// `shares` of deviations lie along the normal; `base` is the offset of the sequence that the
-    /// golden surface is measured by.
-    pub fn of(
+    /// Prepares all sequences for phases of `range`; the recipe's arrays can be dropped then.
+    /// Deviations lie by `shares` along the normal; `base` is the offset of the sequence that the
+    /// golden surface is by. The second value is what all of them show, each raster once.
+    pub fn all(
+        sequences: Vec<RecipeSequence>,
+        conditions: &Conditions,
+        golden: (&Arrays, &[f32], Option<usize>),
+        range: PhaseRange,
+    ) -> Result<(Vec<Self>, Vec<Shot>), String> {
+        let mut shots = Vec::new();
+        // Golden was measured with the full sequence, the last.
+        let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
+        let prepared = sequences
+            .into_iter()
+            .map(|sequence| {
+                let brighter = sequence.fundamental() / taught;
+                Self::of(sequence, conditions, brighter, golden, range, &mut shots)
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let (columns, rows) = conditions.raster;
+        let patterns = shots.len() * columns as usize * rows as usize;
+        if patterns > MAX_PATTERN_BYTES {
+            return Err(format!(
+                "its sequences show {} patterns of {} MiB together, at most {} are held: teach it with fewer frames",
+                shots.len(),
+                patterns >> 20,
+                MAX_PATTERN_BYTES >> 20
+            ));
+        }
+        Ok((prepared, shots))
+    }
+
+    /// Prepares a sequence with `brighter` times golden's modulation. What it shows and `rasters`
+    /// do not have is added to them.
+    fn of(
         sequence: RecipeSequence,
-        (noise, fundamental): (SampleNoise, f64),
+        conditions: &Conditions,
+        brighter: f64,
         (arrays, shares, base): (&Arrays, &[f32], Option<usize>),
-        (range, bit_depth, least): (PhaseRange, u8, LeastModulation),
+        range: PhaseRange,
         rasters: &mut Vec<Shot>,
     ) -> Result<Self, String> {
-        let brighter = sequence.fundamental() / fundamental;
         let RecipeSequence {
             kind,
             shots,
@@ -109,8 +134,9 @@ impl Prepared {
         } = sequence;
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
         let offsets = (golden::offset(arrays, offset), golden::offset(arrays, base));
-        let decoder = Decoder::new(&levels, range, bit_depth).map_err(|error| error.to_string())?;
-        let decoder = decoder.with_least_modulation(least);
+        let decoder = Decoder::new(&levels, range, conditions.camera.2);
+        let decoder = decoder.map_err(|error| error.to_string())?;
+        let decoder = decoder.with_least_modulation(conditions.least_modulation);
         let indices = shots.into_iter().map(|shot| {
             let shown = rasters.iter().position(|known| *known == shot);
             shown.unwrap_or_else(|| {
@@ -121,7 +147,7 @@ impl Prepared {
         Ok(Self {
             kind,
             indices: indices.collect(),
-            taught: golden::taught((noise, brighter), arrays, shares, &decoder),
+            taught: golden::taught((conditions.noise, brighter), arrays, shares, &decoder),
             map: golden::map(arrays, kind, offsets),
             decoder,
             brighter,
@@ -130,8 +156,8 @@ impl Prepared {
         })
     }
 
-    /// The noise of golden in frames of `width` columns; `self` is the full sequence, and the
-    /// golden surface is measured by the sequence `base`.
+    /// The noise of golden, where this is the full sequence, in frames of `width` columns. The
+    /// golden surface is by the sequence `base`.
     pub fn golden_noise(
         &self,
         base: &Self,
@@ -158,12 +184,12 @@ impl Prepared {
         self.decoder.phase_noise(full, noise)
     }
 
-    /// σ of golden's heights in deviations by this sequence, over σ of the heights of one
-    /// measurement by this sequence.
+    /// σ of golden's heights that deviations by this sequence have, over that of one measurement by
+    /// it.
     ///
-    /// Deviations are from golden's phase by this sequence. Where the golden surface is measured by
-    /// another sequence, a displaced part is compared with heights by that sequence, and the
-    /// heights at both places have its noise.
+    /// Golden's phase by this sequence is what deviations are from. Where the golden surface is by
+    /// another one, a displaced part is compared with heights by that one, and the heights of both
+    /// places have its noise.
     fn noise_of_golden(&self, golden: &GoldenNoise) -> f64 {
         let own = self.phase_noise();
         let measured = self.offset.is_some() || self.kind == SequenceKind::Full;
@@ -175,8 +201,8 @@ impl Prepared {
         (variance / golden.captures).sqrt() / own
     }
 
-    /// Joins the sequence with what all sequences share.
-    pub fn join(self, shared: &Shared) -> Result<Run, String> {
+    /// Joins it with what all sequences share.
+    pub fn join(self, shared: &Shared<'_>) -> Result<Run, String> {
         let golden_noise = self.noise_of_golden(&shared.golden);
         let over_full = golden_noise * self.phase_noise() / shared.golden.full;
         let largest = shared.golden.largest.iter();
@@ -192,7 +218,7 @@ impl Prepared {
         } = self;
         let displaced = |gauge: &Gauge| {
             let side = gauge.measure.facts().basis.square_side()?;
-            shared.good_parts?.displaced(side)
+            shared.conditions.good_parts?.displaced(side)
         };
         let bytes = size_of_val(map.as_deref().unwrap_or(&[])) + taught.bytes();
         let production = Production::new(Parts {
@@ -203,13 +229,13 @@ impl Prepared {
             taught,
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
-            noise: shared.noise.by([0.0, 1.0 / brighter]),
+            noise: shared.conditions.noise.by([0.0, 1.0 / brighter]),
             noise_counts: shared.noise_counts,
             aligned: shared.aligned,
             golden_noise,
             largest: largest.map(|largest| largest.times(over_full)).collect(),
             displaced: shared.gauges.iter().map(displaced).collect(),
-            calibration: shared.calibration,
+            calibration: shared.conditions.calibration,
             ripple: ripple_mm,
         });
         let production = production.map_err(|error| error.to_string())?;

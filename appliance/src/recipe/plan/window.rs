@@ -1,19 +1,28 @@
 //! The part of the frame that the gauges need.
 
+use crate::recipe::Demands;
+use crate::recipe::archive::Arrays;
 use algo::geometry::Triangulator;
 use algo::inspect::Gauge;
 use algo::units::Height;
 use std::ops::Range;
 
 /// The columns of each row of a frame of (width, height) that some gauge needs: its region, half of
-/// its smoothing square and `away` pixels around it, by which the part may be displaced. Nothing
-/// outside is computed.
+/// its smoothing square and around it as many pixels as the part may be displaced by, which are the
+/// second value. Nothing outside is computed. A part's motion is found from all pixels that are
+/// compared.
 pub(super) fn of(
     gauges: &[Gauge],
     (width, height): (usize, usize),
-    (away, widest): (usize, usize),
-) -> Vec<Range<usize>> {
-    let mut window = vec![0..0; height];
+    triangulator: &Triangulator,
+    demands: &Demands,
+    arrays: &Arrays,
+) -> (Vec<Range<usize>>, usize) {
+    let (mut window, widest) = (vec![0..0; height], arrays.widest());
+    let away = match demands.aligned {
+        true => pixels(triangulator, demands.tolerance_mm),
+        false => 0,
+    };
     for gauge in gauges {
         let side = gauge.measure.facts().basis.square_side();
         let margin = away + side.map_or(0, |side| side.max(widest) / 2);
@@ -30,19 +39,16 @@ pub(super) fn of(
             }
         }
     }
-    window
-}
-
-/// Widens the window to all pixels that are compared, those that are `valid`: the part's motion is
-/// estimated from all of them.
-pub(super) fn add_compared(window: &mut [Range<usize>], valid: &[u8], width: usize) {
-    for (columns, valid) in window.iter_mut().zip(valid.chunks(width.max(1))) {
-        let first = valid.iter().position(|&valid| valid != 0);
-        let last = valid.iter().rposition(|&valid| valid != 0);
-        if let Some((first, last)) = first.zip(last) {
-            widen(columns, first..last + 1);
+    if demands.aligned {
+        for (columns, valid) in window.iter_mut().zip(arrays.valid.chunks(width.max(1))) {
+            let first = valid.iter().position(|&valid| valid != 0);
+            let last = valid.iter().rposition(|&valid| valid != 0);
+            if let Some((first, last)) = first.zip(last) {
+                widen(columns, first..last + 1);
+            }
         }
     }
+    (window, away)
 }
 
 fn widen(columns: &mut Range<usize>, by: Range<usize>) {

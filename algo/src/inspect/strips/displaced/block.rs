@@ -2,14 +2,14 @@
 
 use super::linear::{BLOCK, BlockNumbers, Linear, Whole, floor, is_near};
 use super::pixel::{deviation_of, height, is_small, scaled};
-use super::{Deviations, GoldenMap, OffsetRow};
+use super::row::{Deviations, GoldenMap, OffsetRow};
 use crate::math::nearest::whole;
 use crate::pipeline::{NO_OFFSET, SQUARE};
 use crate::units::Height;
 use core::ops::Range;
 
 /// The pixels of a block, or some of them, and what displaces them.
-pub(super) struct Block<'a> {
+pub struct Block<'a> {
     pub numbers: &'a BlockNumbers,
     pub from: Whole,
     pub linear: Linear,

@@ -23,12 +23,10 @@ mod block;
 mod linear;
 mod next;
 mod pixel;
+mod row;
 mod same;
 
-use crate::inspect::Factor;
-use crate::pipeline::NO_OFFSET;
 use crate::simd::{Backend, Lanes, back_end_entry};
-use crate::units::Height;
 use block::Block;
 use core::ops::Range;
 pub(super) use linear::{
@@ -36,49 +34,8 @@ pub(super) use linear::{
 };
 use next::align_next;
 pub(super) use pixel::{mask, pick, scaled};
+pub(super) use row::{Deviations, GoldenMap, OffsetRow};
 use same::align_same;
-
-/// The golden map that rows are compared with.
-#[derive(Clone, Copy)]
-pub(super) struct GoldenMap<'a> {
-    pub height: &'a [Height],
-    /// See [`crate::pipeline::CubicInput`].
-    pub taught: &'a [u16],
-    /// What deviations in height are multiplied by.
-    pub factor: &'a [Factor],
-    pub width: usize,
-}
-
-/// Deviations of a row, nm; [`NO_OFFSET`] where the part is not compared.
-pub(super) struct Deviations<'a> {
-    /// In height.
-    pub height: &'a mut [i32],
-    /// Along the normal, weighted.
-    pub normal: &'a mut [i32],
-}
-
-impl Deviations<'_> {
-    fn of(&mut self, columns: Range<usize>) -> Deviations<'_> {
-        Deviations {
-            height: &mut self.height[columns.clone()],
-            normal: &mut self.normal[columns],
-        }
-    }
-
-    fn leave_open(&mut self) {
-        self.height.fill(NO_OFFSET);
-        self.normal.fill(NO_OFFSET);
-    }
-}
-
-/// A row of height offsets to be aligned.
-#[derive(Clone, Copy)]
-pub(super) struct OffsetRow<'a> {
-    pub v: usize,
-    pub offset: &'a [i32],
-    /// Displacements of its blocks.
-    pub blocks: &'a [BlockNumbers],
-}
 
 back_end_entry! {
     /// The taught coordinates of columns of a row, rounded to nearest: columns and rows.
@@ -90,32 +47,9 @@ back_end_entry! {
     )
 }
 
-impl GoldenMap<'_> {
-    /// The place of a pixel after a whole displacement, and how many pixels the map has from there
-    /// to the end of the row; none if it has not so many rows.
-    #[inline(always)]
-    fn inside(
-        &self,
-        (u, v): (usize, usize),
-        [along, down]: [i32; 2],
-        rows: usize,
-    ) -> Option<(usize, usize)> {
-        let column = (u as i32).wrapping_add(along);
-        let row = (v as i32).wrapping_add(down);
-        let inside = column >= 0
-            && row >= 0
-            && (column as usize) < self.width
-            && (row as usize + rows) * self.width <= self.height.len();
-        let place = (row as usize)
-            .wrapping_mul(self.width)
-            .wrapping_add(column as usize);
-        inside.then(|| (place, self.width - column as usize))
-    }
-}
-
 /// Aligns columns of a row: writes their deviations from golden at the taught coordinates, and
 /// whether one is too large for sums in 32 bits ([`super::squares::narrow`]).
-pub(super) fn align_row(
+pub fn align_row(
     backend: Backend,
     golden: GoldenMap<'_>,
     row: OffsetRow<'_>,

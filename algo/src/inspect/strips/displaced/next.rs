@@ -3,7 +3,7 @@
 use super::block::Block;
 use super::linear::BLOCK;
 use super::pixel::{deviation_of, height, is_small, mask, pick, scaled, square};
-use super::{Deviations, GoldenMap};
+use super::row::{Deviations, GoldenMap};
 use crate::math::nearest::whole;
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};

@@ -1,7 +1,7 @@
 //! A pixel: the height that it sees, and its deviation from golden between four heights.
 
-use super::super::squares::narrow::MAX_NARROW_NM;
-use crate::inspect::Factor;
+use crate::inspect::strips::squares::narrow::MAX_NARROW_NM;
+use crate::inspect::weight::Factor;
 use crate::pipeline::SQUARE;
 use crate::units::Height;
 

@@ -1,9 +1,9 @@
 //! Blocks whose pixels all have one whole displacement.
 
-use super::super::squares::narrow::MAX_NARROW_NM;
 use super::linear::{BLOCK, Linear, Whole};
 use super::pixel::{deviation_of, height, mask, pick, scaled, square};
-use super::{Deviations, GoldenMap, OffsetRow};
+use super::row::{Deviations, GoldenMap, OffsetRow};
+use crate::inspect::strips::squares::narrow::MAX_NARROW_NM;
 use crate::math::nearest::whole;
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};

@@ -1,8 +1,9 @@
 //! Blocks of pixels against single ones.
 
 use super::*;
-use crate::pipeline::SQUARE;
-use crate::simd::Backend;
+use crate::inspect::weight::Factor;
+use crate::pipeline::{NO_OFFSET, SQUARE};
+use crate::units::Height;
 use std::vec;
 use std::vec::Vec;
 

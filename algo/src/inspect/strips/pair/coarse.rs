@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 /// A picture at one scale.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Coarse {
+pub struct Coarse {
     pub width: usize,
     pub height: usize,
     /// Counts, row-major.

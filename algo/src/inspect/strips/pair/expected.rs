@@ -12,21 +12,30 @@
 //! Within 2⁻¹⁵ turn of the same in double precision:
 //! `expected_phases_are_those_of_double_precision`.
 
-use super::super::Production;
-use super::super::displaced::{BLOCK, BlockNumbers, Linear, Whole, floor, is_near};
-use super::super::pose::PoseField;
 use super::window::ExpectedRow;
+use crate::inspect::strips::displaced::{BLOCK, BlockNumbers, Linear, Whole, floor, is_near};
+use crate::inspect::strips::golden::Golden;
+use crate::inspect::strips::pose::PoseField;
 use crate::math::nearest::whole;
 use crate::pipeline::{COMPARED, CubicRow};
-use crate::simd::{Lanes, back_end_entry};
+use crate::simd::{Backend, Lanes, back_end_entry};
 use crate::units::{AbsolutePhase, Height};
 
 /// Rounds in which the height of a pixel is found.
 const ROUNDS: usize = 2;
 
+/// What a part is expected to show.
+#[derive(Clone, Copy)]
+pub struct Expectation<'a> {
+    pub backend: Backend,
+    pub golden: &'a Golden,
+    /// How it lies; as taught if none.
+    pub pose: Option<&'a PoseField>,
+}
+
 /// What is known of golden.
 #[derive(Clone, Copy)]
-pub(super) struct Golden<'a> {
+pub struct GoldenHeights<'a> {
     height: &'a [Height],
     /// See [`crate::pipeline::CubicInput`].
     taught: &'a [u16],
@@ -36,7 +45,7 @@ pub(super) struct Golden<'a> {
 
 /// A block of pixels along a row.
 #[derive(Clone, Copy)]
-pub(super) struct Pixels<'a> {
+pub struct Pixels<'a> {
     numbers: &'a BlockNumbers,
     from: Whole,
     /// The first one.
@@ -49,33 +58,40 @@ pub(super) struct Pixels<'a> {
 
 /// What was found of a block.
 #[derive(Default)]
-pub(super) struct Sought {
+pub struct Sought {
     /// z − z₀, nm.
     rise: [f32; BLOCK],
     /// Not 0 where the pixel's cubic does not reach there.
     exact: [i32; BLOCK],
 }
 
-impl Production {
-    /// The phases of row `v` for a part that lies as in the field. Around the part and in its
-    /// openings golden's surface is interpolated ([`super::super::Parts::cubics`]).
-    pub(super) fn expect(
-        &self,
-        pose: &PoseField,
-        v: usize,
-        blocks: &mut [BlockNumbers],
-        out: ExpectedRow<'_>,
-    ) {
-        let (width, rows) = self.size();
-        let (backend, surface) = (self.decoder.backend(), self.cubics.surface());
+impl Expectation<'_> {
+    /// The phases of row `v`. Around the part and in its openings golden's surface is interpolated
+    /// ([`Parts::cubics`](crate::inspect::Parts::cubics)).
+    pub fn row(self, v: usize, blocks: &mut [BlockNumbers], out: ExpectedRow<'_>) {
+        let Self {
+            backend,
+            golden,
+            pose,
+        } = self;
+        let (width, rows) = golden.size();
+        let (cubics, surface) = (golden.cubics.row(v), golden.cubics.surface());
+        let Some(pose) = pose else {
+            out.phase.copy_from_slice(cubics.base);
+            let taught = golden.taught.row(v, width);
+            for (compared, taught) in out.compared.iter_mut().zip(taught) {
+                *compared = *taught >= COMPARED;
+            }
+            return;
+        };
         pose.row(backend, (v, rows), &(0..width), blocks);
-        let golden = Golden {
+        let heights = GoldenHeights {
             height: &surface.height,
-            taught: self.taught.pixels(),
+            taught: golden.taught.pixels(),
             width,
             rows,
         };
-        let (bases, cubics) = (&surface.height[v * width..][..width], self.cubics.row(v));
+        let bases = &surface.height[v * width..][..width];
         let ExpectedRow { phase, compared } = out;
         let lists = phase.chunks_mut(BLOCK).zip(compared.chunks_mut(BLOCK));
         for ((numbers, start), (phase, compared)) in
@@ -97,39 +113,29 @@ impl Production {
                 cubics,
             };
             let mut sought = Sought::default();
-            expect_block(backend, golden, pixels, phase, compared, &mut sought);
+            expect_block(backend, heights, pixels, phase, compared, &mut sought);
             for (i, phase) in phase.iter_mut().enumerate() {
                 if sought.exact[i] != 0 {
                     let z = pixels.base[i].mm() + f64::from(sought.rise[i]) * 1e-6;
-                    *phase = self.exact_phase((start + i, v), z);
+                    *phase = exact_phase(golden, (start + i, v), z);
                 }
             }
         }
     }
+}
 
-    /// The same for a part that lies as taught.
-    pub(super) fn expect_as_taught(&self, v: usize, out: ExpectedRow<'_>) {
-        let row = v * self.size().0..(v + 1) * self.size().0;
-        let taught = &self.taught.pixels()[row.clone()];
-        out.phase.copy_from_slice(&self.cubics.surface().phase[row]);
-        for (compared, taught) in out.compared.iter_mut().zip(taught) {
-            *compared = *taught >= COMPARED;
-        }
-    }
-
-    /// The phase at which a pixel sees height `z` mm.
-    fn exact_phase(&self, (u, v): (usize, usize), z: f64) -> AbsolutePhase {
-        let sight = self.triangulator.sight(u as f64, v as f64);
-        let turns = sight.and_then(|sight| sight.phase(z));
-        turns.map_or(AbsolutePhase::UNKNOWN, AbsolutePhase::from_turns)
-    }
+/// The phase at which a pixel sees height `z` mm.
+fn exact_phase(golden: &Golden, (u, v): (usize, usize), z: f64) -> AbsolutePhase {
+    let sight = golden.triangulator.sight(u as f64, v as f64);
+    let turns = sight.and_then(|sight| sight.phase(z));
+    turns.map_or(AbsolutePhase::UNKNOWN, AbsolutePhase::from_turns)
 }
 
 back_end_entry! {
     /// The phases of a block of pixels, and whether golden is compared where they look; left as
     /// they are where nothing is known of it.
     fn expect_block [] = expect_pixels(
-        golden: Golden<'_>,
+        golden: GoldenHeights<'_>,
         pixels: Pixels<'_>,
         phase: &mut [AbsolutePhase],
         compared: &mut [bool],
@@ -140,14 +146,14 @@ back_end_entry! {
 #[inline(always)]
 fn expect_pixels<V: Lanes>(
     _: V,
-    golden: Golden<'_>,
+    golden: GoldenHeights<'_>,
     pixels: Pixels<'_>,
     phase: &mut [AbsolutePhase],
     compared: &mut [bool],
     sought: &mut Sought,
 ) {
     let length = phase.len().min(BLOCK);
-    let Golden {
+    let GoldenHeights {
         height,
         taught,
         width,
@@ -253,10 +259,9 @@ fn expect_pixels<V: Lanes>(
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::displaced::{Node, between};
     use super::*;
+    use crate::inspect::strips::displaced::{Node, between};
     use crate::pipeline::SQUARE;
-    use crate::simd::Backend;
     use std::vec;
     use std::vec::Vec;
 
@@ -343,7 +348,7 @@ mod tests {
             .collect();
         let (first, second) = (vec![CUBIC.0; base.len()], vec![CUBIC.1; base.len()]);
         let third = vec![CUBIC.2; base.len()];
-        let golden = Golden {
+        let golden = GoldenHeights {
             height: &heights,
             taught: &taught,
             width: WIDTH,

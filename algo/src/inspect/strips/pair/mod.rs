@@ -8,7 +8,7 @@
 //! 4. The part's motion is found from these phases as from those of any sequence, in all six
 //!    components; those that the shape does not determine keep what the picture has found. Then
 //!    stages 2 and 3 are repeated with it, and their map goes through the ordinary inspection
-//!    ([`Input::Phases`]).
+//!    ([`Input::Phases`](super::Input::Phases)).
 //!
 //! Neighbouring phases share pixels. Their σ is therefore that of the two samples of the pixel
 //! alone, which is right for means over areas that are large against the window; means over smaller
@@ -17,165 +17,15 @@
 mod coarse;
 mod expected;
 mod picture;
-mod shared;
+mod place;
+pub(super) mod shared;
 mod solve;
 mod sums;
+mod terms;
 mod window;
 
 pub use picture::{Found, Picture};
-pub(super) use shared::{correlated, smoothed};
-
-use super::displaced::BlockNumbers;
-use super::pose::{PoseField, blocks_of_row};
-use super::{Input, Production, Strips};
-use crate::frame::FrameView;
-use crate::inspect::align::{Alignment, Placed, Spot};
-use crate::phase::{DecodeError, PhaseRow};
-use crate::pipeline::{PhaseMap, for_each};
-use alloc::vec::Vec;
-use coarse::Coarse;
-use window::{BAND_ROWS, Band, SIDE, Windows};
-
-/// The buffers of a pair, allocated once.
-#[derive(Debug)]
-pub struct PairBuffers {
-    windows: Windows,
-    /// What was measured last.
-    phases: PhaseMap,
-    /// Of each band of rows: the buffers of its windows, and the displacements along a row.
-    bands: Vec<(Band, Vec<BlockNumbers>)>,
-    pictures: Vec<Coarse>,
-}
-
-impl PairBuffers {
-    /// What was measured last, for [`Input::Phases`].
-    pub fn phases(&self) -> &PhaseMap {
-        &self.phases
-    }
-}
-
-/// How a part lies by a pair.
-#[derive(Clone, Debug)]
-pub struct PairPlaced {
-    /// By its picture; none where that does not determine it.
-    pub found: Option<Found>,
-    /// By its phases; none as in [`Production::place`].
-    pub placed: Option<Placed>,
-}
-
-impl Production {
-    /// Buffers for frames of this size.
-    pub fn pair_buffers(&self) -> PairBuffers {
-        let (width, height) = self.size();
-        PairBuffers {
-            windows: Windows::new(
-                self.decoder.backend(),
-                self.decoder.bit_depth(),
-                self.noise_counts,
-                self.decoder.least_modulation(),
-            ),
-            phases: PhaseMap::new(width, height),
-            bands: (0..height.div_ceil(BAND_ROWS))
-                .map(|_| (Band::default(), blocks_of_row(width)))
-                .collect(),
-            pictures: Vec::new(),
-        }
-    }
-
-    /// Golden's picture, from its modulation in counts (row-major), for parts within `tolerance_px`
-    /// pixels. None where parts are not aligned, or the picture has no edges.
-    pub fn picture(&self, modulation: &[f32], tolerance_px: f64) -> Option<Picture> {
-        let centre = self.alignment.as_ref()?.centre;
-        let surface = self.cubics.surface();
-        Picture::new(
-            &self.triangulator,
-            surface,
-            modulation,
-            centre,
-            tolerance_px,
-        )
-    }
-
-    /// Finds how the part lies, and measures its phases into the buffers.
-    ///
-    /// # Errors
-    /// If the frames are not two of this size and bit depth.
-    pub fn place_pair(
-        &self,
-        frames: &[FrameView<'_>],
-        picture: Option<&Picture>,
-        strips: &mut Strips,
-        buffers: &mut PairBuffers,
-    ) -> Result<PairPlaced, DecodeError> {
-        self.decoder.check(frames)?;
-        let &[plus, minus] = frames else {
-            return Err(DecodeError::FrameCount {
-                expected: 2,
-                given: frames.len(),
-            });
-        };
-        let frames = [plus, minus];
-        let triangulator = &self.triangulator;
-        let found =
-            picture.and_then(|picture| picture.find(triangulator, frames, &mut buffers.pictures));
-        let motion = found.map(|found| found.motion);
-        if let Some(motion) = &motion {
-            strips.pose.displace(self, motion);
-        }
-        let pose = motion.is_some().then_some(&strips.pose);
-        if let Some(alignment) = &self.alignment {
-            self.fit_pair(frames, pose, buffers, Some(alignment));
-        }
-        let placed = self.place_from(Input::Phases(&buffers.phases), strips, motion)?;
-        if let Some(placed) = &placed {
-            strips.pose.displace(self, &placed.motion);
-        }
-        let pose = (placed.is_some() || motion.is_some()).then_some(&strips.pose);
-        self.fit_pair(frames, pose, buffers, None);
-        Ok(PairPlaced { found, placed })
-    }
-
-    /// Measures the phases of a part that lies as in a field, as taught if none: in all rows, or
-    /// only in those that its motion is found from.
-    fn fit_pair(
-        &self,
-        frames: [FrameView<'_>; 2],
-        pose: Option<&PoseField>,
-        buffers: &mut PairBuffers,
-        only: Option<&Alignment>,
-    ) {
-        let PairBuffers {
-            windows,
-            phases,
-            bands,
-            ..
-        } = buffers;
-        let mut rows = phases.rows();
-        let work: Vec<_> = rows.chunks_mut(BAND_ROWS).zip(bands).collect();
-        for_each(work, |at, (rows, (band, blocks))| {
-            let top = at * BAND_ROWS;
-            let mut fit = |rows: &mut [PhaseRow<'_>], top: usize| {
-                windows.fit(frames, top, rows, band, |v, out| match pose {
-                    Some(pose) => self.expect(pose, v, blocks, out),
-                    None => self.expect_as_taught(v, out),
-                });
-            };
-            let Some(alignment) = only else {
-                return fit(rows, top);
-            };
-            let (_, spots) = alignment.spots(top..top + rows.len());
-            for near in spots.chunk_by(share_rows) {
-                let (first, last) = (near[0].v, near[near.len() - 1].v);
-                fit(&mut rows[first - top..=last - top], first);
-            }
-        });
-    }
-}
-
-/// Whether the windows of two spots share rows.
-fn share_rows(a: &Spot, b: &Spot) -> bool {
-    b.v - a.v < SIDE
-}
+pub use place::{PairBuffers, PairPlaced};
 
 #[cfg(test)]
 mod tests;

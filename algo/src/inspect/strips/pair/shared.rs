@@ -5,7 +5,7 @@
 //!
 //! Accuracy: `means_over_squares_scatter_as_their_shared_pixels_make_them`.
 
-use super::window::SIDE;
+use super::terms::SIDE;
 
 /// The variance of the mean over a square of `side` pixels, over that of the mean of as many
 /// independent pixels of two shifts.

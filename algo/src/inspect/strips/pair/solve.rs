@@ -5,7 +5,7 @@
 //! rounding changes δ by 10⁻⁶ rad.
 
 use super::sums::{BLOCK, SUMS, sum_up};
-use super::window::{FAINT, PIXELS};
+use super::terms::{FAINT, PIXELS};
 use crate::math::nearest::whole;
 use crate::phase::{LeastModulation, Trust};
 use crate::simd::{Lanes, back_end_entry};
@@ -19,7 +19,7 @@ const MOST_LEFT: f32 = 0.15;
 
 /// What solving needs, worked out once.
 #[derive(Clone, Debug)]
-pub(super) struct Solver {
+pub struct Solver {
     /// What noise leaves of the light's change in a window, in the squared unit of the sums.
     noise: f32,
     /// The square of the least modulation of I₁ − I₂ in the unit of the sums.
@@ -30,7 +30,7 @@ pub(super) struct Solver {
 
 /// The results of a block.
 #[derive(Debug)]
-pub(super) struct Solved {
+pub struct Solved {
     pub phase: [AbsolutePhase; BLOCK],
     pub modulation: [Modulation; BLOCK],
     pub trust: [Trust; BLOCK],
@@ -62,7 +62,7 @@ impl Solver {
 
 back_end_entry! {
     /// Solves the windows around the pixels of a block, from the sums of their columns, with what
-    /// the pixels are expected to see and their light ([`super::window::Terms`]).
+    /// the pixels are expected to see and their light ([`super::terms::Terms`]).
     fn solve_block [] = solve(
         solver: &Solver,
         columns: [&[i32]; SUMS],

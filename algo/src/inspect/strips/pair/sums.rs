@@ -1,19 +1,19 @@
 //! Sums of products down the columns of a window, which slide from row to row.
 
-use super::window::{REACH, SIDE, Terms};
+use super::terms::{REACH, SIDE, Terms};
 use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec::Vec;
 
 /// Pixels that are solved together.
-pub(super) const BLOCK: usize = 64;
+pub const BLOCK: usize = 64;
 /// Columns of their windows.
-pub(super) const WIDE: usize = BLOCK + 2 * REACH;
+pub const WIDE: usize = BLOCK + 2 * REACH;
 /// Σs², Σsc, Σc², Σds, Σdc, Σd².
-pub(super) const SUMS: usize = 6;
+pub const SUMS: usize = 6;
 
 /// The sums over the rows of a window, per column; [`REACH`] columns of 0 on both sides.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Columns([Vec<i32>; SUMS]);
+pub struct Columns([Vec<i32>; SUMS]);
 
 impl Columns {
     /// Begins with no rows of so many pixels.
@@ -67,7 +67,7 @@ fn slide_row<V: Lanes>(_: V, new: [&[i16]; 2], old: [&[i16]; 2], sums: &mut [i32
 
 /// The sums over windows, from those of their columns.
 #[inline(always)]
-pub(super) fn sum_up(columns: &[i32], windows: &mut [i32; BLOCK]) {
+pub fn sum_up(columns: &[i32], windows: &mut [i32; BLOCK]) {
     let columns = &columns[..WIDE];
     for i in 0..BLOCK {
         let mut sum = columns[i];

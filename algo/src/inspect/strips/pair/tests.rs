@@ -1,7 +1,8 @@
 //! Fits of made-up pairs against theory.
 
 use super::shared::{correlated, smoothed};
-use super::window::{Band, SIDE, Windows};
+use super::terms::SIDE;
+use super::window::{Band, Windows};
 use crate::frame::{FrameView, Samples};
 use crate::phase::{LeastModulation, Trust};
 use crate::pipeline::PhaseMap;

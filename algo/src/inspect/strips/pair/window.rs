@@ -31,21 +31,17 @@
 
 use super::solve::{Solved, Solver, solve_block};
 use super::sums::{BLOCK, Columns};
+use super::terms::{FAINT, REACH, SIDE, Terms, refill};
 use crate::frame::{FrameView, Sample, Samples};
 use crate::phase::{LeastModulation, PhaseRow};
 use crate::simd::{Backend, Lanes, back_end_entry};
 use crate::units::AbsolutePhase;
 use alloc::vec::Vec;
 
-/// The window's side in pixels.
-pub const SIDE: usize = 7;
-pub(super) const REACH: usize = SIDE / 2;
-/// Pixels of a window.
-pub const PIXELS: f64 = (SIDE * SIDE) as f64;
 /// Bits of the samples that are used.
 const BITS: u8 = 12;
 /// Rows of a band.
-pub(super) const BAND_ROWS: usize = 64;
+pub const BAND_ROWS: usize = 64;
 /// Steps of a turn in the table of sines.
 const TURN: usize = 4096;
 
@@ -61,50 +57,20 @@ pub struct Windows {
 
 /// What a row is expected to show.
 #[derive(Debug)]
-pub(super) struct ExpectedRow<'a> {
+pub struct ExpectedRow<'a> {
     pub phase: &'a mut [AbsolutePhase],
     /// Whether golden is compared there; elsewhere its surface is interpolated.
     pub compared: &'a mut [bool],
 }
 
-/// A row as the fit needs it. Whole blocks of pixels; those behind the row are 0, and nothing is
-/// expected there.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Terms {
-    pub phase: Vec<AbsolutePhase>,
-    pub compared: Vec<bool>,
-    /// (I₁ + I₂) / 2 in the unit of the sums, less than 0 where a sample is at full scale.
-    pub light: Vec<f32>,
-    /// s, c and d in 12 bits.
-    pub s: Vec<i16>,
-    pub c: Vec<i16>,
-    pub d: Vec<i16>,
-}
-
 /// The buffers of a band of rows.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Band {
+pub struct Band {
     /// Row v lies at v modulo their number: the rows of a window, and the one that it leaves.
     terms: [Terms; SIDE + 1],
     columns: Columns,
     /// Of the row that enters.
     sines: Vec<[i16; 2]>,
-}
-
-impl Terms {
-    fn clear(&mut self, pixels: usize) {
-        refill(&mut self.phase, pixels, AbsolutePhase::UNKNOWN);
-        refill(&mut self.compared, pixels, false);
-        refill(&mut self.light, pixels, 0.0);
-        for list in [&mut self.s, &mut self.c, &mut self.d] {
-            refill(list, pixels, 0);
-        }
-    }
-}
-
-fn refill<T: Copy>(list: &mut Vec<T>, length: usize, value: T) {
-    list.clear();
-    list.resize(length, value);
 }
 
 impl Band {
@@ -118,10 +84,6 @@ impl Band {
         refill(&mut self.sines, pixels, [0; 2]);
     }
 }
-
-/// By so many bits the terms of pixels are smaller where golden is not compared: beside the others
-/// they hardly count.
-pub(super) const FAINT: u8 = 3;
 
 impl Windows {
     /// For samples of `bit_depth` bits with σ = `noise` counts, trusted from a modulation of
@@ -260,7 +222,7 @@ impl Windows {
 
 /// How samples become terms.
 #[derive(Clone, Copy)]
-pub(super) struct Scale {
+pub struct Scale {
     /// The largest sample.
     brightest: i32,
     /// To [`BITS`] bits.

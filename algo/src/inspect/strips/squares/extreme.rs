@@ -1,13 +1,15 @@
 //! The square of largest mean deviation, exactly, from packed sums down the columns.
 
-use super::COUNT_BIT;
 use crate::inspect::gauge::MIN_SUPPORT;
 use crate::pipeline::NO_OFFSET;
 use core::ops::Range;
 
+/// A packed sum holds the number of its terms above this bit, and their sum below it.
+pub const COUNT_BIT: u32 = 44;
+
 /// A square and the deviations in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in super::super) struct Extreme {
+pub struct Extreme {
     /// Σ of the deviations in nm.
     pub sum: i64,
     /// How many there are.
@@ -26,7 +28,7 @@ impl Extreme {
 }
 
 /// Whether packed sums hold squares of `side` pixels with deviations of up to `span_nm`.
-pub(in super::super) fn fits(side: usize, span_nm: f64) -> bool {
+pub fn fits(side: usize, span_nm: f64) -> bool {
     let side = (side | 1) as f64;
     let pixels = side * side;
     // A signed sum of 44 bits; a count of 19 bits.
@@ -34,12 +36,12 @@ pub(in super::super) fn fits(side: usize, span_nm: f64) -> bool {
 }
 
 /// Least number of deviations in a square that counts.
-pub(in super::super) fn least_support(side: usize) -> i64 {
+pub fn least_support(side: usize) -> i64 {
     libm::ceil(MIN_SUPPORT * (side * side) as f64) as i64
 }
 
 /// The squares around the pixels of one row.
-pub(in super::super) struct SquareRow<'a> {
+pub struct SquareRow<'a> {
     /// Packed sums down the columns, with half a side of padding in front.
     pub sums: &'a [i64],
     /// Deviations of the row itself.
@@ -134,12 +136,12 @@ impl SquareRow<'_> {
 }
 
 /// |sum| of a square; 0 without one.
-pub(in super::super) fn strength(square: Option<Extreme>) -> i64 {
+pub fn strength(square: Option<Extreme>) -> i64 {
     square.map_or(0, |square| square.sum.abs())
 }
 
 /// A sum of at least `least` deviations whose magnitude is below this does not reach the best mean.
-pub(in super::super) fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
+pub fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
     // Rounded down, so that a sum of just that mean still reaches it.
     best.map_or(0, |best| best.sum.abs() * least / best.count)
 }

@@ -9,24 +9,22 @@ pub(super) mod extreme;
 pub(super) mod narrow;
 pub(super) mod rivals;
 
-use super::pose::PoseField;
+use super::coordinates::Comparison;
+use super::gauges::Gauges;
 use super::recent::RecentRows;
-use super::{Production, common};
+use super::spans::{common, hull};
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
-use extreme::SquareRow;
+use extreme::{COUNT_BIT, SquareRow};
 use narrow::NarrowSums;
 use rivals::Extremes;
 
-/// A packed sum holds the number of its terms above this bit, and their sum below it.
-const COUNT_BIT: u32 = 44;
-
 /// The squares of a strip.
 #[derive(Debug)]
-pub(super) struct Squares {
+pub struct Squares {
     /// For each side the packed sums down the columns, with half a side of padding at both ends.
     columns: Vec<Vec<i64>>,
     narrow: NarrowSums,
@@ -38,12 +36,12 @@ pub(super) struct Squares {
 }
 
 impl Squares {
-    /// Of a strip's own rows.
-    pub fn new(plan: &Production, rows: &Range<usize>) -> Self {
-        let (width, sides) = (plan.size().0, &plan.gauges.sides);
-        let padding = plan.gauges.largest_side().map_or(0, |side| side / 2 * 2);
-        let padded = sides.iter().map(|of| vec![0; width + of.side / 2 * 2]);
-        let squares = plan.gauges.squares.iter();
+    /// Of a strip's own rows of `width` pixels.
+    pub fn new(gauges: &Gauges, width: usize, rows: &Range<usize>) -> Self {
+        let padding = gauges.largest_side().map_or(0, |side| side / 2 * 2);
+        let sides = gauges.sides.iter();
+        let padded = sides.map(|of| vec![0; width + of.side / 2 * 2]);
+        let squares = gauges.squares.iter();
         let partly = squares.clone().any(|squares| squares.partly);
         let extremes = squares.map(|squares| Extremes::new(squares.side, rows, width));
         Self {
@@ -66,20 +64,24 @@ impl Squares {
     /// are deviations of.
     pub fn slide(
         &mut self,
-        plan: &Production,
-        pose: &PoseField,
+        with: Comparison<'_>,
+        gauges: &Gauges,
         v: usize,
         recent: &RecentRows,
         (own, written): (&Range<usize>, &Range<usize>),
     ) {
-        let backend = plan.decoder.backend();
+        let Comparison {
+            backend,
+            golden,
+            pose,
+        } = with;
         let Self {
             columns,
             narrow: narrow_sums,
             centres,
             extremes,
         } = self;
-        for (of, sums) in plan.gauges.sides.iter().zip(columns) {
+        for (of, sums) in gauges.sides.iter().zip(columns) {
             let (side, half) = (of.side, of.side / 2);
             let written = common(written, &of.reached(&of.rows));
             let row_of = |v: usize| {
@@ -105,7 +107,7 @@ impl Squares {
             if narrow {
                 narrow_sums.add(backend, sums, side, seen.clone());
             }
-            let squares = plan.gauges.squares.iter().zip(&mut *extremes);
+            let squares = gauges.squares.iter().zip(&mut *extremes);
             for (squares, extremes) in squares.filter(|(squares, _)| squares.side == side) {
                 let mut row = SquareRow {
                     sums,
@@ -114,7 +116,7 @@ impl Squares {
                     row: middle,
                 };
                 if squares.partly {
-                    let least = plan.taught.least_sides(middle, plan.size().0);
+                    let least = golden.taught.least_sides(middle, golden.size().0);
                     let places = row.centres.iter().zip(least);
                     for (centre, (&nm, &least)) in centres.iter_mut().zip(places) {
                         let own = squares.smallest.max(usize::from(least)) == side;
@@ -122,7 +124,7 @@ impl Squares {
                     }
                     row.centres = centres;
                 }
-                for (_, span) in pose.region(plan, squares.gauge).row(middle) {
+                for (_, span) in pose.region(&gauges.regions, squares.gauge).row(middle) {
                     let span = common(span, &seen);
                     extremes.update(middle, &span, |found, span| match narrow {
                         true => narrow_sums.search(backend, &row, span, found),
@@ -131,15 +133,6 @@ impl Squares {
                 }
             }
         }
-    }
-}
-
-/// The columns from the first to the last of either.
-fn hull(a: Range<usize>, b: Range<usize>) -> Range<usize> {
-    match (a.is_empty(), b.is_empty()) {
-        (true, _) => b,
-        (_, true) => a,
-        _ => a.start.min(b.start)..a.end.max(b.end),
     }
 }
 

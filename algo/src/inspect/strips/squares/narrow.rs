@@ -1,8 +1,7 @@
 //! Sums over squares in 32 bits, many pixels at a time: they tell where in a row the largest
 //! deviation may be.
 
-use super::COUNT_BIT;
-use super::extreme::{Extreme, SquareRow, floor_of, least_support, strength};
+use super::extreme::{COUNT_BIT, Extreme, SquareRow, floor_of, least_support, strength};
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec;
@@ -10,13 +9,13 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 /// Deviations up to this many nm are summed in 32 bits: more than a cubic gives.
-pub(in super::super) const MAX_NARROW_NM: u32 = 1 << 22;
+pub const MAX_NARROW_NM: u32 = 1 << 22;
 /// Sums over squares of up to so many such deviations do not overflow.
 const MAX_PIXELS: usize = (i32::MAX as u32 / MAX_NARROW_NM) as usize;
 
 /// Sums over the squares around the pixels of a row.
 #[derive(Debug)]
-pub(super) struct NarrowSums {
+pub struct NarrowSums {
     /// Sums down single columns.
     columns: Vec<i32>,
     /// Sums over some neighbouring columns.

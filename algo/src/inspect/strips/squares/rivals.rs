@@ -1,8 +1,8 @@
 //! The squares that come near the largest deviation: where several do, noise decides which of them
 //! is found, and the reading scatters less than any of them.
 
-use super::common;
 use super::extreme::{Extreme, strength};
+use crate::inspect::strips::spans::common;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -16,7 +16,7 @@ const COLUMNS: usize = 64;
 
 /// The square of largest mean deviation, and that of the largest sum in each tile of the frame.
 #[derive(Clone, Debug, Default)]
-pub(in super::super) struct Extremes {
+pub struct Extremes {
     side: usize,
     /// The first row of tiles, and how many there are.
     bands: Range<usize>,
@@ -78,7 +78,7 @@ impl Extremes {
 
 /// The largest of strips that are joined, and the largest of other tiles that share no pixel with a
 /// larger one: those with at least half of its deviation, in falling order.
-pub(in super::super) fn rivals<'a>(
+pub fn rivals<'a>(
     strips: impl Iterator<Item = &'a Extremes> + Clone,
 ) -> heapless::Vec<Extreme, RIVALS> {
     let mut rivals = heapless::Vec::<Extreme, RIVALS>::new();

@@ -1,7 +1,7 @@
 //! The part as taught: where parts are compared with it, how noisy its heights were, and how much
 //! deviations count.
 
-use crate::inspect::{Factor, Weight};
+use super::weight::{Factor, Weight};
 use crate::pipeline::{COMPARED, SIGMA, SQUARE};
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -61,13 +61,13 @@ impl Taught {
     }
 
     /// The side of the square about a place for a deviation in squares of `side` pixels.
-    pub(in crate::inspect) fn side(&self, place: usize, side: usize) -> usize {
+    pub(super) fn side(&self, place: usize, side: usize) -> usize {
         let least = self.sides.get(place).copied().unwrap_or_default();
         side.max(usize::from(least))
     }
 
     /// All sides that [`Self::side`] has, each once, the smallest first.
-    pub(in crate::inspect) fn sides(&self, side: usize) -> Vec<usize> {
+    pub(super) fn sides(&self, side: usize) -> Vec<usize> {
         let mut known = [false; 256];
         for &least in &self.sides {
             known[usize::from(least)] = true;
@@ -96,7 +96,7 @@ impl Taught {
     }
 
     /// All pixels, row-major: [`COMPARED`], [`SQUARE`] and σ.
-    pub(in crate::inspect) fn pixels(&self) -> &[u16] {
+    pub(super) fn pixels(&self) -> &[u16] {
         &self.pixels
     }
 
@@ -127,22 +127,22 @@ impl Taught {
     }
 
     /// The same at one place.
-    pub(in crate::inspect) fn factor(&self, place: usize) -> f64 {
+    pub(super) fn factor(&self, place: usize) -> f64 {
         self.factors[place].number()
     }
 
     /// Whether the part is compared at a place, and its deviation counts in full.
-    pub(in crate::inspect) fn full(&self, place: usize) -> bool {
+    pub(super) fn full(&self, place: usize) -> bool {
         self.compared(place) && self.weight(place) == Weight::FULL
     }
 
     /// Whether the part is compared at a place.
-    pub(in crate::inspect) fn compared(&self, place: usize) -> bool {
+    pub(super) fn compared(&self, place: usize) -> bool {
         self.pixels[place] & COMPARED != 0
     }
 
     /// Whether the part is compared at all of these places.
-    pub(in crate::inspect) fn all_compared(&self, places: Range<usize>) -> bool {
+    pub(super) fn all_compared(&self, places: Range<usize>) -> bool {
         let common = self.pixels[places]
             .iter()
             .fold(COMPARED, |all, at| all & at);
@@ -150,7 +150,7 @@ impl Taught {
     }
 
     /// The same, and all their deviations count in full.
-    pub(in crate::inspect) fn all_full(&self, places: Range<usize>) -> bool {
+    pub(super) fn all_full(&self, places: Range<usize>) -> bool {
         let partial = |weights: &[Weight]| weights.iter().any(|weight| *weight != Weight::FULL);
         self.all_compared(places.clone())
             && (self.weights.is_empty() || !partial(&self.weights[places]))
@@ -162,7 +162,7 @@ impl Taught {
     }
 
     /// σ in mm, 0 where not known.
-    pub(in crate::inspect) fn sigma_mm(&self, place: usize) -> f64 {
+    pub(super) fn sigma_mm(&self, place: usize) -> f64 {
         f64::from(self.sigma(place)) * (Self::SIGMA_UNIT_NM * 1e-6)
     }
 }

@@ -1,0 +1,118 @@
+//! The stages of an inspection in their order, for all strips.
+
+use super::decode::Input;
+use super::findings::Findings;
+use super::maps::Maps;
+use super::plan::Production;
+use super::pose::PoseField;
+use super::strip::{CellBuffers, Strip, Strips};
+use crate::frame::FrameView;
+use crate::inspect::align::{FitBuffers, Motion, Placed};
+use crate::phase::DecodeError;
+use crate::pipeline::{for_each, for_each_item};
+use alloc::vec::Vec;
+
+impl Production {
+    /// Strips of `rows` rows that cover the frame.
+    pub fn strips(&self, rows: usize) -> Strips {
+        let (height, rows) = (self.golden.window.len(), rows.max(1));
+        let tops = (0..height).step_by(rows);
+        Strips {
+            strips: tops
+                .map(|top| Strip::new(self, top..(top + rows).min(height)))
+                .collect(),
+            rows,
+            pose: PoseField::new(&self.golden, &self.gauges.regions, self.alignment.is_some()),
+            samples: Vec::new(),
+            fitting: FitBuffers::default(),
+            cells: CellBuffers::default(),
+        }
+    }
+
+    /// Inspects a part, in strips from [`Self::strips`]. If `heights` is given (as long as a frame,
+    /// row-major), it gets z in mm, NaN where not resolved and outside of [`Self::window`]. The
+    /// same as [`Self::place`] and [`Self::inspect_placed`].
+    ///
+    /// # Errors
+    /// If the frames are not what the decoder was made for. Nothing else can fail.
+    pub fn inspect(
+        &self,
+        frames: &[FrameView<'_>],
+        strips: &mut Strips,
+        heights: Option<&mut [f32]>,
+    ) -> Result<Findings, DecodeError> {
+        let input = Input::Frames(frames);
+        let placed = self.place(input, strips)?;
+        let maps = Maps {
+            heights,
+            deviation: None,
+        };
+        self.inspect_placed(input, strips, placed, maps)
+    }
+
+    /// The first half: how the part lies, from a few rows of each strip. None if parts are not
+    /// aligned ([`Parts::aligned`](super::Parts::aligned)), or if too few points are resolved.
+    ///
+    /// # Errors
+    /// As [`Self::inspect`].
+    pub fn place(
+        &self,
+        input: Input<'_>,
+        strips: &mut Strips,
+    ) -> Result<Option<Placed>, DecodeError> {
+        self.place_from(input, strips, None)
+    }
+
+    /// As [`Self::place`], from a motion that is nearly right.
+    pub(super) fn place_from(
+        &self,
+        input: Input<'_>,
+        strips: &mut Strips,
+        from: Option<Motion>,
+    ) -> Result<Option<Placed>, DecodeError> {
+        self.phase.check(input, self.golden.size())?;
+        let Some(alignment) = &self.alignment else {
+            return Ok(None);
+        };
+        for_each_item(&mut strips.strips, |strip| {
+            strip.sample(self, alignment, input);
+        });
+        strips.samples.clear();
+        for strip in &strips.strips {
+            strips.samples.extend(&strip.samples);
+        }
+        let mut fitting = alignment.fitting(self.golden.surface());
+        fitting.from = from;
+        Ok(fitting.fit(&strips.samples, &mut strips.fitting))
+    }
+
+    /// The second half: the readings of a part that lies so, from the input and strips that it was
+    /// placed with, and `maps` of it.
+    ///
+    /// # Errors
+    /// As [`Self::inspect`].
+    pub fn inspect_placed(
+        &self,
+        input: Input<'_>,
+        strips: &mut Strips,
+        placed: Option<Placed>,
+        maps: Maps<'_>,
+    ) -> Result<Findings, DecodeError> {
+        self.phase.check(input, self.golden.size())?;
+        let regions = &self.gauges.regions;
+        strips.pose.set(&self.golden, regions, placed);
+        let pose = &strips.pose;
+        if maps.is_empty() {
+            for_each_item(&mut strips.strips, |strip| {
+                strip.inspect(self, pose, input, Maps::default());
+            });
+        } else {
+            let maps = maps.split((strips.rows * self.golden.size().0).max(1));
+            let work = strips.strips.iter_mut().zip(maps).collect();
+            for_each(work, |_, (strip, maps)| {
+                strip.inspect(self, pose, input, maps);
+            });
+        }
+        Ok(self.findings(input, strips))
+    }
+}
