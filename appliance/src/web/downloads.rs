@@ -1,7 +1,7 @@
 //! Downloads: point cloud, recording and gauges of the last result, and the diagnostic bundle.
 
 use std::fs::File;
-use std::io::{self, Cursor, Write as _};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use axum::body::{Body, Bytes};
@@ -11,14 +11,14 @@ use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
+use zip::ZipWriter;
 use zip::result::ZipError;
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipWriter};
 
 use super::problem::Problem;
 use super::site::Site;
 use super::{metrics, view};
 use crate::history::{Filter, JudgedPart, name_of};
+use crate::storage::archive::{packed, stored};
 
 /// Bytes of a file that are sent to its client at a time.
 const CHUNK: usize = 64 << 10;
@@ -130,7 +130,7 @@ impl Packed {
         let mut zip = ZipWriter::new_stream(to);
         for (inside, mut file) in self.members {
             let parts: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
-            zip.start_file(format!("{}/{}", self.name, parts.join("/")), stored)?;
+            zip.start_file(format!("{}/{}", self.name, parts.join("/")), stored())?;
             io::copy(&mut file, &mut zip)?;
         }
         zip.finish().map(drop)
@@ -274,11 +274,5 @@ fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {
         ("metrics.txt", metrics::text(site)),
         ("fringed.toml", site.configuration.clone()),
     ];
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-    for (name, content) in members {
-        zip.start_file(name, stored)?;
-        zip.write_all(content.as_bytes())?;
-    }
-    Ok(zip.finish()?.into_inner())
+    packed(members)
 }
