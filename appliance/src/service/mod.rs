@@ -28,7 +28,7 @@ use crate::production::opening::Opening;
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Simulation;
 use crate::production::warm_up::WarmUp;
-use crate::production::{Aborts, Order, Worker};
+use crate::production::{Aborts, JudgedBy, Order, Worker};
 use crate::service::survey::Survey;
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
@@ -227,6 +227,8 @@ impl Daemon {
                     config,
                     aborts,
                     lost: None,
+                    plan: None,
+                    last: JudgedBy::default(),
                     shelf: Shelf::default(),
                     pulse,
                     computing,
