@@ -2,7 +2,7 @@
 
 use super::numbers::{number, numbers};
 use crate::config::{Backend, HeadConfig};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::placed::Placed;
 use crate::production::backend;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -45,7 +45,7 @@ impl SimulatedPart {
     ///
     /// # Errors
     /// If the configured head is not simulated, or there is no such part, defect or placement (64).
-    pub fn placed(&self, head: &HeadConfig) -> Result<Option<Placed>, Failure> {
+    pub fn placed(&self, head: &HeadConfig) -> Result<Option<Placed>> {
         let asked = self.part.is_some() || !self.defect.is_empty() || self.material.is_some();
         if !asked
             && self.pose.is_none()

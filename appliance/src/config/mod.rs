@@ -6,7 +6,7 @@ mod keys;
 
 pub use keys::{Key, TABLE, keys};
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::place::IN_STATE;
 use crate::head::commission::Commissioning;
 use crate::head::exposing::Exposing;
@@ -186,7 +186,7 @@ impl Config {
     /// # Errors
     /// If it does not exist (66), is not TOML, has an unknown key or a value out of range (78); the
     /// message names the file, the key and the remedy.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    pub fn read(path: &Path) -> Result<Self> {
         let place = path.display();
         let text = fs::read_to_string(path).map_err(|error| {
             let exit = match error.kind() {

@@ -9,7 +9,7 @@ mod score;
 pub use report::{Manner, Report};
 pub use score::{GROSS_MM, Score, Truth};
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::channel::{Channel, Expected};
 use crate::head::direction::Sensitivity;
 use crate::head::scan::Scan;
@@ -27,6 +27,7 @@ use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference};
 use known::Known;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 use std::time::Instant;
 
@@ -65,7 +66,7 @@ pub struct Measurement {
 ///
 /// # Errors
 /// If levels cannot be unwrapped or a model is absurd; the message names `folder`.
-pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Failure> {
+pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement> {
     measure_with(recording, folder, None)
 }
 
@@ -78,8 +79,8 @@ pub fn measure_after(
     recording: &Recording,
     folder: &Path,
     preliminary: &ProjectorMap,
-) -> Result<Measurement, Failure> {
-    let known = Known::expected(preliminary, recording).map_err(|error| wrong(folder, &*error))?;
+) -> Result<Measurement> {
+    let known = Known::expected(preliminary, recording).map_err(wrong(folder))?;
     measure_about(recording, folder, None, Some(known))
 }
 
@@ -92,8 +93,8 @@ pub fn measure_about_map(
     recording: &Recording,
     folder: &Path,
     map: &Array<f64>,
-) -> Result<Measurement, Failure> {
-    let known = Known::given(map, recording).map_err(|error| wrong(folder, &*error))?;
+) -> Result<Measurement> {
+    let known = Known::given(map, recording).map_err(wrong(folder))?;
     measure_about(recording, folder, None, Some(known))
 }
 
@@ -107,16 +108,16 @@ pub fn measure_with(
     recording: &Recording,
     folder: &Path,
     recipe: Option<&Recipe>,
-) -> Result<Measurement, Failure> {
+) -> Result<Measurement> {
     let known = recipe.map(|recipe| Known::of(recipe, recording));
-    let known = known.transpose().map_err(|error| wrong(folder, &*error))?;
+    let known = known.transpose().map_err(wrong(folder))?;
     measure_about(recording, folder, recipe, known)
 }
 
 /// The failure of a recording with wrong content, in this folder.
-pub fn wrong(folder: &Path, error: &dyn std::fmt::Display) -> Failure {
+pub fn wrong<E: Display>(folder: &Path) -> impl Fn(E) -> Failure {
     let manifest = folder.join("recording.json");
-    Failure::because(Exit::Content, manifest.display(), error)
+    Exit::Content.because(manifest.display().to_string())
 }
 
 fn measure_about(
@@ -124,17 +125,16 @@ fn measure_about(
     folder: &Path,
     recipe: Option<&Recipe>,
     known: Option<Known>,
-) -> Result<Measurement, Failure> {
-    let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
+) -> Result<Measurement> {
     if recording.frames.is_empty() {
         return match known {
-            None => coded::measure(recording).map_err(|error| wrong(&error)),
-            Some(_) => Err(wrong(
-                &"it has a Gray code without fringes, which needs no expected phase: measure without one",
+            None => coded::measure(recording).map_err(wrong(folder)),
+            Some(_) => Err(wrong(folder)(
+                "it has a Gray code without fringes, which needs no expected phase: measure without one",
             )),
         };
     }
-    let devices = Geometry::of(recording, recipe).map_err(|error| wrong(&error))?;
+    let devices = Geometry::of(recording, recipe).map_err(wrong(folder))?;
     let mut stage_us = BTreeMap::new();
     let mut stage_ended = |stage, started: Instant| {
         let us = u64::try_from(started.elapsed().as_micros()).unwrap_or(u64::MAX);
@@ -145,17 +145,17 @@ fn measure_about(
     let (mut phases, mut wrapped, mut wrapped_only) = (Vec::new(), Vec::new(), Vec::new());
     let mut channels = Vec::new();
     for at in 0..recording.patterns.len() {
-        let channel = Channel::new(recording, at, least).map_err(|error| wrong(&error))?;
+        let channel = Channel::new(recording, at, least).map_err(wrong(folder))?;
         let started = Instant::now();
         let geometry = devices.triangulator(&channel.function);
-        let geometry = geometry.map_err(|error| wrong(&error))?;
+        let geometry = geometry.map_err(wrong(folder))?;
         let golden = known.as_ref().filter(|known| known.pattern == at);
         let golden = golden.map(|known| known as &dyn Expected);
         let unwrapping = channel.unwrapping(golden, &geometry);
-        let unwrapping = unwrapping.map_err(|error| wrong(&error))?;
+        let unwrapping = unwrapping.map_err(wrong(folder))?;
         stage_ended("map", started);
         let started = Instant::now();
-        let decoded = channel.decode(&unwrapping).map_err(|error| wrong(&error))?;
+        let decoded = channel.decode(&unwrapping).map_err(wrong(folder))?;
         stage_ended("phase", started);
         phases.push(decoded.absolute);
         wrapped.push(decoded.wrapped);
@@ -174,7 +174,7 @@ fn measure_about(
         None => primary_of(recording, &sensitivities),
     };
     if channels.len() <= primary {
-        return Err(wrong(&"the recording has no pattern"));
+        return Err(wrong(folder)("the recording has no pattern"));
     }
     let (channel, geometry, unwrapping) = channels.swap_remove(primary);
     let started = Instant::now();

@@ -1,6 +1,6 @@
 //! Measuring a recording with the models of a `calibration.json` instead of its own.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::seam;
 use hal::replay::Recording;
@@ -18,7 +18,7 @@ const REACH: f64 = 0.5;
 /// # Errors
 /// If there is no such file (66), or it cannot be used or is of a head with frames or a raster of
 /// another size (65).
-pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>, Failure> {
+pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>> {
     let failed = |exit, words: String| Failure::because(exit, path.display(), words);
     let bytes = std::fs::read(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound => failed(Exit::Missing, "there is no such calibration".into()),

@@ -2,7 +2,7 @@
 //! generation.
 
 use super::{Recipe, RecipeFile, archive};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
 use std::fs;
@@ -156,7 +156,7 @@ impl Store {
     ///
     /// # Errors
     /// If the folder cannot be created or written (exit code 73).
-    pub fn of_state(state: &StateFolder) -> Result<Self, Failure> {
+    pub fn of_state(state: &StateFolder) -> Result<Self> {
         let folder = state.path().join("recipes");
         let opened =
             Self::open(&folder).and_then(|store| store.remove_left_behind().map(|()| store));

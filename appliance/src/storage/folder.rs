@@ -1,6 +1,6 @@
 //! Files that a loss of power leaves whole, and a folder of them.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use rustix::fs::OFlags;
 use std::fs;
 use std::io::{self, Read as _, Write as _};
@@ -19,7 +19,7 @@ impl OutputFolder {
     ///
     /// # Errors
     /// If it cannot be created (exit code 73).
-    pub fn create(path: &Path) -> Result<Self, Failure> {
+    pub fn create(path: &Path) -> Result<Self> {
         fs::create_dir_all(path).map_err(|error| {
             let what = format!("create the output folder {}", path.display());
             Failure::because(
@@ -37,7 +37,7 @@ impl OutputFolder {
     ///
     /// # Errors
     /// If it cannot be written (exit code 73).
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let target = self.path.join(name);
         write_whole(&target, bytes).map_err(|error| {
             let what = format!("write {}", target.display());
@@ -53,7 +53,7 @@ impl OutputFolder {
     ///
     /// # Errors
     /// If it cannot be removed (exit code 73).
-    pub fn remove(&self, name: &str) -> Result<bool, Failure> {
+    pub fn remove(&self, name: &str) -> Result<bool> {
         let target = self.path.join(name);
         match fs::remove_file(&target) {
             Ok(()) => Ok(true),

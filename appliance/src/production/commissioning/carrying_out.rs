@@ -2,7 +2,7 @@
 
 use super::{Asked, OpenHead, PICTURES};
 use crate::config::{Backend, HeadConfig};
-use crate::error::Failure;
+use crate::error::Result;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::place::Place;
 use crate::head::commission::{Commissioning, Name, Step, Subject};
@@ -192,7 +192,7 @@ impl Worker {
     }
 
     /// Sets exposure and gain, if the step asks for it.
-    fn set_exposing(&mut self, asked: &Asked) -> Result<(), Failure> {
+    fn set_exposing(&mut self, asked: &Asked) -> Result<()> {
         let Some((exposing, _)) = asked.exposing else {
             return Ok(());
         };

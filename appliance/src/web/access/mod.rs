@@ -74,7 +74,7 @@ impl Access {
         };
         std::fs::create_dir_all(folder).map_err(|error| failed(error.to_string()))?;
         let given = given.map_or(Ok(None), secret::given);
-        let given = given.map_err(|error| Failure::new(Exit::Configuration, error))?;
+        let given = given.map_err(Exit::Configuration.failure())?;
         let (hash, shown) = match given {
             Some(hash) => (hash, None),
             None => secret::open(&folder.join("secret")).map_err(failed)?,

@@ -2,7 +2,7 @@
 
 use super::picture::{ENDINGS, Picture};
 use super::{content, name};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Failure, Result};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -41,7 +41,7 @@ impl Place {
 /// # Errors
 /// If the folder is missing (66); if a file cannot be read, or there is another number of pictures
 /// (65).
-pub fn pictures(folder: &Path, pattern: &str, expected: usize) -> Result<Vec<Place>, Failure> {
+pub fn pictures(folder: &Path, pattern: &str, expected: usize) -> Result<Vec<Place>> {
     let files = files(folder, pattern)?;
     let mut found = Vec::new();
     for file in files {
@@ -75,7 +75,7 @@ pub fn pictures(folder: &Path, pattern: &str, expected: usize) -> Result<Vec<Pla
     Err(content(folder, words))
 }
 
-fn files(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>, Failure> {
+fn files(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
     let entries = fs::read_dir(folder).map_err(|error| {
         let what = format!("import {}", folder.display());
         Failure::because(
