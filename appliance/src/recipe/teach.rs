@@ -21,6 +21,7 @@ use algo::pattern::{Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use hal::head::Head;
+use std::fmt::Display;
 use std::time::Duration;
 
 /// Shifts per level of the part's own pattern.
@@ -51,6 +52,11 @@ pub enum TeachError {
 }
 
 impl TeachError {
+    /// [`Self::Rig`] of an error.
+    pub(super) fn rig(error: impl Display) -> Self {
+        Self::Rig(error.to_string())
+    }
+
     /// The value of register ERROR_CODE.
     pub fn code(&self) -> u16 {
         match self {
@@ -191,7 +197,7 @@ pub fn teach_while(
     drop(golden);
     stage(0.9, "trying the recipe on the part")?;
     let plan = computing.on(|| Plan::new(taught.recipe.clone(), calibration, false));
-    let plan = plan.map_err(|error| TeachError::Rig(error.to_string()))?;
+    let plan = plan.map_err(TeachError::rig)?;
     let trying = |share: f64| progress(0.9 + 0.1 * share, "trying the recipe on the part");
     let mut judged = proof::as_it_lies(&plan, head.head, calibration, timeout, &trying)?;
     drop(plan);
