@@ -37,6 +37,15 @@ impl Exit {
         move |error| Failure::because(self, &what, error)
     }
 
+    /// As [`Self::because`], with what to do about it.
+    pub fn advising<E: Display>(
+        self,
+        what: impl Display,
+        remedy: impl Display,
+    ) -> impl Fn(E) -> Failure {
+        move |error| Failure::because(self, &what, format!("{error}: {remedy}"))
+    }
+
     /// A failure with this code, for whatever should have been done.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use super::names;
 use super::options::{Output, Threads};
-use crate::error::{Exit, Failure, Result};
+use crate::error::{Exit, Result};
 use crate::history::kept;
 use crate::measure::{Measurement, measure_about_map, measure_with, models};
 use crate::output::cloud::Axes;
@@ -80,15 +80,13 @@ const MAX_MAP: u64 = 1 << 30;
 /// The expected phase in a file.
 fn expected_phase(path: &Path) -> Result<npy::Array<f64>> {
     let what = || format!("read {}", path.display());
-    let missing = |error| {
-        let words = format!("{error}: name the expected phase that fringed-lab adapt wrote");
-        Failure::because(Exit::Missing, what(), words)
-    };
-    if std::fs::metadata(path).map_err(missing)?.len() > MAX_MAP {
-        let words = "it is larger than a map of any camera: name the expected phase that fringed-lab adapt wrote";
-        return Err(Failure::because(Exit::Content, what(), words));
+    let remedy = "name the expected phase that fringed-lab adapt wrote";
+    let missing = Exit::Missing.advising(what(), remedy);
+    if std::fs::metadata(path).map_err(&missing)?.len() > MAX_MAP {
+        let too_large = Exit::Content.advising(what(), remedy);
+        return Err(too_large("it is larger than a map of any camera"));
     }
-    let bytes = std::fs::read(path).map_err(missing)?;
+    let bytes = std::fs::read(path).map_err(&missing)?;
     npy::read::<f64>(&bytes).map_err(Exit::Content.because(what()))
 }
 

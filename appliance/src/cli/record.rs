@@ -4,7 +4,7 @@ use super::names;
 use super::numbers::number;
 use super::options::{Files, Quiet, Threads};
 use super::part::SimulatedPart;
-use crate::error::{Exit, Failure, Result};
+use crate::error::{Exit, Result};
 use crate::head::scan::take;
 use crate::head::seam;
 use crate::history::kept;
@@ -126,7 +126,7 @@ fn take_of_recipe(
     let number = recipe.id.number;
     // It may have been taught from a recording, which does not have the whole calibration.
     let plan = Plan::again(recipe, calibration, stage.is_some())
-        .map_err(|error| Failure::new(Exit::Content, format!("record: {error}")))?;
+        .map_err(Exit::Content.because("record"))?;
     let mut sequences = 0..plan.sequence_count();
     let sequence = sequences.find(|&sequence| plan.indices(sequence).len() > PAIR);
     let sequence = sequence.unwrap_or_default();

@@ -158,7 +158,7 @@ impl Teach {
         let naming = self.naming(replaced.as_ref());
         if let Some(recipes) = &recipes {
             let shared = recipes.refuse_shared(self.number, &naming.part_number);
-            shared.map_err(|words| Failure::new(Exit::CannotCreate, format!("teach: {words}")))?;
+            shared.map_err(Exit::CannotCreate.because("teach"))?;
         }
         let pool = options.threads.pool(config.threads)?;
         let taught = match &self.golden {
@@ -166,14 +166,15 @@ impl Teach {
             None => self.teach_head(&config, &pool, &naming)?,
         };
         let taught = match replaced.filter(|_| self.keep_gauges) {
-            Some(file) => replace::keep_gauges(taught, &file)
-                .map_err(|words| Failure::new(Exit::Content, format!("teach: {words}")))?,
+            Some(file) => {
+                replace::keep_gauges(taught, &file).map_err(Exit::Content.because("teach"))?
+            }
             None => taught,
         };
         let taught = match self.frames {
             Some(_) => taught
                 .with_two_frames()
-                .map_err(|words| Failure::new(Exit::Content, format!("teach: {words}")))?,
+                .map_err(Exit::Content.because("teach"))?,
             None => taught,
         };
         let place = target.store(&taught)?;

@@ -111,13 +111,12 @@ impl Scratch {
     fn new() -> Result<Self> {
         let name = format!("fringed-{:08x}", crate::storage::state::random()?);
         let folder = std::env::temp_dir().join(name);
-        match DirBuilder::new().mode(0o700).create(&folder) {
-            Ok(()) => Ok(Self(folder)),
-            Err(error) => {
-                let what = format!("create {}", folder.display());
-                Err(Failure::because(Exit::CannotCreate, what, error))
-            }
-        }
+        let failed = Exit::CannotCreate.because(format!("create {}", folder.display()));
+        DirBuilder::new()
+            .mode(0o700)
+            .create(&folder)
+            .map_err(failed)?;
+        Ok(Self(folder))
     }
 }
 

@@ -111,17 +111,15 @@ fn turns(path: &Path, (columns, rows): (u32, u32)) -> Result<Vec<f64>> {
     let wrong = |error: &dyn std::fmt::Display| {
         Failure::because(Exit::Content, format!("read {name}"), error)
     };
-    let missing = |error| {
-        let words = format!("{error}: name a phase function that adapt wrote");
-        Failure::because(Exit::Missing, format!("read {name}"), words)
-    };
-    let length = std::fs::metadata(path).map_err(missing)?.len();
+    let remedy = "name a phase function that adapt wrote";
+    let missing = Exit::Missing.advising(format!("read {name}"), remedy);
+    let length = std::fs::metadata(path).map_err(&missing)?.len();
     if length > MAX_FUNCTION {
         return Err(wrong(
             &"it is larger than a phase function of any projector",
         ));
     }
-    let bytes = std::fs::read(path).map_err(missing)?;
+    let bytes = std::fs::read(path).map_err(&missing)?;
     let array = npy::read::<f64>(&bytes).map_err(|error| wrong(&error))?;
     match (array.columns, array.rows) == (columns as usize, rows as usize) {
         true => Ok(array.elements),

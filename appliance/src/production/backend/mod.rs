@@ -357,14 +357,9 @@ pub fn scenario(path: Option<&Path>) -> Result<Scenario> {
         return Ok(Scenario::default());
     };
     let place = path.display().to_string();
-    let text = fs::read_to_string(path).map_err(|error| {
-        let what = format!("read scenario {place}");
-        Failure::because(
-            Exit::Missing,
-            what,
-            format!("{error}: head.scenario names a TOML file"),
-        )
-    })?;
+    let what = format!("read scenario {place}");
+    let missing = Exit::Missing.advising(what, "head.scenario names a TOML file");
+    let text = fs::read_to_string(path).map_err(missing)?;
     Scenario::from_toml(&text, &place).map_err(Exit::Configuration.failure())
 }
 

@@ -76,14 +76,9 @@ pub fn pictures(folder: &Path, pattern: &str, expected: usize) -> Result<Vec<Pla
 }
 
 fn files(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
-    let entries = fs::read_dir(folder).map_err(|error| {
-        let what = format!("import {}", folder.display());
-        Failure::because(
-            Exit::Missing,
-            what,
-            format!("{error}: name a folder of pictures"),
-        )
-    })?;
+    let what = format!("import {}", folder.display());
+    let missing = Exit::Missing.advising(what, "name a folder of pictures");
+    let entries = fs::read_dir(folder).map_err(missing)?;
     let is_picture = |path: &PathBuf| {
         let ending = path.extension().and_then(|ending| ending.to_str());
         let known = ending.is_some_and(|ending| {
