@@ -26,6 +26,35 @@ pub enum Exit {
     Configuration = 78,
 }
 
+impl Exit {
+    /// What makes a failure with this code of an error.
+    pub fn failure<E: Display>(self) -> impl Fn(E) -> Failure + Copy {
+        move |error| Failure::new(self, error)
+    }
+
+    /// What makes a failure with this code of an error while doing `what`, which names the file.
+    pub fn because<E: Display>(self, what: impl Display) -> impl Fn(E) -> Failure {
+        move |error| Failure::because(self, &what, error)
+    }
+
+    /// As [`Self::because`], with what to do about it.
+    pub fn advising<E: Display>(
+        self,
+        what: impl Display,
+        remedy: impl Display,
+    ) -> impl Fn(E) -> Failure {
+        move |error| Failure::because(self, &what, format!("{error}: {remedy}"))
+    }
+
+    /// A failure with this code, for whatever should have been done.
+    ///
+    /// # Errors
+    /// Always.
+    pub fn fail<T>(self, message: impl Display) -> Result<T> {
+        Err(Failure::new(self, message))
+    }
+}
+
 /// A command that could not be carried out.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
@@ -40,10 +69,10 @@ pub struct Failure {
 
 impl Failure {
     /// A failure with any exit code.
-    pub fn new(exit: Exit, message: impl Into<String>) -> Self {
+    pub fn new(exit: Exit, message: impl Display) -> Self {
         Self {
             exit,
-            message: message.into(),
+            message: message.to_string(),
             device: None,
         }
     }
@@ -53,6 +82,9 @@ impl Failure {
         Self::new(exit, format!("{what}: {error}"))
     }
 }
+
+/// What a command comes to, unless another error is named.
+pub type Result<T, E = Failure> = std::result::Result<T, E>;
 
 /// ERROR_CODE of a device's error.
 pub fn code_of(error: &Error) -> u16 {
@@ -79,7 +111,7 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         Self {
             device: Some(error.clone()),
-            ..Self::new(Exit::Unavailable, error.to_string())
+            ..Self::new(Exit::Unavailable, error)
         }
     }
 }
@@ -91,6 +123,6 @@ impl From<hal::replay::RecordingError> for Failure {
         } else {
             Exit::Content
         };
-        Self::new(exit, error.to_string())
+        Self::new(exit, error)
     }
 }

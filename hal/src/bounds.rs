@@ -48,15 +48,27 @@ const LONGEST_MESSAGE: usize = 600;
 /// Most characters of a value that a message quotes.
 const REPEATED: usize = 48;
 
-/// Defines structs whose fields have their bounds beside them, as in `pub gain: f64 = 0.0..=100.0`.
-/// Each value of an option, an array or a vector must lie in them; fields without bounds are not
-/// checked. [`Fields`](crate::bounds::Fields) checks such a struct.
+/// Defines structs of files and settings whose fields have their bounds beside them, as in
+/// `pub gain: f64 = 0.0..=100.0`. Each value of an option, an array or a vector must lie in them;
+/// fields without bounds are not checked. [`Fields`](crate::bounds::Fields) checks such a struct.
+///
+/// A struct is cloned, compared, shown, read and written, and has no other keys than its fields.
+/// Of a `struct Name: Default` any key may be left out: its field then has the value that follows
+/// it, as in `pub gain: f64 = 0.0..=100.0 => 1.0`, or else the default of its type.
 #[macro_export]
 macro_rules! bounded {
-    ($($(#[$meta:meta])* $vis:vis struct $name:ident {
-        $($(#[$note:meta])* $see:vis $field:ident: $kind:ty $(= $bound:expr)?,)*
-    })*) => {$(
-        $(#[$meta])*
+    (@value) => {
+        Default::default()
+    };
+    (@value $value:expr) => {
+        $value
+    };
+    (@item [] [$($meta:tt)*] $vis:vis $name:ident {
+        $($(#[$note:meta])* $see:vis $field:ident: $kind:ty $(= $bound:expr)? $(=> $value:expr)?,)*
+    }) => {
+        #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        $($meta)*
         $vis struct $name {
             $($(#[$note])* $see $field: $kind,)*
         }
@@ -71,7 +83,25 @@ macro_rules! bounded {
                 Ok(())
             }
         }
-    )*};
+    };
+    (@item [Default] [$($meta:tt)*] $vis:vis $name:ident $fields:tt) => {
+        $crate::bounded! { @item [] [$($meta)* #[serde(default)]] $vis $name $fields }
+        $crate::bounded! { @default $name $fields }
+    };
+    (@default $name:ident {
+        $($(#[$note:meta])* $see:vis $field:ident: $kind:ty $(= $bound:expr)? $(=> $value:expr)?,)*
+    }) => {
+        impl Default for $name {
+            fn default() -> Self {
+                Self {
+                    $($field: $crate::bounded!(@value $($value)?),)*
+                }
+            }
+        }
+    };
+    ($($(#[$meta:meta])* $vis:vis struct $name:ident $(: $default:ident)? { $($field:tt)* })*) => {
+        $($crate::bounded! { @item [$($default)?] [$(#[$meta])*] $vis $name { $($field)* } })*
+    };
 }
 
 /// The bounds of one value: a range of numbers, [`Longest`] or [`Fields`].

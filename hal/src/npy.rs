@@ -51,24 +51,23 @@ impl Element for u8 {
     }
 }
 
-impl Element for i16 {
-    const KIND: &'static str = "<i2";
-    fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>> {
-        (kind == "<i2").then(|| chunks(bytes, Self::from_le_bytes))
-    }
-    fn write(self, bytes: &mut Vec<u8>) {
-        bytes.extend_from_slice(&self.to_le_bytes());
-    }
+macro_rules! elements {
+    ($($type:ident = $kind:literal;)*) => {$(
+        impl Element for $type {
+            const KIND: &'static str = $kind;
+            fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>> {
+                (kind == $kind).then(|| chunks(bytes, Self::from_le_bytes))
+            }
+            fn write(self, bytes: &mut Vec<u8>) {
+                bytes.extend_from_slice(&self.to_le_bytes());
+            }
+        }
+    )*};
 }
 
-impl Element for f32 {
-    const KIND: &'static str = "<f4";
-    fn read(kind: &str, bytes: &[u8]) -> Option<Vec<Self>> {
-        (kind == "<f4").then(|| chunks(bytes, Self::from_le_bytes))
-    }
-    fn write(self, bytes: &mut Vec<u8>) {
-        bytes.extend_from_slice(&self.to_le_bytes());
-    }
+elements! {
+    i16 = "<i2";
+    f32 = "<f4";
 }
 
 /// Also reads files of `f32`.

@@ -22,10 +22,10 @@ pub const MOST_GAIN: f64 = 64.0;
 const MAX_NAME: usize = 255;
 
 bounded! {
-    /// Which camera, and how it exposes. Nothing changes while it runs.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct CameraSetup {
+    /// Which camera, and how it exposes. Nothing changes while it runs. The defaults are those of
+    /// the reference head: one refresh of 60 Hz is exposed, then 1118 lines of 14.8 µs are read out
+    /// in 16.56 ms.
+    pub struct CameraSetup: Default {
         /// libcamera's id; none = the only camera that is there.
         pub id: Option<String> = Longest(MAX_NAME),
         /// Pixels per row of the sensor's picture; none = the sensor's. A frame of a colour sensor
@@ -34,33 +34,16 @@ bounded! {
         /// Rows; none = the sensor's.
         pub height: Option<u32> = 1..=MAX_SIDE,
         /// Exposure, µs: whole refreshes of the projector.
-        pub exposure_us: u32 = 1..=1_000_000,
+        pub exposure_us: u32 = 1..=1_000_000 => 16_667,
         /// From the start of one exposure to the start of the next, µs: the shortest possible time
         /// of a triggered camera, the fixed time of one that runs by itself.
-        pub period_us: u32,
+        pub period_us: u32 => 33_333,
         /// Gain, 1 = none.
-        pub gain: f64 = NO_GAIN..=MOST_GAIN,
+        pub gain: f64 = NO_GAIN..=MOST_GAIN => 1.0,
         /// From the end of an exposure until its frame can be fetched, without any delay, µs.
-        pub delivery_us: u32 = 0..=1_000_000,
+        pub delivery_us: u32 = 0..=1_000_000 => 20_000,
         /// Whether the luminance of a YUV format will do where the camera offers no raw one.
         pub luma: bool,
-    }
-}
-
-impl Default for CameraSetup {
-    /// The reference head: one refresh of 60 Hz is exposed, then 1118 lines of 14.8 µs are read out
-    /// in 16.56 ms.
-    fn default() -> Self {
-        Self {
-            id: None,
-            width: None,
-            height: None,
-            exposure_us: 16_667,
-            period_us: 33_333,
-            gain: 1.0,
-            delivery_us: 20_000,
-            luma: false,
-        }
     }
 }
 
@@ -88,10 +71,9 @@ pub enum Led {
 }
 
 bounded! {
-    /// Which projector, and in which mode.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct ProjectorSetup {
+    /// Which projector, and in which mode; by default any, in its preferred mode, without a
+    /// controller to set up.
+    pub struct ProjectorSetup: Default {
         /// The card's device file, such as "/dev/dri/card1"; none = the only one with a connector
         /// that fits.
         pub card: Option<PathBuf> = Longest(MAX_PATH),
@@ -107,65 +89,32 @@ bounded! {
         /// The kind of its controller.
         pub controller: ControllerKind,
         /// Device file of the controller's I²C bus.
-        pub controller_bus: PathBuf = Longest(MAX_PATH),
+        pub controller_bus: PathBuf = Longest(MAX_PATH) => "/dev/i2c-1".into(),
         /// The controller's address on the bus, 7 bits. Addresses outside these bounds are reserved
         /// (I²C-bus specification, UM10204, section 3.1.12).
-        pub controller_address: u8 = 8..=119,
+        pub controller_address: u8 = 8..=119 => 0x1B,
         /// The LED that patterns are shown with.
-        pub led: Led,
+        pub led: Led => Led::Blue,
         /// Its current in steps of the LED's driver; none = as the projector's firmware sets it.
         pub led_current: Option<u16> = 0..=1023,
     }
 }
 
-impl Default for ProjectorSetup {
-    /// Any projector, in its preferred mode, without a controller to set up.
-    fn default() -> Self {
-        Self {
-            card: None,
-            connector: None,
-            width: None,
-            height: None,
-            refresh_hz: None,
-            controller: ControllerKind::None,
-            controller_bus: "/dev/i2c-1".into(),
-            controller_address: 0x1B,
-            led: Led::Blue,
-            led_current: None,
-        }
-    }
-}
-
 bounded! {
-    /// The line that starts an exposure of the camera.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct TriggerSetup {
+    /// The line that starts an exposure of the camera. The defaults are those of the reference head:
+    /// a pulse of 16 653 µs exposes for 16 667 µs, and a transistor inverts it for the camera.
+    pub struct TriggerSetup: Default {
         /// Label of the GPIO chip.
-        pub chip: String = Longest(MAX_NAME),
+        pub chip: String = Longest(MAX_NAME) => "pinctrl-rp1".into(),
         /// Name of the line; none = the camera runs by itself, or the projector triggers it.
         pub line: Option<String> = Longest(MAX_NAME),
         /// Whether the projector's trigger output is wired to the camera.
         pub by_projector: bool,
         /// How long a pulse lasts, µs. Many cameras expose for as long as the pulse lasts; a pulse
         /// shorter than half the exposure is assumed to start the exposure only.
-        pub pulse_us: u32 = 1..=1_000_000,
+        pub pulse_us: u32 = 1..=1_000_000 => 16_653,
         /// Whether the line is low during a pulse and high when idle.
         pub active_low: bool,
-    }
-}
-
-impl Default for TriggerSetup {
-    /// The reference head: a pulse of 16 653 µs exposes for 16 667 µs. A transistor inverts it for
-    /// the camera.
-    fn default() -> Self {
-        Self {
-            chip: "pinctrl-rp1".into(),
-            line: None,
-            by_projector: false,
-            pulse_us: 16_653,
-            active_low: false,
-        }
     }
 }
 
@@ -196,17 +145,15 @@ impl TriggerSetup {
 bounded! {
     /// The lines between the station and a press or another machine that starts it by wire. Each is
     /// used only if it is named.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct LinesSetup {
+    pub struct LinesSetup: Default {
         /// Label of the GPIO chip.
-        pub chip: String = Longest(MAX_NAME),
+        pub chip: String = Longest(MAX_NAME) => "pinctrl-rp1".into(),
         /// In: starts a cycle.
         pub start: Option<String> = Longest(MAX_NAME),
         /// Whether the start line is active when low.
-        pub start_active_low: bool,
+        pub start_active_low: bool => true,
         /// How long the start line must keep its level before a start counts, ms.
-        pub debounce_ms: u32 = 0..=1000,
+        pub debounce_ms: u32 = 0..=1000 => 5,
         /// Out: the station is measuring.
         pub busy: Option<String> = Longest(MAX_NAME),
         /// Out: the last part passed.
@@ -215,21 +162,6 @@ bounded! {
         pub fault: Option<String> = Longest(MAX_NAME),
         /// Whether busy, ok and fault are low when they are on.
         pub outputs_active_low: bool,
-    }
-}
-
-impl Default for LinesSetup {
-    fn default() -> Self {
-        Self {
-            chip: "pinctrl-rp1".into(),
-            start: None,
-            start_active_low: true,
-            debounce_ms: 5,
-            busy: None,
-            ok: None,
-            fault: None,
-            outputs_active_low: false,
-        }
     }
 }
 

@@ -319,3 +319,21 @@ macro_rules! operations {
     };
 }
 pub(super) use operations;
+
+/// Defines operations on two `$type` that result in one, as `name = function;`.
+macro_rules! pairs {
+    ($within:ident, $inline:ident, $type:ident; $($name:ident = $function:ident;)*) => {
+        operations! { $within, $inline;
+            $($name(self, a: $type, b: $type) -> $type = $function(a, b);)*
+        }
+    };
+}
+pub(super) use pairs;
+
+/// The expression itself, for operations that need no proof.
+macro_rules! plain {
+    ($e:expr) => {
+        $e
+    };
+}
+pub(super) use plain;

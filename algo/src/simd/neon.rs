@@ -1,6 +1,6 @@
 //! The back-end of aarch64, where NEON is always available.
 
-use super::lanes::{LINE, Lanes, Scaled, operations};
+use super::lanes::{LINE, Lanes, Scaled, operations, pairs};
 use super::rows::{block, block_mut};
 use core::arch::aarch64::*;
 use core::arch::asm;
@@ -59,27 +59,43 @@ impl Lanes for Neon {
     type F = F;
     type Count = Count;
 
+    pairs! { neon, always, B;
+        min8 = vminq_u8;
+        max8 = vmaxq_u8;
+        sub8 = vsubq_u8;
+        eq8 = vceqq_u8;
+        and8 = vandq_u8;
+        or8 = vorrq_u8;
+        xor8 = veorq_u8;
+        excess8 = vqsubq_u8;
+    }
+    pairs! { neon, always, W;
+        add = vaddq_s16;
+        sub = vsubq_s16;
+        add_sat = vqaddq_s16;
+        mul_q15 = vqrdmulhq_s16;
+        mul_low = vmulq_s16;
+        min = vminq_s16;
+        max = vmaxq_s16;
+        and = vandq_s16;
+        or = vorrq_s16;
+        xor = veorq_s16;
+    }
+    pairs! { neon, always, D;
+        add32 = vaddq_s32;
+    }
+    pairs! { neon, always, F;
+        mul_single = vmulq_f32;
+    }
+
     operations! { neon, always;
         splat8(self, x: u8) -> B = vdupq_n_u8(x);
-        min8(self, a: B, b: B) -> B = vminq_u8(a, b);
-        max8(self, a: B, b: B) -> B = vmaxq_u8(a, b);
-        sub8(self, a: B, b: B) -> B = vsubq_u8(a, b);
-        eq8(self, a: B, b: B) -> B = vceqq_u8(a, b);
-        and8(self, a: B, b: B) -> B = vandq_u8(a, b);
-        or8(self, a: B, b: B) -> B = vorrq_u8(a, b);
-        xor8(self, a: B, b: B) -> B = veorq_u8(a, b);
         pick8(self, mask: B, a: B, b: B) -> B = vbslq_u8(mask, a, b);
-        excess8(self, a: B, b: B) -> B = vqsubq_u8(a, b);
         bytes_of(self, x: W) -> B = vreinterpretq_u8_s16(x);
         narrow_mask(self, mask: [W; 2]) -> B = vuzp1q_u8(vreinterpretq_u8_s16(mask[0]), vreinterpretq_u8_s16(mask[1]));
         splat16(self, x: i16) -> W = vdupq_n_s16(x);
-        add(self, a: W, b: W) -> W = vaddq_s16(a, b);
-        sub(self, a: W, b: W) -> W = vsubq_s16(a, b);
         sign_of(self, x: W) -> W = vorrq_s16(vshrq_n_s16::<15>(x), vdupq_n_s16(1));
         add_signed(self, a: W, b: W, sign: W) -> W = vmlaq_s16(a, b, sign);
-        add_sat(self, a: W, b: W) -> W = vqaddq_s16(a, b);
-        mul_q15(self, a: W, b: W) -> W = vqrdmulhq_s16(a, b);
-        mul_low(self, a: W, b: W) -> W = vmulq_s16(a, b);
         left(self, n: u8) -> Count = vdupq_n_s16(i16::from(n));
         right(self, n: u8) -> Count = vdupq_n_s16(-i16::from(n));
         shl_by(self, x: W, n: Count) -> W = vshlq_s16(x, n);
@@ -89,25 +105,18 @@ impl Lanes for Neon {
         mean(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vrhaddq_u16(vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b)));
         abs(self, x: W) -> W = vabsq_s16(x);
         excess(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vqsubq_u16(vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b)));
-        min(self, a: W, b: W) -> W = vminq_s16(a, b);
-        max(self, a: W, b: W) -> W = vmaxq_s16(a, b);
         max_unsigned(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vmaxq_u16(vreinterpretq_u16_s16(a), vreinterpretq_u16_s16(b)));
         gt(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vcgtq_s16(a, b));
         eq(self, a: W, b: W) -> W = vreinterpretq_s16_u16(vceqq_s16(a, b));
-        and(self, a: W, b: W) -> W = vandq_s16(a, b);
-        or(self, a: W, b: W) -> W = vorrq_s16(a, b);
-        xor(self, a: W, b: W) -> W = veorq_s16(a, b);
         pick(self, mask: W, a: W, b: W) -> W = vbslq_s16(vreinterpretq_u16_s16(mask), a, b);
         narrow_mask32(self, mask: [D; 2]) -> W = vuzp1q_s16(vreinterpretq_s16_s32(mask[0]), vreinterpretq_s16_s32(mask[1]));
         splat32(self, x: i32) -> D = vdupq_n_s32(x);
-        add32(self, a: D, b: D) -> D = vaddq_s32(a, b);
         sar32_by(self, x: D, n: u8) -> D = vshlq_s32(x, vdupq_n_s32(-i32::from(n)));
         gt32(self, a: D, b: D) -> D = vreinterpretq_s32_u32(vcgtq_s32(a, b));
         pick32(self, mask: D, a: D, b: D) -> D = vbslq_s32(vreinterpretq_u32_s32(mask), a, b);
         to_single(self, x: D) -> F = vcvtq_f32_s32(x);
         to_whole(self, x: F) -> D = vcvtnq_s32_f32(x);
         splat_single(self, x: f32) -> F = vdupq_n_f32(x);
-        mul_single(self, a: F, b: F) -> F = vmulq_f32(a, b);
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@
 //! operations are not inlined, because kernels of hundreds of inlined loops take minutes to
 //! compile.
 
-use super::lanes::{Lanes, Scaled, operations};
+use super::lanes::{Lanes, Scaled, operations, plain};
 use crate::math::nearest;
 
 /// Always available.
@@ -73,10 +73,12 @@ type D = [i32; DOUBLES];
 type F = [f32; DOUBLES];
 type Count = u8;
 
-/// The expression itself: nothing here is unsafe.
-macro_rules! plain {
-    ($e:expr) => {
-        $e
+/// Operations on two `$type`, lane by lane, as `name = function;`.
+macro_rules! lanewise {
+    ($type:ident; $($name:ident = $function:expr;)*) => {
+        operations! { plain, never;
+            $($name(self, a: $type, b: $type) -> $type = pairs(a, b, $function);)*
+        }
     };
 }
 
@@ -91,16 +93,42 @@ impl Lanes for Portable {
     type F = F;
     type Count = Count;
 
+    lanewise! { B;
+        min8 = u8::min;
+        max8 = u8::max;
+        sub8 = u8::wrapping_sub;
+        eq8 = |a, b| mask8(a == b);
+        and8 = |a, b| a & b;
+        or8 = |a, b| a | b;
+        xor8 = |a, b| a ^ b;
+    }
+    lanewise! { W;
+        add = i16::wrapping_add;
+        sub = i16::wrapping_sub;
+        add_sat = i16::saturating_add;
+        mul_q15 = |a, b| ((i32::from(a) * i32::from(b) + (1 << 14)) >> 15) as i16;
+        mul_low = i16::wrapping_mul;
+        mean = |a, b| ((u32::from(a.cast_unsigned()) + u32::from(b.cast_unsigned())).div_ceil(2) as u16).cast_signed();
+        min = i16::min;
+        max = i16::max;
+        max_unsigned = |a, b| a.cast_unsigned().max(b.cast_unsigned()).cast_signed();
+        gt = |a, b| mask16(a > b);
+        eq = |a, b| mask16(a == b);
+        and = |a, b| a & b;
+        or = |a, b| a | b;
+        xor = |a, b| a ^ b;
+    }
+    lanewise! { D;
+        add32 = i32::wrapping_add;
+        gt32 = |a, b| mask32(a > b);
+    }
+    lanewise! { F;
+        mul_single = |a, b| a * b;
+    }
+
     operations! { plain, never;
         splat8(self, x: u8) -> B = [x; BYTES];
         load8(self, from: &[u8], at: usize) -> B = core::array::from_fn(|lane| from[at + lane]);
-        min8(self, a: B, b: B) -> B = pairs(a, b, u8::min);
-        max8(self, a: B, b: B) -> B = pairs(a, b, u8::max);
-        sub8(self, a: B, b: B) -> B = pairs(a, b, u8::wrapping_sub);
-        eq8(self, a: B, b: B) -> B = pairs(a, b, |a, b| mask8(a == b));
-        and8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a & b);
-        or8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a | b);
-        xor8(self, a: B, b: B) -> B = pairs(a, b, |a, b| a ^ b);
         bound(self, x: u8) -> u8 = x;
         all_at_least(self, x: B, bound: u8) -> bool = x.iter().all(|&x| x >= bound);
         all_at_most(self, x: B, bound: u8) -> bool = x.iter().all(|&x| x <= bound);
@@ -113,38 +141,21 @@ impl Lanes for Portable {
         bytes_of(self, x: W) -> B = core::array::from_fn(|lane| x[lane / 2].to_le_bytes()[lane % 2]);
         narrow_mask(self, mask: [W; 2]) -> B = lanes(whole::<_, WORDS, BYTES>(mask), |mask: i16| mask as u8);
         splat16(self, x: i16) -> W = [x; WORDS];
-        add(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_add);
-        sub(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_sub);
         sign_of(self, x: W) -> W = lanes(x, |x| if x < 0 { -1 } else { 1 });
         add_signed(self, a: W, b: W, sign: W) -> W = self.add(a, pairs(b, sign, i16::wrapping_mul));
-        add_sat(self, a: W, b: W) -> W = pairs(a, b, i16::saturating_add);
-        mul_q15(self, a: W, b: W) -> W = pairs(a, b, |a, b| ((i32::from(a) * i32::from(b) + (1 << 14)) >> 15) as i16);
-        mul_low(self, a: W, b: W) -> W = pairs(a, b, i16::wrapping_mul);
         left(self, n: u8) -> Count = n;
         right(self, n: u8) -> Count = n;
         shl_by(self, x: W, n: u8) -> W = lanes(x, |x| x.checked_shl(u32::from(n)).unwrap_or(0));
         sar_by(self, x: W, n: u8) -> W = lanes(x, |x| x >> n);
         shr_by(self, x: W, n: u8) -> W = lanes(x, |x| (x.cast_unsigned() >> n).cast_signed());
         halve(self, x: W) -> W = lanes(x, |x| x.cast_unsigned().div_ceil(2).cast_signed());
-        mean(self, a: W, b: W) -> W = pairs(a, b, |a, b| ((u32::from(a.cast_unsigned()) + u32::from(b.cast_unsigned())).div_ceil(2) as u16).cast_signed());
         abs(self, x: W) -> W = lanes(x, i16::wrapping_abs);
-        min(self, a: W, b: W) -> W = pairs(a, b, i16::min);
-        max(self, a: W, b: W) -> W = pairs(a, b, i16::max);
-        max_unsigned(self, a: W, b: W) -> W = pairs(a, b, |a, b| a.cast_unsigned().max(b.cast_unsigned()).cast_signed());
-        gt(self, a: W, b: W) -> W = pairs(a, b, |a, b| mask16(a > b));
-        eq(self, a: W, b: W) -> W = pairs(a, b, |a, b| mask16(a == b));
-        and(self, a: W, b: W) -> W = pairs(a, b, |a, b| a & b);
-        or(self, a: W, b: W) -> W = pairs(a, b, |a, b| a | b);
-        xor(self, a: W, b: W) -> W = pairs(a, b, |a, b| a ^ b);
         narrow_mask32(self, mask: [D; 2]) -> W = lanes(whole::<_, DOUBLES, WORDS>(mask), |mask: i32| mask as i16);
         splat32(self, x: i32) -> D = [x; DOUBLES];
-        add32(self, a: D, b: D) -> D = pairs(a, b, i32::wrapping_add);
         sar32_by(self, x: D, n: u8) -> D = lanes(x, |x| x >> n);
-        gt32(self, a: D, b: D) -> D = pairs(a, b, |a, b| mask32(a > b));
         to_single(self, x: D) -> F = lanes(x, |x| x as f32);
         to_whole(self, x: F) -> D = lanes(x, nearest::whole);
         splat_single(self, x: f32) -> F = [x; DOUBLES];
-        mul_single(self, a: F, b: F) -> F = pairs(a, b, |a, b| a * b);
     }
 
     #[inline(always)]

@@ -2,7 +2,7 @@
 
 use super::names;
 use super::options::Quiet;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::head::board;
 use crate::output::board::sheet;
 use crate::storage::folder::write_whole;
@@ -27,14 +27,12 @@ impl Print {
     ///
     /// # Errors
     /// If no paper holds the board (64), or the file cannot be written (73).
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let place = self.out.display();
-        let sheet = sheet(&self.board)
-            .map_err(|error| Failure::because(Exit::Usage, format!("draw {place}"), error))?;
-        write_whole(&self.out, &sheet.pdf).map_err(|error| {
-            let words = format!("{error}: free space, or name another file");
-            Failure::because(Exit::CannotCreate, format!("write {place}"), words)
-        })?;
+        let sheet = sheet(&self.board).map_err(Exit::Usage.because(format!("draw {place}")))?;
+        let remedy = "free space, or name another file";
+        write_whole(&self.out, &sheet.pdf)
+            .map_err(Exit::CannotCreate.advising(format!("write {place}"), remedy))?;
         self.quiet.say(|| {
             format!(
                 "{place}: print it on {} at 100 %, glue it on something flat, and measure it",

@@ -2,7 +2,7 @@
 
 use super::options::{Json, Output};
 use crate::config::{Backend, Config, TABLE, keys};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::head::calibration::place::Place;
 use crate::production::backend;
 use hal::replay::Recording;
@@ -30,7 +30,7 @@ impl ConfigCommand {
     ///
     /// # Errors
     /// What is wrong with the configuration.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         match self {
             Self::Keys { json } if json.json => {
                 let keys: Vec<_> = keys().collect();
@@ -57,10 +57,10 @@ impl ConfigCommand {
     }
 }
 
-fn check_named_files(config: &Config) -> Result<(), Failure> {
+fn check_named_files(config: &Config) -> Result<()> {
     backend::built_for(config)?;
     if let Some(calibration) = &config.head.calibration {
-        let wrong = |problem| Failure::new(Exit::Content, problem);
+        let wrong = Exit::Content.failure();
         // The file need not exist yet.
         Place::at(calibration).load().map_err(wrong)?;
     }

@@ -2,7 +2,7 @@
 
 use super::options::Measuring;
 use crate::config::Backend;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::head::doctor::{Check, Verdict, computer, controller, examine};
 use crate::production::backend;
 use crate::system::host::Host;
@@ -26,7 +26,7 @@ impl Doctor {
     ///
     /// # Errors
     /// If the head cannot be opened, or a check failed (69).
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let options = &self.measuring;
         let mut config = options.files.configuration()?;
         config.head = options.files.head(&config);
@@ -36,10 +36,7 @@ impl Doctor {
             config.head.calibration = None;
         }
         if config.head.backend == Backend::Replay {
-            return Err(Failure::new(
-                Exit::Usage,
-                "doctor: a recording cannot be examined: configure another head or name a scenario with --scenario",
-            ));
+            return Exit::Usage.fail("doctor: a recording cannot be examined: configure another head or name a scenario with --scenario");
         }
         let progress = options.output.progress();
         let on_progress =
@@ -71,9 +68,9 @@ impl Doctor {
         if failed.is_empty() {
             return Ok(());
         }
-        Err(Failure::new(
-            Exit::Unavailable,
-            format!("doctor: the head is not well: {}", failed.join(", ")),
+        Exit::Unavailable.fail(format!(
+            "doctor: the head is not well: {}",
+            failed.join(", ")
         ))
     }
 }

@@ -3,7 +3,7 @@
 use super::numbers::number;
 use super::options::{Files, Json};
 use crate::config::MAX_RESULTS;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::history::{Entry, Filter, HistoryError, Reader, time};
 use crate::station::Verdict;
 use crate::station::control::MAX_RECIPE;
@@ -51,7 +51,7 @@ impl History {
     ///
     /// # Errors
     /// If there is no history (66), or it is damaged or of another version (65).
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let state = self.files.state_folder()?;
         let reader = Reader::of(&state);
         let usual = if self.csv { MAX_RESULTS } else { SCREEN };
@@ -104,7 +104,7 @@ impl History {
         Ok(())
     }
 
-    fn csv(&self, reader: &Reader, filter: &Filter) -> Result<(), Failure> {
+    fn csv(&self, reader: &Reader, filter: &Filter) -> Result<()> {
         let mut out = std::io::BufWriter::new(std::io::stdout().lock());
         match reader.csv(filter, &mut out) {
             // A pipe that the reader has closed is not an error.
@@ -121,7 +121,7 @@ impl From<HistoryError> for Failure {
             (true, true) => Exit::Content,
             (true, false) => Exit::Unavailable,
         };
-        Self::new(exit, error.to_string())
+        Self::new(exit, error)
     }
 }
 

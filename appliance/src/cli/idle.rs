@@ -2,7 +2,7 @@
 //! daemon was killed.
 
 use crate::config::Config;
-use crate::error::Failure;
+use crate::error::Result;
 use crate::production::backend;
 use std::path::PathBuf;
 
@@ -20,7 +20,7 @@ impl Idle {
     /// # Errors
     /// If the configuration is wrong, or a line cannot be used, for example because a running
     /// station holds it (69).
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let config = self.config.as_deref().map(Config::read).transpose()?;
         backend::leave_lines_idle(&config.unwrap_or_default())
     }

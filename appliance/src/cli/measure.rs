@@ -2,7 +2,7 @@
 
 use super::names;
 use super::options::{Output, Threads};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::history::kept;
 use crate::measure::{Measurement, measure_about_map, measure_with, models};
 use crate::output::cloud::Axes;
@@ -45,7 +45,7 @@ impl Measure {
     ///
     /// # Errors
     /// If the recording cannot be opened or measured, or the results cannot be written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let unpacked = Unpacked::of(&self.recording)?;
         let mut recording = Recording::open(unpacked.folder())?;
         let models = match &self.calibration {
@@ -64,7 +64,7 @@ impl Measure {
         let folder = OutputFolder::create(&self.out)?;
         pool.install(|| write(&folder, &measurement, self.axes))?;
         let json = serde_json::to_string_pretty(&measurement.report)
-            .map_err(|error| Failure::because(Exit::Software, "write the report", error))?;
+            .map_err(Exit::Software.because("write the report"))?;
         folder.write("report.json", format!("{json}\n").as_bytes())?;
         let text = || {
             let table = measurement.report.table();
@@ -78,18 +78,16 @@ impl Measure {
 const MAX_MAP: u64 = 1 << 30;
 
 /// The expected phase in a file.
-fn expected_phase(path: &Path) -> Result<npy::Array<f64>, Failure> {
+fn expected_phase(path: &Path) -> Result<npy::Array<f64>> {
     let what = || format!("read {}", path.display());
-    let missing = |error| {
-        let words = format!("{error}: name the expected phase that fringed-lab adapt wrote");
-        Failure::because(Exit::Missing, what(), words)
-    };
-    if std::fs::metadata(path).map_err(missing)?.len() > MAX_MAP {
-        let words = "it is larger than a map of any camera: name the expected phase that fringed-lab adapt wrote";
-        return Err(Failure::because(Exit::Content, what(), words));
+    let remedy = "name the expected phase that fringed-lab adapt wrote";
+    let missing = Exit::Missing.advising(what(), remedy);
+    if std::fs::metadata(path).map_err(&missing)?.len() > MAX_MAP {
+        let too_large = Exit::Content.advising(what(), remedy);
+        return Err(too_large("it is larger than a map of any camera"));
     }
-    let bytes = std::fs::read(path).map_err(missing)?;
-    npy::read::<f64>(&bytes).map_err(|error| Failure::because(Exit::Content, what(), error))
+    let bytes = std::fs::read(path).map_err(&missing)?;
+    npy::read::<f64>(&bytes).map_err(Exit::Content.because(what()))
 }
 
 /// Files that are written only if there are heights.
@@ -101,7 +99,7 @@ const PLACES: [&str; 2] = ["column", "row"];
 /// Files of each pattern, by the beginning of their names.
 const OF_PATTERN: [&str; 4] = ["phase", "wrapped", "modulation", "mask"];
 
-fn write(folder: &OutputFolder, measurement: &Measurement, axes: Axes) -> Result<(), Failure> {
+fn write(folder: &OutputFolder, measurement: &Measurement, axes: Axes) -> Result<()> {
     let array = |name: &str, width, values: &[f32]| folder.write(name, &npy::write(width, values));
     let patterns = measurement.phases.len();
     write_pattern(folder, measurement, measurement.primary, "")?;
@@ -152,7 +150,7 @@ fn write_pattern(
     measurement: &Measurement,
     pattern: usize,
     suffix: &str,
-) -> Result<(), Failure> {
+) -> Result<()> {
     let (absolute, wrapped) = (&measurement.phases[pattern], &measurement.wrapped[pattern]);
     let width = wrapped.width;
     let named = OF_PATTERN.map(|name| format!("{name}{suffix}.npy"));

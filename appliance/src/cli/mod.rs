@@ -32,7 +32,7 @@ pub use completions::Completions;
 pub use options::{Files, Output, Quiet, Threads};
 
 use crate::VERSION;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::modbus::{registers_csv, registers_json};
 use crate::system::journal::{self, Severity};
 use crate::system::stderr;
@@ -56,40 +56,64 @@ struct Arguments {
 const MORE: &str = "These are the options of serve; `fringed help COMMAND` lists those of a command. They may stand before the command \
                     as well as behind it.";
 
-#[derive(Debug, Subcommand)]
-enum Command {
+/// Defines the commands, each by the struct that runs it.
+macro_rules! commands {
+    ($($(#[$meta:meta])* $name:ident($options:ty);)*) => {
+        #[derive(Debug, Subcommand)]
+        enum Command {
+            $($(#[$meta])* $name($options),)*
+            /// Print what makes a shell complete the command line.
+            Completions(Completions),
+        }
+
+        impl Command {
+            fn run(self) -> Result<()> {
+                match self {
+                    $(Self::$name(options) => options.run(),)*
+                    Self::Completions(options) => options.run(Arguments::command()),
+                }
+            }
+        }
+    };
+}
+
+commands! {
     /// Run the station: Modbus TCP for the PLC, a page for the technician.
-    Serve(serve::Serve),
+    Serve(serve::Serve);
     /// Run the station and play the PLC: ten parts, three of them defective.
-    Demo(demo::Demo),
+    Demo(demo::Demo);
     /// Measure a recording: phase, height, picture, point cloud and report.
-    Measure(measure::Measure),
+    Measure(measure::Measure);
     /// Examine the head step by step.
-    Doctor(doctor::Doctor),
+    Doctor(doctor::Doctor);
     /// Calibrate the head: make models from a board or import them, measure the rest.
-    Calibrate(calibrate::Calibrate),
+    Calibrate(calibrate::Calibrate);
     /// Draw a checkerboard to print, for `calibrate --board`.
-    Board(board::Print),
+    Board(board::Print);
     /// Record a sequence from the configured head.
-    Record(record::Record),
+    Record(record::Record);
     /// Make a recipe from a good part in front of the head, or from recordings.
-    Teach(teach::Teach),
+    Teach(teach::Teach);
     /// Show or export stored results.
-    History(history::History),
+    History(history::History);
     /// Judge a part that did not pass again and compare with the history.
-    Replay(replay::Replay),
+    Replay(replay::Replay);
     /// List, export, import or delete recipes, or undo that.
     #[command(subcommand)]
-    Recipe(recipe::RecipeCommand),
+    Recipe(recipe::RecipeCommand);
     /// Check a configuration, or list its keys.
     #[command(subcommand)]
-    Config(config::ConfigCommand),
+    Config(config::ConfigCommand);
     /// Leave the output lines at their idle levels: no trigger pulse, busy and ok off, fault on.
-    Idle(idle::Idle),
+    Idle(idle::Idle);
     /// Print the register map as CSV (or JSON with --json).
-    Registers(Json),
-    /// Print what makes a shell complete the command line.
-    Completions(Completions),
+    Registers(Registers);
+}
+
+#[derive(Debug, clap::Args)]
+struct Registers {
+    #[command(flatten)]
+    json: Json,
 }
 
 /// Commands of `fringed-lab` that `fringed` once had.
@@ -109,14 +133,14 @@ pub fn main() -> ExitCode {
 
 /// Parses the arguments of this process, runs the command and returns its exit code. Options may
 /// stand before the command or after it.
-pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode {
+pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
     journal::take_panics();
     let code = carry_out(run);
     stderr::end();
     code
 }
 
-fn carry_out<A: Parser>(run: impl FnOnce(A) -> Result<(), Failure>) -> ExitCode {
+fn carry_out<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
     let words = options::behind_the_command(&A::command(), std::env::args_os());
     let arguments = match A::try_parse_from(words) {
         Ok(arguments) => arguments,
@@ -153,38 +177,21 @@ fn refused(error: &clap::Error) -> ExitCode {
     }
 }
 
-fn run(arguments: Arguments) -> Result<(), Failure> {
+fn run(arguments: Arguments) -> Result<()> {
     match arguments.command {
         None => arguments.serve.run(),
-        Some(Command::Serve(command)) => command.run(),
-        Some(Command::Demo(command)) => command.run(),
-        Some(Command::Measure(command)) => command.run(),
-        Some(Command::Doctor(command)) => command.run(),
-        Some(Command::Calibrate(command)) => command.run(),
-        Some(Command::Board(command)) => command.run(),
-        Some(Command::Record(command)) => command.run(),
-        Some(Command::Teach(command)) => command.run(),
-        Some(Command::History(command)) => command.run(),
-        Some(Command::Replay(command)) => command.run(),
-        Some(Command::Recipe(command)) => command.run(),
-        Some(Command::Config(command)) => command.run(),
-        Some(Command::Idle(command)) => command.run(),
-        Some(Command::Registers(format)) => {
-            registers(format);
-            Ok(())
-        }
-        Some(Command::Completions(command)) => {
-            command.run(Arguments::command());
-            Ok(())
-        }
+        Some(command) => command.run(),
     }
 }
 
-fn registers(format: Json) {
-    if format.json {
-        say!("{:#}", registers_json());
-    } else {
-        say!("{}", registers_csv().trim_end());
+impl Registers {
+    fn run(&self) -> Result<()> {
+        if self.json.json {
+            say!("{:#}", registers_json());
+        } else {
+            say!("{}", registers_csv().trim_end());
+        }
+        Ok(())
     }
 }
 

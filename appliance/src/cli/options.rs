@@ -2,7 +2,7 @@
 
 use super::numbers::{address, number};
 use crate::config::{Config, HeadConfig};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::storage::state::StateFolder;
 use crate::system::progress::Progress;
 use clap::{Arg, Args, Command};
@@ -94,7 +94,7 @@ impl Files {
     ///
     /// # Errors
     /// If the file is missing or wrong.
-    pub fn configuration(&self) -> Result<Config, Failure> {
+    pub fn configuration(&self) -> Result<Config> {
         let mut config = match &self.config {
             Some(path) => Config::read(path)?,
             None => Config::default(),
@@ -102,9 +102,7 @@ impl Files {
         if let Some(state) = &self.state {
             config.state = Some(state.clone());
         }
-        config
-            .check()
-            .map_err(|error| Failure::new(Exit::Configuration, error))?;
+        config.check().map_err(Exit::Configuration.failure())?;
         Ok(config)
     }
 
@@ -112,7 +110,7 @@ impl Files {
     ///
     /// # Errors
     /// If the configuration is wrong, or the platform has no default.
-    pub fn state_folder(&self) -> Result<PathBuf, Failure> {
+    pub fn state_folder(&self) -> Result<PathBuf> {
         match self.configuration()?.state {
             Some(path) => Ok(path),
             None => StateFolder::default_path(),
@@ -134,7 +132,7 @@ impl Serving {
     ///
     /// # Errors
     /// If the file is missing or wrong.
-    pub fn configuration(&self) -> Result<Config, Failure> {
+    pub fn configuration(&self) -> Result<Config> {
         let mut config = self.files.configuration()?;
         if let Some(listen) = self.listen.modbus {
             config.modbus.listen = listen;
@@ -152,12 +150,12 @@ impl Threads {
     ///
     /// # Errors
     /// If threads cannot be started (exit code 70).
-    pub fn pool(&self, configured: usize) -> Result<rayon::ThreadPool, Failure> {
+    pub fn pool(&self, configured: usize) -> Result<rayon::ThreadPool> {
         rayon::ThreadPoolBuilder::new()
             .num_threads(self.threads.map_or(configured, usize::from))
             .thread_name(|at| format!("computing-{at}"))
             .build()
-            .map_err(|error| Failure::because(Exit::Software, "start the computing threads", error))
+            .map_err(Exit::Software.because("start the computing threads"))
     }
 }
 
@@ -185,14 +183,10 @@ impl Output {
     ///
     /// # Errors
     /// If it cannot be written as JSON (70).
-    pub fn answer(
-        self,
-        result: &impl Serialize,
-        text: impl FnOnce() -> String,
-    ) -> Result<(), Failure> {
+    pub fn answer(self, result: &impl Serialize, text: impl FnOnce() -> String) -> Result<()> {
         if self.is_json() {
             let json = serde_json::to_string_pretty(result);
-            let failed = |error| Failure::because(Exit::Software, "write the result", error);
+            let failed = Exit::Software.because("write the result");
             say!("{}", json.map_err(failed)?);
         } else {
             self.quiet.say(text);

@@ -2,7 +2,7 @@
 
 use super::numbers::{number, numbers};
 use crate::config::{Backend, HeadConfig};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::placed::Placed;
 use crate::production::backend;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -11,7 +11,7 @@ use sim::Material;
 use sim::parts::Board;
 
 /// The part in front of a simulated head, if not the scenario's.
-#[derive(Clone, Debug, clap::Args)]
+#[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct SimulatedPart {
     /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth,
     /// sphere, tube, spline, face, handset, plane, board or empty.
@@ -45,14 +45,8 @@ impl SimulatedPart {
     ///
     /// # Errors
     /// If the configured head is not simulated, or there is no such part, defect or placement (64).
-    pub fn placed(&self, head: &HeadConfig) -> Result<Option<Placed>, Failure> {
-        let asked = self.part.is_some() || !self.defect.is_empty() || self.material.is_some();
-        if !asked
-            && self.pose.is_none()
-            && self.shift.is_none()
-            && self.tilt.is_none()
-            && self.rotate.is_none()
-        {
+    pub fn placed(&self, head: &HeadConfig) -> Result<Option<Placed>> {
+        if *self == Self::default() {
             return Ok(None);
         }
         let usage =

@@ -6,7 +6,7 @@
 use super::names;
 use super::numbers::number;
 use super::options::{Files, Json, Quiet};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::production::backend;
 use crate::recipe::exchange::{Destination, Listed};
 use crate::recipe::plan::Plan;
@@ -75,7 +75,7 @@ impl RecipeCommand {
     /// # Errors
     /// If the recipe does not exist (66), is damaged or of another calibration (65), a station has
     /// it in use (69), or the store cannot be written (73).
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         match self {
             Self::List { files, json } => {
                 list(&store(files)?.list(), json.json);
@@ -150,7 +150,7 @@ impl RecipeCommand {
 }
 
 /// The recipes of the station's state.
-fn store(files: &Files) -> Result<Store, Failure> {
+fn store(files: &Files) -> Result<Store> {
     let folder = files.state_folder()?.join("recipes");
     Store::open(&folder).map_err(|error| {
         let what = format!("use the recipes in {}", folder.display());
@@ -159,7 +159,7 @@ fn store(files: &Files) -> Result<Store, Failure> {
 }
 
 /// The state folder, locked against stations.
-fn at_rest(files: &Files, button: &str) -> Result<StateFolder, Failure> {
+fn at_rest(files: &Files, button: &str) -> Result<StateFolder> {
     let instead = format!("use *Recipes*, *{button}* on its page");
     StateFolder::open_unless_used(&files.state_folder()?, Exit::Unavailable, &instead)
 }
@@ -177,7 +177,7 @@ impl From<ChangeError> for Failure {
                 Exit::CannotCreate
             }
         };
-        Self::new(exit, error.to_string())
+        Self::new(exit, error)
     }
 }
 

@@ -4,7 +4,7 @@ use super::names;
 use super::numbers::number;
 use super::options::{Files, Quiet, Threads};
 use super::part::SimulatedPart;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::head::scan::take;
 use crate::head::seam;
 use crate::history::kept;
@@ -58,7 +58,7 @@ impl Record {
     /// # Errors
     /// If the recipe cannot be read or does not fit the head, the head cannot be opened, the
     /// pattern cannot be shown, or the folder cannot be written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let mut config = self.files.configuration()?;
         config.head.part = self.part.placed(&config.head)?;
         let recipe = self.recipe.as_deref().map(kept::read).transpose()?;
@@ -76,15 +76,14 @@ impl Record {
         progress.clear();
         opened.dark.iter().for_each(|words| progress.warn(words));
         let recording = taken?;
-        recorder::write(&recording, &self.folder)
-            .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))?;
+        recorder::write(&recording, &self.folder).map_err(Exit::CannotCreate.failure())?;
         let count = recording.frames.len();
         self.quiet
             .say(|| format!("recorded {count} frames to {}", self.folder.display()));
         Ok(())
     }
 
-    fn take(&self, opened: &mut Opened, on_progress: &dyn Fn(f64)) -> Result<Recording, Failure> {
+    fn take(&self, opened: &mut Opened, on_progress: &dyn Fn(f64)) -> Result<Recording> {
         let Opened {
             head,
             calibration,
@@ -94,7 +93,7 @@ impl Record {
         let (columns, rows) = calibration.raster();
         let fringes = self.fringes.unwrap_or(f64::from(columns) / 12.0);
         let function = PhaseFunction::vertical(columns as usize, rows as usize, fringes)
-            .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
+            .map_err(Exit::Usage.because("--fringes"))?;
         let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
         let shots = Sequence::geometric(function.range(), levels, steps);
         let taken = take(head, calibration, &function, &shots, TIMEOUT, on_progress)?;
@@ -117,7 +116,7 @@ fn take_of_recipe(
     opened: &mut Opened,
     recipe: Recipe,
     on_progress: &dyn Fn(f64),
-) -> Result<Recording, Failure> {
+) -> Result<Recording> {
     let Opened {
         head,
         calibration,
@@ -127,7 +126,7 @@ fn take_of_recipe(
     let number = recipe.id.number;
     // It may have been taught from a recording, which does not have the whole calibration.
     let plan = Plan::again(recipe, calibration, stage.is_some())
-        .map_err(|error| Failure::new(Exit::Content, format!("record: {error}")))?;
+        .map_err(Exit::Content.because("record"))?;
     let mut sequences = 0..plan.sequence_count();
     let sequence = sequences.find(|&sequence| plan.indices(sequence).len() > PAIR);
     let sequence = sequence.unwrap_or_default();

@@ -3,7 +3,7 @@
 //! frames of the recipe's sequences.
 
 use super::options::Measuring;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, GaugeEntry, Reader, difference, seq_of};
 use crate::recipe::plan::PlanError;
@@ -45,7 +45,7 @@ impl Replay {
     /// If the recording, the recipe or the history's result is missing (66) or damaged (65), the
     /// frames do not fit the recipe (65), the results differ (70), or as for every command with a
     /// configuration and a state folder.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let options = &self.measuring;
         let unpacked = Unpacked::of(&self.recording)?;
         let state = self.state()?;
@@ -66,7 +66,7 @@ impl Replay {
             let inspect = |sequence| plan.inspect(sequence, &frames, Instant::now());
             Ok::<_, PlanError>(plan.sequence_of(&shots).map(inspect))
         });
-        let judged = judged.map_err(|error| Failure::new(Exit::Content, error.to_string()))?;
+        let judged = judged.map_err(Exit::Content.failure())?;
         let inspection = judged.ok_or_else(|| {
             let words = format!(
                 "replay {}: recipe {number}, fingerprint {fingerprint:.8}, has no sequence with these frames: name the recipe that the part was judged by",
@@ -99,7 +99,7 @@ impl Replay {
                 "compare with the history: it has no result of {} with the recording's recipe and PART_ID: the result above was compared with nothing",
                 self.recording.display()
             );
-            return Err(Failure::new(Exit::Missing, message));
+            return Exit::Missing.fail(message);
         };
         match difference(&before, &replayed) {
             None => {
@@ -116,14 +116,14 @@ impl Replay {
                     "the replay differs from result {}: {difference}",
                     before.seq
                 );
-                Err(Failure::new(Exit::Software, message))
+                Exit::Software.fail(message)
             }
         }
     }
 
     /// The state folder: that of `--state` if it is given, else the one that the recording lies in,
     /// else the configured one.
-    fn state(&self) -> Result<PathBuf, Failure> {
+    fn state(&self) -> Result<PathBuf> {
         let files = &self.measuring.files;
         let own = self.recording.canonicalize().ok();
         let own = own.and_then(|folder| Some(folder.parent()?.parent()?.to_path_buf()));
@@ -133,7 +133,7 @@ impl Replay {
         }
     }
 
-    fn choose(&self, folder: &Path, store: &Store) -> Result<(Kept, Chosen), Failure> {
+    fn choose(&self, folder: &Path, store: &Store) -> Result<(Kept, Chosen)> {
         let (kept, recipe, from) = match &self.recipe {
             None => {
                 let kept = Kept::open(folder)?;
@@ -171,7 +171,7 @@ impl Replay {
 /// The result of a recording in the history: the one that names the recording, else the one with
 /// the SEQ in the recording's name. It is ignored if its recipe or PART_ID is not the recording's:
 /// the history may be another station's, or have begun again at SEQ 1.
-fn result_of(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Entry>, Failure> {
+fn result_of(state: &Path, name: Option<&str>, kept: &Kept) -> Result<Option<Entry>> {
     let reader = Reader::of(state);
     let Some(name) = name.filter(|_| reader.path().exists()) else {
         return Ok(None);

@@ -2,7 +2,7 @@
 
 use super::options::{Quiet, Serving};
 use super::part::SimulatedPart;
-use crate::error::Failure;
+use crate::error::Result;
 use crate::service::{Caller, Daemon};
 use crate::station::Snapshot;
 use crate::station::refusal::reject;
@@ -33,7 +33,7 @@ impl Serve {
     ///
     /// # Errors
     /// If it cannot start.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let mut config = self.serving.configuration()?;
         config.head.part = self.part.placed(&config.head)?;
         let progress = self.quiet.progress();

@@ -5,7 +5,7 @@ use super::numbers::number;
 use super::options::Measuring;
 use super::part::SimulatedPart;
 use crate::config::Config;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::measure::{measure, measure_after};
@@ -84,7 +84,7 @@ enum Target<'a> {
 
 impl Target<'_> {
     /// Writes the recipe; returns where, in words.
-    fn store(&self, taught: &TaughtRecipe) -> Result<String, Failure> {
+    fn store(&self, taught: &TaughtRecipe) -> Result<String> {
         let (written, what, place) = match self {
             Self::File(out) => (
                 write_whole(out, &taught.bytes),
@@ -100,7 +100,7 @@ impl Target<'_> {
                 )
             }
         };
-        written.map_err(|error| Failure::because(Exit::CannotCreate, what, error))?;
+        written.map_err(Exit::CannotCreate.because(what))?;
         Ok(place)
     }
 }
@@ -126,7 +126,7 @@ impl Teach {
     /// # Errors
     /// If the part cannot be taught, the number is taken, or the recipe cannot be stored; a recipe
     /// stored before is unchanged.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let options = &self.measuring;
         let mut config = options.files.configuration()?;
         let part = self.part.placed(&config.head)?;
@@ -135,7 +135,7 @@ impl Teach {
                 "teach from {}: a recording has its own part: leave out --golden, or the part's options",
                 golden.display()
             );
-            return Err(Failure::new(Exit::Usage, words));
+            return Exit::Usage.fail(words);
         }
         config.head.part = part;
         // Opened before anything is measured, and locked until the recipe is stored.
@@ -158,7 +158,7 @@ impl Teach {
         let naming = self.naming(replaced.as_ref());
         if let Some(recipes) = &recipes {
             let shared = recipes.refuse_shared(self.number, &naming.part_number);
-            shared.map_err(|words| Failure::new(Exit::CannotCreate, format!("teach: {words}")))?;
+            shared.map_err(Exit::CannotCreate.because("teach"))?;
         }
         let pool = options.threads.pool(config.threads)?;
         let taught = match &self.golden {
@@ -166,14 +166,15 @@ impl Teach {
             None => self.teach_head(&config, &pool, &naming)?,
         };
         let taught = match replaced.filter(|_| self.keep_gauges) {
-            Some(file) => replace::keep_gauges(taught, &file)
-                .map_err(|words| Failure::new(Exit::Content, format!("teach: {words}")))?,
+            Some(file) => {
+                replace::keep_gauges(taught, &file).map_err(Exit::Content.because("teach"))?
+            }
             None => taught,
         };
         let taught = match self.frames {
             Some(_) => taught
                 .with_two_frames()
-                .map_err(|words| Failure::new(Exit::Content, format!("teach: {words}")))?,
+                .map_err(Exit::Content.because("teach"))?,
             None => taught,
         };
         let place = target.store(&taught)?;
@@ -202,16 +203,15 @@ impl Teach {
     ///
     /// # Errors
     /// If the number is taken and `--replace` is not given, or there are no gauges to keep.
-    fn replaced(&self, recipes: &Store) -> Result<Option<RecipeFile>, Failure> {
+    fn replaced(&self, recipes: &Store) -> Result<Option<RecipeFile>> {
         let number = self.number;
         if !self.replace {
             let words = ("teach", "add --replace (and --keep-gauges)", "teach number");
-            replace::refuse_taken(recipes, number, words)
-                .map_err(|words| Failure::new(Exit::CannotCreate, words))?;
+            replace::refuse_taken(recipes, number, words).map_err(Exit::CannotCreate.failure())?;
         }
         let replaced = recipes.present(number);
         if self.keep_gauges && replaced.is_none() {
-            return Err(Failure::new(Exit::Missing, replace::no_gauges(number)));
+            return Exit::Missing.fail(replace::no_gauges(number));
         }
         Ok(replaced)
     }
@@ -232,7 +232,7 @@ impl Teach {
         config: &Config,
         pool: &rayon::ThreadPool,
         naming: &Naming,
-    ) -> Result<TaughtRecipe, Failure> {
+    ) -> Result<TaughtRecipe> {
         let options = &self.measuring;
         let progress = options.output.progress();
         let on_progress = |share: f64| progress.tell(share, "working out the light of the scene");
@@ -253,11 +253,11 @@ impl Teach {
                     Exit::Content
                 }
             };
-            Failure::new(exit, error.to_string())
+            Failure::new(exit, error)
         })
     }
 
-    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<TaughtRecipe, Failure> {
+    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<TaughtRecipe> {
         let recording = Recording::open(folder)?;
         let manifest = folder.join("recording.json");
         let wrong = |error: &dyn std::fmt::Display| {

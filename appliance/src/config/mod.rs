@@ -6,7 +6,7 @@ mod keys;
 
 pub use keys::{Key, TABLE, keys};
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::place::IN_STATE;
 use crate::head::commission::Commissioning;
 use crate::head::exposing::Exposing;
@@ -36,9 +36,7 @@ const PRIVATE: [&str; 6] = [
 
 bounded! {
     /// The whole configuration. The defaults need no file: a simulated head on this machine.
-    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Config {
+    pub struct Config: Default {
         /// State folder; none = the platform's.
         pub state: Option<PathBuf> = Longest(MAX_PATH),
         /// Computing threads; 0 = one per core.
@@ -63,46 +61,40 @@ pub const MAX_RESULTS: u32 = 10_000_000;
 
 bounded! {
     /// What is kept of results; the oldest are deleted first.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct HistoryConfig {
+    pub struct HistoryConfig: Default {
         /// The most results.
-        pub results: u32 = 1..=MAX_RESULTS,
+        pub results: u32 = 1..=MAX_RESULTS => 100_000,
         /// The most MiB of recordings of failed parts; 0 = none are kept.
-        pub recordings_mib: u32,
+        pub recordings_mib: u32 => 1024,
     }
 
     /// The station.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct StationConfig {
+    pub struct StationConfig: Default {
         /// The recipe that is loaded at the start.
-        pub recipe: u16 = 1..=9999,
+        pub recipe: u16 = 1..=9999 => 1,
         /// Whether the PLC may teach.
         pub teach_allowed: bool,
         /// PLC_HEARTBEAT may stand still for this long, s.
-        pub plc_timeout_s: u32 = 1..=3600,
+        pub plc_timeout_s: u32 = 1..=3600 => 5,
         /// Cycles between two checks of the geometry; 0 = never.
-        pub geometry_check_cycles: u32 = 0..=1_000_000,
+        pub geometry_check_cycles: u32 = 0..=1_000_000 => 200,
     }
 
     /// Modbus TCP.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct ModbusConfig {
+    pub struct ModbusConfig: Default {
         /// Address and port.
         #[serde(deserialize_with = "listen")]
-        pub listen: SocketAddr,
+        pub listen: SocketAddr => SocketAddr::from((Ipv4Addr::LOCALHOST, 1502)),
         /// Order of the words of 32- and 64-bit values.
         pub word_order: WordOrder,
         /// Answer only to this unit id.
         pub strict_unit_id: Option<u8>,
         /// The most connections at a time.
-        pub connections: u16 = 2..=64,
+        pub connections: u16 = 2..=64 => CONNECTIONS,
         /// Networks whose clients may read.
-        pub readers: Vec<IpNet>,
+        pub readers: Vec<IpNet> => networks(&[&LOOPBACK[..], &PRIVATE].concat()),
         /// Networks whose clients may write.
-        pub writers: Vec<IpNet>,
+        pub writers: Vec<IpNet> => networks(&LOOPBACK),
     }
 }
 
@@ -130,12 +122,10 @@ fn listen<'a, D: serde::Deserializer<'a>>(source: D) -> Result<SocketAddr, D::Er
 
 bounded! {
     /// The page.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct HttpConfig {
+    pub struct HttpConfig: Default {
         /// Address and port.
         #[serde(deserialize_with = "listen")]
-        pub listen: SocketAddr,
+        pub listen: SocketAddr => SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
         /// Host names of the page, besides IP addresses and localhost.
         pub hosts: Vec<String> = Longest(MAX_HOST),
         /// Networks of proxies in front of the page.
@@ -143,9 +133,7 @@ bounded! {
     }
 
     /// The devices.
-    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct HeadConfig {
+    pub struct HeadConfig: Default {
         /// Which kind of head.
         pub backend: Backend,
         /// Scenario file of the simulated head; none = the default part.
@@ -188,48 +176,8 @@ const MAX_LISTED: usize = 1024;
 /// Longest name of a host (RFC 1035, section 2.3.4).
 const MAX_HOST: usize = 255;
 
-impl Default for StationConfig {
-    fn default() -> Self {
-        Self {
-            recipe: 1,
-            teach_allowed: false,
-            plc_timeout_s: 5,
-            geometry_check_cycles: 200,
-        }
-    }
-}
-
-impl Default for ModbusConfig {
-    fn default() -> Self {
-        let networks = |all: &[&str]| all.iter().filter_map(|net| net.parse().ok()).collect();
-        Self {
-            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 1502)),
-            word_order: WordOrder::Normal,
-            strict_unit_id: None,
-            connections: CONNECTIONS,
-            readers: networks(&[&LOOPBACK[..], &PRIVATE].concat()),
-            writers: networks(&LOOPBACK),
-        }
-    }
-}
-
-impl Default for HttpConfig {
-    fn default() -> Self {
-        Self {
-            listen: SocketAddr::from((Ipv4Addr::LOCALHOST, 8080)),
-            hosts: Vec::new(),
-            proxies: Vec::new(),
-        }
-    }
-}
-
-impl Default for HistoryConfig {
-    fn default() -> Self {
-        Self {
-            results: 100_000,
-            recordings_mib: 1024,
-        }
-    }
+fn networks(all: &[&str]) -> Vec<IpNet> {
+    all.iter().filter_map(|net| net.parse().ok()).collect()
 }
 
 impl Config {
@@ -238,7 +186,7 @@ impl Config {
     /// # Errors
     /// If it does not exist (66), is not TOML, has an unknown key or a value out of range (78); the
     /// message names the file, the key and the remedy.
-    pub fn read(path: &Path) -> Result<Self, Failure> {
+    pub fn read(path: &Path) -> Result<Self> {
         let place = path.display();
         let text = fs::read_to_string(path).map_err(|error| {
             let exit = match error.kind() {

@@ -1,7 +1,7 @@
 //! Opens the recording of a part that a station judged, so that it can be judged again: frames,
 //! calibration, recipe.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
 use crate::head::seam;
 use crate::history::RECIPE;
@@ -31,7 +31,7 @@ impl Kept {
     ///
     /// # Errors
     /// If it is not there (66), damaged, or not one that a station kept (65).
-    pub fn open(folder: &Path) -> Result<Self, Failure> {
+    pub fn open(folder: &Path) -> Result<Self> {
         let recording = Recording::open(folder)?;
         if recording.recipe.is_none() {
             let remedy = "replay one that the station kept, or name the recipe with --recipe";
@@ -46,13 +46,13 @@ impl Kept {
     ///
     /// # Errors
     /// If it is not there (66), damaged, or without models (65).
-    pub fn judged_by(folder: &Path, recipe: &Recipe) -> Result<Self, Failure> {
+    pub fn judged_by(folder: &Path, recipe: &Recipe) -> Result<Self> {
         let recording = Recording::open(folder)?;
         let noise = recipe.conditions.noise_counts;
         Self::of(folder, recording, Some(noise))
     }
 
-    fn of(folder: &Path, mut recording: Recording, noise: Option<f64>) -> Result<Self, Failure> {
+    fn of(folder: &Path, mut recording: Recording, noise: Option<f64>) -> Result<Self> {
         let remedy = "replay one that the station kept, or add what is missing";
         let noise = recording.noise_counts.or(noise);
         let noise = noise.ok_or_else(|| wrong(folder, "has no camera.noise_counts", remedy))?;
@@ -100,14 +100,14 @@ impl Kept {
     /// # Errors
     /// If neither the recording nor the store has it (66), or the recording's is damaged or another
     /// one (65).
-    pub fn recipe(&self, stored: &Store) -> Result<(Recipe, bool), Failure> {
+    pub fn recipe(&self, stored: &Store) -> Result<(Recipe, bool)> {
         let Some(RecipeReference {
             number,
             fingerprint,
         }) = &self.reference
         else {
             let words = "replay: the recording has no recipe: name one with --recipe";
-            return Err(Failure::new(Exit::Content, words));
+            return Exit::Content.fail(words);
         };
         let Some(own) = &self.own else {
             let number = u16::try_from(*number).unwrap_or(0);
@@ -126,7 +126,7 @@ impl Kept {
             own.display(),
             recipe.id.fingerprint
         );
-        Err(Failure::new(Exit::Content, words))
+        Exit::Content.fail(words)
     }
 
     /// Joins a recipe with what the recording says of the head.
@@ -171,7 +171,7 @@ pub fn missing(error: &LoadError) -> Failure {
 ///
 /// # Errors
 /// If it is not there (66), or is no recipe (65).
-pub fn read(path: &Path) -> Result<Recipe, Failure> {
+pub fn read(path: &Path) -> Result<Recipe> {
     let what = format!("read recipe {}", path.display());
     let opened = File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
     let (size, file) = opened.map_err(|error| match error.kind() {
@@ -181,6 +181,5 @@ pub fn read(path: &Path) -> Result<Recipe, Failure> {
         ),
         _ => Failure::because(Exit::Content, &what, error),
     })?;
-    Recipe::read(BufReader::new(file), size)
-        .map_err(|error| Failure::because(Exit::Content, what, error))
+    Recipe::read(BufReader::new(file), size).map_err(Exit::Content.because(what))
 }

@@ -76,6 +76,9 @@ pub struct HistoryError {
     pub aside: Option<String>,
 }
 
+/// What is asked of the history, unless another error is named.
+pub type Result<T, E = HistoryError> = std::result::Result<T, E>;
+
 impl HistoryError {
     fn of(path: &std::path::Path, error: &rusqlite::Error) -> Self {
         Self {

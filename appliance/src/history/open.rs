@@ -7,7 +7,7 @@ use super::seqs::{AHEAD, Numbering};
 use super::spool::{SLOTS, Spool, is_after};
 use super::task::Task;
 use super::writer::Writer;
-use super::{Bounds, DATABASE, HistoryError, RECORDINGS};
+use super::{Bounds, DATABASE, HistoryError, RECORDINGS, Result};
 use crate::recipe::Store;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
@@ -28,7 +28,7 @@ pub fn open(
     state: &Path,
     numbering: Numbering,
     bounds: Bounds,
-) -> Result<(History, Task, u32, Option<String>), HistoryError> {
+) -> Result<(History, Task, u32, Option<String>)> {
     let failed = |what: &str, error: std::io::Error| HistoryError {
         path: state.join(what),
         reason: format!("{error}: free space"),

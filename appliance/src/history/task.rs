@@ -1,7 +1,7 @@
 //! The history's thread: takes results from a bounded queue and stores them. Each commit waits for
 //! the card; results that come meanwhile go into the next one together.
 
-use super::HistoryError;
+use super::Result;
 use super::entry::Entry;
 use super::handle::History;
 use super::keeper::Keeping;
@@ -137,7 +137,7 @@ impl Task {
     }
 
     /// Notes where the frames of a result are, or why they are not kept.
-    fn note(&mut self, seq: u32, kept: &Result<String, Unkept>) -> Result<(), HistoryError> {
+    fn note(&mut self, seq: u32, kept: &Result<String, Unkept>) -> Result<()> {
         let waiting = self.waiting.iter_mut().find(|entry| entry.seq == seq);
         match (waiting, kept) {
             (Some(entry), Ok(name)) => entry.recording = Some(name.clone()),
@@ -167,7 +167,7 @@ impl Task {
     }
 
     /// Stores what waits, if need be in a new database: then a line that says so.
-    fn store(&mut self) -> Result<Option<String>, HistoryError> {
+    fn store(&mut self) -> Result<Option<String>> {
         if self.waiting.is_empty() {
             return Ok(None);
         }

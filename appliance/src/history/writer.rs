@@ -3,7 +3,7 @@
 use super::entry::Entry;
 use super::reader::rows;
 use super::unkept::Unkept;
-use super::{HistoryError, schema};
+use super::{HistoryError, Result, schema};
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 use std::path::{Path, PathBuf};
 
@@ -26,7 +26,7 @@ impl Writer {
     ///
     /// # Errors
     /// If it can be neither opened nor set aside.
-    pub fn open(path: &Path, limit: u64) -> Result<(Self, Option<String>), HistoryError> {
+    pub fn open(path: &Path, limit: u64) -> Result<(Self, Option<String>)> {
         match Self::open_sound(path, limit) {
             Err(error) if error.aside.is_some() => {
                 let said = set_aside(&error)?;
@@ -36,7 +36,7 @@ impl Writer {
         }
     }
 
-    fn open_sound(path: &Path, limit: u64) -> Result<Self, HistoryError> {
+    fn open_sound(path: &Path, limit: u64) -> Result<Self> {
         let connection = schema::open(path)?;
         if let Some(reason) = schema::complaint(&connection) {
             return Err(HistoryError {
@@ -61,7 +61,7 @@ impl Writer {
     ///
     /// # Errors
     /// If that is not possible; then nothing can be stored until it is.
-    pub fn begin_anew(&mut self, why: &HistoryError) -> Result<String, HistoryError> {
+    pub fn begin_anew(&mut self, why: &HistoryError) -> Result<String> {
         let failed = |error| HistoryError::of(&self.path, &error);
         // Closed before it is renamed: a log that is still open would be taken for the new
         // database's.
@@ -85,7 +85,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn last_seq(&self) -> Result<Option<u32>, HistoryError> {
+    pub fn last_seq(&self) -> Result<Option<u32>> {
         let newest = "SELECT seq FROM result ORDER BY id DESC LIMIT 1";
         let seq = self.connection.query_row(newest, (), |row| row.get(0));
         seq.optional().map_err(|error| self.failed(&error))
@@ -96,10 +96,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`]; then nothing was stored.
-    pub fn store<'a>(
-        &mut self,
-        entries: impl Iterator<Item = &'a Entry>,
-    ) -> Result<(), HistoryError> {
+    pub fn store<'a>(&mut self, entries: impl Iterator<Item = &'a Entry>) -> Result<()> {
         let (known, limit) = (self.count, self.limit);
         let stored = self.connection.transaction().and_then(|transaction| {
             let mut count = known;
@@ -135,7 +132,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn checkpoint(&mut self) -> Result<(), HistoryError> {
+    pub fn checkpoint(&mut self) -> Result<()> {
         schema::checkpoint(&self.connection).map_err(|error| self.failed(&error))
     }
 
@@ -143,7 +140,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn link(&mut self, seq: u32, name: &str) -> Result<(), HistoryError> {
+    pub fn link(&mut self, seq: u32, name: &str) -> Result<()> {
         let newest = "UPDATE result SET recording = ?2, unkept = NULL
             WHERE id = (SELECT max(id) FROM result WHERE seq = ?1)";
         self.change(newest, params![seq, name])
@@ -153,7 +150,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn leave_out(&mut self, seq: u32, why: &Unkept) -> Result<(), HistoryError> {
+    pub fn leave_out(&mut self, seq: u32, why: &Unkept) -> Result<()> {
         let newest =
             "UPDATE result SET unkept = ?2 WHERE id = (SELECT max(id) FROM result WHERE seq = ?1)";
         self.change(newest, params![seq, why.to_string()])
@@ -163,7 +160,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn unlink(&mut self, name: &str, why: &Unkept) -> Result<(), HistoryError> {
+    pub fn unlink(&mut self, name: &str, why: &Unkept) -> Result<()> {
         let linked = "UPDATE result SET recording = NULL, unkept = ?2 WHERE recording = ?1";
         self.change(linked, params![name, why.to_string()])
     }
@@ -173,7 +170,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn date(&mut self, boot_id: &str, utc_us: u64) -> Result<(), HistoryError> {
+    pub fn date(&mut self, boot_id: &str, utc_us: u64) -> Result<()> {
         let start = "INSERT INTO start VALUES (?1, ?2)
             ON CONFLICT (boot_id) DO UPDATE SET browser_utc_us = excluded.browser_utc_us";
         self.change(start, params![boot_id, utc_us])?;
@@ -185,17 +182,13 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn linked(&self) -> Result<Vec<String>, HistoryError> {
+    pub fn linked(&self) -> Result<Vec<String>> {
         let linked = "SELECT DISTINCT recording FROM result WHERE recording IS NOT NULL";
         let names = rows(&self.connection, linked, (), |row| row.get(0));
         names.map_err(|error| self.failed(&error))
     }
 
-    fn change(
-        &mut self,
-        statement: &str,
-        values: impl rusqlite::Params,
-    ) -> Result<(), HistoryError> {
+    fn change(&mut self, statement: &str, values: impl rusqlite::Params) -> Result<()> {
         let changed = self.connection.execute(statement, values);
         changed.map_err(|error| self.failed(&error))?;
         Ok(())
@@ -217,7 +210,7 @@ fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> 
 }
 
 /// Sets the database of an error aside; answers with a line for the log.
-fn set_aside(error: &HistoryError) -> Result<String, HistoryError> {
+fn set_aside(error: &HistoryError) -> Result<String> {
     let HistoryError {
         path,
         reason,

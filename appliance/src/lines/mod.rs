@@ -8,7 +8,7 @@ mod signals;
 
 pub use signals::{Follower, Signals};
 
-use crate::error::Failure;
+use crate::error::Result;
 use crate::production::backend::Wires;
 use crate::station::control::TRIGGER;
 use crate::station::{Client, ControlWrite, Event, StationHandle};
@@ -30,7 +30,7 @@ const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
 /// Opens the lines again.
-pub type Open = Box<dyn Fn() -> Result<Wires, Failure> + Send + Sync>;
+pub type Open = Box<dyn Fn() -> Result<Wires> + Send + Sync>;
 
 /// Serves the lines until `stopped` is true; then they are released.
 ///
@@ -42,7 +42,7 @@ pub fn serve(
     station: &StationHandle,
     progress: &Progress,
     mut stopped: watch::Receiver<bool>,
-) -> Result<(), Failure> {
+) -> Result<()> {
     runtime()?.block_on(async {
         let stop = stopped.wait_for(|stop| *stop);
         tokio::select! {

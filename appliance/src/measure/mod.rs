@@ -9,7 +9,7 @@ mod score;
 pub use report::{Manner, Report};
 pub use score::{GROSS_MM, Score, Truth};
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::channel::{Channel, Expected, Unwrapping};
 use crate::head::direction::Sensitivity;
 use crate::head::scan::Scan;
@@ -27,6 +27,7 @@ use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference};
 use known::Known;
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::path::Path;
 use std::time::Instant;
 
@@ -67,7 +68,7 @@ pub struct Measurement {
 ///
 /// # Errors
 /// If levels cannot be unwrapped or a model is absurd; the message names `folder`.
-pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement, Failure> {
+pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement> {
     measure_with(recording, folder, None)
 }
 
@@ -80,8 +81,8 @@ pub fn measure_after(
     recording: &Recording,
     folder: &Path,
     preliminary: &ProjectorMap,
-) -> Result<Measurement, Failure> {
-    let known = Known::expected(preliminary, recording).map_err(|error| wrong(folder, &*error))?;
+) -> Result<Measurement> {
+    let known = Known::expected(preliminary, recording).map_err(wrong(folder))?;
     measure_about(recording, folder, None, Some(known))
 }
 
@@ -94,8 +95,8 @@ pub fn measure_about_map(
     recording: &Recording,
     folder: &Path,
     map: &Array<f64>,
-) -> Result<Measurement, Failure> {
-    let known = Known::given(map, recording).map_err(|error| wrong(folder, &*error))?;
+) -> Result<Measurement> {
+    let known = Known::given(map, recording).map_err(wrong(folder))?;
     measure_about(recording, folder, None, Some(known))
 }
 
@@ -109,16 +110,16 @@ pub fn measure_with(
     recording: &Recording,
     folder: &Path,
     recipe: Option<&Recipe>,
-) -> Result<Measurement, Failure> {
+) -> Result<Measurement> {
     let known = recipe.map(|recipe| Known::of(recipe, recording));
-    let known = known.transpose().map_err(|error| wrong(folder, &*error))?;
+    let known = known.transpose().map_err(wrong(folder))?;
     measure_about(recording, folder, recipe, known)
 }
 
 /// The failure of a recording with wrong content, in this folder.
-pub fn wrong(folder: &Path, error: &dyn std::fmt::Display) -> Failure {
+pub fn wrong<E: Display>(folder: &Path) -> impl Fn(E) -> Failure {
     let manifest = folder.join("recording.json");
-    Failure::because(Exit::Content, manifest.display(), error)
+    Exit::Content.because(manifest.display().to_string())
 }
 
 fn measure_about(
@@ -134,7 +135,7 @@ fn measure_about(
             "it has a Gray code without fringes, which needs no expected phase: measure without one".into(),
         ),
     };
-    measured.map_err(|error| wrong(folder, &*error))
+    measured.map_err(wrong(folder))
 }
 
 /// How long the stages of a measurement take, µs.

@@ -1,6 +1,6 @@
 //! Measuring a recording with the models of a `calibration.json` instead of its own.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::seam;
 use hal::replay::Recording;
@@ -18,13 +18,16 @@ const REACH: f64 = 0.5;
 /// # Errors
 /// If there is no such file (66), or it cannot be used or is of a head with frames or a raster of
 /// another size (65).
-pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>, Failure> {
-    let failed = |exit, words: String| Failure::because(exit, path.display(), words);
+pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>> {
+    let place = path.display();
+    let wrong = Exit::Content.because(&place);
     let bytes = std::fs::read(path).map_err(|error| match error.kind() {
-        ErrorKind::NotFound => failed(Exit::Missing, "there is no such calibration".into()),
-        _ => failed(Exit::Content, error.to_string()),
+        ErrorKind::NotFound => {
+            Failure::because(Exit::Missing, &place, "there is no such calibration")
+        }
+        _ => wrong(error.to_string()),
     })?;
-    let file = CalibrationFile::read(&bytes).map_err(|words| failed(Exit::Content, words))?;
+    let file = CalibrationFile::read(&bytes).map_err(&wrong)?;
     let (camera, projector) = (&file.camera, &file.projector);
     let frames = [
         (camera.width, camera.height),
@@ -41,7 +44,7 @@ pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>, Fa
                 "the calibration is of a head with {of} of {} × {} pixels, and the recording has {} × {}: name the calibration of the head that took it",
                 calibrated.0, calibrated.1, recorded.0, recorded.1
             );
-            return Err(failed(Exit::Content, words));
+            return Err(wrong(words));
         }
     }
     let lowest = [
@@ -51,11 +54,11 @@ pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>, Fa
     .into_iter()
     .map(|(device, model, size)| Ok(seam::pinhole(device, model, size)?.centre().z))
     .collect::<Result<Vec<f64>, String>>()
-    .map_err(|words| failed(Exit::Content, words))?
+    .map_err(&wrong)?
     .into_iter()
     .fold(f64::INFINITY, f64::min);
     let calibration = file.calibration();
-    let calibration = calibration.map_err(|words| failed(Exit::Content, words))?;
+    let calibration = calibration.map_err(&wrong)?;
     recording.range_mm = Some([-REACH * lowest, REACH * lowest]);
     recording.camera_model = Some(file.camera.model);
     recording.projector.model = Some(file.projector.model);

@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 /// The sequence that a part was judged by.
 #[derive(Default)]
-pub(super) struct JudgedBy {
+pub struct JudgedBy {
     /// Index among the recipe's sequences.
     pub sequence: usize,
     /// The frames of the sequence; empty if the part was not judged.
@@ -27,15 +27,16 @@ pub(super) struct JudgedBy {
 
 impl Worker {
     /// Runs a cycle; returns the frames that the part was judged by.
-    pub(super) fn measure(&mut self, plan: Option<&Arc<Plan>>, job: &Job) -> JudgedBy {
+    pub(super) fn measure(&mut self, job: &Job) -> JudgedBy {
         let id = job.job;
-        let Some(plan) = plan else {
+        let Some(plan) = self.plan.clone() else {
             // Not reached: the station accepts triggers only with an active recipe, whose plan this
             // is.
             let message = "measure: no recipe is loaded".into();
             self.station.event(failed(id, error_code::RIG, message));
             return JudgedBy::default();
         };
+        let plan = &plan;
         let (mut sequence, mut flags, mut cpu) = (0, 0, Duration::ZERO);
         let mut stages = Stages::default();
         let waited = self.station.now().since(job.accepted);

@@ -15,6 +15,7 @@ mod teaching;
 pub mod warm_up;
 
 pub use aborts::Aborts;
+pub use cycle::JudgedBy;
 
 use crate::config::HeadConfig;
 use crate::head::calibration::Current;
@@ -38,7 +39,6 @@ use crate::station::{
 use crate::system::computing::Computing;
 use crate::system::notify::Pulse;
 use crate::system::progress::Progress;
-use cycle::JudgedBy;
 use hal::controller::{ControllerState, fault};
 use hal::error::Error;
 use std::any::Any;
@@ -93,6 +93,10 @@ pub struct Worker {
     pub history: History,
     /// Progress and log.
     pub progress: Progress,
+    /// The plan of the active recipe.
+    pub plan: Option<Arc<Plan>>,
+    /// What the last part was judged by.
+    pub last: JudgedBy,
     /// The configured head, to open it again.
     pub config: HeadConfig,
     /// The job that the station wants to be ended early.
@@ -127,15 +131,13 @@ impl Worker {
         if let Some(first) = first.filter(|_| begun.state_word != "stopping") {
             self.station.event(Event::Request(first));
         }
-        let mut plan: Option<Arc<Plan>> = None;
-        let mut last = JudgedBy::default();
         loop {
             self.pulse.beat();
             // Pictures are computed only while no order waits.
             let order = match orders.try_recv() {
                 Err(TryRecvError::Empty) => {
                     if self.last_cycle.wanted() {
-                        self.tell(plan.as_ref(), &last);
+                        self.tell();
                     }
                     orders.recv_timeout(SIGN_OF_LIFE)
                 }
@@ -149,29 +151,26 @@ impl Worker {
                 Ok(Order::Measure(job)) => {
                     self.watch.due.cycle();
                     // Freed first: the head reuses the memory for the new frames.
-                    drop(last);
-                    last = self.measure(plan.as_ref(), &job);
+                    self.last = JudgedBy::default();
+                    self.last = self.measure(&job);
                 }
                 Ok(Order::Load(job, key)) => {
-                    last = JudgedBy::default();
-                    self.live = false;
-                    self.load(job, &key, &mut plan);
+                    self.forget();
+                    self.load(job, &key);
                 }
                 Ok(Order::Teach(job, number, keep_gauges)) => {
-                    last = JudgedBy::default();
-                    self.live = false;
-                    self.teach(job, number, keep_gauges, &mut plan);
+                    self.forget();
+                    self.teach(job, number, keep_gauges);
                 }
                 Ok(Order::Commission(job)) => {
-                    last = JudgedBy::default();
-                    self.live = false;
-                    self.commission(job, &mut plan);
+                    self.forget();
+                    self.commission(job);
                 }
                 Ok(Order::Look(look)) => {
                     // Pictures that are asked for one after another leave no time for the sign of
                     // life below.
                     self.station.event(Event::Alive);
-                    self.look(look, plan.as_ref());
+                    self.look(look);
                 }
                 Ok(Order::Place(placing)) => placing.carry_out(),
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
@@ -182,18 +181,22 @@ impl Worker {
                     self.tell_camera(self.opened.head.camera_temperature_c());
                     self.tell_warm_up();
                     if self.lost.is_none() {
-                        self.rest_and_check(plan.as_ref());
+                        self.rest_and_check();
                     }
                 }
             }
             if let Some(error) = self.lost.take() {
-                last = JudgedBy::default();
-                self.live = false;
-                if self.recover(&error, &mut plan, orders).is_break() {
+                self.forget();
+                if self.recover(&error, orders).is_break() {
                     return;
                 }
             }
         }
+    }
+
+    /// Forgets the frames of the last part and the patterns in the projector for live pictures.
+    fn forget(&mut self) {
+        (self.last, self.live) = (JudgedBy::default(), false);
     }
 
     /// Reports what the projector's controller says of itself, if that has changed; nothing is
@@ -256,9 +259,10 @@ impl Worker {
     }
 
     /// Answers the requests about the last cycle.
-    fn tell(&self, plan: Option<&Arc<Plan>>, last: &JudgedBy) {
-        let result = self.station.snapshot().result.clone();
-        let measured = plan.filter(|_| !last.frames.is_empty()).zip(result);
+    fn tell(&self) {
+        let (last, result) = (&self.last, self.station.snapshot().result.clone());
+        let plan = self.plan.as_ref().filter(|_| !last.frames.is_empty());
+        let measured = plan.zip(result);
         let cycle = measured.map(|(plan, record)| JudgedPart {
             record,
             plan: plan.clone(),
@@ -271,12 +275,13 @@ impl Worker {
     }
 
     /// Loads a recipe; if that fails, the one before stays active.
-    fn load(&mut self, job: JobId, key: &RecipeKey, plan: &mut Option<Arc<Plan>>) {
-        let (result, message) = match caught(|| self.prepare(key, plan.as_ref())) {
+    fn load(&mut self, job: JobId, key: &RecipeKey) {
+        let shown = self.plan.clone();
+        let (result, message) = match caught(|| self.prepare(key, shown)) {
             Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
-                *plan = Some(ready);
+                self.plan = Some(ready);
                 if let Some(fallback) = fallback {
                     self.progress.warn(&fallback);
                 }
@@ -285,7 +290,7 @@ impl Worker {
             }
             Err(refused) => refused,
         };
-        self.restore(plan);
+        self.restore();
         // The fault of a lost head ends the job.
         if self.lost.is_none() {
             let message = Arc::from(message);
@@ -300,15 +305,15 @@ impl Worker {
     /// Loads the patterns of the active recipe into the projector again, after those of another one
     /// may have replaced them. If that fails, there is no plan any more, and each trigger ends
     /// INVALID.
-    fn restore(&mut self, plan: &mut Option<Arc<Plan>>) {
-        let Some(before) = plan else { return };
+    fn restore(&mut self) {
+        let Some(before) = &self.plan else { return };
         let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
         match self.pool.install(|| before.load(head, calibration)) {
             Ok(()) => {}
             Err(error) if recovery::is_lost(&error) => self.lost = Some(error),
             Err(error) => {
                 self.progress.warn(&error.to_string());
-                *plan = None;
+                self.plan = None;
             }
         }
     }
@@ -319,7 +324,7 @@ impl Worker {
     fn prepare(
         &mut self,
         key: &RecipeKey,
-        shown: Option<&Arc<Plan>>,
+        shown: Option<Arc<Plan>>,
     ) -> Result<(Arc<Plan>, Option<String>), (RecipeResult, String)> {
         if let Some(problem) = &self.opened.problem {
             return Err((RecipeResult::OtherCalibration, problem.clone()));
@@ -363,7 +368,7 @@ impl Worker {
                 (plan, loaded.fallback)
             }
         };
-        if shown.is_some_and(|shown| Arc::ptr_eq(shown, &plan)) {
+        if shown.is_some_and(|shown| Arc::ptr_eq(&shown, &plan)) {
             return Ok((plan, fallback));
         }
         let head = &mut self.opened.head;

@@ -4,7 +4,7 @@
 use super::Order;
 use super::recovery::{Pause, REMEDY};
 use crate::config::{Backend, HeadConfig};
-use crate::error::{Exit, Failure, code_of};
+use crate::error::{Exit, Failure, Result, code_of};
 use crate::production::backend::{self, Opened};
 use crate::station::{Event, StationHandle, error_code};
 use crate::system::computing::Computing;
@@ -39,7 +39,7 @@ impl Opening<'_> {
     pub fn run(
         &self,
         orders: &Receiver<Order>,
-        outcome: &Sender<Result<Option<Stage>, Failure>>,
+        outcome: &Sender<Result<Option<Stage>>>,
     ) -> Option<(Opened, Event)> {
         let on_progress = |share: f64| {
             self.pulse.beat();

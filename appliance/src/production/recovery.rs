@@ -3,12 +3,10 @@
 
 use super::{Order, SIGN_OF_LIFE, Worker, active};
 use crate::error::code_of;
-use crate::recipe::plan::Plan;
 use crate::station::{Event, StationHandle};
 use crate::system::notify::Pulse;
 use hal::error::Error;
 use std::ops::ControlFlow;
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 
 /// Longest wait before the head is opened again, in signs of life.
@@ -34,12 +32,7 @@ impl Worker {
     }
 
     /// Tries to open the head until it is there again; `Break` if the daemon ends before.
-    pub(super) fn recover(
-        &mut self,
-        error: &Error,
-        plan: &mut Option<Arc<Plan>>,
-        orders: &Receiver<Order>,
-    ) -> ControlFlow<()> {
+    pub(super) fn recover(&mut self, error: &Error, orders: &Receiver<Order>) -> ControlFlow<()> {
         self.station.event(Event::Faulted {
             error_code: code_of(error),
             cause: error.to_string().into(),
@@ -57,10 +50,11 @@ impl Worker {
                 Err(failure) => failure.message,
                 Ok(()) => {
                     self.tell_condition();
-                    if self.opened.calibration.fingerprint() != before && plan.take().is_some() {
+                    if self.opened.calibration.fingerprint() != before && self.plan.take().is_some()
+                    {
                         self.progress.warn("the head that came back has another calibration: load or teach a recipe for it");
                     }
-                    self.restore(plan);
+                    self.restore();
                     match self.lost.take() {
                         Some(error) => error.to_string(),
                         None => break,
@@ -73,7 +67,7 @@ impl Worker {
                 reported = problem;
             }
         }
-        let recipe = plan.as_deref().map(active);
+        let recipe = self.plan.as_deref().map(active);
         self.station.event(Event::Recovered { recipe });
         ControlFlow::Continue(())
     }

@@ -2,22 +2,14 @@
 //! measure.
 
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, recovery};
-use crate::recipe::plan::Plan;
 use crate::recipe::teach::{TaughtRecipe, TeachError, teach_while};
 use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, StationHandle, error_code};
-use std::sync::Arc;
 
 impl Worker {
     /// Teaches the part in front of the head and stores it as recipe `number`; it is the active one
     /// then. Where that fails the recipe before stays active.
-    pub(super) fn teach(
-        &mut self,
-        job: JobId,
-        number: u16,
-        keep_gauges: bool,
-        plan: &mut Option<Arc<Plan>>,
-    ) {
+    pub(super) fn teach(&mut self, job: JobId, number: u16, keep_gauges: bool) {
         let replaced = self.recipes.present(number);
         let taught = self
             .taught(job, number, replaced.as_ref(), keep_gauges)
@@ -35,12 +27,12 @@ impl Worker {
         match ready {
             Ok((ready, _)) => {
                 let recipe = active(&ready);
-                *plan = Some(ready);
+                self.plan = Some(ready);
                 self.place_waiting(job);
                 self.station.event(Event::Taught { job, recipe });
             }
             Err((error_code, message)) => {
-                self.restore(plan);
+                self.restore();
                 // The fault of a lost head ends the job.
                 if self.lost.is_none() {
                     self.station.event(Event::TeachFailed {

@@ -44,8 +44,7 @@ impl Preliminary {
     /// If the projector is too small.
     pub fn new((columns, rows): (usize, usize)) -> Result<Self, TeachError> {
         let fringes = columns as f64 / PRELIMINARY_PITCH_PX;
-        let function = PhaseFunction::vertical(columns, rows, fringes)
-            .map_err(|error| TeachError::Rig(error.to_string()))?;
+        let function = PhaseFunction::vertical(columns, rows, fringes).map_err(TeachError::rig)?;
         let shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
         Ok(Self { function, shots })
     }

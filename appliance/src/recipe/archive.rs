@@ -1,15 +1,13 @@
 //! A recipe as one file: an uncompressed ZIP of `recipe.json` and NumPy arrays, with a fingerprint.
 
 use super::file::{FORMAT, RecipeFile, VERSION};
-use crate::storage::archive::Members;
+use crate::storage::archive::{Members, packed};
 use crate::storage::hex;
 use hal::bounds::{self, shortened};
 use hal::npy;
 use sha2::{Digest, Sha256};
-use std::io::{Cursor, Read, Seek, Write as _};
+use std::io::{Read, Seek};
 use zip::read::ZipFile;
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipWriter};
 
 /// The manifest's name in the archive.
 const MANIFEST: &str = "recipe.json";
@@ -134,13 +132,7 @@ pub(crate) fn seal(
     let fingerprint = fingerprint(manifest.as_bytes(), &members);
     let manifest = manifest.replacen(NO_FINGERPRINT, &fingerprint, 1);
     members.insert(0, (MANIFEST, manifest.into_bytes()));
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-    for (name, bytes) in members {
-        zip.start_file(name, stored).map_err(broken)?;
-        zip.write_all(&bytes).map_err(broken)?;
-    }
-    let bytes = zip.finish().map_err(broken)?.into_inner();
+    let bytes = packed(members).map_err(broken)?;
     Ok((bytes, fingerprint))
 }
 

@@ -69,7 +69,6 @@ impl Captured {
         expected: &[AbsolutePhase],
         progress: &dyn Fn(f64) -> bool,
     ) -> Result<Self, TeachError> {
-        let rig = |error: &dyn std::fmt::Display| TeachError::Rig(error.to_string());
         let [short @ .., full] = sequences else {
             return Err(TeachError::Rig("there is no sequence".into()));
         };
@@ -95,23 +94,23 @@ impl Captured {
             let means = means::take(head, shots.len(), *timeout, &share)?;
             let means = means.ok_or(TeachError::Ended)?;
             let (by_modulation, offset, phases) =
-                decode(full, &means, expected).map_err(|error| rig(&error))?;
+                decode(full, &means, expected).map_err(TeachError::rig)?;
             (noise, offset_counts) = (by_modulation, offset);
             let offsets = short.iter().map(|shown| {
                 let (.., by) = decode(shown, &means, &phases.phase)?;
                 Ok(offsets(&by, &phases))
             });
             let offsets: Result<_, String> = offsets.collect();
-            all.push((phases, offsets.map_err(|error| rig(&error))?));
+            all.push((phases, offsets.map_err(TeachError::rig)?));
         }
-        let sequence = Sequence::from_frames(full).map_err(|error| rig(&error))?;
+        let sequence = Sequence::from_frames(full).map_err(TeachError::rig)?;
         let (_, _, bit_depth) = calibration.frames();
         let decoder = Decoder::new(&sequence, function.range(), bit_depth);
         let decoder = decoder
-            .map_err(|error| rig(&error))?
+            .map_err(TeachError::rig)?
             .with_least_modulation(least);
         let triangulator = calibration.triangulator(function.clone(), None);
-        let triangulator = triangulator.map_err(|error| rig(&error))?;
+        let triangulator = triangulator.map_err(TeachError::rig)?;
         let Ok([(mut phases, first), (other, second)]) = <[_; MEANS]>::try_from(all) else {
             return Err(TeachError::Ended);
         };

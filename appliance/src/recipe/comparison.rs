@@ -6,12 +6,9 @@ use algo::phase::Trust;
 use algo::pipeline::{HeightMap, PhaseMap};
 use hal::bounded;
 use hal::bounds::{Fields, MAX_SIGMA_MM};
-use serde::{Deserialize, Serialize};
 
 bounded! {
     /// Both measurements.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct ComparisonFile {
         /// With straight, equidistant fringes.
         pub fixed: QualityFile = Fields,
@@ -20,8 +17,7 @@ bounded! {
     }
 
     /// Noise and coverage of one measurement.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
+    #[derive(Copy)]
     pub struct QualityFile {
         /// Frames of the sequence.
         pub frames: usize = 1..=MAX_FRAMES,

@@ -4,6 +4,7 @@ use crate::error::code_of;
 use crate::head::calibrated::MeasureError;
 use crate::station::error_code;
 use algo::adaptive::AdaptError;
+use std::fmt::Display;
 
 /// A part that could not be taught.
 #[derive(Debug, thiserror::Error)]
@@ -26,6 +27,11 @@ pub enum TeachError {
 }
 
 impl TeachError {
+    /// [`Self::Rig`] of an error.
+    pub(super) fn rig(error: impl Display) -> Self {
+        Self::Rig(error.to_string())
+    }
+
     /// The value of register ERROR_CODE.
     pub fn code(&self) -> u16 {
         match self {

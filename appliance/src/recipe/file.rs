@@ -39,8 +39,6 @@ const MAX_CAPTURES: usize = 1000;
 
 bounded! {
     /// Everything in a recipe that is not an array.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct RecipeFile {
         /// [`FORMAT`].
         pub format: String,
@@ -133,8 +131,6 @@ bounded! {
     }
 
     /// How a gauge judges good parts that lie anywhere within the placement tolerance.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct TriedFile {
         /// Its name.
         pub gauge: String,
@@ -158,8 +154,7 @@ impl TriedFile {
 
 bounded! {
     /// A camera's frames.
-    #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
+    #[derive(Eq)]
     pub struct CameraFile {
         /// Columns.
         pub width: u32 = 1..=MAX_SIDE,
@@ -170,8 +165,7 @@ bounded! {
     }
 
     /// A projector's raster.
-    #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
+    #[derive(Eq)]
     pub struct RasterFile {
         /// Columns.
         pub width: u32 = 1..=MAX_SIDE,
@@ -211,8 +205,6 @@ impl PatternFile {
 
 bounded! {
     /// A sequence, its predicted noise on this part, and the share of the part that it can unwrap.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct SequenceFile {
         /// What it can unwrap.
         pub kind: SequenceKind,
@@ -238,8 +230,7 @@ bounded! {
 
     /// Shares of pixels that get a wrong fringe order without a residual, for parts anywhere within
     /// the placement tolerance ([`algo::pattern::Slips`]).
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
+    #[derive(Copy)]
     pub struct UnseenFile {
         /// Mean over the golden surface where the sequence is safe, by the modulation and the phase
         /// reach of each pixel.
@@ -298,8 +289,6 @@ pub fn safe(phase: &[AbsolutePhase], changes: &[f32], limit: f32) -> Vec<Absolut
 
 bounded! {
     /// A named polygon.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct RegionFile {
         /// Its name.
         pub name: String = Longest(LONGEST_NAME),

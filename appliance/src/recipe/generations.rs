@@ -6,8 +6,7 @@
 
 use super::RecipeFile;
 use super::store::{ChangeError, LoadError, Store, is_sound, manifest_at, write};
-use crate::storage::folder::{name_also, rename_whole, sync_folder_of};
-use std::fs;
+use crate::storage::folder::{name_also, remove, rename_whole, sync_folder_of};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -138,15 +137,6 @@ impl Store {
     }
 }
 
-/// Removes a file; returns whether it existed.
-fn remove(file: &Path) -> io::Result<bool> {
-    match fs::remove_file(file) {
-        Ok(()) => Ok(true),
-        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-        Err(error) => Err(error),
-    }
-}
-
 /// The manifest of a recipe file that can be used under this number.
 ///
 /// # Errors
@@ -164,6 +154,7 @@ mod tests {
     use crate::recipe::archive::{self, Arrays};
     use crate::recipe::file::{FORMAT, VERSION};
     use serde_json::json;
+    use std::fs;
     use std::io::Cursor;
 
     /// A small whole recipe.

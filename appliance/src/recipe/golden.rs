@@ -112,20 +112,9 @@ impl TaughtRecipe {
     pub(super) fn of(mut manifest: RecipeFile, arrays: Arrays) -> Result<Self, String> {
         let choice = planner::choose(&manifest.sequences, &manifest.gauges, arrays.widest());
         manifest.production = choice.production;
-        let mut recipe = Recipe::check(&manifest, arrays)?;
-        let (bytes, fingerprint) = archive::pack(&manifest, &recipe.arrays)?;
-        recipe.id.fingerprint.clone_from(&fingerprint);
-        manifest.fingerprint = fingerprint;
-        Ok(Self {
-            bytes,
-            manifest,
-            recipe,
-            choice,
-        })
+        Self::sealed(manifest, arrays, choice)
     }
-}
 
-impl TaughtRecipe {
     /// The same recipe, whose cycles begin with two frames.
     ///
     /// # Errors
@@ -135,14 +124,19 @@ impl TaughtRecipe {
         self.choice.reasons.push(
             "2 frames are tried first, the sequence taken follows in the same cycle where they do not hold".into(),
         );
-        let mut recipe = Recipe::check(&self.manifest, self.recipe.arrays)?;
-        let (bytes, fingerprint) = archive::pack(&self.manifest, &recipe.arrays)?;
+        Self::sealed(self.manifest, self.recipe.arrays, self.choice)
+    }
+
+    fn sealed(mut manifest: RecipeFile, arrays: Arrays, choice: Choice) -> Result<Self, String> {
+        let mut recipe = Recipe::check(&manifest, arrays)?;
+        let (bytes, fingerprint) = archive::pack(&manifest, &recipe.arrays)?;
         recipe.id.fingerprint.clone_from(&fingerprint);
-        self.manifest.fingerprint = fingerprint;
+        manifest.fingerprint = fingerprint;
         Ok(Self {
             bytes,
+            manifest,
             recipe,
-            ..self
+            choice,
         })
     }
 }

@@ -21,7 +21,6 @@ use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_varian
 use algo::inspect::{GoldenSurface, Largest, Taught, Weight, normal_shares};
 use algo::pipeline::KnownSurface;
 use hal::bounded;
-use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
 /// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be
@@ -49,8 +48,7 @@ pub(super) const DENT: f64 = 4.06;
 
 bounded! {
     /// The deviation of good parts, as predicted when the part was taught.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
+    #[derive(Copy, Default)]
     pub struct GoodPartsFile {
         /// The tolerance that was asked for, ± mm.
         pub tolerance_mm: f64 = length(),
@@ -156,18 +154,10 @@ impl Noise<'_> {
         let found = GoodPartsFile {
             tolerance_mm,
             limit_mm,
-            largest_mm: 0.0,
-            scatter_mm: 0.0,
-            beyond: 0.0,
             left_out: 1.0 - compared.count() as f64 / count(&valid).max(1.0),
             weighed: weighed / f64::max(all, f64::MIN_POSITIVE),
             least_weight,
-            smoothing_px: 0,
-            wider_px: 0,
-            wider: 0.0,
-            dent_mm: 0.0,
-            displaced_mm: 0.0,
-            displaced_scatter_mm: 0.0,
+            ..GoodPartsFile::default()
         };
         let mut weighed = Weighed {
             found,

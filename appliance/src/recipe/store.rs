@@ -2,7 +2,7 @@
 //! generation.
 
 use super::{Recipe, RecipeFile, archive};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
 use std::fs;
@@ -156,15 +156,13 @@ impl Store {
     ///
     /// # Errors
     /// If the folder cannot be created or written (exit code 73).
-    pub fn of_state(state: &StateFolder) -> Result<Self, Failure> {
+    pub fn of_state(state: &StateFolder) -> Result<Self> {
         let folder = state.path().join("recipes");
         let opened =
             Self::open(&folder).and_then(|store| store.remove_left_behind().map(|()| store));
-        opened.map_err(|error| {
-            let what = format!("open the state folder {}", state.path().display());
-            let remedy = format!("{error}: name one that can be written with --state");
-            Failure::because(Exit::CannotCreate, what, remedy)
-        })
+        let what = format!("open the state folder {}", state.path().display());
+        let remedy = "name one that can be written with --state";
+        opened.map_err(Exit::CannotCreate.advising(what, remedy))
     }
 
     pub(super) fn path(&self, number: u16) -> PathBuf {

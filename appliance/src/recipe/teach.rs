@@ -135,7 +135,7 @@ pub fn teach_while(
     drop(golden);
     stage(0.9, "trying the recipe on the part")?;
     let plan = computing.on(|| Plan::new(taught.recipe.clone(), calibration, false));
-    let plan = plan.map_err(|error| TeachError::Rig(error.to_string()))?;
+    let plan = plan.map_err(TeachError::rig)?;
     let trying = |share: f64| progress(0.9 + 0.1 * share, "trying the recipe on the part");
     let mut judged = proof::as_it_lies(&plan, head.head, calibration, timeout, &trying)?;
     drop(plan);

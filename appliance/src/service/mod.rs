@@ -16,7 +16,7 @@ pub use caller::Caller;
 use rooms::Rooms;
 
 use crate::config::{Backend, Config};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Current;
 use crate::history::{self, Bounds, History, Numbering};
 use crate::modbus;
@@ -92,7 +92,7 @@ impl Daemon {
         pool: rayon::ThreadPool,
         progress: Progress,
         caller: &Caller,
-    ) -> Result<Self, Failure> {
+    ) -> Result<Self> {
         let path = match &config.state {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
@@ -200,7 +200,7 @@ fn opened_head(
 const SECRET: &str = "fringed.secret";
 
 /// Opens the access control; the secret of a new device is written to stderr here and never again.
-fn open_access(state: &StateFolder, progress: &Progress) -> Result<Access, Failure> {
+fn open_access(state: &StateFolder, progress: &Progress) -> Result<Access> {
     let folder = state.path().join("access");
     let given =
         std::env::var_os("CREDENTIALS_DIRECTORY").map(|given| Path::new(&given).join(SECRET));
@@ -220,22 +220,22 @@ fn open_access(state: &StateFolder, progress: &Progress) -> Result<Access, Failu
     Ok(access)
 }
 
-async fn listen(config: &Config) -> Result<(TcpListener, TcpListener), Failure> {
+async fn listen(config: &Config) -> Result<(TcpListener, TcpListener)> {
     let plc = socket::bind("Modbus TCP", config.modbus.listen).await?;
     let page = socket::bind("the page", config.http.listen).await?;
     Ok((plc, page))
 }
 
-fn address_of(listener: &TcpListener) -> Result<SocketAddr, Failure> {
+fn address_of(listener: &TcpListener) -> Result<SocketAddr> {
     listener
         .local_addr()
-        .map_err(|error| Failure::because(Exit::Unavailable, "ask for a socket's port", error))
+        .map_err(Exit::Unavailable.because("ask for a socket's port"))
 }
 
 fn open_history(
     config: &Config,
     state: &StateFolder,
-) -> Result<(History, history::Task, u32, Option<String>), Failure> {
+) -> Result<(History, history::Task, u32, Option<String>)> {
     let bounds = Bounds {
         results: u64::from(config.history.results),
         recordings: u64::from(config.history.recordings_mib) << 20,
@@ -247,11 +247,10 @@ fn open_history(
         // Run 0 means that none was recorded.
         run: random()?.max(1),
     };
-    history::open(state.path(), numbering, bounds)
-        .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))
+    history::open(state.path(), numbering, bounds).map_err(Exit::CannotCreate.failure())
 }
 
-fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Station, Failure> {
+fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Station> {
     let settings = Settings {
         next_seq,
         boot_id: random()?,

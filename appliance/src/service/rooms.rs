@@ -4,7 +4,7 @@ use super::caller::Caller;
 use super::serving::{PlcSide, serve};
 use super::survey::Survey;
 use crate::config::Config;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::head::calibration::Current;
 use crate::head::placed::Placed;
 use crate::history::{History, Reader, Task};
@@ -17,7 +17,7 @@ use crate::production::opening::Opening;
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Simulation;
 use crate::production::warm_up::WarmUp;
-use crate::production::{Aborts, Order, Worker};
+use crate::production::{Aborts, JudgedBy, Order, Worker};
 use crate::recipe::Store;
 use crate::station::{Request, StationHandle};
 use crate::system::computing::Computing;
@@ -53,7 +53,7 @@ pub(super) struct Rooms<'a> {
 }
 
 /// A room's thread.
-type Room = Result<JoinHandle<()>, Failure>;
+type Room = Result<JoinHandle<()>>;
 
 impl Rooms<'_> {
     /// Stores results.
@@ -113,7 +113,7 @@ impl Rooms<'_> {
     }
 
     /// Surveys the machine, until what this returns with the thread is dropped.
-    pub fn survey(&self) -> Result<(Sender<()>, JoinHandle<()>), Failure> {
+    pub fn survey(&self) -> Result<(Sender<()>, JoinHandle<()>)> {
         let (end, ended) = mpsc::channel();
         let (clients, progress) = (self.clients.clone(), self.progress.clone());
         let survey = Survey::new(self.path, self.recipes.clone(), clients, progress);
@@ -129,7 +129,7 @@ impl Rooms<'_> {
         caller: &Caller,
         (inbox, aborts): (Receiver<Order>, Aborts),
         first: Option<Request>,
-        opened: Sender<Result<Option<Stage>, Failure>>,
+        opened: Sender<Result<Option<Stage>>>,
     ) -> Room {
         let mut config = self.config.head_in(self.path);
         let waiting = match first {
@@ -176,6 +176,8 @@ impl Rooms<'_> {
                 config,
                 aborts,
                 lost: None,
+                plan: None,
+                last: JudgedBy::default(),
                 shelf: Shelf::default(),
                 pulse,
                 computing,
@@ -194,7 +196,5 @@ fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Room {
     Builder::new()
         .name(name.into())
         .spawn(run)
-        .map_err(|error| {
-            Failure::because(Exit::Software, format!("start the thread {name}"), error)
-        })
+        .map_err(Exit::Software.because(format!("start the thread {name}")))
 }

@@ -1,7 +1,7 @@
 //! Waits for the end of the start: the station has its recipe, or there is a reason why not.
 
 use super::{Daemon, runtime};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::station::snapshot::status;
 use crate::station::{RecipeResult, Snapshot};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ impl Daemon {
     ///
     /// # Errors
     /// The station has a fault, or its recipe could be neither loaded nor taught.
-    pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>, Failure> {
+    pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>> {
         runtime()?.block_on(self.settled())
     }
 
@@ -20,10 +20,10 @@ impl Daemon {
     ///
     /// # Errors
     /// As [`Daemon::wait_until_ready`].
-    pub async fn settled(&self) -> Result<Arc<Snapshot>, Failure> {
+    pub async fn settled(&self) -> Result<Arc<Snapshot>> {
         if !self.awaited {
             let message = "there is no recipe yet: load or teach one, or import one with `fringed recipe import`";
-            return Err(Failure::new(Exit::Unavailable, message));
+            return Exit::Unavailable.fail(message);
         }
         let mut snapshots = self.station.subscribe();
         let refused = |snapshot: &Snapshot| snapshot.recipe_result != RecipeResult::Ok;
@@ -38,16 +38,14 @@ impl Daemon {
         match (&snapshot.fault, &snapshot.error) {
             (Some(fault), _) => {
                 let message = format!("{}: {}", fault.cause, fault.remedy);
-                Err(Failure::new(Exit::Unavailable, message))
+                Exit::Unavailable.fail(message)
             }
             (None, error) if refused(&snapshot) => {
                 let otherwise = "the recipe was not loaded: load another, or teach it again";
                 let message = error.as_deref().unwrap_or(otherwise);
-                Err(Failure::new(Exit::Content, message))
+                Exit::Content.fail(message)
             }
-            (None, Some(error)) if !snapshot.is(status::READY) => {
-                Err(Failure::new(Exit::Unavailable, error.to_string()))
-            }
+            (None, Some(error)) if !snapshot.is(status::READY) => Exit::Unavailable.fail(error),
             _ => Ok(snapshot),
         }
     }

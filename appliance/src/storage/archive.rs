@@ -4,13 +4,35 @@
 //! more members than its format needs, no two members share a byte, and all are stored without
 //! compression: reading all of them costs as much as reading the file once.
 
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, Read, Seek, SeekFrom, Write as _};
 use zip::read::ZipFile;
-use zip::{CompressionMethod, ZipArchive};
+use zip::result::ZipResult;
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
 /// Bytes of the record that ends a ZIP without a comment (APPNOTE 6.3.10, section 4.3.16).
 const END_BYTES: usize = 22;
 const END_MAGIC: &[u8; 4] = b"PK\x05\x06";
+
+/// How members are stored: without compression.
+pub fn stored() -> SimpleFileOptions {
+    SimpleFileOptions::default().compression_method(CompressionMethod::Stored)
+}
+
+/// A ZIP of these members.
+///
+/// # Errors
+/// If it cannot be made.
+pub fn packed<'a>(
+    members: impl IntoIterator<Item = (&'a str, impl AsRef<[u8]>)>,
+) -> ZipResult<Vec<u8>> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, content) in members {
+        zip.start_file(name, stored())?;
+        zip.write_all(content.as_ref())?;
+    }
+    Ok(zip.finish()?.into_inner())
+}
 
 /// The members of a ZIP, by name; folders are left out.
 #[derive(Debug)]
@@ -129,7 +151,6 @@ fn listed(source: &mut (impl Read + Seek)) -> io::Result<Option<usize>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::io::{Cursor, Write as _};
     use std::time::{Duration, Instant};
     use zip::ZipWriter;
     use zip::write::SimpleFileOptions;

@@ -1,6 +1,6 @@
 //! Files that a loss of power leaves whole, and a folder of them.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use rustix::fs::OFlags;
 use std::fs;
 use std::io::{self, Read as _, Write as _};
@@ -19,15 +19,10 @@ impl OutputFolder {
     ///
     /// # Errors
     /// If it cannot be created (exit code 73).
-    pub fn create(path: &Path) -> Result<Self, Failure> {
-        fs::create_dir_all(path).map_err(|error| {
-            let what = format!("create the output folder {}", path.display());
-            Failure::because(
-                Exit::CannotCreate,
-                what,
-                format!("{error}: name one that can be written"),
-            )
-        })?;
+    pub fn create(path: &Path) -> Result<Self> {
+        let what = format!("create the output folder {}", path.display());
+        let failed = Exit::CannotCreate.advising(what, "name one that can be written");
+        fs::create_dir_all(path).map_err(failed)?;
         Ok(Self {
             path: path.to_path_buf(),
         })
@@ -37,36 +32,37 @@ impl OutputFolder {
     ///
     /// # Errors
     /// If it cannot be written (exit code 73).
-    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), Failure> {
+    pub fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let target = self.path.join(name);
-        write_whole(&target, bytes).map_err(|error| {
-            let what = format!("write {}", target.display());
-            Failure::because(
-                Exit::CannotCreate,
-                what,
-                format!("{error}: free space or name another folder"),
-            )
-        })
+        let what = format!("write {}", target.display());
+        let failed = Exit::CannotCreate.advising(what, "free space or name another folder");
+        write_whole(&target, bytes).map_err(failed)
     }
 
     /// Removes a file, and answers whether there was one.
     ///
     /// # Errors
     /// If it cannot be removed (exit code 73).
-    pub fn remove(&self, name: &str) -> Result<bool, Failure> {
+    pub fn remove(&self, name: &str) -> Result<bool> {
         let target = self.path.join(name);
-        match fs::remove_file(&target) {
-            Ok(()) => Ok(true),
-            Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
-            Err(error) => {
-                let what = format!(
-                    "remove {}, which is of another measurement",
-                    target.display()
-                );
-                let remedy = format!("{error}: name another folder");
-                Err(Failure::because(Exit::CannotCreate, what, remedy))
-            }
-        }
+        let what = format!(
+            "remove {}, which is of another measurement",
+            target.display()
+        );
+        let failed = Exit::CannotCreate.advising(what, "name another folder");
+        remove(&target).map_err(failed)
+    }
+}
+
+/// Removes a file; returns whether it existed.
+///
+/// # Errors
+/// If it cannot be removed.
+pub fn remove(file: &Path) -> io::Result<bool> {
+    match fs::remove_file(file) {
+        Ok(()) => Ok(true),
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
     }
 }
 

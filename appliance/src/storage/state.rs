@@ -1,6 +1,6 @@
 //! The state folder: its lock, the result counter and the device's serial.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::storage::folder::{read_whole, write_whole};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write as _;
@@ -27,7 +27,7 @@ impl StateFolder {
     ///
     /// # Errors
     /// If the platform has none, e.g. without a home directory.
-    pub fn default_path() -> Result<PathBuf, Failure> {
+    pub fn default_path() -> Result<PathBuf> {
         dirs::state_dir()
             .or_else(dirs::data_local_dir)
             .map(|folder| folder.join("fringed"))
@@ -43,7 +43,7 @@ impl StateFolder {
     ///
     /// # Errors
     /// If it cannot be created or written, or another daemon holds it (exit code 73).
-    pub fn open(path: &Path) -> Result<Self, Failure> {
+    pub fn open(path: &Path) -> Result<Self> {
         let remedy = "another fringed uses it: end that one or name another folder with --state";
         Self::open_unless_held(path, (Exit::CannotCreate, remedy))
     }
@@ -53,12 +53,12 @@ impl StateFolder {
     ///
     /// # Errors
     /// If it cannot be created or written (exit code 73), or a station uses it (exit code `used`).
-    pub fn open_unless_used(path: &Path, used: Exit, instead: &str) -> Result<Self, Failure> {
+    pub fn open_unless_used(path: &Path, used: Exit, instead: &str) -> Result<Self> {
         let remedy = format!("a station uses it: {instead}, or end the station first");
         Self::open_unless_held(path, (used, &remedy))
     }
 
-    fn open_unless_held(path: &Path, (held, remedy): (Exit, &str)) -> Result<Self, Failure> {
+    fn open_unless_held(path: &Path, (held, remedy): (Exit, &str)) -> Result<Self> {
         let refused = |exit, error: String| {
             let what = format!("open the state folder {}", path.display());
             Failure::because(exit, what, error)
@@ -117,7 +117,7 @@ impl StateFolder {
     ///
     /// # Errors
     /// If it can neither be read nor written.
-    pub fn serial(&self) -> Result<String, Failure> {
+    pub fn serial(&self) -> Result<String> {
         let file = self.path.join(SERIAL);
         if let Ok(serial) = read_whole(&file, MOST)
             && let Ok(serial) = String::from_utf8(serial)
@@ -126,13 +126,8 @@ impl StateFolder {
             return Ok(serial.trim().to_owned());
         }
         let serial = format!("{:08X}", random()?);
-        write_whole(&file, format!("{serial}\n").as_bytes()).map_err(|error| {
-            Failure::because(
-                Exit::CannotCreate,
-                format!("write {}", file.display()),
-                error,
-            )
-        })?;
+        write_whole(&file, format!("{serial}\n").as_bytes())
+            .map_err(Exit::CannotCreate.because(format!("write {}", file.display())))?;
         Ok(serial)
     }
 }
@@ -198,9 +193,8 @@ impl Counter {
 ///
 /// # Errors
 /// If the system gives none.
-pub fn random() -> Result<u32, Failure> {
-    getrandom::u32()
-        .map_err(|error| Failure::because(Exit::Software, "ask the system for random bits", error))
+pub fn random() -> Result<u32> {
+    getrandom::u32().map_err(Exit::Software.because("ask the system for random bits"))
 }
 
 #[cfg(test)]

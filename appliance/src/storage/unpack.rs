@@ -1,6 +1,6 @@
 //! Unpacks a recording from the ZIP that the page gives, for as long as it is needed.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::storage::archive::Members;
 use std::fmt::Display;
 use std::fs::{self, DirBuilder, File};
@@ -28,7 +28,7 @@ impl Unpacked {
     ///
     /// # Errors
     /// If a file is not a ZIP of a recording (65), or there is no room to unpack it (73).
-    pub fn of(path: &Path) -> Result<Self, Failure> {
+    pub fn of(path: &Path) -> Result<Self> {
         if !path.is_file() {
             let real = path.canonicalize().ok();
             return Ok(Self {
@@ -108,16 +108,15 @@ fn is_inside(name: &str) -> bool {
 struct Scratch(PathBuf);
 
 impl Scratch {
-    fn new() -> Result<Self, Failure> {
+    fn new() -> Result<Self> {
         let name = format!("fringed-{:08x}", crate::storage::state::random()?);
         let folder = std::env::temp_dir().join(name);
-        match DirBuilder::new().mode(0o700).create(&folder) {
-            Ok(()) => Ok(Self(folder)),
-            Err(error) => {
-                let what = format!("create {}", folder.display());
-                Err(Failure::because(Exit::CannotCreate, what, error))
-            }
-        }
+        let failed = Exit::CannotCreate.because(format!("create {}", folder.display()));
+        DirBuilder::new()
+            .mode(0o700)
+            .create(&folder)
+            .map_err(failed)?;
+        Ok(Self(folder))
     }
 }
 

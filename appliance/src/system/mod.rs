@@ -1,7 +1,7 @@
 //! The operating system: clock, signals, sockets, thread priorities, memory, the service manager;
 //! and the log on stderr.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 
 pub mod clock;
 pub mod computing;
@@ -21,9 +21,9 @@ pub mod stop_signal;
 ///
 /// # Errors
 /// If the system refuses its resources (exit code 70).
-pub fn runtime() -> Result<tokio::runtime::Runtime, Failure> {
+pub fn runtime() -> Result<tokio::runtime::Runtime> {
     tokio::runtime::Builder::new_current_thread()
         .enable_all()
         .build()
-        .map_err(|error| Failure::because(Exit::Software, "start a socket runtime", error))
+        .map_err(Exit::Software.because("start a socket runtime"))
 }

@@ -1,6 +1,6 @@
 //! Listening on a TCP port, and comparing addresses with networks.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use ipnet::IpNet;
 use std::io;
 use std::net::{IpAddr, Ipv6Addr, SocketAddr};
@@ -11,7 +11,7 @@ use tokio::net::TcpListener;
 ///
 /// # Errors
 /// The address is in use, not permitted, or not of this machine (exit code 69).
-pub async fn bind(what: &str, address: SocketAddr) -> Result<TcpListener, Failure> {
+pub async fn bind(what: &str, address: SocketAddr) -> Result<TcpListener> {
     TcpListener::bind(address).await.map_err(|error| {
         let words = match error.kind() {
             io::ErrorKind::AddrInUse => {

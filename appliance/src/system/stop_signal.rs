@@ -1,7 +1,7 @@
 //! The stop signal: Ctrl-C or SIGTERM.
 
 use super::runtime;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use std::future::pending;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
@@ -15,12 +15,12 @@ impl StopSignal {
     ///
     /// # Errors
     /// If the system does not deliver signals (exit code 70).
-    pub fn listen() -> Result<Self, Failure> {
-        let failed = |error| Failure::because(Exit::Software, "wait for a signal", error);
+    pub fn listen() -> Result<Self> {
+        let failed = Exit::Software.because("wait for a signal");
         let runtime = runtime()?;
         let listen = |kind| {
             let _inside = runtime.enter();
-            signal(kind).map_err(failed)
+            signal(kind).map_err(&failed)
         };
         let mut interrupt = listen(SignalKind::interrupt())?;
         let mut terminate = listen(SignalKind::terminate())?;
@@ -38,7 +38,7 @@ impl StopSignal {
         std::thread::Builder::new()
             .name("signals".into())
             .spawn(wait)
-            .map_err(failed)?;
+            .map_err(&failed)?;
         Ok(Self(Some(arrived)))
     }
 

@@ -6,7 +6,7 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use crate::head::board::parse;
 use crate::output::board::sheet;
 
@@ -17,7 +17,7 @@ pub(super) struct Wanted {
     board: String,
 }
 
-pub(super) async fn pdf(Query(wanted): Query<Wanted>) -> Result<Response, Problem> {
+pub(super) async fn pdf(Query(wanted): Query<Wanted>) -> Result<Response> {
     let board =
         parse(&wanted.board).map_err(|error| Problem::unclear(format!("board: {error}")))?;
     let sheet = sheet(&board).map_err(|error| Problem::unfit(format!("board: {error}")))?;

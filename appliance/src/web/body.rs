@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use tokio::sync::{OwnedSemaphorePermit, mpsc};
 use tokio_stream::StreamExt as _;
 
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::error::shortened;
 use crate::recipe::incoming::Incoming;
@@ -27,7 +27,7 @@ const FILE_TIME: Duration = Duration::from_secs(120);
 ///
 /// # Errors
 /// It is too long, too slow, or not the JSON of a `T`.
-pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T, Problem> {
+pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
     parsed(&bytes)
 }
@@ -36,7 +36,7 @@ pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T, Problem> {
 ///
 /// # Errors
 /// As [`json`].
-pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Result<T, Problem> {
+pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Result<T> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
     match bytes.is_empty() {
         true => Ok(T::default()),
@@ -44,7 +44,7 @@ pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Result<T,
     }
 }
 
-fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Result<T, Problem> {
+fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
     serde_json::from_slice(bytes).map_err(|error| {
         let error = shortened(&error.to_string());
         Problem::unclear(format!("the request's JSON: {error}"))
@@ -63,7 +63,7 @@ pub struct Upload {
 ///
 /// # Errors
 /// Too many files are being received; it is too long or too slow; or there is no room for it.
-pub async fn file(site: &Site, body: Body) -> Result<Upload, Problem> {
+pub async fn file(site: &Site, body: Body) -> Result<Upload> {
     let place = site.arriving.clone().try_acquire_owned().map_err(|_| {
         Problem::crowded("other files are being imported: wait until they are done")
     })?;
@@ -92,7 +92,7 @@ pub async fn file(site: &Site, body: Body) -> Result<Upload, Problem> {
 }
 
 /// Sends a body to `chunks` piece by piece, until the receiver is gone.
-async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<(), Problem> {
+async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<()> {
     let mut body = body.into_data_stream();
     let mut left = MAX_FILE;
     while let Some(chunk) = body.next().await {
@@ -109,7 +109,7 @@ async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<(), Problem> {
     Ok(())
 }
 
-async fn read(body: Body, most: usize, time: Duration) -> Result<Bytes, Problem> {
+async fn read(body: Body, most: usize, time: Duration) -> Result<Bytes> {
     let read = async {
         to_bytes(body, most)
             .await
@@ -118,10 +118,7 @@ async fn read(body: Body, most: usize, time: Duration) -> Result<Bytes, Problem>
     in_time(time, read).await
 }
 
-async fn in_time<T>(
-    time: Duration,
-    work: impl Future<Output = Result<T, Problem>>,
-) -> Result<T, Problem> {
+async fn in_time<T>(time: Duration, work: impl Future<Output = Result<T>>) -> Result<T> {
     tokio::time::timeout(time, work).await.unwrap_or_else(|_| {
         let words = format!(
             "the request's body did not come within {} s",

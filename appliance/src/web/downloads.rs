@@ -1,24 +1,23 @@
 //! Downloads: point cloud, recording and gauges of the last result, and the diagnostic bundle.
 
 use std::fs::File;
-use std::io::{self, Cursor, Write as _};
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
 
 use axum::body::{Body, Bytes};
-use axum::extract::State;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
+use zip::ZipWriter;
 use zip::result::ZipError;
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, ZipWriter};
 
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::Site;
 use super::{metrics, view};
 use crate::history::{Filter, JudgedPart, name_of};
+use crate::storage::archive::{packed, stored};
 
 /// Bytes of a file that are sent to its client at a time.
 const CHUNK: usize = 64 << 10;
@@ -62,8 +61,8 @@ impl Content {
 pub(super) async fn send(
     site: &Site,
     kind: &'static str,
-    work: impl FnOnce(&Site) -> Result<(String, Content), Problem> + Send + 'static,
-) -> Result<Response, Problem> {
+    work: impl FnOnce(&Site) -> Result<(String, Content)> + Send + 'static,
+) -> Result<Response> {
     let permit =
         site.files.clone().try_acquire_owned().map_err(|_| {
             Problem::crowded("too many files are being sent: wait until one is done")
@@ -126,11 +125,10 @@ impl Packed {
     }
 
     fn write(self, to: &mut ToClient) -> Result<(), ZipError> {
-        let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
         let mut zip = ZipWriter::new_stream(to);
         for (inside, mut file) in self.members {
             let parts: Vec<_> = inside.iter().map(|part| part.to_string_lossy()).collect();
-            zip.start_file(format!("{}/{}", self.name, parts.join("/")), stored)?;
+            zip.start_file(format!("{}/{}", self.name, parts.join("/")), stored())?;
             io::copy(&mut file, &mut zip)?;
         }
         zip.finish().map(drop)
@@ -160,7 +158,7 @@ impl io::Write for ToClient {
     }
 }
 
-pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem> {
+pub(super) async fn cloud(site: Site) -> Result<Response> {
     send(&site, "application/octet-stream", |site| {
         let asked = site.last_cycle.ask(|cycle| {
             let cloud = cycle.plan.cloud(cycle.sequence, &cycle.frames)?;
@@ -175,7 +173,7 @@ pub(super) async fn cloud(State(site): State<Site>) -> Result<Response, Problem>
 const GONE: &str =
     "the frames of the last result are gone, or the station is busy; trigger a measurement";
 
-pub(super) async fn recording(State(site): State<Site>) -> Result<Response, Problem> {
+pub(super) async fn recording(site: Site) -> Result<Response> {
     send(&site, "application/zip", |site| {
         let asked = site.last_cycle.ask(JudgedPart::clone);
         let part = asked.ok_or_else(|| Problem::missing(GONE))?;
@@ -198,11 +196,11 @@ pub(super) fn unpacked(error: io::Error) -> String {
     format!("pack the recording: {error}: free space")
 }
 
-pub(super) async fn gauges(State(site): State<Site>) -> Result<Response, Problem> {
+pub(super) async fn gauges(site: Site) -> Result<Response> {
     send(&site, "text/csv; charset=utf-8", gauges_csv).await
 }
 
-fn gauges_csv(site: &Site) -> Result<(String, Content), Problem> {
+fn gauges_csv(site: &Site) -> Result<(String, Content)> {
     let snapshot = site.station.snapshot();
     let words = "nothing was measured yet; trigger a measurement";
     let result = snapshot
@@ -239,9 +237,9 @@ fn gauges_csv(site: &Site) -> Result<(String, Content), Problem> {
 }
 
 /// A ZIP of everything that explains a device's behaviour; no secrets.
-pub(super) async fn diagnostics(State(site): State<Site>) -> Result<Response, Problem> {
+pub(super) async fn diagnostics(site: Site) -> Result<Response> {
     send(&site, "application/zip", |site| {
-        let packed = pack(site).map_err(|error| Problem::broken(error.to_string()));
+        let packed = pack(site).map_err(Problem::broken);
         let serial = &site.station.snapshot().identity.serial;
         let safe: String = serial.chars().filter(char::is_ascii_alphanumeric).collect();
         Ok((format!("fringed-{safe}.zip"), Content::Bytes(packed?)))
@@ -274,11 +272,5 @@ fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {
         ("metrics.txt", metrics::text(site)),
         ("fringed.toml", site.configuration.clone()),
     ];
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
-    let stored = SimpleFileOptions::default().compression_method(CompressionMethod::Stored);
-    for (name, content) in members {
-        zip.start_file(name, stored)?;
-        zip.write_all(content.as_bytes())?;
-    }
-    Ok(zip.finish()?.into_inner())
+    packed(members)
 }

@@ -8,7 +8,6 @@ use std::convert::Infallible;
 use std::time::{Duration, Instant};
 
 use axum::Extension;
-use axum::extract::State;
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::sse::{Event, Sse};
 use axum::response::{IntoResponse, Response};
@@ -32,10 +31,7 @@ const SHORTEST: Duration = Duration::from_millis(200);
 pub(super) struct Following;
 
 /// The stream of one page; ends when the page is closed, or when another address gets its slot.
-pub(super) async fn follow(
-    State(site): State<Site>,
-    Extension(Peer(address)): Extension<Peer>,
-) -> Response {
+pub(super) async fn follow(site: Site, Extension(Peer(address)): Extension<Peer>) -> Response {
     let mut response = match site.followers.enter(site.holder(address), Instant::now()) {
         Some(slot) => stream(site.station.clone(), slot),
         None => {

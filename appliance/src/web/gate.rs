@@ -4,13 +4,13 @@ use std::net::IpAddr;
 use std::time::Instant;
 
 use axum::Extension;
-use axum::extract::{Request, State};
+use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use super::host::only;
-use super::problem::{Outcome, Problem};
+use super::problem::{Outcome, Problem, Result};
 use super::site::Site;
 use crate::system::clock;
 use crate::system::journal::{self, Severity};
@@ -52,7 +52,7 @@ pub fn is_signed_in(site: &Site, headers: &HeaderMap) -> bool {
 ///
 /// # Errors
 /// How to sign in.
-pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Result<(), Problem> {
+pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Result<()> {
     let words = "sign in first: POST the device's secret to /api/session";
     let refused = || Problem::new(StatusCode::UNAUTHORIZED, words);
     is_signed_in(site, headers)
@@ -85,7 +85,7 @@ fn is_own(headers: &HeaderMap) -> bool {
 
 /// Lets a request through only with an open session, and records its outcome.
 pub async fn signed_in_only(
-    State(site): State<Site>,
+    site: Site,
     Extension(Peer(from)): Extension<Peer>,
     Extension(Action(action)): Extension<Action>,
     request: Request,
@@ -129,7 +129,7 @@ pub async fn record(
                 changed: outcome.as_ref().ok().and_then(Option::as_deref),
             };
             let stored = site.access.changes().add(&change);
-            stored.map_err(|error| Problem::broken(error.to_string()))
+            stored.map_err(Problem::broken)
         })
         .await;
     if let Err(problem) = written {

@@ -1,7 +1,7 @@
 //! The head: its commissioning step by step, and the live picture.
 
 use axum::body::Body;
-use axum::extract::{Path, Query, Request, State};
+use axum::extract::{Path, Query, Request};
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::body;
 use super::gate::signed_in;
 use super::orders::{Accepted, accepted, not_now};
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::{Site, alone};
 use crate::head::board;
 use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
@@ -28,7 +28,7 @@ const MIN_LENGTH_MM: f64 = 1e-3;
 /// Longest one, mm.
 const MAX_LENGTH_MM: f64 = 1e5;
 
-pub(super) async fn state(State(site): State<Site>) -> Json<Value> {
+pub(super) async fn state(site: Site) -> Json<Value> {
     let mut view = site.commission.view(&site.station.snapshot());
     view["placing"] = site.simulation.is_placing().into();
     Json(view)
@@ -68,10 +68,10 @@ enum Poses {
 }
 
 pub(super) async fn step(
-    State(site): State<Site>,
+    site: Site,
     Path(name): Path<String>,
     request: Request,
-) -> Result<Accepted, Problem> {
+) -> Result<Accepted> {
     let asked = asked(&site, &name, request.into_body()).await?;
     if site.simulation.is_placing() {
         return Err(Problem::busy(format!(
@@ -89,10 +89,7 @@ pub(super) async fn step(
     Ok(accepted())
 }
 
-pub(super) async fn end(
-    State(site): State<Site>,
-    Path(name): Path<String>,
-) -> Result<Accepted, Problem> {
+pub(super) async fn end(site: Site, Path(name): Path<String>) -> Result<Accepted> {
     if !site.commission.is_running(&name) {
         let words = format!("end the step {name}: it is not running");
         return Err(Problem::busy(words));
@@ -101,7 +98,7 @@ pub(super) async fn end(
     Ok(accepted())
 }
 
-async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked, Problem> {
+async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked> {
     let plain = match name {
         "devices" => Some(Step::Devices),
         "aim" => Some(Step::Aim),
@@ -128,7 +125,7 @@ async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked, Problem> {
     })
 }
 
-fn exposure(site: &Site, wanted: Exposure) -> Result<Asked, Problem> {
+fn exposure(site: &Site, wanted: Exposure) -> Result<Asked> {
     let head = site.commission.head();
     let head = head.ok_or_else(|| Problem::busy("set the exposure: no head is open"))?;
     let exposing = Exposing {
@@ -198,10 +195,10 @@ pub(super) struct Shown {
 }
 
 pub(super) async fn live(
-    State(site): State<Site>,
+    site: Site,
     headers: HeaderMap,
     Query(shown): Query<Shown>,
-) -> Result<Response, Problem> {
+) -> Result<Response> {
     signed_in(&site, &headers)?;
     let Some(show) = Show::parse(&shown.show) else {
         let words = Show::ALL.map(Show::word).join(", ");
@@ -218,19 +215,14 @@ pub(super) async fn live(
         priority::give_way();
         live.look(show)
     });
-    let (number, png) = taken
-        .await?
-        .map_err(|error| Problem::busy(error.to_string()))?;
+    let (number, png) = taken.await?.map_err(Problem::busy)?;
     let mut response = ([(header::CONTENT_TYPE, "image/png")], png).into_response();
     let headers = response.headers_mut();
     headers.insert(NUMBER, HeaderValue::from(number));
     Ok(response)
 }
 
-pub(super) async fn figures(
-    State(site): State<Site>,
-    headers: HeaderMap,
-) -> Result<Json<Value>, Problem> {
+pub(super) async fn figures(site: Site, headers: HeaderMap) -> Result<Json<Value>> {
     signed_in(&site, &headers)?;
     let words = "no live picture was taken yet: ask for one first";
     site.live
@@ -239,10 +231,7 @@ pub(super) async fn figures(
         .ok_or_else(|| Problem::missing(words))
 }
 
-pub(super) async fn pose(
-    State(site): State<Site>,
-    Path(number): Path<u32>,
-) -> Result<Response, Problem> {
+pub(super) async fn pose(site: Site, Path(number): Path<u32>) -> Result<Response> {
     let png = site
         .aside(move |site| {
             let picture = site.commission.pose_picture(number);

@@ -1,12 +1,12 @@
 //! Stored results: lists, trends, CSV and the frames that were kept.
 
-use axum::extract::{Path, Query, State};
+use axum::extract::{Path, Query};
 use axum::response::{Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::downloads::{Content, Packed, send, unpacked};
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::history::{Filter, HistoryError};
 use crate::station::Verdict;
@@ -19,7 +19,7 @@ const TREND: usize = 100;
 
 impl From<HistoryError> for Problem {
     fn from(error: HistoryError) -> Self {
-        Self::broken(error.to_string())
+        Self::broken(error)
     }
 }
 
@@ -39,7 +39,7 @@ pub(super) struct Wanted {
 impl Wanted {
     /// The filter, of the `usual` number of results unless asked for another one, and at `most`
     /// that many.
-    fn filter(self, usual: usize, most: usize) -> Result<Filter, Problem> {
+    fn filter(self, usual: usize, most: usize) -> Result<Filter> {
         let judged = |word: String| {
             let words = format!("verdict={word}: write PASS, FAIL or INVALID");
             Verdict::of_word(&word).ok_or_else(|| Problem::unclear(words))
@@ -57,10 +57,7 @@ impl Wanted {
     }
 }
 
-pub(super) async fn list(
-    State(site): State<Site>,
-    Query(wanted): Query<Wanted>,
-) -> Result<Json<Value>, Problem> {
+pub(super) async fn list(site: Site, Query(wanted): Query<Wanted>) -> Result<Json<Value>> {
     let filter = wanted.filter(PAGE, MAX_PAGE)?;
     let found = site.aside(move |site| {
         let results = site.history.results(&filter)?;
@@ -78,10 +75,7 @@ pub(super) async fn list(
 /// The most results of one CSV, so that it fits into memory.
 const MAX_CSV: usize = 20_000;
 
-pub(super) async fn csv(
-    State(site): State<Site>,
-    Query(wanted): Query<Wanted>,
-) -> Result<Response, Problem> {
+pub(super) async fn csv(site: Site, Query(wanted): Query<Wanted>) -> Result<Response> {
     let filter = wanted.filter(MAX_CSV, MAX_CSV)?;
     send(&site, "text/csv; charset=utf-8", move |site| {
         let mut bytes = Vec::new();
@@ -91,10 +85,7 @@ pub(super) async fn csv(
     .await
 }
 
-pub(super) async fn recording(
-    State(site): State<Site>,
-    Path(seq): Path<u32>,
-) -> Result<Response, Problem> {
+pub(super) async fn recording(site: Site, Path(seq): Path<u32>) -> Result<Response> {
     send(&site, "application/zip", move |site| {
         let words = format!("the frames of result {seq} were not kept");
         let kept = site.history.recording(seq)?;
@@ -109,7 +100,7 @@ pub(super) async fn recording(
 }
 
 /// The last values of each gauge of the active recipe.
-pub(super) async fn trends(State(site): State<Site>) -> Result<Json<Value>, Problem> {
+pub(super) async fn trends(site: Site) -> Result<Json<Value>> {
     let active = site.station.snapshot().active();
     let recipe = active.ok_or_else(|| Problem::missing("no recipe is active: load one"))?;
     let read = site.aside(move |site| {

@@ -7,13 +7,13 @@
 use axum::http::{HeaderMap, HeaderName, StatusCode, Uri, header};
 use std::net::{IpAddr, Ipv6Addr};
 
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 
 /// Checks that a request names one host, and that this is the device.
 ///
 /// # Errors
 /// 400 where it names several, 421 where it names none or another.
-pub fn check(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Result<(), Problem> {
+pub fn check(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Result<()> {
     let host = only(headers, &header::HOST);
     let several = headers.get_all(header::HOST).iter().count() > 1;
     // The request line may name a host, too.

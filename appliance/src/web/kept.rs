@@ -4,13 +4,13 @@
 //! takes as much memory as a recipe, so it is done for one part at a time, on a thread with a lower
 //! priority than the measuring task.
 
-use axum::extract::{Path, State};
+use axum::extract::Path;
 use axum::response::Json;
 use serde_json::{Value, json};
 
 use super::look::{map_of, place_of};
 use super::map::Map;
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::error::{Exit, Failure};
 use crate::history::kept::Kept;
@@ -18,10 +18,7 @@ use crate::history::why_no_frames;
 use crate::station::result::flag;
 use crate::system::priority;
 
-pub(super) async fn one(
-    State(site): State<Site>,
-    Path(seq): Path<u32>,
-) -> Result<Json<Value>, Problem> {
+pub(super) async fn one(site: Site, Path(seq): Path<u32>) -> Result<Json<Value>> {
     let found = site.aside(move |site| {
         let entry = site.history.result(seq)?;
         let entry = entry.ok_or_else(|| unknown(seq))?;
@@ -35,10 +32,7 @@ fn unknown(seq: u32) -> Problem {
     Problem::missing(format!("there is no result {seq} in the history"))
 }
 
-pub(super) async fn picture(
-    State(site): State<Site>,
-    Path((seq, layer)): Path<(u32, String)>,
-) -> Result<Map, Problem> {
+pub(super) async fn picture(site: Site, Path((seq, layer)): Path<(u32, String)>) -> Result<Map> {
     let at = place_of(&layer)?;
     // Waiting here takes no thread from other requests.
     let mut last = site.kept.clone().lock_owned().await;
@@ -57,7 +51,7 @@ pub(super) async fn picture(
 }
 
 /// The pictures of a kept part.
-fn maps(site: &Site, seq: u32) -> Result<[Map; 3], Problem> {
+fn maps(site: &Site, seq: u32) -> Result<[Map; 3]> {
     let entry = site.history.result(seq)?.ok_or_else(|| unknown(seq))?;
     if let Some(words) = why_no_frames(&entry) {
         let words = format!("the frames of result {seq} are not kept: {words}");
@@ -74,7 +68,7 @@ fn maps(site: &Site, seq: u32) -> Result<[Map; 3], Problem> {
         let kept = Kept::open(&folder).map_err(broken)?;
         let (recipe, _) = kept.recipe(&site.recipes).map_err(broken)?;
         let plan = kept.plan(recipe, false);
-        let plan = plan.map_err(|error| Problem::broken(error.to_string()))?;
+        let plan = plan.map_err(Problem::broken)?;
         let sequence = plan.sequence_of(&kept.shots());
         let layers = sequence.and_then(|sequence| plan.layers(sequence, &kept.frames()));
         let words = "the recording's frames are not those of its recipe";

@@ -1,13 +1,13 @@
 //! Answers that change nothing: snapshot, pictures, registers, log, record of changes, health and
 //! readiness.
 
-use axum::extract::{Path, State};
+use axum::extract::Path;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::{Value, json};
 
 use super::map::{Drawn, Map, map};
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::Site;
 use super::view;
 use crate::recipe::plan::{Layers, Shown};
@@ -20,11 +20,11 @@ pub(super) async fn openapi() -> impl IntoResponse {
     ([(header::CONTENT_TYPE, "application/json")], OPENAPI)
 }
 
-pub(super) async fn snapshot(State(site): State<Site>) -> Json<Value> {
+pub(super) async fn snapshot(site: Site) -> Json<Value> {
     Json(view::snapshot(&site.station.snapshot()))
 }
 
-pub(super) async fn health(State(site): State<Site>) -> Response {
+pub(super) async fn health(site: Site) -> Response {
     if site.station.snapshot().worker_alive {
         (StatusCode::OK, "ok\n").into_response()
     } else {
@@ -33,7 +33,7 @@ pub(super) async fn health(State(site): State<Site>) -> Response {
     }
 }
 
-pub(super) async fn readiness(State(site): State<Site>) -> Response {
+pub(super) async fn readiness(site: Site) -> Response {
     let snapshot = site.station.snapshot();
     if snapshot.worker_alive && snapshot.is(status::READY) {
         return (StatusCode::OK, "ready\n").into_response();
@@ -49,10 +49,7 @@ const LAYERS: [&str; 3] = ["height", "deviation", "modulation"];
 /// The direction in which deviations are measured.
 const DIRECTION: &str = "along the normal";
 
-pub(super) async fn picture(
-    State(site): State<Site>,
-    Path(layer): Path<String>,
-) -> Result<Response, Problem> {
+pub(super) async fn picture(site: Site, Path(layer): Path<String>) -> Result<Response> {
     site.aside(move |site| {
         let at = place_of(&layer)?;
         // Not an error: the page asks for a picture of every result.
@@ -69,7 +66,7 @@ pub(super) async fn picture(
 ///
 /// # Errors
 /// If there is no such picture.
-pub(super) fn place_of(layer: &str) -> Result<usize, Problem> {
+pub(super) fn place_of(layer: &str) -> Result<usize> {
     let at = LAYERS.iter().position(|known| *known == layer);
     at.ok_or_else(|| Problem::missing("there are height, deviation and modulation"))
 }
@@ -136,11 +133,11 @@ fn described(shown: &Shown) -> Value {
     json!({ "side": side, "motion_taken_back": placed, "gauge": gauge })
 }
 
-pub(super) async fn registers(State(site): State<Site>) -> Json<Value> {
+pub(super) async fn registers(site: Site) -> Json<Value> {
     Json((site.registers)(&site.station.snapshot()))
 }
 
-pub(super) async fn log(State(site): State<Site>) -> Result<Json<Value>, Problem> {
+pub(super) async fn log(site: Site) -> Result<Json<Value>> {
     let lines = site
         .aside(|site| Ok(dated(site, site.log.latest())))
         .await?;
@@ -162,7 +159,7 @@ fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
     lines
 }
 
-pub(super) async fn changes(State(site): State<Site>) -> Result<Json<Value>, Problem> {
+pub(super) async fn changes(site: Site) -> Result<Json<Value>> {
     let lines = site
         .aside(|site| {
             let read = site.access.changes().latest();

@@ -2,7 +2,6 @@
 
 use std::fmt::Write as _;
 
-use axum::extract::State;
 use axum::http::header;
 use axum::response::IntoResponse;
 
@@ -12,7 +11,7 @@ use crate::station::{Health, Power, ResultRecord};
 
 const KIND: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
-pub(super) async fn metrics(State(site): State<Site>) -> impl IntoResponse {
+pub(super) async fn metrics(site: Site) -> impl IntoResponse {
     ([(header::CONTENT_TYPE, KIND)], text(&site))
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::extract::{Path, Request as Asked, State};
+use axum::extract::{Path, Request as Asked};
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::Json;
 use serde::Deserialize;
@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::body;
 use super::gate;
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::recipe::replace;
 use crate::station::control::{ERROR_RESET, TRIGGER};
@@ -51,10 +51,7 @@ fn edge(site: &Site, rising: u16, headers: &HeaderMap) -> Arc<Snapshot> {
     })
 }
 
-pub(super) async fn trigger(
-    State(site): State<Site>,
-    headers: HeaderMap,
-) -> Result<Accepted, Problem> {
+pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Result<Accepted> {
     let before = site.station.snapshot().triggers;
     let after = edge(&site, TRIGGER, &headers);
     if after.triggers == before {
@@ -63,15 +60,12 @@ pub(super) async fn trigger(
     Ok(accepted())
 }
 
-pub(super) async fn reset(State(site): State<Site>, headers: HeaderMap) -> Accepted {
+pub(super) async fn reset(site: Site, headers: HeaderMap) -> Accepted {
     edge(&site, ERROR_RESET, &headers);
     accepted()
 }
 
-pub(super) async fn load(
-    State(site): State<Site>,
-    Path(number): Path<u16>,
-) -> Result<Accepted, Problem> {
+pub(super) async fn load(site: Site, Path(number): Path<u16>) -> Result<Accepted> {
     begin_load(&site, number)?;
     Ok(accepted())
 }
@@ -117,7 +111,7 @@ pub(super) async fn reload(site: &Site, number: u16) -> Reload {
 ///
 /// # Errors
 /// It loads or teaches a recipe.
-pub(super) fn recipes_unused(site: &Site, what: &str) -> Result<(), Problem> {
+pub(super) fn recipes_unused(site: &Site, what: &str) -> Result<()> {
     let snapshot = site.station.snapshot();
     match snapshot.state_word {
         "loading" | "teaching" => Err(not_now(what, &snapshot)),
@@ -129,7 +123,7 @@ pub(super) fn recipes_unused(site: &Site, what: &str) -> Result<(), Problem> {
 ///
 /// # Errors
 /// The station is busy.
-pub(super) fn begin_load(site: &Site, number: u16) -> Result<(), Problem> {
+pub(super) fn begin_load(site: &Site, number: u16) -> Result<()> {
     let key = RecipeKey::Number(number);
     let after = site.station.event(Event::Request(Request::Load(key)));
     if after.state_word == "loading" {
@@ -150,10 +144,10 @@ struct Teaching {
 }
 
 pub(super) async fn teach(
-    State(site): State<Site>,
+    site: Site,
     Path(number): Path<u16>,
     request: Asked<Body>,
-) -> Result<Accepted, Problem> {
+) -> Result<Accepted> {
     if !(1..=9999).contains(&number) {
         return Err(Problem::unfit(format!(
             "recipe {number}: numbers are 1 to 9999"

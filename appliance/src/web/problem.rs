@@ -3,6 +3,7 @@
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde_json::json;
+use std::fmt::Display;
 use std::io::{self, ErrorKind};
 
 /// Seconds in Retry-After, where too many requests are being answered.
@@ -21,41 +22,16 @@ pub struct Problem {
 
 impl Problem {
     /// A problem with any status.
-    pub fn new(status: StatusCode, words: impl Into<String>) -> Self {
+    pub fn new(status: StatusCode, words: impl Display) -> Self {
         Self {
             status,
-            words: words.into(),
+            words: words.to_string(),
             taken: None,
         }
     }
 
-    /// 400: the request cannot be understood.
-    pub fn unclear(words: impl Into<String>) -> Self {
-        Self::new(StatusCode::BAD_REQUEST, words)
-    }
-
-    /// 404: there is no such thing, or not yet.
-    pub fn missing(words: impl Into<String>) -> Self {
-        Self::new(StatusCode::NOT_FOUND, words)
-    }
-
-    /// 503: too many requests do the same at the moment.
-    pub fn crowded(words: impl Into<String>) -> Self {
-        Self::new(StatusCode::SERVICE_UNAVAILABLE, words)
-    }
-
-    /// 409: not possible in the present state.
-    pub fn busy(words: impl Into<String>) -> Self {
-        Self::new(StatusCode::CONFLICT, words)
-    }
-
-    /// 422: understood, but its content cannot be used.
-    pub fn unfit(words: impl Into<String>) -> Self {
-        Self::new(StatusCode::UNPROCESSABLE_ENTITY, words)
-    }
-
     /// A file could not be written: 507 if there is no room, else 500.
-    pub fn unstored(words: impl Into<String>, error: &io::Error) -> Self {
+    pub fn unstored(words: impl Display, error: &io::Error) -> Self {
         let full = [ErrorKind::StorageFull, ErrorKind::QuotaExceeded].contains(&error.kind());
         let status = match full {
             true => StatusCode::INSUFFICIENT_STORAGE,
@@ -63,11 +39,31 @@ impl Problem {
         };
         Self::new(status, words)
     }
+}
 
+macro_rules! problems {
+    ($($(#[$doc:meta])* $name:ident = $status:ident;)*) => {
+        impl Problem {
+            $($(#[$doc])* pub fn $name(words: impl Display) -> Self {
+                Self::new(StatusCode::$status, words)
+            })*
+        }
+    };
+}
+
+problems! {
+    /// 400: the request cannot be understood.
+    unclear = BAD_REQUEST;
+    /// 404: there is no such thing, or not yet.
+    missing = NOT_FOUND;
+    /// 503: too many requests do the same at the moment.
+    crowded = SERVICE_UNAVAILABLE;
+    /// 409: not possible in the present state.
+    busy = CONFLICT;
+    /// 422: understood, but its content cannot be used.
+    unfit = UNPROCESSABLE_ENTITY;
     /// 500: the program or its machine is at fault.
-    pub fn broken(words: impl Into<String>) -> Self {
-        Self::new(StatusCode::INTERNAL_SERVER_ERROR, words)
-    }
+    broken = INTERNAL_SERVER_ERROR;
 }
 
 impl IntoResponse for Problem {
@@ -85,6 +81,9 @@ impl IntoResponse for Problem {
         response
     }
 }
+
+/// An answer, unless another error is named.
+pub type Result<T, E = Problem> = std::result::Result<T, E>;
 
 /// The words of a problem, for the record of changes.
 #[derive(Clone, Debug)]

@@ -2,7 +2,7 @@
 
 use axum::Extension;
 use axum::body::Body;
-use axum::extract::{Path, Query, Request, State};
+use axum::extract::{Path, Query, Request};
 use axum::http::StatusCode;
 use axum::response::{Json, Response};
 use serde_json::{Value, json};
@@ -12,7 +12,7 @@ use super::downloads::{Content, send};
 use super::gate::Changed;
 use super::map::{Drawn, Map, map};
 use super::orders::{self, Reload};
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, Edited};
 use crate::recipe::exchange::Destination;
@@ -22,9 +22,9 @@ use crate::recipe::{self, ChangeError, LoadError, Recipe, RecipeFile, Store};
 
 impl From<LoadError> for Problem {
     fn from(error: LoadError) -> Self {
-        match &error {
-            LoadError::Unknown(_) => Self::missing(error.to_string()),
-            _ => Self::unfit(error.to_string()),
+        match error {
+            LoadError::Unknown(_) => Self::missing(error),
+            _ => Self::unfit(error),
         }
     }
 }
@@ -48,7 +48,7 @@ impl From<ChangeError> for Problem {
     }
 }
 
-pub(super) async fn list(State(site): State<Site>) -> Result<Json<Value>, Problem> {
+pub(super) async fn list(site: Site) -> Result<Json<Value>> {
     let listed = site.aside(|site| Ok(listed(&site.recipes))).await?;
     Ok(Json(listed))
 }
@@ -84,20 +84,13 @@ fn summary(file: &RecipeFile) -> Value {
 }
 
 /// `recipe.json`: everything of a recipe except its arrays.
-pub(super) async fn one(
-    State(site): State<Site>,
-    Path(number): Path<u16>,
-) -> Result<Json<Value>, Problem> {
+pub(super) async fn one(site: Site, Path(number): Path<u16>) -> Result<Json<Value>> {
     let read = site.aside(move |site| site.recipes.manifest(number).map_err(Problem::missing));
     let file = serde_json::to_value(read.await?);
-    file.map(Json)
-        .map_err(|error| Problem::broken(error.to_string()))
+    file.map(Json).map_err(Problem::broken)
 }
 
-pub(super) async fn export(
-    State(site): State<Site>,
-    Path(number): Path<u16>,
-) -> Result<Response, Problem> {
+pub(super) async fn export(site: Site, Path(number): Path<u16>) -> Result<Response> {
     send(&site, "application/zip", move |site| {
         let opened = site.recipes.file(number);
         let failed = |error| Problem::missing(format!("read recipe {number}: {error}"));
@@ -107,10 +100,7 @@ pub(super) async fn export(
     .await
 }
 
-pub(super) async fn picture(
-    State(site): State<Site>,
-    Path((number, layer)): Path<(u16, String)>,
-) -> Result<Map, Problem> {
+pub(super) async fn picture(site: Site, Path((number, layer)): Path<(u16, String)>) -> Result<Map> {
     site.aside(move |site| {
         let LoadedRecipe { recipe, .. } = site.recipes.load_to_edit(number)?;
         let width = recipe.conditions.camera.0 as usize;
@@ -136,10 +126,10 @@ pub(super) async fn picture(
 }
 
 pub(super) async fn edit(
-    State(site): State<Site>,
+    site: Site,
     Path(number): Path<u16>,
     request: Request<Body>,
-) -> Result<(Extension<Changed>, Json<Value>), Problem> {
+) -> Result<(Extension<Changed>, Json<Value>)> {
     let wanted: Edit = body::json(request.into_body()).await?;
     let edited = site.change(move |site| {
         let mut note = None;
@@ -168,9 +158,9 @@ pub(super) async fn edit(
 
 /// Brings back the previous generation, or a deleted recipe.
 pub(super) async fn undo(
-    State(site): State<Site>,
+    site: Site,
     Path(number): Path<u16>,
-) -> Result<(Extension<Changed>, Json<Value>), Problem> {
+) -> Result<(Extension<Changed>, Json<Value>)> {
     orders::recipes_unused(&site, "undo a recipe")?;
     let (file, before) = site
         .change(move |site| {
@@ -194,10 +184,7 @@ pub(super) async fn undo(
 }
 
 /// Deletes a recipe that is not the active one; undo brings it back.
-pub(super) async fn delete(
-    State(site): State<Site>,
-    Path(number): Path<u16>,
-) -> Result<Json<Value>, Problem> {
+pub(super) async fn delete(site: Site, Path(number): Path<u16>) -> Result<Json<Value>> {
     orders::recipes_unused(&site, "delete a recipe")?;
     if site.station.snapshot().active() == Some(number) {
         return Err(Problem::busy(format!(
@@ -230,10 +217,10 @@ fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
 /// Takes a recipe from a file: under the number in the file or another one, and in place of a
 /// stored recipe only on request.
 pub(super) async fn import(
-    State(site): State<Site>,
+    site: Site,
     Query(to): Query<Destination>,
     request: Request<Body>,
-) -> Result<(StatusCode, Extension<Changed>, Json<Value>), Problem> {
+) -> Result<(StatusCode, Extension<Changed>, Json<Value>)> {
     if let Some(number) = to.number.filter(|number| !(1..=9999).contains(number)) {
         return Err(Problem::unfit(format!(
             "import as recipe {number}: numbers are 1 to 9999"

@@ -1,7 +1,7 @@
 //! The table of all paths, and the headers of every answer.
 
 use axum::Router;
-use axum::extract::{Request, State};
+use axum::extract::Request;
 use axum::http::{HeaderName, HeaderValue, Method, header};
 use axum::middleware::{Next, from_fn, from_fn_with_state};
 use axum::response::{IntoResponse, Response};
@@ -178,7 +178,7 @@ pub fn router(site: Site) -> Router {
 
 /// Refuses requests that do not name this device as their only host, and adds the headers of every
 /// answer.
-async fn guarded(State(site): State<Site>, request: Request, next: Next) -> Response {
+async fn guarded(site: Site, request: Request, next: Next) -> Response {
     let mut response = match host::check(request.uri(), request.headers(), &site.hosts) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),

@@ -3,7 +3,6 @@
 use std::time::Instant;
 
 use axum::body::Body;
-use axum::extract::State;
 use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use axum::{Extension, extract};
@@ -12,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::body;
 use super::gate::{self, Peer};
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::station::Micros;
 use crate::station::snapshot::warning;
@@ -27,15 +26,15 @@ struct SignIn {
     time_ms: Option<u64>,
 }
 
-pub(super) async fn state(State(site): State<Site>, headers: HeaderMap) -> Json<Value> {
+pub(super) async fn state(site: Site, headers: HeaderMap) -> Json<Value> {
     Json(json!({ "signed_in": gate::is_signed_in(&site, &headers) }))
 }
 
 pub(super) async fn begin(
-    State(site): State<Site>,
+    site: Site,
     Extension(Peer(from)): Extension<Peer>,
     request: extract::Request<Body>,
-) -> Result<Response, Problem> {
+) -> Result<Response> {
     let SignIn { secret, time_ms } = body::json(request.into_body()).await?;
     let received = site.station.now();
     let guess = site.change(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));
@@ -66,7 +65,7 @@ pub(super) async fn begin(
                 Refused::Wait(_) => StatusCode::TOO_MANY_REQUESTS,
                 Refused::Broken(_) => StatusCode::INTERNAL_SERVER_ERROR,
             };
-            let mut response = Problem::new(status, refused.to_string()).into_response();
+            let mut response = Problem::new(status, &refused).into_response();
             if let Refused::Wait(time) = refused {
                 let seconds = HeaderValue::from(time.as_secs().max(1));
                 response.headers_mut().insert(header::RETRY_AFTER, seconds);
@@ -76,7 +75,7 @@ pub(super) async fn begin(
     }
 }
 
-pub(super) async fn end(State(site): State<Site>, headers: HeaderMap) -> Response {
+pub(super) async fn end(site: Site, headers: HeaderMap) -> Response {
     if let Some(token) = gate::token(&headers) {
         site.access.sign_out(token);
     }

@@ -1,12 +1,11 @@
 //! The part in front of a simulated head: shows it, and replaces it.
 
 use axum::body::Body;
-use axum::extract::State;
 use axum::response::Json;
 use serde_json::Value;
 
 use super::body::json;
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::site::{Site, alone};
 use crate::head::placed::Placed;
 use crate::production::simulation::PutError;
@@ -20,12 +19,12 @@ impl From<PutError> for Problem {
     }
 }
 
-pub(super) async fn part(State(site): State<Site>) -> Json<Value> {
+pub(super) async fn part(site: Site) -> Json<Value> {
     Json(site.simulation.view())
 }
 
 /// Answers once the next cycle sees the part.
-pub(super) async fn put(State(site): State<Site>, body: Body) -> Result<Json<Value>, Problem> {
+pub(super) async fn put(site: Site, body: Body) -> Result<Json<Value>> {
     let placed: Placed = json(body).await?;
     let simulation = site.simulation.clone();
     let failed = "putting the part in place failed; see the log";

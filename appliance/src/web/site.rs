@@ -1,14 +1,17 @@
 //! Everything that the answers of the page need, and the limits of concurrent work.
 
+use std::convert::Infallible;
 use std::net::IpAddr;
 use std::sync::Arc;
 
+use axum::extract::FromRequestParts;
+use axum::http::request::Parts as RequestParts;
 use ipnet::IpNet;
 use serde_json::Value;
 use tokio::sync::{Mutex, Semaphore, oneshot};
 
 use super::map::Map;
-use super::problem::Problem;
+use super::problem::{Problem, Result};
 use super::slots::Slots;
 use crate::head::calibration::Current;
 use crate::history::Reader;
@@ -92,6 +95,14 @@ pub struct Site {
     changing: Arc<Semaphore>,
 }
 
+impl FromRequestParts<Self> for Site {
+    type Rejection = Infallible;
+
+    async fn from_request_parts(_: &mut RequestParts, site: &Self) -> Result<Self, Infallible> {
+        Ok(site.clone())
+    }
+}
+
 impl std::ops::Deref for Site {
     type Target = Parts;
 
@@ -125,8 +136,8 @@ impl Site {
     /// What `work` answers.
     pub async fn aside<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
-    ) -> Result<T, Problem> {
+        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
         self.queued(self.looking.clone(), work).await
     }
 
@@ -136,16 +147,16 @@ impl Site {
     /// What `work` answers.
     pub async fn change<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
-    ) -> Result<T, Problem> {
+        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
         self.queued(self.changing.clone(), work).await
     }
 
     async fn queued<T: Send + 'static>(
         &self,
         places: Arc<Semaphore>,
-        work: impl FnOnce(&Self) -> Result<T, Problem> + Send + 'static,
-    ) -> Result<T, Problem> {
+        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
+    ) -> Result<T> {
         let gone = |_| Problem::broken("the page's workers are gone; restart fringed");
         let permit = places.acquire_owned().await.map_err(gone)?;
         let site = self.clone();
@@ -172,7 +183,7 @@ pub(super) async fn alone<T: Send + 'static>(
     name: &str,
     failed: &str,
     work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T, Problem> {
+) -> Result<T> {
     let (done, answer) = oneshot::channel();
     let run = move || {
         // The client may have closed its connection.

@@ -8,29 +8,17 @@ bounded! {
     /// Phong's model: I = ambient + pattern/255 · (diffuse · max(0, n·l) + specular · max(0,
     /// r·v)^shininess), 1 = full scale. n is the surface's normal, l the direction to the
     /// projector, v that to the camera, and r is l mirrored about n.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Lighting {
+    #[derive(Copy)]
+    pub struct Lighting: Default {
         /// Light that does not come from the projector.
-        pub ambient: f64 = 0.0..=100.0,
+        pub ambient: f64 = 0.0..=100.0 => 0.04,
         /// Share of the projector's light that a surface reflects which faces the projector.
-        pub diffuse: f64 = 0.0..=100.0,
+        pub diffuse: f64 = 0.0..=100.0 => 0.86,
         /// Share of the projector's light that a surface reflects which mirrors the projector into
         /// the camera, 0…4.
         pub specular: f64 = 0.0..=4.0,
         /// How narrow the highlight is: the exponent of its cosine, 1…500.
-        pub shininess: f64 = 1.0..=500.0,
-    }
-}
-
-impl Default for Lighting {
-    fn default() -> Self {
-        Self {
-            ambient: 0.04,
-            diffuse: 0.86,
-            specular: 0.0,
-            shininess: 1.0,
-        }
+        pub shininess: f64 = 1.0..=500.0 => 1.0,
     }
 }
 

@@ -124,20 +124,12 @@ pub(crate) fn turn(degrees: [f64; 3]) -> [f64; 9] {
 
 /// R · v, R row-major.
 pub(crate) fn turned(r: &[f64; 9], v: Vector) -> Vector {
-    [
-        r[0] * v[0] + r[1] * v[1] + r[2] * v[2],
-        r[3] * v[0] + r[4] * v[1] + r[5] * v[2],
-        r[6] * v[0] + r[7] * v[1] + r[8] * v[2],
-    ]
+    [0, 3, 6].map(|row| dot([r[row], r[row + 1], r[row + 2]], v))
 }
 
 /// Rᵀ · v, R row-major.
 pub(crate) fn turned_back(r: &[f64; 9], v: Vector) -> Vector {
-    [
-        r[0] * v[0] + r[3] * v[1] + r[6] * v[2],
-        r[1] * v[0] + r[4] * v[1] + r[7] * v[2],
-        r[2] * v[0] + r[5] * v[1] + r[8] * v[2],
-    ]
+    [0, 1, 2].map(|column| dot([r[column], r[column + 3], r[column + 6]], v))
 }
 
 pub(crate) fn dot(a: Vector, b: Vector) -> f64 {

@@ -1,15 +1,12 @@
 //! How a part lies in front of a simulated head.
 
-use serde::{Deserialize, Serialize};
-
 use hal::bounded;
 use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG};
 
 bounded! {
     /// How a part lies: rotated about x, then y (tilt), then z (rotation), then shifted.
-    #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Placement {
+    #[derive(Copy)]
+    pub struct Placement: Default {
         /// Shift x, y, z in mm.
         pub shift_mm: [f64; 3] = -MAX_PLACEMENT_MM..=MAX_PLACEMENT_MM,
         /// Tilt about x and about y, degrees.

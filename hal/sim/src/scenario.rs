@@ -4,7 +4,7 @@
 //! The defaults are the study's rig and lighting (docs/measurement.md, *The study's head and
 //! parts*) with the sheet-metal part.
 
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer};
 
 use super::material::{Lighting, Material};
 use super::optics::{Lens, turn, turned};
@@ -21,21 +21,19 @@ const GREEN: (u32, u32) = (1, 0);
 
 bounded! {
     /// A whole simulated head. Keys that are missing in the TOML have their default values.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Scenario {
+    pub struct Scenario: Default {
         /// Whether the pose and lens of both devices and their times are known from the start; a
         /// head without a calibration is commissioned first.
-        pub calibrated: bool,
+        pub calibrated: bool => true,
         /// Camera bits, 8, 10 or 12.
-        pub bit_depth: u8,
+        pub bit_depth: u8 => 8,
         /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its
         /// frames have half its columns and rows.
         pub colour: bool,
         /// Rays per pixel along each side, 1…16.
-        pub sub_rays: u32 = 1..=16,
+        pub sub_rays: u32 = 1..=16 => 4,
         /// Refresh rate of the projector, 1…1000 Hz.
-        pub refresh_hz: f64 = 1.0..=1000.0,
+        pub refresh_hz: f64 = 1.0..=1000.0 => 60.0,
         /// What the part is made of. If it is not given, `light` says how the part reflects.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub material: Option<Material>,
@@ -59,19 +57,32 @@ bounded! {
 
     /// The two devices. Each looks at the world's origin from the xz plane; its image x runs
     /// along +x, its image y along −y.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Rig {
+    pub struct Rig: Default {
         /// The camera.
         #[serde(deserialize_with = "camera_from")]
-        pub camera: RigDevice = Fields,
+        pub camera: RigDevice = Fields => RigDevice {
+            width: 512,
+            height: 512,
+            fov_deg: [20.0, 20.0],
+            angle_deg: 20.0,
+            distance_mm: 600.0,
+            distortion: [-0.12, 0.15, 2e-4, -3e-4, 0.0],
+            knocked_deg: [0.0; 3],
+        },
         /// The projector.
         #[serde(deserialize_with = "projector_from")]
-        pub projector: RigDevice = Fields,
+        pub projector: RigDevice = Fields => RigDevice {
+            width: 1024,
+            height: 768,
+            fov_deg: [43.6, 33.4],
+            angle_deg: -7.0,
+            distance_mm: 600.0,
+            distortion: [-0.05, 0.03, -3e-4, 2e-4, 0.0],
+            knocked_deg: [0.0; 3],
+        },
     }
 
     /// One device of the rig.
-    #[derive(Clone, Debug, PartialEq, Serialize)]
     pub struct RigDevice {
         /// Columns.
         pub width: u32 = 1..=4096,
@@ -93,98 +104,37 @@ bounded! {
     /// IMX296: saturation capacity 10 636 e⁻, temporal dark noise 4.81 e⁻ (with an ADC of 10 bits).
     /// No data sheet says so, and the spread of responses is an assumption: a head's calibration
     /// measures its own noise.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Noise {
+    #[derive(Copy)]
+    pub struct Noise: Default {
         /// Electrons of a sample at full scale, with gain 1, 100…10 000 000.
-        pub full_well_e: f64 = 100.0..=1e7,
+        pub full_well_e: f64 = 100.0..=1e7 => 10_636.0,
         /// σ of the read noise, electrons, 0…1000.
-        pub read_noise_e: f64 = 0.0..=1000.0,
+        pub read_noise_e: f64 = 0.0..=1000.0 => 4.81,
         /// σ of the pixels' response (photo-response non-uniformity), as a share, 0…0.1.
-        pub prnu: f64 = 0.0..=0.1,
+        pub prnu: f64 = 0.0..=0.1 => 0.005,
         /// If given, the sensor has no other noise than a uniform one of this half-width, in counts
         /// of 8 bits; cameras with more bits have the same share of full scale.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub noise_counts: Option<f64> = 0.0..=255.0,
         /// Seed; frame n of a head has the same noise whenever the seed is the same.
-        pub seed: u64,
+        pub seed: u64 => 1,
     }
 
     /// Blur, response and gain between raster and samples.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Optics {
+    pub struct Optics: Default {
         /// σ of the Gaussian with which the projector's lens blurs its square pixels, projector
         /// pixels, 0…20.
-        pub projector_blur_px: f64 = 0.0..=20.0,
+        pub projector_blur_px: f64 = 0.0..=20.0 => 0.5,
         /// σ of the camera's Gaussian blur, camera pixels, 0…20.
         pub camera_blur_px: f64 = 0.0..=20.0,
         /// Exponent of the projector's response: light = (grey / 255)^gamma, 0.1…10.
-        pub gamma: f64 = 0.1..=10.0,
+        pub gamma: f64 = 0.1..=10.0 => 1.0,
         /// The camera's gain: counts at full scale for 1 / gain of the light, 0…100.
-        pub gain: f64 = 0.0..=100.0,
-        /// How much more light than its grey levels ask for a picture gets whose mean light is
-        /// almost 0, as a share, −1…10; a picture of mean 1 gets no more, others in proportion.
-        /// Projectors that adapt their LEDs to the content of a picture do this.
+        pub gain: f64 = 0.0..=100.0 => 1.0,
+        /// By how much more light than its grey asks for a picture gets whose mean light is almost
+        /// 0, as a share, −1…10; one of mean 1 gets none, and others in proportion. So do
+        /// projectors that adapt their LEDs to the content of a picture.
         pub content_gain: f64 = -1.0..=10.0,
-    }
-}
-
-impl Default for Scenario {
-    fn default() -> Self {
-        Self {
-            calibrated: true,
-            bit_depth: 8,
-            colour: false,
-            sub_rays: 4,
-            refresh_hz: 60.0,
-            material: None,
-            rig: Rig::default(),
-            light: Lighting::default(),
-            noise: Noise::default(),
-            optics: Optics::default(),
-            part: Part::default(),
-            placement: Placement::default(),
-            timing: Timing::default(),
-            faults: Faults::default(),
-        }
-    }
-}
-
-impl Default for Rig {
-    fn default() -> Self {
-        Self {
-            camera: RigDevice {
-                width: 512,
-                height: 512,
-                fov_deg: [20.0, 20.0],
-                angle_deg: 20.0,
-                distance_mm: 600.0,
-                distortion: [-0.12, 0.15, 2e-4, -3e-4, 0.0],
-                knocked_deg: [0.0; 3],
-            },
-            projector: RigDevice {
-                width: 1024,
-                height: 768,
-                fov_deg: [43.6, 33.4],
-                angle_deg: -7.0,
-                distance_mm: 600.0,
-                distortion: [-0.05, 0.03, -3e-4, 2e-4, 0.0],
-                knocked_deg: [0.0; 3],
-            },
-        }
-    }
-}
-
-impl Default for Noise {
-    fn default() -> Self {
-        Self {
-            full_well_e: 10_636.0,
-            read_noise_e: 4.81,
-            prnu: 0.005,
-            noise_counts: None,
-            seed: 1,
-        }
     }
 }
 
@@ -197,18 +147,6 @@ impl Noise {
     pub(super) fn variance(&self, counts: f64) -> [f64; 2] {
         let per_electron = counts / self.full_well_e;
         [(self.read_noise_e * per_electron).powi(2), per_electron]
-    }
-}
-
-impl Default for Optics {
-    fn default() -> Self {
-        Self {
-            projector_blur_px: 0.5,
-            camera_blur_px: 0.0,
-            gamma: 1.0,
-            gain: 1.0,
-            content_gain: 0.0,
-        }
     }
 }
 

@@ -1,20 +1,16 @@
 //! The times of a simulated head: exposure, readout and delays, and the delay that its calibration
 //! states.
 
-use serde::{Deserialize, Serialize};
-
 use hal::bounded;
 use hal::head::Stamp;
 
 bounded! {
     /// Times of a simulated head. By default the camera is triggered, exposes for two refreshes and
     /// needs no time for its readout, and a pattern's light comes with its flip.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Timing {
+    pub struct Timing: Default {
         /// Exposure, refreshes of the projector, 0.01…100. A micromirror device makes grey levels
         /// over whole refreshes.
-        pub exposure_refreshes: f64 = 0.01..=100.0,
+        pub exposure_refreshes: f64 = 0.01..=100.0 => 2.0,
         /// From the end of an exposure until its frame can be fetched, 0…1 000 000 µs.
         pub readout_us: u64,
         /// How long it takes to copy a frame out of the camera's buffer, in a thread of its own,
@@ -24,7 +20,7 @@ bounded! {
         pub start_up_us: u64,
         /// How long a triggered camera may stay on without an exposure, 0…1000 s; 0: it is stopped
         /// after each sequence.
-        pub stays_on_s: u64,
+        pub stays_on_s: u64 => 30,
         /// For how long after its readout a triggered camera still loses triggers, which its stated
         /// times do not contain, 0…1 000 000 µs.
         pub dead_us: u64,
@@ -56,28 +52,5 @@ bounded! {
         /// true time.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub calibrated_stamp_late_us: Option<u64>,
-    }
-}
-
-impl Default for Timing {
-    fn default() -> Self {
-        Self {
-            exposure_refreshes: 2.0,
-            readout_us: 0,
-            copy_us: 0,
-            start_up_us: 0,
-            stays_on_s: 30,
-            dead_us: 0,
-            calibrated_refreshes: None,
-            flip_to_light_us: 0,
-            first_light_us: 0,
-            calibrated_flip_to_light_us: None,
-            by_projector: false,
-            camera_period_us: 0,
-            camera_phase_us: 0,
-            stamp: Stamp::default(),
-            stamp_late_us: 0,
-            calibrated_stamp_late_us: None,
-        }
     }
 }

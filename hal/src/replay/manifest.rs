@@ -26,8 +26,6 @@ pub(crate) const MAX_NAME: usize = 255;
 
 bounded! {
     /// The whole of `recording.json`.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub(crate) struct Manifest {
         pub format: String,
         pub version: u64,
@@ -57,8 +55,6 @@ bounded! {
         pub recipe: Option<RecipeReference> = Fields,
     }
 
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub(crate) struct CameraEntry {
         pub width: u32 = 1..=MAX_SIDE,
         pub height: u32 = 1..=MAX_SIDE,
@@ -70,8 +66,6 @@ bounded! {
     }
 
     /// The projector of a recording.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct RecordedProjector {
         /// Columns.
         pub width: u32 = 1..=MAX_SIDE,
@@ -96,8 +90,6 @@ pub(crate) enum PatternEntry {
 }
 
 bounded! {
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub(crate) struct FrameEntry {
         pub file: String,
         pub ratio: f64 = RATIOS[0]..=RATIOS[1],
@@ -161,8 +153,7 @@ impl Manifest {
 
 bounded! {
     /// The recipe of a measurement in production.
-    #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
+    #[derive(Eq)]
     pub struct RecipeReference {
         /// Recipe number.
         pub number: u32 = 1..=9999,

@@ -4,16 +4,13 @@ use std::time::Duration;
 
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use serde::{Deserialize, Serialize};
 
 use crate::bounded;
 
 bounded! {
     /// Faults of a simulated head. Chances are 0…1 per event, times are upper limits; all are 0 by
     /// default.
-    #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Faults {
+    pub struct Faults: Default {
         /// Seed of all random faults.
         pub seed: u64,
         /// Chance that a flip comes 1…`late_refreshes` refreshes late.

@@ -4,7 +4,7 @@
 use crate::accuracy::{Resolution, Share, budget, resolution};
 use crate::experiment::{OpticsKind, Scene};
 use appliance::cli::{Output, Threads, names};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibrated::MeasureError;
 use appliance::output::picture::height_png;
 use appliance::storage::folder::OutputFolder;
@@ -41,7 +41,7 @@ impl Accuracy {
     ///
     /// # Errors
     /// If a part cannot be measured or a map not be written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let folder = OutputFolder::create(&self.out)?;
         let pool = self.threads.pool(0)?;
         let failed = |error: MeasureError| {

@@ -6,7 +6,7 @@ use algo::adaptive::{Blur, Optics, noise, paper};
 use algo::pattern::{Waveform, Waveforms};
 use appliance::cli::numbers::number;
 use appliance::cli::{Output, Threads, names};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Result};
 use appliance::storage::folder::OutputFolder;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use hal::npy;
@@ -84,11 +84,11 @@ impl Adapt {
     /// # Errors
     /// If the recording cannot be opened or lacks what the method needs, or the file cannot be
     /// written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let options = self.options()?;
         let Some(name) = self.out.file_name().and_then(|name| name.to_str()) else {
             let message = format!("--out {}: name a file", self.out.display());
-            return Err(Failure::new(Exit::Usage, message));
+            return Exit::Usage.fail(message);
         };
         let recording = Recording::open(&self.recording)?;
         let pool = self.threads.pool(0)?;
@@ -101,7 +101,7 @@ impl Adapt {
         if let Some(patterns) = &self.patterns {
             let width = recording.width as usize;
             let projected = Projected::new(&adapted, width, self.frames, self.waveform.choice())
-                .map_err(|error| Failure::because(Exit::Usage, "--frames", error))?;
+                .map_err(Exit::Usage.because("--frames"))?;
             pool.install(|| projected.write(patterns))?;
             frames = Some(projected.words());
         }
@@ -114,26 +114,20 @@ impl Adapt {
         self.output.answer(&adapted.report, text)
     }
 
-    fn options(&self) -> Result<AdaptOptions, Failure> {
+    fn options(&self) -> Result<AdaptOptions> {
         let (projector_pitch, image_pitch) = match self.method {
             Method::Fringed => (noise::PROJECTOR_PITCH, noise::IMAGE_PITCH),
             Method::Paper => (paper::PROJECTOR_PITCH, paper::IMAGE_PITCH),
         };
         if self.method == Method::Paper && self.patterns.is_some() {
-            return Err(Failure::new(
-                Exit::Usage,
-                "--patterns: the sequences are those of --method fringed; the paper's is three geometric levels of four \
-                 sines each, which patterns makes of the phase function",
-            ));
+            return Exit::Usage.fail("--patterns: the sequences are those of --method fringed; the paper's is three geometric levels of four \
+                 sines each, which patterns makes of the phase function");
         }
         if self.method == Method::Paper && self.projector_pitch.is_some() {
-            return Err(Failure::new(
-                Exit::Usage,
-                format!(
+            return Exit::Usage.fail(format!(
                     "--projector-pitch: the paper's method has {projector_pitch} px: leave it out, or use \
                      --method fringed"
-                ),
-            ));
+                ));
         }
         Ok(AdaptOptions {
             method: self.method,

@@ -3,7 +3,7 @@
 
 use crate::benchmark::{self, Effort, Machine, Report, Study};
 use appliance::cli::{Output, Threads, names};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Failure, Result};
 use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
 
@@ -50,7 +50,7 @@ impl Bench {
     ///
     /// # Errors
     /// If something cannot be simulated or results not be written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         if let Some(folder) = &self.frames {
             return self.write_frames(folder);
         }
@@ -77,7 +77,7 @@ impl Bench {
         self.output.answer(&json, || tables)
     }
 
-    fn measure(&self, on_progress: &(dyn Fn(f64, &str) + Sync)) -> Result<Report, Failure> {
+    fn measure(&self, on_progress: &(dyn Fn(f64, &str) + Sync)) -> Result<Report> {
         let software =
             |what: &'static str| move |error: String| Failure::because(Exit::Software, what, error);
         let wanted = |what| self.what.is_none_or(|asked| asked == what);
@@ -126,7 +126,7 @@ impl Bench {
         }
     }
 
-    fn write_frames(&self, folder: &std::path::Path) -> Result<(), Failure> {
+    fn write_frames(&self, folder: &std::path::Path) -> Result<()> {
         let folder_of_frames = OutputFolder::create(folder)?;
         for (name, bytes) in benchmark::frame_files(self.effort().size) {
             folder_of_frames.write(&name, &bytes)?;

@@ -4,7 +4,7 @@
 use crate::workbench::import::{Channel, Picture};
 use appliance::cli::numbers::number;
 use appliance::cli::{Files, Quiet, Threads, names};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibration::Calibration;
 use appliance::head::capture::Shown;
 use appliance::production::backend::{self, Opened};
@@ -91,13 +91,13 @@ impl Capture {
     /// # Errors
     /// If the head cannot be opened (69), a picture cannot be shown (64, 65, 66), the folder cannot
     /// be written (73), or standard input ends before the last pose (64).
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         if self.folder.exists() {
             let words = format!(
                 "capture to {}: it exists already: name a folder that does not exist",
                 self.folder.display()
             );
-            return Err(Failure::new(Exit::CannotCreate, words));
+            return Exit::CannotCreate.fail(words);
         }
         let config = self.files.configuration()?;
         let progress = self.quiet.progress();
@@ -124,9 +124,8 @@ impl Capture {
                 .acquire(&indices, TIMEOUT, &mut |_, frame| taken.push(frame))?;
             let count = taken.len();
             if self.poses > 1 {
-                std::fs::create_dir_all(&self.folder).map_err(|error| {
-                    Failure::because(Exit::CannotCreate, self.folder.display(), error)
-                })?;
+                std::fs::create_dir_all(&self.folder)
+                    .map_err(Exit::CannotCreate.because(self.folder.display()))?;
             }
             plan.write(&opened, taken, &folder)?;
             self.quiet
@@ -136,7 +135,7 @@ impl Capture {
     }
 
     /// Waits until somebody has laid the board.
-    fn wait_for(&self, pose: u8) -> Result<(), Failure> {
+    fn wait_for(&self, pose: u8) -> Result<()> {
         let poses = self.poses;
         if std::io::stdin().is_terminal() {
             self.quiet
@@ -146,17 +145,14 @@ impl Capture {
         let read = std::io::stdin().lock().read_line(&mut line);
         match read {
             Ok(1..) => Ok(()),
-            _ => Err(Failure::new(
-                Exit::Usage,
-                format!(
+            _ => Exit::Usage.fail(format!(
                     "capture pose {pose} of {poses}: standard input has ended: run it in a terminal, or give it a line per pose"
-                ),
-            )),
+                )),
         }
     }
 
     /// The rasters to show.
-    fn plan(&self, calibration: &Calibration) -> Result<Plan, Failure> {
+    fn plan(&self, calibration: &Calibration) -> Result<Plan> {
         let shows =
             |one: &Showing| self.patterns.contains(one) || self.patterns.contains(&Showing::All);
         let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
@@ -165,7 +161,7 @@ impl Capture {
             if shows(&showing) {
                 shown
                     .add_fringes(calibration, vertical, self.fringes, levels, steps)
-                    .map_err(|error| Failure::because(Exit::Usage, "--fringes", error))?;
+                    .map_err(Exit::Usage.because("--fringes"))?;
             }
         }
         (shown.white, shown.black) = (shows(&Showing::White), shows(&Showing::Black));
@@ -187,7 +183,7 @@ impl Capture {
 
 impl Plan {
     /// Writes the frames of a pose: a recording if there are fringes, else pictures alone.
-    fn write(&self, opened: &Opened, taken: Vec<Frame>, folder: &Path) -> Result<(), Failure> {
+    fn write(&self, opened: &Opened, taken: Vec<Frame>, folder: &Path) -> Result<()> {
         let mut frames = taken.into_iter();
         let mut recording = self.shown.recording(&opened.calibration, &mut frames);
         recording.source = match opened.stage {
@@ -195,19 +191,18 @@ impl Plan {
             None => "a head of fringed".into(),
         };
         let named: Vec<(String, Frame)> = self.files.iter().cloned().zip(frames).collect();
-        let refused =
-            |error: recorder::RecorderError| Failure::new(Exit::CannotCreate, error.to_string());
+        let refused = |error: recorder::RecorderError| Failure::new(Exit::CannotCreate, error);
         recorder::write_frames(&recording, folder, &named).map_err(refused)
     }
 }
 
 /// The raster of a grey picture of 8 bits.
-fn raster_of(path: &Path, (columns, rows): (u32, u32)) -> Result<Raster, Failure> {
+fn raster_of(path: &Path, (columns, rows): (u32, u32)) -> Result<Raster> {
     let name = path.display();
     if !path.exists() {
         let words =
             format!("show {name}: there is no such file: name a grey PNG of the projector's size");
-        return Err(Failure::new(Exit::Missing, words));
+        return Exit::Missing.fail(words);
     }
     let wrong = |problem: String| Failure::because(Exit::Content, format!("show {name}"), problem);
     let picture = Picture::single(path).map_err(wrong)?;

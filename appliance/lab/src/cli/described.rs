@@ -7,7 +7,7 @@ use crate::workbench::layout::{
 };
 use algo::chain::Coding;
 use appliance::cli::numbers::number;
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Result};
 use hal::bounds::{MAX_FRINGES, MAX_SHIFT_TURNS, MAX_SIDE};
 
 /// Most levels of a recording that can be decoded.
@@ -89,7 +89,7 @@ impl Described {
     /// # Errors
     /// If neither fringes, pitches nor a Gray code are given, or a Gray code is described that
     /// there is not (64).
-    pub fn description(&self, function: Option<Vec<f64>>) -> Result<Description, Failure> {
+    pub fn description(&self, function: Option<Vec<f64>>) -> Result<Description> {
         let fringes = match (&self.fringes, &self.pitch) {
             (Some(fringes), _) => Fringes::Count(fringes.clone()),
             (None, Some(pitch)) => Fringes::Pitch(pitch.clone()),
@@ -97,7 +97,7 @@ impl Described {
             (None, None) => {
                 let words =
                     "give --fringes or --pitch, or the bits of a Gray code alone with --gray";
-                return Err(Failure::new(Exit::Usage, words));
+                return Exit::Usage.fail(words);
             }
         };
         let described = self.gray_cell.is_some()
@@ -109,7 +109,7 @@ impl Described {
         if self.gray.is_none() && described {
             let words =
                 "options that begin with --gray- describe a Gray code: give its bits with --gray";
-            return Err(Failure::new(Exit::Usage, words));
+            return Exit::Usage.fail(words);
         }
         let gray = self.gray.as_ref().map(|Series(bits)| Gray {
             bits: bits.clone(),

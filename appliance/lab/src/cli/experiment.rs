@@ -3,7 +3,7 @@
 use super::adapt::Form;
 use crate::experiment::{Campaign, OpticsKind, PARTS, Results, RunRow, Scene, csv, figures, means};
 use appliance::cli::{Output, Threads, names, numbers};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Failure, Result};
 use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
 
@@ -37,7 +37,7 @@ impl Experiment {
     ///
     /// # Errors
     /// If a part is not known, a run fails or the results cannot be written.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let campaign = Campaign {
             scenes: self.scenes()?,
             optics: self.optics,
@@ -50,8 +50,7 @@ impl Experiment {
         let on_progress = |share: f64, words: &str| progress.tell(share, words);
         let results = pool.install(|| campaign.run(&on_progress));
         progress.clear();
-        let results = results
-            .map_err(|error| Failure::because(Exit::Software, "run the experiments", error))?;
+        let results = results.map_err(Exit::Software.because("run the experiments"))?;
         let means = means(&results.rows);
         write(&folder, &campaign, &results, &means)?;
         let text = || {
@@ -61,7 +60,7 @@ impl Experiment {
         self.output.answer(&means, text)
     }
 
-    fn scenes(&self) -> Result<Vec<Scene>, Failure> {
+    fn scenes(&self) -> Result<Vec<Scene>> {
         let all = self.part.iter().any(|name| name == "all");
         let names: Vec<&str> = if all {
             PARTS.to_vec()
@@ -88,7 +87,7 @@ fn write(
     campaign: &Campaign,
     results: &Results,
     means: &[RunRow],
-) -> Result<(), Failure> {
+) -> Result<()> {
     folder.write("experiments.csv", csv(&results.rows).as_bytes())?;
     for scene in &campaign.scenes {
         for (name, svg) in figures(scene, means) {

@@ -5,7 +5,7 @@ use super::numbers::range;
 use crate::workbench::import::{Channel, Taken, import};
 use appliance::cli::numbers::number;
 use appliance::cli::{Output, Threads, model_files, names};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Result};
 use appliance::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
 use hal::bounds::{MAX_NOISE_COUNTS, MAX_RANGE_MM, MIN_NOISE_COUNTS};
 use hal::replay::recorder;
@@ -93,7 +93,7 @@ impl Import {
     /// # Errors
     /// If the folder or a model is missing (66), the options contradict each other or the pictures
     /// (64, 65), or the recording cannot be written (73).
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let taken = Taken {
             description: self.described.description(None)?,
             channel: self.channel,
@@ -106,8 +106,7 @@ impl Import {
         let models = |frames| self.models(frames);
         // The models are read on this thread: only pictures are worth others.
         let recording = pool.install(|| import(&self.folder, &taken, models))?;
-        recorder::write(&recording, &self.out)
-            .map_err(|error| Failure::new(Exit::CannotCreate, error.to_string()))?;
+        recorder::write(&recording, &self.out).map_err(Exit::CannotCreate.failure())?;
         let codes = recording.codes.iter();
         let summary = Summary {
             recording: self.out.clone(),
@@ -135,7 +134,7 @@ impl Import {
     }
 
     /// The models that the options name, for frames of this size.
-    fn models(&self, camera: (u32, u32)) -> Result<Option<Models>, Failure> {
+    fn models(&self, camera: (u32, u32)) -> Result<Option<Models>> {
         let named = [&self.camera_model, &self.projector_model, &self.models];
         model_files(named.into_iter().flatten())?;
         let sizes = Sizes {
@@ -154,7 +153,6 @@ impl Import {
             (_, _, Some(models)) => opencv::from_one(models, sizes, declared),
             _ => return Ok(None),
         };
-        both.map(Some)
-            .map_err(|error| Failure::new(Exit::Content, error))
+        both.map(Some).map_err(Exit::Content.failure())
     }
 }

@@ -12,7 +12,7 @@ mod patterns;
 
 use appliance::VERSION;
 use appliance::cli::{Completions, start};
-use appliance::error::Failure;
+use appliance::error::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -52,7 +52,7 @@ pub fn main() -> ExitCode {
     start(run)
 }
 
-fn run(arguments: Arguments) -> Result<(), Failure> {
+fn run(arguments: Arguments) -> Result<()> {
     match arguments.command {
         Command::Experiment(command) => command.run(),
         Command::Bench(command) => command.run(),
@@ -61,10 +61,7 @@ fn run(arguments: Arguments) -> Result<(), Failure> {
         Command::Patterns(command) => command.run(),
         Command::Import(command) => command.run(),
         Command::Capture(command) => command.run(),
-        Command::Completions(command) => {
-            command.run(Arguments::command());
-            Ok(())
-        }
+        Command::Completions(command) => command.run(Arguments::command()),
     }
 }
 

@@ -8,7 +8,7 @@ use algo::chain::GrayCode;
 use algo::pattern::{Encoder, PhaseFunction, Shot};
 use appliance::cli::numbers::number;
 use appliance::cli::{Quiet, Threads, names};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Failure, Result};
 use appliance::head::seam;
 use appliance::output::canvas::grey_png;
 use hal::frame::{Frame, FrameFormat, Pixels};
@@ -52,7 +52,7 @@ impl Patterns {
     /// # Errors
     /// If the options contradict each other (64), the phase function is missing or wrong (66, 65),
     /// or nothing can be written (73).
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let usage =
             |error: &dyn std::fmt::Display| Failure::because(Exit::Usage, "patterns", error);
         let projector = self.described.projector();
@@ -84,7 +84,7 @@ impl Patterns {
         let frames: Vec<Frame> = (0..layout.shown.len())
             .map(frame)
             .collect::<Result<_, _>>()
-            .map_err(|error| Failure::because(Exit::Software, "patterns", error))?;
+            .map_err(Exit::Software.because("patterns"))?;
         let mut outline = layout.recording(projector, format, frames);
         outline.description = "to be filled with the frames of show/".into();
         recorder::write_outline(&outline, &self.folder, &pictures).map_err(|error| {
@@ -92,7 +92,7 @@ impl Patterns {
                 recorder::RecorderError::Content { .. } => Exit::Usage,
                 _ => Exit::CannotCreate,
             };
-            Failure::new(exit, error.to_string())
+            Failure::new(exit, error)
         })?;
         let count = layout.shown.len();
         self.quiet.say(|| {
@@ -106,22 +106,20 @@ impl Patterns {
 }
 
 /// The phase function in a file, for a projector of this size.
-fn turns(path: &Path, (columns, rows): (u32, u32)) -> Result<Vec<f64>, Failure> {
+fn turns(path: &Path, (columns, rows): (u32, u32)) -> Result<Vec<f64>> {
     let name = path.display();
     let wrong = |error: &dyn std::fmt::Display| {
         Failure::because(Exit::Content, format!("read {name}"), error)
     };
-    let missing = |error| {
-        let words = format!("{error}: name a phase function that adapt wrote");
-        Failure::because(Exit::Missing, format!("read {name}"), words)
-    };
-    let length = std::fs::metadata(path).map_err(missing)?.len();
+    let remedy = "name a phase function that adapt wrote";
+    let missing = Exit::Missing.advising(format!("read {name}"), remedy);
+    let length = std::fs::metadata(path).map_err(&missing)?.len();
     if length > MAX_FUNCTION {
         return Err(wrong(
             &"it is larger than a phase function of any projector",
         ));
     }
-    let bytes = std::fs::read(path).map_err(missing)?;
+    let bytes = std::fs::read(path).map_err(&missing)?;
     let array = npy::read::<f64>(&bytes).map_err(|error| wrong(&error))?;
     match (array.columns, array.rows) == (columns as usize, rows as usize) {
         true => Ok(array.elements),

@@ -4,7 +4,7 @@ use algo::adaptive::noise::Light;
 use algo::adaptive::{Optics, ProjectorMap, noise, paper};
 use algo::pattern::PhaseFunction;
 use algo::units::AbsolutePhase;
-use appliance::error::Failure;
+use appliance::error::Result;
 use appliance::head::{direction, seam};
 use appliance::measure::{measure, wrong};
 use hal::replay::Recording;
@@ -71,24 +71,19 @@ pub struct Report {
 /// # Errors
 /// If it cannot be measured, lacks a pattern or a model that the method needs, or has no resolved
 /// pixels.
-pub fn adapt(
-    recording: &Recording,
-    folder: &Path,
-    options: &AdaptOptions,
-) -> Result<Adapted, Failure> {
-    let wrong = |error: &dyn std::fmt::Display| wrong(folder, error);
-    let crossed = crossed(recording, options.method).map_err(|error| wrong(&error))?;
+pub fn adapt(recording: &Recording, folder: &Path, options: &AdaptOptions) -> Result<Adapted> {
+    let crossed = crossed(recording, options.method).map_err(wrong(folder))?;
     let measurement = measure(recording, folder)?;
     if direction::word(&recording.patterns[measurement.primary]) != "vertical" {
-        return Err(wrong(
+        return Err(wrong(folder)(
             &"patterns are adapted along the rows of the projector, and its fringes along the columns hardly depend on the height here: stand the projector beside the camera",
         ));
     }
     let decoder = measurement.decoder.as_ref().ok_or_else(|| {
-        wrong(&"a Gray code alone has no modulation of fringes to go by: record fringes with fringed record")
+        wrong(folder)("a Gray code alone has no modulation of fringes to go by: record fringes with fringed record")
     })?;
     let surface = measurement.heights.as_ref().map_err(|missing| {
-        wrong(&format!(
+        wrong(folder)(format!(
             "{missing}: calibrate the head and add both models, or record with fringed record"
         ))
     })?;
@@ -102,7 +97,7 @@ pub fn adapt(
         }
     };
     let spec = &recording.patterns[measurement.primary];
-    let before = seam::phase_function(spec, columns, rows).map_err(|error| wrong(&error))?;
+    let before = seam::phase_function(spec, columns, rows).map_err(wrong(folder))?;
     let made = match options.method {
         Method::Fringed => {
             let slopes = map.slopes(noise::MAX_SLOPE);
@@ -117,7 +112,7 @@ pub fn adapt(
         }
         Method::Paper => paper::adapt(&map, columns, rows, options.optics.image_pitch),
     };
-    let function = made.map_err(|error| wrong(&error))?;
+    let function = made.map_err(wrong(folder))?;
     let sigmas = noise::predict(
         &surface.map.sigma,
         &map,

@@ -4,7 +4,7 @@
 use super::adapt::Adapted;
 use algo::pattern::{Encoder, PhaseFunction, Shot, Split, Waveforms};
 use algo::units::AbsolutePhase;
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Result};
 use appliance::output::canvas::grey_png;
 use appliance::storage::folder::OutputFolder;
 use hal::npy;
@@ -109,7 +109,7 @@ impl<'a> Projected<'a> {
     ///
     /// # Errors
     /// If it cannot be written (exit code 73).
-    pub fn write(&self, folder: &Path) -> Result<(), Failure> {
+    pub fn write(&self, folder: &Path) -> Result<()> {
         let folder = OutputFolder::create(folder)?;
         let file = |at: usize| format!("{at:03}.png");
         let encoder = Encoder::new(None, &self.shots);
@@ -152,7 +152,7 @@ impl<'a> Projected<'a> {
             expected_phase: EXPECTED_PHASE,
         };
         let json = serde_json::to_string_pretty(&sequence)
-            .map_err(|error| Failure::because(Exit::Software, "write the sequence", error))?;
+            .map_err(Exit::Software.because("write the sequence"))?;
         folder.write("sequence.json", format!("{json}\n").as_bytes())
     }
 }

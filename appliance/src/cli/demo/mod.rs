@@ -6,7 +6,7 @@ mod table;
 
 use super::options::{Output, Serving};
 use crate::config::Backend;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::recipe::{LoadError, Store};
 use crate::service::{Caller, Daemon};
 use crate::storage::state::StateFolder;
@@ -45,13 +45,11 @@ impl Demo {
     ///
     /// # Errors
     /// If the station cannot start or answer, or judges a part wrongly.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let mut config = self.serving.configuration()?;
         if config.head.backend != Backend::Sim || config.head.scenario.is_some() {
-            return Err(Failure::new(
-                Exit::Usage,
-                "demo: it brings its own parts: leave out head.backend and head.scenario",
-            ));
+            return Exit::Usage
+                .fail("demo: it brings its own parts: leave out head.backend and head.scenario");
         }
         if config.state.is_none() {
             // Not the state of the real station, whose recipes stay unchanged.
@@ -83,7 +81,7 @@ impl Demo {
         let wrong = rows.iter().filter(|row| row.is_wrong()).count();
         if wrong > 0 {
             let message = format!("demo: {wrong} of {} parts were judged wrongly", rows.len());
-            return Err(Failure::new(Exit::Software, message));
+            return Exit::Software.fail(message);
         }
         Ok(())
     }
@@ -98,7 +96,7 @@ impl MeasuredPart {
 
 /// Deletes the recipe of the demonstration's own folder if it cannot be used, e.g. because another
 /// version of the program taught it: the station teaches the part again at its start.
-fn forget_unusable(state: &StateFolder, number: u16) -> Result<(), Failure> {
+fn forget_unusable(state: &StateFolder, number: u16) -> Result<()> {
     let recipes = Store::of_state(state)?;
     if let Err(LoadError::Unfit { .. } | LoadError::Corrupt { .. }) = recipes.load(number) {
         recipes.delete(number)?;
@@ -111,12 +109,9 @@ async fn play(
     daemon: &Daemon,
     recipe: u16,
     progress: &crate::system::progress::Progress,
-) -> Result<Vec<MeasuredPart>, Failure> {
+) -> Result<Vec<MeasuredPart>> {
     let Some(stage) = &daemon.stage else {
-        return Err(Failure::new(
-            Exit::Software,
-            "demo: there is no simulated head",
-        ));
+        return Exit::Software.fail("demo: there is no simulated head");
     };
     // Other noise than that of the golden measurement.
     stage.reseed(NOISE_SEED);
@@ -126,7 +121,7 @@ async fn play(
         progress.tell(at as f64 / PARTS.len() as f64, "measuring parts");
         stage
             .place(&placed.part(), &sim::Placement::default())
-            .map_err(|error| Failure::new(Exit::Software, error.to_string()))?;
+            .map_err(Exit::Software.failure())?;
         let result = plc.measure(at as u16 + 1).await?;
         // The registers only number the gauges; their names are taken from the station.
         let snapshot = daemon.station.snapshot();

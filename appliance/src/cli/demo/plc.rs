@@ -1,6 +1,6 @@
 //! The PLC's side of a measurement by token, as a PLC programmer would write it.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 use tokio_modbus::client::{Context, Reader as _, Writer as _, tcp};
@@ -85,12 +85,12 @@ impl Plc {
     ///
     /// # Errors
     /// If there is no answer.
-    pub async fn connect(address: SocketAddr, recipe: u16) -> Result<Self, Failure> {
+    pub async fn connect(address: SocketAddr, recipe: u16) -> Result<Self> {
         let context = tcp::connect(address).await.map_err(lost)?;
         Ok(Self { context, recipe })
     }
 
-    async fn read(&mut self, address: u16, count: u16) -> Result<Vec<u16>, Failure> {
+    async fn read(&mut self, address: u16, count: u16) -> Result<Vec<u16>> {
         let answer = self.context.read_holding_registers(address, count).await;
         answer.map_err(lost)?.map_err(lost)
     }
@@ -101,7 +101,7 @@ impl Plc {
     ///
     /// # Errors
     /// If the station does not answer in time.
-    pub async fn measure(&mut self, token: u16) -> Result<PlcResult, Failure> {
+    pub async fn measure(&mut self, token: u16) -> Result<PlcResult> {
         let started = Instant::now();
         let patient = |what: &str| {
             if started.elapsed() < PATIENCE {

@@ -65,7 +65,7 @@ impl Characteristics {
 }
 
 /// A scene in front of the head, or settings of the head, that do not allow a calibration.
-pub(super) fn scene(words: impl Into<String>) -> Failure {
+pub(super) fn scene(words: impl std::fmt::Display) -> Failure {
     Failure::new(Exit::Unavailable, words)
 }
 

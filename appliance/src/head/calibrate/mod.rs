@@ -61,7 +61,7 @@ pub struct Made {
 }
 
 /// Models that are those of another head.
-fn models(words: impl Into<String>) -> Failure {
+fn models(words: impl std::fmt::Display) -> Failure {
     Failure::new(Exit::Content, words)
 }
 

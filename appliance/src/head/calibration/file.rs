@@ -17,7 +17,7 @@ use hal::bounds::{
 };
 use hal::head::{Stamp, Timing};
 use hal::model::{DeviceModel, PlaneModel};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 use sha2::{Digest, Sha256};
 use std::time::Duration;
 
@@ -45,8 +45,6 @@ const NOMINAL_NOISE: f64 = 1.0;
 
 bounded! {
     /// The file. docs/formats.md lists the keys.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct CalibrationFile {
         /// [`FORMAT`].
         pub format: String,
@@ -92,8 +90,6 @@ bounded! {
     }
 
     /// Size and geometry of the camera.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct CameraFile {
         /// Columns.
         pub width: u32 = 1..=MAX_SIDE,
@@ -106,8 +102,6 @@ bounded! {
     }
 
     /// Size and geometry of the projector.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct ProjectorFile {
         /// Columns.
         pub width: u32 = 1..=MAX_SIDE,
@@ -118,8 +112,6 @@ bounded! {
     }
 
     /// Timing of flips, light and stamps.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct TimingFile {
         /// From a flip to its light.
         pub flip_to_light_ns: u64 = 0..=MAX_TIME_NS,
@@ -154,8 +146,6 @@ impl TimingFile {
 
 bounded! {
     /// The camera's noise.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct NoiseFile {
         /// σ of one sample at half the light of white, counts.
         pub counts: f64 = MIN_NOISE_COUNTS..=MAX_NOISE_COUNTS,
@@ -180,8 +170,6 @@ impl NoiseFile {
 
 bounded! {
     /// Noise at one level.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct LevelFile {
         /// Mean sample, counts.
         pub level: f64 = 0.0..=MAX_NOISE_COUNTS,
@@ -190,8 +178,6 @@ bounded! {
     }
 
     /// Contrast against pitch.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct ContrastFile {
         /// Median modulation of the coarsest pitch, counts.
         pub modulation_counts: f64 = 0.0..=MAX_NOISE_COUNTS,
@@ -213,8 +199,6 @@ impl ContrastFile {
 
 bounded! {
     /// Contrast of one pitch.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct PitchFile {
         /// Projector pixels per fringe.
         pub pitch_px: u32 = 1..=MAX_SIDE,
@@ -223,8 +207,6 @@ bounded! {
     }
 
     /// The reference phase maps of the plane z = 0.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct ReferenceFile {
         /// Projector pixels per fringe.
         pub pitch_px: f64 = 1.0..=f64::from(MAX_SIDE),
@@ -239,8 +221,6 @@ bounded! {
     }
 
     /// One reference phase map.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct MapFile {
         /// The array beside this file: f64, turns, the smooth fit over the whole frame.
         pub file: String = Longest(MAX_NAME),

@@ -3,7 +3,6 @@
 
 use hal::bounded;
 use hal::bounds::{Bound, Fields, Longest, MAX_SIDE, length};
-use serde::{Deserialize, Serialize};
 
 /// Most poses.
 pub const MAX_POSES: usize = 64;
@@ -20,8 +19,6 @@ const MAX_MM: f64 = 1e6;
 
 bounded! {
     /// How the models were made.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct GeometryFile {
         /// The board.
         pub board: BoardFile = Fields,
@@ -41,8 +38,6 @@ bounded! {
     }
 
     /// A checkerboard.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct BoardFile {
         /// Inner corners along x.
         pub columns: usize = 2..=MAX_CORNERS,
@@ -58,8 +53,6 @@ bounded! {
     }
 
     /// One pose of the board.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
     pub struct PoseFile {
         /// Name of the recording.
         pub recording: String = Longest(MAX_NAME),

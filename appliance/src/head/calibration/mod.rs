@@ -72,8 +72,7 @@ pub struct Calibration {
 
 bounded! {
     /// σ of measurements by the uncertainty of the models.
-    #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(deny_unknown_fields)]
+    #[derive(Copy)]
     pub struct CalibrationSigma {
         /// Of a height, mm.
         pub height_mm: f64 = 0.0..=MAX_SIGMA_MM,

@@ -5,7 +5,7 @@ mod devices;
 pub use devices::{Wires, built_for, leave_lines_idle, lines};
 
 use crate::config::{Backend, HeadConfig};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::place::{Loaded, Place};
 use crate::head::examine::{LONGEST_DARK, first_light};
@@ -104,12 +104,10 @@ impl Opened {
     ///
     /// # Errors
     /// If a device is not there.
-    pub fn reopen(&mut self, config: &HeadConfig) -> Result<(), Failure> {
+    pub fn reopen(&mut self, config: &HeadConfig) -> Result<()> {
         match &self.stage {
             Some(stage) => {
-                self.head = stage
-                    .reopen()
-                    .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+                self.head = stage.reopen().map_err(Exit::Unavailable.failure())?;
                 if !stage.scenario().calibrated {
                     self.head.set_timing(Timing::default());
                 }
@@ -129,10 +127,10 @@ impl Opened {
     ///
     /// # Errors
     /// Why not (exit code 65).
-    pub fn calibrated(&self) -> Result<(), Failure> {
+    pub fn calibrated(&self) -> Result<()> {
         match &self.problem {
             None => Ok(()),
-            Some(problem) => Err(Failure::new(Exit::Content, problem.clone())),
+            Some(problem) => Exit::Content.fail(problem),
         }
     }
 
@@ -160,7 +158,7 @@ impl Opened {
     ///
     /// # Errors
     /// If the head cannot expose in this way, or a device is not there.
-    pub fn expose(&mut self, config: &HeadConfig, exposing: Exposing) -> Result<(), Failure> {
+    pub fn expose(&mut self, config: &HeadConfig, exposing: Exposing) -> Result<()> {
         let timing = self.head.timing();
         match &self.stage {
             Some(stage) => exposed(stage, exposing)?,
@@ -223,7 +221,7 @@ impl Opened {
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
-pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
+pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
     let mut opened = open_as_it_is(config, progress)?;
     let encoding = opened.head.encoding();
     // Luma has passed an image processor, so it is used only if the configuration asks for it.
@@ -234,7 +232,7 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
              ask for a raw format; `fringed doctor` says more",
             encoding.name
         );
-        return Err(Failure::new(Exit::Unavailable, message));
+        return Exit::Unavailable.fail(message);
     }
     opened.await_light();
     Ok(opened)
@@ -245,10 +243,7 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
-pub fn open_as_it_is(
-    config: &HeadConfig,
-    progress: &(dyn Fn(f64) + Sync),
-) -> Result<Opened, Failure> {
+pub fn open_as_it_is(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
     let mut opened = match config.backend {
         Backend::Sim => simulated(config, progress)?,
         Backend::Replay => replayed(&config.recordings)?,
@@ -322,8 +317,8 @@ fn set_otherwise(stored: &Loaded, now: Exposing) -> Option<String> {
 ///
 /// # Errors
 /// If a file of the head is missing or wrong.
-pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
-    let wrong = |problem| Failure::new(Exit::Content, problem);
+pub fn calibration(config: &HeadConfig) -> Result<Calibration> {
+    let wrong = Exit::Content.failure();
     match config.backend {
         Backend::Sim => {
             let scenario = scenario(config.scenario.as_deref())?;
@@ -357,37 +352,30 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration, Failure> {
 ///
 /// # Errors
 /// If the file does not exist or is not a scenario.
-pub fn scenario(path: Option<&Path>) -> Result<Scenario, Failure> {
+pub fn scenario(path: Option<&Path>) -> Result<Scenario> {
     let Some(path) = path else {
         return Ok(Scenario::default());
     };
     let place = path.display().to_string();
-    let text = fs::read_to_string(path).map_err(|error| {
-        let what = format!("read scenario {place}");
-        Failure::because(
-            Exit::Missing,
-            what,
-            format!("{error}: head.scenario names a TOML file"),
-        )
-    })?;
-    Scenario::from_toml(&text, &place)
-        .map_err(|error| Failure::new(Exit::Configuration, error.to_string()))
+    let what = format!("read scenario {place}");
+    let missing = Exit::Missing.advising(what, "head.scenario names a TOML file");
+    let text = fs::read_to_string(path).map_err(missing)?;
+    Scenario::from_toml(&text, &place).map_err(Exit::Configuration.failure())
 }
 
 /// The exact calibration of a simulated head.
-fn exact(scenario: &Scenario) -> Result<Calibration, Failure> {
-    Calibration::of_scenario(scenario)
-        .map_err(|error| Failure::because(Exit::Configuration, "simulate the head", error))
+fn exact(scenario: &Scenario) -> Result<Calibration> {
+    Calibration::of_scenario(scenario).map_err(Exit::Configuration.because("simulate the head"))
 }
 
-fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened, Failure> {
+fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
     let mut scenario = scenario(config.scenario.as_deref())?;
     if let Some(placed) = &config.part {
         (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
         scenario.material = placed.material;
     }
-    let (mut head, stage) = sim::head_with_progress(&scenario, progress)
-        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    let (mut head, stage) =
+        sim::head_with_progress(&scenario, progress).map_err(Exit::Unavailable.failure())?;
     if let Some(exposing) = config.exposing {
         exposed(&stage, exposing)?;
     }
@@ -404,13 +392,13 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
 }
 
 /// Sets exposure and gain of a simulated camera.
-fn exposed(stage: &Stage, exposing: Exposing) -> Result<(), Failure> {
+fn exposed(stage: &Stage, exposing: Exposing) -> Result<()> {
     stage
         .expose(exposing.exposure(), exposing.gain)
-        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))
+        .map_err(Exit::Unavailable.failure())
 }
 
-fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
+fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened> {
     let recordings = folders
         .iter()
         .map(|folder| Recording::open(folder))
@@ -418,8 +406,7 @@ fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
     let calibration = calibration_of(folders, &recordings)?;
     let first = folders.iter().zip(&recordings).next();
     let played = first.map(|(folder, recording)| Played::of(folder, recording));
-    let head = hal::replay::head(recordings)
-        .map_err(|error| Failure::new(Exit::Unavailable, error.to_string()))?;
+    let head = hal::replay::head(recordings).map_err(Exit::Unavailable.failure())?;
     Ok(Opened {
         played,
         ..Opened::new(head, calibration)
@@ -427,15 +414,10 @@ fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened, Failure> {
 }
 
 /// The calibration that the first recording carries; the others were taken with the same head.
-fn calibration_of(
-    folders: &[std::path::PathBuf],
-    recordings: &[Recording],
-) -> Result<Calibration, Failure> {
+fn calibration_of(folders: &[std::path::PathBuf], recordings: &[Recording]) -> Result<Calibration> {
     let (Some(folder), Some(first)) = (folders.first(), recordings.first()) else {
-        return Err(Failure::new(
-            Exit::Configuration,
-            "head.backend is \"replay\" and head.recordings names no folder",
-        ));
+        return Exit::Configuration
+            .fail("head.backend is \"replay\" and head.recordings names no folder");
     };
     let missing = |what: &str| {
         let manifest = folder.join("recording.json");

@@ -2,7 +2,7 @@
 
 use super::{Asked, OpenHead, PICTURES};
 use crate::config::{Backend, HeadConfig};
-use crate::error::Failure;
+use crate::error::Result;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::place::Place;
 use crate::head::commission::{Commissioning, Name, Step, Subject};
@@ -23,7 +23,7 @@ use std::thread;
 
 impl Worker {
     /// Carries out the step that waits. The plan stays if the calibration does.
-    pub(in crate::production) fn commission(&mut self, job: JobId, plan: &mut Option<Arc<Plan>>) {
+    pub(in crate::production) fn commission(&mut self, job: JobId) {
         if let Some(asked) = self.commission.take() {
             let before = self.opened.calibration.fingerprint();
             self.carry_out(job, &asked);
@@ -36,20 +36,20 @@ impl Worker {
                 })
             };
             let words = match same {
-                true => plan.as_deref().and_then(otherwise),
+                true => self.plan.as_deref().and_then(otherwise),
                 false => Some("the head has another calibration: teach the recipes anew".into()),
             };
             if let Some(words) = words
-                && plan.take().is_some()
+                && self.plan.take().is_some()
             {
                 self.progress.warn(&words);
             }
             // Steps show patterns of their own.
-            self.restore(plan);
+            self.restore();
             self.progress.clear();
         }
         self.commission.ended();
-        let recipe = plan.as_deref().map(active);
+        let recipe = self.plan.as_deref().map(active);
         self.station.event(Event::Commissioned { job, recipe });
     }
 
@@ -192,7 +192,7 @@ impl Worker {
     }
 
     /// Sets exposure and gain, if the step asks for it.
-    fn set_exposing(&mut self, asked: &Asked) -> Result<(), Failure> {
+    fn set_exposing(&mut self, asked: &Asked) -> Result<()> {
         let Some((exposing, _)) = asked.exposing else {
             return Ok(());
         };

@@ -10,7 +10,6 @@ use crate::head::calibrate::settled;
 use crate::head::examine::{SETTLE, picture};
 use crate::head::live::{Figures, Fringes, Picture, Show, rasters};
 use crate::production::{Order, Worker};
-use crate::recipe::plan::Plan;
 use hal::error::Error;
 use serde_json::{Value, json};
 use std::sync::mpsc::{Sender, SyncSender, sync_channel};
@@ -116,8 +115,8 @@ fn busy() -> NotNow {
 
 impl Worker {
     /// Takes a live picture, unless an order has come since it was asked for.
-    pub(in crate::production) fn look(&mut self, look: Look, plan: Option<&Arc<Plan>>) {
-        let taken = self.looked(&look, plan);
+    pub(in crate::production) fn look(&mut self, look: Look) {
+        let taken = self.looked(&look);
         let answer = match taken {
             Ok(Some(picture)) => Ok(picture),
             Ok(None) => Err(busy()),
@@ -127,7 +126,7 @@ impl Worker {
         let _ = look.answer.send(answer);
     }
 
-    fn looked(&mut self, look: &Look, plan: Option<&Arc<Plan>>) -> Result<Option<Picture>, Error> {
+    fn looked(&mut self, look: &Look) -> Result<Option<Picture>, Error> {
         let station = self.station.clone();
         let at_rest = move || !station.snapshot().is_working();
         if !at_rest() {
@@ -140,7 +139,8 @@ impl Worker {
             self.opened.problem.is_none() || self.commission.inside().kept.measured.is_some();
         let settle = if known { settled(head) } else { SETTLE };
         let index = look.show.at(look.shift);
-        let (kept, live) = (plan.map_or(0, |plan| plan.patterns()), &mut self.live);
+        let kept = self.plan.as_ref().map_or(0, |plan| plan.patterns());
+        let live = &mut self.live;
         let taken = head.aside(kept, Arc::new(at_rest), |head| {
             if !*live {
                 head.load(pool.install(|| rasters(calibration))?)?;

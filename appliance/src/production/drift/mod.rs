@@ -14,7 +14,6 @@ pub use trend::{FILE, Trend};
 use super::{DEVICE_TIMEOUT, Worker, recovery};
 use crate::config::Backend;
 use crate::head::examine::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX};
-use crate::recipe::plan::Plan;
 use crate::recipe::teach::TeachError;
 use crate::station::{Event, JobId, StationHandle};
 use crate::system::priority;
@@ -83,7 +82,7 @@ impl Report {
 impl Worker {
     /// Checks the geometry, if that is due and nothing else is to be done; called with each sign of
     /// life without an order.
-    pub(super) fn rest_and_check(&mut self, plan: Option<&Arc<Plan>>) {
+    pub(super) fn rest_and_check(&mut self) {
         if self.watch.judging.load(Ordering::Relaxed) || !self.can_be_checked() {
             return;
         }
@@ -92,7 +91,8 @@ impl Worker {
         if !self.watch.due.rests(doubtful) {
             return;
         }
-        let (station, kept) = (self.station.clone(), plan.map_or(0, |plan| plan.patterns()));
+        let kept = self.plan.as_ref().map_or(0, |plan| plan.patterns());
+        let station = self.station.clone();
         let at_rest = move || station.snapshot().is_at_rest();
         // Its patterns take the place of those for live pictures.
         self.live = false;

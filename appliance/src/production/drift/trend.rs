@@ -5,8 +5,8 @@ use crate::station::Drift;
 use crate::storage::folder::{read_whole, write_whole};
 use crate::system::clock;
 use algo::pipeline::Epipolar;
-use hal::bounds::{length, shortened, text};
-use serde::{Deserialize, Serialize};
+use hal::bounded;
+use hal::bounds::{Bound as _, FINGERPRINT_DIGITS, Fields, Longest, length, shortened};
 use serde_json::{Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -26,24 +26,24 @@ const MOST_SHOWN: usize = 100;
 /// away, or the press may shake.
 const CONFIRMED: usize = 2;
 
-/// One check. Distances in projector pixels.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Checked {
-    /// When it was, s since 1970 UTC; 0 if the clock was not synchronised.
-    at_unix_s: u64,
-    /// Fingerprint of the calibration that it was compared with.
-    calibration: String,
-    /// RMS distance from the epipolar lines, by a fit over the frame.
-    epipolar_px: f64,
-    /// The distance in the middle of the frame.
-    offset_px: f64,
-    /// From there to the edges, along columns and rows.
-    gradient_px: [f64; 2],
-    /// Noise of a point.
-    noise_px: f64,
-    /// Points that were compared.
-    pixels: usize,
+bounded! {
+    /// One check. Distances in projector pixels.
+    struct Checked {
+        /// When it was, s since 1970 UTC; 0 if the clock was not synchronised.
+        at_unix_s: u64,
+        /// Fingerprint of the calibration that it was compared with.
+        calibration: String = Longest(FINGERPRINT_DIGITS),
+        /// RMS distance from the epipolar lines, by a fit over the frame.
+        epipolar_px: f64,
+        /// The distance in the middle of the frame.
+        offset_px: f64,
+        /// From there to the edges, along columns and rows.
+        gradient_px: [f64; 2],
+        /// Noise of a point.
+        noise_px: f64,
+        /// Points that were compared.
+        pixels: usize,
+    }
 }
 
 impl Checked {
@@ -52,13 +52,14 @@ impl Checked {
     }
 }
 
-/// The checks, the oldest first.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Checks {
-    format: String,
-    version: u32,
-    checks: Vec<Checked>,
+bounded! {
+    /// The checks, the oldest first.
+    #[derive(Default)]
+    struct Checks {
+        format: String,
+        version: u32,
+        checks: Vec<Checked>,
+    }
 }
 
 impl Checks {
@@ -73,7 +74,7 @@ impl Checks {
         }
         length("checks", file.checks.len(), 0, MOST_KEPT)?;
         for check in &file.checks {
-            text("calibration", &check.calibration, 64)?;
+            Fields.check("", check)?;
         }
         Ok(file)
     }

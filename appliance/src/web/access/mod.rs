@@ -16,7 +16,7 @@ pub use changes::{Change, Changes};
 pub use secret::NewSecret;
 pub use session::{MAX_AGE_S, Token};
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use patience::Patience;
 use session::Sessions;
 use std::net::IpAddr;
@@ -67,17 +67,16 @@ impl Access {
     /// # Errors
     /// If the folder cannot be read or written (exit code 73), or the given secret cannot be used
     /// (78).
-    pub fn open(folder: &Path, given: Option<&Path>) -> Result<(Self, Option<NewSecret>), Failure> {
-        let failed = |error: String| {
-            let what = format!("open {}", folder.display());
-            Failure::because(Exit::CannotCreate, what, error)
-        };
-        std::fs::create_dir_all(folder).map_err(|error| failed(error.to_string()))?;
+    pub fn open(folder: &Path, given: Option<&Path>) -> Result<(Self, Option<NewSecret>)> {
+        let what = format!("open {}", folder.display());
+        std::fs::create_dir_all(folder).map_err(Exit::CannotCreate.because(&what))?;
         let given = given.map_or(Ok(None), secret::given);
-        let given = given.map_err(|error| Failure::new(Exit::Configuration, error))?;
+        let given = given.map_err(Exit::Configuration.failure())?;
         let (hash, shown) = match given {
             Some(hash) => (hash, None),
-            None => secret::open(&folder.join("secret")).map_err(failed)?,
+            None => {
+                secret::open(&folder.join("secret")).map_err(Exit::CannotCreate.because(&what))?
+            }
         };
         let changes = Changes::open(&folder.join("changes.jsonl"));
         let inside = Inside {

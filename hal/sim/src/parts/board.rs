@@ -1,7 +1,5 @@
 //! A printed checkerboard, and the poses in which it is shown to a head that is calibrated.
 
-use serde::{Deserialize, Serialize};
-
 use super::Surface;
 use crate::optics::Vector;
 use crate::placement::Placement;
@@ -17,31 +15,17 @@ const MARGIN: f64 = 1.0;
 
 bounded! {
     /// A checkerboard whose middle lies in the origin, its columns along x.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Board {
+    pub struct Board: Default {
         /// Inner corners along x.
-        pub columns: usize = 2..=100,
+        pub columns: usize = 2..=100 => 9,
         /// Inner corners along y.
-        pub rows: usize = 2..=100,
+        pub rows: usize = 2..=100 => 13,
         /// Side of a square according to its label, mm.
-        pub square_mm: f64 = 0.5..=1000.0,
+        pub square_mm: f64 = 0.5..=1000.0 => 10.0,
         /// By how much the middle is higher than the outermost inner corners, µm.
         pub bow_um: f64 = -10_000.0..=10_000.0,
         /// By how much the squares are larger than their label says, parts per million.
         pub scale_ppm: f64 = -100_000.0..=100_000.0,
-    }
-}
-
-impl Default for Board {
-    fn default() -> Self {
-        Self {
-            columns: 9,
-            rows: 13,
-            square_mm: 10.0,
-            bow_um: 0.0,
-            scale_ppm: 0.0,
-        }
     }
 }
 

@@ -1,6 +1,5 @@
 //! The study's analytic parts: cone, sawtooth, sphere, tube, flowerpot, and a flat plane.
 
-use serde::{Deserialize, Serialize};
 use std::ops::RangeInclusive;
 
 use super::{Defect, Surface};
@@ -18,31 +17,17 @@ const TUBE_SLOPE: f64 = 6.0;
 bounded! {
     /// A square block with a cone-shaped hole: z = top, and within the radius z = top − depth · (1
     /// − r / radius).
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Cone {
+    pub struct Cone: Default {
         /// Half the side of the block.
-        pub half_size: f64 = MEASURE,
+        pub half_size: f64 = MEASURE => 100.0,
         /// Radius of the hole at the top.
-        pub radius: f64 = MEASURE,
+        pub radius: f64 = MEASURE => 66.0,
         /// Depth of the hole.
-        pub depth: f64 = COORDINATE,
+        pub depth: f64 = COORDINATE => 160.0,
         /// z of the top.
-        pub top: f64 = COORDINATE,
+        pub top: f64 = COORDINATE => 80.0,
         /// Dents; a good part has none.
         pub defects: Vec<Defect>,
-    }
-}
-
-impl Default for Cone {
-    fn default() -> Self {
-        Self {
-            half_size: 100.0,
-            radius: 66.0,
-            depth: 160.0,
-            top: 80.0,
-            defects: Vec::new(),
-        }
     }
 }
 
@@ -71,37 +56,21 @@ impl Surface for Cone {
 bounded! {
     /// Ridges along y: with f = frac((x − x0) / period), z rises from lo to hi over f < rise and
     /// falls after.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Sawtooth {
+    pub struct Sawtooth: Default {
         /// Half the side of the square.
-        pub half_size: f64 = MEASURE,
+        pub half_size: f64 = MEASURE => 100.0,
         /// Distance of the ridges.
-        pub period: f64 = MEASURE,
+        pub period: f64 = MEASURE => 40.0,
         /// Share of the period that rises, 0.01…0.99.
-        pub rise: f64 = 0.01..=0.99,
+        pub rise: f64 = 0.01..=0.99 => 0.45,
         /// x of a valley.
-        pub x0: f64 = COORDINATE,
+        pub x0: f64 = COORDINATE => -100.0,
         /// z of the valleys.
-        pub lo: f64 = COORDINATE,
+        pub lo: f64 = COORDINATE => -13.5,
         /// z of the ridges.
-        pub hi: f64 = COORDINATE,
+        pub hi: f64 = COORDINATE => 13.5,
         /// Dents; a good part has none.
         pub defects: Vec<Defect>,
-    }
-}
-
-impl Default for Sawtooth {
-    fn default() -> Self {
-        Self {
-            half_size: 100.0,
-            period: 40.0,
-            rise: 0.45,
-            x0: -100.0,
-            lo: -13.5,
-            hi: 13.5,
-            defects: Vec::new(),
-        }
     }
 }
 
@@ -131,28 +100,15 @@ impl Surface for Sawtooth {
 
 bounded! {
     /// The part of a sphere above z = cut.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Sphere {
+    pub struct Sphere: Default {
         /// Radius.
-        pub radius: f64 = MEASURE,
+        pub radius: f64 = MEASURE => 125.0,
         /// z of the centre.
-        pub centre_z: f64 = COORDINATE,
+        pub centre_z: f64 = COORDINATE => -75.0,
         /// z below which the sphere is cut off.
-        pub cut: f64,
+        pub cut: f64 => -10.4,
         /// Dents; a good part has none.
         pub defects: Vec<Defect>,
-    }
-}
-
-impl Default for Sphere {
-    fn default() -> Self {
-        Self {
-            radius: 125.0,
-            centre_z: -75.0,
-            cut: -10.4,
-            defects: Vec::new(),
-        }
     }
 }
 
@@ -183,28 +139,15 @@ impl Surface for Sphere {
 
 bounded! {
     /// The upper side of a cylinder whose axis lies along y.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Tube {
+    pub struct Tube: Default {
         /// Diameter.
-        pub diameter: f64 = MEASURE,
+        pub diameter: f64 = MEASURE => 127.34,
         /// Half the length.
-        pub half_length: f64 = MEASURE,
+        pub half_length: f64 = MEASURE => 47.5,
         /// z of the axis.
-        pub centre_z: f64 = COORDINATE,
+        pub centre_z: f64 = COORDINATE => -20.0,
         /// Dents; a good part has none.
         pub defects: Vec<Defect>,
-    }
-}
-
-impl Default for Tube {
-    fn default() -> Self {
-        Self {
-            diameter: 127.34,
-            half_length: 47.5,
-            centre_z: -20.0,
-            defects: Vec::new(),
-        }
     }
 }
 
@@ -240,28 +183,15 @@ impl Surface for Tube {
 bounded! {
     /// The wall of an open truncated cone, wider at the rim; its axis is along z, and half its
     /// depth lies above z = 0.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Flowerpot {
+    pub struct Flowerpot: Default {
         /// Diameter at the top.
-        pub rim_diameter: f64,
+        pub rim_diameter: f64 => 198.0,
         /// Diameter at the bottom.
-        pub bottom_diameter: f64 = MEASURE,
+        pub bottom_diameter: f64 = MEASURE => 120.0,
         /// Height of the wall.
-        pub depth: f64 = MEASURE,
+        pub depth: f64 = MEASURE => 149.0,
         /// Dents; a good part has none.
         pub defects: Vec<Defect>,
-    }
-}
-
-impl Default for Flowerpot {
-    fn default() -> Self {
-        Self {
-            rim_diameter: 198.0,
-            bottom_diameter: 120.0,
-            depth: 149.0,
-            defects: Vec::new(),
-        }
     }
 }
 
@@ -285,22 +215,11 @@ impl Surface for Flowerpot {
 
 bounded! {
     /// The reference plane z = 0, as a square that covers the study's field of view.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Plane {
+    pub struct Plane: Default {
         /// Half the side of the square.
-        pub half_size: f64 = MEASURE,
+        pub half_size: f64 = MEASURE => 250.0,
         /// Dents; a good part has none.
         pub defects: Vec<Defect>,
-    }
-}
-
-impl Default for Plane {
-    fn default() -> Self {
-        Self {
-            half_size: 250.0,
-            defects: Vec::new(),
-        }
     }
 }
 

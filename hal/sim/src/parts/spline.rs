@@ -1,7 +1,5 @@
 //! The study's free-form part: a uniform bicubic B-spline over a square.
 
-use serde::{Deserialize, Serialize};
-
 use super::shapes::{in_square, square};
 use super::{Defect, Surface};
 use crate::optics::Vector;
@@ -14,25 +12,13 @@ const PATCHES: f64 = (CONTROL - 3) as f64;
 
 bounded! {
     /// A uniform bicubic B-spline, z = Σ N_i(u_y) N_j(u_x) c_ij with u = (x / half_size + 1) · 4.
-    #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-    #[serde(default, deny_unknown_fields)]
-    pub struct Spline {
+    pub struct Spline: Default {
         /// Half the side of the square.
-        pub half_size: f64 = 1.0..=1000.0,
+        pub half_size: f64 = 1.0..=1000.0 => 100.0,
         /// Control values in mm, row = y, column = x.
-        pub control: [[f64; CONTROL]; CONTROL],
+        pub control: [[f64; CONTROL]; CONTROL] => STUDY,
         /// Dents; a good part has none.
         pub defects: Vec<Defect>,
-    }
-}
-
-impl Default for Spline {
-    fn default() -> Self {
-        Self {
-            half_size: 100.0,
-            control: STUDY,
-            defects: Vec::new(),
-        }
     }
 }
 

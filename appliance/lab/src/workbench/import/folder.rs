@@ -2,7 +2,7 @@
 
 use super::picture::{ENDINGS, Picture};
 use super::{content, name};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Failure, Result};
 use std::cmp::Ordering;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -41,7 +41,7 @@ impl Place {
 /// # Errors
 /// If the folder is missing (66); if a file cannot be read, or there is another number of pictures
 /// (65).
-pub fn pictures(folder: &Path, pattern: &str, expected: usize) -> Result<Vec<Place>, Failure> {
+pub fn pictures(folder: &Path, pattern: &str, expected: usize) -> Result<Vec<Place>> {
     let files = files(folder, pattern)?;
     let mut found = Vec::new();
     for file in files {
@@ -75,15 +75,10 @@ pub fn pictures(folder: &Path, pattern: &str, expected: usize) -> Result<Vec<Pla
     Err(content(folder, words))
 }
 
-fn files(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>, Failure> {
-    let entries = fs::read_dir(folder).map_err(|error| {
-        let what = format!("import {}", folder.display());
-        Failure::because(
-            Exit::Missing,
-            what,
-            format!("{error}: name a folder of pictures"),
-        )
-    })?;
+fn files(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
+    let what = format!("import {}", folder.display());
+    let missing = Exit::Missing.advising(what, "name a folder of pictures");
+    let entries = fs::read_dir(folder).map_err(missing)?;
     let is_picture = |path: &PathBuf| {
         let ending = path.extension().and_then(|ending| ending.to_str());
         let known = ending.is_some_and(|ending| {

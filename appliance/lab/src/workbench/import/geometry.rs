@@ -6,7 +6,7 @@ use super::{content, plane};
 use algo::geometry::{Pinhole, RigError};
 use algo::phase::Trust;
 use algo::pipeline::{Epipolar, PhaseMap};
-use appliance::error::Failure;
+use appliance::error::Result;
 use appliance::head::calibration::opencv::Models;
 use appliance::head::seam;
 use appliance::measure::Geometry;
@@ -30,11 +30,7 @@ const MIDDLE: std::ops::Range<f64> = 0.3..0.7;
 ///
 /// # Errors
 /// If heights could not be measured with them.
-pub(super) fn add(
-    recording: &mut Recording,
-    models: Models,
-    folder: &Path,
-) -> Result<Vec<String>, Failure> {
+pub(super) fn add(recording: &mut Recording, models: Models, folder: &Path) -> Result<Vec<String>> {
     let wrong = |words: String| content(folder, words);
     let mut notes = models.notes;
     recording.camera_model = Some(models.camera);

@@ -15,7 +15,7 @@ mod shifts;
 pub use picture::{Channel, Picture};
 
 use super::layout::{Description, Layout};
-use appliance::error::{Exit, Failure};
+use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibration::opencv::Models;
 use appliance::measure::measure;
 use folder::Place;
@@ -53,10 +53,10 @@ pub struct Taken {
 pub fn import(
     folder: &Path,
     taken: &Taken,
-    models: impl FnOnce((u32, u32)) -> Result<Option<Models>, Failure>,
-) -> Result<Recording, Failure> {
+    models: impl FnOnce((u32, u32)) -> Result<Option<Models>>,
+) -> Result<Recording> {
     let layout = Layout::of(&taken.description);
-    let layout = layout.map_err(|problem| Failure::because(Exit::Usage, "import", problem))?;
+    let layout = layout.map_err(Exit::Usage.because("import"))?;
     let places = folder::pictures(folder, &taken.name, layout.shown.len())?;
     let read = |place: &Place| {
         Picture::read(&place.file, place.page.unwrap_or(0)).map_err(|problem| place.wrong(problem))

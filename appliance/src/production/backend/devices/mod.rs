@@ -5,7 +5,7 @@ mod rpi;
 
 use super::Opened;
 use crate::config::{Backend, Config, HeadConfig};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
 use hal::frame::FrameFormat;
 use hal::head::Head;
@@ -39,12 +39,12 @@ const LIBRARIES: [(&str, bool); 4] = [
 ///
 /// # Errors
 /// What it lacks, and how to build it (78).
-pub fn built_for(config: &Config) -> Result<(), Failure> {
+pub fn built_for(config: &Config) -> Result<()> {
     built_for_head(&config.head)?;
     built_for_lines(&config.lines)
 }
 
-fn built_for_head(config: &HeadConfig) -> Result<(), Failure> {
+fn built_for_head(config: &HeadConfig) -> Result<()> {
     if config.backend != Backend::Rpi {
         return Ok(());
     }
@@ -55,12 +55,12 @@ fn built_for_head(config: &HeadConfig) -> Result<(), Failure> {
     built_with("head.backend = \"rpi\"", &needed, "rpi")
 }
 
-fn built_for_lines(setup: &LinesSetup) -> Result<(), Failure> {
+fn built_for_lines(setup: &LinesSetup) -> Result<()> {
     let needed: &[&str] = if setup.any() { &["gpio"] } else { &[] };
     built_with("lines", needed, "gpio")
 }
 
-fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<(), Failure> {
+fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<()> {
     let lacked = LIBRARIES
         .iter()
         .filter(|(library, has)| !has && needed.contains(library));
@@ -72,7 +72,7 @@ fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<(), Failure> 
         "{key}: this fringed was built without {}: build it with `cargo build --release --features {feature}`",
         lacked.join(" and ")
     );
-    Err(Failure::new(Exit::Configuration, message))
+    Exit::Configuration.fail(message)
 }
 
 /// Opens camera, projector and trigger. Their calibration is nominal, so nothing may be measured
@@ -80,7 +80,7 @@ fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<(), Failure> 
 ///
 /// # Errors
 /// If this build has no such devices (78), or one of them is not there (69).
-pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
+pub(super) fn rpi(config: &HeadConfig) -> Result<Opened> {
     built_for_head(config)?;
     let head = head(config, trigger(&config.trigger)?)?;
     let calibration = nominal(head.camera_format(), head.projector_size())?;
@@ -88,18 +88,18 @@ pub(super) fn rpi(config: &HeadConfig) -> Result<Opened, Failure> {
 }
 
 #[cfg(all(feature = "kms", feature = "libcamera"))]
-fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Failure> {
+fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head> {
     Ok(rpi::head(config, trigger)?)
 }
 
 /// Not reached: [`built_for_head`] refuses the head in this build.
 #[cfg(not(all(feature = "kms", feature = "libcamera")))]
-fn head(_: &HeadConfig, _: Box<dyn Trigger>) -> Result<Head, Failure> {
+fn head(_: &HeadConfig, _: Box<dyn Trigger>) -> Result<Head> {
     Err(uncalibrated())
 }
 
 #[cfg(feature = "gpio")]
-fn trigger(setup: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
+fn trigger(setup: &TriggerSetup) -> Result<Box<dyn Trigger>> {
     let Some(line) = &setup.line else {
         return Ok(Box::new(NoTrigger));
     };
@@ -109,19 +109,19 @@ fn trigger(setup: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
     };
     match hal::gpio::Pulse::open(setup, line, prepare) {
         Ok(pulse) => Ok(Box::new(pulse)),
-        Err(error) => Err(Failure::new(Exit::Unavailable, error.to_string())),
+        Err(error) => Exit::Unavailable.fail(error),
     }
 }
 
 /// Without GPIO no trigger line is configured: [`built_for_head`] refuses one.
 #[cfg(not(feature = "gpio"))]
-fn trigger(_: &TriggerSetup) -> Result<Box<dyn Trigger>, Failure> {
+fn trigger(_: &TriggerSetup) -> Result<Box<dyn Trigger>> {
     Ok(Box::new(NoTrigger))
 }
 
 /// A placeholder until the head is calibrated: lenses and poses like those of the reference head.
 /// No height may be computed with it.
-pub(super) fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration, Failure> {
+pub(super) fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Calibration> {
     let model = |width: u32, height: u32, aside_mm: f64| DeviceModel {
         fx: 1.6 * f64::from(width),
         fy: 1.6 * f64::from(width),
@@ -141,7 +141,7 @@ pub(super) fn nominal(camera: FrameFormat, projector: (u32, u32)) -> Result<Cali
         ),
         1.0,
     )
-    .map_err(|error| Failure::because(Exit::Unavailable, "open the head", error))
+    .map_err(Exit::Unavailable.because("open the head"))
 }
 
 /// The failure of a head without a calibration.
@@ -154,7 +154,7 @@ pub(super) fn uncalibrated() -> Failure {
 ///
 /// # Errors
 /// If this build has no lines (78), or one of them cannot be used (69).
-pub fn lines(setup: &LinesSetup) -> Result<Wires, Failure> {
+pub fn lines(setup: &LinesSetup) -> Result<Wires> {
     built_for_lines(setup)?;
     wired(setup)
 }
@@ -164,7 +164,7 @@ pub fn lines(setup: &LinesSetup) -> Result<Wires, Failure> {
 ///
 /// # Errors
 /// If this build has no lines (78), or some of them cannot be used (69).
-pub fn leave_lines_idle(config: &Config) -> Result<(), Failure> {
+pub fn leave_lines_idle(config: &Config) -> Result<()> {
     let mut trigger = config.head.trigger.clone();
     // Other heads do not use the trigger's line.
     trigger
@@ -178,7 +178,7 @@ pub fn leave_lines_idle(config: &Config) -> Result<(), Failure> {
     if errors.is_empty() {
         return Ok(());
     }
-    Err(Failure::new(Exit::Unavailable, errors.join("; ")))
+    Exit::Unavailable.fail(errors.join("; "))
 }
 
 #[cfg(feature = "gpio")]
@@ -194,7 +194,7 @@ fn unusable(_: &TriggerSetup, _: &LinesSetup) -> Vec<String> {
 }
 
 #[cfg(feature = "gpio")]
-fn wired(setup: &LinesSetup) -> Result<Wires, Failure> {
+fn wired(setup: &LinesSetup) -> Result<Wires> {
     use hal::gpio::{LineError, Output, Start};
     use hal::lines::{OutputLine, StartLine};
     let output = |name: &Option<String>, idle| -> Result<_, LineError> {
@@ -213,12 +213,12 @@ fn wired(setup: &LinesSetup) -> Result<Wires, Failure> {
             fault: output(&setup.fault, true)?,
         })
     };
-    open().map_err(|error: LineError| Failure::new(Exit::Unavailable, error.to_string()))
+    open().map_err(|error: LineError| Failure::new(Exit::Unavailable, error))
 }
 
 /// Without GPIO no line is configured: [`lines`] refuses those that are.
 #[cfg(not(feature = "gpio"))]
-fn wired(_: &LinesSetup) -> Result<Wires, Failure> {
+fn wired(_: &LinesSetup) -> Result<Wires> {
     Ok(Wires::default())
 }
 
