@@ -57,29 +57,32 @@ impl Exit {
 
 /// A command that could not be carried out.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{message}")]
+#[error("{problem}{}{remedy}", if remedy.is_empty() { "" } else { ": " })]
 pub struct Failure {
     /// The exit code.
     pub exit: Exit,
-    /// What was attempted with what, and the remedy.
-    pub message: String,
+    /// What was attempted with what, or what is wrong.
+    pub problem: String,
+    /// Why it failed, where that is not said yet, and what to do; empty where the problem says both.
+    pub remedy: String,
     /// The error of the device that is at fault, if one is.
     pub device: Option<Error>,
 }
 
 impl Failure {
-    /// A failure with any exit code.
+    /// A failure in words that also say what to do.
     pub fn new(exit: Exit, message: impl Display) -> Self {
-        Self {
-            exit,
-            message: message.to_string(),
-            device: None,
-        }
+        Self::because(exit, message, "")
     }
 
-    /// `error` while doing `what`, which names the file.
+    /// `what` was attempted, with the name of the file, or is wrong; `error` and what to do about it.
     pub fn because(exit: Exit, what: impl Display, error: impl Display) -> Self {
-        Self::new(exit, format!("{what}: {error}"))
+        Self {
+            exit,
+            problem: what.to_string(),
+            remedy: error.to_string(),
+            device: None,
+        }
     }
 }
 
@@ -111,7 +114,7 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         Self {
             device: Some(error.clone()),
-            ..Self::new(Exit::Unavailable, error)
+            ..Self::because(Exit::Unavailable, error.problem(), error.remedy())
         }
     }
 }

@@ -31,23 +31,16 @@ pub struct FoundBoard {
 #[non_exhaustive]
 pub enum BoardError {
     /// There is no grid of corners.
-    #[error(
-        "no checkerboard is in the picture: light the whole board, and show it sharp and less tilted"
-    )]
+    #[error("no checkerboard is in the picture")]
     None,
     /// The grid has another size.
-    #[error(
-        "a grid of {} × {} inner corners was found: show the whole board, in even light without reflections, or correct --board",
-        found.0, found.1
-    )]
+    #[error("a grid of {} × {} inner corners was found", found.0, found.1)]
     Size {
         /// Corners along the longer and the shorter side, or as found.
         found: (usize, usize),
     },
     /// Too many corners of the grid could not be located.
-    #[error(
-        "only {located} of {all} corners could be located: show the board sharp, in even light without reflections"
-    )]
+    #[error("only {located} of {all} corners could be located")]
     Few {
         /// Corners that could be located.
         located: usize,

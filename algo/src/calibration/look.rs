@@ -21,7 +21,7 @@ const LEAST_COVERED: f64 = 0.9;
 /// tilted by 8° moves as far.
 const SAME_PLACE: (f64, f64) = (0.03, MOST_MOTION);
 
-/// A pose that cannot be used.
+/// A pose that cannot be used; [`Self::remedy`] says what to do.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
@@ -30,7 +30,7 @@ pub enum PoseError {
     Board(#[from] BoardError),
     /// The camera's picture is blurred.
     #[error(
-        "the picture is blurred: edges of the squares have a σ of {blur:.1} px, at most {most:.1} px is accepted: focus, or bring the board nearer to where it is sharp"
+        "the picture is blurred: edges of the squares have a σ of {blur:.1} px, at most {most:.1} px is accepted"
     )]
     Blurred {
         /// σ of the edges, px.
@@ -39,19 +39,39 @@ pub enum PoseError {
         most: f64,
     },
     /// The board moved between frames.
-    #[error(
-        "the board moved by {pixels:.2} px between the frames of different levels: hold it still, or put it down, while frames are taken"
-    )]
+    #[error("the board moved by {pixels:.2} px between the frames of different levels")]
     Moved {
         /// How far, px.
         pixels: f64,
     },
     /// The projector does not light all of the board, or its fringes cannot be decoded there.
-    #[error("only {:.0} % of the board's bright squares have a phase under both patterns: move the board into the projector's light, without shadow or reflection", share * 100.0)]
+    #[error("only {:.0} % of the board's bright squares have a phase under both patterns", share * 100.0)]
     OffFringes {
         /// Share of the bright squares that have a projector point.
         share: f64,
     },
+}
+
+impl PoseError {
+    /// What to do about it.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Board(BoardError::None) => {
+                "light the whole board, and show it sharp and less tilted"
+            }
+            Self::Board(BoardError::Size { .. }) => {
+                "show the whole board, in even light without reflections, or correct --board"
+            }
+            Self::Board(BoardError::Few { .. }) => {
+                "show the board sharp, in even light without reflections"
+            }
+            Self::Blurred { .. } => "focus, or bring the board nearer to where it is sharp",
+            Self::Moved { .. } => "hold it still, or put it down, while frames are taken",
+            Self::OffFringes { .. } => {
+                "move the board into the projector's light, without shadow or reflection"
+            }
+        }
+    }
 }
 
 /// Finds the board in the offset of each level, and its points in the projector's raster.

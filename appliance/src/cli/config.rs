@@ -44,7 +44,7 @@ impl ConfigCommand {
             Self::Check { file, output } => {
                 let checked = Config::read(file).and_then(|config| check_named_files(&config));
                 let problem = checked.as_ref().err();
-                let problem = problem.map(|failure| failure.message.as_str());
+                let problem = problem.map(|failure| failure.to_string());
                 let document = serde_json::json!({
                     "file": file.display().to_string(), "valid": problem.is_none(), "problem": problem,
                 });

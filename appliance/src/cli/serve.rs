@@ -82,7 +82,7 @@ async fn serve(daemon: &Daemon, notify: &Notify, progress: &Progress) {
             }
         }
         // The station serves without a recipe as well: the PLC loads or teaches one.
-        Err(failure) => progress.warn(&failure.message),
+        Err(failure) => progress.warn(&failure.to_string()),
     }
     progress.log(&format!(
         "Modbus TCP on {}, page on http://{}",

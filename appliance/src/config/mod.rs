@@ -293,8 +293,8 @@ mod tests {
         ] {
             let failure = read(text).unwrap_err();
             assert_eq!(failure.exit, Exit::Configuration);
-            assert!(failure.message.contains(word), "{failure}");
-            assert!(failure.message.contains("fringed.toml"), "{failure}");
+            assert!(failure.to_string().contains(word), "{failure}");
+            assert!(failure.to_string().contains("fringed.toml"), "{failure}");
         }
     }
 

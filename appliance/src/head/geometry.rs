@@ -4,6 +4,7 @@ use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use super::channel::Channel;
 use super::code::CodeAlone;
 use super::standing::Ground;
+use crate::error::{Exit, Failure};
 use algo::calibration::{
     Adjusted, Arrow, Board, CalibrationError, FoundBoard, Fringes, MeasuredBoard, Picture,
     Prediction, Residuals, View, calibrate, look,
@@ -25,10 +26,8 @@ const VIEW_MM: (f64, f64) = (5.0, 1e5);
 pub struct SeenPose {
     /// Name of its recording.
     pub recording: String,
-    /// Columns, rows and bits of the camera's frames.
-    pub frames: (u32, u32, u8),
-    /// Columns and rows of the projector's raster.
-    pub raster: (u32, u32),
+    /// What tells its head apart, as [`Calibration::sizes`](super::calibration::Calibration::sizes).
+    pub head: [u32; 5],
     /// Corners and projector points.
     pub view: View,
 }
@@ -37,8 +36,8 @@ impl SeenPose {
     /// Finds the board in a recording with vertical and horizontal fringes, or Gray codes alone.
     ///
     /// # Errors
-    /// In words: what the recording lacks, or why the pose cannot be used.
-    pub fn of(recording: &Recording, name: &str, board: &Board) -> Result<Self, String> {
+    /// What the recording lacks, or why the pose cannot be used (65).
+    pub fn of(recording: &Recording, name: &str, board: &Board) -> Result<Self, Failure> {
         let fringes = |vertical: bool| {
             let wanted = |spec: &PatternSpec| match spec {
                 PatternSpec::Vertical { fringes } if vertical => Some(*fringes),
@@ -49,13 +48,20 @@ impl SeenPose {
             let found = patterns.find_map(|(at, spec)| Some((at, wanted(spec)?)));
             let direction = if vertical { "vertical" } else { "horizontal" };
             found.ok_or_else(|| {
-                format!("it has no {direction} fringes: both directions are needed, each with all of its levels")
+                Failure::because(
+                    Exit::Content,
+                    format!("it has no {direction} fringes"),
+                    "both directions are needed, each with all of its levels",
+                )
             })
         };
         let (vertical, horizontal) = (fringes(true)?, fringes(false)?);
         let mut levels = Vec::new();
-        let vertical_map = decoded(recording, vertical.0, &mut levels)?;
-        let horizontal_map = decoded(recording, horizontal.0, &mut levels)?;
+        let mut decoded = |pattern| {
+            let decoded = decoded(recording, pattern, &mut levels);
+            decoded.map_err(|error| Failure::new(Exit::Content, error))
+        };
+        let (vertical_map, horizontal_map) = (decoded(vertical.0)?, decoded(horizontal.0)?);
         let projector = &recording.projector;
         let raster = (projector.width, projector.height);
         let fringes = Fringes {
@@ -66,12 +72,13 @@ impl SeenPose {
                 f64::from(raster.1) / horizontal.1,
             ),
         };
-        let view = look(board, &levels, &fringes).map_err(|error| error.to_string())?;
+        let view = look(board, &levels, &fringes)
+            .map_err(|error| Failure::because(Exit::Content, error, error.remedy()))?;
         sized(board, &view.found, recording.width)?;
+        let bits = u32::from(recording.bit_depth);
         Ok(Self {
             recording: name.to_owned(),
-            frames: (recording.width, recording.height, recording.bit_depth),
-            raster,
+            head: [recording.width, recording.height, bits, raster.0, raster.1],
             view,
         })
     }
@@ -121,8 +128,8 @@ fn decoded(
 /// Checks that a board of such squares can lie in front of a head.
 ///
 /// # Errors
-/// In words: by their size and their picture, the camera sees less than a head can, or more.
-fn sized(board: &Board, found: &FoundBoard, columns: u32) -> Result<(), String> {
+/// By their size and their picture, the camera sees less than a head can, or more.
+fn sized(board: &Board, found: &FoundBoard, columns: u32) -> Result<(), Failure> {
     let square = board.square;
     let across = square * f64::from(columns) / found.step;
     let (distance, unit, factor) = match across {
@@ -130,9 +137,15 @@ fn sized(board: &Board, found: &FoundBoard, columns: u32) -> Result<(), String> 
         across if across > VIEW_MM.1 => ("far", "micrometres", 1e-3),
         _ => return Ok(()),
     };
-    Err(format!(
-        "squares of {square} mm would lie so {distance} that the camera's picture is {across:.2} mm wide there: state the side of a square in mm, {} if {square} is in {unit}",
-        square * factor
+    Err(Failure::because(
+        Exit::Content,
+        format!(
+            "squares of {square} mm would lie so {distance} that the camera's picture is {across:.2} mm wide there"
+        ),
+        format!(
+            "state the side of a square in mm, {} if {square} is in {unit}",
+            square * factor
+        ),
     ))
 }
 
@@ -170,7 +183,7 @@ impl Geometry {
         let Some(first) = poses.first() else {
             return Err(CalibrationError::Few { given: 0 }.to_string());
         };
-        let other = |pose: &&SeenPose| (pose.frames, pose.raster) != (first.frames, first.raster);
+        let other = |pose: &&SeenPose| pose.head != first.head;
         if let Some(other) = poses.iter().find(other) {
             return Err(format!(
                 "{}: its frames or its projector's raster have another size than those of {}: calibrate with recordings of one head",
@@ -186,8 +199,8 @@ impl Geometry {
                 same_place(&before.recording)
             ));
         }
-        let frame = (first.frames.0 as usize, first.frames.1 as usize);
-        let raster = (first.raster.0 as usize, first.raster.1 as usize);
+        let [width, height, _, columns, rows] = first.head.map(|size| size as usize);
+        let (frame, raster) = ((width, height), (columns, rows));
         let views: Vec<View> = poses.iter().map(|pose| pose.view.clone()).collect();
         let blame = |error: CalibrationError| match error.pose() {
             Some(pose) => format!("{}: {error}", poses[pose].recording),

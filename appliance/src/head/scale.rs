@@ -5,6 +5,10 @@ use super::calibration::geometry::GeometryFile;
 use algo::calibration::Board;
 use serde::{Deserialize, Serialize};
 
+/// Shortest length on a board that can be checked, mm.
+pub const MIN_LENGTH_MM: f64 = 1e-3;
+/// Longest one, mm.
+pub const MAX_LENGTH_MM: f64 = 1e5;
 /// Largest difference from a stated length, and of the baseline from the calibration before, as a
 /// share.
 const MOST_SCALE: f64 = 0.01;

@@ -73,9 +73,9 @@ async fn reopened(open: &Open, progress: &Progress) -> Wires {
         wait = (2 * wait).min(LONGEST_WAIT);
         match open() {
             Ok(wires) => return wires,
-            Err(failure) if failure.message != said => {
-                progress.log(&failure.message);
-                said = failure.message;
+            Err(failure) if failure.to_string() != said => {
+                said = failure.to_string();
+                progress.log(&said);
             }
             Err(_) => {}
         }

@@ -73,9 +73,9 @@ impl Opening<'_> {
                     if self.patient
                         && (failure.exit == Exit::Unavailable || !reported.is_empty()) =>
                 {
-                    if failure.message != reported {
+                    if failure.to_string() != reported {
                         self.lost(&failure);
-                        reported = failure.message;
+                        reported = failure.to_string();
                     }
                     drop(outcome.send(Ok(None)));
                 }
@@ -93,7 +93,7 @@ impl Opening<'_> {
     fn lost(&self, failure: &Failure) {
         self.station.event(Event::Faulted {
             error_code: failure.device.as_ref().map_or(error_code::UNNAMED, code_of),
-            cause: failure.message.as_str().into(),
+            cause: failure.to_string().into(),
             remedy: REMEDY.into(),
         });
     }

@@ -47,7 +47,7 @@ impl Worker {
         loop {
             pause.wait(orders, &self.station, &self.pulse)?;
             let problem = match self.opened.reopen(&self.config) {
-                Err(failure) => failure.message,
+                Err(failure) => failure.to_string(),
                 Ok(()) => {
                     self.tell_condition();
                     if self.opened.calibration.fingerprint() != before && self.plan.take().is_some()

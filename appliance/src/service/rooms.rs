@@ -69,7 +69,7 @@ impl Rooms<'_> {
         let open: lines::Open = Box::new(move || backend::lines(&setup));
         spawn("lines", move || {
             if let Err(failure) = lines::serve(wires, &open, &station, &progress, stopped) {
-                progress.warn(&failure.message);
+                progress.warn(&failure.to_string());
             }
         })
     }

@@ -221,7 +221,7 @@ mod tests {
         let _first = StateFolder::open(folder.path()).unwrap();
         let refused = StateFolder::open(folder.path()).unwrap_err();
         assert_eq!(refused.exit, Exit::CannotCreate);
-        assert!(refused.message.contains("another fringed"), "{refused}");
+        assert!(refused.to_string().contains("another fringed"), "{refused}");
     }
 
     #[test]

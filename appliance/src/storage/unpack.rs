@@ -178,7 +178,10 @@ mod tests {
         ] {
             let failure = unpack(&zip(&[(name, b"{}")])).unwrap_err();
             assert_eq!(failure.exit, Exit::Content, "{name}: {failure}");
-            assert!(failure.message.contains("does not lie inside"), "{failure}");
+            assert!(
+                failure.to_string().contains("does not lie inside"),
+                "{failure}"
+            );
         }
         let twice = zip(&[("recording.json", b"{}"), ("recording.json/frame", b"x")]);
         let many: Vec<String> = (0..=MOST_MEMBERS).map(|at| at.to_string()).collect();
@@ -200,7 +203,8 @@ mod tests {
             let failure = unpack(&bytes).unwrap_err();
             assert_eq!(failure.exit, Exit::Content, "{words}: {failure}");
             assert!(
-                failure.message.contains(words) && failure.message.contains("name a recording's"),
+                failure.to_string().contains(words)
+                    && failure.to_string().contains("name a recording's"),
                 "{words}: {failure}"
             );
         }

@@ -398,7 +398,7 @@ fn a_boundary_value_in_a_configuration_is_refused_by_its_key_or_it_can_be_read_a
     let mut tally = Tally::default();
     tally.walk(&tree, |place, value| {
         fs::write(&path, place.replaced(&tree, in_toml(value), toml)).unwrap();
-        let config = Config::read(&path).map_err(|failure| failure.message)?;
+        let config = Config::read(&path).map_err(|failure| failure.to_string())?;
         let text = toml::to_string(&config).map_err(|error| error.to_string())?;
         fs::write(&path, text).unwrap();
         assert_eq!(Config::read(&path).unwrap(), config);

@@ -47,7 +47,7 @@ fn a_station_whose_recipe_cannot_be_used_stays_reachable_and_loads_another() {
     )
     .unwrap();
     let refused = daemon.wait_until_ready().unwrap_err();
-    assert!(refused.message.contains("range"), "{}", refused.message);
+    assert!(refused.to_string().contains("range"), "{refused}");
     let after = daemon.station.snapshot();
     assert_eq!(after.error_code, error_code::RECIPE_UNUSABLE);
     assert!(after.fault.is_none() && after.worker_alive && after.recipe.is_none());

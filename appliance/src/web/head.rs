@@ -13,20 +13,17 @@ use super::orders::{Accepted, accepted, not_now};
 use super::problem::{Problem, Result};
 use super::site::{Site, alone};
 use crate::head::board;
-use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
-use crate::head::commission::{Solving, Step};
+use crate::head::calibration::geometry::MAX_POSES;
+use crate::head::commission::{EXPOSURE, GEOMETRY, Poses, STEPS, Solving, Step};
 use crate::head::exposing::Exposing;
 use crate::head::live::Show;
 use crate::production::commissioning::Asked;
 use crate::station::{Event, Request as Command};
 use crate::system::priority;
+use hal::bounds::{Bound, Fields};
 
 /// The number of a live picture, which its figures have as well.
 const NUMBER: HeaderName = HeaderName::from_static("x-picture");
-/// Shortest length on a board that can be checked, mm.
-const MIN_LENGTH_MM: f64 = 1e-3;
-/// Longest one, mm.
-const MAX_LENGTH_MM: f64 = 1e5;
 
 pub(super) async fn state(site: Site) -> Json<Value> {
     let mut view = site.commission.view(&site.station.snapshot());
@@ -52,19 +49,10 @@ struct Exposure {
 /// What to do with the poses.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "action", rename_all = "lowercase", deny_unknown_fields)]
-enum Poses {
-    Pose {
-        board: String,
-        pose: Option<u32>,
-    },
-    Forget {
-        pose: Option<u32>,
-    },
-    Solve {
-        check_length_mm: Option<f64>,
-        #[serde(default)]
-        board_sigma_ppm: f64,
-    },
+enum Action {
+    Pose { board: String, pose: Option<u32> },
+    Forget { pose: Option<u32> },
+    Solve(Solving),
 }
 
 pub(super) async fn step(
@@ -99,33 +87,30 @@ pub(super) async fn end(site: Site, Path(name): Path<String>) -> Result<Accepted
 }
 
 async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked> {
-    let plain = match name {
-        "devices" => Some(Step::Devices),
-        "aim" => Some(Step::Aim),
-        "timing" => Some(Step::Timing),
-        "plane" => Some(Step::Plane),
-        _ => None,
-    };
-    let step = match (name, plain) {
-        (_, Some(step)) => {
-            let Nothing {} = body::json_if_any(body).await?;
-            step
+    let step = Step::of(name).ok_or_else(|| {
+        let [before @ .., last] = STEPS.each_ref().map(|step| step.name);
+        let before = before.join(", ");
+        Problem::missing(format!("there are the steps {before} and {last}"))
+    })?;
+    let (mut poses, mut exposing) = (None, None);
+    match step.name {
+        EXPOSURE => exposing = exposure(site, body::json_if_any(body).await?)?,
+        GEOMETRY => {
+            let wanted = geometry(site, body::json(body).await?);
+            poses = Some(wanted.map_err(Problem::unfit)?);
         }
-        ("exposure", _) => return exposure(site, body::json_if_any(body).await?),
-        ("geometry", _) => geometry(site, body::json(body).await?).map_err(Problem::unfit)?,
         _ => {
-            return Err(Problem::missing(
-                "there are the steps devices, aim, exposure, timing, geometry and plane",
-            ));
+            let Nothing {} = body::json_if_any(body).await?;
         }
-    };
+    }
     Ok(Asked {
         step,
-        exposing: None,
+        poses,
+        exposing,
     })
 }
 
-fn exposure(site: &Site, wanted: Exposure) -> Result<Asked> {
+fn exposure(site: &Site, wanted: Exposure) -> Result<Option<(Exposing, bool)>> {
     let head = site.commission.head();
     let head = head.ok_or_else(|| Problem::busy("set the exposure: no head is open"))?;
     let exposing = Exposing {
@@ -144,45 +129,25 @@ fn exposure(site: &Site, wanted: Exposure) -> Result<Asked> {
             whole.map_err(Problem::unfit)?;
         }
     }
-    Ok(Asked {
-        step: Step::Exposure,
-        exposing: given.then_some((exposing, wanted.keep)),
-    })
+    Ok(given.then_some((exposing, wanted.keep)))
 }
 
-fn geometry(site: &Site, wanted: Poses) -> Result<Step, String> {
+fn geometry(site: &Site, wanted: Action) -> Result<Poses, String> {
     let most = MAX_POSES as u32;
     let within = |pose: u32| match (1..=most).contains(&pose) {
         true => Ok(pose),
         false => Err(format!("pose {pose}: poses are numbered 1 to {most}")),
     };
     Ok(match wanted {
-        Poses::Pose { board, pose } => {
+        Action::Pose { board, pose } => {
             let board = board::parse(&board).map_err(|error| format!("board: {error}"))?;
             let number = pose.unwrap_or_else(|| site.commission.free_pose());
-            Step::Pose(board, within(number)?)
+            Poses::Pose(board, within(number)?)
         }
-        Poses::Forget { pose } => Step::Forget(pose.map(within).transpose()?),
-        Poses::Solve {
-            check_length_mm,
-            board_sigma_ppm,
-        } => {
-            let length = check_length_mm.unwrap_or(1.0);
-            if !(MIN_LENGTH_MM..=MAX_LENGTH_MM).contains(&length) {
-                let words = format!(
-                    "check_length_mm is {length:?}: write {MIN_LENGTH_MM} to {MAX_LENGTH_MM}"
-                );
-                return Err(words);
-            }
-            if !(0.0..=MAX_SIGMA_PPM).contains(&board_sigma_ppm) {
-                let words =
-                    format!("board_sigma_ppm is {board_sigma_ppm}: write 0 to {MAX_SIGMA_PPM}");
-                return Err(words);
-            }
-            Step::Solve(Solving {
-                check_length_mm,
-                board_sigma_ppm,
-            })
+        Action::Forget { pose } => Poses::Forget(pose.map(within).transpose()?),
+        Action::Solve(solving) => {
+            Fields.check("", &solving)?;
+            Poses::Solve(solving)
         }
     })
 }

@@ -79,7 +79,7 @@ fn maps(site: &Site, seq: u32) -> Result<[Map; 3]> {
 
 fn broken(failure: Failure) -> Problem {
     match failure.exit {
-        Exit::Missing => Problem::missing(failure.message),
-        _ => Problem::broken(failure.message),
+        Exit::Missing => Problem::missing(failure.to_string()),
+        _ => Problem::broken(failure.to_string()),
     }
 }

@@ -146,10 +146,7 @@ impl Calibrate {
             .map(|file| Ok((file, file.calibration()?)))
             .transpose()
             .map_err(content)?
-            .filter(|(_, stored)| {
-                let sizes = |of: &Calibration| (of.frames(), of.raster());
-                sizes(stored) == sizes(&calibration)
-            });
+            .filter(|(_, stored)| stored.sizes() == calibration.sizes());
         let mut models_from = OF_SCENARIO.to_owned();
         let mut geometry = None;
         if let Some((from, models)) = self.imported(&calibration)? {

@@ -12,7 +12,7 @@ use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
 use crate::head::calibration::place::Place;
 use crate::head::geometry::{CELLS, Geometry, SeenPose};
-use crate::head::scale::Scale;
+use crate::head::scale::{MAX_LENGTH_MM, MIN_LENGTH_MM, Scale};
 use crate::output::residuals::{arrows_png, coverage_png};
 use crate::storage::folder::OutputFolder;
 use crate::storage::state::StateFolder;
@@ -21,9 +21,6 @@ use algo::calibration::{Arrow, Board};
 use hal::replay::Recording;
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
-
-/// Longest length that can be checked, mm.
-const MAX_LENGTH_MM: f64 = 1e5;
 
 /// Models from recordings of a board.
 #[derive(Debug, clap::Args)]
@@ -49,7 +46,7 @@ pub struct Poses {
     board_sigma_ppm: Option<f64>,
     /// Length on the board from its first to its last inner corner along the longer side, as
     /// measured with a ruler.
-    #[arg(long, value_name = "MM", value_parser = number(1e-3, MAX_LENGTH_MM))]
+    #[arg(long, value_name = "MM", value_parser = number(MIN_LENGTH_MM, MAX_LENGTH_MM))]
     check_length: Option<f64>,
 }
 
@@ -96,14 +93,14 @@ impl Poses {
         if let Some(folder) = &self.pictures {
             draw(&OutputFolder::create(folder)?, head, &geometry)?;
         }
-        let same = before.as_ref().filter(|before| is_of(before, head));
+        let same = before.as_ref().filter(|before| before.sizes() == head.head);
         let scale =
             Scale::of(self.check_length, same, &geometry.file).map_err(|error| content(&error))?;
         if same.is_some_and(|before| before.reference.is_some()) {
             notes.push("the reference plane was measured with other models: run `fringed calibrate` with a plate".into());
         }
         notes.extend(geometry.ground.remedy());
-        let sealed = file(head, &geometry, same).sealed();
+        let sealed = file(head, board, &geometry, same).sealed();
         let (file, bytes) = sealed.map_err(|error| content(&error))?;
         place.save(&bytes, &[], FULL)?;
         let report = Report {
@@ -144,8 +141,8 @@ fn content(words: &str) -> Failure {
 
 /// Draws residuals and coverage.
 fn draw(folder: &OutputFolder, head: &SeenPose, geometry: &Geometry) -> Result<(), Failure> {
-    let size = |(width, height): (u32, u32)| (width as usize, height as usize);
-    let frame = size((head.frames.0, head.frames.1));
+    let [width, height, _, columns, rows] = head.head.map(|size| size as usize);
+    let frame = (width, height);
     let of = |device: usize| -> Vec<&[Arrow]> {
         let poses = geometry.arrows.iter();
         poses.map(|pose| pose[device].as_slice()).collect()
@@ -155,7 +152,7 @@ fn draw(folder: &OutputFolder, head: &SeenPose, geometry: &Geometry) -> Result<(
         ("camera.png", arrows_png("camera", frame, &camera)),
         (
             "projector.png",
-            arrows_png("projector", size(head.raster), &projector),
+            arrows_png("projector", (columns, rows), &projector),
         ),
         ("coverage.png", coverage_png(frame, CELLS, &camera)),
     ];
@@ -164,23 +161,18 @@ fn draw(folder: &OutputFolder, head: &SeenPose, geometry: &Geometry) -> Result<(
         .try_for_each(|(name, bytes)| folder.write(name, bytes))
 }
 
-/// Whether a calibration is of a head whose devices have the sizes of this one's.
-fn is_of(file: &CalibrationFile, head: &SeenPose) -> bool {
-    let (camera, projector) = (&file.camera, &file.projector);
-    let frames = (camera.width, camera.height, camera.bit_depth);
-    frames == head.frames && (projector.width, projector.height) == head.raster
-}
-
 /// The calibration with these models. What the one before has measured on the head stays, without
 /// the reference plane.
-fn file(head: &SeenPose, geometry: &Geometry, before: Option<&CalibrationFile>) -> CalibrationFile {
-    let board = &geometry.file.board;
+fn file(
+    head: &SeenPose,
+    board: &Board,
+    geometry: &Geometry,
+    before: Option<&CalibrationFile>,
+) -> CalibrationFile {
     let from = format!(
-        "{} poses of checker:{}x{}:{}",
+        "{} poses of {}",
         geometry.file.poses.len(),
-        board.columns,
-        board.rows,
-        board.square_mm
+        board::name(board)
     );
     let (camera, projector) = (&geometry.camera, &geometry.projector);
     CalibrationFile {
@@ -189,6 +181,6 @@ fn file(head: &SeenPose, geometry: &Geometry, before: Option<&CalibrationFile>) 
         response: before.and_then(|file| file.response.clone()),
         contrast: before.and_then(|file| file.contrast.clone()),
         geometry: Some(geometry.file.clone()),
-        ..CalibrationFile::of_models(head.frames.2, camera, projector, from)
+        ..CalibrationFile::of_models(head.head[2] as u8, camera, projector, from)
     }
 }

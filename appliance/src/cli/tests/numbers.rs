@@ -235,7 +235,7 @@ fn check(
             let part = SimulatedPart::from_arg_matches(&matches).unwrap();
             if let Err(refused) = part.placed(&HeadConfig::default()) {
                 assert_eq!(refused.exit, Exit::Usage, "{case}");
-                let words = refused.message;
+                let words = refused.to_string();
                 assert!(words.contains(&name), "{case}: {words}");
                 assert!(words.contains(&takes.bounds()[0]), "{case}: {words}");
                 return false;

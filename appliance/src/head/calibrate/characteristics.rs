@@ -6,9 +6,10 @@ use crate::head::calibration::Calibration;
 use crate::head::calibration::file::{
     CalibrationFile, ContrastFile, LevelFile, NoiseFile, TimingFile, inverted,
 };
+use crate::head::doctor::light::{alike, exposed, lit_enough};
+use crate::head::doctor::{Check, Verdict};
 use crate::head::examine::{
-    Delay, LEAST_BRIGHT, LEAST_LIT, Lit, MOST_BY_CONTENT, MOST_SATURATED, SETTLE, Spaced, Stamps,
-    by_content, contrast, noise, pace, refreshes, response,
+    Delay, Lit, SETTLE, Spaced, Stamps, by_content, contrast, noise, pace, refreshes, response,
 };
 use algo::frame::SampleNoise;
 use hal::head::{Head, Timing};
@@ -69,6 +70,19 @@ pub(super) fn scene(words: impl std::fmt::Display) -> Failure {
     Failure::new(Exit::Unavailable, words)
 }
 
+/// Refuses a head that does not pass a check of the doctor.
+fn passed(check: Check) -> Result<(), Failure> {
+    let Check { found, remedy, .. } = check;
+    match check.verdict {
+        Verdict::Pass => Ok(()),
+        _ => Err(Failure::because(
+            Exit::Unavailable,
+            format!("calibrate: {found}"),
+            remedy,
+        )),
+    }
+}
+
 /// Measures what does not depend on the geometry, and gives it to head and `calibration`, which
 /// says what the camera is set to. The response `before` is kept where the new one equals it within
 /// noise. `progress` gets the share done and what is measured next; `notes` remarks for the user.
@@ -98,13 +112,18 @@ pub fn characterise(
     });
     progress(0.05, "light");
     let lit = Lit::take(head, SETTLE)?;
-    bright_enough(&lit)?;
+    passed(lit_enough(&lit))?;
+    passed(exposed(&lit))?;
     progress(0.1, "flip-to-light delay");
     let share = |share: f64| progress(0.1 + 0.28 * share, "flip-to-light delay");
     let delay = Delay::measure(head, &lit, ROUNDS, &share)?
         .filter(|delay| delay.seconds >= LEAST_DELAY_S)
         .ok_or_else(|| {
-            scene("measure the flip-to-light delay: light does not follow the flips: `fringed doctor` says more")
+            Failure::because(
+                Exit::Unavailable,
+                "measure the flip-to-light delay",
+                "light does not follow the flips: `fringed doctor` says more",
+            )
         })?;
     head.set_timing(Timing {
         flip_to_light: delay.duration(),
@@ -112,7 +131,10 @@ pub fn characterise(
     });
     let settle = settled(head);
     progress(0.38, "light by content");
-    alike(by_content(head, settle, &lit)?)?;
+    if let Some(off) = by_content(head, settle, &lit)? {
+        // No response holds for a projector whose light depends on the content of a picture.
+        passed(alike(off))?;
+    }
     let share = |share: f64| progress(0.4 + 0.4 * share, "grey response");
     let mut greys = response(head, settle, &lit, &share)?.to_vec();
     if let Some(before) = before.filter(|before| same(before, &greys)) {
@@ -191,40 +213,4 @@ fn nanoseconds(time: Duration) -> u64 {
 fn same(before: &[f64], now: &[f64]) -> bool {
     let near = |(a, b): (&f64, &f64)| (a - b).abs() < SAME_RESPONSE;
     before.len() == now.len() && before.iter().zip(now).all(near)
-}
-
-fn bright_enough(lit: &Lit) -> Result<(), Failure> {
-    let (share, bright) = (lit.share(), lit.bright() / lit.full_scale());
-    let words = if share < LEAST_LIT {
-        format!(
-            "{:.1} % of the picture is lit: switch the lamp on, open the apertures",
-            share * 100.0
-        )
-    } else if lit.saturated() > MOST_SATURATED {
-        format!(
-            "{:.0} % of the lit pixels are saturated: expose less",
-            lit.saturated() * 100.0
-        )
-    } else if bright < LEAST_BRIGHT {
-        format!(
-            "white is {:.0} % of full scale: expose more",
-            bright * 100.0
-        )
-    } else {
-        return Ok(());
-    };
-    Err(scene(format!(
-        "calibrate: {words}; `fringed doctor` says more"
-    )))
-}
-
-/// Refuses a projector whose light depends on the content of a picture: no response holds for it.
-fn alike(by_content: Option<f64>) -> Result<(), Failure> {
-    match by_content {
-        Some(off) if off.abs() > MOST_BY_CONTENT => Err(scene(format!(
-            "calibrate: the light of a grey depends on the rest of the picture, by {:.1} %: `fringed doctor` says what to switch off",
-            off * 100.0
-        ))),
-        _ => Ok(()),
-    }
 }

@@ -1,6 +1,6 @@
 //! Where the plate lies in the world of the models, if it does not lie in their z = 0.
 
-use super::{PLATE_PITCH, grid};
+use super::PLATE_PITCH;
 use crate::head::calibration::Calibration;
 use crate::head::calibration::geometry::PoseFile;
 use algo::geometry::{FittedMap, Vector};
@@ -21,7 +21,7 @@ impl LaidPlate {
     pub fn of(calibration: &Calibration, corrections: [&FittedMap; 2]) -> Option<Self> {
         let (camera, projector) = (&calibration.camera, &calibration.projector);
         let (mut points, mut squares) = (Vec::new(), 0.0);
-        for (u, v) in grid(calibration) {
+        for (u, v) in calibration.grid() {
             let ray = camera.ray(u, v)?;
             let eye = camera.centre();
             let on_plane = projector.project(eye + ray * (-eye.z / ray.z))?;
@@ -45,7 +45,7 @@ impl LaidPlate {
 
     /// What is wrong, and what to do about it; `ground` is the pose of the board that z = 0 goes
     /// by.
-    pub fn elsewhere(&self, ground: Option<&PoseFile>) -> String {
+    pub fn elsewhere(&self, ground: Option<&PoseFile>) -> (String, String) {
         let Self {
             tilt_degrees,
             height_mm,
@@ -60,10 +60,11 @@ impl LaidPlate {
                 .into(),
         };
         let side = if *height_mm < 0.0 { "below" } else { "above" };
-        format!(
-            "the plate does not lie in the plane z = 0, it is tilted by {tilt_degrees:.1}° against it and on average {:.1} mm {side} it: {remedy}",
+        let problem = format!(
+            "the plate does not lie in the plane z = 0, it is tilted by {tilt_degrees:.1}° against it and on average {:.1} mm {side} it",
             height_mm.abs()
-        )
+        );
+        (problem, remedy)
     }
 }
 

@@ -4,6 +4,7 @@
 
 mod characteristics;
 mod laid_plate;
+mod words;
 
 pub use characteristics::{Characteristics, characterise, off_proportion, settled};
 
@@ -162,17 +163,18 @@ fn reference(
     let corrections = [&vertical.plate.correction, &horizontal.plate.correction];
     let models_off_px = PLATE_PITCH * rms(corrections, calibration);
     if !(models_off_px <= MOST_OFF_PX) {
-        let of_models = || {
-            format!(
-                "the models are off the measured plate by {models_off_px:.1} projector pixels, more than {MOST_OFF_PX}: put the \
-                 plate into the plane z = 0 of the models, or import the models of this head"
-            )
-        };
         let laid = LaidPlate::of(calibration, corrections);
-        let laid = laid.filter(|laid| laid.apart_px <= MOST_OFF_PX);
-        return Err(models(
-            laid.map_or_else(of_models, |laid| laid.elsewhere(ground)),
-        ));
+        let (problem, remedy) = match laid.filter(|laid| laid.apart_px <= MOST_OFF_PX) {
+            Some(laid) => laid.elsewhere(ground),
+            None => (
+                format!(
+                    "the models are off the measured plate by {models_off_px:.1} projector pixels, more than {MOST_OFF_PX}"
+                ),
+                "put the plate into the plane z = 0 of the models, or import the models of this head"
+                    .into(),
+            ),
+        };
+        return Err(Failure::because(Exit::Content, problem, remedy));
     }
     let mut map = |name: &str, plane: &ReferencePlane| {
         let bytes = hal::npy::write(calibration.camera.width(), &plane.map());
@@ -199,19 +201,9 @@ fn reference(
 
 /// RMS of the corrections of projector points over the frame, in their unit.
 fn rms(corrections: [&FittedMap; 2], calibration: &Calibration) -> f64 {
-    let squares = grid(calibration).map(|(u, v)| {
+    let squares = calibration.grid().map(|(u, v)| {
         let square = |of: &FittedMap| of.at(u, v).powi(2);
         corrections.into_iter().map(square).sum::<f64>()
     });
-    (squares.sum::<f64>() / f64::from(GRID * GRID)).sqrt()
-}
-
-/// Places along each side of the frame that are looked at.
-const GRID: u32 = 16;
-
-/// Places all over the frame of a head.
-pub(super) fn grid(calibration: &Calibration) -> impl Iterator<Item = (f64, f64)> {
-    let (width, height, _) = calibration.frames();
-    let place = |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(GRID) * f64::from(pixels);
-    (0..GRID * GRID).map(move |at| (place(at % GRID, width), place(at / GRID, height)))
+    (squares.sum::<f64>() / f64::from(Calibration::GRID.pow(2))).sqrt()
 }

@@ -270,6 +270,19 @@ impl CalibrationFile {
         }
     }
 
+    /// As [`Calibration::sizes`].
+    pub fn sizes(&self) -> [u32; 5] {
+        let (camera, projector) = (&self.camera, &self.projector);
+        let bits = u32::from(camera.bit_depth);
+        [
+            camera.width,
+            camera.height,
+            bits,
+            projector.width,
+            projector.height,
+        ]
+    }
+
     /// Reads and checks the bytes of a file.
     ///
     /// # Errors

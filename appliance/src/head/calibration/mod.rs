@@ -234,13 +234,30 @@ impl Calibration {
         size(&self.projector)
     }
 
+    /// What tells heads apart: columns, rows and bits of the camera's frames, columns and rows of
+    /// the projector.
+    pub fn sizes(&self) -> [u32; 5] {
+        let ((width, height), (columns, rows)) = (size(&self.camera), size(&self.projector));
+        [width, height, u32::from(self.bit_depth), columns, rows]
+    }
+
+    /// Places along each side of the frame in [`Self::grid`].
+    pub const GRID: u32 = 16;
+
+    /// Places all over the frame.
+    pub fn grid(&self) -> impl Iterator<Item = (f64, f64)> {
+        let (width, height) = size(&self.camera);
+        let n = Self::GRID;
+        let place =
+            move |at: u32, pixels: u32| (f64::from(at) + 0.5) / f64::from(n) * f64::from(pixels);
+        (0..n * n).map(move |at| (place(at % n, width), place(at / n, height)))
+    }
+
     /// SHA-256 over everything that heights depend on, so that a recipe made for another
     /// calibration is refused.
     pub fn fingerprint(&self) -> String {
         let mut hash = Sha256::new();
-        let (width, height, bits) = self.frames();
-        let (columns, rows) = self.raster();
-        for number in [width, height, u32::from(bits), columns, rows] {
+        for number in self.sizes() {
             hash.update(number.to_le_bytes());
         }
         for model in [self.camera.model(), self.projector.model()] {

@@ -1,15 +1,15 @@
 //! `commissioning.json`: what the steps have found, so that each survives a restart.
 
+use super::Step;
 use super::outcome::Outcome;
-use super::poses::PoseFile;
-use super::step::Name;
+use super::pose::PoseFile;
 use crate::head::calibrate::Characteristics;
 use crate::head::calibration::geometry::GeometryFile;
 use crate::head::exposing::{Exposing, LEAST_GAIN};
 use crate::head::geometry::covered;
 use crate::head::scale::Scale;
 use crate::storage::folder::{read_whole, write_whole};
-use hal::bounds::{length, shortened, text, within};
+use hal::bounds::{clipped, length, shortened, text, within};
 use hal::model::DeviceModel;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -57,8 +57,8 @@ pub struct Commissioning {
     pub head: [u32; 5],
     /// Exposure and gain that are kept; none = as configured.
     pub exposing: Option<Exposing>,
-    /// How each step ended; one that is not here is still to be done.
-    pub steps: BTreeMap<Name, Outcome>,
+    /// How each step ended, by its name; one that is not here is still to be done.
+    pub steps: BTreeMap<String, Outcome>,
     /// What the step `timing` has measured.
     pub measured: Option<Characteristics>,
     /// The board's name.
@@ -117,6 +117,9 @@ impl Commissioning {
     fn check(&self) -> Result<(), String> {
         if let Some(exposing) = &self.exposing {
             exposing.check(LEAST_GAIN)?;
+        }
+        if let Some(name) = self.steps.keys().find(|name| Step::of(name).is_none()) {
+            return Err(format!("there is no step {:?}", clipped(name)));
         }
         text("board", self.board.as_deref().unwrap_or(""), MAX_BOARD)?;
         length("poses", self.poses.len(), 0, MAX_POSES)?;
@@ -180,7 +183,7 @@ mod tests {
         };
         let mut kept = Commissioning::of([4, 3, 8, 8, 6], Some(exposing));
         let outcome = Outcome::failed("measure", "too dark: expose more");
-        kept.steps.insert(Name::Exposure, outcome);
+        kept.steps.insert("exposure".into(), outcome);
         let pose = PoseFile {
             corners: vec![Some([0.1, 1.0 / 3.0, 0.5]), None],
             step: 14.5,

@@ -3,7 +3,7 @@
 
 use super::file::{Commissioning, Models};
 use super::outcome::Outcome;
-use super::poses::pose_name;
+use super::pose::pose_name;
 use crate::head::board;
 use crate::head::seam;
 use crate::head::standing::Ground;
@@ -79,24 +79,25 @@ impl Models {
     /// What the step that made them has found.
     pub(super) fn found(&self, head: [u32; 5]) -> Outcome {
         let file = &self.geometry;
-        let mut said = vec![format!(
+        let residuals = format!(
             "residuals camera {:.3} px, projector {:.3} px RMS over {} poses; σ of heights {:.4} mm, of a length of 100 mm {:.4} mm",
             file.camera_px,
             file.projector_px,
             file.poses.len(),
             file.height_sigma_mm,
             file.length_sigma_mm
-        )];
+        );
         let ground = self.ground(head);
-        said.extend(ground.as_ref().map(Ground::words));
+        let said = [residuals]
+            .into_iter()
+            .chain(ground.as_ref().map(Ground::words));
         let figures = json!({
             "camera_px": file.camera_px, "projector_px": file.projector_px, "height_sigma_mm": file.height_sigma_mm,
             "length_sigma_mm": file.length_sigma_mm, "poses": file.poses.len(),
         });
         Outcome {
-            said,
-            remedy: ground.and_then(|ground| ground.remedy()),
-            ..Outcome::passed("", figures)
+            remedy: ground.as_ref().and_then(Ground::remedy),
+            ..Outcome::passed(said, figures)
         }
     }
 }

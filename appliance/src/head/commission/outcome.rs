@@ -24,22 +24,22 @@ pub struct Outcome {
 
 impl Outcome {
     /// A step that passed.
-    pub fn passed(said: impl Into<String>, figures: Value) -> Self {
+    pub fn passed(said: impl IntoIterator<Item = String>, figures: Value) -> Self {
         Self {
             at_unix_s: clock::utc_us().unwrap_or(0) / 1_000_000,
             passed: true,
-            said: vec![said.into()],
+            said: said.into_iter().collect(),
             remedy: None,
             figures,
         }
     }
 
     /// A step that failed.
-    pub fn failed(said: impl Into<String>, remedy: &str) -> Self {
+    pub fn failed(said: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             passed: false,
             remedy: Some(remedy.into()),
-            ..Self::passed(said, json!({}))
+            ..Self::passed([said.into()], json!({}))
         }
     }
 
@@ -57,28 +57,23 @@ impl Outcome {
         Self {
             passed: checks.iter().all(|check| check.verdict == Verdict::Pass),
             remedy: failed.map(|check| check.remedy.clone()),
-            said: said.collect(),
-            ..Self::passed("", Value::Object(figures))
+            ..Self::passed(said, Value::Object(figures))
         }
     }
 }
 
 impl From<Failure> for Outcome {
-    fn from(failure: Failure) -> Self {
-        match failure.device {
-            Some(error) => Self::failed(error.problem(), error.remedy()),
-            None => {
-                let (attempt, rest) = parted(&failure.message);
-                Self::failed(attempt, rest)
-            }
-        }
+    fn from(
+        Failure {
+            problem, remedy, ..
+        }: Failure,
+    ) -> Self {
+        let remedy = match remedy.is_empty() {
+            true => problem.clone(),
+            false => remedy,
+        };
+        Self::failed(problem, remedy)
     }
-}
-
-/// What words begin with, and what follows the first colon: what is wrong, or its remedy. Without a
-/// colon both are all of them.
-pub(super) fn parted(words: &str) -> (&str, &str) {
-    words.split_once(": ").unwrap_or((words, words))
 }
 
 #[cfg(test)]
@@ -98,7 +93,7 @@ mod tests {
         let (said, remedy) = both(device.into());
         assert_eq!(said, "opening a: b is not supported");
         assert_eq!(remedy, "free it: end c");
-        let (said, remedy) = both(Failure::new(Exit::Content, "try a: not b: do c"));
+        let (said, remedy) = both(Failure::because(Exit::Content, "try a", "not b: do c"));
         assert_eq!((&*said, &*remedy), ("try a", "not b: do c"));
     }
 }

@@ -2,7 +2,6 @@
 //! from those by the models.
 
 use super::{Check, Checked, Subject};
-use crate::head::calibrate::grid;
 use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::examine::PLATE_PITCH;
 use crate::head::seam;
@@ -51,7 +50,7 @@ fn difference(calibration: &Calibration) -> Option<(f64, f64)> {
     let camera = &calibration.camera;
     let distance = camera.centre().z / -camera.axis().z;
     let (mut squares, mut most, mut points) = (0.0_f64, 0.0_f64, 0_u32);
-    for (u, v) in grid(calibration) {
+    for (u, v) in calibration.grid() {
         let Some(sight) = measured.sight(u, v) else {
             continue;
         };

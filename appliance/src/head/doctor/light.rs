@@ -1,10 +1,10 @@
 //! The doctor's checks of light: there is some, it is exposed well, fringes are sharp, and light is
 //! proportional to grey.
 
-use super::{Check, Checked, Subject};
+use super::{Check, Checked, Subject, Verdict};
 use crate::head::examine::{self, SETTLE};
 use crate::head::examine::{
-    LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, MOST_BY_CONTENT, MOST_SATURATED, by_content,
+    LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, Lit, MOST_BY_CONTENT, MOST_SATURATED, by_content,
 };
 use serde_json::json;
 
@@ -21,37 +21,48 @@ const MOST_NONLINEAR: f64 = 0.03;
 
 pub(super) fn light(subject: &mut Subject<'_>) -> Checked {
     let first = subject.first_light;
-    let share = subject.lit()?.1.share();
-    let mut measured = json!({ "lit_percent": share * 100.0 });
-    let mut found = format!(
-        "{:.1} % of the picture is lit by the projector",
-        share * 100.0
-    );
+    let mut check = lit_enough(subject.lit()?.1);
     if let Some(first) = first {
         let seconds = first.map(|first| first.as_secs_f64());
-        measured["first_light_s"] = json!(seconds);
-        found += &match seconds {
+        check.measured["first_light_s"] = json!(seconds);
+        check.found += &match seconds {
             Some(seconds) => format!(", at the latest {seconds:.1} s after its mode was set"),
             None => format!(
                 ", not within {} s after its mode was set",
                 LONGEST_DARK.as_secs()
             ),
         };
-        if share >= LEAST_LIT && first.is_none() {
+        if check.verdict == Verdict::Pass && first.is_none() {
             let remedy = "the projector needs too long to lock on to its signal: let it stay switched on, and give it the mode that its own description prefers";
-            return Ok(Check::new(found, Some(remedy), measured));
+            return Ok(Check::new(check.found, Some(remedy), check.measured));
         }
     }
+    Ok(check)
+}
+
+/// Judges whether the projector lights the picture.
+pub fn lit_enough(lit: &Lit) -> Check {
+    let share = lit.share();
     let remedy = "switch the projector's lamp on, take off the lens caps, open the apertures, and put a part into view";
-    let dark = share < LEAST_LIT;
-    Ok(Check::new(found, dark.then_some(remedy), measured))
+    Check::new(
+        format!(
+            "{:.1} % of the picture is lit by the projector",
+            share * 100.0
+        ),
+        (share < LEAST_LIT).then_some(remedy),
+        json!({ "lit_percent": share * 100.0 }),
+    )
 }
 
 /// The remedy for a projector that adapts to content.
 const ADAPTS: &str = "switch off what adapts the projector to the content of a picture (CAIC, dynamic contrast, eco mode): for TI's DLPC3470, DLPC3478 and DLPC3479 write head.projector.controller = \"dlpc347x\"";
 
 pub(super) fn exposure(subject: &mut Subject<'_>) -> Checked {
-    let (_, lit) = subject.lit()?;
+    Ok(exposed(subject.lit()?.1))
+}
+
+/// Judges whether white is neither saturated nor dark.
+pub fn exposed(lit: &Lit) -> Check {
     let saturated = lit.saturated();
     let bright = lit.bright() / lit.full_scale();
     let measured =
@@ -62,13 +73,15 @@ pub(super) fn exposure(subject: &mut Subject<'_>) -> Checked {
         saturated * 100.0
     );
     let remedy = if saturated > MOST_SATURATED {
-        Some("lower the gain, the lamp or the aperture, or expose fewer whole refreshes")
+        Some(
+            "expose less: lower the gain, the lamp or the aperture, or expose fewer whole refreshes",
+        )
     } else if bright < LEAST_BRIGHT {
         Some("raise the lamp, open the aperture, or expose more whole refreshes")
     } else {
         None
     };
-    Ok(Check::new(found, remedy, measured))
+    Check::new(found, remedy, measured)
 }
 
 pub(super) fn contrast(subject: &mut Subject<'_>) -> Checked {
@@ -101,13 +114,20 @@ pub(super) fn content(subject: &mut Subject<'_>) -> Checked {
             json!({}),
         ));
     };
-    let found = format!(
-        "the light of a grey between white stripes differs by {:.1} % from that between black ones",
-        off * 100.0
-    );
-    let measured = json!({ "by_content_percent": off * 100.0 });
-    let adapts = (off.abs() > MOST_BY_CONTENT).then_some(ADAPTS);
-    Ok(Check::new(found, adapts, measured))
+    Ok(alike(off))
+}
+
+/// Judges whether a grey gives the same light whatever surrounds it; between white stripes it gives
+/// more than between black ones by the share `off`.
+pub fn alike(off: f64) -> Check {
+    Check::new(
+        format!(
+            "the light of a grey depends on the rest of the picture: between white stripes it differs by {:.1} % from that between black ones",
+            off * 100.0
+        ),
+        (off.abs() > MOST_BY_CONTENT).then_some(ADAPTS),
+        json!({ "by_content_percent": off * 100.0 }),
+    )
 }
 
 pub(super) fn response(subject: &mut Subject<'_>) -> Checked {

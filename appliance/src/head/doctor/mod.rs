@@ -9,7 +9,7 @@ pub mod controller;
 mod delivery;
 mod geometry;
 mod heights;
-mod light;
+pub mod light;
 mod time;
 
 use crate::head::calibration::Calibration;

@@ -199,7 +199,7 @@ impl Opened {
                     _ => self.calibration.exposing = Some(exposing),
                 }
                 self.is_bare(config)
-                    .then(|| devices::uncalibrated().message)
+                    .then(|| devices::uncalibrated().to_string())
             }
             Ok(Some((loaded, calibration))) => {
                 let misfit = misfit(config, &self.calibration, &calibration);
@@ -268,16 +268,14 @@ fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>, String> 
 
 /// Why a stored calibration does not fit the head; `None` if it does.
 fn misfit(config: &HeadConfig, head: &Calibration, stored: &Calibration) -> Option<String> {
-    let sizes = |calibration: &Calibration| (calibration.frames(), calibration.raster());
-    if sizes(head) == sizes(stored) {
+    if head.sizes() == stored.sizes() {
         return None;
     }
     let place = config.calibration.as_deref().unwrap_or(Path::new(""));
     let describe = |calibration: &Calibration| {
-        let ((width, height, bits), projector) = sizes(calibration);
+        let [width, height, bits, columns, rows] = calibration.sizes();
         format!(
-            "a camera of {width}×{height} pixels of {bits} bit and a projector of {}×{}",
-            projector.0, projector.1
+            "a camera of {width}×{height} pixels of {bits} bit and a projector of {columns}×{rows}"
         )
     };
     Some(format!(

@@ -5,7 +5,7 @@ use crate::config::{Backend, HeadConfig};
 use crate::error::Result;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::place::Place;
-use crate::head::commission::{Commissioning, Name, Step, Subject};
+use crate::head::commission::{Commissioning, PLANE, Poses, Subject, TIMING};
 use crate::head::exposing::Exposing;
 use crate::head::live::{Picture, outlines};
 use crate::production::{SIGN_OF_LIFE, Worker, active};
@@ -55,7 +55,8 @@ impl Worker {
 
     fn carry_out(&mut self, job: JobId, asked: &Asked) {
         let mut kept = self.commission.kept();
-        let head = self.head_of();
+        let head = self.opened.calibration.sizes();
+        let name = asked.step.name;
         if kept.head != head {
             // What other devices have shown is of no use here; exposure and gain are those of this
             // camera already.
@@ -63,14 +64,14 @@ impl Worker {
         }
         let before = (self.config.clone(), self.opened.exposing(&self.config));
         if let Err(failure) = self.set_exposing(asked) {
-            kept.steps.insert(asked.step.name(), failure.into());
+            kept.steps.insert(name.into(), failure.into());
             return self.keep(kept);
         }
         let timing = self.opened.head.timing();
-        let (white, ended) = self.step(job, &asked.step, &mut kept);
+        let (white, ended) = self.step(job, asked, &mut kept);
+        let passed = !ended && kept.steps.get(name).is_some_and(|outcome| outcome.passed);
         if let Some((exposing, keep)) = asked.exposing {
-            let outcome = kept.steps.get(&asked.step.name());
-            match !ended && outcome.is_some_and(|outcome| outcome.passed) {
+            match passed {
                 true if keep => keep_exposing(&mut kept, exposing),
                 true => {}
                 false => self.expose_again(before),
@@ -80,20 +81,19 @@ impl Worker {
             // What it has found so far is not kept.
             self.opened.head.set_timing(timing);
             self.tell_head();
-            let name = asked.step.name().word();
             return self.progress.log(&format!("the step {name} was ended"));
         }
         if self.opened.problem.is_none() {
             // The calibration in use stays so until another one is complete.
             self.opened.head.set_timing(timing);
         }
-        if let Step::Pose(board, number) = &asked.step {
-            let pose = kept.poses.get(number);
+        if let Some(Poses::Pose(board, number)) = asked.poses {
+            let pose = kept.poses.get(&number);
             let corners = pose.map_or(&[][..], |pose| &pose.corners);
             let marked: Vec<[f64; 2]> =
                 corners.iter().flatten().map(|[u, v, _]| [*u, *v]).collect();
             if let Some(white) = &white {
-                self.keep_picture(*number, white, &marked);
+                self.keep_picture(number, white, &marked);
             }
             self.progress.log(&format!(
                 "pose {number}: {} of {} corners",
@@ -101,10 +101,8 @@ impl Worker {
                 board.columns * board.rows
             ));
         }
-        let completed = matches!(asked.step, Step::Plane)
-            && kept.steps.get(&Name::Plane).is_some_and(|step| step.passed);
         self.keep(kept);
-        if completed {
+        if passed && name == PLANE {
             self.opened.adopt(&self.config);
         }
         self.tell_condition();
@@ -112,7 +110,12 @@ impl Worker {
 
     /// Runs the step on the head. Returns the white frame of a pose, and whether a stop, the page
     /// or the PLC has ended the step.
-    fn step(&mut self, job: JobId, step: &Step, kept: &mut Commissioning) -> (Option<Frame>, bool) {
+    fn step(
+        &mut self,
+        job: JobId,
+        asked: &Asked,
+        kept: &mut Commissioning,
+    ) -> (Option<Frame>, bool) {
         let before = self.stored();
         let (station, pulse, bar) = (&self.station, &self.pulse, &self.progress);
         let commission = &self.commission;
@@ -145,22 +148,26 @@ impl Worker {
                 calibration: &mut calibration,
                 before,
                 place,
+                poses: asked.poses,
+                white: None,
                 progress: &progress,
             };
-            if !matches!(step, Step::Solve(_)) {
-                return pool.install(|| step.run(&mut subject, kept));
+            let mut work = || pool.install(|| asked.step.run(&mut subject, kept));
+            match asked.poses {
+                // It computes for long, without a device and without telling how far it is.
+                Some(Poses::Solve(_)) => computing.on(|| {
+                    thread::scope(|scope| {
+                        let solving = scope.spawn(work);
+                        while !solving.is_finished() {
+                            progress(0.1, "adjusting the models");
+                            thread::sleep(SIGN_OF_LIFE);
+                        }
+                        solving.join().unwrap_or_else(|panic| resume_unwind(panic));
+                    });
+                }),
+                _ => work(),
             }
-            // It computes for long, without a device and without telling how far it is.
-            computing.on(|| {
-                thread::scope(|scope| {
-                    let solving = scope.spawn(|| pool.install(|| step.run(&mut subject, kept)));
-                    while !solving.is_finished() {
-                        progress(0.1, "adjusting the models");
-                        thread::sleep(SIGN_OF_LIFE);
-                    }
-                    solving.join().unwrap_or_else(|panic| resume_unwind(panic))
-                })
-            })
+            subject.white
         };
         let ended = Arc::new(AtomicBool::new(false));
         let (aborts, refused) = (self.aborts.clone(), ended.clone());
@@ -177,18 +184,7 @@ impl Worker {
     fn stored(&self) -> Option<CalibrationFile> {
         let place = self.config.calibration.as_deref()?;
         let file = Place::at(place).load().ok()??.file;
-        let [width, height, bits, columns, rows] = self.head_of();
-        let camera = (file.camera.width, file.camera.height);
-        let projector = (file.projector.width, file.projector.height);
-        let same = camera == (width, height) && projector == (columns, rows);
-        (same && u32::from(file.camera.bit_depth) == bits).then_some(file)
-    }
-
-    /// The sizes that tell heads apart.
-    fn head_of(&self) -> [u32; 5] {
-        let (width, height, bits) = self.opened.calibration.frames();
-        let (columns, rows) = self.opened.calibration.raster();
-        [width, height, u32::from(bits), columns, rows]
+        (file.sizes() == self.opened.calibration.sizes()).then_some(file)
     }
 
     /// Sets exposure and gain, if the step asks for it.
@@ -211,7 +207,7 @@ impl Worker {
             && let Err(failure) = self.opened.expose(&config, exposing)
         {
             // A head that is lost is opened again by this configuration.
-            self.progress.warn(&failure.message);
+            self.progress.warn(&failure.to_string());
         }
         self.config = config;
     }
@@ -238,7 +234,7 @@ impl Worker {
     pub(in crate::production) fn tell_head(&mut self) {
         let kept = self.commission.kept();
         if self.opened.problem.is_some()
-            && kept.head == self.head_of()
+            && kept.head == self.opened.calibration.sizes()
             && let Some(measured) = &kept.measured
         {
             let head = &mut self.opened.head;
@@ -268,7 +264,7 @@ impl Worker {
 fn keep_exposing(kept: &mut Commissioning, exposing: Exposing) {
     if kept.exposing != Some(exposing) {
         // Response and noise were measured with other ones.
-        kept.steps.remove(&Name::Timing);
+        kept.steps.remove(TIMING);
     }
     kept.exposing = Some(exposing);
 }

@@ -10,7 +10,7 @@ pub mod live;
 mod view;
 
 use crate::head::calibration::Calibration;
-use crate::head::commission::{Commissioning, Laid, Step};
+use crate::head::commission::{Commissioning, Laid, Poses, Step};
 use crate::head::exposing::Exposing;
 use crate::head::live::Outline;
 use crate::production::drift::Trend;
@@ -23,10 +23,12 @@ use std::time::{Duration, Instant};
 const PICTURES: &str = "commissioning";
 
 /// A step that was asked for, with what is set before it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Asked {
     /// The step.
-    pub step: Step,
+    pub step: &'static Step,
+    /// What is done with the poses, where the step is about them.
+    pub poses: Option<Poses>,
     /// Exposure and gain to set first, and whether they are kept.
     pub exposing: Option<(Exposing, bool)>,
 }
@@ -122,7 +124,7 @@ impl Commission {
                 return false;
             }
             inside.running = Some(Running {
-                name: asked.step.name().word(),
+                name: asked.step.name,
                 said: "waiting for the measuring task".into(),
                 share: 0.0,
                 since: Instant::now(),

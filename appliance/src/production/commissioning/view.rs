@@ -1,7 +1,7 @@
 //! The head and its commissioning as `GET /api/head` answers.
 
 use super::{Commission, Inside, OpenHead};
-use crate::head::commission::{Name, Outcome, pose_name};
+use crate::head::commission::{GEOMETRY, Outcome, STEPS, pose_name};
 use crate::station::Snapshot;
 use serde_json::{Value, json};
 
@@ -45,16 +45,23 @@ impl Commission {
 
 fn steps(inside: &Inside, snapshot: &Snapshot) -> Vec<Value> {
     let running = inside.running.as_ref().map(|running| running.name);
-    let mut steps: Vec<Value> = Name::ALL
-        .into_iter()
-        .map(|name| {
-            let outcome = inside.kept.steps.get(&name);
-            let mut step = step(name.word(), outcome, running == Some(name.word()));
+    let mut steps: Vec<Value> = STEPS
+        .iter()
+        .map(|step| {
+            let outcome = inside.kept.steps.get(step.name);
+            let state = match outcome {
+                _ if running == Some(step.name) => "running",
+                None => "open",
+                Some(outcome) if outcome.passed => "done",
+                Some(_) => "failed",
+            };
+            let mut shown = shown(step.name, state, outcome);
             let ground = inside.laid.ground.as_ref();
-            if let (Name::Geometry, None, Some(ground)) = (name, outcome, ground) {
-                (step["said"], step["remedy"]) = (json!([ground.words()]), json!(ground.remedy()));
+            if let (GEOMETRY, None, Some(ground)) = (step.name, outcome, ground) {
+                (shown["said"], shown["remedy"]) =
+                    (json!([ground.words()]), json!(ground.remedy()));
             }
-            step
+            shown
         })
         .collect();
     let state = match (&snapshot.teach, &snapshot.recipe) {
@@ -62,31 +69,21 @@ fn steps(inside: &Inside, snapshot: &Snapshot) -> Vec<Value> {
         (None, Some(_)) => "done",
         (None, None) => "open",
     };
-    let said = snapshot
-        .recipe
-        .as_ref()
-        .map(|recipe| format!("recipe {} ({}) is active", recipe.number, recipe.name));
-    steps.push(json!({
-        "name": "teach", "state": state, "at_unix_s": null, "said": Vec::from_iter(said), "remedy": null, "figures": {},
-    }));
+    let mut teach = shown("teach", state, None);
+    if let Some(recipe) = &snapshot.recipe {
+        let words = format!("recipe {} ({}) is active", recipe.number, recipe.name);
+        teach["said"] = json!([words]);
+    }
+    steps.push(teach);
     steps
 }
 
-fn step(name: &str, outcome: Option<&Outcome>, running: bool) -> Value {
-    let state = match outcome {
-        _ if running => "running",
-        None => "open",
-        Some(outcome) if outcome.passed => "done",
-        Some(_) => "failed",
-    };
-    let Some(outcome) = outcome else {
-        return json!({
-            "name": name, "state": state, "at_unix_s": null, "said": [], "remedy": null, "figures": {},
-        });
-    };
+fn shown(name: &str, state: &str, outcome: Option<&Outcome>) -> Value {
     json!({
-        "name": name, "state": state, "at_unix_s": outcome.at_unix_s, "said": outcome.said, "remedy": outcome.remedy,
-        "figures": outcome.figures,
+        "name": name, "state": state, "at_unix_s": outcome.map(|outcome| outcome.at_unix_s),
+        "said": outcome.map_or(&[][..], |outcome| &outcome.said),
+        "remedy": outcome.and_then(|outcome| outcome.remedy.as_ref()),
+        "figures": outcome.map_or(json!({}), |outcome| outcome.figures.clone()),
     })
 }
 

@@ -2,9 +2,8 @@
 
 pub(super) mod poses;
 
-use crate::head::calibrate::off_proportion;
-use crate::head::calibration::file::{CalibrationFile, MapFile};
-use hal::head::Stamp;
+use crate::head::calibrate::Characteristics;
+use crate::head::calibration::file::CalibrationFile;
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::path::Path;
@@ -34,69 +33,14 @@ impl Report<'_> {
             let _ = writeln!(lines, "{name:9} {found}");
         };
         line("models", format!("of {}", file.models_from));
-        if let Some(timing) = &file.timing {
-            let marks = match timing.stamp {
-                Stamp::ExposureStart => "start of the exposure",
-                Stamp::ExposureEnd => "end of the exposure",
-                Stamp::ReadoutEnd => "end of the readout",
-            };
-            let late = timing
-                .stamp_late_ns
-                .map(|ns| format!(", {} µs late", ns / 1000));
-            let late = late.unwrap_or_default();
-            line("stamps", format!("the camera's mark the {marks}{late}"));
-            if let Some(refreshes) = timing.refreshes {
-                line(
-                    "pace",
-                    format!("no trigger is lost with a pattern in {refreshes} refreshes"),
-                );
-            }
-            line(
-                "delay",
-                format!(
-                    "light comes {:.3} ms after its flip (1 σ {:.2} µs)",
-                    timing.flip_to_light_ns as f64 * 1e-6,
-                    timing.sigma_ns as f64 * 1e-3
-                ),
-            );
+        for (name, found) in Characteristics::of(file)
+            .iter()
+            .flat_map(Characteristics::words)
+        {
+            line(name, found);
         }
-        if let Some(response) = &file.response {
-            line(
-                "response",
-                format!(
-                    "off proportion by {:.1} of 255 levels at most; patterns are corrected for it",
-                    off_proportion(response)
-                ),
-            );
-        }
-        if let Some(noise) = &file.noise {
-            line(
-                "noise",
-                format!(
-                    "{:.2} counts at half of white; {:.2} in the dark, and {:.4} counts² per count of light",
-                    noise.counts, noise.read_counts, noise.shot
-                ),
-            );
-        }
-        if let Some(contrast) = &file.contrast {
-            line("contrast", contrast.words());
-        }
-        if let Some(maps) = &file.reference {
-            let residual = |name: &str, map: &MapFile| {
-                format!(
-                    "{name} {:.5} turn (noise {:.4})",
-                    map.residual_turns, map.noise_turns
-                )
-            };
-            line(
-                "plane",
-                format!(
-                    "residual {}, {}; the models are off it by {:.3} px",
-                    residual("vertical", &maps.vertical),
-                    residual("horizontal", &maps.horizontal),
-                    maps.models_off_px
-                ),
-            );
+        if let Some(plane) = &file.reference {
+            line("plane", plane.words());
         }
         for note in self.notes {
             line("note", note.clone());

@@ -232,8 +232,9 @@ mod tests {
         if cfg!(feature = "gpio") {
             assert_eq!(failure, Ok(()));
         } else {
-            let Failure { exit, message, .. } = failure.unwrap_err();
-            assert_eq!(exit, Exit::Configuration);
+            let failure = failure.unwrap_err();
+            let message = failure.to_string();
+            assert_eq!(failure.exit, Exit::Configuration);
             assert!(message.starts_with("lines: this fringed was built without gpio: "));
             assert!(message.ends_with("--features gpio`"), "{message}");
         }
@@ -247,10 +248,10 @@ mod tests {
         config.head.trigger.line = Some("GPIO17".into());
         assert_eq!(leave_lines_idle(&config), Ok(()));
         config.head.backend = Backend::Rpi;
-        let trigger = leave_lines_idle(&config).unwrap_err().message;
+        let trigger = leave_lines_idle(&config).unwrap_err().to_string();
         config.lines.chip = "no such chip".into();
         config.lines.fault = Some("GPIO5".into());
-        let both = leave_lines_idle(&config).unwrap_err().message;
+        let both = leave_lines_idle(&config).unwrap_err().to_string();
         if cfg!(feature = "gpio") {
             assert!(trigger.contains("GPIO17"), "{trigger}");
             assert!(both.contains("GPIO17") && both.contains("GPIO5"), "{both}");
@@ -265,7 +266,8 @@ mod tests {
             backend: Backend::Rpi,
             ..HeadConfig::default()
         };
-        let lacks = |config: &HeadConfig| built_for_head(config).map_err(|failure| failure.message);
+        let lacks =
+            |config: &HeadConfig| built_for_head(config).map_err(|failure| failure.to_string());
         let free = lacks(&config);
         config.trigger.line = Some("GPIO24".into());
         let triggered = lacks(&config);
