@@ -10,12 +10,14 @@ mod names;
 mod pose;
 mod tree;
 
+use algo::calibration::Pose;
+use algo::geometry::Vector;
 use clap::ValueEnum as _;
 use hal::bounds::shortened;
 use hal::model::DeviceModel;
 use matrix::Matrix;
 use names::{ALONE, CAMERA, Device, PLATE, POSE, PROJECTOR, Row};
-use pose::Pose;
+use pose::{HALF_TURN, OWN};
 use std::fs;
 use std::path::Path;
 use tree::Node;
@@ -100,13 +102,13 @@ pub fn from_two(
                 return Ok((lens, None));
             }
             let mm_per_unit = millimetres(tree, declared)?;
-            Ok((lens, Some(Pose::read(own, POSE, mm_per_unit, &mut notes)?)))
+            Ok((lens, Some(pose::read(own, POSE, mm_per_unit, &mut notes)?)))
         })
     };
     // A camera without a pose is the world that the projector's is in.
     let (camera_lens, own_pose) = one(camera, &CAMERA, sizes.camera, false)?;
     let (projector_lens, pose) = one(projector, &PROJECTOR, sizes.projector, true)?;
-    let pose = pose.unwrap_or_else(Pose::identity);
+    let pose = pose.unwrap_or(OWN);
     let world = World::of(own_pose, declared).map_err(|error| failed(camera, &error))?;
     let projector_pose = match world.is_stated {
         true => turned(pose, declared),
@@ -151,9 +153,9 @@ pub fn from_one(path: &Path, sizes: Sizes, declared: Declared) -> Result<Models,
             Some(projector) if !names::has(tree, POSE) => projector,
             _ => tree,
         };
-        let between = Pose::read(between, POSE, mm_per_unit, &mut notes)?;
+        let between = pose::read(between, POSE, mm_per_unit, &mut notes)?;
         let plate = names::has(tree, PLATE)
-            .then(|| Pose::read(tree, PLATE, mm_per_unit, &mut notes))
+            .then(|| pose::read(tree, PLATE, mm_per_unit, &mut notes))
             .transpose()
             .map_err(|error| {
                 format!(
@@ -185,8 +187,8 @@ impl World {
     /// across the camera's axis, at the declared distance or nowhere yet.
     fn of(stated: Option<Pose>, declared: Declared) -> Result<Self, String> {
         let across = |distance| Pose {
-            translation_mm: [0.0, 0.0, distance],
-            ..Pose::identity().about_x()
+            shift: Vector::new(0.0, 0.0, distance),
+            ..HALF_TURN
         };
         match (stated, declared.plane_at) {
             (Some(_), Some(_)) => {
@@ -266,14 +268,13 @@ fn right_size(tree: &Node, size: (u32, u32)) -> Result<(), String> {
 
 /// The same pose, with the world turned round where its z points away from the head.
 fn turned(pose: Pose, declared: Declared) -> Pose {
-    if declared.z_away {
-        pose.about_x()
-    } else {
-        pose
+    match declared.z_away {
+        true => pose.after(&HALF_TURN),
+        false => pose,
     }
 }
 
-/// A device that stands at the origin.
+/// A device whose pose is not known yet.
 fn lens(tree: &Node, device: &str, rows: &[Row]) -> Result<DeviceModel, String> {
     let (name, found, distortions) =
         names::first(tree, rows).map_err(|error| format!("{error}: the {device}'s matrix, 3×3"))?;
@@ -309,26 +310,23 @@ fn lens(tree: &Node, device: &str, rows: &[Row]) -> Result<DeviceModel, String> 
     for (to, from) in distortion.iter_mut().zip(&all.numbers) {
         *to = *from;
     }
-    let Pose {
-        rotation,
-        translation_mm,
-    } = Pose::identity();
     Ok(DeviceModel {
         fx,
         fy,
         cx,
         cy,
         distortion,
-        rotation,
-        translation_mm,
+        rotation: [0.0; 9],
+        translation_mm: [0.0; 3],
     })
 }
 
 /// The same device in this pose.
 fn at(device: DeviceModel, pose: &Pose) -> DeviceModel {
+    let ([a, b, c], shift) = (pose.rows, pose.shift);
     DeviceModel {
-        rotation: pose.rotation,
-        translation_mm: pose.translation_mm,
+        rotation: [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z],
+        translation_mm: [shift.x, shift.y, shift.z],
         ..device
     }
 }
