@@ -251,7 +251,8 @@ pub(super) fn greys(
     levels.map(move |level| Raster::uniform(columns, rows, level))
 }
 
-pub(super) fn median(mut values: Vec<f64>) -> f64 {
+/// The median; 0 of nothing.
+pub fn median(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)
 }

@@ -3,6 +3,7 @@
 
 use super::patterns::{SHIFTS, Show};
 use super::picture::Picture;
+use crate::head::examine::median;
 use serde::Serialize;
 
 /// Bins of the histogram.
@@ -43,14 +44,7 @@ impl Figures {
         }
         let pixels = picture.counts.len().max(1) as f64;
         let mut sorted = picture.counts.clone();
-        let mut share = |part: f64| {
-            let last = sorted.len().saturating_sub(1);
-            let at = (part * last as f64) as usize;
-            match sorted.is_empty() {
-                true => 0.0,
-                false => f64::from(*sorted.select_nth_unstable(at).1) / full,
-            }
-        };
+        let mut share = |part: f64| quantile(&mut sorted, part) / full;
         let (dark, brightest) = (share(0.01), share(1.0 - GLINTS));
         Self {
             histogram,
@@ -72,11 +66,15 @@ fn steepest(picture: &Picture) -> f64 {
     for row in counts.chunks(width.max(1)) {
         slopes.extend(row.windows(3).map(|three| three[2].abs_diff(three[0])));
     }
-    if slopes.is_empty() {
-        return 0.0;
+    quantile(&mut slopes, 1.0 - STEEPEST) / 2.0
+}
+
+/// The value below which lies this part of all values, 0 if there is none.
+fn quantile(values: &mut [u16], part: f64) -> f64 {
+    match values.len().checked_sub(1) {
+        None => 0.0,
+        Some(last) => f64::from(*values.select_nth_unstable((part * last as f64) as usize).1),
     }
-    let at = ((1.0 - STEEPEST) * (slopes.len() - 1) as f64) as usize;
-    f64::from(*slopes.select_nth_unstable(at).1) / 2.0
 }
 
 /// The last picture of each shift of the fringes of each pitch.
@@ -133,18 +131,12 @@ impl Fringes {
             return None;
         }
         let least = 4.0 * LIT * f64::from(a.full_scale);
-        let mut shares: Vec<f64> = (0..a.counts.len())
-            .filter_map(|at| {
-                let [a, b, c, d] = [a, b, c, d].map(|picture| f64::from(picture.counts[at]));
-                let sum = a + b + c + d;
-                (sum >= least).then(|| 2.0 * (a - c).hypot(b - d) / sum)
-            })
-            .collect();
-        if shares.is_empty() {
-            return Some(0.0);
-        }
-        let middle = shares.len() / 2;
-        Some(*shares.select_nth_unstable_by(middle, f64::total_cmp).1)
+        let shares = (0..a.counts.len()).filter_map(|at| {
+            let [a, b, c, d] = [a, b, c, d].map(|picture| f64::from(picture.counts[at]));
+            let sum = a + b + c + d;
+            (sum >= least).then(|| 2.0 * (a - c).hypot(b - d) / sum)
+        });
+        Some(median(shares.collect()))
     }
 }
 
