@@ -28,15 +28,12 @@ impl Doctor {
     /// If the head cannot be opened, or a check failed (69).
     pub fn run(&self) -> Result<()> {
         let options = &self.measuring;
-        let mut config = options.files.configuration()?;
+        let why = "doctor: a recording cannot be examined";
+        let mut config = options.live(self.scenario.as_ref(), why)?;
         config.head = options.files.head(&config);
-        if let Some(scenario) = &self.scenario {
-            (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
+        if self.scenario.is_some() {
             // The stored calibration belongs to the configured head.
             config.head.calibration = None;
-        }
-        if config.head.backend == Backend::Replay {
-            return Exit::Usage.fail("doctor: a recording cannot be examined: configure another head or name a scenario with --scenario");
         }
         let progress = options.output.progress();
         let on_progress =

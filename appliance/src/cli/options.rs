@@ -1,8 +1,8 @@
 //! Options that several commands share, in groups.
 
 use super::numbers::{address, number};
-use crate::config::{Config, HeadConfig};
-use crate::error::{Exit, Result};
+use crate::config::{Backend, Config, HeadConfig};
+use crate::error::{Exit, Failure, Result};
 use crate::storage::state::StateFolder;
 use crate::system::progress::Progress;
 use clap::{Arg, Args, Command};
@@ -123,6 +123,24 @@ impl Files {
         match self.state_folder() {
             Ok(state) => config.head_in(&state),
             Err(_) => config.head.clone(),
+        }
+    }
+}
+
+impl Measuring {
+    /// The configuration, with a simulated head of a scenario if one is named.
+    ///
+    /// # Errors
+    /// If the file is missing or wrong; if the head plays recordings, and `why` not (64).
+    pub fn live(&self, scenario: Option<&PathBuf>, why: &str) -> Result<Config, Failure> {
+        let mut config = self.files.configuration()?;
+        if let Some(scenario) = scenario {
+            (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
+        }
+        let remedy = "configure another head or name a scenario with --scenario";
+        match config.head.backend {
+            Backend::Replay => Err(Failure::because(Exit::Usage, why, remedy)),
+            Backend::Sim | Backend::Rpi => Ok(config),
         }
     }
 }

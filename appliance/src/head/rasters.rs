@@ -101,12 +101,7 @@ pub fn fringes(
     shifts: usize,
     calibration: &Calibration,
 ) -> Result<Vec<Raster>, Error> {
-    let function = seam::fringes(true, size, f64::from(pitch)).map_err(|error| {
-        Error::unsupported(
-            format!("a pitch of {pitch} px: {error}, which"),
-            "use a projector of more pixels",
-        )
-    })?;
+    let function = seam::fringes(true, size, f64::from(pitch))?;
     let shots: Vec<Shot> = Shot::level(1.0, shifts).collect();
     rasters(&function, &shots, calibration)
 }

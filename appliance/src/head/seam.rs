@@ -4,6 +4,7 @@
 use algo::frame::{FrameError, FrameView, Samples};
 use algo::geometry::{FittedMap, Pinhole, PinholeModel, Reference};
 use algo::pattern::{PhaseFunction, PhaseFunctionError, Shot, Waveform};
+use hal::error::Error;
 use hal::frame::Frame;
 use hal::model::{DeviceModel, PlaneModel};
 use hal::replay::recording::{PatternSpec, RecordedFrame};
@@ -98,17 +99,26 @@ pub fn phase_function(
 /// Vertical or else horizontal fringes of `pitch` pixels on a projector of `(columns, rows)`.
 ///
 /// # Errors
-/// If the projector is too small for them.
+/// `Unsupported` if the projector is too small for them.
 pub fn fringes(
     vertical: bool,
     (columns, rows): (u32, u32),
     pitch: f64,
-) -> Result<PhaseFunction, PhaseFunctionError> {
+) -> Result<PhaseFunction, Error> {
     let (width, height) = (columns as usize, rows as usize);
-    match vertical {
+    let function = match vertical {
         true => PhaseFunction::vertical(width, height, f64::from(columns) / pitch),
         false => PhaseFunction::horizontal(width, height, f64::from(rows) / pitch),
-    }
+    };
+    function.map_err(|error| small(pitch, &error))
+}
+
+/// That a projector is too small for fringes of `pitch` pixels.
+pub fn small(pitch: f64, problem: &dyn std::fmt::Display) -> Error {
+    Error::unsupported(
+        format!("fringes of {pitch} px: {problem}, which"),
+        "use a projector of more pixels",
+    )
 }
 
 /// What a recorded frame shows.

@@ -6,7 +6,7 @@ mod report;
 
 use super::numbers::number;
 use super::options::Measuring;
-use crate::config::{Backend, HeadConfig};
+use crate::config::HeadConfig;
 use crate::error::{Exit, Failure};
 use crate::head::calibrate::{Basis, make};
 use crate::head::calibration::file::CalibrationFile;
@@ -85,16 +85,8 @@ impl Calibrate {
         if self.poses.given() {
             return self.poses.run(options);
         }
-        let mut config = options.files.configuration()?;
-        if let Some(scenario) = &self.scenario {
-            (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));
-        }
-        if config.head.backend == Backend::Replay {
-            return Err(Failure::new(
-                Exit::Usage,
-                "calibrate: a recording carries its own calibration: configure another head or name a scenario with --scenario",
-            ));
-        }
+        let why = "calibrate: a recording carries its own calibration";
+        let config = options.live(self.scenario.as_ref(), why)?;
         // Locked until all is written: no station measures meanwhile with the calibration that is
         // being replaced.
         let state = StateFolder::open(&options.files.state_folder()?)?;
@@ -112,13 +104,13 @@ impl Calibrate {
             ..head
         };
         let mut opened = pool.install(|| backend::open(&bare, &on_progress))?;
-        let basis = self.basis(&opened, before.as_ref(), &mut notes)?;
+        let (basis, response) = self.basis(&opened, before.as_ref(), &mut notes)?;
         if basis.plate {
             let stage = opened.stage.clone();
             pool.install(|| lay_plate(stage.as_ref(), &mut notes))?;
         }
         let on_progress = |share: f64, words: &str| progress.tell(0.3 + 0.7 * share, words);
-        let made = pool.install(|| make(&mut opened.head, basis, &on_progress));
+        let made = pool.install(|| make(&mut opened.head, basis, response, &on_progress));
         progress.clear();
         let mut made = made?;
         let place = self.poses.out.as_deref().map_or(place, Place::at);
@@ -133,13 +125,13 @@ impl Calibrate {
         options.output.answer(&report.json(), || report.table())
     }
 
-    /// What the calibration starts from.
+    /// What the calibration starts from, and the response of the one before.
     fn basis(
         &self,
         opened: &Opened,
         before: Option<&CalibrationFile>,
         notes: &mut Vec<String>,
-    ) -> Result<Basis, Failure> {
+    ) -> Result<(Basis, Option<Vec<f64>>), Failure> {
         let mut calibration = opened.calibration.clone();
         let content = |error: String| Failure::new(Exit::Content, error);
         let stored = before
@@ -167,29 +159,26 @@ impl Calibrate {
             geometry = file.geometry.clone();
             calibration.camera = stored.camera.clone();
             calibration.projector = stored.projector.clone();
-        } else if opened.problem.is_some() {
+        } else if opened.problem.is_some() || opened.stage.is_none() {
             let words = "calibrate: the models of camera and projector are not known yet: make them with --board and --poses, or import them with \
                          --camera and --projector, or with --models";
             return Err(Failure::new(Exit::Usage, words));
         }
-        if models_from == OF_SCENARIO && opened.stage.is_none() {
-            let message = "calibrate: the models of this head are not known: make them with --board and --poses, or with OpenCV and name them with --camera and --projector";
-            return Err(Failure::new(Exit::Usage, message));
-        }
         calibration.response = None;
-        Ok(Basis {
+        let heights_by = match self.no_plate {
+            true => None,
+            false => self.heights_by.or(before.map(|file| file.heights_by)),
+        };
+        let basis = Basis {
             calibration,
             models_from,
-            response: stored.and_then(|(file, _)| file.response.clone()),
             geometry,
             temperature_c: self.temperature.filter(|celsius| celsius.is_finite()),
             plate: !self.no_plate,
-            heights_by: match (self.no_plate, self.heights_by, before) {
-                (true, ..) => HeightsBy::Models,
-                (false, Some(chosen), _) => chosen,
-                (false, None, before) => before.map_or(HeightsBy::Models, |file| file.heights_by),
-            },
-        })
+            heights_by: heights_by.unwrap_or(HeightsBy::Models),
+        };
+        let response = stored.and_then(|(file, _)| file.response.clone());
+        Ok((basis, response))
     }
 
     /// The models that the options name, and their files' names.

@@ -65,11 +65,6 @@ impl Characteristics {
     }
 }
 
-/// A scene in front of the head, or settings of the head, that do not allow a calibration.
-pub(super) fn scene(words: impl std::fmt::Display) -> Failure {
-    Failure::new(Exit::Unavailable, words)
-}
-
 /// Refuses a head that does not pass a check of the doctor.
 fn passed(check: Check) -> Result<(), Failure> {
     let Check { found, remedy, .. } = check;
@@ -144,7 +139,7 @@ pub fn characterise(
         );
         greys = before;
     }
-    calibration.response = inverted(&greys).map_err(scene)?;
+    calibration.response = inverted(&greys).map_err(Exit::Unavailable.failure())?;
     progress(0.8, "noise");
     let noise = noise(head, settle, &lit)?;
     calibration.noise_counts = noise.counts;

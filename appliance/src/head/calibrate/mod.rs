@@ -17,7 +17,6 @@ use super::examine::{PLATE_PITCH, ReferencePlane, plate};
 use crate::error::{Exit, Failure};
 use algo::geometry::FittedMap;
 use algo::pattern::PhaseFunction;
-use characteristics::scene;
 use hal::head::Head;
 use hal::model::PlaneModel;
 use laid_plate::LaidPlate;
@@ -36,8 +35,6 @@ pub struct Basis {
     pub calibration: Calibration,
     /// Where the models come from.
     pub models_from: String,
-    /// The response of the previous calibration.
-    pub response: Option<Vec<f64>>,
     /// How the models were made, where they come from poses of a board.
     pub geometry: Option<GeometryFile>,
     /// Temperature of the head.
@@ -61,24 +58,22 @@ pub struct Made {
     pub notes: Vec<String>,
 }
 
-/// Models that are those of another head.
-fn models(words: impl std::fmt::Display) -> Failure {
-    Failure::new(Exit::Content, words)
-}
-
-/// Measures a calibration. `progress` gets the share done and what is measured next. Afterwards the
-/// head's timing is the calibrated one.
+/// Measures a calibration; `response` is that of the previous one. `progress` gets the share done
+/// and what is measured next. Afterwards the head's timing is the calibrated one.
 ///
 /// # Errors
 /// The error of a device; if too little light comes back, or too much, or there is no flat plate
 /// (69); if the models do not fit it (65).
-pub fn make(head: &mut Head, basis: Basis, progress: &dyn Fn(f64, &str)) -> Result<Made, Failure> {
-    let mut basis = basis;
+pub fn make(
+    head: &mut Head,
+    mut basis: Basis,
+    response: Option<Vec<f64>>,
+    progress: &dyn Fn(f64, &str),
+) -> Result<Made, Failure> {
     let mut notes = Vec::new();
     let early = |share: f64, words: &str| progress(0.75 * share, words);
     let calibration = &mut basis.calibration;
-    let before = basis.response.take();
-    let measured = characterise(head, calibration, before, &mut notes, &early)?;
+    let measured = characterise(head, calibration, response, &mut notes, &early)?;
     let late = |share: f64, words: &str| progress(0.75 + 0.25 * share, words);
     let mut made = complete(head, &measured, basis, &late)?;
     notes.append(&mut made.notes);
@@ -98,7 +93,9 @@ pub fn complete(
     progress: &dyn Fn(f64, &str),
 ) -> Result<Made, Failure> {
     let mut calibration = basis.calibration;
-    measured.adopt(&mut calibration).map_err(models)?;
+    measured
+        .adopt(&mut calibration)
+        .map_err(Exit::Content.failure())?;
     let mut notes = Vec::new();
     let mut maps = Vec::new();
     let reference = if basis.plate {
@@ -131,7 +128,7 @@ pub fn complete(
             basis.models_from,
         )
     };
-    let (file, bytes) = file.sealed().map_err(scene)?;
+    let (file, bytes) = file.sealed().map_err(Exit::Unavailable.failure())?;
     Ok(Made {
         file,
         bytes,

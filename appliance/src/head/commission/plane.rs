@@ -90,7 +90,6 @@ impl Commissioning {
         let basis = Basis {
             calibration: calibration.map_err(|error| missing(&error))?,
             models_from,
-            response: None,
             geometry,
             temperature_c: None,
             plate: true,

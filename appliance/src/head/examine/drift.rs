@@ -40,8 +40,7 @@ impl CrossedFringes {
         progress: &dyn Fn(),
     ) -> Result<Self, Error> {
         let mut take = |vertical: bool| {
-            let function = seam::fringes(vertical, head.projector_size(), PITCH);
-            let function = function.map_err(|error| small(&error.to_string()))?;
+            let function = seam::fringes(vertical, head.projector_size(), PITCH)?;
             let shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
             let said = |_| progress();
             let taken = scan::take(head, calibration, &function, &shots, timeout, &said)?;
@@ -59,17 +58,10 @@ impl CrossedFringes {
         let phases = |at: usize| -> Result<PhaseMap, Error> {
             let (range, shots, taken) = &self.0[at];
             let map = Scan::new(*range, shots, taken).and_then(|scan| scan.phases(None));
-            map.map_err(|error| small(&error))
+            map.map_err(|error| seam::small(PITCH, &error))
         };
         let devices = (&calibration.camera, &calibration.projector);
         let (vertical, horizontal) = (phases(0)?, phases(1)?);
         Ok(Epipolar::of(devices, [&vertical, &horizontal], [PITCH; 2]))
     }
-}
-
-fn small(problem: &str) -> Error {
-    Error::unsupported(
-        format!("fringes of {PITCH} px: {problem}, which"),
-        "use a projector of more pixels",
-    )
 }

@@ -56,13 +56,12 @@ fn calibrated((head, calibration): &mut (Head, Calibration)) -> Made {
     let basis = Basis {
         calibration: calibration.clone(),
         models_from: "scenario".into(),
-        response: None,
         geometry: None,
         temperature_c: None,
         plate: false,
         heights_by: HeightsBy::Models,
     };
-    make(head, basis, &|_, _| ()).unwrap()
+    make(head, basis, None, &|_, _| ()).unwrap()
 }
 
 #[test]
