@@ -20,7 +20,6 @@ use crate::head::live::Show;
 use crate::production::commissioning::Asked;
 use crate::station::{Event, Request as Command};
 use crate::system::priority;
-use hal::bounds::{Bound, Fields};
 
 /// The number of a live picture, which its figures have as well.
 const NUMBER: HeaderName = HeaderName::from_static("x-picture");
@@ -146,7 +145,7 @@ fn geometry(site: &Site, wanted: Action) -> Result<Poses, String> {
         }
         Action::Forget { pose } => Poses::Forget(pose.map(within).transpose()?),
         Action::Solve(solving) => {
-            Fields.check("", &solving)?;
+            solving.check()?;
             Poses::Solve(solving)
         }
     })

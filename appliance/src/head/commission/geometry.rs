@@ -15,6 +15,7 @@ use crate::head::scan::take_loaded;
 use crate::head::seam;
 use algo::calibration::{Board, Picture};
 use hal::bounded;
+use hal::bounds::{Bound as _, Fields};
 use hal::error::Error;
 use serde_json::json;
 use std::time::Duration;
@@ -30,6 +31,16 @@ bounded! {
         pub check_length_mm: Option<f64> = MIN_LENGTH_MM..=MAX_LENGTH_MM,
         /// σ of the board's scale, parts per million.
         pub board_sigma_ppm: f64 = 0.0..=MAX_SIGMA_PPM,
+    }
+}
+
+impl Solving {
+    /// Checks the bounds.
+    ///
+    /// # Errors
+    /// In words that name the key.
+    pub fn check(&self) -> Result<(), String> {
+        Fields.check("", self)
     }
 }
 
