@@ -1,6 +1,7 @@
 //! What ends a command early: a message for people and an exit code after sysexits.
 
 use crate::station::error_code;
+// For `web`, which imports nothing of `hal`.
 pub use hal::bounds::shortened;
 use hal::error::{DeviceKind, Error};
 use std::fmt::Display;

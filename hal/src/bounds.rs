@@ -41,6 +41,8 @@ pub const FINGERPRINT_DIGITS: usize = 64;
 pub const LAST_SECOND: u64 = 253_402_300_799;
 /// Largest σ of a height or a length, mm: no head is worse.
 pub const MAX_SIGMA_MM: f64 = 1000.0;
+/// Longest name of a device, line, part, program, recording or file, characters.
+pub const MAX_NAME: usize = 255;
 /// Longest path that the system opens.
 pub const MAX_PATH: usize = 4096;
 /// Most characters of a message about a file.
@@ -116,6 +118,12 @@ pub trait Bound<T> {
 impl<T: PartialOrd + Debug + Copy> Bound<T> for RangeInclusive<T> {
     fn check(&self, key: &str, value: &T) -> Result<(), String> {
         within(key, *value, *self.start(), *self.end())
+    }
+}
+
+impl<T: PartialOrd + Debug + Copy, const N: usize> Bound<[T; N]> for RangeInclusive<T> {
+    fn check(&self, key: &str, values: &[T; N]) -> Result<(), String> {
+        values.iter().try_for_each(|value| self.check(key, value))
     }
 }
 

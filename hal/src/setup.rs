@@ -11,15 +11,13 @@ use std::time::Duration;
 use serde::{Deserialize, Serialize};
 
 use crate::bounded;
-use crate::bounds::{Longest, MAX_PATH, MAX_SIDE};
+use crate::bounds::{Longest, MAX_NAME, MAX_PATH, MAX_SIDE};
 use crate::camera::Starts;
 
 /// Least gain of a real camera: the amplifier of a sensor does not make less of its samples.
 pub const NO_GAIN: f64 = 1.0;
 /// Largest gain of any camera.
 pub const MOST_GAIN: f64 = 64.0;
-/// Longest name of a device or a line, characters.
-const MAX_NAME: usize = 255;
 
 bounded! {
     /// Which camera, and how it exposes. Nothing changes while it runs. The defaults are those of

@@ -2,12 +2,13 @@
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, READY, long, pause, trigger};
-use crate::written::program;
+use crate::written::{FRINGED, program};
 use appliance::history::{Entry, Filter, Reader, Writer};
 use appliance::station::Verdict;
 use std::fs;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
+use tests::program::Program;
 use tests::random::Random;
 
 /// Longest wait for the history's own threads.
@@ -154,6 +155,16 @@ fn the_history_is_shown_and_exported_while_the_station_runs() {
             .count(),
         1
     );
+    // A disk that is full is told, and a pager that was closed is none of the user's concern.
+    let into = |end: &str| {
+        let (fringed, state) = (FRINGED, state.display());
+        let words = format!("set -o pipefail; {fringed} history --csv --state {state} {end}");
+        Program::at("bash").run(&["-c", &words])
+    };
+    let full = into("> /dev/full");
+    assert_eq!(full.code, 73, "{}", full.stderr);
+    assert!(full.stderr.contains("free space"), "{}", full.stderr);
+    into("| true").succeeded();
     let json = history(&["--json", "--recipe", "1"]).succeeded().stdout;
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["results"][0]["verdict"], "FAIL");

@@ -1,4 +1,5 @@
-//! The project's plan: which code may import which. Each test fails with the text of its rule.
+//! Rules that are read from the project's files: which code may import which, how long files are,
+//! what documents name. Each test fails with the text of its rule.
 
 use std::fs;
 use std::path::Path;

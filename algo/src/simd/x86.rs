@@ -1,15 +1,13 @@
 //! What the back-ends of x86-64 share: their proof, the operations that both have by the same
 //! instructions, and prefetching.
 
-use super::lanes::{Lanes, Scaled};
+use super::lanes::{LINE, Lanes, Scaled};
 use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
 
 /// Rows of a single level are prefetched this many samples ahead, which is about 350 ns of work
 /// with AVX2; rows of several levels half as far, which takes as long. docs/design.md has what
 /// other distances cost.
 pub(super) const AHEAD: usize = 512;
-/// Bytes of a cache line.
-const LINE: usize = 64;
 
 /// Prefetches the cache lines of the block `after` samples behind the one at `at`: there are more
 /// rows than the processor's own prefetcher follows. A block is `PIXELS` samples.

@@ -8,6 +8,7 @@ use crate::history::{Entry, Filter, HistoryError, Reader, time};
 use crate::station::Verdict;
 use crate::station::control::MAX_RECIPE;
 use crate::system::journal::{self, Severity};
+use std::io::{self, BufWriter, StdoutLock, Write};
 
 /// Show or export stored results, newest first.
 #[derive(Debug, clap::Args)]
@@ -105,12 +106,52 @@ impl History {
     }
 
     fn csv(&self, reader: &Reader, filter: &Filter) -> Result<()> {
-        let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-        match reader.csv(filter, &mut out) {
-            // A pipe that the reader has closed is not an error.
-            Err(error) if !error.reason.starts_with("write as CSV") => Err(error.into()),
-            _ => Ok(()),
+        let mut pipe = Pipe {
+            out: io::stdout().lock(),
+            failure: None,
+        };
+        let mut out = BufWriter::new(&mut pipe);
+        let read = reader.csv(filter, &mut out);
+        // The pipe notes its failure.
+        let _ = out.flush();
+        drop(out);
+        match pipe.failure {
+            // The reader of a pipe that is closed wants no more.
+            Some((io::ErrorKind::BrokenPipe, _)) => Ok(()),
+            Some((_, error)) => {
+                let failed = Exit::CannotCreate.advising("write the history as CSV", "free space");
+                Err(failed(error))
+            }
+            None => read.map_err(Failure::from),
         }
+    }
+}
+
+/// Standard output, and why it first failed.
+struct Pipe<'a> {
+    out: StdoutLock<'a>,
+    failure: Option<(io::ErrorKind, String)>,
+}
+
+impl Pipe<'_> {
+    fn note<T>(&mut self, done: io::Result<T>) -> io::Result<T> {
+        if let Err(error) = &done {
+            let failure = (error.kind(), error.to_string());
+            self.failure.get_or_insert(failure);
+        }
+        done
+    }
+}
+
+impl Write for Pipe<'_> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let done = self.out.write(bytes);
+        self.note(done)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        let done = self.out.flush();
+        self.note(done)
     }
 }
 

@@ -132,7 +132,7 @@ impl Measuring {
     ///
     /// # Errors
     /// If the file is missing or wrong; if the head plays recordings, and `why` not (64).
-    pub fn live(&self, scenario: Option<&PathBuf>, why: &str) -> Result<Config, Failure> {
+    pub fn live(&self, scenario: Option<&PathBuf>, why: &str) -> Result<Config> {
         let mut config = self.files.configuration()?;
         if let Some(scenario) = scenario {
             (config.head.backend, config.head.scenario) = (Backend::Sim, Some(scenario.clone()));

@@ -152,10 +152,8 @@ impl RecipeCommand {
 /// The recipes of the station's state.
 fn store(files: &Files) -> Result<Store> {
     let folder = files.state_folder()?.join("recipes");
-    Store::open(&folder).map_err(|error| {
-        let what = format!("use the recipes in {}", folder.display());
-        Failure::because(Exit::CannotCreate, what, error)
-    })
+    let what = format!("use the recipes in {}", folder.display());
+    Store::open(&folder).map_err(Exit::CannotCreate.because(what))
 }
 
 /// The state folder, locked against stations.

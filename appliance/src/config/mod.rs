@@ -11,6 +11,7 @@ use crate::head::calibration::place::IN_STATE;
 use crate::head::commission::Commissioning;
 use crate::head::exposing::Exposing;
 use crate::head::placed::Placed;
+use crate::station::control::MAX_RECIPE;
 use hal::bounded;
 use hal::bounds::{Bound, Fields, Longest, MAX_PATH, clipped, length, shortened};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
@@ -71,7 +72,7 @@ bounded! {
     /// The station.
     pub struct StationConfig: Default {
         /// The recipe that is loaded at the start.
-        pub recipe: u16 = 1..=9999 => 1,
+        pub recipe: u16 = 1..=MAX_RECIPE => 1,
         /// Whether the PLC may teach.
         pub teach_allowed: bool,
         /// PLC_HEARTBEAT may stand still for this long, s.
@@ -252,7 +253,7 @@ impl Config {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Config, Failure> {
+    fn read(text: &str) -> Result<Config> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fringed.toml");
         fs::write(&path, text).unwrap();

@@ -49,8 +49,11 @@ pub enum MeasureError {
     Impossible(String),
 }
 
-fn impossible(error: impl std::fmt::Display) -> MeasureError {
-    MeasureError::Impossible(error.to_string())
+impl MeasureError {
+    /// [`Self::Impossible`] of an error.
+    pub fn impossible(error: impl std::fmt::Display) -> Self {
+        Self::Impossible(error.to_string())
+    }
 }
 
 impl CalibratedHead<'_> {
@@ -85,10 +88,10 @@ impl CalibratedHead<'_> {
     ) -> Result<Measured, MeasureError> {
         let (calibration, timeout) = (self.calibration, self.timeout);
         let triangulator = calibration.triangulator(function.clone(), None);
-        let triangulator = triangulator.map_err(impossible)?;
+        let triangulator = triangulator.map_err(MeasureError::impossible)?;
         illumination.load(self.head, function, shots, calibration)?;
         let frames = scan::take_loaded(self.head, shots.len(), timeout, progress)?;
-        let scan = Scan::new(function.range(), shots, &frames).map_err(impossible)?;
+        let scan = Scan::new(function.range(), shots, &frames).map_err(MeasureError::impossible)?;
         let scan = scan.trusting(calibration.least_modulation());
         let reference;
         let map = match map {
@@ -98,7 +101,7 @@ impl CalibratedHead<'_> {
             }
             map => map.filter(|_| scan.needs_map()),
         };
-        let mut phases = scan.phases(map).map_err(impossible)?;
+        let mut phases = scan.phases(map).map_err(MeasureError::impossible)?;
         let noise = scan.noise(calibration, &phases);
         let heights = scan.heights(&triangulator, Some(noise), &mut phases);
         Ok(Measured {

@@ -4,7 +4,7 @@ use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use super::channel::Channel;
 use super::code::CodeAlone;
 use super::standing::Ground;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use algo::calibration::{
     Adjusted, Arrow, Board, CalibrationError, FoundBoard, Fringes, MeasuredBoard, Picture,
     Prediction, Residuals, View, calibrate, look,
@@ -37,7 +37,7 @@ impl SeenPose {
     ///
     /// # Errors
     /// What the recording lacks, or why the pose cannot be used (65).
-    pub fn of(recording: &Recording, name: &str, board: &Board) -> Result<Self, Failure> {
+    pub fn of(recording: &Recording, name: &str, board: &Board) -> Result<Self> {
         let fringes = |vertical: bool| {
             let wanted = |spec: &PatternSpec| match spec {
                 PatternSpec::Vertical { fringes } if vertical => Some(*fringes),
@@ -57,10 +57,8 @@ impl SeenPose {
         };
         let (vertical, horizontal) = (fringes(true)?, fringes(false)?);
         let mut levels = Vec::new();
-        let mut decoded = |pattern| {
-            let decoded = decoded(recording, pattern, &mut levels);
-            decoded.map_err(|error| Failure::new(Exit::Content, error))
-        };
+        let mut decoded =
+            |pattern| decoded(recording, pattern, &mut levels).map_err(Exit::Content.failure());
         let (vertical_map, horizontal_map) = (decoded(vertical.0)?, decoded(horizontal.0)?);
         let projector = &recording.projector;
         let raster = (projector.width, projector.height);
@@ -129,7 +127,7 @@ fn decoded(
 ///
 /// # Errors
 /// By their size and their picture, the camera sees less than a head can, or more.
-fn sized(board: &Board, found: &FoundBoard, columns: u32) -> Result<(), Failure> {
+fn sized(board: &Board, found: &FoundBoard, columns: u32) -> Result<()> {
     let square = board.square;
     let across = square * f64::from(columns) / found.step;
     let (distance, unit, factor) = match across {

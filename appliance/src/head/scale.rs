@@ -17,7 +17,7 @@ const MOST_SCALE: f64 = 0.01;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
-    /// Nobody checked the size of the board's squares.
+    /// The size of the board's squares was not checked.
     Unchecked,
     /// With a length on the board.
     Length,

@@ -127,7 +127,7 @@ fn measure_about(
     folder: &Path,
     recipe: Option<&Recipe>,
     known: Option<Known>,
-) -> Result<Measurement, Failure> {
+) -> Result<Measurement> {
     let measured = match (recording.frames.is_empty(), &known) {
         (false, _) => of_fringes(recording, recipe, known.as_ref()),
         (true, None) => coded::measure(recording).map_err(AnyError::from),

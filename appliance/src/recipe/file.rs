@@ -5,6 +5,7 @@ use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::CalibrationSigma;
 use crate::head::exposing::Exposing;
+use crate::station::control::MAX_RECIPE;
 use algo::pattern::Shot;
 use algo::phase::LeastModulation;
 use algo::units::AbsolutePhase;
@@ -47,7 +48,7 @@ bounded! {
         /// SHA-256 over all members with this field zeroed, 64 hexadecimal digits.
         pub fingerprint: String,
         /// 1–9999.
-        pub number: u16 = 1..=9999,
+        pub number: u16 = 1..=MAX_RECIPE,
         /// The key that a PLC may select by, at most 32 ASCII characters.
         pub part_number: String = Longest(LONGEST_PART_NUMBER),
         /// For people.

@@ -6,6 +6,7 @@
 
 use super::RecipeFile;
 use super::store::{ChangeError, LoadError, Store, is_sound, manifest_at, write};
+use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::{name_also, remove, rename_whole, sync_folder_of};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -62,7 +63,7 @@ impl Store {
     /// The lowest number without a stored or deleted recipe; `None` if all 9999 are taken.
     pub fn free(&self) -> Option<u16> {
         let taken = self.numbers_with(&["", ".previous", ".kept"]);
-        (1..=9999).find(|number| taken.binary_search(number).is_err())
+        (1..=MAX_RECIPE).find(|number| taken.binary_search(number).is_err())
     }
 
     /// Exchanges the newest and the previous generation, or restores a deleted recipe. A second

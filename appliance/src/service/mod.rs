@@ -16,7 +16,7 @@ pub use caller::Caller;
 use rooms::Rooms;
 
 use crate::config::{Backend, Config};
-use crate::error::{Exit, Failure, Result};
+use crate::error::{Exit, Result};
 use crate::head::calibration::Current;
 use crate::history::{self, Bounds, History, Numbering};
 use crate::modbus;
@@ -97,7 +97,7 @@ impl Daemon {
             Some(path) => path.clone(),
             None => StateFolder::default_path()?,
         };
-        // Whatever is said from here on, nothing waits for whoever reads it.
+        // From here on no thread waits until stderr is read.
         stderr::detach();
         crate::system::memory::give_back();
         let state = StateFolder::open(&path)?;
@@ -180,17 +180,16 @@ impl Daemon {
 /// Waits for the measuring task's head, or for the stop signal: where parts are placed in front of
 /// a simulated head.
 fn opened_head(
-    opening: &mpsc::Receiver<Result<Option<Stage>, Failure>>,
+    opening: &mpsc::Receiver<Result<Option<Stage>>>,
     stop: &StopSignal,
-) -> Result<Option<Stage>, Failure> {
+) -> Result<Option<Stage>> {
     loop {
         match opening.recv_timeout(POLLING) {
             Ok(outcome) => return outcome,
             Err(mpsc::RecvTimeoutError::Timeout) if stop.has_arrived() => return Ok(None),
             Err(mpsc::RecvTimeoutError::Timeout) => {}
             Err(mpsc::RecvTimeoutError::Disconnected) => {
-                let message = "the measuring task ended before its head was open";
-                return Err(Failure::new(Exit::Software, message));
+                return Exit::Software.fail("the measuring task ended before its head was open");
             }
         }
     }

@@ -144,7 +144,7 @@ mod tests {
         zip.finish().unwrap().into_inner()
     }
 
-    fn unpack(bytes: &[u8]) -> Result<Unpacked, Failure> {
+    fn unpack(bytes: &[u8]) -> Result<Unpacked> {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("part.zip");
         fs::write(&path, bytes).unwrap();

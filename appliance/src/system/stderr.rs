@@ -49,7 +49,7 @@ pub(super) fn show(bar: Bar) {
     }
 }
 
-/// From now on nobody waits for stderr.
+/// From now on no caller waits until its lines are written.
 pub fn detach() {
     STDERR.waiting().detached = true;
 }
@@ -91,7 +91,7 @@ struct Waiting {
     handed: u64,
     /// How much of what was handed over is done.
     done: u64,
-    /// Whether nobody waits.
+    /// Whether callers go on before their lines are written.
     detached: bool,
 }
 
@@ -132,7 +132,7 @@ impl Outbox {
         self.hand_over(waiting);
     }
 
-    /// Whoever shows a bar does not wait for it; whoever removes it may print next.
+    /// Showing a bar does not wait; removing it does, since its caller may print next.
     fn show(&self, bar: Bar) {
         let removed = bar.is_none();
         let mut waiting = self.waiting();
@@ -143,7 +143,7 @@ impl Outbox {
         }
     }
 
-    /// Wakes the thread, and waits until it is done unless nobody waits.
+    /// Wakes the thread, and waits until it is done unless detached.
     fn hand_over(&self, mut waiting: MutexGuard<'_, Waiting>) {
         waiting.handed += 1;
         self.changed.notify_all();

@@ -16,7 +16,7 @@ use super::gate;
 use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::recipe::replace;
-use crate::station::control::{ERROR_RESET, TRIGGER};
+use crate::station::control::{ERROR_RESET, MAX_RECIPE, TRIGGER};
 use crate::station::{Client, ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
 
 /// The answer to an accepted order; its progress comes with the events.
@@ -148,9 +148,9 @@ pub(super) async fn teach(
     Path(number): Path<u16>,
     request: Asked<Body>,
 ) -> Result<Accepted> {
-    if !(1..=9999).contains(&number) {
+    if !(1..=MAX_RECIPE).contains(&number) {
         return Err(Problem::unfit(format!(
-            "recipe {number}: numbers are 1 to 9999"
+            "recipe {number}: numbers are 1 to {MAX_RECIPE}"
         )));
     }
     // Without a head the station says why below.

@@ -19,6 +19,7 @@ use crate::recipe::exchange::Destination;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
 use crate::recipe::{self, ChangeError, LoadError, Recipe, RecipeFile, Store};
+use crate::station::control::MAX_RECIPE;
 
 impl From<LoadError> for Problem {
     fn from(error: LoadError) -> Self {
@@ -221,9 +222,12 @@ pub(super) async fn import(
     Query(to): Query<Destination>,
     request: Request<Body>,
 ) -> Result<(StatusCode, Extension<Changed>, Json<Value>)> {
-    if let Some(number) = to.number.filter(|number| !(1..=9999).contains(number)) {
+    if let Some(number) = to
+        .number
+        .filter(|number| !(1..=MAX_RECIPE).contains(number))
+    {
         return Err(Problem::unfit(format!(
-            "import as recipe {number}: numbers are 1 to 9999"
+            "import as recipe {number}: numbers are 1 to {MAX_RECIPE}"
         )));
     }
     let upload = body::file(&site, request.into_body()).await?;

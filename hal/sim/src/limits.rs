@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use super::scenario::Scenario;
-use hal::bounds::{Bound, Fields, within};
+use hal::bounds::{Bound, Fields};
 
 /// Most rays of a light transport; so many take minutes.
 const MAX_RAYS: u64 = 1 << 28;
@@ -41,34 +41,9 @@ impl Scenario {
         self.part.check()
     }
 
-    /// Checks the times and faults; the error names the key and its range.
+    /// Checks the times of a camera against each other; the error names the key.
     fn check_timing(&self) -> Result<(), String> {
-        let (timing, faults) = (&self.timing, &self.faults);
-        let believed = timing.calibrated_flip_to_light_us.unwrap_or(0);
-        let believed_late = timing.calibrated_stamp_late_us.unwrap_or(0);
-        for (key, us, most) in [
-            ("timing.readout_us", timing.readout_us, 1e6),
-            ("timing.start_up_us", timing.start_up_us, 1e7),
-            ("timing.stays_on_s", timing.stays_on_s, 1e3),
-            ("timing.dead_us", timing.dead_us, 1e6),
-            ("timing.flip_to_light_us", timing.flip_to_light_us, 1e6),
-            ("timing.copy_us", timing.copy_us, 1e6),
-            ("timing.first_light_us", timing.first_light_us, 6e7),
-            ("timing.calibrated_flip_to_light_us", believed, 1e6),
-            ("timing.stamp_late_us", timing.stamp_late_us, 1e6),
-            ("timing.calibrated_stamp_late_us", believed_late, 1e6),
-            ("timing.camera_period_us", timing.camera_period_us, 1e7),
-            ("timing.camera_phase_us", timing.camera_phase_us, 1e7),
-            ("faults.flip_jitter_us", faults.flip_jitter_us, 1e6),
-            ("faults.late_news_us", faults.late_news_us, 1e7),
-            ("faults.late_frame_us", faults.late_frame_us, 1e7),
-            ("faults.stamp_jitter_us", faults.stamp_jitter_us, 1e6),
-            ("faults.trigger_jitter_us", faults.trigger_jitter_us, 1e6),
-            ("faults.long_pulse_us", faults.long_pulse_us, 1e6),
-            ("faults.stall_us", faults.stall_us, 1e7),
-        ] {
-            within(key, us as f64, 0.0, most)?;
-        }
+        let timing = &self.timing;
         if timing.by_projector && timing.camera_period_us > 0 {
             return Err(
                 "timing.camera_period_us: write 0 for a camera that the projector triggers (timing.by_projector)".into(),
@@ -84,17 +59,6 @@ impl Scenario {
                 busy.as_nanos().div_ceil(1000)
             ));
         }
-        within(
-            "faults.late_refreshes",
-            f64::from(faults.late_refreshes),
-            0.0,
-            1000.0,
-        )?;
-        within(
-            "faults.drift_ppm",
-            f64::from(faults.drift_ppm),
-            -100_000.0,
-            100_000.0,
-        )
+        Ok(())
     }
 }

@@ -3,9 +3,9 @@
 use std::path::{Component, Path};
 
 use super::failure::Wrong;
-use super::manifest::{CodeEntry, MAX_NAME, Manifest, PatternEntry};
+use super::manifest::{CodeEntry, Manifest, PatternEntry};
 use crate::bounds::{
-    Bound, Fields, MAX_FRINGES, MAX_HARMONIC, MAX_RANGE_MM, MAX_SIDE, clipped, fingerprint, within,
+    Bound, Fields, MAX_FRINGES, MAX_HARMONIC, MAX_NAME, MAX_SIDE, clipped, fingerprint, within,
 };
 use crate::model::DeviceModel;
 
@@ -43,14 +43,12 @@ fn values(manifest: &Manifest) -> Result<(), String> {
             return Err(format!("{device}.model.{name} is not finite"));
         }
     }
-    if let Some([lowest, highest]) = manifest.range_mm {
-        within("range_mm", lowest, -MAX_RANGE_MM, MAX_RANGE_MM)?;
-        within("range_mm", highest, -MAX_RANGE_MM, MAX_RANGE_MM)?;
-        if lowest >= highest {
-            return Err(format!(
-                "range_mm is [{lowest:?}, {highest:?}]: write two heights in mm, the lower one first"
-            ));
-        }
+    if let Some([lowest, highest]) = manifest.range_mm
+        && lowest >= highest
+    {
+        return Err(format!(
+            "range_mm is [{lowest:?}, {highest:?}]: write two heights in mm, the lower one first"
+        ));
     }
     within("the number of notes", manifest.notes.len(), 0, MAX_NOTES)?;
     if let Some(recipe) = &manifest.recipe {

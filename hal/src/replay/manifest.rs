@@ -8,8 +8,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use super::failure::Wrong;
 use crate::bounded;
 use crate::bounds::{
-    Fields, Longest, MAX_EXPOSURE_US, MAX_NOISE_COUNTS, MAX_SHIFT_TURNS, MAX_SIDE,
-    MIN_NOISE_COUNTS, RATIOS,
+    Fields, Longest, MAX_EXPOSURE_US, MAX_NAME, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS,
+    MAX_SIDE, MIN_NOISE_COUNTS, RATIOS,
 };
 use crate::model::{DeviceModel, PlaneModel};
 
@@ -21,8 +21,6 @@ pub const FORMAT: &str = "fringed-recording";
 pub const VERSION: u64 = 3;
 /// Longest description and note, characters.
 const MAX_TEXT: usize = 4096;
-/// Longest part id and file name, characters.
-pub(crate) const MAX_NAME: usize = 255;
 
 bounded! {
     /// The whole of `recording.json`.
@@ -46,7 +44,7 @@ bounded! {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub black: Option<String>,
         #[serde(default, skip_serializing_if = "Option::is_none")]
-        pub range_mm: Option<[f64; 2]>,
+        pub range_mm: Option<[f64; 2]> = -MAX_RANGE_MM..=MAX_RANGE_MM,
         #[serde(default, skip_serializing_if = "Option::is_none")]
         pub exposure_us: Option<f64> = 1e-3..=MAX_EXPOSURE_US,
         #[serde(default, skip_serializing_if = "Option::is_none")]

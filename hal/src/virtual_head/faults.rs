@@ -16,13 +16,13 @@ bounded! {
         /// Chance that a flip comes 1…`late_refreshes` refreshes late.
         pub late_flip: f64 = 0.0..=1.0,
         /// Refreshes that a late flip misses, at most.
-        pub late_refreshes: u32,
+        pub late_refreshes: u32 = 0..=1000,
         /// Jitter of the flips' stamps, ± µs.
-        pub flip_jitter_us: u64,
+        pub flip_jitter_us: u64 = 0..=1_000_000,
         /// Chance that a flip is reported late, by up to `late_news_us`. Its stamp stays true.
         pub late_news: f64 = 0.0..=1.0,
         /// How late, at most, µs.
-        pub late_news_us: u64,
+        pub late_news_us: u64 = 0..=10_000_000,
         /// Chance that the projector's driver stamps a flip one refresh late; never two in a row,
         /// which could not be distinguished from a longer flip-to-light delay.
         pub wrong_stamp: f64 = 0.0..=1.0,
@@ -35,26 +35,26 @@ bounded! {
         /// Chance that a frame arrives late, by up to `late_frame_us`.
         pub late_frame: f64 = 0.0..=1.0,
         /// How late, at most, µs.
-        pub late_frame_us: u64,
+        pub late_frame_us: u64 = 0..=10_000_000,
         /// Jitter of the frames' stamps, ± µs.
-        pub stamp_jitter_us: u64,
+        pub stamp_jitter_us: u64 = 0..=1_000_000,
         /// Chance that a trigger is lost.
         pub lost_trigger: f64 = 0.0..=1.0,
         /// Longest delay of an exposure after its trigger, or after its time by the camera's
         /// period, µs.
-        pub trigger_jitter_us: u64,
+        pub trigger_jitter_us: u64 = 0..=1_000_000,
         /// Chance that a trigger's pulse, and so the exposure, lasts too long, by up to
         /// `long_pulse_us`: the computer was busy.
         pub long_pulse: f64 = 0.0..=1.0,
         /// How much too long, at most, µs.
-        pub long_pulse_us: u64,
+        pub long_pulse_us: u64 = 0..=1_000_000,
         /// By how much the period of a camera that runs by itself is longer than stated, parts per
         /// million.
-        pub drift_ppm: i32,
+        pub drift_ppm: i32 = -100_000..=100_000,
         /// Chance that a wait lasts too long, by up to `stall_us`: the computer was busy.
         pub stall: f64 = 0.0..=1.0,
         /// How long, at most, µs.
-        pub stall_us: u64,
+        pub stall_us: u64 = 0..=10_000_000,
         /// The trigger's wire is open: no pulse arrives.
         pub wire_open: bool,
         /// After how many flips the projector stops flipping; 0 = never.

@@ -1,6 +1,7 @@
 //! The components of a part's motion.
 
-/// A component of a part's motion.
+/// A component of a part's motion, in the order of
+/// [`Placed::component`](crate::inspect::Placed::component).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",

@@ -1,8 +1,9 @@
-//! What gauges that are not linear in height share: models of the errors of extremes and shares.
+//! What gauges that are not linear in height share: the model of the error of an extreme, estimates
+//! of true values, and the variance by the motion.
 //!
 //! Cells do not share pixels, so the errors of their means are independent; each has σ² = σ_z² /
-//! side². The models need the cells' values only; `tests/suite/precision.rs` compares them with
-//! simulation.
+//! side². The models need the cells' values only; `tests/suite/repeatability.rs` compares them with
+//! the scatter of repeated measurements.
 
 use super::cells::Cell;
 use super::reading::Found;

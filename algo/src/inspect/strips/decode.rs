@@ -24,9 +24,10 @@ pub enum Input<'a> {
 #[derive(Debug)]
 pub struct PhasePlan {
     pub decoder: Decoder,
-    /// The noise of one sample, and σ in counts with which σ_z of the compared part as taught has
-    /// the same RMS.
+    /// The noise of one sample.
     pub noise: SampleNoise,
+    /// σ of a sample in counts, the same at all pixels, with which σ_z of the compared part as
+    /// taught has the same RMS.
     pub noise_counts: f64,
     /// The same as [`crate::pipeline::CubicInput::noise`].
     pub variance_scale: f32,

@@ -4,8 +4,7 @@
 use crate::accuracy::{Resolution, Share, budget, resolution};
 use crate::experiment::{OpticsKind, Scene};
 use appliance::cli::{Output, Threads, names};
-use appliance::error::{Exit, Failure, Result};
-use appliance::head::calibrated::MeasureError;
+use appliance::error::{Exit, Result};
 use appliance::output::picture::height_png;
 use appliance::storage::folder::OutputFolder;
 use serde::Serialize;
@@ -44,9 +43,7 @@ impl Accuracy {
     pub fn run(&self) -> Result<()> {
         let folder = OutputFolder::create(&self.out)?;
         let pool = self.threads.pool(0)?;
-        let failed = |error: MeasureError| {
-            Failure::because(Exit::Software, "measure the simulated parts", error)
-        };
+        let failed = Exit::Software.because("measure the simulated parts");
         let (mut errors, mut dents) = (Vec::new(), Vec::new());
         for optics in OPTICS {
             for part in PARTS {
@@ -56,7 +53,7 @@ impl Accuracy {
                 };
                 let found = pool
                     .install(|| budget(&scene, optics, SEED))
-                    .map_err(failed)?;
+                    .map_err(&failed)?;
                 let [width, height] = found.size;
                 let name = format!("bias-{part}-{}.png", optics.word());
                 folder.write(&name, &height_png(width, height, &found.bias_mm))?;
@@ -65,7 +62,7 @@ impl Accuracy {
             if let Some(scene) = Scene::named(PARTS[0]) {
                 dents.extend(
                     pool.install(|| resolution(&scene, optics))
-                        .map_err(failed)?,
+                        .map_err(&failed)?,
                 );
             }
         }

@@ -3,7 +3,7 @@
 
 use crate::benchmark::{self, Effort, Machine, Report, Study};
 use appliance::cli::{Output, Threads, names};
-use appliance::error::{Exit, Failure, Result};
+use appliance::error::{Exit, Result};
 use appliance::storage::folder::OutputFolder;
 use std::path::PathBuf;
 
@@ -78,8 +78,6 @@ impl Bench {
     }
 
     fn measure(&self, on_progress: &(dyn Fn(f64, &str) + Sync)) -> Result<Report> {
-        let software =
-            |what: &'static str| move |error: String| Failure::because(Exit::Software, what, error);
         let wanted = |what| self.what.is_none_or(|asked| asked == what);
         let pool = self.threads.pool(0)?;
         let mut report = Report {
@@ -90,7 +88,7 @@ impl Bench {
         };
         if wanted(What::Kernel) {
             let table = benchmark::kernel_table(&self.effort(), on_progress);
-            report.kernel = Some(table.map_err(software("time the kernels"))?);
+            report.kernel = Some(table.map_err(Exit::Software.because("time the kernels"))?);
         }
         if wanted(What::Accuracy) {
             let study = if self.quick {
@@ -99,7 +97,8 @@ impl Bench {
                 Study::full()
             };
             let points = pool.install(|| study.run(on_progress));
-            report.accuracy = Some(points.map_err(software("measure run time against error"))?);
+            report.accuracy =
+                Some(points.map_err(Exit::Software.because("measure run time against error"))?);
         }
         if wanted(What::Budget) {
             let cameras = if self.quick {
@@ -112,7 +111,8 @@ impl Bench {
                 let each = |&camera| benchmark::budgets(camera, &effort, on_progress);
                 cameras.iter().map(each).collect::<Result<Vec<_>, _>>()
             });
-            let budgets = budgets.map_err(software("measure from trigger to verdict"))?;
+            let budgets =
+                budgets.map_err(Exit::Software.because("measure from trigger to verdict"))?;
             report.budget = Some(budgets.concat());
         }
         Ok(report)

@@ -7,6 +7,7 @@ use appliance::cli::{Files, Quiet, Threads, names};
 use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibration::Calibration;
 use appliance::head::capture::Shown;
+use appliance::head::scan::take_loaded;
 use appliance::production::backend::{self, Opened};
 use hal::bounds::MAX_FRINGES;
 use hal::frame::Frame;
@@ -117,11 +118,7 @@ impl Capture {
                     self.folder.join(format!("pose-{pose:02}"))
                 }
             };
-            let indices: Vec<usize> = (0..plan.rasters.len()).collect();
-            let mut taken = Vec::with_capacity(indices.len());
-            opened
-                .head
-                .acquire(&indices, TIMEOUT, &mut |_, frame| taken.push(frame))?;
+            let taken = take_loaded(&mut opened.head, plan.rasters.len(), TIMEOUT, &|_| ())?;
             let count = taken.len();
             if self.poses > 1 {
                 std::fs::create_dir_all(&self.folder)
@@ -191,8 +188,7 @@ impl Plan {
             None => "a head of fringed".into(),
         };
         let named: Vec<(String, Frame)> = self.files.iter().cloned().zip(frames).collect();
-        let refused = |error: recorder::RecorderError| Failure::new(Exit::CannotCreate, error);
-        recorder::write_frames(&recording, folder, &named).map_err(refused)
+        recorder::write_frames(&recording, folder, &named).map_err(Exit::CannotCreate.failure())
     }
 }
 

@@ -80,7 +80,8 @@ impl Runner {
     pub fn new(scene: &Scene, optics: OpticsKind) -> Result<Self, MeasureError> {
         let scenario = scene.scenario(optics, 1);
         let (head, stage) = sim::head(&scenario)?;
-        let calibration = Calibration::of_scenario(stage.scenario()).map_err(rig)?;
+        let calibration =
+            Calibration::of_scenario(stage.scenario()).map_err(MeasureError::impossible)?;
         Ok(Self {
             head,
             truth: stage.truth(),
@@ -98,7 +99,7 @@ impl Runner {
     pub fn run(&mut self, method: Method, seed: u64) -> Result<Run, MeasureError> {
         self.learn_with(seed);
         let (function, map) = self.pattern(method)?;
-        let shots = method.shots(&function).map_err(rig)?;
+        let shots = method.shots(&function).map_err(MeasureError::impossible)?;
         let mut measured = self.measure(stream(method), &function, &shots, map.as_deref())?;
         if map.is_none() {
             reject_too_fine(&mut measured.phases);
@@ -141,7 +142,7 @@ impl Runner {
             Method::Paper { image_pitch } => {
                 let ((columns, rows), map) = (self.size(), self.paper_map()?);
                 let function = paper::adapt(&map, columns, rows, f64::from(image_pitch));
-                (function.map_err(rig)?, None)
+                (function.map_err(MeasureError::impossible)?, None)
             }
             Method::Better(sequence) => {
                 let better = self.better()?;
@@ -191,7 +192,7 @@ impl Runner {
 
     fn vertical(&self, fringes: f64) -> Result<PhaseFunction, MeasureError> {
         let (columns, rows) = self.size();
-        PhaseFunction::vertical(columns, rows, fringes).map_err(rig)
+        PhaseFunction::vertical(columns, rows, fringes).map_err(MeasureError::impossible)
     }
 
     /// The preliminary measurement of both adaptive methods: one vertical sequence at 20 px pitch.
@@ -206,7 +207,7 @@ impl Runner {
     }
 
     fn first(&self) -> Result<Preliminary, MeasureError> {
-        Preliminary::new(self.size()).map_err(rig)
+        Preliminary::new(self.size()).map_err(MeasureError::impossible)
     }
 
     /// The paper's preliminary maps: vertical and horizontal at 20 px, each measured by itself.
@@ -217,7 +218,8 @@ impl Runner {
         let vertical = self.preliminary()?;
         let (columns, rows) = self.size();
         let fringes = rows as f64 / PRELIMINARY_PITCH;
-        let function = PhaseFunction::horizontal(columns, rows, fringes).map_err(rig)?;
+        let function =
+            PhaseFunction::horizontal(columns, rows, fringes).map_err(MeasureError::impossible)?;
         let shots = Sequence::geometric(function.range(), 3, 4);
         let horizontal = self.measure(HORIZONTAL_STREAM, &function, &shots, None)?;
         let phases = [&vertical.phases.phase[..], &horizontal.phases.phase];
@@ -233,7 +235,7 @@ impl Runner {
         }
         let preliminary = self.preliminary()?;
         let made = self.first()?.adapt(&preliminary, &self.calibration);
-        let found = Arc::new(made.map_err(rig)?);
+        let found = Arc::new(made.map_err(MeasureError::impossible)?);
         Ok(Arc::clone(self.learnt.better.insert(found)))
     }
 
@@ -244,15 +246,13 @@ impl Runner {
         }
         let better = self.better()?;
         let map = Some(&better.expected[..]);
-        let shots = BetterSequence::TWELVE.shots().map_err(rig)?;
+        let shots = BetterSequence::TWELVE
+            .shots()
+            .map_err(MeasureError::impossible)?;
         let measured = self.measure(GOLDEN_STREAM, &better.function, &shots, map)?;
         let found = Arc::new(measured.phases.phase);
         Ok(Arc::clone(self.learnt.golden.insert(found)))
     }
-}
-
-fn rig(error: impl std::fmt::Display) -> MeasureError {
-    MeasureError::Impossible(error.to_string())
 }
 
 /// Smallest image pitch along u that the paper's chain resolves, camera pixels.

@@ -7,10 +7,9 @@ mod report;
 use super::numbers::number;
 use super::options::Measuring;
 use crate::config::HeadConfig;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::head::calibrate::{Basis, make};
-use crate::head::calibration::file::CalibrationFile;
-use crate::head::calibration::file::{COLDEST_C, HOTTEST_C};
+use crate::head::calibration::file::{COLDEST_C, CalibrationFile, HOTTEST_C};
 use crate::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
 use crate::head::calibration::place::Place;
 use crate::head::calibration::{Calibration, HeightsBy};
@@ -80,7 +79,7 @@ impl Calibrate {
     /// # Errors
     /// If a model cannot be imported (65, 66), the head cannot be measured (69), or the calibration
     /// cannot be written (73). The calibration before is then unchanged.
-    pub fn run(&self) -> Result<(), Failure> {
+    pub fn run(&self) -> Result<()> {
         let options = &self.measuring;
         if self.poses.given() {
             return self.poses.run(options);
@@ -131,9 +130,9 @@ impl Calibrate {
         opened: &Opened,
         before: Option<&CalibrationFile>,
         notes: &mut Vec<String>,
-    ) -> Result<(Basis, Option<Vec<f64>>), Failure> {
+    ) -> Result<(Basis, Option<Vec<f64>>)> {
         let mut calibration = opened.calibration.clone();
-        let content = |error: String| Failure::new(Exit::Content, error);
+        let content = Exit::Content.failure::<String>();
         let stored = before
             .map(|file| Ok((file, file.calibration()?)))
             .transpose()
@@ -162,7 +161,7 @@ impl Calibrate {
         } else if opened.problem.is_some() || opened.stage.is_none() {
             let words = "calibrate: the models of camera and projector are not known yet: make them with --board and --poses, or import them with \
                          --camera and --projector, or with --models";
-            return Err(Failure::new(Exit::Usage, words));
+            return Exit::Usage.fail(words);
         }
         calibration.response = None;
         let heights_by = match self.no_plate {
@@ -182,7 +181,7 @@ impl Calibrate {
     }
 
     /// The models that the options name, and their files' names.
-    fn imported(&self, head: &Calibration) -> Result<Option<(String, Models)>, Failure> {
+    fn imported(&self, head: &Calibration) -> Result<Option<(String, Models)>> {
         let (width, height, _) = head.frames();
         let sizes = Sizes {
             camera: (width, height),
@@ -196,7 +195,7 @@ impl Calibrate {
         let name = |path: &Path| path.display().to_string();
         let named = [&self.camera, &self.projector, &self.models];
         model_files(named.into_iter().flatten())?;
-        let content = |error| Failure::new(Exit::Content, error);
+        let content = Exit::Content.failure();
         let (names, models) = match (&self.camera, &self.projector, &self.models) {
             (Some(camera), Some(projector), _) => {
                 let models = opencv::from_two(camera, projector, sizes, declared);
@@ -229,15 +228,12 @@ fn before(place: &Place, notes: &mut Vec<String>) -> Option<CalibrationFile> {
 ///
 /// # Errors
 /// If one does not (66).
-pub fn model_files<'a>(named: impl IntoIterator<Item = &'a PathBuf>) -> Result<(), Failure> {
+pub fn model_files<'a>(named: impl IntoIterator<Item = &'a PathBuf>) -> Result<()> {
     match named.into_iter().find(|path| !path.exists()) {
         None => Ok(()),
-        Some(path) => Err(Failure::new(
-            Exit::Missing,
-            format!(
-                "import {}: there is no such file: name one that cv2.FileStorage wrote",
-                path.display()
-            ),
+        Some(path) => Exit::Missing.fail(format!(
+            "import {}: there is no such file: name one that cv2.FileStorage wrote",
+            path.display()
         )),
     }
 }
@@ -258,7 +254,7 @@ fn fits(calibration: &Calibration) -> Result<(), String> {
 }
 
 /// Puts a flat plate in front of a simulated head, where nobody can lay one.
-fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<(), Failure> {
+fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<()> {
     let Some(stage) = stage else {
         return Ok(());
     };
@@ -269,5 +265,5 @@ fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<(), Failu
     let plate = Part::Plane(sim::parts::Plane::default());
     stage
         .place(&plate, &sim::Placement::default())
-        .map_err(|error| Failure::new(Exit::Software, error.to_string()))
+        .map_err(Exit::Software.failure())
 }

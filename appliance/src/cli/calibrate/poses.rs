@@ -6,7 +6,7 @@ use super::super::numbers::number;
 use super::super::options::Measuring;
 use super::report::poses::Report;
 use super::{FULL, before};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::board;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::geometry::{MAX_POSES, MAX_SIGMA_PPM};
@@ -64,10 +64,10 @@ impl Poses {
     /// If options are missing (64), a recording is missing (66), a pose cannot be used or the poses
     /// do not fit (65), or the calibration cannot be written (73). The calibration before is then
     /// unchanged.
-    pub fn run(&self, options: &Measuring) -> Result<(), Failure> {
+    pub fn run(&self, options: &Measuring) -> Result<()> {
         let Some(board) = self.board.as_ref().filter(|_| !self.poses.is_empty()) else {
             let words = "calibrate: models are made of a board in several poses: name both with --board and --poses, or leave out --pictures, --check-length and --board-sigma-ppm";
-            return Err(Failure::new(Exit::Usage, words));
+            return Exit::Usage.fail(words);
         };
         let config = options.files.configuration()?;
         // The station's calibration is locked until it is written.
@@ -116,7 +116,7 @@ impl Poses {
     }
 
     /// The board in each recording.
-    fn seen(&self, board: &Board) -> Result<Vec<SeenPose>, Failure> {
+    fn seen(&self, board: &Board) -> Result<Vec<SeenPose>> {
         if self.poses.len() > MAX_POSES {
             let words = format!("{} poses: at most {MAX_POSES} are used", self.poses.len());
             return Err(content(&words));
@@ -130,7 +130,7 @@ impl Poses {
                 .map_err(|error| content(&format!("{}: {error}", path.display())))
         };
         // The first pose that fails is named, in whatever order they end.
-        let each: Vec<Result<SeenPose, Failure>> = self.poses.par_iter().map(seen).collect();
+        let each: Vec<Result<SeenPose>> = self.poses.par_iter().map(seen).collect();
         each.into_iter().collect()
     }
 }
@@ -140,7 +140,7 @@ fn content(words: &str) -> Failure {
 }
 
 /// Draws residuals and coverage.
-fn draw(folder: &OutputFolder, head: &SeenPose, geometry: &Geometry) -> Result<(), Failure> {
+fn draw(folder: &OutputFolder, head: &SeenPose, geometry: &Geometry) -> Result<()> {
     let [width, height, _, columns, rows] = head.head.map(|size| size as usize);
     let frame = (width, height);
     let of = |device: usize| -> Vec<&[Arrow]> {

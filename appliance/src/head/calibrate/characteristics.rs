@@ -1,7 +1,7 @@
 //! What is measured on a head whatever its geometry: time stamps, pace, flip-to-light delay, grey
 //! response, noise and contrast.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::{
     CalibrationFile, ContrastFile, LevelFile, NoiseFile, TimingFile, inverted,
@@ -66,7 +66,7 @@ impl Characteristics {
 }
 
 /// Refuses a head that does not pass a check of the doctor.
-fn passed(check: Check) -> Result<(), Failure> {
+fn passed(check: Check) -> Result<()> {
     let Check { found, remedy, .. } = check;
     match check.verdict {
         Verdict::Pass => Ok(()),
@@ -90,7 +90,7 @@ pub fn characterise(
     before: Option<Vec<f64>>,
     notes: &mut Vec<String>,
     progress: &dyn Fn(f64, &str),
-) -> Result<Characteristics, Failure> {
+) -> Result<Characteristics> {
     // Patterns are shown as they are until their response is known.
     calibration.response = None;
     progress(0.0, "camera stamps");

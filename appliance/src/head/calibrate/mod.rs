@@ -14,7 +14,7 @@ use super::calibration::place::Place;
 use super::calibration::{Calibration, HeightsBy};
 use super::direction::Sensitivity;
 use super::examine::{PLATE_PITCH, ReferencePlane, plate};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use algo::geometry::FittedMap;
 use algo::pattern::PhaseFunction;
 use hal::head::Head;
@@ -69,7 +69,7 @@ pub fn make(
     mut basis: Basis,
     response: Option<Vec<f64>>,
     progress: &dyn Fn(f64, &str),
-) -> Result<Made, Failure> {
+) -> Result<Made> {
     let mut notes = Vec::new();
     let early = |share: f64, words: &str| progress(0.75 * share, words);
     let calibration = &mut basis.calibration;
@@ -91,7 +91,7 @@ pub fn complete(
     measured: &Characteristics,
     basis: Basis,
     progress: &dyn Fn(f64, &str),
-) -> Result<Made, Failure> {
+) -> Result<Made> {
     let mut calibration = basis.calibration;
     measured
         .adopt(&mut calibration)
@@ -156,7 +156,7 @@ fn reference(
     [vertical, horizontal]: [&ReferencePlane; 2],
     ground: Option<&PoseFile>,
     maps: &mut Vec<(String, Vec<u8>)>,
-) -> Result<ReferenceFile, Failure> {
+) -> Result<ReferenceFile> {
     let corrections = [&vertical.plate.correction, &horizontal.plate.correction];
     let models_off_px = PLATE_PITCH * rms(corrections, calibration);
     if !(models_off_px <= MOST_OFF_PX) {

@@ -12,8 +12,8 @@ use algo::geometry::Pinhole;
 use algo::pattern::GreyResponse;
 use hal::bounded;
 use hal::bounds::{
-    Fields, LAST_SECOND, Longest, MAX_FRINGES, MAX_NOISE_COUNTS, MAX_SIDE, MIN_NOISE_COUNTS,
-    clipped, shortened,
+    Fields, LAST_SECOND, Longest, MAX_FRINGES, MAX_NAME, MAX_NOISE_COUNTS, MAX_SIDE,
+    MIN_NOISE_COUNTS, clipped, shortened,
 };
 use hal::head::{Stamp, Timing};
 use hal::model::{DeviceModel, PlaneModel};
@@ -33,8 +33,6 @@ pub const HOTTEST_C: f64 = 200.0;
 const MAX_TIME_NS: u64 = 10_000_000_000;
 /// Most refreshes per pattern.
 const MAX_REFRESHES: u32 = 1000;
-/// Longest name of a program or a file, characters.
-const MAX_NAME: usize = 255;
 /// Longest list of the files that models came from, characters.
 const MAX_SOURCES: usize = 8192;
 /// Stands in place of the checksum while it is computed.

@@ -2,7 +2,7 @@
 //! with, and how well they fit.
 
 use hal::bounded;
-use hal::bounds::{Bound, Fields, Longest, MAX_SIDE, length};
+use hal::bounds::{Bound, Fields, Longest, MAX_NAME, MAX_SIDE, length};
 
 /// Most poses.
 pub const MAX_POSES: usize = 64;
@@ -12,8 +12,6 @@ pub const MAX_CORNERS: usize = 100;
 pub const MAX_SQUARE_MM: f64 = 1000.0;
 /// Largest σ of a board's scale, parts per million.
 pub const MAX_SIGMA_PPM: f64 = 1e5;
-/// Longest name of a recording, characters.
-const MAX_NAME: usize = 255;
 /// Largest length that is stored, mm.
 const MAX_MM: f64 = 1e6;
 

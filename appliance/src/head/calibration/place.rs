@@ -2,7 +2,7 @@
 //! beside them.
 
 use super::file::CalibrationFile;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Result};
 use crate::storage::folder::{name_also, read_whole, sync_folder_of, write_whole};
 use crate::storage::hex;
 use sha2::{Digest, Sha256};
@@ -88,16 +88,10 @@ impl Place {
     ///
     /// # Errors
     /// With this remedy, if it cannot be written (73); then the calibration is unchanged.
-    pub fn save(
-        &self,
-        bytes: &[u8],
-        maps: &[(String, Vec<u8>)],
-        remedy: &str,
-    ) -> Result<(), Failure> {
-        self.write(bytes, maps).map_err(|error| {
-            let what = format!("write {}", self.path.display());
-            Failure::because(Exit::CannotCreate, what, format!("{error}: {remedy}"))
-        })
+    pub fn save(&self, bytes: &[u8], maps: &[(String, Vec<u8>)], remedy: &str) -> Result<()> {
+        let what = format!("write {}", self.path.display());
+        self.write(bytes, maps)
+            .map_err(Exit::CannotCreate.advising(what, remedy))
     }
 
     fn write(&self, bytes: &[u8], maps: &[(String, Vec<u8>)]) -> io::Result<()> {

@@ -4,7 +4,7 @@ use super::file::{Commissioning, MAX_POSES, Models};
 use super::outcome::Outcome;
 use super::pose::{PoseFile, pose_name};
 use super::{PLANE, Subject};
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::board;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::geometry::MAX_SIGMA_PPM;
@@ -58,7 +58,7 @@ pub enum Poses {
 pub(super) fn measure(
     subject: &mut Subject<'_>,
     kept: &mut Commissioning,
-) -> Result<Option<Outcome>, Failure> {
+) -> Result<Option<Outcome>> {
     let before: Vec<SeenPose> = kept.usable(None).collect();
     let refused = match subject.poses {
         Some(Poses::Pose(board, number)) => kept.take_pose(subject, &board, number)?,
@@ -100,7 +100,7 @@ impl Commissioning {
         subject: &mut Subject<'_>,
         board: &Board,
         number: u32,
-    ) -> Result<Option<Outcome>, Failure> {
+    ) -> Result<Option<Outcome>> {
         if self.measured.is_none() && !subject.calibrated {
             return Err(Failure::because(
                 Exit::Content,
@@ -154,7 +154,7 @@ impl Commissioning {
     ///
     /// # Errors
     /// It did not move.
-    fn elsewhere(&self, board: &Board, number: u32, seen: SeenPose) -> Result<SeenPose, Failure> {
+    fn elsewhere(&self, board: &Board, number: u32, seen: SeenPose) -> Result<SeenPose> {
         if self.board.as_ref() != Some(&board::name(board)) {
             return Ok(seen);
         }
@@ -179,11 +179,11 @@ impl Commissioning {
     }
 
     /// Makes the models of all poses that can be used.
-    fn solve(&mut self, subject: &Subject<'_>, solving: Solving) -> Result<Outcome, Failure> {
+    fn solve(&mut self, subject: &Subject<'_>, solving: Solving) -> Result<Outcome> {
         (subject.progress)(0.1, "adjusting the models");
         let models = self
             .solved(subject.before.as_ref(), solving)
-            .map_err(|problem| Failure::new(Exit::Content, problem))?;
+            .map_err(Exit::Content.failure())?;
         let outcome = models.found(self.head);
         self.models = Some(models);
         // The plane was measured with other models.

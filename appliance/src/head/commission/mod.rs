@@ -19,7 +19,7 @@ pub use laid::Laid;
 pub use outcome::Outcome;
 pub use pose::{PoseFile, pose_name};
 
-use crate::error::Failure;
+use crate::error::Result;
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::doctor::examine_for;
@@ -34,7 +34,7 @@ pub struct Step {
     pub name: &'static str,
     /// Measures, judges, and stores in what is kept what later steps need. Without an outcome the
     /// step is to be done again.
-    measure: fn(&mut Subject<'_>, &mut Commissioning) -> Result<Option<Outcome>, Failure>,
+    measure: fn(&mut Subject<'_>, &mut Commissioning) -> Result<Option<Outcome>>,
 }
 
 /// The step before which exposure and gain are set.
@@ -118,7 +118,7 @@ impl Step {
 }
 
 /// The doctor's checks of these names.
-fn doctor(subject: &mut Subject<'_>, names: &[&str]) -> Result<Option<Outcome>, Failure> {
+fn doctor(subject: &mut Subject<'_>, names: &[&str]) -> Result<Option<Outcome>> {
     Ok(Some(Outcome::of(&examine_for(
         subject.head,
         subject.calibration,

@@ -3,7 +3,7 @@
 use super::Subject;
 use super::file::Commissioning;
 use super::outcome::Outcome;
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibrate::{Basis, Characteristics, complete};
 use crate::head::calibration::file::ReferenceFile;
 use crate::head::calibration::place::Place;
@@ -16,7 +16,7 @@ use serde_json::json;
 pub(super) fn measure(
     subject: &mut Subject<'_>,
     kept: &mut Commissioning,
-) -> Result<Option<Outcome>, Failure> {
+) -> Result<Option<Outcome>> {
     let (basis, measured) = kept.basis(subject)?;
     let before = subject.head.timing();
     subject.head.set_timing(measured.timing.over(before));
@@ -38,7 +38,7 @@ impl Commissioning {
     ///
     /// # Errors
     /// Something is still to be measured.
-    fn basis(&self, subject: &Subject<'_>) -> Result<(Basis, Characteristics), Failure> {
+    fn basis(&self, subject: &Subject<'_>) -> Result<(Basis, Characteristics)> {
         let missing =
             |words: &str| Failure::because(Exit::Content, "complete the calibration", words);
         let (known, before) = (&*subject.calibration, subject.before.as_ref());

@@ -3,7 +3,7 @@
 use super::Subject;
 use super::file::Commissioning;
 use super::outcome::Outcome;
-use crate::error::Failure;
+use crate::error::Result;
 use crate::head::calibrate::{characterise, off_proportion};
 use crate::head::examine::by_pitch;
 use serde_json::json;
@@ -11,7 +11,7 @@ use serde_json::json;
 pub(super) fn measure(
     subject: &mut Subject<'_>,
     kept: &mut Commissioning,
-) -> Result<Option<Outcome>, Failure> {
+) -> Result<Option<Outcome>> {
     let response = kept.measured.as_ref().map(|known| known.response.clone());
     let before = subject.before.as_ref();
     let mut notes = Vec::new();

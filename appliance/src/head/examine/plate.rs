@@ -1,7 +1,7 @@
 //! Measures the reference phase maps: a flat plate in the plane z = 0 under vertical and horizontal
 //! fringes.
 
-use crate::error::{Exit, Failure};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::scan::{self, Scan};
 use crate::head::seam;
@@ -56,7 +56,7 @@ pub fn plate(
     calibration: &Calibration,
     vertical: bool,
     timeout: Duration,
-) -> Result<ReferencePlane, Failure> {
+) -> Result<ReferencePlane> {
     let function = seam::fringes(vertical, head.projector_size(), PITCH).map_err(unfit)?;
     let mut shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
     shots.truncate((LEVELS - 1) * SHIFTS);
@@ -69,7 +69,7 @@ pub fn plate(
         ..calibration.clone()
     };
     let predicted = by_models.triangulator(function, None);
-    let predicted = predicted.map_err(|error| Failure::new(Exit::Content, error.to_string()))?;
+    let predicted = predicted.map_err(Exit::Content.failure())?;
     let plate = Plate::fit(&phases, |u, v| predicted.reference_phase(u, v)).map_err(unfit)?;
     Ok(ReferencePlane { plate, predicted })
 }

@@ -153,7 +153,7 @@ impl Commission {
         self.inside().kept.free_pose()
     }
 
-    /// The number of a pose's picture file.
+    /// The file of a pose's picture.
     fn picture_file(&self, number: u32) -> PathBuf {
         self.state.join(PICTURES).join(format!("pose-{number}.png"))
     }

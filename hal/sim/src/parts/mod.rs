@@ -133,7 +133,7 @@ impl Part {
                 let least = part.bottom_diameter + 0.05 * part.depth;
                 within("part.rim_diameter", part.rim_diameter, least, 1000.0)
             }
-            Self::Spline(part) => part.check(),
+            Self::Spline(part) => Fields.check("part", &**part),
             Self::Plane(part) => Fields.check("part", part),
             Self::Board(part) => Fields.check("part", part),
             Self::SheetMetal(part) => part.check(),

@@ -4,7 +4,6 @@ use super::shapes::{in_square, square};
 use super::{Defect, Surface};
 use crate::optics::Vector;
 use hal::bounded;
-use hal::bounds::{Bound, Fields, within};
 
 /// Control values along each side, for 8 cubic patches.
 const CONTROL: usize = 11;
@@ -16,21 +15,13 @@ bounded! {
         /// Half the side of the square.
         pub half_size: f64 = 1.0..=1000.0 => 100.0,
         /// Control values in mm, row = y, column = x.
-        pub control: [[f64; CONTROL]; CONTROL] => STUDY,
+        pub control: [[f64; CONTROL]; CONTROL] = -1000.0..=1000.0 => STUDY,
         /// Dents; a good part has none.
         pub defects: Vec<Defect>,
     }
 }
 
 impl Spline {
-    pub(super) fn check(&self) -> Result<(), String> {
-        Fields.check("part", self)?;
-        for value in self.control.as_flattened() {
-            within("part.control", *value, -1000.0, 1000.0)?;
-        }
-        Ok(())
-    }
-
     /// The index of the first of the four control values that contribute at `x`, and the four
     /// weights.
     fn weights(&self, x: f64) -> (usize, [f64; 4]) {

@@ -33,7 +33,7 @@ pub fn scaled(nm: f32, units: i32) -> f32 {
     nm * (units as f32 * Factor::UNIT as f32)
 }
 
-/// Whether a deviation in nm is at most [`MAX_NARROW_NM`].
+/// Whether the magnitude of a deviation in nm is below [`MAX_NARROW_NM`].
 #[inline(always)]
 pub fn is_small(nm: f32) -> bool {
     (nm > -(MAX_NARROW_NM as f32)) & (nm < MAX_NARROW_NM as f32)

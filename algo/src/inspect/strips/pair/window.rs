@@ -20,7 +20,7 @@
 //! independent pixels of two shifts each. Neighbouring results share pixels (`shared.rs`).
 //!
 //! # Shapes and units
-//! Sums are exact: samples as 12 bits, sines as Q15, products as 24 bits, 81 of them in 32 bits. So
+//! Sums are exact: samples as 12 bits, sines as Q15, products as 24 bits, the 49 of a window in 32. So
 //! the result depends neither on bands nor on threads. A row enters the sums down the columns as
 //! another one leaves them (`sums.rs`); from these follow the sums over windows and the phases
 //! (`solve.rs`), many pixels at a time.
