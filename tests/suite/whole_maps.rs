@@ -68,6 +68,7 @@ impl<'a> Comparison<'a> {
             sigma: (sigma > 0.0).then_some(sigma),
             expected: None,
             systematic: 0.0,
+            compared: 0.0,
             square: Some(Square { column, row, side }),
         })
     }
@@ -105,6 +106,7 @@ impl<'a> Comparison<'a> {
             sigma: None,
             expected: None,
             systematic: 0.0,
+            compared: 0.0,
             square: None,
         }
     }

@@ -12,9 +12,9 @@ use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, Opened};
 use crate::recipe::file::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
 use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe};
-use crate::recipe::replace;
 use crate::recipe::teach::{TeachError, teach};
 use crate::recipe::{PatternFile, RecipeFile, Store};
+use crate::recipe::{replace, signal};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
@@ -35,7 +35,7 @@ pub struct Teach {
     /// recipe undo` brings it back.
     #[arg(long, conflicts_with = "out")]
     replace: bool,
-    /// Keep regions, gauges and limits of the recipe that is replaced.
+    /// Keep features, datum systems, gauges and limits of the recipe that is replaced.
     #[arg(long, requires = "replace")]
     keep_gauges: bool,
     /// Part number: the key that a PLC may select by; without it that of the recipe that is
@@ -161,20 +161,19 @@ impl Teach {
             shared.map_err(Exit::CannotCreate.because("teach"))?;
         }
         let pool = options.threads.pool(config.threads)?;
-        let taught = match &self.golden {
+        let (taught, head) = match &self.golden {
             Some(golden) => pool.install(|| self.teach_recordings(golden, &naming))?,
             None => self.teach_head(&config, &pool, &naming)?,
         };
-        let taught = match replaced.filter(|_| self.keep_gauges) {
-            Some(file) => {
-                replace::keep_gauges(taught, &file).map_err(Exit::Content.because("teach"))?
-            }
+        let unfit = Exit::Content.because("teach");
+        let taught = match self.frames {
+            Some(_) => taught.with_two_frames().map_err(&unfit)?,
             None => taught,
         };
-        let taught = match self.frames {
-            Some(_) => taught
-                .with_two_frames()
-                .map_err(Exit::Content.because("teach"))?,
+        let taught = match replaced.filter(|_| self.keep_gauges) {
+            Some(file) => pool
+                .install(|| replace::keep_gauges(taught, &file, &head))
+                .map_err(&unfit)?,
             None => taught,
         };
         let place = target.store(&taught)?;
@@ -232,7 +231,7 @@ impl Teach {
         config: &Config,
         pool: &rayon::ThreadPool,
         naming: &Naming,
-    ) -> Result<TaughtRecipe> {
+    ) -> Result<(TaughtRecipe, Calibration)> {
         let options = &self.measuring;
         let progress = options.output.progress();
         let on_progress = |share: f64| progress.tell(share, "working out the light of the scene");
@@ -246,7 +245,7 @@ impl Teach {
         let on_progress = |share: f64, words: &str| progress.tell(share, words);
         let taught = pool.install(|| teach(&mut head, &calibration, naming, TIMEOUT, &on_progress));
         progress.clear();
-        taught.map_err(|error| {
+        let taught = taught.map_err(|error| {
             let exit = match error {
                 TeachError::Device(_) | TeachError::Ended => Exit::Unavailable,
                 TeachError::Scene(_) | TeachError::Rig(_) | TeachError::NotCalibrated(_) => {
@@ -254,10 +253,15 @@ impl Teach {
                 }
             };
             Failure::new(exit, error)
-        })
+        })?;
+        Ok((taught, calibration))
     }
 
-    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<TaughtRecipe> {
+    fn teach_recordings(
+        &self,
+        folder: &Path,
+        naming: &Naming,
+    ) -> Result<(TaughtRecipe, Calibration)> {
         let recording = Recording::open(folder)?;
         let manifest = folder.join("recording.json");
         let wrong = |error: &dyn std::fmt::Display| {
@@ -295,6 +299,7 @@ impl Teach {
         crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
         let at = measured.primary;
         let full = &measured.shots;
+        let signal = signal::of_recording(&recording, at).map_err(|error| wrong(&error))?;
         let part = GoldenPart {
             calibration: &calibration,
             pattern: PatternFile::of(&recording.patterns[at]),
@@ -306,6 +311,7 @@ impl Teach {
             phases,
             heights: &surface.map,
             offsets: &[],
+            signal: &signal,
             noise: SampleNoise::constant(noise),
             offset_counts: None,
             captures: 1,
@@ -322,6 +328,6 @@ impl Teach {
             let words = "levels that are unwrapped by beats are for teaching alone: cycles take the finest one, about the golden phase";
             taught.choice.reasons.push(words.into());
         }
-        Ok(taught)
+        Ok((taught, calibration))
     }
 }

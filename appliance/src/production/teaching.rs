@@ -84,7 +84,11 @@ impl Worker {
             )
         })?;
         match kept {
-            Some(file) => replace::keep_gauges(taught, file).map_err(TeachError::Rig),
+            Some(file) => {
+                let kept = || replace::keep_gauges(taught, file, calibration);
+                let kept = self.computing.on(|| self.pool.install(kept));
+                kept.map_err(TeachError::Rig)
+            }
             None => Ok(taught),
         }
     }

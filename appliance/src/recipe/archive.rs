@@ -11,8 +11,8 @@ use zip::read::ZipFile;
 
 /// The manifest's name in the archive.
 const MANIFEST: &str = "recipe.json";
-/// The manifest and eleven arrays.
-const MAX_MEMBERS: usize = 12;
+/// The manifest and twelve arrays.
+const MAX_MEMBERS: usize = 13;
 /// The largest manifest that is read, in bytes.
 const MAX_MANIFEST: u64 = 1 << 20;
 /// The fingerprint in the manifest while the fingerprint is computed.
@@ -37,10 +37,10 @@ macro_rules! arrays {
 
             /// The arrays by their members' names, in rows of as many `columns` as an array of this
             /// name has.
-            fn members(&self, columns: impl Fn(&str) -> u32) -> Vec<(&'static str, Vec<u8>)> {
+            fn members(&self, columns: impl Fn(&str) -> usize) -> Vec<(&'static str, Vec<u8>)> {
                 vec![$((
                     concat!(stringify!($name), ".npy"),
-                    npy::write(columns(stringify!($name)) as usize, &self.$name),
+                    npy::write(columns(stringify!($name)), &self.$name),
                 )),*]
             }
 
@@ -84,6 +84,9 @@ arrays! {
     /// Least side of the squares of a deviation about each pixel, in pixels; empty where any will
     /// do.
     smoothing: u8,
+    /// The demodulated light of the finest level of the full sequence, its real and its imaginary
+    /// part behind each other, in 1/64 count of an 8-bit sample; empty where it was not measured.
+    golden_signal: i16,
 }
 
 impl Arrays {
@@ -116,8 +119,9 @@ pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Str
 /// The arrays by their members' names; one that is empty has no member.
 pub(crate) fn members(file: &RecipeFile, arrays: &Arrays) -> Vec<(&'static str, Vec<u8>)> {
     let mut members = arrays.members(|name| match name {
-        "phase_function" | "amplitude" => file.projector.width,
-        _ => file.camera.width,
+        "phase_function" | "amplitude" => file.projector.width as usize,
+        "golden_signal" => 2 * file.camera.width as usize,
+        _ => file.camera.width as usize,
     });
     let mut lengths = arrays.lengths().into_iter();
     members.retain(|_| lengths.next().is_some_and(|(_, length)| length > 0));

@@ -3,22 +3,23 @@
 //!
 //! The same bounds hold for files that are read and for edits; `docs/formats.md` lists them.
 
-use super::file::{LONGEST_NAME, PatternFile, RecipeFile, RegionFile, SequenceFile};
+use super::feature::{DatumFile, FeatureFile, MAX_DATUMS, MAX_FEATURES};
+use super::file::{LONGEST_NAME, PatternFile, RecipeFile, SequenceFile};
 use super::gauge::GaugeFile;
 use crate::station::MAX_GAUGES;
 use algo::inspect::{Basis, Facts};
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
-    Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, MAX_SIDE, RATIOS, length, text,
+    Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, RATIOS, clipped, length, text,
     within,
 };
 
 /// Sequences that a part can be measured with; teaching makes four.
 const MAX_SEQUENCES: usize = 8;
-/// Regions of a recipe.
-const MAX_REGIONS: usize = 32;
-/// Corners of a region.
-const MAX_CORNERS: usize = 256;
+/// Features of a gauge.
+const MAX_OF: usize = 2;
+/// Slots of gauges.
+const MAX_SLOT: u16 = 64;
 
 impl RecipeFile {
     /// Checks each value by itself; [`Recipe::check`](super::Recipe::check) checks that they fit
@@ -52,14 +53,37 @@ impl RecipeFile {
             let full_scale = f64::from((1_u32 << self.camera.bit_depth) - 1);
             within("golden_offset_counts", counts, 0.0, full_scale)?;
         }
-        length("regions", self.regions.len(), 0, MAX_REGIONS)?;
-        each("regions", ".", &self.regions, RegionFile::check_bounds)?;
+        length("features", self.features.len(), 0, MAX_FEATURES)?;
+        each("features", ".", &self.features, FeatureFile::check_bounds)?;
+        length("datums", self.datums.len(), 0, MAX_DATUMS)?;
+        each("datums", ".", &self.datums, DatumFile::check_bounds)?;
         length("gauges", self.gauges.len(), 1, MAX_GAUGES)?;
         let largest = self.camera.width.max(self.camera.height) as usize;
         each("gauges", ": ", &self.gauges, |gauge| {
             gauge.check_bounds(largest)
-        })
+        })?;
+        check_slots(&self.gauges)?;
+        self.check_references()
     }
+}
+
+/// Refuses slots that two gauges have, and gauges that are not in the order of their slots.
+fn check_slots(gauges: &[GaugeFile]) -> Result<(), String> {
+    let mut pairs = gauges.iter().zip(gauges.iter().skip(1));
+    let Some((first, second)) = pairs.find(|(first, second)| first.slot >= second.slot) else {
+        return Ok(());
+    };
+    let [one, other] = [first, second].map(|gauge| clipped(&gauge.name));
+    Err(match first.slot == second.slot {
+        true => format!(
+            "gauges {one:?} and {other:?} both have slot {}: give each its own",
+            first.slot
+        ),
+        false => format!(
+            "gauge {other:?} of slot {} stands behind {one:?} of slot {}: write them in the order of their slots",
+            second.slot, first.slot
+        ),
+    })
 }
 
 /// Checks each element of the list `name`; an error begins with the element's place and
@@ -100,34 +124,20 @@ impl GaugeFile {
     /// In words that name the key, the value and the bounds.
     fn check_bounds(&self, largest: usize) -> Result<(), String> {
         text("name", &self.name, LONGEST_NAME)?;
-        text("region", &self.region, LONGEST_NAME)?;
+        within("slot", self.slot, 1, MAX_SLOT)?;
+        length("of", self.of.len(), 0, MAX_OF)?;
+        let mut names = self.of.iter().chain(&self.datum);
+        names.try_for_each(|name| text("of", name, LONGEST_NAME))?;
         let kind = self.measures.kind();
-        if let Some(from) = kind.from() {
-            text("measures.from", from, LONGEST_NAME)?;
-        }
         let Facts { basis, .. } = kind.facts();
         if let Some(side) = basis.side() {
-            within("measures.smoothing_px", side, 1, largest)?;
+            within("smoothing_px", side, 1, largest)?;
             if basis == Basis::Squares(side) && side % 2 == 0 {
                 return Err(format!(
-                    "measures.smoothing_px is {side}: write an odd number, the square has a middle pixel"
+                    "smoothing_px is {side}: write an odd number, the square has a middle pixel"
                 ));
             }
         }
         kind.check()
-    }
-}
-
-impl RegionFile {
-    fn check_bounds(&self) -> Result<(), String> {
-        Fields.check("", self)?;
-        length("polygon", self.polygon.len(), 3, MAX_CORNERS)?;
-        // Polygons are clipped to the frame: corners up to one frame's width outside of it are
-        // enough for any shape.
-        let far = f64::from(MAX_SIDE);
-        for corner in self.polygon.as_flattened() {
-            within("polygon", *corner, -far, 2.0 * far)?;
-        }
-        Ok(())
     }
 }

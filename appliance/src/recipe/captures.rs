@@ -9,7 +9,7 @@
 //! The captures are averaged as two means, from which follows what of that difference is noise.
 
 use super::failure::TeachError;
-use super::light;
+use super::{light, signal};
 use crate::head::calibrated::CalibratedHead;
 use crate::head::means;
 use crate::head::rasters::Illumination;
@@ -44,6 +44,8 @@ pub struct Captured {
     pub triangulator: Triangulator,
     /// Offsets of all sequences but the full one.
     pub offsets: Vec<Offsets>,
+    /// Golden's signal, the mean of all captures.
+    pub signal: Vec<i16>,
     /// The noise of a sample by the modulation of its pixel, by the full sequence.
     pub noise: SampleNoise,
     /// Median of the mean samples of its pixels by the full sequence, counts of the camera.
@@ -76,9 +78,7 @@ impl Captured {
         let least = calibration.least_modulation();
         let full_scale = f64::from((1_u32 << calibration.bit_depth) - 1);
         let decode = |shown: &[Shot], means: &[Frame], map: &[AbsolutePhase]| {
-            let frame = |shot| shots.iter().position(|other| other == shot);
-            let frames = shown.iter().filter_map(frame).map(|at| &means[at]);
-            let scan = Scan::new(function.range(), shown, frames)?.trusting(least);
+            let scan = scan(function, (&shots, shown), means)?.trusting(least);
             let phases = scan.phases(scan.needs_map().then_some(map))?;
             let counts = light::offset_counts(&scan.frames, &phases);
             // Means of frames have more bits than the camera's samples.
@@ -89,6 +89,7 @@ impl Captured {
         illumination.load(head, function, &shots, calibration)?;
         let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
         let (mut noise, mut offset_counts) = (calibration.noise, None);
+        let mut signals: Vec<Vec<i16>> = Vec::new();
         for mean in 0..MEANS {
             let share = |share: f64| progress((mean as f64 + share) / MEANS as f64);
             let means = means::take(head, shots.len(), *timeout, &share)?;
@@ -96,6 +97,9 @@ impl Captured {
             let (by_modulation, offset, phases) =
                 decode(full, &means, expected).map_err(TeachError::rig)?;
             (noise, offset_counts) = (by_modulation, offset);
+            let seen = scan(function, (&shots, full), &means).map_err(TeachError::rig)?;
+            let most = seen.decoder.full_scale();
+            signals.push(signal::of(full, &seen.frames, most));
             let offsets = short.iter().map(|shown| {
                 let (.., by) = decode(shown, &means, &phases.phase)?;
                 Ok(offsets(&by, &phases))
@@ -126,10 +130,25 @@ impl Captured {
                 .zip(second)
                 .map(<[_; MEANS]>::from)
                 .collect(),
+            signal: signals
+                .into_iter()
+                .reduce(|a, b| signal::mean(&a, &b))
+                .unwrap_or_default(),
             noise,
             offset_counts,
         })
     }
+}
+
+/// The frames of the shots that a sequence has `shown`, of those that were taken of all `shots`.
+fn scan<'a>(
+    function: &PhaseFunction,
+    (shots, shown): (&[Shot], &[Shot]),
+    means: &'a [Frame],
+) -> Result<Scan<'a>, String> {
+    let frame = |shot| shots.iter().position(|other| other == shot);
+    let frames = shown.iter().filter_map(frame).map(|at| &means[at]);
+    Scan::new(function.range(), shown, frames)
 }
 
 /// The shots of all sequences, each shot once.

@@ -2,16 +2,18 @@
 
 use super::archive::{Arrays, short, unpack};
 use super::demands::Demands;
-use super::file::{PatternFile, RecipeFile, RegionFile, SequenceKind};
+use super::feature::FeatureFile;
+use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
-use algo::inspect::{Basis, CalibrationError, Gauge, Region};
+use algo::inspect::{CalibrationError, Gauge, Region};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
+use algo::units::Modulation;
 use std::collections::HashMap;
 use std::io::{Cursor, Read, Seek};
 
@@ -104,6 +106,11 @@ pub struct RecipeSequence {
 }
 
 impl RecipeSequence {
+    /// Whether it is two frames, which are compared with golden's picture.
+    pub fn is_pair(&self) -> bool {
+        self.kind == SequenceKind::TwoFrames
+    }
+
     /// The fundamental of the finest level's waveform, relative to a sine's.
     pub fn fundamental(&self) -> f64 {
         let finest = self.levels.levels().last();
@@ -146,6 +153,21 @@ impl Recipe {
         Ok((file, recipe))
     }
 
+    /// Golden's modulation by one of the sequences.
+    pub(super) fn light(&self, sequence: usize) -> Vec<Modulation> {
+        let (_, _, bit_depth) = self.conditions.camera;
+        let full_scale = f64::from((1_u32 << bit_depth) - 1);
+        let fundamental = |of: Option<&RecipeSequence>| of.map_or(1.0, |of| of.fundamental());
+        let brighter =
+            fundamental(self.sequences.get(sequence)) / fundamental(self.sequences.last());
+        let unit = f64::from(u16::MAX) / full_scale * brighter;
+        let bits = |counts: &f32| (f64::from(*counts) * unit).round() as u16;
+        let counts = self.arrays.modulation.iter();
+        counts
+            .map(|counts| Modulation::from_bits(bits(counts)))
+            .collect()
+    }
+
     /// Checks that manifest and arrays fit each other, and that the recipe can judge.
     ///
     /// # Errors
@@ -155,7 +177,11 @@ impl Recipe {
         Self::fit(file, arrays)
     }
 
-    fn fit(file: &RecipeFile, arrays: Arrays) -> Result<Self, String> {
+    /// As [`Self::check`], without checking whether it can judge.
+    ///
+    /// # Errors
+    /// In words: what does not fit.
+    pub(super) fn fit(file: &RecipeFile, arrays: Arrays) -> Result<Self, String> {
         file.check_bounds()?;
         let (width, height) = (file.camera.width as usize, file.camera.height as usize);
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
@@ -163,14 +189,14 @@ impl Recipe {
         let of_projector = ["phase_function", "amplitude"];
         let lengths = arrays.lengths().into_iter();
         for (name, length) in lengths.filter(|(name, _)| !of_projector.contains(name)) {
-            let of_short = name == "sequence_offset";
-            let maps = if of_short {
-                file.sequences.len() - 1
-            } else {
-                1
+            let maps = match name {
+                "sequence_offset" => file.sequences.len() - 1,
+                // Its real and imaginary parts.
+                "golden_signal" => 2,
+                _ => 1,
             };
             let expected = pixels.and_then(|pixels| pixels.checked_mul(maps));
-            let optional = of_short || name == "smoothing";
+            let optional = ["sequence_offset", "smoothing", "golden_signal"].contains(&name);
             if Some(length) != expected && !(optional && length == 0) {
                 return Err(format!(
                     "{name} has {length} values for a camera of {width}x{height} and {} sequences",
@@ -216,7 +242,7 @@ impl Recipe {
         let function = function.map_err(|error| format!("projector and pattern: {error}"))?;
         Ok(Self {
             sequences: sequences(file)?,
-            gauges: gauges(&file.regions, &file.gauges, (width, height))?,
+            gauges: gauges(&file.features, &file.gauges, (width, height))?,
             id: file.into(),
             conditions: file.into(),
             demands: file.into(),
@@ -264,38 +290,28 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
 /// The gauges that are computed, for frames of (width, height) pixels.
 ///
 /// # Errors
-/// Naming the gauge or region that cannot be used, and why.
+/// Naming the feature that cannot be used, and why.
 fn gauges(
-    regions: &[RegionFile],
+    features: &[FeatureFile],
     gauges: &[GaugeFile],
     (width, height): (usize, usize),
 ) -> Result<Vec<Gauge>, String> {
     let mut named = HashMap::new();
-    for region in regions {
-        let corners: Vec<_> = region.polygon.iter().map(|&[u, v]| (u, v)).collect();
+    for feature in features {
+        let corners: Vec<_> = feature.region.iter().map(|&[u, v]| (u, v)).collect();
         let pixels = Region::polygon(&corners, width, height)
-            .map_err(|error| format!("region {:?}: {error}", region.name))?;
-        named.insert(region.name.as_str(), pixels);
+            .map_err(|error| format!("feature {:?}: {error}", feature.name))?;
+        named.insert(feature.name.as_str(), pixels);
     }
     let gauge = |gauge: &GaugeFile| {
-        let name = &gauge.name;
-        let find = |region: &str| {
-            let found = named.get(region).cloned();
-            found.ok_or_else(|| {
-                format!("gauge {name:?} names a region {region:?} that is not there")
-            })
-        };
-        let placement = matches!(gauge.measures.facts().basis, Basis::Motion(_));
-        Ok(Gauge {
-            region: match placement && gauge.region.is_empty() {
-                true => Region::default(),
-                false => find(&gauge.region)?,
-            },
-            from: gauge.measures.kind().from().map(find).transpose()?,
+        let mut regions = gauge.of.iter().map(|name| named.get(&**name).cloned());
+        Gauge {
+            region: regions.next().flatten().unwrap_or_default(),
+            from: regions.next().flatten(),
             measure: gauge.measures.clone(),
-        })
+        }
     };
-    gauges.iter().map(gauge).collect()
+    Ok(gauges.iter().map(gauge).collect())
 }
 
 impl RecipeId {

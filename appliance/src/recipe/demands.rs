@@ -1,6 +1,7 @@
 //! What a recipe demands of a part: limits of its gauges, least coverage, and where it may lie.
 
 use super::file::{AlignmentKind, RecipeFile};
+use super::tolerance::Substitution;
 use crate::station::Unit;
 use std::sync::Arc;
 
@@ -24,19 +25,24 @@ pub struct Demands {
 /// The limits of a gauge, with the name that every result shares.
 #[derive(Clone, Debug)]
 pub(super) struct GaugeLimits {
+    pub slot: u16,
     pub name: Arc<str>,
     pub unit: Unit,
     pub low: Option<f64>,
     pub high: Option<f64>,
+    /// What a master makes of each value.
+    pub master: Option<Substitution>,
 }
 
 impl From<&RecipeFile> for Demands {
     fn from(file: &RecipeFile) -> Self {
         let limits = file.gauges.iter().map(|gauge| GaugeLimits {
+            slot: gauge.slot,
             name: Arc::from(&*gauge.name),
             unit: gauge.measures.facts().unit,
             low: gauge.low,
             high: gauge.high,
+            master: gauge.substitution(),
         });
         Self {
             limits: limits.collect(),

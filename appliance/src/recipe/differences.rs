@@ -29,16 +29,20 @@ impl RecipeFile {
             (true, false) => words.push("judges again".into()),
             _ => {}
         }
-        words.extend(lists(
-            ("gauge", &before.gauges, &self.gauges),
-            |gauge| &gauge.name,
-            gauge,
-        ));
+        words.extend(gauges(&before.gauges, &self.gauges));
         words.extend(self.other_slots(before));
         words.extend(lists(
-            ("region", &before.regions, &self.regions),
-            |region| &region.name,
-            |before, after| (before.polygon != after.polygon).then(|| "moved".into()),
+            ("feature", &before.features, &self.features),
+            |feature| &feature.name,
+            |before, after| match before.kind == after.kind {
+                true => (before.region != after.region).then(|| "moved".into()),
+                false => Some(format!("is a {} now", after.kind.name())),
+            },
+        ));
+        words.extend(lists(
+            ("datum", &before.datums, &self.datums),
+            |datum| &datum.name,
+            |before, after| (before.of != after.of).then(|| "is of other features".into()),
         ));
         match words.is_empty() {
             true => "nothing".into(),
@@ -49,14 +53,10 @@ impl RecipeFile {
     /// Which gauges have another slot than `before`, in words; `None` if none has. A PLC reads
     /// gauges by their slots.
     pub fn other_slots(&self, before: &Self) -> Option<String> {
-        let slot = |gauges: &[GaugeFile], name: &str| {
-            let mut names = gauges.iter().map(|gauge| &gauge.name);
-            names.position(|other| other == name)
-        };
-        let moved = self.gauges.iter().enumerate().filter_map(|(now, gauge)| {
-            let then = slot(&before.gauges, &gauge.name)?;
+        let moved = self.gauges.iter().filter_map(|gauge| {
+            let then = called(&before.gauges, &gauge.name)?.slot;
             let name = clipped(&gauge.name);
-            (then != now).then(|| format!("{name:?} from {then} to {now}"))
+            (then != gauge.slot).then(|| format!("{name:?} from {then} to {}", gauge.slot))
         });
         let moved: Vec<_> = moved.collect();
         (!moved.is_empty()).then(|| format!("slots of gauges: {}", moved.join(", ")))
@@ -85,11 +85,47 @@ fn lists<'a, T>(
     gone.chain(others).collect()
 }
 
+/// The gauge of this name.
+fn called<'a>(gauges: &'a [GaugeFile], name: &str) -> Option<&'a GaugeFile> {
+    gauges.iter().find(|gauge| gauge.name == name)
+}
+
+/// What differs in two lists of gauges. One whose name is gone and whose slot is not has another
+/// name.
+fn gauges(before: &[GaugeFile], after: &[GaugeFile]) -> Vec<String> {
+    let renamed = |gauge: &&GaugeFile| called(before, &gauge.name).is_none();
+    let kept = |gauge: &&GaugeFile| called(after, &gauge.name).is_some();
+    let earlier = |gauge: &GaugeFile| {
+        let mut gone = before.iter().filter(|gauge| !kept(gauge));
+        gone.find(|gone| gone.slot == gauge.slot)
+    };
+    let new: Vec<_> = after.iter().filter(renamed).collect();
+    let removed = before
+        .iter()
+        .filter(|gone| !kept(gone) && !new.iter().any(|gauge| gauge.slot == gone.slot));
+    let removed = removed.map(|gone| format!("gauge {:?} removed", clipped(&gone.name)));
+    let others = after.iter().filter_map(|after| {
+        let same = called(before, &after.name);
+        let words = match same.or_else(|| earlier(after)) {
+            None => "added".to_owned(),
+            Some(before) => gauge(before, after)?,
+        };
+        Some(format!("gauge {:?} {words}", clipped(&after.name)))
+    });
+    removed.chain(others).collect()
+}
+
 /// How a gauge differs, in words.
 fn gauge(before: &GaugeFile, after: &GaugeFile) -> Option<String> {
     let mut words = Vec::new();
-    if before.measures != after.measures || before.region != after.region {
+    if before.name != after.name {
+        words.push(format!("instead of {:?}", clipped(&before.name)));
+    }
+    if before.measures != after.measures || before.of != after.of || before.datum != after.datum {
         words.push("measures something else".to_owned());
+    }
+    if before.master != after.master {
+        words.push("has another master".to_owned());
     }
     let limit =
         |limit: Option<f64>, of: &GaugeFile| match (limit, of.measures.facts().unit.symbol()) {

@@ -1,10 +1,11 @@
-//! Edits a taught recipe: names, regions, gauges, guard band and least coverage.
+//! Edits a taught recipe: names, features, datum systems, gauges, guard band and least coverage.
 
 use super::file::LONGEST_NAME;
 use super::golden::TaughtRecipe;
 use super::judging::check_unique;
 use super::store::LoadedRecipe;
-use super::{ChangeError, GaugeFile, Recipe, RegionFile, Store};
+use super::{ChangeError, DatumFile, FeatureFile, GaugeFile, Recipe, RecipeFile, Store};
+use crate::head::calibration::Calibration;
 use hal::bounds::clipped;
 use serde::Deserialize;
 
@@ -25,8 +26,10 @@ pub struct Edit {
     pub guard_k: Option<f64>,
     /// Whether the recipe may be without any limit. A recipe that has limits judges nevertheless.
     pub judges_nothing: Option<bool>,
-    /// All regions.
-    pub regions: Option<Vec<RegionFile>>,
+    /// All features.
+    pub features: Option<Vec<FeatureFile>>,
+    /// All datum systems.
+    pub datums: Option<Vec<DatumFile>>,
     /// All gauges.
     pub gauges: Option<Vec<GaugeFile>>,
 }
@@ -42,8 +45,9 @@ pub struct Edited {
     pub other_slots: Option<String>,
 }
 
-/// Changes a stored recipe; what was stored before stays as the previous generation. `fits` tries
-/// the changed recipe on the head and says in words why it cannot be used there.
+/// Changes a stored recipe; what was stored before stays as the previous generation. Limits that
+/// come from golden are worked out with `head`; `fits` tries the changed recipe on the head and says
+/// in words why it cannot be used there.
 ///
 /// # Errors
 /// The recipe cannot be read, was changed since, would not be usable, or cannot be stored.
@@ -51,6 +55,7 @@ pub fn edit(
     store: &Store,
     number: u16,
     edit: Edit,
+    head: Option<&Calibration>,
     fits: impl FnOnce(Recipe) -> Result<(), String>,
 ) -> Result<Edited, ChangeError> {
     let LoadedRecipe {
@@ -68,25 +73,15 @@ pub fn edit(
     }
     file.min_coverage = edit.min_coverage.unwrap_or(file.min_coverage);
     file.guard_k = edit.guard_k.unwrap_or(file.guard_k);
-    file.regions = edit.regions.unwrap_or(file.regions);
+    file.features = edit.features.unwrap_or(file.features);
+    file.datums = edit.datums.unwrap_or(file.datums);
     file.gauges = edit.gauges.unwrap_or(file.gauges);
-    // Limits that are added end that it judges nothing.
-    file.judges_nothing =
-        edit.judges_nothing.unwrap_or(file.judges_nothing) && file.is_without_limits();
-    // It is not known how gauges that were changed judge good parts.
-    let of = |gauges: &[GaugeFile], name: &str| {
-        let gauge = gauges.iter().find(|gauge| gauge.name == name);
-        gauge.cloned()
-    };
-    file.tried
-        .retain(|tried| of(&before.gauges, &tried.gauge) == of(&file.gauges, &tried.gauge));
-    let regions = file.regions.iter().map(|region| &region.name);
-    let gauges = file.gauges.iter().map(|gauge| &gauge.name);
-    check_names("region", regions)?;
-    check_names("gauge", gauges)?;
-    check_names("recipe", std::iter::once(&file.name))?;
+    if let Some(judges_nothing) = edit.judges_nothing {
+        file.judges_nothing = judges_nothing;
+    }
+    file.set_gauges_of(&before).map_err(ChangeError::Unfit)?;
     // Tighter limits may need a longer sequence, wider ones a shorter one.
-    let changed = TaughtRecipe::of(file, recipe.arrays).map_err(ChangeError::Unfit)?;
+    let changed = TaughtRecipe::of(file, recipe.arrays, head).map_err(ChangeError::Unfit)?;
     fits(changed.recipe).map_err(ChangeError::Unfit)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
     match store.replace(number, &edit.fingerprint, &changed.bytes) {
@@ -100,19 +95,42 @@ pub fn edit(
     }
 }
 
+impl RecipeFile {
+    /// Makes the recipe one whose features, datum systems and gauges were changed from those of the
+    /// recipe `before`, and checks its names.
+    ///
+    /// # Errors
+    /// In words: a name is empty, too long, or there twice.
+    pub(super) fn set_gauges_of(&mut self, before: &Self) -> Result<(), String> {
+        // Limits that are added end that it judges nothing.
+        self.judges_nothing &= self.is_without_limits();
+        // It is not known how gauges that were changed judge good parts.
+        let of = |gauges: &[GaugeFile], name: &str| {
+            let gauge = gauges.iter().find(|gauge| gauge.name == name);
+            gauge.cloned()
+        };
+        let mut tried = std::mem::take(&mut self.tried);
+        tried.retain(|tried| of(&before.gauges, &tried.gauge) == of(&self.gauges, &tried.gauge));
+        self.tried = tried;
+        check_names("feature", self.features.iter().map(|feature| &feature.name))?;
+        check_names("datum", self.datums.iter().map(|datum| &datum.name))?;
+        check_names("gauge", self.gauges.iter().map(|gauge| &gauge.name))?;
+        check_names("recipe", std::iter::once(&self.name))
+    }
+}
+
 fn check_names<'a>(
     what: &str,
     names: impl Iterator<Item = &'a String> + Clone,
-) -> Result<(), ChangeError> {
+) -> Result<(), String> {
     for name in names.clone() {
         let length = name.chars().count();
         if name.trim().is_empty() || length > LONGEST_NAME {
-            let words = format!(
+            return Err(format!(
                 "{what} name {:?} has {length} characters: write 1 to {LONGEST_NAME}",
                 clipped(name)
-            );
-            return Err(ChangeError::Unfit(words));
+            ));
         }
     }
-    check_unique(what, names).map_err(ChangeError::Unfit)
+    check_unique(what, names)
 }

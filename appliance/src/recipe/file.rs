@@ -1,6 +1,7 @@
-//! The manifest `recipe.json` of a recipe, version 2. Frozen: see `docs/formats.md`.
+//! The manifest `recipe.json` of a recipe, version 3. Frozen: see `docs/formats.md`.
 
 use super::comparison::ComparisonFile;
+use super::feature::{DatumFile, FeatureFile};
 use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
 use crate::head::calibration::CalibrationSigma;
@@ -21,8 +22,8 @@ use std::ops::RangeInclusive;
 /// The name of the format.
 pub const FORMAT: &str = "fringed-recipe";
 /// The version that this program writes, and the only one that it reads.
-pub const VERSION: u32 = 2;
-/// The longest name of a recipe, region or gauge, in characters.
+pub const VERSION: u32 = 3;
+/// The longest name of a recipe, feature, datum system or gauge, in characters.
 pub const LONGEST_NAME: usize = 64;
 /// The longest part number: the registers of PART_NUMBER.
 pub const LONGEST_PART_NUMBER: usize = 32;
@@ -114,9 +115,11 @@ bounded! {
         pub guard_k: f64 = 0.0..=MAX_GUARD_K,
         /// Whether the recipe only measures: no gauge has a limit that a part can miss.
         pub judges_nothing: bool,
-        /// Polygons in camera pixels.
-        pub regions: Vec<RegionFile>,
-        /// At most 16.
+        /// Geometry that is measured of the part.
+        pub features: Vec<FeatureFile>,
+        /// Datum systems of features.
+        pub datums: Vec<DatumFile>,
+        /// At most 64, in the order of their slots.
         pub gauges: Vec<GaugeFile>,
         /// Fixed against adaptive pattern, as measured when it was taught; `None` if it was taught
         /// from a recording.
@@ -286,16 +289,6 @@ pub fn safe(phase: &[AbsolutePhase], changes: &[f32], limit: f32) -> Vec<Absolut
             }
         })
         .collect()
-}
-
-bounded! {
-    /// A named polygon.
-    pub struct RegionFile {
-        /// Its name.
-        pub name: String = Longest(LONGEST_NAME),
-        /// Corners [u, v] in camera pixels of the golden measurement.
-        pub polygon: Vec<[f64; 2]>,
-    }
 }
 
 /// How a part's motion against the taught one is compensated before it is gauged.

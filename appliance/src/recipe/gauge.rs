@@ -1,78 +1,55 @@
 //! The gauges of a recipe in its file, and which limits are refused.
 
+use super::gauge_keys::Keys;
+use super::tolerance::{About, Master, Tolerance};
 use crate::station::Unit;
 use algo::inspect::{Facts, Measure};
-use hal::bounds::clipped;
-use serde::{Deserialize, Serialize};
-use serde_json::value::RawValue;
+use hal::bounds::within;
+use serde::Deserialize;
 use serde_json::{Value, json};
 use std::fmt::Display;
 
-/// A gauge and its limits.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "GaugeText")]
+/// A gauge and its limits. Its keys in files are those of `gauge_keys`.
+#[derive(Clone, Debug, PartialEq, Deserialize)]
+#[serde(try_from = "Keys")]
 pub struct GaugeFile {
+    /// Its place in registers, 1 to 64.
+    pub slot: u16,
     /// Its name.
     pub name: String,
-    /// The name of its region; only a placement needs none.
-    #[serde(skip_serializing_if = "String::is_empty")]
-    pub region: String,
     /// What it measures; `docs/formats.md` has the definitions.
     pub measures: Measure,
+    /// The names of its features in the order in which its kind takes them.
+    pub of: Vec<String>,
+    /// The datum system in which it is measured.
+    pub datum: Option<String>,
     /// Lower limit, inclusive, in mm, degrees, mm³ or as a share from 0 to 1.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub low: Option<f64>,
     /// Upper limit, inclusive.
-    #[serde(skip_serializing_if = "Option::is_none")]
     pub high: Option<f64>,
+    /// What the limits are worked out from, if they are.
+    pub tolerance: Option<Tolerance>,
+    /// What another instrument has measured of the part that was taught.
+    pub master: Option<Master>,
+    /// What is measured of golden, where limits or master need it.
+    pub golden_value: Option<f64>,
 }
 
-/// A gauge as it is written. Its limits are parsed once its name and unit are known, so that a
-/// refusal can name the gauge and its bounds; the parser's message would only give the line and
-/// column.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct GaugeText {
-    name: String,
-    #[serde(default)]
-    region: String,
-    measures: Measure,
-    #[serde(default)]
-    low: Option<Box<RawValue>>,
-    #[serde(default)]
-    high: Option<Box<RawValue>>,
-}
-
-impl TryFrom<GaugeText> for GaugeFile {
-    type Error = String;
-
-    fn try_from(text: GaugeText) -> Result<Self, String> {
-        let GaugeText {
-            name,
-            region,
-            measures,
-            low,
-            high,
-        } = text;
-        let read = |which, limit: Option<Box<RawValue>>| {
-            let Some(limit) = limit else { return Ok(None) };
-            serde_json::from_str(limit.get()).map(Some).map_err(|_| {
-                let words = no_limit(
-                    &clipped(&name),
-                    measures.facts().unit,
-                    which,
-                    clipped(limit.get()),
-                );
-                words + " as a number"
-            })
-        };
-        Ok(Self {
-            low: read("low", low)?,
-            high: read("high", high)?,
-            name,
-            region,
-            measures,
-        })
+impl GaugeFile {
+    /// A gauge of features without limits.
+    pub fn new(slot: u16, name: &str, measures: impl Into<Measure>, of: &[&str]) -> Self {
+        Self {
+            slot,
+            name: name.into(),
+            measures: measures.into(),
+            of: of.iter().map(|&name| name.into()).collect(),
+            datum: None,
+            low: None,
+            high: None,
+            tolerance: None,
+            master: None,
+            golden_value: None,
+        }
     }
 }
 
@@ -99,7 +76,7 @@ pub fn kinds() -> Value {
 }
 
 /// Refuses a limit that the unit of its gauge cannot have.
-fn no_limit(gauge: &str, unit: Unit, which: &str, limit: impl Display) -> String {
+pub(super) fn no_limit(gauge: &str, unit: Unit, which: &str, limit: impl Display) -> String {
     let ([least, most], symbol) = (unit.range(), spaced(unit));
     format!(
         "gauge {gauge:?} cannot have the limit {which} = {limit}{symbol}: write {least} to {most}{symbol}"
@@ -130,6 +107,8 @@ impl GaugeFile {
         let unit = measures.facts().unit;
         let [least, most] = unit.range();
         let symbol = spaced(unit);
+        self.check_numbers(most)
+            .map_err(|error| format!("gauge {name:?}: {error}"))?;
         for (which, limit) in [("low", low), ("high", high)] {
             if let Some(limit) = limit.filter(|limit| !(least..=most).contains(limit)) {
                 return Err(no_limit(name, unit, which, limit));
@@ -142,6 +121,33 @@ impl GaugeFile {
             (_, Some(high)) if *high < 0.0 && measures.facts().never_negative => Err(format!(
                 "gauge {name:?} passes no part: its value is never below 0, its limit high = {high}{symbol} is"
             )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses numbers behind the limits that its unit, of which `most` is the largest value, cannot
+    /// have, and golden's value where it is missing.
+    fn check_numbers(&self, most: f64) -> Result<(), String> {
+        if let Some(Tolerance { about, plus, minus }) = self.tolerance {
+            if let About::Nominal(nominal) = about {
+                within("nominal", nominal, -most, most)?;
+            }
+            for (key, value) in [("plus", plus), ("minus", minus)] {
+                value.map_or(Ok(()), |value| within(key, value, -2.0 * most, 2.0 * most))?;
+            }
+        }
+        if let Some(Master { value, u }) = self.master {
+            within("master", value, -most, most)?;
+            within("master_u", u, 0.0, most)?;
+        }
+        match (self.needs_golden(), self.golden_value) {
+            (true, None) => Err(
+                "golden_value is missing: set the gauges again on the head, or teach the recipe again"
+                    .into(),
+            ),
+            (true, Some(value)) if !value.is_finite() => {
+                Err(format!("golden_value is {value}: set the gauges again"))
+            }
             _ => Ok(()),
         }
     }
@@ -168,11 +174,9 @@ mod tests {
 
     fn gauge(measures: &Measure, low: Option<f64>, high: Option<f64>) -> GaugeFile {
         GaugeFile {
-            name: "the gauge".into(),
-            region: String::new(),
-            measures: measures.clone(),
             low,
             high,
+            ..GaugeFile::new(1, "the gauge", measures.clone(), &[])
         }
     }
 
@@ -265,25 +269,25 @@ mod tests {
 
     #[test]
     fn a_limit_that_is_no_number_is_refused_by_its_gauge_and_key_with_the_bounds() {
-        let read = |measures: &str, limit: &str| {
+        let read = |kind: &str, limit: &str| {
             let text = format!(
-                r#"{{"high": {limit}, "name": "dome", "region": "all", "measures": {measures}}}"#
+                r#"{{"slot": 1, "high": {limit}, "name": "dome", "of": ["all"], "kind": {kind:?}}}"#
             );
             let read = serde_json::from_str::<GaugeFile>(&text);
             read.map(|gauge| gauge.high)
                 .map_err(|error| error.to_string())
         };
         for limit in ["1e999", "\"0.3\"", "true", "[]", "{}"] {
-            let words = read(r#"{"kind": "mean_height"}"#, limit).unwrap_err();
+            let words = read("mean_height", limit).unwrap_err();
             let wanted = format!(
                 "gauge \"dome\" cannot have the limit high = {limit} mm: write -214748.3647 to 214748.3647 mm as a number"
             );
             assert!(words.starts_with(&wanted), "{words}");
-            let words = read(r#"{"kind": "coverage"}"#, limit).unwrap_err();
+            let words = read("coverage", limit).unwrap_err();
             assert!(words.contains("write 0 to 1 as a number"), "{words}");
         }
         for (limit, number) in [("0.3", Some(0.3)), ("-1", Some(-1.0)), ("null", None)] {
-            assert_eq!(read(r#"{"kind": "mean_height"}"#, limit), Ok(number));
+            assert_eq!(read("mean_height", limit), Ok(number));
         }
     }
 

@@ -170,8 +170,9 @@ mod tests {
             "exposures": 1, "noise_counts": 1.0, "read_noise_counts": 1.0, "shot_noise": 0.0, "golden_captures": 1,
             "least_modulation": 16.0, "expansion_range_turns": 0.5, "min_coverage": 0.8, "guard_k": 0.0,
             "judges_nothing": false, "tried": [],
-            "regions": [{ "name": "frame", "polygon": [[-0.5, -0.5], [3.5, -0.5], [3.5, 3.5], [-0.5, 3.5]] }],
-            "gauges": [{ "name": "coverage", "region": "frame", "measures": { "kind": "coverage" }, "low": 0.5 }],
+            "features": [{ "name": "frame", "kind": "surface", "region": [[-0.5, -0.5], [3.5, -0.5], [3.5, 3.5], [-0.5, 3.5]] }],
+            "datums": [],
+            "gauges": [{ "slot": 1, "name": "coverage", "kind": "coverage", "of": ["frame"], "low": 0.5 }],
         });
         let arrays = Arrays {
             golden_phase: vec![0.0; 16],
@@ -361,11 +362,11 @@ mod tests {
         let place = Place::with(&["first"]);
         let (mut file, recipe) =
             Recipe::read_to_edit(Cursor::new(packed(7, "first", "c")), u64::MAX).unwrap();
-        for version in [1, VERSION + 1] {
+        for version in [1, 2, VERSION + 1] {
             file.version = version;
             let (bytes, _) = archive::pack(&file, &recipe.arrays).unwrap();
             let expected =
-                format!("version is {version}, this program reads 2: teach the part again");
+                format!("version is {version}, this program reads 3: teach the part again");
             let words = Recipe::from_bytes(&bytes).unwrap_err();
             assert!(words.contains(&expected), "{words}");
             fs::write(place.file(""), &bytes).unwrap();

@@ -7,7 +7,7 @@ use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::good_parts::DEVIATION_MM;
 use super::planner::{self, Choice};
 use super::sides::SIDES;
-use super::{AlignmentKind, GaugeFile, PatternFile, Recipe, RecipeFile, RegionFile};
+use super::{AlignmentKind, FeatureFile, GaugeFile, PatternFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use algo::adaptive::phase_reach;
@@ -80,6 +80,8 @@ pub struct GoldenPart<'a> {
     /// For each of the other sequences, in their order, its phase less `phases`; empty if they were
     /// not measured.
     pub offsets: &'a [Offsets],
+    /// Golden's signal, as [`Arrays::golden_signal`].
+    pub signal: &'a [i16],
     /// The noise of a sample by the modulation of its pixel in one capture.
     pub noise: SampleNoise,
     /// Median of the mean samples of the part's pixels, counts; `None` where it was not measured.
@@ -105,15 +107,8 @@ pub struct TaughtRecipe {
 }
 
 impl TaughtRecipe {
-    /// Chooses the production sequence for the gauges of a manifest, and packs it with its arrays.
-    ///
-    /// # Errors
-    /// In words, if they do not fit each other.
-    pub(super) fn of(mut manifest: RecipeFile, arrays: Arrays) -> Result<Self, String> {
-        let choice = planner::choose(&manifest.sequences, &manifest.gauges, arrays.widest());
-        manifest.production = choice.production;
-        Self::sealed(manifest, arrays, choice)
-    }
+    /// What is said of recipes whose cycles begin with two frames.
+    pub(super) const TWO_FRAMES: &str = "2 frames are tried first, the sequence taken follows in the same cycle where they do not hold";
 
     /// The same recipe, whose cycles begin with two frames.
     ///
@@ -121,13 +116,15 @@ impl TaughtRecipe {
     /// In words, if it could not be packed.
     pub fn with_two_frames(mut self) -> Result<Self, String> {
         self.manifest.two_frames = true;
-        self.choice.reasons.push(
-            "2 frames are tried first, the sequence taken follows in the same cycle where they do not hold".into(),
-        );
+        self.choice.reasons.push(Self::TWO_FRAMES.into());
         Self::sealed(self.manifest, self.recipe.arrays, self.choice)
     }
 
-    fn sealed(mut manifest: RecipeFile, arrays: Arrays, choice: Choice) -> Result<Self, String> {
+    pub(super) fn sealed(
+        mut manifest: RecipeFile,
+        arrays: Arrays,
+        choice: Choice,
+    ) -> Result<Self, String> {
         let mut recipe = Recipe::check(&manifest, arrays)?;
         let (bytes, fingerprint) = archive::pack(&manifest, &recipe.arrays)?;
         recipe.id.fingerprint.clone_from(&fingerprint);
@@ -143,7 +140,7 @@ impl TaughtRecipe {
 
 impl GoldenPart<'_> {
     /// Makes the recipe: expansion of the height, phase reach (from which follows where a short
-    /// sequence is safe), sequences, regions and gauges. The gauges are the deviation from golden
+    /// sequence is safe), sequences, features and gauges. The gauges are the deviation from golden
     /// and the coverage of the whole frame, and, for each of the up to 8 largest openings of the
     /// part that have 60 pixels and room for a region, the coverage of the opening.
     ///
@@ -153,7 +150,7 @@ impl GoldenPart<'_> {
         // A highlight is not resolved either, but it is no opening: it moves over the part.
         let seen = |trust: &Trust| matches!(trust, Trust::Resolved | Trust::Saturated);
         let seen: Vec<bool> = self.phases.trust.iter().map(seen).collect();
-        let (regions, gauges) = gauges(&seen, self.phases.width);
+        let (features, gauges) = gauges(&seen, self.phases.width);
         let surface = KnownSurface {
             width: self.phases.width,
             phase: self.phases.phase.clone(),
@@ -205,7 +202,8 @@ impl GoldenPart<'_> {
             min_coverage: MIN_COVERAGE,
             judges_nothing: false,
             guard_k: GUARD_K,
-            regions,
+            features,
+            datums: Vec::new(),
             gauges,
             comparison: self.comparison.clone(),
             good_parts: None,
@@ -284,6 +282,7 @@ impl GoldenPart<'_> {
             sequence_offset: self.offsets.iter().flat_map(mean).collect(),
             amplitude: self.illumination.amplitude.clone(),
             smoothing: Vec::new(),
+            golden_signal: self.signal.to_vec(),
         }
     }
 }
@@ -294,57 +293,43 @@ fn mean(offsets: &Offsets) -> impl Iterator<Item = i16> + '_ {
     first.iter().zip(second).map(|(a, b)| a.midpoint(*b))
 }
 
-/// The regions and gauges of a part that is seen by these pixels: those of the whole frame, and
+/// The features and gauges of a part that is seen by these pixels: those of the whole frame, and
 /// those of its openings.
-fn gauges(seen: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
+fn gauges(seen: &[bool], width: usize) -> (Vec<FeatureFile>, Vec<GaugeFile>) {
     let rows = seen.len() / width.max(1);
     let (right, bottom) = (width as f64 - 0.5, rows as f64 - 0.5);
-    let mut regions = vec![RegionFile {
-        name: "frame".into(),
-        polygon: vec![[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]],
-    }];
+    let frame = vec![[-0.5, -0.5], [right, -0.5], [right, bottom], [-0.5, bottom]];
+    let mut features = vec![FeatureFile::surface("frame", frame)];
+    let smoothing_px = SIDES[SIDES.len() - 1];
     let mut gauges = vec![
         GaugeFile {
-            name: "deviation".into(),
-            region: "frame".into(),
-            measures: Deviation {
-                smoothing_px: SIDES[SIDES.len() - 1],
-            }
-            .into(),
             low: Some(-DEVIATION_MM),
             high: Some(DEVIATION_MM),
+            ..GaugeFile::new(1, "deviation", Deviation { smoothing_px }, &["frame"])
         },
         GaugeFile {
-            name: "coverage".into(),
-            region: "frame".into(),
-            measures: Coverage {}.into(),
             low: Some(0.0),
-            high: None,
+            ..GaugeFile::new(2, "coverage", Coverage {}, &["frame"])
         },
     ];
     let found = openings(seen, width, OPENING_PIXELS);
     let usable = found
         .iter()
         .filter(|opening| opening.reach >= OPENING_REACH);
-    for (at, opening) in usable.take(MAX_OPENINGS).enumerate() {
-        let name = format!("opening {}", at + 1);
+    for (number, opening) in (1..).zip(usable.take(MAX_OPENINGS)) {
+        let name = format!("opening {number}");
         let ((u, v), reach) = (opening.centre, opening.reach as f64);
-        regions.push(RegionFile {
-            name: name.clone(),
-            polygon: vec![
-                [u - reach, v],
-                [u, v - reach],
-                [u + reach, v],
-                [u, v + reach],
-            ],
-        });
+        let diamond = [
+            [u - reach, v],
+            [u, v - reach],
+            [u + reach, v],
+            [u, v + reach],
+        ];
+        features.push(FeatureFile::surface(&*name, diamond.to_vec()));
         gauges.push(GaugeFile {
-            name: name.clone(),
-            region: name,
-            measures: Coverage {}.into(),
-            low: None,
             high: Some(OPENING_COVERAGE),
+            ..GaugeFile::new(2 + number, &name, Coverage {}, &[&name])
         });
     }
-    (regions, gauges)
+    (features, gauges)
 }

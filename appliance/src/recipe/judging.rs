@@ -1,5 +1,5 @@
 //! Whether a recipe can judge: limits that a part can keep and miss, names that are unique, steps
-//! between two regions.
+//! between two features.
 //!
 //! Without this a part of any shape passes, and nobody sees why. It is checked whenever a recipe is
 //! taught, imported, edited or loaded.
@@ -20,7 +20,8 @@ impl RecipeFile {
             refused.map_err(|error| format!("{error}: change the limits"))?;
             self.check_step(gauge)?;
         }
-        check_unique("region", self.regions.iter().map(|region| &region.name))?;
+        check_unique("feature", self.features.iter().map(|feature| &feature.name))?;
+        check_unique("datum", self.datums.iter().map(|datum| &datum.name))?;
         check_unique("gauge", self.gauges.iter().map(|gauge| &gauge.name))?;
         let limited = self.gauges.iter().find(|gauge| gauge.can_fail());
         match (limited, self.judges_nothing) {
@@ -41,28 +42,26 @@ impl RecipeFile {
         !self.gauges.iter().any(GaugeFile::can_fail)
     }
 
-    /// Refuses a step between a region and itself, under whatever name: it is 0 for every part.
+    /// Refuses what a feature has from itself, under whatever name: it is 0 for every part.
     fn check_step(&self, gauge: &GaugeFile) -> Result<(), String> {
-        let Some(from) = gauge.measures.kind().from() else {
+        let [region, from] = &gauge.of[..] else {
             return Ok(());
         };
-        let polygon = |name: &str| {
-            let mut regions = self.regions.iter();
-            Some(&regions.find(|region| region.name == name)?.polygon)
-        };
-        let same = from == gauge.region
-            || polygon(from).is_some_and(|here| polygon(&gauge.region) == Some(here));
+        let polygon = |name: &str| self.feature(name).map(|feature| &feature.region);
+        let same =
+            from == region || polygon(from).is_some_and(|here| polygon(region) == Some(here));
         match same {
             true => Err(format!(
-                "gauge {:?} measures the step of region {:?} from itself, which is 0 whatever the part: name another region",
-                gauge.name, gauge.region
+                "gauge {:?} measures the {} of {region:?} from itself, which is 0 whatever the part: name another feature",
+                gauge.name,
+                gauge.kind_name()
             )),
             false => Ok(()),
         }
     }
 }
 
-/// Refuses a name that two regions or two gauges have: limits and references would belong to
+/// Refuses a name that two features or two gauges have: limits and references would belong to
 /// either.
 pub(super) fn check_unique<'a>(
     what: &str,

@@ -1,7 +1,9 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
-//! - On disk: [`mod@file`] is the manifest, `gauge` its gauges, [`bounds`] the bounds of lists and of
-//!   values that depend on others, [`archive`] the ZIP with its fingerprint.
+//! - On disk: [`mod@file`] is the manifest, [`feature`] its features and datum systems, `gauge` and
+//!   `gauge_keys` its gauges, [`tolerance`] what their limits come from, [`bounds`] the bounds of
+//!   lists and of values that depend on others, [`archive`] the ZIP with its fingerprint,
+//!   [`gauges_toml`] features, datum systems and gauges as text for people.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot
 //!   judge, [`plan`] joins that with the head's calibration; `light` tells bad light from bad
 //!   parts.
@@ -12,8 +14,9 @@
 //!   pattern, [`captures`] measures the part with this pattern by every sequence that production
 //!   may use (`candidates`), [`golden`] makes the recipe, [`planner`] chooses the sequence,
 //!   [`good_parts`] squares and limit of the deviation, `sides` those squares from place to place,
-//!   `limits` sets and `proof` tries the limits of all gauges; [`replace`] keeps names and gauges
-//!   of a recipe that is taught again.
+//!   `limits` sets and `proof` tries the limits of all gauges, `signal` is golden's light as it was
+//!   demodulated; [`replace`] keeps names and gauges of a recipe that is taught again, `regauge`
+//!   works out limits that follow golden.
 
 pub mod adaptive;
 pub mod archive;
@@ -27,8 +30,11 @@ mod differences;
 pub mod edit;
 pub mod exchange;
 mod failure;
+pub mod feature;
 pub mod file;
 mod gauge;
+mod gauge_keys;
+pub mod gauges_toml;
 pub mod generations;
 pub mod golden;
 pub mod good_parts;
@@ -41,18 +47,22 @@ mod median;
 pub mod plan;
 pub mod planner;
 mod proof;
+mod regauge;
 pub mod replace;
+mod seam;
 mod shots;
 mod sides;
+pub mod signal;
 pub mod store;
 pub mod teach;
+pub mod tolerance;
 
 pub use archive::short;
 pub use check::{Conditions, Recipe, RecipeId, RecipeSequence};
 pub use demands::Demands;
+pub use feature::{DatumFile, FeatureFile, FeatureKind};
 pub use file::{
-    AlignmentKind, PatternFile, RecipeFile, RegionFile, SequenceFile, SequenceKind, UnseenFile,
-    safe,
+    AlignmentKind, PatternFile, RecipeFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };
 pub use gauge::{GaugeFile, kinds};
 pub use store::{ChangeError, LoadError, Store};

@@ -130,11 +130,9 @@ mod tests {
 
     fn gauge(limit: f64) -> Vec<GaugeFile> {
         vec![GaugeFile {
-            name: "deviation".into(),
-            region: "frame".into(),
-            measures: Deviation { smoothing_px: 9 }.into(),
             low: Some(-limit),
             high: Some(2.0 * limit),
+            ..GaugeFile::new(1, "deviation", Deviation { smoothing_px: 9 }, &["frame"])
         }]
     }
 
@@ -153,11 +151,8 @@ mod tests {
     fn an_opening_that_must_stay_open_needs_the_full_sequence() {
         let mut gauges = gauge(0.25);
         gauges.push(GaugeFile {
-            name: "opening 1".into(),
-            region: "opening 1".into(),
-            measures: Coverage {}.into(),
-            low: None,
             high: Some(0.25),
+            ..GaugeFile::new(2, "opening 1", Coverage {}, &["opening 1"])
         });
         let sequences = sequences([0.05, 0.045, 0.03], [1.0; 3]);
         let choice = choose(&sequences, &gauges, 0);

@@ -54,18 +54,8 @@ impl Proof {
         calibration: &Calibration,
     ) -> Result<Self, String> {
         let recipe = Recipe::check(manifest, arrays.clone())?;
-        let (_, _, bit_depth) = recipe.conditions.camera;
-        let full_scale = f64::from((1_u32 << bit_depth) - 1);
-        let taught = recipe.sequences.last().map_or(1.0, |of| of.fundamental());
-        let light = recipe.sequences.iter().map(|sequence| {
-            let unit = f64::from(u16::MAX) / full_scale * sequence.fundamental() / taught;
-            let bits = |counts: &f32| (f64::from(*counts) * unit).round() as u16;
-            let counts = arrays.modulation.iter();
-            counts
-                .map(|counts| Modulation::from_bits(bits(counts)))
-                .collect()
-        });
-        let light = light.collect();
+        let sequences = 0..recipe.sequences.len();
+        let light = sequences.map(|sequence| recipe.light(sequence)).collect();
         let plan = Plan::new(recipe, calibration, false).map_err(|error| error.to_string())?;
         let places = placements(plan.corners(), REACH * manifest.placement_tolerance_mm);
         Ok(Self {
@@ -186,8 +176,8 @@ pub(super) fn leave_out_covered(
         ));
         let removed = manifest.gauges.remove(at);
         manifest
-            .regions
-            .retain(|region| region.name != removed.region);
+            .features
+            .retain(|feature| !removed.of.contains(&feature.name));
         manifest.tried.retain(|tried| tried.gauge != removed.name);
         for inspection in &mut *judged {
             inspection.gauges.remove(at);

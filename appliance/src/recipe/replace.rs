@@ -2,6 +2,7 @@
 
 use super::golden::{Naming, TaughtRecipe};
 use super::{RecipeFile, Store};
+use crate::head::calibration::Calibration;
 
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
@@ -50,7 +51,7 @@ pub fn refuse_taken(
         Some(file) => format!(
             "{:?} with {} and {}",
             file.name,
-            count(file.regions.len(), "region"),
+            count(file.features.len(), "feature"),
             count(file.gauges.len(), "gauge")
         ),
         None => "a file that cannot be read".into(),
@@ -71,7 +72,7 @@ pub fn no_gauges(number: u16) -> String {
 /// Checks that the gauges of a recipe can be kept on a head with frames of (width, height).
 ///
 /// # Errors
-/// In words: the frames have another size (regions are polygons in camera pixels), or the recipe
+/// In words: the frames have another size (features have polygons in camera pixels), or the recipe
 /// cannot judge.
 pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<(), String> {
     let camera = &replaced.camera;
@@ -79,32 +80,38 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
         return replaced.check_judging();
     }
     Err(format!(
-        "the regions of recipe {} are in pixels of frames of {}×{}, this camera has {width}×{height}: teach without its gauges",
+        "the features of recipe {} are in pixels of frames of {}×{}, this camera has {width}×{height}: teach without its gauges",
         replaced.number, camera.width, camera.height
     ))
 }
 
-/// Gives a recipe that was just taught the regions, gauges, limits, guard band and least coverage
-/// of the one that it replaces, and its two frames if it begins with them; the production sequence
-/// is chosen again for those limits.
+/// Gives a recipe that was just taught the features, datum systems, gauges, guard band and least
+/// coverage of the one that it replaces, and its two frames if it begins with them. Limits that
+/// come from golden follow the new one, which `head` measured; the production sequence is chosen
+/// again for the limits.
 ///
 /// # Errors
 /// In words, if they do not fit what was taught.
-pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<TaughtRecipe, String> {
+pub fn keep_gauges(
+    taught: TaughtRecipe,
+    replaced: &RecipeFile,
+    head: &Calibration,
+) -> Result<TaughtRecipe, String> {
     let TaughtRecipe {
         mut manifest,
         recipe,
         ..
     } = taught;
     check_kept(replaced, (manifest.camera.width, manifest.camera.height))?;
-    manifest.regions.clone_from(&replaced.regions);
+    manifest.features.clone_from(&replaced.features);
+    manifest.datums.clone_from(&replaced.datums);
     manifest.gauges.clone_from(&replaced.gauges);
     manifest.judges_nothing = replaced.judges_nothing;
     manifest.min_coverage = replaced.min_coverage;
     manifest.guard_k = replaced.guard_k;
-    manifest.two_frames = replaced.two_frames;
+    manifest.two_frames |= replaced.two_frames;
     // The prediction is for the limits that teaching sets.
     manifest.good_parts = None;
     manifest.tried = Vec::new();
-    TaughtRecipe::of(manifest, recipe.arrays)
+    TaughtRecipe::of(manifest, recipe.arrays, Some(head))
 }

@@ -124,6 +124,7 @@ pub fn teach_while(
         phases: &golden.phases,
         heights: &golden.heights,
         offsets: &golden.offsets,
+        signal: &golden.signal,
         noise: golden.noise,
         offset_counts: golden.offset_counts,
         captures: CAPTURES,
@@ -146,7 +147,7 @@ pub fn teach_while(
     words.extend(proof::hold(&mut taught.manifest, &judged));
     if !words.is_empty() {
         let reasons = taught.choice.reasons;
-        let again = computing.on(|| TaughtRecipe::of(taught.manifest, taught.recipe.arrays));
+        let again = computing.on(|| TaughtRecipe::of(taught.manifest, taught.recipe.arrays, None));
         taught = again.map_err(TeachError::Rig)?;
         taught.choice.reasons = reasons.into_iter().chain(words).collect();
     }

@@ -79,7 +79,7 @@ fn summary(file: &RecipeFile) -> Value {
     json!({
         "number": file.number, "name": file.name, "part_number": file.part_number,
         "fingerprint": file.fingerprint, "taught_at_unix_s": file.taught_at_unix_s,
-        "regions": file.regions.len(), "gauges": file.gauges.len(), "judges_nothing": file.judges_nothing,
+        "features": file.features.len(), "gauges": file.gauges.len(), "judges_nothing": file.judges_nothing,
         "frames": file.sequences.get(file.production).map(|sequence| sequence.frames.len()),
     })
 }
@@ -138,7 +138,8 @@ pub(super) async fn edit(
             note = tried(site, recipe)?;
             Ok(())
         };
-        let edited = edit::edit(&site.recipes, number, wanted, fits)?;
+        let head = site.calibration.get();
+        let edited = edit::edit(&site.recipes, number, wanted, head.as_deref(), fits)?;
         Ok((edited, note))
     });
     let (edited, note) = edited.await?;

@@ -17,6 +17,9 @@ pub struct Reading {
     /// What is the same in every measurement and so not in σ, 1 σ: the effect of golden's noise and
     /// of the calibration's error.
     pub systematic: f64,
+    /// The same of what the value differs by from golden's own: what the measurements of both share
+    /// is not in it, the noise of golden and the error over the part's displacement are.
+    pub compared: f64,
     /// Where the value is, of a deviation.
     pub square: Option<Square>,
 }

@@ -110,18 +110,18 @@ impl ErrorBudget {
         let largest = self.of_displaced(largest, gauge, placed);
         let extreme = largest.uncertain([magnitude(best), pixels + motion], others);
         let sigma = libm::sqrt(extreme.variance + (1.0 - extreme.defect) * motion);
+        // The extreme of noise scatters with golden's noise, too; that of a defect is shifted by it.
+        let golden = libm::sqrt(
+            golden * (extreme.defect * pixels + motion * smoothed / self.spot_variance()),
+        );
+        let wrong = libm::hypot(self.displaced(placed), self.rippled() * lever);
+        let systematic = libm::hypot(golden, wrong);
         Some(Reading {
             value: best.sum as f64 / best.count as f64 / 1e6,
             sigma: (sigma > 0.0).then_some(sigma),
             expected: Some(largest.mean).filter(|mean| *mean > 0.0),
-            // The extreme of noise scatters with golden's noise, too; that of a defect is shifted
-            // by it.
-            systematic: libm::hypot(
-                libm::sqrt(
-                    golden * (extreme.defect * pixels + motion * smoothed / self.spot_variance()),
-                ),
-                libm::hypot(self.displaced(placed), self.rippled() * lever),
-            ),
+            systematic,
+            compared: systematic,
             square: Some(Square {
                 column: best.column,
                 row: best.row,

@@ -125,6 +125,7 @@ impl Production {
                     sigma: Some(coverage::sigma(variance, pixels)),
                     expected: None,
                     systematic: 0.0,
+                    compared: 0.0,
                     square: None,
                 })
             }
@@ -153,15 +154,17 @@ impl Production {
             Basis::Motion(component) => {
                 let (value, sigma) = pose.placed.as_ref()?.component(component as usize)?;
                 let budget = &self.budget;
+                let systematic = libm::hypot(
+                    sigma * libm::sqrt(budget.golden_variance(noisier) / budget.spot_variance()),
+                    value * budget.calibration.length,
+                );
                 Some(Reading {
                     value,
                     sigma: Some(sigma),
                     expected: None,
-                    systematic: libm::hypot(
-                        sigma
-                            * libm::sqrt(budget.golden_variance(noisier) / budget.spot_variance()),
-                        value * budget.calibration.length,
-                    ),
+                    systematic,
+                    // A motion is what the part differs by from golden.
+                    compared: systematic,
                     square: None,
                 })
             }

@@ -81,17 +81,21 @@ impl ErrorBudget {
         } = found;
         // Golden's pixels are independent of each other.
         let moved = motion / self.spot_variance();
-        let (golden, wrong) = match made {
-            Made::OfHeights => (moved, self.calibration.height),
-            Made::OfDeviations => (pixels / smoothed + moved, self.displaced(placed)),
+        let systematic = |golden: f64, wrong: f64| {
+            let golden = golden * self.golden_variance(noisier);
+            let wrong = libm::hypot(wrong, self.rippled());
+            libm::sqrt(golden + wrong * wrong * lever * lever)
         };
-        let golden = golden * self.golden_variance(noisier);
-        let wrong = libm::hypot(wrong, self.rippled());
+        let compared = systematic(pixels / smoothed + moved, self.displaced(placed));
         Reading {
             value,
             sigma: Some(libm::sqrt(pixels + motion)),
             expected: None,
-            systematic: libm::sqrt(golden + wrong * wrong * lever * lever),
+            systematic: match made {
+                Made::OfHeights => systematic(moved, self.calibration.height),
+                Made::OfDeviations => compared,
+            },
+            compared,
             square: None,
         }
     }

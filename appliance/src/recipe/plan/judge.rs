@@ -43,16 +43,23 @@ impl Demands {
     /// Judges the findings.
     pub(super) fn judge(&self, findings: &Findings, inspection: &mut Inspection) {
         for (limits, reading) in self.limits.iter().zip(&findings.readings) {
+            let measured = reading.map_or_else(Measured::default, |reading| {
+                let (value, systematic) = match limits.master {
+                    None => (reading.value, reading.systematic),
+                    Some(master) => master.of(&reading),
+                };
+                Measured {
+                    value: Some(value),
+                    sigma: reading.sigma,
+                    systematic,
+                    expected: reading.expected,
+                    square: reading.square.map(Into::into),
+                }
+            });
             let judged = GaugeValue::judged(
                 Arc::clone(&limits.name),
                 limits.unit,
-                reading.map_or_else(Measured::default, |reading| Measured {
-                    value: Some(reading.value),
-                    sigma: reading.sigma,
-                    systematic: reading.systematic,
-                    expected: reading.expected,
-                    square: reading.square.map(Into::into),
-                }),
+                measured,
                 GaugeLimits {
                     low: limits.low,
                     high: limits.high,

@@ -1,9 +1,16 @@
-//! Checks whether a recipe can be used on a head by planning it; the plan is dropped.
+//! Plans a recipe before it is used: whether it can be used on a head, and what it measures of
+//! golden. The plan is dropped.
 
-use super::{Plan, PlanError};
+use super::{Laps, Plan, PlanError};
 use crate::head::calibration::Calibration;
 use crate::recipe::Recipe;
+use crate::station::Inspection;
+use algo::inspect::{Findings, Input, Maps};
+use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
+use algo::units::Modulation;
 use std::sync::{Mutex, PoisonError};
+use std::time::Instant;
 
 /// One recipe is tried at a time: planning takes up to 31 bytes per pixel beside the recipe itself.
 static ONE: Mutex<()> = Mutex::new(());
@@ -15,15 +22,85 @@ impl Plan {
     /// # Errors
     /// As [`Plan::new`].
     pub fn try_out(recipe: Recipe, calibration: &Calibration) -> Result<(), PlanError> {
-        let number = recipe.id.number;
-        let _alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-        let thread = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        let thread = thread.map_err(|error| PlanError::Unfit {
-            number,
-            reason: format!("it cannot be tried out: {error}: end other programs"),
-        })?;
-        thread
-            .install(|| Self::new(recipe, calibration, false))
-            .map(drop)
+        alone(recipe, |recipe| {
+            Self::new(recipe, calibration, false).map(drop)
+        })
     }
+
+    /// What the recipe measures of golden, that is, of a part that lies as taught and is seen
+    /// without noise by the first of its sequences; σ is that of one measurement. On one thread as
+    /// [`Plan::try_out`].
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn golden(recipe: Recipe, calibration: &Calibration) -> Result<Findings, PlanError> {
+        alone(recipe, |recipe| {
+            golden(recipe, calibration).map(|(_, found)| found)
+        })
+    }
+
+    /// As [`Plan::golden`], judged as a part is.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn judge_golden(
+        recipe: Recipe,
+        calibration: &Calibration,
+    ) -> Result<Inspection, PlanError> {
+        alone(recipe, |recipe| {
+            let (plan, found) = golden(recipe, calibration)?;
+            let mut laps = Laps::since(Instant::now());
+            Ok(plan.judged((0, &[]), Ok((found, None)), &mut laps))
+        })
+    }
+}
+
+/// Does something with a recipe on one thread, one recipe at a time.
+fn alone<T: Send>(
+    recipe: Recipe,
+    work: impl FnOnce(Recipe) -> Result<T, PlanError> + Send,
+) -> Result<T, PlanError> {
+    let number = recipe.id.number;
+    let _alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let thread = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let thread = thread.map_err(|error| PlanError::Unfit {
+        number,
+        reason: format!("it cannot be tried out: {error}: end other programs"),
+    })?;
+    thread.install(|| work(recipe))
+}
+
+/// A plan, and what it finds of golden.
+fn golden(recipe: Recipe, calibration: &Calibration) -> Result<(Plan, Findings), PlanError> {
+    let number = recipe.id.number;
+    let unfit = |reason: String| PlanError::Unfit { number, reason };
+    // Two frames compare pictures, and golden's is by the sequence behind them.
+    let planned = recipe.sequences.iter().position(|of| !of.is_pair());
+    let sequence = planned.ok_or_else(|| unfit("it has no sequence".into()))?;
+    let light = recipe.light(sequence);
+    let plan = Plan::new(recipe, calibration, false)?;
+    let production = &plan.runs[sequence].production;
+    let (map, decoder) = (production.map(), production.decoder());
+    let surface = production.cubics().surface();
+    let mut phases = PhaseMap::new(surface.width, map.len() / surface.width.max(1));
+    let least = decoder.least_modulation().counts(decoder.full_scale());
+    let lit = |light: Modulation| light.counts(decoder.full_scale()) >= least;
+    for (at, &phase) in map.iter().enumerate() {
+        phases.trust[at] = match (phase.is_known(), lit(light[at])) {
+            (false, _) => Trust::Unexpected,
+            (true, false) => Trust::Dark,
+            (true, true) => {
+                (phases.phase[at], phases.modulation[at]) = (phase, light[at]);
+                Trust::Resolved
+            }
+        };
+    }
+    let input = Input::Phases(&phases);
+    let mut strips = plan.strips();
+    let placed = production.place(input, &mut strips);
+    let found = placed
+        .and_then(|placed| production.inspect_placed(input, &mut strips, placed, Maps::default()))
+        .map_err(|error| unfit(error.to_string()))?;
+    drop(strips);
+    Ok((plan, found))
 }

@@ -1,0 +1,304 @@
+//! The keys of a gauge, as `recipe.json`, `gauges.toml` and the API have them.
+//!
+//! Numbers are parsed once the gauge's name is known, so that a refusal can name the gauge and the
+//! key; the parser's message would only give the line and column.
+
+use super::gauge::{GaugeFile, no_limit};
+use super::seam;
+use super::tolerance::{About, Master, Tolerance};
+use algo::inspect::Measure;
+use hal::bounds::{clipped, shortened};
+use serde::de::{DeserializeOwned, Error as _, MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::value::RawValue;
+use serde_json::{Value, json};
+use std::fmt::{Display, Formatter};
+
+/// Limits that were worked out may differ from what they come from by this share: other programs
+/// write fewer digits.
+const SAME: f64 = 1e-9;
+
+/// The keys of an object in their order, each with the text of its value.
+pub(super) struct Keys(pub Vec<(String, Box<RawValue>)>);
+
+impl<'de> Deserialize<'de> for Keys {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        struct All;
+        impl<'de> Visitor<'de> for All {
+            type Value = Keys;
+
+            fn expecting(&self, out: &mut Formatter<'_>) -> std::fmt::Result {
+                out.write_str("an object with the keys of a gauge")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Keys, A::Error> {
+                let mut all: Vec<(String, Box<RawValue>)> = Vec::new();
+                while let Some((key, value)) = map.next_entry::<String, _>()? {
+                    if all.iter().any(|(other, _)| *other == key) {
+                        let words = format!("key {:?} stands twice in a gauge", clipped(&key));
+                        return Err(A::Error::custom(words));
+                    }
+                    all.push((key, value));
+                }
+                Ok(Keys(all))
+            }
+        }
+        from.deserialize_map(All)
+    }
+}
+
+/// An error of the JSON parser without its place in a text that nobody sees.
+pub(super) fn placeless(error: impl Display) -> String {
+    let words = error.to_string();
+    let end = words.find(" at line ").unwrap_or(words.len());
+    shortened(&words[..end])
+}
+
+impl Keys {
+    fn take(&mut self, key: &str) -> Option<Box<RawValue>> {
+        let at = self.0.iter().position(|(other, _)| other == key)?;
+        Some(self.0.remove(at).1)
+    }
+
+    /// The value of a key, `what` it is; none if it is missing or null.
+    fn read<T: DeserializeOwned>(&mut self, key: &str, what: &str) -> Result<Option<T>, String> {
+        let Some(text) = self.take(key) else {
+            return Ok(None);
+        };
+        serde_json::from_str(text.get())
+            .map_err(|_| format!("{key} is {}: write {what}", clipped(text.get())))
+    }
+
+    fn number(&mut self, key: &str) -> Result<Option<f64>, String> {
+        self.read(key, "a number")
+    }
+
+    /// What limits come from.
+    fn tolerance(&mut self) -> Result<Option<Tolerance>, String> {
+        let nominal = self.number("nominal")?;
+        let golden = self
+            .read("golden", "true or leave it out")?
+            .unwrap_or(false);
+        let (plus, minus) = (self.number("plus")?, self.number("minus")?);
+        let about = match (nominal, golden) {
+            (Some(_), true) => {
+                return Err("it has nominal and golden = true: leave one of them out".into());
+            }
+            (Some(nominal), false) => About::Nominal(nominal),
+            (None, true) => About::Golden,
+            (None, false) => {
+                let stray = plus.map(|_| "plus").or(minus.map(|_| "minus"));
+                return stray.map_or(Ok(None), |key| {
+                    Err(format!(
+                        "it has {key} without nominal or golden = true: add one of them"
+                    ))
+                });
+            }
+        };
+        if plus.is_none() && minus.is_none() {
+            return Err("it has neither plus nor minus about its middle: add them".into());
+        }
+        Ok(Some(Tolerance { about, plus, minus }))
+    }
+
+    fn master(&mut self) -> Result<Option<Master>, String> {
+        let (value, u) = (self.number("master")?, self.number("master_u")?);
+        match (value, u) {
+            (None, Some(_)) => Err("it has master_u without master: add it".into()),
+            (value, u) => Ok(value.map(|value| Master {
+                value,
+                u: u.unwrap_or(0.0),
+            })),
+        }
+    }
+
+    /// The kind with its parameters: all keys that are left.
+    fn measures(self, of: &[String]) -> Result<Measure, String> {
+        let Self(mut keys) = self;
+        if !keys.iter().any(|(key, _)| key == "kind") {
+            return Err("it has no kind: `fringed recipe kinds` lists them".into());
+        }
+        if let Some((key, _)) = keys.iter().find(|(key, _)| key == "from") {
+            return Err(format!(
+                "it has an unknown key {key:?}: write of = [region, from]"
+            ));
+        }
+        let second = of.get(1).map(|second| json!(second));
+        let text = |keys: &[(String, Box<RawValue>)]| {
+            let values = keys
+                .iter()
+                .map(|(key, value)| format!("{}:{value}", json!(key)));
+            format!("{{{}}}", values.collect::<Vec<_>>().join(","))
+        };
+        let mut read = serde_json::from_str::<Measure>(&text(&keys));
+        if let (Err(_), Some(second)) = (&read, second)
+            && let Ok(from) = serde_json::value::to_raw_value(&second)
+        {
+            keys.push(("from".into(), from));
+            if let Ok(step) = serde_json::from_str(&text(&keys)) {
+                read = Ok(step);
+            }
+            keys.pop();
+        }
+        let measures = read.map_err(placeless)?;
+        let (_, known) = seam::parameters(&measures);
+        let unknown = |key: &&(String, _)| key.0 != "kind" && !known.contains_key(&key.0);
+        match keys.iter().find(unknown) {
+            Some((key, _)) => Err(format!("it has an unknown key {:?}", clipped(key))),
+            None => Ok(seam::with_second(measures, of)),
+        }
+    }
+}
+
+impl TryFrom<Keys> for GaugeFile {
+    type Error = String;
+
+    fn try_from(mut keys: Keys) -> Result<Self, String> {
+        let name = keys.read("name", "the gauge's name in quotes")?;
+        let name: String = name.ok_or("a gauge has no name: add one")?;
+        let named = |error: String| format!("gauge {:?}: {error}", clipped(&name));
+        let gauge = Self::of_keys(keys, &name).map_err(|refused| match refused {
+            Refused::Limit { unit, which, text } => {
+                no_limit(&clipped(&name), unit, which, text) + " as a number"
+            }
+            Refused::Words(words) => named(words),
+        })?;
+        gauge.check_sources().map_err(named)?;
+        Ok(gauge)
+    }
+}
+
+/// Why keys make no gauge.
+enum Refused {
+    /// A limit is no number.
+    Limit {
+        unit: crate::station::Unit,
+        which: &'static str,
+        text: String,
+    },
+    Words(String),
+}
+
+impl From<String> for Refused {
+    fn from(words: String) -> Self {
+        Self::Words(words)
+    }
+}
+
+impl GaugeFile {
+    fn of_keys(mut keys: Keys, name: &str) -> Result<Self, Refused> {
+        let slot = keys.read("slot", "a whole number from 1 to 64")?;
+        let slot = slot.ok_or_else(|| "it has no slot: write 1 to 64".to_owned())?;
+        let of: Vec<String> = keys
+            .read("of", "a list of names of features")?
+            .unwrap_or_default();
+        let datum = keys.read("datum", "the name of a datum system")?;
+        let limits = [keys.take("low"), keys.take("high")];
+        let (tolerance, master) = (keys.tolerance()?, keys.master()?);
+        let golden_value = keys.number("golden_value")?;
+        let measures = keys.measures(&of)?;
+        let unit = measures.facts().unit;
+        let read = |which, limit: Option<Box<RawValue>>| match limit {
+            None => Ok(None),
+            Some(limit) => serde_json::from_str(limit.get()).map_err(|_| Refused::Limit {
+                unit,
+                which,
+                text: clipped(limit.get()),
+            }),
+        };
+        let [low, high] = limits;
+        let mut gauge = Self {
+            slot,
+            name: name.to_owned(),
+            measures,
+            of,
+            datum,
+            low: read("low", low)?,
+            high: read("high", high)?,
+            tolerance,
+            master,
+            golden_value,
+        };
+        if !gauge.needs_golden() {
+            gauge.golden_value = None;
+        }
+        if gauge.low.is_none() && gauge.high.is_none() {
+            gauge.set_limits();
+        }
+        Ok(gauge)
+    }
+
+    /// Refuses limits that are not what they are said to come from.
+    fn check_sources(&self) -> Result<(), String> {
+        let Some(tolerance) = self.tolerance else {
+            return Ok(());
+        };
+        let source = match tolerance.about {
+            About::Nominal(_) => "nominal",
+            About::Golden => "golden = true",
+        };
+        let expected = self.middle().map(|middle| tolerance.limits(middle));
+        let expected = expected.unwrap_or_default();
+        for (which, limit, expected) in [
+            ("low", self.low, expected[0]),
+            ("high", self.high, expected[1]),
+        ] {
+            let same = match (limit, expected) {
+                (Some(limit), Some(expected)) => {
+                    (limit - expected).abs() <= SAME * limit.abs().max(1.0)
+                }
+                (limit, expected) => limit.is_none() && expected.is_none(),
+            };
+            if !same {
+                return Err(format!(
+                    "{which} is not what {source} with plus and minus gives: leave {which} or {source} out"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// The name of its kind in recipes.
+    pub fn kind_name(&self) -> String {
+        seam::parameters(&self.measures).0
+    }
+
+    /// Its keys with their values, in the order in which they are written.
+    pub(super) fn keys(&self) -> Vec<(String, Value)> {
+        let (kind, parameters) = seam::parameters(&self.measures);
+        let mut keys = vec![
+            ("slot".to_owned(), json!(self.slot)),
+            ("name".to_owned(), json!(self.name)),
+            ("kind".to_owned(), json!(kind)),
+        ];
+        keys.extend(parameters);
+        let (nominal, golden) = match self.tolerance.map(|tolerance| tolerance.about) {
+            None => (None, None),
+            Some(About::Nominal(nominal)) => (Some(nominal), None),
+            Some(About::Golden) => (None, Some(true)),
+        };
+        let some = |number: Option<f64>| number.map(|number| json!(number));
+        let optional = [
+            ("of", (!self.of.is_empty()).then(|| json!(self.of))),
+            ("datum", self.datum.as_ref().map(|name| json!(name))),
+            ("low", some(self.low)),
+            ("high", some(self.high)),
+            ("nominal", some(nominal)),
+            ("golden", golden.map(|golden| json!(golden))),
+            ("plus", some(self.tolerance.and_then(|of| of.plus))),
+            ("minus", some(self.tolerance.and_then(|of| of.minus))),
+            ("master", some(self.master.map(|master| master.value))),
+            ("master_u", some(self.master.map(|master| master.u))),
+            ("golden_value", some(self.golden_value)),
+        ];
+        let optional = optional.into_iter();
+        keys.extend(optional.filter_map(|(key, value)| Some((key.to_owned(), value?))));
+        keys
+    }
+}
+
+impl Serialize for GaugeFile {
+    fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
+        to.collect_map(self.keys())
+    }
+}
