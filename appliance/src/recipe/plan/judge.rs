@@ -31,6 +31,9 @@ const LEAST_TURN: f64 = 0.05;
 /// are used.
 pub(super) const ALIKE: f64 = 0.8;
 
+/// Why a gauge has no value.
+const NOTHING: &str = "found nothing to measure";
+
 /// Why a part cannot be judged.
 struct Reason {
     /// ERROR_CODE.
@@ -42,16 +45,22 @@ struct Reason {
 impl Demands {
     /// Judges the findings.
     pub(super) fn judge(&self, findings: &Findings, inspection: &mut Inspection) {
-        for (limits, reading) in self.limits.iter().zip(&findings.readings) {
+        for (slot, (limits, reading)) in (1..).zip(self.limits.iter().zip(&findings.readings)) {
+            let unseen = || Measured {
+                reason: Some(NOTHING.into()),
+                ..Measured::default()
+            };
             let judged = GaugeValue::judged(
+                slot,
                 Arc::clone(&limits.name),
                 limits.unit,
-                reading.map_or_else(Measured::default, |reading| Measured {
+                reading.map_or_else(unseen, |reading| Measured {
                     value: Some(reading.value),
                     sigma: reading.sigma,
                     systematic: reading.systematic,
                     expected: reading.expected,
                     square: reading.square.map(Into::into),
+                    ..Measured::default()
                 }),
                 GaugeLimits {
                     low: limits.low,
@@ -104,7 +113,7 @@ impl Demands {
         }
         let gauges = inspection.gauges.iter();
         let missing: Vec<&str> = gauges
-            .filter(|gauge| !gauge.decision.valid)
+            .filter(|gauge| gauge.decision.unseen())
             .map(|gauge| &*gauge.name)
             .collect();
         if missing.is_empty() {
@@ -124,7 +133,7 @@ impl Demands {
         let missing = missing.join(", ");
         Some(Reason {
             code: NOT_MEASURED,
-            words: format!("gauge {missing} found nothing to measure{left_out}"),
+            words: format!("gauge {missing} {NOTHING}{left_out}"),
         })
     }
 
