@@ -180,6 +180,9 @@ fn moment(entry: &Entry) -> String {
     }
 }
 
+/// Bit 5 of a decision.
+const ABSENT: u16 = 1 << 5;
+
 fn row(entry: &Entry) -> String {
     let outside = entry.gauges.iter().filter(|gauge| gauge.decision & 1 == 0);
     let mut remarks: Vec<String> = outside
@@ -187,6 +190,7 @@ fn row(entry: &Entry) -> String {
             Some(value) => format!("{} {value:+.3} {}", gauge.name, gauge.unit)
                 .trim_end()
                 .to_owned(),
+            None if gauge.decision & ABSENT != 0 => format!("{} absent", gauge.name),
             None => format!("{} not measured", gauge.name),
         })
         .collect();

@@ -14,6 +14,7 @@ mod completions;
 mod config;
 mod demo;
 mod doctor;
+mod gauges;
 mod history;
 mod idle;
 mod measure;
@@ -98,7 +99,7 @@ commands! {
     History(history::History);
     /// Judge a part that did not pass again and compare with the history.
     Replay(replay::Replay);
-    /// List, export, import or delete recipes, or undo that.
+    /// List, export, import or delete recipes, undo that, or change the gauges of one.
     #[command(subcommand)]
     Recipe(recipe::RecipeCommand);
     /// Check a configuration, or list its keys.

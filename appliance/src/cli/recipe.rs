@@ -1,8 +1,10 @@
-//! `fringed recipe`: lists, exports, imports and deletes the station's recipes, and undoes changes.
+//! `fringed recipe`: lists, exports, imports and deletes the station's recipes, undoes changes, and
+//! changes the gauges of a file.
 //!
 //! A running station uses an imported recipe when it is selected next. Deleting and undoing need a
 //! stopped station or its page, because the recipe may be active.
 
+use super::gauges::Gauges;
 use super::names;
 use super::numbers::number;
 use super::options::{Files, Json, Quiet};
@@ -49,6 +51,7 @@ pub enum RecipeCommand {
         #[command(flatten)]
         quiet: Quiet,
     },
+    Gauges(Gauges),
     /// Delete a recipe; `undo` brings it back. Not while a station runs: its page deletes recipes
     /// as well.
     Delete(Numbered),
@@ -119,6 +122,7 @@ impl RecipeCommand {
                 });
                 Ok(())
             }
+            Self::Gauges(gauges) => gauges.run(),
             Self::Delete(recipe) => {
                 let number = recipe.number;
                 let state = at_rest(&recipe.files, "Delete")?;

@@ -62,7 +62,7 @@ columns! {
         /// Where the clock was not synchronised: the trigger time in µs since 1970 UTC by the clock
         /// of a browser whose user signed in during the same start.
         browser_utc_us: Option<u64> = None;
-        /// The gauges, in the recipe's order.
+        /// The gauges, by ascending slots.
         gauges: Vec<GaugeEntry> = record.inspection.gauges.iter().map(GaugeEntry::of).collect();
     }
 }
@@ -75,8 +75,10 @@ columns! {
         name: String = gauge.name.as_ref().into(), "TEXT NOT NULL";
         /// The unit's symbol, empty for shares and bare numbers.
         unit: String = gauge.unit.symbol().into(), "TEXT NOT NULL";
-        /// None if it could not be measured.
+        /// None if it could not be measured, or is absent.
         value: Option<f64> = finite(gauge.value), "REAL";
+        /// Why there is no value, in words.
+        reason: Option<String> = gauge.reason.as_deref().map(str::to_owned), "TEXT";
         /// 1 σ, as far as predicted.
         sigma: Option<f64> = finite(gauge.sigma), "REAL";
         /// U = 2 u, with the systematic part of the error.
@@ -89,10 +91,13 @@ columns! {
         low: Option<f64> = finite(gauge.low), "REAL";
         /// Upper limit.
         high: Option<f64> = finite(gauge.high), "REAL";
-        /// The bits of registers 296–311: 0 pass, 1 valid, 2 low, 3 high, 4 doubtful.
+        /// The bits of registers 1116–1179: 0 pass, 1 valid, 2 low, 3 high, 4 doubtful, 5 absent.
         decision: u16 = gauge.decision.bits(), "INTEGER NOT NULL";
     }
-    {}
+    {
+        /// The place in the registers, 1 to 64; the column `place` is one less.
+        slot: u16 = gauge.slot;
+    }
 }
 
 /// Which results: all conditions hold together. The default asks for the newest hundred.

@@ -45,7 +45,7 @@ pub struct TrendPoint {
     pub value: Option<f64>,
     /// 1 σ.
     pub sigma: Option<f64>,
-    /// The bits of registers 296–311.
+    /// The bits of registers 1116–1179.
     pub decision: u16,
 }
 
@@ -298,8 +298,16 @@ fn read(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry> {
     let of_result = "SELECT * FROM gauge WHERE result = ?1 ORDER BY place";
     Ok(Entry {
         browser_utc_us: row.get("browser_utc_us")?,
-        gauges: rows(connection, of_result, [id], GaugeEntry::read)?,
+        gauges: rows(connection, of_result, [id], gauge)?,
         ..Entry::read(row)?
+    })
+}
+
+fn gauge(row: &Row<'_>) -> rusqlite::Result<GaugeEntry> {
+    let place: u16 = row.get("place")?;
+    Ok(GaugeEntry {
+        slot: place.saturating_add(1),
+        ..GaugeEntry::read(row)?
     })
 }
 

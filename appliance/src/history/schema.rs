@@ -10,7 +10,7 @@ use std::time::Duration;
 /// SQLite's `application_id` of a history: "FRNG".
 const APPLICATION: i64 = 0x4652_4E47;
 /// The schema that this program writes and reads, as SQLite's `user_version`.
-pub const VERSION: i64 = 2;
+pub const VERSION: i64 = 3;
 /// Longest wait for another process that holds the database, the command line's for instance.
 const BUSY: Duration = Duration::from_secs(2);
 

@@ -18,9 +18,9 @@ use std::os::unix::fs::{FileExt as _, MetadataExt as _};
 
 /// Results that are kept: as many as may wait for the card, six seconds of the fastest line.
 pub(super) const SLOTS: u32 = 512;
-/// Bytes of a slot; a result with as many gauges as the registers hold takes a quarter. Only what
-/// was written takes memory.
-const SLOT: usize = 16 << 10;
+/// Bytes of a slot; a result with as many gauges as the registers hold takes half. Only what was
+/// written takes memory.
+const SLOT: usize = 64 << 10;
 /// Bytes of a number: hexadecimal digits.
 const DIGITS: usize = 8;
 
@@ -150,7 +150,8 @@ fn place(slot: u32) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::station::Verdict;
+    use crate::history::GaugeEntry;
+    use crate::station::{MAX_GAUGES, Square, Verdict};
 
     fn entry(seq: u32) -> Entry {
         Entry {
@@ -159,6 +160,29 @@ mod tests {
             height_noise_mm: Some(1.0 / 3.0),
             reason: Some("a, \"b\"".into()),
             ..Entry::default()
+        }
+    }
+
+    /// A result with every slot in use, by the longest names and numbers.
+    fn full() -> Entry {
+        let number = Some(-f64::MIN_POSITIVE / 3.0);
+        let gauge = |slot| GaugeEntry {
+            slot,
+            name: "\"".repeat(64),
+            unit: "mm³".into(),
+            value: number,
+            reason: None,
+            sigma: number,
+            uncertainty: number,
+            expected: number,
+            square: Some(Square::default()),
+            low: number,
+            high: number,
+            decision: 63,
+        };
+        Entry {
+            gauges: (1..=MAX_GAUGES as u16).map(gauge).collect(),
+            ..entry(9)
         }
     }
 
@@ -186,6 +210,17 @@ mod tests {
         spool.file.write_all_at(&[0; DIGITS], place(1)).unwrap();
         let left = [u32::MAX - 1, u32::MAX, 0].map(entry).to_vec();
         assert_eq!(spool.of_run(7), Some((0, left)));
+        spool.remove();
+    }
+
+    #[test]
+    fn a_result_with_every_slot_in_use_goes_in_and_takes_half_of_the_room() {
+        let spool = open("FULL");
+        spool.begin([7, 7], 8).unwrap();
+        spool.put(&full()).unwrap();
+        assert_eq!(spool.of_run(7), Some((9, vec![full()])));
+        let bytes = serde_json::to_vec(&full()).unwrap().len();
+        assert!(bytes < SLOT / 2, "{bytes}");
         spool.remove();
     }
 

@@ -203,7 +203,8 @@ impl Writer {
 fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> {
     entry.insert(transaction, &[])?;
     let result = transaction.last_insert_rowid();
-    for (place, gauge) in entry.gauges.iter().enumerate() {
+    for gauge in &entry.gauges {
+        let place = gauge.slot.saturating_sub(1);
         gauge.insert(transaction, &[("result", &result), ("place", &place)])?;
     }
     Ok(())

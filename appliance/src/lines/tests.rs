@@ -135,6 +135,7 @@ fn ready() -> (StationHandle, Receiver<JobId>) {
 fn good() -> Arc<Inspection> {
     let limits = (Some(-1.0), Some(1.0));
     let gauge = GaugeValue::judged(
+        1,
         "height",
         Unit::Length,
         Measured::new(Some(0.1), Some(0.01)),

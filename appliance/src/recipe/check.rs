@@ -158,9 +158,8 @@ impl Recipe {
         let (_, _, bit_depth) = self.conditions.camera;
         let full_scale = f64::from((1_u32 << bit_depth) - 1);
         let fundamental = |of: Option<&RecipeSequence>| of.map_or(1.0, |of| of.fundamental());
-        let brighter =
-            fundamental(self.sequences.get(sequence)) / fundamental(self.sequences.last());
-        let unit = f64::from(u16::MAX) / full_scale * brighter;
+        let (own, taught) = (self.sequences.get(sequence), self.sequences.last());
+        let unit = f64::from(u16::MAX) / full_scale * fundamental(own) / fundamental(taught);
         let bits = |counts: &f32| (f64::from(*counts) * unit).round() as u16;
         let counts = self.arrays.modulation.iter();
         counts

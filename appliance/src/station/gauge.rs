@@ -5,7 +5,7 @@ use std::sync::Arc;
 pub use algo::inspect::Unit;
 use serde::{Deserialize, Serialize};
 
-/// What was decided about one gauge: bits 0–4 of registers 296–311.
+/// What was decided about one gauge: bits 0–5 of registers 296–311 and 1116–1179.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Decision {
     /// Measured and within its limits, farther from them than the guard band.
@@ -18,6 +18,8 @@ pub struct Decision {
     pub high: bool,
     /// A limit lies within 2 σ of the value, or the value lies within the guard band.
     pub doubtful: bool,
+    /// What it measures is not there, a hole that is closed for example: the part is bad.
+    pub absent: bool,
 }
 
 /// The limits of a gauge, inclusive.
@@ -42,20 +44,30 @@ impl From<(Option<f64>, Option<f64>)> for GaugeLimits {
 }
 
 impl Decision {
-    /// The bits of registers 296–311.
+    /// The bits of registers 296–311 and 1116–1179.
     pub fn bits(self) -> u16 {
-        [self.pass, self.valid, self.low, self.high, self.doubtful]
-            .iter()
-            .enumerate()
-            .fold(0, |bits, (k, &set)| bits | (u16::from(set) << k))
+        [
+            self.pass,
+            self.valid,
+            self.low,
+            self.high,
+            self.doubtful,
+            self.absent,
+        ]
+        .iter()
+        .enumerate()
+        .fold(0, |bits, (k, &set)| bits | (u16::from(set) << k))
     }
 
-    /// The decision for a value. Without a finite value it is not valid, and no other bit is set. A
-    /// value within its limits, but inside the guard band of one, proves neither that the part
-    /// conforms nor that it does not: it is doubtful and no pass.
+    /// The decision for a value. Without a finite value it is not valid, and no other bit is set
+    /// but `absent`. A value within its limits, but inside the guard band of one, proves neither
+    /// that the part conforms nor that it does not: it is doubtful and no pass.
     pub fn of(measured: &Measured, limits: &GaugeLimits) -> Self {
         let Some(value) = measured.value.filter(|value| value.is_finite()) else {
-            return Self::default();
+            return Self {
+                absent: measured.absent,
+                ..Self::default()
+            };
         };
         let GaugeLimits { low, high, guard_k } = *limits;
         let below = low.is_some_and(|limit| value < limit);
@@ -73,13 +85,24 @@ impl Decision {
             low: below,
             high: above,
             doubtful: guarded || near(measured.sigma.map(|sigma| 2.0 * sigma)),
+            absent: false,
         }
     }
 
     /// Whether the value was measured, lies within its limits and is no pass, because it lies in
     /// the guard band.
     pub fn guarded(self) -> bool {
-        self.valid && !self.pass && !self.low && !self.high
+        self.valid && !self.pass && !self.failed()
+    }
+
+    /// Whether it proves that the part is bad: outside a limit, or absent.
+    pub fn failed(self) -> bool {
+        self.low || self.high || self.absent
+    }
+
+    /// Whether it says nothing about the part: neither measured nor absent.
+    pub fn unseen(self) -> bool {
+        !self.valid && !self.absent
     }
 }
 
@@ -88,9 +111,9 @@ impl Decision {
 pub const COVERAGE_FACTOR: f64 = 2.0;
 
 /// What was found for a gauge, in its unit.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Measured {
-    /// `None` if it could not be measured.
+    /// `None` if it could not be measured, or is absent.
     pub value: Option<f64>,
     /// One standard deviation of the value; `None` where it is not predicted.
     pub sigma: Option<f64>,
@@ -100,6 +123,10 @@ pub struct Measured {
     pub expected: Option<f64>,
     /// Where the value is, of a deviation.
     pub square: Option<Square>,
+    /// Whether what it measures is not there; then there is no value.
+    pub absent: bool,
+    /// Why there is no value, in words.
+    pub reason: Option<Arc<str>>,
 }
 
 /// A square of camera pixels of the measured frame.
@@ -139,13 +166,17 @@ impl Measured {
 /// One gauge of a result, as the page has it in JSON. Values in mm, °, mm³ or as a share 0…1.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct GaugeValue {
+    /// The place of the gauge in the registers, 1 to [`MAX_GAUGES`](super::MAX_GAUGES).
+    pub slot: u16,
     /// The gauge's name in the recipe.
     pub name: Arc<str>,
     /// What the value is.
     #[serde(rename = "kind")]
     pub unit: Unit,
-    /// `None` if it could not be measured.
+    /// `None` if it could not be measured, or is absent.
     pub value: Option<f64>,
+    /// Why there is no value, in words; `None` where there is one.
+    pub reason: Option<Arc<str>>,
     /// One standard deviation of the value; `None` where it is not predicted.
     pub sigma: Option<f64>,
     /// U = [`COVERAGE_FACTOR`] · u, u with the systematic part of the error; `None` where σ is not
@@ -170,6 +201,7 @@ impl GaugeValue {
     /// A gauge with the decision that follows from its value and limits. A σ of 0 says that nothing
     /// is known of it: a share of which no pixel is near the threshold would have none.
     pub fn judged(
+        slot: u16,
         name: impl Into<Arc<str>>,
         unit: Unit,
         measured: Measured,
@@ -177,27 +209,23 @@ impl GaugeValue {
     ) -> Self {
         let limits = limits.into();
         let measured = Measured {
+            value: measured.value.filter(|_| !measured.absent),
             sigma: measured.sigma.filter(|sigma| *sigma > 0.0),
             ..measured
         };
-        let Measured {
-            value,
-            sigma,
-            expected,
-            square,
-            ..
-        } = measured;
         Self {
+            slot,
             name: name.into(),
             unit,
-            value,
-            sigma,
             uncertainty: measured.uncertainty().map(|u| COVERAGE_FACTOR * u),
-            expected,
-            square,
             low: limits.low,
             high: limits.high,
             decision: Decision::of(&measured, &limits),
+            value: measured.value,
+            reason: measured.reason.filter(|_| measured.value.is_none()),
+            sigma: measured.sigma,
+            expected: measured.expected,
+            square: measured.square,
         }
     }
 }
@@ -213,12 +241,36 @@ mod tests {
                 systematic: 0.01,
                 ..Measured::new(Some(1.0), Some(sigma))
             };
-            GaugeValue::judged("coverage", Unit::Share, measured, (Some(0.9), None))
+            GaugeValue::judged(1, "coverage", Unit::Share, measured, (Some(0.9), None))
         };
         let (unknown, known) = (of(0.0), of(0.001));
         assert_eq!((unknown.sigma, unknown.uncertainty), (None, None));
         assert!(unknown.decision.pass && unknown.value == Some(1.0));
         assert!(known.sigma == Some(0.001) && known.uncertainty.is_some());
+    }
+
+    #[test]
+    fn what_is_absent_has_no_value_and_no_bit_but_its_own() {
+        let measured = |absent| Measured {
+            absent,
+            reason: Some("closed".into()),
+            ..Measured::new(Some(0.5), Some(0.01))
+        };
+        let of = |absent| {
+            GaugeValue::judged(3, "hole", Unit::Length, measured(absent), (None, Some(1.0)))
+        };
+        let (absent, there) = (of(true), of(false));
+        assert_eq!((absent.slot, absent.value), (3, None));
+        assert_eq!(
+            (absent.decision.bits(), there.decision.bits()),
+            (0b10_0000, 0b11)
+        );
+        assert_eq!(
+            (absent.reason.as_deref(), there.reason),
+            (Some("closed"), None)
+        );
+        assert!(absent.decision.failed() && !absent.decision.unseen());
+        assert!(Decision::default().unseen() && !Decision::default().failed());
     }
 
     #[test]

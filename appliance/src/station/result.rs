@@ -21,7 +21,7 @@ pub enum Verdict {
     None,
     /// 1: every gauge was measured and lies within its limits.
     Pass,
-    /// 2: every gauge was measured and at least one lies outside.
+    /// 2: every gauge was measured or is absent, and at least one is absent or lies outside.
     Fail,
     /// 3: something could not be measured, or a value lies so close to a limit that neither PASS
     /// nor FAIL is proven.
@@ -123,7 +123,7 @@ pub struct Inspection {
     /// `PATTERN_UNFIT`, `FRAME_SLIP`.
     #[serde(skip)]
     pub warnings: u16,
-    /// The recipe's gauges, in its order.
+    /// The recipe's gauges, by ascending slots.
     #[serde(skip)]
     pub gauges: heapless::Vec<GaugeValue, MAX_GAUGES>,
     /// Resolved pixels.
@@ -157,13 +157,14 @@ pub struct Inspection {
 impl Inspection {
     /// The verdict that is shown. The worker's judgement can make it worse than the gauges say,
     /// never better: it is INVALID without a judgement, without gauges, or with a gauge that was
-    /// not measured; it is not PASS with a gauge outside its limits, or in a guard band.
+    /// neither measured nor found absent, whatever the others say; it is not PASS with a gauge that
+    /// is absent, outside its limits, or in a guard band.
     pub fn verdict(&self) -> Verdict {
-        let unmeasured =
-            self.gauges.is_empty() || self.gauges.iter().any(|gauge| !gauge.decision.valid);
+        let unseen =
+            self.gauges.is_empty() || self.gauges.iter().any(|gauge| gauge.decision.unseen());
         match self.judged {
             Verdict::None | Verdict::Invalid => Verdict::Invalid,
-            Verdict::Pass | Verdict::Fail if unmeasured => Verdict::Invalid,
+            Verdict::Pass | Verdict::Fail if unseen => Verdict::Invalid,
             Verdict::Pass if self.gauges.iter().any(|gauge| !gauge.decision.pass) => {
                 match self.guarded().next() {
                     Some(_) => Verdict::Invalid,
@@ -174,10 +175,9 @@ impl Inspection {
         }
     }
 
-    /// The gauges whose values lie in a guard band, if none lies outside its limits.
+    /// The gauges whose values lie in a guard band, if none is absent or lies outside its limits.
     pub fn guarded(&self) -> impl Iterator<Item = &GaugeValue> {
-        let outside = |gauge: &GaugeValue| gauge.decision.low || gauge.decision.high;
-        let none = !self.gauges.iter().any(outside);
+        let none = !self.gauges.iter().any(|gauge| gauge.decision.failed());
         let guarded = move |gauge: &&GaugeValue| none && gauge.decision.guarded();
         self.gauges.iter().filter(guarded)
     }
@@ -250,6 +250,7 @@ mod tests {
             .iter()
             .map(|&value| {
                 GaugeValue::judged(
+                    1,
                     "g",
                     Unit::Length,
                     Measured::new(value, None),
@@ -290,7 +291,7 @@ mod tests {
             guard_k: 2.0,
         };
         let measured = Measured::new(Some(0.95), Some(0.05));
-        close.gauges[0] = GaugeValue::judged("g", Unit::Length, measured, limits);
+        close.gauges[0] = GaugeValue::judged(1, "g", Unit::Length, measured, limits);
         assert_eq!(close.verdict(), Verdict::Invalid);
         close.gauges[1] = inspection(Verdict::Pass, &[Some(1.1)]).gauges[0].clone();
         assert_eq!(close.verdict(), Verdict::Fail);
@@ -302,5 +303,39 @@ mod tests {
             inspection(Verdict::Fail, &[Some(1.1), None]).verdict(),
             Verdict::Invalid
         );
+    }
+
+    #[test]
+    fn what_is_absent_makes_fail_and_what_is_unseen_beside_it_makes_invalid() {
+        let absent = |mut of: Inspection| {
+            let measured = Measured {
+                absent: true,
+                ..Measured::default()
+            };
+            let gauge = GaugeValue::judged(2, "hole", Unit::Length, measured, (None, None));
+            let _ = of.gauges.push(gauge);
+            of.verdict()
+        };
+        for judged in [Verdict::Pass, Verdict::Fail] {
+            assert_eq!(absent(inspection(judged, &[Some(0.0)])), Verdict::Fail);
+            assert_eq!(absent(inspection(judged, &[])), Verdict::Fail);
+            assert_eq!(absent(inspection(judged, &[Some(1.1)])), Verdict::Fail);
+            assert_eq!(absent(inspection(judged, &[None])), Verdict::Invalid);
+        }
+        assert_eq!(
+            absent(inspection(Verdict::Invalid, &[Some(0.0)])),
+            Verdict::Invalid
+        );
+        let mut close = inspection(Verdict::Pass, &[]);
+        let limits = GaugeLimits {
+            low: None,
+            high: Some(1.0),
+            guard_k: 2.0,
+        };
+        let measured = Measured::new(Some(0.95), Some(0.05));
+        let gauge = GaugeValue::judged(1, "g", Unit::Length, measured, limits);
+        let _ = close.gauges.push(gauge);
+        assert_eq!(close.verdict(), Verdict::Invalid, "in the guard band");
+        assert_eq!(absent(close), Verdict::Fail);
     }
 }

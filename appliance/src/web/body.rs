@@ -14,8 +14,8 @@ use super::site::Site;
 use crate::error::shortened;
 use crate::recipe::incoming::Incoming;
 
-/// Largest body in JSON, bytes: 32 regions of 100 corners take a tenth of it.
-const MAX_JSON: usize = 64 << 10;
+/// Largest body in JSON, bytes: 96 features of 40 corners and 64 gauges take a third of it.
+const MAX_JSON: usize = 256 << 10;
 /// Longest wait for it.
 const JSON_TIME: Duration = Duration::from_secs(10);
 /// Largest file, bytes: a recipe for 2048 × 2048 pixels has 160 MB.

@@ -208,13 +208,13 @@ fn gauges_csv(site: &Site) -> Result<(String, Content)> {
         .as_deref()
         .ok_or_else(|| Problem::missing(words))?;
     let mut csv = String::from(
-        "seq,verdict,gauge,value,sigma,low,high,unit,pass,valid,doubtful,uncertainty,expected\n",
+        "seq,verdict,gauge,value,sigma,low,high,unit,pass,valid,doubtful,uncertainty,expected,slot,absent\n",
     );
     let number = |value: Option<f64>| value.map_or(String::new(), |value| value.to_string());
     for gauge in &result.inspection.gauges {
         let decision = gauge.decision;
         csv += &format!(
-            "{},{},\"{}\",{},{},{},{},{},{},{},{},{},{}\n",
+            "{},{},\"{}\",{},{},{},{},{},{},{},{},{},{},{},{}\n",
             result.seq,
             result.verdict.word(),
             gauge.name.replace('"', "\"\""),
@@ -228,6 +228,8 @@ fn gauges_csv(site: &Site) -> Result<(String, Content)> {
             u8::from(decision.doubtful),
             number(gauge.uncertainty),
             number(gauge.expected),
+            gauge.slot,
+            u8::from(decision.absent),
         );
     }
     Ok((

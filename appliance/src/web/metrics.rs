@@ -170,7 +170,9 @@ impl Text {
         self.family(name, "gauge", meaning);
         for gauge in &found.gauges {
             let value = gauge.value.filter(|_| gauge.decision.valid);
-            let labels = [("gauge", &*gauge.name), ("unit", gauge.unit.symbol())];
+            let slot = gauge.slot.to_string();
+            let unit = gauge.unit.symbol();
+            let labels = [("gauge", &*gauge.name), ("unit", unit), ("slot", &slot)];
             self.sample(name, &labels, value.unwrap_or(f64::NAN));
         }
     }

@@ -23,7 +23,7 @@ pub struct Gauge {
 }
 
 /// Gauges that a recipe may have.
-pub const MAX_GAUGES: usize = 16;
+pub const MAX_GAUGES: usize = 64;
 
 /// Gauges that cannot be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]

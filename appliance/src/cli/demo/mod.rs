@@ -35,8 +35,8 @@ const NOISE_SEED: u64 = 2008;
 struct MeasuredPart {
     placed: &'static DemoPart,
     result: PlcResult,
-    /// Names of the gauges outside their limits.
-    outside: Vec<String>,
+    /// Slots and names of the gauges outside their limits.
+    outside: Vec<(u16, String)>,
 }
 
 impl Demo {
@@ -123,16 +123,16 @@ async fn play(
             .place(&placed.part(), &sim::Placement::default())
             .map_err(Exit::Software.failure())?;
         let result = plc.measure(at as u16 + 1).await?;
-        // The registers only number the gauges; their names are taken from the station.
+        // The names of the slots are taken from the station.
         let snapshot = daemon.station.snapshot();
-        let names = snapshot
+        let gauges = snapshot
             .result
             .iter()
             .flat_map(|record| &record.inspection.gauges);
-        let outside = names
-            .zip(&result.passes)
-            .filter(|(_, pass)| !**pass)
-            .map(|(gauge, _)| gauge.name.to_string())
+        let fails = |slot: u16| result.passes.get(usize::from(slot) - 1) == Some(&false);
+        let outside = gauges
+            .filter(|gauge| fails(gauge.slot))
+            .map(|gauge| (gauge.slot, gauge.name.to_string()))
             .collect();
         rows.push(MeasuredPart {
             placed,

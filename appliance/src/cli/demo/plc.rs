@@ -30,9 +30,9 @@ pub struct PlcResult {
     pub seq: u32,
     /// 1 PASS, 2 FAIL, 3 INVALID.
     pub verdict: u16,
-    /// Value of each gauge in mm or as a share; NaN = invalid.
+    /// Value of each of the first slots in mm or as a share; NaN = invalid or empty.
     pub values: Vec<f32>,
-    /// Whether each gauge passes.
+    /// Whether the gauge of each of these slots passes.
     pub passes: Vec<bool>,
     /// Trigger → exposure done, µs.
     pub exposure_us: u32,

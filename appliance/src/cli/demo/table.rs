@@ -23,14 +23,22 @@ pub fn text(rows: &[MeasuredPart]) -> String {
             value(1) * 100.0,
             result.exposure_us / 1000,
             result.total_us / 1000,
-            if row.outside.is_empty() {
-                "-".into()
-            } else {
-                row.outside.join(", ")
-            },
+            outside(row),
         );
     }
     table
+}
+
+/// "slot 1 deviation, slot 3 opening"; "-" if no gauge is outside its limits.
+fn outside(row: &MeasuredPart) -> String {
+    let names = row.outside.iter();
+    let names: Vec<_> = names
+        .map(|(slot, name)| format!("slot {slot} {name}"))
+        .collect();
+    match names.is_empty() {
+        true => "-".into(),
+        false => names.join(", "),
+    }
 }
 
 /// As JSON: one object per part.
@@ -44,7 +52,8 @@ pub fn json(rows: &[MeasuredPart]) -> Value {
                 "verdict": row.result.word(),
                 "seq": row.result.seq,
                 "values": row.result.values,
-                "outside": row.outside,
+                "outside": row.outside.iter().map(|(_, name)| name).collect::<Vec<_>>(),
+                "slots_outside": row.outside.iter().map(|(slot, _)| slot).collect::<Vec<_>>(),
                 "exposure_us": row.result.exposure_us,
                 "total_us": row.result.total_us,
             })

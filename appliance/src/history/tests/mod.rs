@@ -16,10 +16,13 @@ use std::time::{Duration, Instant};
 const ENOUGH: u64 = 1000;
 
 fn entry(seq: u32, recipe: u16, verdict: Verdict) -> Entry {
-    let gauge = |name: &str, value: f64| GaugeEntry {
+    // The second slot is empty.
+    let gauge = |slot, name: &str, value: f64| GaugeEntry {
+        slot,
         name: name.into(),
         unit: "mm".into(),
         value: Some(value),
+        reason: None,
         sigma: None,
         uncertainty: Some(value / 7.0),
         expected: None,
@@ -41,8 +44,8 @@ fn entry(seq: u32, recipe: u16, verdict: Verdict) -> Entry {
         height_noise_mm: Some(f64::from(seq) / 3.0),
         stages,
         gauges: vec![
-            gauge("deviation", f64::from(seq).sqrt()),
-            gauge("-step", f64::MIN_POSITIVE),
+            gauge(1, "deviation", f64::from(seq).sqrt()),
+            gauge(3, "-step", f64::MIN_POSITIVE),
         ],
         ..Entry::default()
     }
@@ -491,14 +494,14 @@ fn a_history_of_another_version_is_set_aside_whole_and_a_new_one_with_an_id_of_i
     for (version, name) in [
         (1, "history.version-1.db"),
         (1, "history.version-1-2.db"),
-        (3, "history.version-3.db"),
+        (2, "history.version-2.db"),
     ] {
         let other = rusqlite::Connection::open(&path).unwrap();
         other.pragma_update(None, "user_version", version).unwrap();
         drop(other);
         let words = reader.results(&Filter::default()).unwrap_err().to_string();
         let expected =
-            format!("version {version}, this program reads 2: the station sets it aside");
+            format!("version {version}, this program reads 3: the station sets it aside");
         assert!(words.contains(&expected), "{words}");
         let (mut writer, complaint) = Writer::open(&path, ENOUGH).unwrap();
         let complaint = complaint.unwrap();

@@ -31,6 +31,9 @@ const LEAST_TURN: f64 = 0.05;
 /// are used.
 pub(super) const ALIKE: f64 = 0.8;
 
+/// Why a gauge has no value.
+const NOTHING: &str = "found nothing to measure";
+
 /// Why a part cannot be judged.
 struct Reason {
     /// ERROR_CODE.
@@ -43,7 +46,11 @@ impl Demands {
     /// Judges the findings.
     pub(super) fn judge(&self, findings: &Findings, inspection: &mut Inspection) {
         for (limits, reading) in self.limits.iter().zip(&findings.readings) {
-            let measured = reading.map_or_else(Measured::default, |reading| {
+            let unseen = || Measured {
+                reason: Some(NOTHING.into()),
+                ..Measured::default()
+            };
+            let measured = reading.map_or_else(unseen, |reading| {
                 let (value, systematic) = match limits.master {
                     None => (reading.value, reading.systematic),
                     Some(master) => master.of(&reading),
@@ -54,9 +61,11 @@ impl Demands {
                     systematic,
                     expected: reading.expected,
                     square: reading.square.map(Into::into),
+                    ..Measured::default()
                 }
             });
             let judged = GaugeValue::judged(
+                limits.slot,
                 Arc::clone(&limits.name),
                 limits.unit,
                 measured,
@@ -111,7 +120,7 @@ impl Demands {
         }
         let gauges = inspection.gauges.iter();
         let missing: Vec<&str> = gauges
-            .filter(|gauge| !gauge.decision.valid)
+            .filter(|gauge| gauge.decision.unseen())
             .map(|gauge| &*gauge.name)
             .collect();
         if missing.is_empty() {
@@ -131,7 +140,7 @@ impl Demands {
         let missing = missing.join(", ");
         Some(Reason {
             code: NOT_MEASURED,
-            words: format!("gauge {missing} found nothing to measure{left_out}"),
+            words: format!("gauge {missing} {NOTHING}{left_out}"),
         })
     }
 

@@ -51,6 +51,7 @@ pub(super) fn recipe(number: u16) -> ActiveRecipe {
 
 pub(super) fn good() -> Arc<Inspection> {
     let gauge = GaugeValue::judged(
+        1,
         "height",
         Unit::Length,
         Measured::new(Some(0.1), Some(0.01)),

@@ -3,7 +3,7 @@ import { $, fill, make, show, text } from "./element.js";
 import { limits, quantity } from "./number.js";
 import { ask } from "./api.js";
 import { trend } from "./trend.js";
-import { decided, tag, uncertainty } from "./verdict.js";
+import { decided, named, tag, uncertainty } from "./verdict.js";
 
 // Values of a trend.
 const KEPT = 100;
@@ -33,16 +33,14 @@ function bar(gauge) {
 }
 
 function row(gauge) {
-  const value = make("td", "", make("span", "value", gauge.value === null ? "not measured" : quantity(gauge.value, gauge.unit)));
+  const value = make("td", "", make("span", "value", gauge.value === null ? gauge.reason || "not measured" : quantity(gauge.value, gauge.unit)));
   const lines = gauge.value !== null ? uncertainty(gauge) : [];
   value.append(...(lines.length ? lines : [make("small", "room", "\u00a0")]));
   const range = make("td", "limits", bar(gauge), make("small", "", limits(gauge.lowest, gauge.highest, gauge.unit)));
   const points = trends.get(gauge.name) || [];
   const verdict = make("td", "", tag(gauge));
   verdict.append(gauge.doubtful ? make("small", "", "close to a limit") : make("small", "room", "\u00a0"));
-  const name = make("th", "", gauge.name);
-  name.scope = "row";
-  return make("tr", "", name, value, range, make("td", "trend-cell", trend(points, gauge)), verdict);
+  return make("tr", "", named(gauge), value, range, make("td", "trend-cell", trend(points, gauge)), verdict);
 }
 
 // Reads the last values from the device's history; later ones are added as they come.

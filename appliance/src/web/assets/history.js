@@ -2,8 +2,8 @@
 import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { openKept } from "./kept.js";
-import { about, count, milliseconds, moment, quantity } from "./number.js";
-import { decided } from "./verdict.js";
+import { about, count, milliseconds, moment } from "./number.js";
+import { decided, wrong } from "./verdict.js";
 
 const PAGE = 50;
 let oldest = null;
@@ -29,7 +29,7 @@ function filter() {
 function outside(entry) {
   if (entry.reason) return entry.reason;
   const bad = entry.gauges.filter((gauge) => !decided(gauge).pass);
-  return bad.map((gauge) => (gauge.value === null ? `${gauge.name} not measured` : `${gauge.name} ${quantity(gauge.value, gauge.unit)} ${decided(gauge).low ? "too low" : "too high"}`)).join(", ");
+  return bad.map((gauge) => `${gauge.name} ${wrong(gauge, decided(gauge))}`).join(", ");
 }
 
 function row(entry) {

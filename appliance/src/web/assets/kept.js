@@ -6,7 +6,7 @@ import { about, limits, measures, milliseconds, moment, quantity, signed } from 
 import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
 import { nameOf } from "./times.js";
-import { decided, tag, uncertainty } from "./verdict.js";
+import { decided, named, tag, uncertainty } from "./verdict.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
 const state = { seq: 0, layer: "height", asked: 0, failed: [] };
@@ -15,11 +15,9 @@ function gauge(entry) {
   const decision = decided(entry);
   const verdict = make("td", "", tag(decision));
   if (decision.doubtful) verdict.append(make("small", "", "close to a limit"));
-  const value = make("td", "nowrap", entry.value === null ? "not measured" : quantity(entry.value, entry.unit));
+  const value = make("td", "nowrap", entry.value === null ? entry.reason || "not measured" : quantity(entry.value, entry.unit));
   if (entry.value !== null) value.append(...uncertainty(entry));
-  const name = make("th", "", entry.name);
-  name.scope = "row";
-  return make("tr", "", name, value, make("td", "", limits(entry.low, entry.high, entry.unit)), verdict);
+  return make("tr", "", named(entry), value, make("td", "", limits(entry.low, entry.high, entry.unit)), verdict);
 }
 
 // The pose of the part relative to its taught pose; a component that its shape does not determine is left out.

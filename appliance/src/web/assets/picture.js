@@ -15,7 +15,7 @@ function failing() {
   if (!recipe || !result) return [];
   return recipe.gauges.flatMap((gauge) => {
     const found = result.gauges.find((value) => value.name === gauge.name);
-    return !found || (found.valid && found.pass) ? [] : [{ gauge, kind: found.valid ? "fail" : "invalid", square: found.square }];
+    return !found || (found.valid && found.pass) ? [] : [{ gauge, kind: found.valid || found.absent ? "fail" : "invalid", square: found.square }];
   });
 }
 

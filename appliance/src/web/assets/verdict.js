@@ -10,8 +10,8 @@ const SENTENCES = {
 
 // The decision about a stored gauge by its bits, which are those of the register GAUGE_DECISION.
 export function decided({ decision }) {
-  const [pass, valid, low, high, doubtful] = [1, 2, 4, 8, 16].map((bit) => (decision & bit) !== 0);
-  return { pass, valid, low, high, doubtful };
+  const [pass, valid, low, high, doubtful, absent] = [1, 2, 4, 8, 16, 32].map((bit) => (decision & bit) !== 0);
+  return { pass, valid, low, high, doubtful, absent };
 }
 
 // "± 0.012 mm" and "good parts 0.026 mm", a line each: the expanded uncertainty U, and what is expected where noise alone moves the value away from 0.
@@ -24,7 +24,8 @@ export function uncertainty({ uncertainty: expanded, expected, unit }) {
 }
 
 // The tag that shows the decision about a gauge.
-export function tag({ pass, valid, low, high }) {
+export function tag({ pass, valid, low, high, absent }) {
+  if (absent) return make("span", "tag fail", "✗ absent");
   // Within its limits, but closer to one than the guard band.
   const guarded = valid && !pass && !low && !high;
   const kind = !valid || guarded ? "invalid" : pass ? "pass" : "fail";
@@ -32,10 +33,23 @@ export function tag({ pass, valid, low, high }) {
   return make("span", `tag ${kind}`, words);
 }
 
-// "deviation +0.612 mm, opening 4 too high"
+// "+0.612 mm too high": what is wrong with a gauge that did not pass.
+export function wrong({ value, unit }, { low, absent }) {
+  if (value === null) return absent ? "absent" : "not measured";
+  return `${quantity(value, unit)} ${low ? "too low" : "too high"}`;
+}
+
+// The element that names a gauge, with its place in the registers.
+export function named({ name, slot }) {
+  const made = make("th", "", name, make("small", "", `slot ${slot}`));
+  made.scope = "row";
+  return made;
+}
+
+// "deviation +0.612 mm too high, opening 4 absent"
 function outside(result) {
-  const failed = result.gauges.filter((gauge) => gauge.valid && !gauge.pass);
-  return failed.map((gauge) => `${gauge.name} ${quantity(gauge.value, gauge.unit)} ${gauge.low ? "too low" : "too high"}`).join(", ");
+  const failed = result.gauges.filter((gauge) => gauge.absent || (gauge.valid && !gauge.pass));
+  return failed.map((gauge) => `${gauge.name} ${wrong(gauge, gauge)}`).join(", ");
 }
 
 function partWords(result) {
