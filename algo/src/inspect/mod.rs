@@ -1,6 +1,7 @@
 //! What a height map says about a part: regions, gauges and the comparison with the golden map.
 
 mod align;
+mod feature;
 mod gauge;
 pub mod good;
 mod largest;
@@ -15,7 +16,8 @@ mod taught;
 mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
-pub use gauge::{Basis, Evidence, Facts, Kind, Measure, Reading, Square, TooFine, Unit, kinds};
+pub use feature::{Feature, FeatureKind, Geometry, TooFine};
+pub use gauge::{Basis, Evidence, Facts, Kind, MAX_PLACES, Measure, Reading, Square, Unit, kinds};
 pub use largest::Largest;
 pub(crate) use mask::components;
 pub use mask::eroded;
@@ -24,8 +26,8 @@ pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
 pub use strips::{
-    CalibrationError, Findings, Found, Gauge, Input, MAX_GAUGES, Maps, PairBuffers, PairPlaced,
-    Parts, Picture, Production, Skipped, Strips, Unmeasurable,
+    CalibrationError, Findings, Found, Gauge, Input, MAX_FEATURES, MAX_GAUGES, Maps, PairBuffers,
+    PairPlaced, Parts, Picture, Production, Skipped, Strips, Unmeasurable,
 };
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

@@ -3,11 +3,10 @@
 //!
 //! The same bounds hold for files that are read and for edits; `docs/formats.md` lists them.
 
-use super::feature::{DatumFile, FeatureFile, MAX_DATUMS, MAX_FEATURES};
 use super::file::{LONGEST_NAME, PatternFile, RecipeFile, SequenceFile};
 use super::gauge::GaugeFile;
 use crate::station::MAX_GAUGES;
-use algo::inspect::{Basis, Facts};
+use algo::inspect::{Basis, Facts, MAX_PLACES};
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
     Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, RATIOS, clipped, length, text,
@@ -16,10 +15,8 @@ use hal::bounds::{
 
 /// Sequences that a part can be measured with; teaching makes four.
 const MAX_SEQUENCES: usize = 8;
-/// Features of a gauge.
-const MAX_OF: usize = 2;
 /// Slots of gauges.
-const MAX_SLOT: u16 = 64;
+const MAX_SLOT: u16 = MAX_GAUGES as u16;
 
 impl RecipeFile {
     /// Checks each value by itself; [`Recipe::check`](super::Recipe::check) checks that they fit
@@ -53,10 +50,7 @@ impl RecipeFile {
             let full_scale = f64::from((1_u32 << self.camera.bit_depth) - 1);
             within("golden_offset_counts", counts, 0.0, full_scale)?;
         }
-        length("features", self.features.len(), 0, MAX_FEATURES)?;
-        each("features", ".", &self.features, FeatureFile::check_bounds)?;
-        length("datums", self.datums.len(), 0, MAX_DATUMS)?;
-        each("datums", ".", &self.datums, DatumFile::check_bounds)?;
+        self.check_features()?;
         length("gauges", self.gauges.len(), 1, MAX_GAUGES)?;
         let largest = self.camera.width.max(self.camera.height) as usize;
         each("gauges", ": ", &self.gauges, |gauge| {
@@ -88,7 +82,7 @@ fn check_slots(gauges: &[GaugeFile]) -> Result<(), String> {
 
 /// Checks each element of the list `name`; an error begins with the element's place and
 /// `separator`.
-fn each<T>(
+pub(super) fn each<T>(
     name: &str,
     separator: &str,
     list: &[T],
@@ -125,7 +119,7 @@ impl GaugeFile {
     fn check_bounds(&self, largest: usize) -> Result<(), String> {
         text("name", &self.name, LONGEST_NAME)?;
         within("slot", self.slot, 1, MAX_SLOT)?;
-        length("of", self.of.len(), 0, MAX_OF)?;
+        length("of", self.of.len(), 0, MAX_PLACES)?;
         let mut names = self.of.iter().chain(&self.datum);
         names.try_for_each(|name| text("of", name, LONGEST_NAME))?;
         let kind = self.measures.kind();

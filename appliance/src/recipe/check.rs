@@ -10,11 +10,10 @@ use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
-use algo::inspect::{CalibrationError, Gauge, Region};
+use algo::inspect::{CalibrationError, Feature, Gauge, Region};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
 use algo::units::Modulation;
-use std::collections::HashMap;
 use std::io::{Cursor, Read, Seek};
 
 /// Most different sides of squares of one recipe, with 0 where any will do: each takes time in
@@ -35,7 +34,9 @@ pub struct Recipe {
     /// The sequences that a part is measured with in turn, until one is good enough: the one for
     /// production, and behind it those that unwrap further.
     pub sequences: Vec<RecipeSequence>,
-    /// What its gauges measure.
+    /// What is found on a part.
+    pub features: Vec<Feature>,
+    /// What its gauges measure of these features.
     pub gauges: Vec<Gauge>,
     /// The arrays, each of the size of the camera's frames or the projector's raster.
     pub arrays: Arrays,
@@ -241,7 +242,8 @@ impl Recipe {
         let function = function.map_err(|error| format!("projector and pattern: {error}"))?;
         Ok(Self {
             sequences: sequences(file)?,
-            gauges: gauges(&file.features, &file.gauges, (width, height))?,
+            features: features(&file.features, (width, height))?,
+            gauges: gauges(&file.features, &file.gauges),
             id: file.into(),
             conditions: file.into(),
             demands: file.into(),
@@ -286,31 +288,32 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
     Ok(chain)
 }
 
-/// The gauges that are computed, for frames of (width, height) pixels.
+/// The features of frames of (width, height) pixels.
 ///
 /// # Errors
 /// Naming the feature that cannot be used, and why.
-fn gauges(
+fn features(
     features: &[FeatureFile],
-    gauges: &[GaugeFile],
     (width, height): (usize, usize),
-) -> Result<Vec<Gauge>, String> {
-    let mut named = HashMap::new();
-    for feature in features {
+) -> Result<Vec<Feature>, String> {
+    let feature = |feature: &FeatureFile| {
         let corners: Vec<_> = feature.region.iter().map(|&[u, v]| (u, v)).collect();
-        let pixels = Region::polygon(&corners, width, height)
+        let region = Region::polygon(&corners, width, height)
             .map_err(|error| format!("feature {:?}: {error}", feature.name))?;
-        named.insert(feature.name.as_str(), pixels);
-    }
-    let gauge = |gauge: &GaugeFile| {
-        let mut regions = gauge.of.iter().map(|name| named.get(&**name).cloned());
-        Gauge {
-            region: regions.next().flatten().unwrap_or_default(),
-            from: regions.next().flatten(),
-            measure: gauge.measures.clone(),
-        }
+        let kind = feature.kind;
+        Ok(Feature { kind, region })
     };
-    Ok(gauges.iter().map(gauge).collect())
+    features.iter().map(feature).collect()
+}
+
+/// The gauges that are computed; their features were checked to be there.
+fn gauges(features: &[FeatureFile], gauges: &[GaugeFile]) -> Vec<Gauge> {
+    let place = |name: &String| features.iter().position(|feature| feature.name == *name);
+    let gauge = |gauge: &GaugeFile| Gauge {
+        of: gauge.of.iter().filter_map(place).collect(),
+        measure: gauge.measures.clone(),
+    };
+    gauges.iter().map(gauge).collect()
 }
 
 impl RecipeId {

@@ -27,6 +27,8 @@ pub struct Demands {
 pub(super) struct GaugeLimits {
     pub slot: u16,
     pub name: Arc<str>,
+    /// The names of its features.
+    pub of: Vec<String>,
     pub unit: Unit,
     pub low: Option<f64>,
     pub high: Option<f64>,
@@ -39,6 +41,7 @@ impl From<&RecipeFile> for Demands {
         let limits = file.gauges.iter().map(|gauge| GaugeLimits {
             slot: gauge.slot,
             name: Arc::from(&*gauge.name),
+            of: gauge.of.clone(),
             unit: gauge.measures.facts().unit,
             low: gauge.low,
             high: gauge.high,

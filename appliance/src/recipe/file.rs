@@ -1,6 +1,7 @@
 //! The manifest `recipe.json` of a recipe, version 3. Frozen: see `docs/formats.md`.
 
 use super::comparison::ComparisonFile;
+pub use super::feature::LONGEST_NAME;
 use super::feature::{DatumFile, FeatureFile};
 use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
@@ -23,8 +24,6 @@ use std::ops::RangeInclusive;
 pub const FORMAT: &str = "fringed-recipe";
 /// The version that this program writes, and the only one that it reads.
 pub const VERSION: u32 = 3;
-/// The longest name of a recipe, feature, datum system or gauge, in characters.
-pub const LONGEST_NAME: usize = 64;
 /// The longest part number: the registers of PART_NUMBER.
 pub const LONGEST_PART_NUMBER: usize = 32;
 /// Farthest that a part may lie from where it was taught, mm.

@@ -1,17 +1,14 @@
 //! The gauges of a recipe in its file, and which limits are refused.
 
-use super::gauge_keys::Keys;
 use super::tolerance::{About, Master, Tolerance};
 use crate::station::Unit;
 use algo::inspect::{Facts, Measure};
 use hal::bounds::within;
-use serde::Deserialize;
 use serde_json::{Value, json};
 use std::fmt::Display;
 
 /// A gauge and its limits. Its keys in files are those of `gauge_keys`.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(try_from = "Keys")]
+#[derive(Clone, Debug, PartialEq)]
 pub struct GaugeFile {
     /// Its place in registers, 1 to 64.
     pub slot: u16,

@@ -4,14 +4,13 @@
 //! key; the parser's message would only give the line and column.
 
 use super::gauge::{GaugeFile, no_limit};
-use super::seam;
 use super::tolerance::{About, Master, Tolerance};
 use algo::inspect::Measure;
 use hal::bounds::{clipped, shortened};
 use serde::de::{DeserializeOwned, Error as _, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::value::RawValue;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::fmt::{Display, Formatter};
 
 /// Limits that were worked out may differ from what they come from by this share: other programs
@@ -113,58 +112,37 @@ impl Keys {
     }
 
     /// The kind with its parameters: all keys that are left.
-    fn measures(self, of: &[String]) -> Result<Measure, String> {
-        let Self(mut keys) = self;
+    fn measures(self) -> Result<Measure, String> {
+        let Self(keys) = self;
         if !keys.iter().any(|(key, _)| key == "kind") {
-            return Err("it has no kind: `fringed recipe kinds` lists them".into());
+            return Err("it has no kind: add one".into());
         }
-        if let Some((key, _)) = keys.iter().find(|(key, _)| key == "from") {
-            return Err(format!(
-                "it has an unknown key {key:?}: write of = [region, from]"
-            ));
-        }
-        let second = of.get(1).map(|second| json!(second));
-        let text = |keys: &[(String, Box<RawValue>)]| {
-            let values = keys
-                .iter()
-                .map(|(key, value)| format!("{}:{value}", json!(key)));
-            format!("{{{}}}", values.collect::<Vec<_>>().join(","))
-        };
-        let mut read = serde_json::from_str::<Measure>(&text(&keys));
-        if let (Err(_), Some(second)) = (&read, second)
-            && let Ok(from) = serde_json::value::to_raw_value(&second)
-        {
-            keys.push(("from".into(), from));
-            if let Ok(step) = serde_json::from_str(&text(&keys)) {
-                read = Ok(step);
-            }
-            keys.pop();
-        }
-        let measures = read.map_err(placeless)?;
-        let (_, known) = seam::parameters(&measures);
+        let values = keys.iter();
+        let values = values.map(|(key, value)| format!("{}:{value}", json!(key)));
+        let text = format!("{{{}}}", values.collect::<Vec<_>>().join(","));
+        let measures = serde_json::from_str(&text).map_err(placeless)?;
+        let (_, known) = parameters(&measures);
         let unknown = |key: &&(String, _)| key.0 != "kind" && !known.contains_key(&key.0);
         match keys.iter().find(unknown) {
             Some((key, _)) => Err(format!("it has an unknown key {:?}", clipped(key))),
-            None => Ok(seam::with_second(measures, of)),
+            None => Ok(measures),
         }
     }
 }
 
-impl TryFrom<Keys> for GaugeFile {
-    type Error = String;
+/// The name of a kind, and its parameters by their names.
+fn parameters(measure: &Measure) -> (String, Map<String, Value>) {
+    let Ok(Value::Object(mut all)) = serde_json::to_value(measure) else {
+        return Default::default();
+    };
+    let kind = all.remove("kind");
+    let name = kind.as_ref().and_then(Value::as_str);
+    (name.unwrap_or_default().to_owned(), all)
+}
 
-    fn try_from(mut keys: Keys) -> Result<Self, String> {
-        let name = keys.read("name", "the gauge's name in quotes")?;
-        let name: String = name.ok_or("a gauge has no name: add one")?;
-        let named = |error: String| format!("gauge {:?}: {error}", clipped(&name));
-        let gauge = Self::of_keys(keys, &name).map_err(|refused| match refused {
-            Refused::Limit { unit, which, text } => {
-                no_limit(&clipped(&name), unit, which, text) + " as a number"
-            }
-            Refused::Words(words) => named(words),
-        })?;
-        gauge.check_sources().map_err(named)?;
-        Ok(gauge)
+impl<'de> Deserialize<'de> for GaugeFile {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        Self::read(Keys::deserialize(from)?).map_err(D::Error::custom)
     }
 }
 
@@ -186,6 +164,21 @@ impl From<String> for Refused {
 }
 
 impl GaugeFile {
+    /// The gauge that has these keys.
+    fn read(mut keys: Keys) -> Result<Self, String> {
+        let name = keys.read("name", "the gauge's name in quotes")?;
+        let name: String = name.ok_or("a gauge has no name: add one")?;
+        let named = |error: String| format!("gauge {:?}: {error}", clipped(&name));
+        let gauge = Self::of_keys(keys, &name).map_err(|refused| match refused {
+            Refused::Limit { unit, which, text } => {
+                no_limit(&clipped(&name), unit, which, text) + " as a number"
+            }
+            Refused::Words(words) => named(words),
+        })?;
+        gauge.check_sources().map_err(named)?;
+        Ok(gauge)
+    }
+
     fn of_keys(mut keys: Keys, name: &str) -> Result<Self, Refused> {
         let slot = keys.read("slot", "a whole number from 1 to 64")?;
         let slot = slot.ok_or_else(|| "it has no slot: write 1 to 64".to_owned())?;
@@ -196,7 +189,7 @@ impl GaugeFile {
         let limits = [keys.take("low"), keys.take("high")];
         let (tolerance, master) = (keys.tolerance()?, keys.master()?);
         let golden_value = keys.number("golden_value")?;
-        let measures = keys.measures(&of)?;
+        let measures = keys.measures()?;
         let unit = measures.facts().unit;
         let read = |which, limit: Option<Box<RawValue>>| match limit {
             None => Ok(None),
@@ -260,12 +253,12 @@ impl GaugeFile {
 
     /// The name of its kind in recipes.
     pub fn kind_name(&self) -> String {
-        seam::parameters(&self.measures).0
+        parameters(&self.measures).0
     }
 
     /// Its keys with their values, in the order in which they are written.
     pub(super) fn keys(&self) -> Vec<(String, Value)> {
-        let (kind, parameters) = seam::parameters(&self.measures);
+        let (kind, parameters) = parameters(&self.measures);
         let mut keys = vec![
             ("slot".to_owned(), json!(self.slot)),
             ("name".to_owned(), json!(self.name)),

@@ -1,9 +1,10 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
 //! - On disk: [`mod@file`] is the manifest, [`feature`] its features and datum systems, `gauge` and
-//!   `gauge_keys` its gauges, [`tolerance`] what their limits come from, [`bounds`] the bounds of
-//!   lists and of values that depend on others, [`archive`] the ZIP with its fingerprint,
-//!   [`gauges_toml`] features, datum systems and gauges as text for people.
+//!   `gauge_keys` its gauges, [`tolerance`] and `gauge_limits` what their limits come from,
+//!   `references` which features they name, [`bounds`] the bounds of lists and of values that
+//!   depend on others, [`archive`] the ZIP with its fingerprint, [`gauges_toml`] features, datum
+//!   systems and gauges as text for people.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot
 //!   judge, [`plan`] joins that with the head's calibration; `light` tells bad light from bad
 //!   parts.
@@ -34,6 +35,7 @@ pub mod feature;
 pub mod file;
 mod gauge;
 mod gauge_keys;
+mod gauge_limits;
 pub mod gauges_toml;
 pub mod generations;
 pub mod golden;
@@ -47,9 +49,9 @@ mod median;
 pub mod plan;
 pub mod planner;
 mod proof;
+mod references;
 mod regauge;
 pub mod replace;
-mod seam;
 mod shots;
 mod sides;
 pub mod signal;
@@ -60,7 +62,7 @@ pub mod tolerance;
 pub use archive::short;
 pub use check::{Conditions, Recipe, RecipeId, RecipeSequence};
 pub use demands::Demands;
-pub use feature::{DatumFile, FeatureFile, FeatureKind};
+pub use feature::{DatumFile, FeatureFile};
 pub use file::{
     AlignmentKind, PatternFile, RecipeFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };

@@ -1,6 +1,5 @@
 //! What the limits of a gauge come from, and what another instrument has measured.
 
-use super::gauge::GaugeFile;
 use algo::inspect::Reading;
 
 /// What limits are worked out from: they lie `minus` below and `plus` above a middle.
@@ -43,6 +42,14 @@ pub struct Substitution {
 }
 
 impl Substitution {
+    /// By a master, in place of golden's own value.
+    pub(super) fn new(master: Master, golden: f64) -> Self {
+        Self {
+            shift: master.value - golden,
+            u: master.u,
+        }
+    }
+
     /// Value and systematic error of a reading. What the measurements of golden and of the part
     /// share is in the difference no more; golden's noise and the error over the displacement are.
     pub fn of(self, reading: &Reading) -> (f64, f64) {
@@ -57,44 +64,5 @@ impl Tolerance {
             self.minus.map(|minus| middle - minus),
             self.plus.map(|plus| middle + plus),
         ]
-    }
-}
-
-impl GaugeFile {
-    /// Whether golden must be measured for its limits or its master.
-    pub fn needs_golden(&self) -> bool {
-        let by_golden = |tolerance: &Tolerance| tolerance.about == About::Golden;
-        self.master.is_some() || self.tolerance.as_ref().is_some_and(by_golden)
-    }
-
-    /// What its master makes of readings; none without a master.
-    pub(super) fn substitution(&self) -> Option<Substitution> {
-        let (Master { value, u }, golden) = self.master.zip(self.golden_value)?;
-        let shift = value - golden;
-        Some(Substitution { shift, u })
-    }
-
-    /// The middle of its tolerance, where it has one and that is known.
-    pub(super) fn middle(&self) -> Option<f64> {
-        match self.tolerance?.about {
-            About::Nominal(nominal) => Some(nominal),
-            // What golden reads with a master is the master's value.
-            About::Golden => self.master.map(|master| master.value).or(self.golden_value),
-        }
-    }
-
-    /// Works out its limits, where they come from something that is known.
-    pub(super) fn set_limits(&mut self) {
-        if let Some((tolerance, middle)) = self.tolerance.zip(self.middle()) {
-            [self.low, self.high] = tolerance.limits(middle);
-        }
-    }
-
-    /// Takes over what golden reads; its limits follow.
-    pub(super) fn set_golden(&mut self, golden: Option<&Reading>) {
-        if self.needs_golden() {
-            self.golden_value = golden.map(|reading| reading.value);
-            self.set_limits();
-        }
     }
 }

@@ -5,9 +5,9 @@
 //! side². The models need the cells' values only; `tests/suite/repeatability.rs` compares them with
 //! the scatter of repeated measurements.
 
-use super::cells::Cell;
 use super::reading::Found;
 use crate::inspect::align::{Placed, form};
+use crate::inspect::feature::Cell;
 use core::f64::consts::{PI, SQRT_2};
 
 /// Largest less smallest value, one per cell. Its error is made of those of both ends, each the

@@ -2,7 +2,7 @@
 
 use super::extreme::range;
 use super::kind::*;
-use super::level::Plane;
+use crate::inspect::feature::Plane;
 
 kind! {
     /// The distance between the two planes parallel to the least-squares plane that enclose all

@@ -3,13 +3,17 @@
 use super::component::Component;
 use super::extreme::motion;
 use crate::inspect::align::Placed;
+use crate::inspect::feature::FeatureKind::{self, Plane, Surface};
 
-pub(super) use super::cells::Cell;
 pub(super) use super::reading::Found;
 pub(super) use super::unit::Unit;
+pub(super) use crate::inspect::feature::{Cell, Geometry};
 pub(super) use alloc::format;
 pub(super) use alloc::string::String;
 pub(super) use alloc::vec::Vec;
+
+/// Most features of a gauge.
+pub const MAX_PLACES: usize = 2;
 
 /// What a value is worked out from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +29,8 @@ pub enum Basis {
     Pixels,
     /// The part's motion; there is no region.
     Motion(Component),
+    /// The geometry of its features ([`Kind::value`]); its error is propagated numerically.
+    Geometry,
 }
 
 impl Basis {
@@ -32,7 +38,7 @@ impl Basis {
     pub fn side(self) -> Option<usize> {
         match self {
             Self::Squares(side) | Self::Cells(side) => Some(side),
-            Self::Region | Self::Pixels | Self::Motion(_) => None,
+            Self::Region | Self::Pixels | Self::Motion(_) | Self::Geometry => None,
         }
     }
 
@@ -48,11 +54,23 @@ impl Basis {
     pub(in crate::inspect) fn cell_side(self) -> Option<usize> {
         match self {
             Self::Cells(side) => Some(side.max(1)),
-            Self::Region => Some(0),
+            Self::Region | Self::Geometry => Some(0),
             Self::Squares(_) | Self::Pixels | Self::Motion(_) => None,
         }
     }
 }
+
+/// Of which kinds the features of a gauge are: for each of its places, those that fit.
+pub type Takes = &'static [&'static [FeatureKind]];
+
+/// One surface.
+pub(super) const SURFACE: Takes = &[&[Surface]];
+/// A surface, and a second one.
+pub(super) const SURFACES: Takes = &[&[Surface], &[Surface]];
+/// One plane.
+pub(super) const PLANE: Takes = &[&[Plane]];
+/// A plane, and a second one.
+pub(super) const PLANES: Takes = &[&[Plane], &[Plane]];
 
 /// What a gauge says of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,6 +79,8 @@ pub struct Facts {
     pub unit: Unit,
     /// What its value is worked out from.
     pub basis: Basis,
+    /// The kinds of its features, place by place; empty where it is of the whole part.
+    pub takes: Takes,
     /// What its fields say, in words behind the kind's name; each name of a field in braces stands
     /// for its value.
     pub words: &'static str,
@@ -74,11 +94,12 @@ pub struct Facts {
 }
 
 impl Facts {
-    /// The facts of a value that is made of heights and may be negative.
+    /// The facts of a value of one surface that is made of heights and may be negative.
     pub(super) fn new(unit: Unit, basis: Basis, words: &'static str) -> Self {
         Self {
             unit,
             basis,
+            takes: SURFACE,
             words,
             compares: false,
             never_negative: false,
@@ -100,17 +121,18 @@ pub trait Kind {
         Vec::new()
     }
 
-    /// The name of the second region, with which it compares its own.
-    fn from(&self) -> Option<&str> {
-        None
-    }
-
-    /// Refuses values of its fields; sides and names are checked by the recipe.
+    /// Refuses values of its fields; sides are checked by the recipe.
     ///
     /// # Errors
     /// In words that follow the gauge's name.
     fn check(&self) -> Result<(), String> {
         Ok(())
+    }
+
+    /// The value of a gauge as a function of the geometry of its features, of which there are as
+    /// many as it takes; `None` for other gauges.
+    fn value(&self, _: &[Geometry]) -> Option<f64> {
+        None
     }
 
     /// The value of a gauge that is worked out from cells; `None` where there was nothing to

@@ -1,7 +1,7 @@
 //! The mean height of a region.
 
 use super::kind::*;
-use super::level::mean;
+use crate::inspect::feature::mean;
 
 kind! {
     /// The mean height, mm.

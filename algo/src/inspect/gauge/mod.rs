@@ -1,39 +1,34 @@
 //! What a gauge measures, and how its value and error follow from cells.
 //!
-//! A region is divided into square cells of pixels in golden's frame. A strip adds each measured
-//! pixel to the cell that holds its taught coordinates. The height of a cell is its taught height
-//! plus its pixels' mean deviation, so on a slope too it does not depend on which of them were
-//! measured. The values of all gauges but coverage, deviation and placement are worked out from
-//! these heights and deviations.
+//! A gauge measures features of the part ([`feature`](super::feature)). Coverage, deviation and
+//! placement are worked out from pixels and from the motion, the values of all other gauges from
+//! the cells of a region, or from the geometry that is fitted to them.
 
-mod cells;
+mod angle;
 mod component;
 mod coverage;
 mod deviation;
+mod distance;
 mod extreme;
 mod flatness;
-mod grid;
 mod kind;
-mod level;
 mod mean_height;
 mod out_of_tolerance;
 mod peak_to_valley;
 mod placement;
+mod propagate;
 mod reading;
 mod rms_deviation;
 mod step;
-mod taught;
 mod tilt;
 mod unit;
 mod volume;
+mod z;
 
-pub use cells::{Cell, Sum, cells};
-pub use grid::{Grid, TooFine};
-pub use kind::{Basis, Evidence, Facts, Kind};
+pub use kind::{Basis, Evidence, Facts, Kind, MAX_PLACES};
+pub(super) use propagate::{Sensitive, propagate};
 pub(super) use reading::MIN_SUPPORT;
 pub use reading::{Found, Reading, Square};
-pub use taught::TaughtCell;
-pub(super) use taught::taught_cells;
 pub use unit::Unit;
 
 use alloc::vec::Vec;
@@ -101,12 +96,15 @@ kinds! {
     out_of_tolerance: OutOfTolerance { smoothing_px: 9, tolerance_mm: 0.1 },
     coverage: Coverage {},
     mean_height: MeanHeight {},
-    step: Step { from: "other".into() },
+    step: Step {},
     flatness: Flatness { smoothing_px: 9 },
     peak_to_valley: PeakToValley { smoothing_px: 9 },
     tilt: Tilt { about: kinds::Axis::X },
     volume: Volume { above_mm: 8.0 },
     placement: Placement { component: kinds::Component::AboutZ },
+    z: Z {},
+    distance: Distance {},
+    angle: Angle {},
 }
 
 #[cfg(test)]

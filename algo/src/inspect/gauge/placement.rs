@@ -22,7 +22,10 @@ impl Kind for Placement {
             AboutY => (Unit::Angle, "about y"),
             AboutZ => (Unit::Angle, "about z"),
         };
-        Facts::new(unit, Basis::Motion(self.component), words)
+        Facts {
+            takes: &[],
+            ..Facts::new(unit, Basis::Motion(self.component), words)
+        }
     }
 
     fn others(&self) -> Vec<Self> {

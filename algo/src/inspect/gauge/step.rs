@@ -1,23 +1,19 @@
 //! The height of a region above another one.
 
 use super::kind::*;
-use super::level::mean;
+use crate::inspect::feature::mean;
 
 kind! {
     /// The mean height less that of a second region, mm.
-    Step {
-        /// The name of the second region.
-        from: String,
-    }
+    Step {}
 }
 
 impl Kind for Step {
     fn facts(&self) -> Facts {
-        Facts::new(Unit::Length, Basis::Region, "from {from}")
-    }
-
-    fn from(&self) -> Option<&str> {
-        Some(&self.from)
+        Facts {
+            takes: SURFACES,
+            ..Facts::new(Unit::Length, Basis::Region, "")
+        }
     }
 
     fn find(&self, of: Evidence<'_>) -> Option<Found> {

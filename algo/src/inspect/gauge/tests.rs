@@ -2,7 +2,13 @@
 
 use super::kinds::*;
 use super::*;
-use crate::inspect::align::Placed;
+use crate::geometry::Vector;
+use crate::inspect::align::{Motion, Placed};
+use crate::inspect::feature::{
+    Cell, FittedPlane, Geometry, Grid, Middle, Sum, TaughtCell, TooFine, cells,
+};
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
 /// A square of `side` × `side` cells of 4 pixels, 2 mm apart, about (0, 0), taught flat at 0.
 fn grid(side: usize, height: impl Fn(f64, f64) -> f64) -> (Vec<Sum>, Vec<TaughtCell>) {
@@ -25,6 +31,7 @@ fn grid(side: usize, height: impl Fn(f64, f64) -> f64) -> (Vec<Sum>, Vec<TaughtC
             area: 1.5,
             jacobian: [0.0, 0.0, 1.0, 0.0, 0.0, 0.0],
             variance: 4.0 * 0.01,
+            ray: [0.0; 2],
         };
         (sum, taught)
     });
@@ -82,8 +89,7 @@ fn a_step_is_the_difference_of_two_means_and_has_the_errors_of_both() {
     let (low, taught) = grid(4, |_, _| 8.0);
     let (high, _) = grid(4, |_, _| 10.5);
     let (high, low) = (seen(&high, &taught, None), seen(&low, &taught, None));
-    let from = "low".into();
-    let step = find_in(&Step { from }, [&high, &low], (0.0, 0.1), None).unwrap();
+    let step = find_in(&Step {}, [&high, &low], (0.0, 0.1), None).unwrap();
     close(step.value, 2.5);
     // 64 pixels of 0.1 mm on each side.
     close(sigma(step), 0.1 / 8.0 * core::f64::consts::SQRT_2);
@@ -188,8 +194,7 @@ fn the_motion_moves_a_mean_as_a_whole_and_leaves_a_step_alone() {
         sigma(found.unwrap())
     };
     close(moved(&MeanHeight {}), 0.02);
-    let from = "itself".into();
-    close(moved(&Step { from }), 0.0);
+    close(moved(&Step {}), 0.0);
     assert_eq!(placed.component(2), Some((0.0, 0.02)));
     close(placed.component(3).unwrap().1, 0.0);
 }
@@ -215,4 +220,195 @@ fn a_region_with_too_many_cells_is_refused_and_others_hold_every_pixel() {
     // Beside the box: the nearest.
     assert_eq!((grid.cell(-3, -9), grid.cell(400, 400)), (0, 43 * 43 - 1));
     assert!(Grid::over(&region, 0).unwrap().len() <= 1024);
+}
+
+/// A plane of 9 × 9 cells about (x, y) with these slopes, measured with this error of a pixel; and
+/// what its cells add to its parameters.
+fn plane((x, y): (f64, f64), slopes: [f64; 2], pixel: f64) -> (FittedPlane, Vec<[f64; 3]>) {
+    let (sums, mut taught) = grid(9, |_, _| 0.0);
+    for cell in &mut taught {
+        (cell.x, cell.y) = (cell.x + x, cell.y + y);
+        cell.height = 5.0 + slopes[0] * cell.x + slopes[1] * cell.y;
+        cell.ray = [0.364, 0.001 * cell.y];
+    }
+    let (cells, mut rows) = (seen(&sums, &taught, None), Vec::new());
+    let middle = Middle::of(&taught);
+    let plane = FittedPlane::of(&cells, middle, pixel * pixel, &mut rows);
+    (plane.unwrap(), rows)
+}
+
+/// A part whose motion has this covariance.
+fn lying(covariance: [[f64; 6]; 6]) -> Placed {
+    Placed {
+        motion: crate::inspect::align::Motion::none(Vector::new(1.0, -2.0, 4.0)),
+        covariance,
+        radius: 50.0,
+        left_out: [false; 6],
+        points: 100,
+        outliers: 0.0,
+        reach: 0.0,
+        reach_sigma: 0.0,
+    }
+}
+
+/// A lower triangle L with L Lᵀ = C.
+fn root<const N: usize>(c: &[[f64; N]; N]) -> [[f64; N]; N] {
+    let mut l = [[0.0; N]; N];
+    for i in 0..N {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            l[i][j] = match i == j {
+                true => (c[i][i] - sum).max(0.0).sqrt(),
+                false => (c[i][j] - sum) / l[j][j],
+            };
+        }
+    }
+    l
+}
+
+/// Normal numbers with a covariance of which this is the root.
+fn draw<const N: usize>(root: &[[f64; N]; N], random: &mut SplitMix64) -> [f64; N] {
+    let mut share = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let own: [f64; N] = core::array::from_fn(|_| {
+        let (length, angle) = ((-2.0 * (1.0 - share()).ln()).sqrt(), share());
+        length * (core::f64::consts::TAU * angle).cos()
+    });
+    core::array::from_fn(|i| (0..=i).map(|j| root[i][j] * own[j]).sum())
+}
+
+#[test]
+fn errors_of_geometric_kinds_are_the_scatter_of_random_draws() {
+    const DRAWS: usize = 20_000;
+    const KINK: f64 = 10.0;
+    const WITHIN: f64 = 0.02;
+    // Shifts of some µm and turns by as much at the radius, correlated.
+    let covariance: [[f64; 6]; 6] = core::array::from_fn(|i| {
+        core::array::from_fn(|j| if i == j { 9e-6 } else { 3e-6 } * (1.0 + 0.2 * (i * j) as f64))
+    });
+    let placed = lying(covariance);
+    let mut random = SplitMix64::seed_from_u64(3);
+    let mut compared = 0;
+    for (one, other) in [
+        ([0.0, 0.0], [0.0, 0.0]),
+        ([0.0, 0.0], [0.08, 0.02]),
+        ([0.4, 0.1], [-0.4, 0.0]),
+        ([1.0, 0.0], [-1.0, 0.3]),
+        ([0.0, 0.0], [-5.0, 0.0]),
+    ] {
+        let both = [
+            plane((-20.0, 3.0), one, 0.03),
+            plane((15.0, -8.0), other, 0.05),
+        ];
+        let of: Vec<Sensitive<'_>> = both
+            .iter()
+            .map(|(plane, rows)| Sensitive { plane, rows })
+            .collect();
+        let roots = both.each_ref().map(|(plane, _)| root(&plane.covariance));
+        let moving = root(&placed.covariance);
+        for measure in Measure::examples() {
+            let Facts {
+                basis,
+                takes,
+                never_negative,
+                ..
+            } = measure.facts();
+            if basis != Basis::Geometry {
+                continue;
+            }
+            let count = takes.len();
+            let found = propagate(measure.kind(), &of[..count], Some(&placed)).unwrap();
+            if never_negative && found.value < KINK * sigma(found) {
+                continue;
+            }
+            let (mut sum, mut squares) = (0.0, 0.0);
+            for _ in 0..DRAWS {
+                let [x, y, z, about_x, about_y, about_z] = draw(&moving, &mut random);
+                let turn = Vector::new(about_x, about_y, about_z) * (1.0 / placed.radius);
+                let motion = Motion::new(placed.motion.centre, Vector::new(x, y, z), turn);
+                let drawn: Vec<Geometry> = (0..count)
+                    .map(|at| {
+                        let mut plane = both[at].0;
+                        let noise = draw(&roots[at], &mut random);
+                        plane.parameters = core::array::from_fn(|i| plane.parameters[i] + noise[i]);
+                        plane.geometry(plane.moved(&motion))
+                    })
+                    .collect();
+                let off = measure.kind().value(&drawn).unwrap() - found.value;
+                (sum, squares) = (sum + off, squares + off * off);
+            }
+            let mean = sum / DRAWS as f64;
+            let scatter = (squares / DRAWS as f64 - mean * mean).sqrt();
+            let ratio = sigma(found) / scatter;
+            assert!(
+                (ratio - 1.0).abs() < WITHIN,
+                "{measure:?} of {one:?} {other:?}: {ratio}"
+            );
+            compared += 1;
+        }
+    }
+    // z of all, distance of all, angle of all but the parallel ones.
+    assert_eq!(compared, 14);
+}
+
+#[test]
+fn the_motion_cancels_in_the_distance_and_the_angle_of_planes_and_not_in_z() {
+    let mut covariance = [[0.0; 6]; 6];
+    for (at, row) in covariance.iter_mut().enumerate() {
+        row[at] = 0.02 * 0.02;
+    }
+    let placed = lying(covariance);
+    let motion = |kind: &dyn Kind, other: [f64; 2]| {
+        let both = [
+            plane((-20.0, 3.0), [0.3, 0.1], 0.0),
+            plane((15.0, -8.0), other, 0.0),
+        ];
+        let of = both
+            .each_ref()
+            .map(|(plane, rows)| Sensitive { plane, rows });
+        let count = kind.facts().takes.len();
+        sigma(propagate(kind, &of[..count], Some(&placed)).unwrap())
+    };
+    // Parallel planes, and any angle.
+    assert!(motion(&Distance {}, [0.3, 0.1]) < 1e-7);
+    assert!(motion(&Angle {}, [-0.9, 0.4]) < 1e-7);
+    // The middle of an inclined plane's region stays in the frame as taught: displaced by a along
+    // y, it lies on another place of the part.
+    assert!(motion(&Distance {}, [0.3, 0.9]) > 0.01);
+    assert!(motion(&Z {}, [0.3, 0.1]) > 0.02);
+}
+
+#[test]
+fn distances_and_angles_of_planes_are_those_of_a_drawing() {
+    let value = |kind: &dyn Kind, one, other| {
+        let both = [
+            plane((-20.0, 0.0), one, 0.03),
+            plane((15.0, 0.0), other, 0.03),
+        ];
+        let of = both
+            .each_ref()
+            .map(|(plane, rows)| Sensitive { plane, rows });
+        propagate(kind, &of[..kind.facts().takes.len()], None).unwrap()
+    };
+    let slope = |degrees: f64| libm::tan(degrees.to_radians());
+    close(value(&Z {}, [0.1, 0.0], [0.0, 0.0]).value, 5.0 - 2.0);
+    // Bent by 5°, 45° and 90° towards the camera.
+    for bend in [0.0, 5.0, 45.0, 90.0] {
+        let (one, other) = (slope(bend / 2.0), -slope(bend / 2.0));
+        close(value(&Angle {}, [one, 0.0], [other, 0.0]).value, bend);
+        // Both planes are at 5 mm where x is 0.
+        let distance = 15.0 * 2.0 * slope(bend / 2.0) / libm::hypot(1.0, one);
+        close(
+            value(&Distance {}, [one, 0.0], [other, 0.0]).value,
+            distance,
+        );
+    }
+    // Parallel planes have an error although the angle has its kink there.
+    let parallel = value(&Angle {}, [0.1, 0.0], [0.1, 0.0]);
+    assert!(
+        parallel.pixels > 0.0 && parallel.value < 1e-6,
+        "{parallel:?}"
+    );
+    // An error of all heights moves both by as much; on the steeper one by less along its normal.
+    let level = value(&Distance {}, [0.0, 0.0], [0.0, 0.0]);
+    assert!((level.lever - 2.0).abs() < 1.0, "{level:?}");
 }

@@ -1,7 +1,7 @@
 //! The angle of a region.
 
 use super::kind::*;
-use super::level::{Plane, weight};
+use crate::inspect::feature::{Plane, weight};
 
 /// An axis of the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

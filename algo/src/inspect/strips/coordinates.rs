@@ -10,7 +10,7 @@ use super::height::HeightRow;
 use super::pose::{PoseField, blocks_of_row};
 use super::recent::RecentRows;
 use super::spans::common;
-use crate::inspect::gauge::{Grid, Sum};
+use crate::inspect::feature::{Grid, Sum};
 use crate::inspect::weight::Factor;
 use crate::math::nearest::whole;
 use crate::pipeline::NO_OFFSET;

@@ -6,7 +6,7 @@ use super::coverage::{add_variances, count_known};
 use super::gauges::Gauges;
 use super::height::HeightRow;
 use super::spans::common;
-use crate::inspect::gauge::{Basis, Sum};
+use crate::inspect::feature::Sum;
 use crate::phase::Trust;
 use crate::pipeline::{HeightTally, PhaseMap};
 use crate::simd::{Lanes, back_end_entry};
@@ -73,11 +73,11 @@ impl Counts {
         self.exact += heights.exact;
         let trusts = &decoded.trust[golden.window[v].clone()];
         count_trusts(backend, trusts, &mut self.trusts);
-        for (at, gauge) in gauges.list.iter().enumerate() {
-            if gauge.measure.facts().basis != Basis::Pixels {
+        for &at in &gauges.coverages {
+            let Some(region) = gauges.region(pose, at) else {
                 continue;
-            }
-            for (_, columns) in pose.region(&gauges.regions, at).row(v) {
+            };
+            for (_, columns) in region.row(v) {
                 let span = common(columns, &extent);
                 let offsets = &heights.offset[span.clone()];
                 let modulations = &decoded.modulation[span];
@@ -87,7 +87,7 @@ impl Counts {
             }
         }
         for (patch, cells) in gauges.patches.iter().zip(&mut self.cells) {
-            for (_, columns) in pose.region(&gauges.regions, patch.region).row(v) {
+            for (_, columns) in pose.region(&gauges.regions, patch.feature).row(v) {
                 let span = common(columns, &extent);
                 coordinates.add_to_cells(&patch.grid, span, cells);
             }

@@ -3,6 +3,7 @@
 use super::counts::TRUSTS;
 use super::coverage;
 use super::decode::Input;
+use super::fits::{Fit, value_of};
 use super::gauges::MAX_GAUGES;
 use super::plan::Production;
 use super::pose::PoseField;
@@ -11,15 +12,20 @@ use super::squares::rivals::rivals;
 use super::strip::{CellBuffers, Strip, Strips};
 use super::uncertainty::Made;
 use crate::inspect::align::Placed;
-use crate::inspect::gauge::{Basis, Evidence, Facts, Reading, Sum, TaughtCell, cells};
+use crate::inspect::feature::{Sum, TaughtCell, cells};
+use crate::inspect::gauge::{Basis, Evidence, Facts, MAX_PLACES, Reading};
 use crate::phase::Trust;
-use crate::pipeline::VARIANCE_UNIT_NM;
+use crate::pipeline::{VARIANCE_UNIT_NM, for_each_item};
+use alloc::vec::Vec;
 
 /// Everything that is known of a part after one cycle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Findings {
     /// Per gauge; `None` where there was nothing to measure.
     pub readings: heapless::Vec<Option<Reading>, MAX_GAUGES>,
+    /// Per gauge without a value, of cells or planes, which share of each of its features as taught
+    /// was measured.
+    pub unmeasured: heapless::Vec<Option<[f64; MAX_PLACES]>, MAX_GAUGES>,
     /// Pixels with a height.
     pub resolved: u64,
     /// Share of the compared surface inside the window that has a height.
@@ -75,13 +81,20 @@ impl Production {
         let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
         // From the noise of independent pixels to that of the map.
         let windows = libm::sqrt(self.budget.square_variance(1));
-        let readings = (0..self.gauges.list.len())
+        self.fit(strips, noisier);
+        let readings: heapless::Vec<Option<Reading>, MAX_GAUGES> = (0..self.gauges.list.len())
             .map(|gauge| self.reading(gauge, input, noisier, strips))
             .collect();
+        let without = |(gauge, reading): (usize, &Option<Reading>)| match reading {
+            Some(_) => None,
+            None => self.shares(gauge, &strips.strips),
+        };
+        let unmeasured = readings.iter().enumerate().map(without).collect();
         let count = |trust: Trust| trusts[trust as usize];
         let contradicting = count(Trust::Residual);
         Findings {
             readings,
+            unmeasured,
             resolved: trusts[Trust::Resolved as usize],
             coverage: tally.compared as f64 / self.golden.compared.max(1) as f64,
             height_noise_mm: height_noise_mm * windows,
@@ -110,11 +123,12 @@ impl Production {
             strips,
             pose,
             cells,
+            fits,
             ..
         } = strips;
         match self.gauges.list[gauge].measure.facts().basis {
             Basis::Pixels => {
-                let pixels = pose.region(&self.gauges.regions, gauge).len();
+                let pixels = self.gauges.region(pose, gauge)?.len();
                 let (mut covered, mut variance) = (0, 0);
                 for strip in strips {
                     covered += strip.counts.covered[gauge];
@@ -169,6 +183,13 @@ impl Production {
                 })
             }
             Basis::Cells(_) | Basis::Region => self.of_cells(gauge, noisier, pose, strips, cells),
+            Basis::Geometry => {
+                let own = &self.gauges.patches_of[gauge];
+                let placed = pose.placed.as_ref();
+                let found = value_of(self.gauges.list[gauge].measure.kind(), own, fits, placed)?;
+                let budget = &self.budget;
+                Some(budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed))
+            }
         }
     }
 
@@ -186,14 +207,14 @@ impl Production {
             basis, compares, ..
         } = measure.facts();
         let side = basis.cell_side()?;
-        let patches = self.gauges.patches_of[gauge].clone();
-        let [first, last] = [patches.start, patches.end - 1];
+        let patches = &self.gauges.patches_of[gauge];
+        let (&first, &last) = (patches.first()?, patches.last()?);
         buffers.cells.clear();
         buffers.weights.clear();
         let taught: &[TaughtCell] = &self.gauges.patches[first].taught;
         self.gather(first, side, strips, buffers);
         let count = buffers.cells.len();
-        if first != last {
+        if patches.len() > 1 {
             // Both regions' cells behind each other: the motion moves them together.
             self.gather(last, side, strips, buffers);
         }
@@ -204,26 +225,14 @@ impl Production {
                 cell.taught = cell.taught.along_normal();
             }
         }
-        let pixels = |taught: &[TaughtCell]| taught.iter().map(|cell| cell.pixels).sum::<u32>();
         // A region without cells as a square of its area.
         let smoothed = self.budget.square_variance(match side {
             0 => pixels(taught).isqrt() as usize,
             side => side,
         });
-        let variance = |taught: &[TaughtCell]| {
-            let pixels = pixels(taught);
-            let variances = taught.iter().map(|cell| match compares {
-                true => cell.along_normal().variance,
-                false => cell.variance,
-            });
-            let sum: f64 = variances.sum();
-            sum / f64::from(pixels.max(1)) * noisier * noisier * smoothed
-        };
+        let variance = |taught| pixel_variance(taught, compares) * noisier * noisier * smoothed;
         let pixel = variance(taught);
-        let from = match first == last {
-            true => pixel,
-            false => variance(&self.gauges.patches[last].taught),
-        };
+        let from = variance(&self.gauges.patches[last].taught);
         let placed = pose.placed.as_ref();
         let mut found = measure.kind().find(Evidence {
             all: cells,
@@ -247,20 +256,67 @@ impl Production {
         )
     }
 
+    /// Which share of the cells of each of a gauge's features was measured; none if it has no cells.
+    fn shares(&self, gauge: usize, strips: &[Strip]) -> Option<[f64; MAX_PLACES]> {
+        let own = self.gauges.patches_of.get(gauge)?;
+        let mut shares = [1.0; MAX_PLACES];
+        for (share, &patch) in shares.iter_mut().zip(own) {
+            let had = pixels(&self.gauges.patches[patch].taught);
+            let sums = strips.iter().flat_map(|strip| &strip.counts.cells[patch]);
+            let has: i64 = sums.map(|sum| sum.count).sum();
+            *share = has as f64 / f64::from(had.max(1));
+        }
+        (!own.is_empty()).then_some(shares)
+    }
+
+    /// Fits the planes of features, one per task.
+    fn fit(&self, strips: &mut Strips, noisier: f64) {
+        let Strips { strips, fits, .. } = strips;
+        let strips = &strips[..];
+        for_each_item(fits, |fit: &mut Fit| {
+            let patch = &self.gauges.patches[fit.patch];
+            add_up(strips, fit.patch, patch.grid.len(), &mut fit.sums);
+            let side = pixels(&patch.taught).isqrt() as usize;
+            let smoothed = self.budget.square_variance(side);
+            let pixel = pixel_variance(&patch.taught, false);
+            fit.find(&patch.taught, pixel * noisier * noisier * smoothed);
+        });
+    }
+
     /// Appends the cells of a patch.
     fn gather(&self, at: usize, side: usize, strips: &[Strip], buffers: &mut CellBuffers) {
         let patch = &self.gauges.patches[at];
         let CellBuffers {
             sums, cells: out, ..
         } = buffers;
-        sums.clear();
-        sums.resize(patch.grid.len(), Sum::default());
-        for strip in strips {
-            for (sum, more) in sums.iter_mut().zip(&strip.counts.cells[at]) {
-                sum.add(more);
-            }
-        }
+        add_up(strips, at, patch.grid.len(), sums);
         let least = (side > 0).then(|| patch.grid.least());
         cells(sums, &patch.taught, least, out);
     }
+}
+
+/// The sums of all strips over the cells of a patch.
+fn add_up(strips: &[Strip], patch: usize, cells: usize, sums: &mut Vec<Sum>) {
+    sums.clear();
+    sums.resize(cells, Sum::default());
+    for strip in strips {
+        for (sum, more) in sums.iter_mut().zip(&strip.counts.cells[patch]) {
+            sum.add(more);
+        }
+    }
+}
+
+/// The pixels of cells as taught.
+fn pixels(taught: &[TaughtCell]) -> u32 {
+    taught.iter().map(|cell| cell.pixels).sum()
+}
+
+/// The mean variance of a pixel as taught, in height or along the normal, mm².
+fn pixel_variance(taught: &[TaughtCell], along_normal: bool) -> f64 {
+    let variances = taught.iter().map(|cell| match along_normal {
+        true => cell.along_normal().variance,
+        false => cell.variance,
+    });
+    let sum: f64 = variances.sum();
+    sum / f64::from(pixels(taught).max(1))
 }

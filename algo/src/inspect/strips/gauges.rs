@@ -1,29 +1,43 @@
 //! The gauges of a production: where each measures what, and what is planned of that beforehand.
 
 use super::coverage::Threshold;
+use super::pose::PoseField;
 use super::spans::hull;
 use super::squares::extreme;
 use crate::geometry::Vector;
 use crate::inspect::align::{Alignment, GoldenSurface};
-use crate::inspect::gauge::{Grid, Measure, TaughtCell, TooFine, taught_cells};
+use crate::inspect::feature::{Feature, FeatureKind, Grid, TaughtCell, TooFine, taught_cells};
+use crate::inspect::gauge::{Basis, Measure};
 use crate::inspect::region::Region;
-use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 
-/// A gauge: where it measures what.
+/// A gauge: what it measures of which features.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gauge {
-    /// Where; empty for a placement.
-    pub region: Region,
-    /// The region that a step starts from.
-    pub from: Option<Region>,
+    /// Which of the production's features, in the order of the measure's places.
+    pub of: Vec<usize>,
     /// What.
     pub measure: Measure,
 }
 
+impl Gauge {
+    /// Whether its kind measures such features.
+    fn fits(&self, features: &[Feature]) -> bool {
+        let takes = self.measure.facts().takes;
+        let fits = |(kinds, at): (&&[FeatureKind], &usize)| {
+            let feature = features.get(*at);
+            feature.is_some_and(|feature| kinds.contains(&feature.kind))
+        };
+        takes.len() == self.of.len() && takes.iter().zip(&self.of).all(fits)
+    }
+}
+
 /// Gauges that a recipe may have.
 pub const MAX_GAUGES: usize = 64;
+
+/// Features that a recipe may have.
+pub const MAX_FEATURES: usize = 96;
 
 /// Gauges that cannot be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -33,6 +47,18 @@ pub enum Unmeasurable {
     TooMany {
         /// How many.
         gauges: usize,
+    },
+    /// More than [`MAX_FEATURES`].
+    #[error("{features} features where at most {MAX_FEATURES} are found")]
+    TooManyFeatures {
+        /// How many.
+        features: usize,
+    },
+    /// A gauge whose kind does not measure such features.
+    #[error("gauge {} is of features that its kind does not measure", gauge + 1)]
+    Unfit {
+        /// Which gauge.
+        gauge: usize,
     },
     /// A smoothing over so many pixels that sums of heights over them could overflow.
     #[error("a smoothing over {side}x{side} pixels is too wide for the working range")]
@@ -45,11 +71,13 @@ pub enum Unmeasurable {
     TooFine(TooFine),
 }
 
-/// The cells of a gauge's region.
+/// The cells of a feature's region, of one side. All gauges that ask for them share them.
 #[derive(Debug)]
 pub struct Patch {
-    /// Which of the regions.
-    pub region: usize,
+    /// Which of the features.
+    pub feature: usize,
+    /// The side that was asked for; 0 where the grid has chosen one.
+    side: usize,
     pub grid: Grid,
     pub taught: Vec<TaughtCell>,
 }
@@ -92,12 +120,16 @@ impl Side {
 #[derive(Debug)]
 pub struct Gauges {
     pub list: Vec<Gauge>,
-    /// One per gauge, then those that steps start from.
+    /// One per feature; empty where no gauge is of the feature.
     pub regions: Vec<Region>,
     /// The cells of all gauges that are worked out from cells.
     pub patches: Vec<Patch>,
-    /// Per gauge which patches are its own: one, two of a step, or none.
-    pub patches_of: Vec<Range<usize>>,
+    /// Per gauge its patches, in the order of its features; none if it has no cells.
+    pub patches_of: Vec<Vec<usize>>,
+    /// The patches that planes are fitted to.
+    pub planes: Vec<usize>,
+    /// The gauges of pixels.
+    pub coverages: Vec<usize>,
     /// The squares of all gauges of deviation, gauge by gauge.
     pub squares: Vec<SquaresOf>,
     /// The sides of these squares, each once.
@@ -107,9 +139,10 @@ pub struct Gauges {
 }
 
 impl Gauges {
-    /// Plans gauges. Deviations are at most `span_nm`; the motion of a part turns it as `alignment`
-    /// says.
+    /// Plans gauges of features. Deviations are at most `span_nm`; the motion of a part turns it as
+    /// `alignment` says.
     pub fn new(
+        features: &[Feature],
         list: Vec<Gauge>,
         golden: GoldenSurface<'_>,
         alignment: Option<&Alignment>,
@@ -119,6 +152,13 @@ impl Gauges {
         if list.len() > MAX_GAUGES {
             let gauges = list.len();
             return Err(Unmeasurable::TooMany { gauges });
+        }
+        if features.len() > MAX_FEATURES {
+            let features = features.len();
+            return Err(Unmeasurable::TooManyFeatures { features });
+        }
+        if let Some(gauge) = list.iter().position(|gauge| !gauge.fits(features)) {
+            return Err(Unmeasurable::Unfit { gauge });
         }
         let (mut squares, mut sides) = (Vec::new(), Vec::new());
         for (at, gauge) in list.iter().enumerate() {
@@ -158,36 +198,64 @@ impl Gauges {
             }
         }
         let about = alignment.map_or((Vector::default(), 1.0), |a| (a.centre, a.radius));
-        let mut regions: Vec<Region> = list.iter().map(|gauge| gauge.region.clone()).collect();
-        let (mut patches, mut patches_of) = (Vec::new(), Vec::new());
+        let used = |at: usize| list.iter().any(|gauge| gauge.of.contains(&at));
+        let features = features.iter().enumerate();
+        let regions = features.map(|(at, feature)| match used(at) {
+            true => feature.region.clone(),
+            false => Region::default(),
+        });
+        let regions: Vec<Region> = regions.collect();
+        let (mut patches, mut planes): (Vec<Patch>, Vec<usize>) = (Vec::new(), Vec::new());
+        let (mut patches_of, mut coverages) = (Vec::new(), Vec::new());
         for (at, gauge) in list.iter().enumerate() {
-            let first = patches.len();
-            let mut places = vec![at];
-            if let Some(from) = &gauge.from {
-                places.push(regions.len());
-                regions.push(from.clone());
+            let basis = gauge.measure.facts().basis;
+            if basis == Basis::Pixels {
+                coverages.push(at);
             }
-            if let Some(side) = gauge.measure.facts().basis.cell_side() {
-                for region in places {
-                    let grid = Grid::over(&regions[region], side).map_err(Unmeasurable::TooFine)?;
-                    patches.push(Patch {
-                        region,
-                        grid,
-                        taught: taught_cells(&grid, &regions[region], golden, about),
-                    });
+            let mut own = Vec::new();
+            for &feature in &gauge.of {
+                let Some(side) = basis.cell_side() else {
+                    break;
+                };
+                let known = |patch: &Patch| (patch.feature, patch.side) == (feature, side);
+                let patch = match patches.iter().position(known) {
+                    Some(patch) => patch,
+                    None => {
+                        let region = &regions[feature];
+                        let grid = Grid::over(region, side).map_err(Unmeasurable::TooFine)?;
+                        patches.push(Patch {
+                            feature,
+                            side,
+                            grid,
+                            taught: taught_cells(&grid, region, golden, about),
+                        });
+                        patches.len() - 1
+                    }
+                };
+                own.push(patch);
+                if basis == Basis::Geometry && !planes.contains(&patch) {
+                    planes.push(patch);
                 }
             }
-            patches_of.push(first..patches.len());
+            patches_of.push(own);
         }
         Ok(Self {
             list,
             regions,
             patches,
             patches_of,
+            planes,
+            coverages,
             squares,
             sides,
             threshold,
         })
+    }
+
+    /// The region of a gauge of one feature, as taught or as the part lies.
+    pub fn region<'a>(&'a self, pose: &'a PoseField, gauge: usize) -> Option<&'a Region> {
+        let feature = *self.list.get(gauge)?.of.first()?;
+        Some(pose.region(&self.regions, feature))
     }
 
     /// The largest side of a square; none if there is no deviation.

@@ -2,6 +2,7 @@
 
 use super::decode::Input;
 use super::findings::Findings;
+use super::fits::Fit;
 use super::maps::Maps;
 use super::plan::Production;
 use super::pose::PoseField;
@@ -26,6 +27,12 @@ impl Production {
             samples: Vec::new(),
             fitting: FitBuffers::default(),
             cells: CellBuffers::default(),
+            fits: self
+                .gauges
+                .planes
+                .iter()
+                .map(|&patch| Fit::new(patch, &self.gauges.patches[patch].taught))
+                .collect(),
         }
     }
 

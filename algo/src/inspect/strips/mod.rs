@@ -11,10 +11,10 @@
 //!    (`pose`): the pixel's taught coordinates, and its deviation from golden there, in height and,
 //!    weighted, along golden's normal ([`normal_shares`](super::normal_shares));
 //! 4. **accumulate** (`counts`, `coverage`, `squares`): counts, the sums of the gauges' cells
-//!    ([`gauge`](super::gauge)), and the square with the largest mean deviation along the normal;
+//!    ([`feature`](super::feature)), and the square with the largest mean deviation along the normal;
 //!    for the squares, the rows before this one are kept (`recent`);
-//! 5. **gauge** (`findings`, `deviation`, `uncertainty`): after all strips, readings and their
-//!    errors from these sums.
+//! 5. **gauge** (`fits`, `findings`, `deviation`, `uncertainty`): after all strips, the planes of
+//!    features, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few
 //! points of each are kept: the motion is found from these, in the order of the rows.
@@ -43,6 +43,7 @@ mod decode;
 mod deviation;
 mod displaced;
 mod findings;
+mod fits;
 mod gauges;
 mod golden;
 mod height;
@@ -61,7 +62,7 @@ mod uncertainty;
 
 pub use decode::Input;
 pub use findings::{Findings, Skipped};
-pub use gauges::{Gauge, MAX_GAUGES, Unmeasurable};
+pub use gauges::{Gauge, MAX_FEATURES, MAX_GAUGES, Unmeasurable};
 pub use maps::Maps;
 pub use pair::{Found, PairBuffers, PairPlaced, Picture};
 pub use plan::{Parts, Production};

@@ -10,6 +10,7 @@ use super::uncertainty::{CalibrationError, ErrorBudget};
 use crate::frame::SampleNoise;
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::align::Alignment;
+use crate::inspect::feature::Feature;
 use crate::inspect::largest::Largest;
 use crate::inspect::taught::Taught;
 use crate::phase::Decoder;
@@ -35,6 +36,8 @@ pub struct Parts {
     pub map: Option<Vec<AbsolutePhase>>,
     /// The part as taught.
     pub taught: Taught,
+    /// What gauges are of. A feature without a gauge costs nothing.
+    pub features: Vec<Feature>,
     /// What is measured.
     pub gauges: Vec<Gauge>,
     /// The columns of each row that are looked at: every gauge's region with half its smoothing and
@@ -77,7 +80,8 @@ impl Production {
     /// Joins what is known of head and part.
     ///
     /// # Errors
-    /// If there are too many gauges, or one's squares are so large that sums of heights over them
+    /// If there are too many gauges or features, a gauge's kind does not measure its features, or
+    /// one's squares are so large that sums of heights over them
     /// could overflow, or so small that there are too many.
     pub fn new(parts: Parts) -> Result<Self, Unmeasurable> {
         let Parts {
@@ -86,6 +90,7 @@ impl Production {
             cubics,
             map,
             taught,
+            features,
             gauges,
             window,
             noise,
@@ -110,7 +115,14 @@ impl Production {
         let span_nm = (range.high - range.low) * 1e6;
         let threshold = Threshold::new(&decoder, noise);
         let surface = golden.surface();
-        let gauges = Gauges::new(gauges, surface, alignment.as_ref(), span_nm, threshold)?;
+        let gauges = Gauges::new(
+            &features,
+            gauges,
+            surface,
+            alignment.as_ref(),
+            span_nm,
+            threshold,
+        )?;
         Ok(Self {
             budget: ErrorBudget {
                 golden_noise,

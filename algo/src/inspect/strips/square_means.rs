@@ -47,11 +47,9 @@ impl Production {
             .filter(|(_, gauge)| gauge.measure.facts().compares)
             .peekable();
         let mut inside = vec![comparing.peek().is_none(); pixels];
-        let regions = &self.gauges.regions;
-        for (at, _) in comparing {
-            for place in strips.pose.region(regions, at).places(self.golden.size().0) {
-                inside[place] = true;
-            }
+        let regions = comparing.filter_map(|(at, _)| self.gauges.region(&strips.pose, at));
+        for place in regions.flat_map(|region| region.places(self.golden.size().0)) {
+            inside[place] = true;
         }
         inside
     }

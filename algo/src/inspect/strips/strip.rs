@@ -4,6 +4,7 @@ use super::coordinates::{Comparison, TaughtCoordinates};
 use super::counts::Counts;
 use super::decode::Input;
 use super::deviation::SquareNoise;
+use super::fits::Fit;
 use super::height::HeightRow;
 use super::maps::Maps;
 use super::plan::Production;
@@ -13,7 +14,7 @@ use super::spans::common;
 use super::squares::Squares;
 use super::squares::extreme::Extreme;
 use crate::inspect::align::{Alignment, FitBuffers, Sample};
-use crate::inspect::gauge::{Cell, Sum};
+use crate::inspect::feature::{Cell, Sum};
 use crate::pipeline::{NO_OFFSET, PhaseMap};
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -30,6 +31,8 @@ pub struct Strips {
     pub(super) samples: Vec<Sample>,
     pub(super) fitting: FitBuffers,
     pub(super) cells: CellBuffers,
+    /// One per plane that a gauge is of.
+    pub(super) fits: Vec<Fit>,
 }
 
 /// Buffers for the cells of one gauge after the other.

@@ -1,12 +1,14 @@
 //! From findings to a verdict, or to the reason why a longer sequence should be tried.
 
 use crate::recipe::Demands;
+use crate::recipe::demands::GaugeLimits as Limits;
 use crate::recipe::light::{Cause, Light};
 use crate::station::error_code::{BLURRED, GUARD_BAND, NOT_MEASURED, NOT_THE_PART, OUT_OF_PLACE};
 use crate::station::{
     COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Unit, Verdict,
 };
-use algo::inspect::{Findings, Placed};
+use algo::inspect::{Findings, MAX_PLACES, Placed};
+use hal::bounds::clipped;
 use std::sync::Arc;
 
 /// Largest share of lit pixels whose levels contradict each other; silhouettes cause about 1 %.
@@ -34,6 +36,31 @@ pub(super) const ALIKE: f64 = 0.8;
 /// Why a gauge has no value.
 const NOTHING: &str = "found nothing to measure";
 
+/// Less than this share of a feature is not measured.
+const MIN_SHARE: f64 = 0.5;
+
+impl Limits {
+    /// Why there is no value, where these shares of its features were measured.
+    fn unseen(&self, shares: Option<[f64; MAX_PLACES]>) -> String {
+        let Some(shares) = shares else {
+            return NOTHING.into();
+        };
+        let mut features = self.of.iter().zip(shares);
+        let few = |(_, share): &(&String, f64)| *share < MIN_SHARE;
+        match features.find(few) {
+            Some((name, share)) => format!(
+                "feature {:?}: {:.0} % of it was measured",
+                clipped(name),
+                share * 100.0
+            ),
+            None => format!(
+                "{}: too few cells were measured, or they lie on a line",
+                self.of.join(", ")
+            ),
+        }
+    }
+}
+
 /// Why a part cannot be judged.
 struct Reason {
     /// ERROR_CODE.
@@ -45,9 +72,10 @@ struct Reason {
 impl Demands {
     /// Judges the findings.
     pub(super) fn judge(&self, findings: &Findings, inspection: &mut Inspection) {
-        for (limits, reading) in self.limits.iter().zip(&findings.readings) {
+        let readings = findings.readings.iter().zip(&findings.unmeasured);
+        for (limits, (reading, shares)) in self.limits.iter().zip(readings) {
             let unseen = || Measured {
-                reason: Some(NOTHING.into()),
+                reason: Some(limits.unseen(*shares).into()),
                 ..Measured::default()
             };
             let measured = reading.map_or_else(unseen, |reading| {
@@ -119,9 +147,12 @@ impl Demands {
             });
         }
         let gauges = inspection.gauges.iter();
-        let missing: Vec<&str> = gauges
+        let missing: Vec<String> = gauges
             .filter(|gauge| gauge.decision.unseen())
-            .map(|gauge| &*gauge.name)
+            .map(|gauge| match gauge.reason.as_deref() {
+                None | Some(NOTHING) => gauge.name.to_string(),
+                Some(reason) => format!("{} ({reason})", gauge.name),
+            })
             .collect();
         if missing.is_empty() {
             let words = self.undecided(inspection)?;

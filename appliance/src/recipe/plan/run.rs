@@ -5,7 +5,7 @@ use crate::recipe::archive::Arrays;
 use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
-use algo::inspect::{Basis, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught};
+use algo::inspect::{Feature, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught};
 use algo::pattern::{PhaseRange, Shot};
 use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
@@ -45,6 +45,7 @@ pub(super) struct Shared<'a> {
     pub aligned: bool,
     pub triangulator: Arc<Triangulator>,
     pub cubics: Arc<HeightCubics>,
+    pub features: Vec<Feature>,
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
     pub noise_counts: f64,
@@ -162,11 +163,16 @@ impl Prepared {
         &self,
         base: &Self,
         captures: usize,
-        (gauges, width): (&[Gauge], usize),
+        (features, gauges): (&[Feature], &[Gauge]),
+        width: usize,
     ) -> GoldenNoise {
-        let largest = |gauge: &Gauge| match gauge.measure.facts().basis {
-            Basis::Squares(side) => Largest::of(&self.taught, width, &gauge.region, side),
-            _ => Largest::default(),
+        let largest = |gauge: &Gauge| {
+            let side = gauge.measure.facts().basis.square_side();
+            let feature = gauge.of.first().and_then(|&at| features.get(at));
+            match side.zip(feature) {
+                Some((side, of)) => Largest::of(&self.taught, width, &of.region, side),
+                None => Largest::default(),
+            }
         };
         GoldenNoise {
             captures: captures as f64,
@@ -227,6 +233,7 @@ impl Prepared {
             cubics: Arc::clone(&shared.cubics),
             map,
             taught,
+            features: shared.features.clone(),
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
             noise: shared.conditions.noise.by([0.0, 1.0 / brighter]),

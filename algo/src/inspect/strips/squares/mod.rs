@@ -124,7 +124,8 @@ impl Squares {
                     }
                     row.centres = centres;
                 }
-                for (_, span) in pose.region(&gauges.regions, squares.gauge).row(middle) {
+                let region = gauges.region(pose, squares.gauge);
+                for (_, span) in region.map_or(&[][..], |region| region.row(middle)) {
                     let span = common(span, &seen);
                     extremes.update(middle, &span, |found, span| match narrow {
                         true => narrow_sums.search(backend, &row, span, found),

@@ -30,6 +30,8 @@ pub struct TaughtCell {
     /// The share of a height difference that lies along the normal
     /// ([`normal_shares`](crate::inspect::normal_shares)).
     pub normal: f64,
+    /// Their mean ray: how far a point moves along x and y that becomes 1 mm higher on it.
+    pub ray: [f64; 2],
 }
 
 impl TaughtCell {
@@ -46,7 +48,7 @@ impl TaughtCell {
 const FACETS: usize = 4;
 
 /// The cells of a region; turns are `about` this centre, as ways at this radius.
-pub(in crate::inspect) fn taught_cells(
+pub fn taught_cells(
     grid: &Grid,
     region: &Region,
     golden: GoldenSurface<'_>,
@@ -74,6 +76,8 @@ pub(in crate::inspect) fn taught_cells(
             cell.height += point.z;
             cell.x += point.x;
             cell.y += point.y;
+            let ray = golden.triangulator.higher(point, 1.0) - point;
+            cell.ray = [cell.ray[0] + ray.x, cell.ray[1] + ray.y];
             if u % stride != 0 || v % stride != 0 {
                 continue;
             }
@@ -97,6 +101,7 @@ pub(in crate::inspect) fn taught_cells(
         let pixels = f64::from(cell.pixels);
         let each = 1.0 / pixels.max(1.0);
         (cell.height, cell.x, cell.y) = (cell.height * each, cell.x * each, cell.y * each);
+        cell.ray = cell.ray.map(|sum| sum * each);
         if facets > 0.0 {
             cell.jacobian = cell.jacobian.map(|sum| sum / facets);
             cell.area *= pixels / facets;

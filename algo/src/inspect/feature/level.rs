@@ -1,17 +1,16 @@
-//! What gauges that are linear in height share: their errors follow exactly from those of the
-//! pixels ([`Evidence::linear`](super::Evidence::linear)).
+//! Mean and least-squares plane of the heights of cells, in closed form.
 
 use super::cells::Cell;
 use alloc::vec::Vec;
 
 /// The weight of a cell: the number of its pixels as taught, so that it is the same in every
 /// measurement.
-pub(super) fn weight(cell: &Cell) -> f64 {
+pub fn weight(cell: &Cell) -> f64 {
     f64::from(cell.taught.pixels)
 }
 
 /// The mean height over the pixels as taught, mm. The weights of the cells are appended to `out`.
-pub(super) fn mean(cells: &[Cell], out: &mut Vec<f64>) -> Option<f64> {
+pub fn mean(cells: &[Cell], out: &mut Vec<f64>) -> Option<f64> {
     let all: f64 = cells.iter().map(weight).sum();
     let sum: f64 = cells.iter().map(|cell| weight(cell) * cell.height).sum();
     if all <= 0.0 {
@@ -24,7 +23,7 @@ pub(super) fn mean(cells: &[Cell], out: &mut Vec<f64>) -> Option<f64> {
 /// The least-squares plane z = z₀ + p·(x − x₀) + q·(y − y₀) of cells; a cell's weight is the number
 /// of its pixels as taught.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Plane {
+pub struct Plane {
     pub centre: [f64; 3],
     pub along: f64,
     pub down: f64,

@@ -1,0 +1,26 @@
+//! What is found on a part before it is measured: cells of a region, and the geometry that is
+//! fitted to them.
+//!
+//! A region is divided into square cells of pixels in golden's frame. A strip adds each measured
+//! pixel to the cell that holds its taught coordinates. The height of a cell is its taught height
+//! plus its pixels' mean deviation, so on a slope too it does not depend on which of them were
+//! measured.
+
+mod cells;
+mod geometry;
+mod grid;
+mod kind;
+mod level;
+mod plane;
+mod taught;
+
+pub use cells::{Cell, Sum, cells};
+pub use geometry::Geometry;
+pub use grid::{Grid, TooFine};
+pub use kind::{Feature, FeatureKind};
+pub use level::{Plane, mean, weight};
+pub use plane::{FittedPlane, Middle};
+pub use taught::{TaughtCell, taught_cells};
+
+#[cfg(test)]
+mod tests;
