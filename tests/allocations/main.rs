@@ -4,13 +4,13 @@
 
 mod plans;
 
-use algo::inspect::{Basis, Measure};
+use algo::inspect::{FeatureKind, Measure};
 use allocation_counter::measure;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::golden::Naming;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::teach;
-use appliance::recipe::{GaugeFile, Recipe, archive};
+use appliance::recipe::{FeatureFile, GaugeFile, Recipe, archive};
 use appliance::station::{
     ActiveRecipe, Event, Identity, Limits, Micros, Settings, Station, StationHandle,
 };
@@ -54,11 +54,9 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
     let mut file = taught.manifest.clone();
     file.judges_nothing = true;
-    file.gauges = gauges(&file.regions[0].name);
-    let mut other = file.regions[0].clone();
-    other.name = "other".into();
-    other.polygon[0][0] += 1.0;
-    file.regions.push(other);
+    let frame = &file.features[0].region;
+    file.features = features(frame);
+    file.gauges = gauges();
     let (bytes, _) = archive::pack(&file, &taught.recipe.arrays).unwrap();
     let plan = Plan::new(Recipe::from_bytes(&bytes).unwrap(), &calibration, true).unwrap();
     head.load(plan.rasters(&calibration).unwrap()).unwrap();
@@ -106,23 +104,32 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     assert!(publishing.count_total <= PUBLISHING, "{publishing:?}");
 }
 
-/// One gauge of every kind, all in one region; the step is from the region "other".
-fn gauges(region: &str) -> Vec<GaugeFile> {
-    let gauge = |(at, measures): (usize, Measure)| GaugeFile {
-        name: format!("gauge {at}"),
-        region: match measures.facts().basis {
-            Basis::Motion(_) => String::new(),
-            _ => region.into(),
-        },
-        measures,
-        low: None,
-        high: None,
+/// Two features of every kind, the second of a slightly smaller region.
+fn features(region: &[[f64; 2]]) -> Vec<FeatureFile> {
+    let mut smaller = region.to_vec();
+    smaller[0][0] += 1.0;
+    let feature = |kind: FeatureKind, place: usize| FeatureFile {
+        name: format!("{} {place}", kind.name()),
+        kind,
+        region: [region, &smaller][place].to_vec(),
     };
-    Measure::examples()
-        .into_iter()
-        .enumerate()
-        .map(gauge)
+    let kinds = FeatureKind::ALL.into_iter();
+    kinds
+        .flat_map(|kind| [feature(kind, 0), feature(kind, 1)])
         .collect()
+}
+
+/// One gauge of every kind.
+fn gauges() -> Vec<GaugeFile> {
+    let gauge = |(slot, measures): (u16, Measure)| {
+        let takes = measures.facts().takes.iter().enumerate();
+        let of = takes.map(|(place, kinds)| format!("{} {place}", kinds[0].name()));
+        GaugeFile {
+            of: of.collect(),
+            ..GaugeFile::new(slot, &format!("gauge {slot}"), measures, &[])
+        }
+    };
+    (1..).zip(Measure::examples()).map(gauge).collect()
 }
 
 /// The allocations of the station for the measuring task's events of a cycle with twelve frames.

@@ -11,7 +11,7 @@ use algo::simd::Backend;
 use appliance::head::seam;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
-use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile};
+use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile};
 use appliance::station::{Inspection, Unit, Verdict};
 use hal::frame::Frame;
 use sim::parts::{Plane, SheetMetal};
@@ -29,20 +29,19 @@ const ALIGNED_MM: f64 = 0.015;
 const PLATE: [[f64; 2]; 4] = [[82.0, 95.0], [130.0, 95.0], [130.0, 145.0], [82.0, 145.0]];
 const BEAD: [[f64; 2]; 4] = [[90.0, 160.0], [150.0, 160.0], [150.0, 168.0], [90.0, 168.0]];
 
-pub(crate) fn gauge(name: &str, region: &str, measures: impl Into<Measure>) -> GaugeFile {
-    GaugeFile {
-        name: name.into(),
-        region: region.into(),
-        measures: measures.into(),
-        low: None,
-        high: None,
-    }
+/// A gauge of one feature; [`plan`] gives it its slot.
+pub(crate) fn gauge(name: &str, feature: &str, measures: impl Into<Measure>) -> GaugeFile {
+    GaugeFile::new(1, name, measures, &[feature])
+}
+
+/// A gauge of the whole part.
+fn of_part(name: &str, component: Component) -> GaugeFile {
+    GaugeFile::new(1, name, kinds::Placement { component }, &[])
 }
 
 /// A gauge of every kind except coverage, on the regions `plate` and `bead`.
 pub(crate) fn all_kinds(side: usize, tolerance_mm: f64) -> Vec<GaugeFile> {
     let smoothing_px = side;
-    let component = |component| kinds::Placement { component };
     vec![
         gauge(
             "deviation",
@@ -52,21 +51,15 @@ pub(crate) fn all_kinds(side: usize, tolerance_mm: f64) -> Vec<GaugeFile> {
             },
         ),
         gauge("mean", "plate", MeanHeight {}),
-        gauge(
-            "step",
-            "bead",
-            Step {
-                from: "plate".into(),
-            },
-        ),
+        GaugeFile::new(1, "step", Step {}, &["bead", "plate"]),
         gauge("tilt x", "plate", Tilt { about: Axis::X }),
         gauge("tilt y", "plate", Tilt { about: Axis::Y }),
         gauge("volume", "bead", Volume { above_mm: 8.0 }),
-        gauge("z", "", component(Component::Z)),
-        gauge("x", "", component(Component::X)),
-        gauge("y", "", component(Component::Y)),
-        gauge("about x", "", component(Component::AboutX)),
-        gauge("about y", "", component(Component::AboutY)),
+        of_part("z", Component::Z),
+        of_part("x", Component::X),
+        of_part("y", Component::Y),
+        of_part("about x", Component::AboutX),
+        of_part("about y", Component::AboutY),
         gauge("flatness", "plate", Flatness { smoothing_px }),
         gauge("range", "bead", PeakToValley { smoothing_px }),
         gauge("rms", "plate", RmsDeviation { smoothing_px }),
@@ -81,21 +74,21 @@ pub(crate) fn all_kinds(side: usize, tolerance_mm: f64) -> Vec<GaugeFile> {
     ]
 }
 
-pub(crate) fn regions(plate: [[f64; 2]; 4], bead: [[f64; 2]; 4]) -> Vec<RegionFile> {
+pub(crate) fn features(plate: [[f64; 2]; 4], bead: [[f64; 2]; 4]) -> Vec<FeatureFile> {
     [("plate", plate), ("bead", bead)]
-        .map(|(name, polygon)| RegionFile {
-            name: name.into(),
-            polygon: polygon.to_vec(),
-        })
+        .map(|(name, region)| FeatureFile::surface(name, region.to_vec()))
         .to_vec()
 }
 
 pub(crate) fn plan(bed: &Bed, file: &RecipeFile, arrays: &Arrays) -> Plan {
     let limited = |gauge: &GaugeFile| gauge.low.is_some() || gauge.high.is_some();
-    let file = RecipeFile {
+    let mut file = RecipeFile {
         judges_nothing: !file.gauges.iter().any(limited),
         ..file.clone()
     };
+    for (slot, gauge) in (1..).zip(&mut file.gauges) {
+        gauge.slot = slot;
+    }
     let (bytes, _) = pack(&file, arrays).unwrap();
     Plan::new(Recipe::from_bytes(&bytes).unwrap(), &bed.calibration, true).unwrap()
 }
@@ -151,7 +144,7 @@ fn gauges_give_what_is_true_of_the_part_wherever_it_lies_within_its_tolerance() 
     let taught = taught(&mut bed).unwrap();
     let (mean, bead) = (true_mean(&bed, PLATE), true_mean(&bed, BEAD));
     let file = RecipeFile {
-        regions: regions(PLATE, BEAD),
+        features: features(PLATE, BEAD),
         gauges: all_kinds(5, 0.1),
         placement_tolerance_mm: 3.0,
         ..taught.manifest.clone()
@@ -231,7 +224,7 @@ fn findings_of_a_moved_part_depend_neither_on_strips_nor_on_threads_nor_on_the_b
     let mut gauges = all_kinds(5, 0.02);
     gauges.push(gauge("coverage", "plate", Coverage {}));
     let file = RecipeFile {
-        regions: regions(PLATE, BEAD),
+        features: features(PLATE, BEAD),
         gauges,
         ..taught.manifest.clone()
     };

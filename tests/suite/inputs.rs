@@ -1,7 +1,7 @@
 //! Inputs of the fuzz targets: small examples, inputs that once failed, and seeded damage to the
 //! examples.
 
-use algo::inspect::Measure;
+use algo::inspect::{FeatureKind, Measure};
 use serde_json::json;
 use std::collections::BTreeSet;
 use std::fs;
@@ -41,11 +41,24 @@ fn inputs(kind: &str, target: &str) -> Vec<(String, Vec<u8>)> {
 /// Edits to a gauge of every kind: a new kind needs no example of its own.
 fn edits() -> Vec<(String, Vec<u8>)> {
     let edit = |measures: &Measure| {
-        let region = |name: &str, right: u32| json!({ "name": name, "polygon": [[0, 0], [right, 0], [right, 17], [0, 17]] });
+        let takes = measures.facts().takes.iter().enumerate();
+        let of: Vec<String> = takes
+            .map(|(place, kinds)| format!("{} {place}", kinds[0].name()))
+            .collect();
+        let feature = |kind: FeatureKind, place: u32| {
+            let right = 23 - 13 * place;
+            json!({ "name": format!("{} {place}", kind.name()), "kind": kind, "region": [[0, 0], [right, 0], [right, 17], [0, 17]] })
+        };
+        let features = FeatureKind::ALL
+            .iter()
+            .flat_map(|&kind| [feature(kind, 0), feature(kind, 1)]);
+        let mut gauge = serde_json::to_value(measures).unwrap();
+        (gauge["slot"], gauge["name"], gauge["of"], gauge["high"]) =
+            (json!(1), json!("one"), json!(of), json!(0.5));
         let edit = json!({
             "fingerprint": "",
-            "regions": [region("frame", 23), region("other", 10)],
-            "gauges": [{ "name": "one", "region": "frame", "measures": measures, "high": 0.5 }],
+            "features": features.collect::<Vec<_>>(),
+            "gauges": [gauge],
         });
         (format!("{measures:?}"), edit.to_string().into_bytes())
     };

@@ -52,29 +52,32 @@ fn toothless() -> [(Change, &'static str); 6] {
         (
             |file| {
                 let gauge = &mut file.gauges[0];
-                let from = gauge.region.clone();
-                gauge.measures = Step { from }.into();
+                gauge.of = vec![gauge.of[0].clone(); 2];
+                gauge.measures = Step {}.into();
             },
             "from itself",
         ),
         // The same region under another name.
         (
             |file| {
-                let mut twin = file.regions[0].clone();
+                let mut twin = file.features[0].clone();
                 twin.name = "twin".into();
-                file.gauges[0].region.clone_from(&file.regions[0].name);
-                let from = twin.name.clone();
-                file.gauges[0].measures = Step { from }.into();
-                file.regions.push(twin);
+                file.gauges[0].of = vec![file.features[0].name.clone(), twin.name.clone()];
+                file.gauges[0].measures = Step {}.into();
+                file.features.push(twin);
             },
             "from itself",
         ),
         (
-            |file| file.regions.push(file.regions[0].clone()),
-            "each region its own name",
+            |file| file.features.push(file.features[0].clone()),
+            "each feature its own name",
         ),
         (
-            |file| file.gauges.push(file.gauges[0].clone()),
+            |file| {
+                let mut twin = file.gauges[0].clone();
+                twin.slot = 64;
+                file.gauges.push(twin);
+            },
             "each gauge its own name",
         ),
     ]
@@ -110,7 +113,7 @@ fn a_recipe_whose_parts_would_all_pass_is_refused_by_page_and_command_with_the_r
         let (file, _) = files::recipe(&bytes);
         let edit = json!({
             "fingerprint": browser.get("/api/recipes/1")["fingerprint"],
-            "gauges": file.gauges, "regions": file.regions,
+            "gauges": file.gauges, "features": file.features,
         });
         let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
         let answer = answer["error"].as_str().unwrap_or_default();

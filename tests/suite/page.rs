@@ -161,18 +161,18 @@ fn an_edit_that_makes_no_recipe_is_refused_in_words_and_changes_nothing() {
     let mut browser = Browser::new(&daemon);
     browser.sign_in(&daemon);
     let recipe = browser.get("/api/recipes/1");
-    let region = json!({ "name": "line", "polygon": [[1.0, 1.0], [2.0, 2.0]] });
+    let region = json!({ "name": "line", "kind": "surface", "region": [[1.0, 1.0], [2.0, 2.0]] });
     for (key, value) in [
         ("name", json!("")),
         ("name", json!("x".repeat(100))),
         ("part_number", json!("ä")),
         ("min_coverage", json!(1.5)),
         ("gauges", json!([])),
-        ("regions", json!([])),
-        ("regions", json!([region])),
+        ("features", json!([])),
+        ("features", json!([region])),
         (
-            "regions",
-            json!([recipe["regions"][0], recipe["regions"][0]]),
+            "features",
+            json!([recipe["features"][0], recipe["features"][0]]),
         ),
     ] {
         let edit = json!({ "fingerprint": recipe["fingerprint"], key: value });

@@ -8,7 +8,7 @@ use appliance::head::calibration::Calibration;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
-use appliance::recipe::{AlignmentKind, GaugeFile, Recipe, RecipeFile, RegionFile, safe};
+use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile, safe};
 use hal::head::Head;
 use sim::parts::{Cone, Face, Handset, Plane, Sawtooth, SheetMetal, Sphere, Spline};
 use sim::scenario::Noise;
@@ -215,29 +215,27 @@ fn pixels_that_no_gauge_looks_at_are_not_computed_and_the_others_are_the_same() 
     let mut bed = bed(&scenario(Part::Sphere(Sphere::default())));
     let taught = taught(&mut bed).unwrap();
     let (file, arrays) = (taught.manifest, taught.recipe.arrays);
-    let region = RegionFile {
-        name: "middle".into(),
-        polygon: vec![
-            [100.0, 110.0],
-            [150.0, 110.0],
-            [150.0, 140.0],
-            [100.0, 140.0],
-        ],
-    };
+    let middle = vec![
+        [100.0, 110.0],
+        [150.0, 110.0],
+        [150.0, 140.0],
+        [100.0, 140.0],
+    ];
     let gauge = GaugeFile {
-        region: "middle".into(),
+        of: vec!["middle".into()],
         ..file.gauges[0].clone()
     };
     let small = RecipeFile {
-        regions: vec![region.clone()],
+        features: vec![FeatureFile::surface("middle", middle)],
         gauges: vec![gauge.clone()],
         // Alignment uses the whole part.
         alignment: AlignmentKind::None,
         ..file.clone()
     };
     let mut whole = small.clone();
-    whole.regions.extend(file.regions.clone());
+    whole.features.extend(file.features.clone());
     whole.gauges.push(GaugeFile {
+        slot: 2,
         name: "whole".into(),
         ..file.gauges[0].clone()
     });

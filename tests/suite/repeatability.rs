@@ -1,7 +1,7 @@
 //! Repeatability of every kind of gauge, and errors of heights, compared with their own
 //! predictions, over many placements of a part.
 
-use super::gauges::{all_kinds, frames, gauge, plan, regions};
+use super::gauges::{all_kinds, features, frames, gauge, plan};
 use super::placement::{Bed, TIMEOUT, bed, taught_within};
 use algo::inspect::kinds::Deviation;
 use appliance::head::calibrated::CalibratedHead;
@@ -77,7 +77,7 @@ fn every_kind(bed: &Bed, taught: &TaughtRecipe, two_frames: bool) -> (RecipeFile
         two_frames,
         ..taught.manifest.clone()
     };
-    file.regions.extend(regions(plate, bead));
+    file.features.extend(features(plate, bead));
     let plan = plan(bed, &file, &taught.recipe.arrays);
     (file, plan)
 }

@@ -39,13 +39,13 @@ fn fingerprint(recipe: &Value) -> String {
 /// recipe.
 fn edit(browser: &mut Browser) -> Value {
     let before = browser.get("/api/recipes/1");
-    let (mut regions, mut gauges) = (before["regions"].clone(), before["gauges"].clone());
+    let (mut features, mut gauges) = (before["features"].clone(), before["gauges"].clone());
     let corners = json!([[40.0, 40.0], [90.0, 40.0], [90.0, 90.0]]);
-    let added = json!({ "name": "rim", "polygon": corners });
-    regions.as_array_mut().unwrap().push(added);
+    let added = json!({ "name": "rim", "kind": "surface", "region": corners });
+    features.as_array_mut().unwrap().push(added);
     (gauges[0]["low"], gauges[0]["high"]) = (json!(0.2), json!(0.3));
     let edit = json!({
-        "fingerprint": before["fingerprint"], "name": "bracket", "part_number": "BR-1", "regions": regions, "gauges": gauges,
+        "fingerprint": before["fingerprint"], "name": "bracket", "part_number": "BR-1", "features": features, "gauges": gauges,
     });
     let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
     assert_eq!(status, 200, "{answer}");
@@ -68,12 +68,12 @@ fn a_number_that_is_taken_is_taught_only_with_replace_and_what_was_edited_stays_
     let (status, body) = browser.ask("POST", "/api/recipes/1/teach", &[]);
     let words = String::from_utf8(body).unwrap();
     assert_eq!(status, 409, "{words}");
-    let regions = edited["regions"].as_array().unwrap().len();
+    let features = edited["features"].as_array().unwrap().len();
     for needle in [
         "bracket",
         "replace",
         "number 2",
-        &format!("{regions} regions"),
+        &format!("{features} features"),
     ] {
         assert!(words.contains(needle), "{needle}: {words}");
     }
@@ -85,7 +85,7 @@ fn a_number_that_is_taken_is_taught_only_with_replace_and_what_was_edited_stays_
     assert_eq!(teach(&mut browser, keep).0, 202);
     let kept = browser.wait_for_another(&fingerprint(&edited));
     let recipe = browser.get("/api/recipes/1");
-    for key in ["name", "part_number", "regions", "gauges", "min_coverage"] {
+    for key in ["name", "part_number", "features", "gauges", "min_coverage"] {
         assert_eq!(recipe[key], edited[key], "{key}");
     }
     assert_eq!(

@@ -207,9 +207,9 @@ fn a_highlight_is_not_taught_as_an_opening_of_the_part() {
         let manifest = taught_within(&mut bed, 1.0).unwrap().manifest;
         let gauges = manifest.gauges.iter().map(|gauge| &gauge.name);
         assert!(gauges.eq(manifest.tried.iter().map(|tried| &tried.gauge)));
-        let regions = manifest.regions.into_iter();
-        let openings = regions.filter(|region| region.name.starts_with("opening"));
-        openings.map(|region| region.polygon).collect::<Vec<_>>()
+        let features = manifest.features.into_iter();
+        let openings = features.filter(|feature| feature.name.starts_with("opening"));
+        openings.map(|feature| feature.region).collect::<Vec<_>>()
     };
     let (shining, matte) = (openings(Material::RolledSteel), openings(Material::Matte));
     // The bracket has three round holes and a slot; beside one of them rolled steel shines.

@@ -299,7 +299,7 @@ fn a_recipe_without_a_gauge_of_the_deviation_still_has_a_picture_that_says_what_
     let mut line = Line::of("sheet_metal");
     let recipe = line.browser.get("/api/recipes/1");
     let mut gauges = recipe["gauges"].clone();
-    let is_deviation = |gauge: &Value| gauge["measures"]["kind"] == "deviation";
+    let is_deviation = |gauge: &Value| gauge["kind"] == "deviation";
     gauges
         .as_array_mut()
         .unwrap()

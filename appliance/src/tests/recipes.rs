@@ -8,8 +8,8 @@ use crate::recipe::exchange::Destination;
 use crate::recipe::golden::Naming;
 use crate::recipe::plan::Plan;
 use crate::recipe::teach::teach;
-use crate::recipe::{Recipe, RecipeFile, Store};
-use algo::inspect::Measure;
+use crate::recipe::{DatumFile, Recipe, RecipeFile, Store};
+use algo::inspect::{FeatureKind, Measure};
 use hal::frame::Frame;
 use serde_json::Value;
 use sim::Scenario;
@@ -93,10 +93,19 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
         exposure_us: 5000,
         gain: 2.0,
     });
-    let mut other = full.regions[0].clone();
-    other.name = "other".into();
-    other.polygon[0][0] += 1.0;
-    full.regions.push(other);
+    for kind in FeatureKind::ALL {
+        for place in 0..2 {
+            let mut feature = full.features[0].clone();
+            feature.name = format!("{} {place}", kind.name());
+            feature.kind = kind;
+            feature.region[0][0] += place as f64;
+            full.features.push(feature);
+        }
+    }
+    full.datums.push(DatumFile {
+        name: "datum".into(),
+        of: vec!["plane 0".into()],
+    });
     let mut kinds = Measure::examples();
     kinds.retain(|kind| {
         file.gauges
@@ -105,7 +114,12 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
     });
     for (at, kind) in kinds.into_iter().enumerate() {
         let mut gauge = full.gauges[0].clone();
+        gauge.slot = 30 + at as u16;
         gauge.name = format!("kind {at}");
+        let takes = kind.facts().takes.iter().enumerate();
+        gauge.of = takes
+            .map(|(place, kinds)| format!("{} {place}", kinds[0].name()))
+            .collect();
         gauge.measures = kind;
         (gauge.low, gauge.high) = (Some(-0.5), Some(0.5));
         if gauge.measures.facts().unit == crate::station::Unit::Share {

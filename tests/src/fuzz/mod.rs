@@ -14,13 +14,14 @@ mod recipe;
 pub type Target = fn(&[u8]);
 
 /// All targets with their names, which are also the names of the folders of their inputs.
-pub const TARGETS: [(&str, Target); 12] = [
+pub const TARGETS: [(&str, Target); 13] = [
     ("npy", folder::npy),
     ("png_frame", folder::png_frame),
     ("recording", folder::recording),
     ("recipe_zip", recipe::zip),
     ("recipe_json", recipe::json),
     ("edit", recipe::edit),
+    ("gauges_toml", recipe::gauges_toml),
     ("calibration", head::calibration),
     ("opencv", head::opencv),
     ("scenario", head::scenario),

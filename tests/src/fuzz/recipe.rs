@@ -3,6 +3,7 @@
 use super::bounded;
 use super::part::PART;
 use appliance::recipe::edit::{self, Edit};
+use appliance::recipe::gauges_toml::Gauging;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::{Recipe, RecipeFile, Store, archive};
 use std::fs;
@@ -48,6 +49,25 @@ pub fn json(data: &[u8]) {
     }
 }
 
+/// Features, datum systems and gauges as text, for the recipe of a taught part: what is read is
+/// written as the same, and what fits can be planned, and the part judged by it.
+pub fn gauges_toml(data: &[u8]) {
+    let Ok(text) = str::from_utf8(data) else {
+        return;
+    };
+    let read = bounded(64 * data.len() + (1 << 20), || Gauging::from_toml(text));
+    let Ok(gauging) = read else { return };
+    let again = Gauging::from_toml(&gauging.to_toml()).expect("what was written can be read");
+    assert_eq!(again.to_toml(), gauging.to_toml());
+    let part = &*PART;
+    let recipe = (part.file.clone(), part.recipe.arrays.clone());
+    if let Ok(taught) = gauging.set(recipe, || Ok(part.calibration.clone()))
+        && let Ok(plan) = Plan::new(taught.recipe, &part.calibration, true)
+    {
+        part.judge(&plan);
+    }
+}
+
 /// A store with the taught recipe, in a folder of its own.
 struct Stored {
     folder: TempDir,
@@ -77,7 +97,7 @@ pub fn edit(data: &[u8]) {
             let tried = Plan::try_out(recipe, &part.calibration);
             tried.map_err(|error| error.to_string())
         };
-        if edit::edit(&stored.store, 1, wanted, fits).is_ok() {
+        if edit::edit(&stored.store, 1, wanted, Some(&part.calibration), fits).is_ok() {
             let loaded = stored.store.load(1).expect("what was taken can be loaded");
             assert_eq!(loaded.fallback, None);
             let plan = Plan::new(loaded.recipe, &part.calibration, true).expect("and planned");

@@ -45,7 +45,8 @@ async fn a_boundary_value_in_an_edit_is_refused_by_its_key_or_the_recipe_judges_
         "part_number",
         "min_coverage",
         "guard_k",
-        "regions",
+        "features",
+        "datums",
         "gauges",
     ] {
         edit[key] = file[key].clone();
