@@ -55,6 +55,7 @@ mod projected;
 mod promises_own;
 mod promises_shared;
 mod real_board;
+mod recipe_files;
 mod recovery;
 mod repeatability;
 mod replacing;
