@@ -106,13 +106,17 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     assert!(publishing.count_total <= PUBLISHING, "{publishing:?}");
 }
 
-/// One gauge of every kind, all in one region; the step is from the region "other".
+/// One gauge of every kind, all in one region; the second one is "other".
 fn gauges(region: &str) -> Vec<GaugeFile> {
     let gauge = |(at, measures): (usize, Measure)| GaugeFile {
         name: format!("gauge {at}"),
         region: match measures.facts().basis {
             Basis::Motion(_) => String::new(),
             _ => region.into(),
+        },
+        from: match measures.facts().takes.len() {
+            2 => "other".into(),
+            _ => String::new(),
         },
         measures,
         low: None,

@@ -33,9 +33,18 @@ pub(crate) fn gauge(name: &str, region: &str, measures: impl Into<Measure>) -> G
     GaugeFile {
         name: name.into(),
         region: region.into(),
+        from: String::new(),
         measures: measures.into(),
         low: None,
         high: None,
+    }
+}
+
+/// A gauge that measures from a second region.
+pub(crate) fn from(second: &str, gauge: GaugeFile) -> GaugeFile {
+    GaugeFile {
+        from: second.into(),
+        ..gauge
     }
 }
 
@@ -52,13 +61,7 @@ pub(crate) fn all_kinds(side: usize, tolerance_mm: f64) -> Vec<GaugeFile> {
             },
         ),
         gauge("mean", "plate", MeanHeight {}),
-        gauge(
-            "step",
-            "bead",
-            Step {
-                from: "plate".into(),
-            },
-        ),
+        from("plate", gauge("step", "bead", Step {})),
         gauge("tilt x", "plate", Tilt { about: Axis::X }),
         gauge("tilt y", "plate", Tilt { about: Axis::Y }),
         gauge("volume", "bead", Volume { above_mm: 8.0 }),

@@ -42,10 +42,14 @@ fn inputs(kind: &str, target: &str) -> Vec<(String, Vec<u8>)> {
 fn edits() -> Vec<(String, Vec<u8>)> {
     let edit = |measures: &Measure| {
         let region = |name: &str, right: u32| json!({ "name": name, "polygon": [[0, 0], [right, 0], [right, 17], [0, 17]] });
+        let from = match measures.facts().takes.len() {
+            2 => "other",
+            _ => "",
+        };
         let edit = json!({
             "fingerprint": "",
             "regions": [region("frame", 23), region("other", 10)],
-            "gauges": [{ "name": "one", "region": "frame", "measures": measures, "high": 0.5 }],
+            "gauges": [{ "name": "one", "region": "frame", "from": from, "measures": measures, "high": 0.5 }],
         });
         (format!("{measures:?}"), edit.to_string().into_bytes())
     };

@@ -52,8 +52,8 @@ fn toothless() -> [(Change, &'static str); 6] {
         (
             |file| {
                 let gauge = &mut file.gauges[0];
-                let from = gauge.region.clone();
-                gauge.measures = Step { from }.into();
+                gauge.from.clone_from(&gauge.region);
+                gauge.measures = Step {}.into();
             },
             "from itself",
         ),
@@ -63,8 +63,8 @@ fn toothless() -> [(Change, &'static str); 6] {
                 let mut twin = file.regions[0].clone();
                 twin.name = "twin".into();
                 file.gauges[0].region.clone_from(&file.regions[0].name);
-                let from = twin.name.clone();
-                file.gauges[0].measures = Step { from }.into();
+                file.gauges[0].from.clone_from(&twin.name);
+                file.gauges[0].measures = Step {}.into();
                 file.regions.push(twin);
             },
             "from itself",

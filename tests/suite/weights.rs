@@ -126,10 +126,11 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     let aside = [-BENT_PX, BENT_PX].map(|aside| golden(aside, true));
     let (golden, unweighed) = (golden(0.0, true), golden(0.0, false));
     let gauge = &recipe.gauges[0];
+    let region = &recipe.features[gauge.of[0]].region;
     let reading = found.readings[0].unwrap().value;
     let value = |golden: &Golden| {
         let comparison = Comparison::new(golden, &measured);
-        expected(&comparison, &gauge.measure, &gauge.region).value
+        expected(&comparison, &gauge.measure, region).value
     };
     let (expected, full) = (value(&golden), value(&unweighed));
     // Another square may be the extreme one, of the other sign.

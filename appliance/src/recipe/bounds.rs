@@ -102,9 +102,7 @@ impl GaugeFile {
         text("name", &self.name, LONGEST_NAME)?;
         text("region", &self.region, LONGEST_NAME)?;
         let kind = self.measures.kind();
-        if let Some(from) = kind.from() {
-            text("measures.from", from, LONGEST_NAME)?;
-        }
+        text("from", &self.from, LONGEST_NAME)?;
         let Facts { basis, .. } = kind.facts();
         if let Some(side) = basis.side() {
             within("measures.smoothing_px", side, 1, largest)?;

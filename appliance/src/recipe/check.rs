@@ -9,10 +9,9 @@ use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
-use algo::inspect::{Basis, CalibrationError, Gauge, Region};
+use algo::inspect::{CalibrationError, Feature, FeatureKind, Gauge, Region};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
-use std::collections::HashMap;
 use std::io::{Cursor, Read, Seek};
 
 /// Most different sides of squares of one recipe, with 0 where any will do: each takes time in
@@ -33,6 +32,8 @@ pub struct Recipe {
     /// The sequences that a part is measured with in turn, until one is good enough: the one for
     /// production, and behind it those that unwrap further.
     pub sequences: Vec<RecipeSequence>,
+    /// What its gauges are of.
+    pub features: Vec<Feature>,
     /// What its gauges measure.
     pub gauges: Vec<Gauge>,
     /// The arrays, each of the size of the camera's frames or the projector's raster.
@@ -214,9 +215,11 @@ impl Recipe {
             }
         };
         let function = function.map_err(|error| format!("projector and pattern: {error}"))?;
+        let (features, gauges) = gauges(&file.regions, &file.gauges, (width, height))?;
         Ok(Self {
             sequences: sequences(file)?,
-            gauges: gauges(&file.regions, &file.gauges, (width, height))?,
+            features,
+            gauges,
             id: file.into(),
             conditions: file.into(),
             demands: file.into(),
@@ -261,7 +264,8 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
     Ok(chain)
 }
 
-/// The gauges that are computed, for frames of (width, height) pixels.
+/// The gauges that are computed and the features that they are of, for frames of (width, height)
+/// pixels. Each region is a feature of every kind that its gauges take.
 ///
 /// # Errors
 /// Naming the gauge or region that cannot be used, and why.
@@ -269,33 +273,43 @@ fn gauges(
     regions: &[RegionFile],
     gauges: &[GaugeFile],
     (width, height): (usize, usize),
-) -> Result<Vec<Gauge>, String> {
-    let mut named = HashMap::new();
+) -> Result<(Vec<Feature>, Vec<Gauge>), String> {
+    let mut pixels = Vec::new();
     for region in regions {
         let corners: Vec<_> = region.polygon.iter().map(|&[u, v]| (u, v)).collect();
-        let pixels = Region::polygon(&corners, width, height)
+        let inside = Region::polygon(&corners, width, height)
             .map_err(|error| format!("region {:?}: {error}", region.name))?;
-        named.insert(region.name.as_str(), pixels);
+        pixels.push(inside);
     }
-    let gauge = |gauge: &GaugeFile| {
-        let name = &gauge.name;
-        let find = |region: &str| {
-            let found = named.get(region).cloned();
-            found.ok_or_else(|| {
-                format!("gauge {name:?} names a region {region:?} that is not there")
-            })
-        };
-        let placement = matches!(gauge.measures.facts().basis, Basis::Motion(_));
-        Ok(Gauge {
-            region: match placement && gauge.region.is_empty() {
-                true => Region::default(),
-                false => find(&gauge.region)?,
-            },
-            from: gauge.measures.kind().from().map(find).transpose()?,
-            measure: gauge.measures.clone(),
-        })
+    let mut features: Vec<(usize, FeatureKind)> = Vec::new();
+    let mut feature = |gauge: &str, region: &str, kind: FeatureKind| {
+        let found = regions.iter().position(|known| known.name == region);
+        let found = found.ok_or_else(|| {
+            format!("gauge {gauge:?} names a region {region:?} that is not there")
+        })?;
+        let known = features.iter().position(|known| *known == (found, kind));
+        Ok::<_, String>(known.unwrap_or_else(|| {
+            features.push((found, kind));
+            features.len() - 1
+        }))
     };
-    gauges.iter().map(gauge).collect()
+    let mut found = Vec::new();
+    for gauge in gauges {
+        let GaugeFile { name, measures, .. } = gauge;
+        let takes = measures.facts().takes;
+        let places = [&gauge.region, &gauge.from].into_iter().zip(takes);
+        let of = places.filter_map(|(region, kinds)| Some((region, *kinds.first()?)));
+        let of = of.map(|(region, kind)| feature(name, region, kind));
+        found.push(Gauge {
+            of: of.collect::<Result<_, _>>()?,
+            measure: measures.clone(),
+        });
+    }
+    let features = features.into_iter().map(|(region, kind)| Feature {
+        kind,
+        region: pixels[region].clone(),
+    });
+    Ok((features.collect(), found))
 }
 
 impl RecipeId {

@@ -88,7 +88,9 @@ fn lists<'a, T>(
 /// How a gauge differs, in words.
 fn gauge(before: &GaugeFile, after: &GaugeFile) -> Option<String> {
     let mut words = Vec::new();
-    if before.measures != after.measures || before.region != after.region {
+    if before.measures != after.measures
+        || (&before.region, &before.from) != (&after.region, &after.from)
+    {
         words.push("measures something else".to_owned());
     }
     let limit =

@@ -17,6 +17,9 @@ pub struct GaugeFile {
     /// The name of its region; only a placement needs none.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub region: String,
+    /// The name of the second region of a gauge that measures two.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub from: String,
     /// What it measures; `docs/formats.md` has the definitions.
     pub measures: Measure,
     /// Lower limit, inclusive, in mm, degrees, mm³ or as a share from 0 to 1.
@@ -36,6 +39,8 @@ struct GaugeText {
     name: String,
     #[serde(default)]
     region: String,
+    #[serde(default)]
+    from: String,
     measures: Measure,
     #[serde(default)]
     low: Option<Box<RawValue>>,
@@ -50,6 +55,7 @@ impl TryFrom<GaugeText> for GaugeFile {
         let GaugeText {
             name,
             region,
+            from,
             measures,
             low,
             high,
@@ -71,6 +77,7 @@ impl TryFrom<GaugeText> for GaugeFile {
             high: read("high", high)?,
             name,
             region,
+            from,
             measures,
         })
     }
@@ -170,6 +177,7 @@ mod tests {
         GaugeFile {
             name: "the gauge".into(),
             region: String::new(),
+            from: String::new(),
             measures: measures.clone(),
             low,
             high,

@@ -307,6 +307,7 @@ fn gauges(seen: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
         GaugeFile {
             name: "deviation".into(),
             region: "frame".into(),
+            from: String::new(),
             measures: Deviation {
                 smoothing_px: SIDES[SIDES.len() - 1],
             }
@@ -317,6 +318,7 @@ fn gauges(seen: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
         GaugeFile {
             name: "coverage".into(),
             region: "frame".into(),
+            from: String::new(),
             measures: Coverage {}.into(),
             low: Some(0.0),
             high: None,
@@ -341,6 +343,7 @@ fn gauges(seen: &[bool], width: usize) -> (Vec<RegionFile>, Vec<GaugeFile>) {
         gauges.push(GaugeFile {
             name: name.clone(),
             region: name,
+            from: String::new(),
             measures: Coverage {}.into(),
             low: None,
             high: Some(OPENING_COVERAGE),

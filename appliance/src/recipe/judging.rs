@@ -18,7 +18,7 @@ impl RecipeFile {
         for gauge in &self.gauges {
             let refused = gauge.check_limits();
             refused.map_err(|error| format!("{error}: change the limits"))?;
-            self.check_step(gauge)?;
+            self.check_from(gauge)?;
         }
         check_unique("region", self.regions.iter().map(|region| &region.name))?;
         check_unique("gauge", self.gauges.iter().map(|gauge| &gauge.name))?;
@@ -41,20 +41,22 @@ impl RecipeFile {
         !self.gauges.iter().any(GaugeFile::can_fail)
     }
 
-    /// Refuses a step between a region and itself, under whatever name: it is 0 for every part.
-    fn check_step(&self, gauge: &GaugeFile) -> Result<(), String> {
-        let Some(from) = gauge.measures.kind().from() else {
+    /// Refuses a gauge that measures a region from itself, under whatever name: it is 0 for every
+    /// part.
+    fn check_from(&self, gauge: &GaugeFile) -> Result<(), String> {
+        let from = &gauge.from;
+        if from.is_empty() {
             return Ok(());
-        };
+        }
         let polygon = |name: &str| {
             let mut regions = self.regions.iter();
             Some(&regions.find(|region| region.name == name)?.polygon)
         };
-        let same = from == gauge.region
+        let same = *from == gauge.region
             || polygon(from).is_some_and(|here| polygon(&gauge.region) == Some(here));
         match same {
             true => Err(format!(
-                "gauge {:?} measures the step of region {:?} from itself, which is 0 whatever the part: name another region",
+                "gauge {:?} measures region {:?} from itself, which is 0 whatever the part: name another region",
                 gauge.name, gauge.region
             )),
             false => Ok(()),

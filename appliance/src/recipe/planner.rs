@@ -132,6 +132,7 @@ mod tests {
         vec![GaugeFile {
             name: "deviation".into(),
             region: "frame".into(),
+            from: String::new(),
             measures: Deviation { smoothing_px: 9 }.into(),
             low: Some(-limit),
             high: Some(2.0 * limit),
@@ -155,6 +156,7 @@ mod tests {
         gauges.push(GaugeFile {
             name: "opening 1".into(),
             region: "opening 1".into(),
+            from: String::new(),
             measures: Coverage {}.into(),
             low: None,
             high: Some(0.25),

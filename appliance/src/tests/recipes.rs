@@ -106,6 +106,9 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
     for (at, kind) in kinds.into_iter().enumerate() {
         let mut gauge = full.gauges[0].clone();
         gauge.name = format!("kind {at}");
+        if kind.facts().takes.len() == 2 {
+            gauge.from = "other".into();
+        }
         gauge.measures = kind;
         (gauge.low, gauge.high) = (Some(-0.5), Some(0.5));
         if gauge.measures.facts().unit == crate::station::Unit::Share {

@@ -122,6 +122,7 @@ impl Plan {
             demands,
             function,
             sequences,
+            features,
             gauges,
             mut arrays,
         } = recipe;
@@ -140,7 +141,8 @@ impl Plan {
         let [low, high] = conditions.range_mm;
         let triangulator = calibration.triangulator(function, Some(HeightRange { low, high }));
         let triangulator = triangulator.map_err(|error| error.to_string())?;
-        let (window, away) = window::of(&gauges, size, &triangulator, &demands, &arrays);
+        let (window, away) =
+            window::of((&features, &gauges), size, &triangulator, &demands, &arrays);
         // The golden surface is by the sequence that is projected first, so that deviations by that
         // have no other error of golden's.
         let base = sequences.first().and_then(|first| first.offset);
@@ -162,7 +164,11 @@ impl Plan {
         let full = prepared.last().ok_or("it has no sequence")?;
         let first = prepared.first().filter(|_| base.is_some());
         let captures = conditions.golden_captures;
-        let golden = full.golden_noise(first.unwrap_or(full), captures, (&gauges, size.0));
+        let golden = full.golden_noise(
+            first.unwrap_or(full),
+            captures,
+            (&features, &gauges, size.0),
+        );
         let range = conditions.expansion_range_turns;
         let cubics = HeightCubics::new(&triangulator, surface, range, &window, away.max(AROUND));
         let shared = Shared {
@@ -170,6 +176,7 @@ impl Plan {
             aligned: demands.aligned,
             triangulator: Arc::new(triangulator),
             cubics: Arc::new(cubics),
+            features,
             gauges,
             window,
             noise_counts,

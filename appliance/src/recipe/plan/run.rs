@@ -5,7 +5,9 @@ use crate::recipe::archive::Arrays;
 use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
-use algo::inspect::{Basis, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught};
+use algo::inspect::{
+    Basis, Feature, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught,
+};
 use algo::pattern::{PhaseRange, Shot};
 use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
@@ -45,6 +47,7 @@ pub(super) struct Shared<'a> {
     pub aligned: bool,
     pub triangulator: Arc<Triangulator>,
     pub cubics: Arc<HeightCubics>,
+    pub features: Vec<Feature>,
     pub gauges: Vec<Gauge>,
     pub window: Vec<Range<usize>>,
     pub noise_counts: f64,
@@ -162,10 +165,12 @@ impl Prepared {
         &self,
         base: &Self,
         captures: usize,
-        (gauges, width): (&[Gauge], usize),
+        (features, gauges, width): (&[Feature], &[Gauge], usize),
     ) -> GoldenNoise {
-        let largest = |gauge: &Gauge| match gauge.measure.facts().basis {
-            Basis::Squares(side) => Largest::of(&self.taught, width, &gauge.region, side),
+        let largest = |gauge: &Gauge| match (gauge.measure.facts().basis, &gauge.of[..]) {
+            (Basis::Squares(side), [at]) => {
+                Largest::of(&self.taught, width, &features[*at].region, side)
+            }
             _ => Largest::default(),
         };
         GoldenNoise {
@@ -227,6 +232,7 @@ impl Prepared {
             cubics: Arc::clone(&shared.cubics),
             map,
             taught,
+            features: shared.features.clone(),
             gauges: shared.gauges.clone(),
             window: shared.window.clone(),
             noise: shared.conditions.noise.by([0.0, 1.0 / brighter]),

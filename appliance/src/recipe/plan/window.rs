@@ -3,7 +3,7 @@
 use crate::recipe::Demands;
 use crate::recipe::archive::Arrays;
 use algo::geometry::Triangulator;
-use algo::inspect::Gauge;
+use algo::inspect::{Feature, Gauge};
 use algo::units::Height;
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ use std::ops::Range;
 /// second value. Nothing outside is computed. A part's motion is found from all pixels that are
 /// compared.
 pub(super) fn of(
-    gauges: &[Gauge],
+    (features, gauges): (&[Feature], &[Gauge]),
     (width, height): (usize, usize),
     triangulator: &Triangulator,
     demands: &Demands,
@@ -26,11 +26,8 @@ pub(super) fn of(
     for gauge in gauges {
         let side = gauge.measure.facts().basis.square_side();
         let margin = away + side.map_or(0, |side| side.max(widest) / 2);
-        for (row, columns) in [Some(&gauge.region), gauge.from.as_ref()]
-            .into_iter()
-            .flatten()
-            .flat_map(|region| region.spans())
-        {
+        let regions = gauge.of.iter().map(|&at| &features[at].region);
+        for (row, columns) in regions.flat_map(|region| region.spans()) {
             let left = columns.start.saturating_sub(margin);
             let right = (columns.end + margin).min(width);
             let near = row.saturating_sub(margin)..(row + margin + 1).min(height);
