@@ -6,7 +6,7 @@ use super::placement::{Bed, bed, taught_within};
 use algo::geometry::{Pinhole, Vector};
 use algo::inspect::Region;
 use algo::inspect::kinds::{Angle, Distance, Z};
-use appliance::recipe::{GaugeFile, RecipeFile, RegionFile};
+use appliance::recipe::{GaugeFile, RegionFile};
 use appliance::station::{GaugeValue, Inspection, Unit};
 use sim::parts::Sawtooth;
 use sim::scenario::Noise;
