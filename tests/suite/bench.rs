@@ -142,6 +142,17 @@ fn time_stands_against_error_and_the_cycle_has_its_stages() {
     assert_eq!(serde_json::from_str::<Value>(&written).unwrap(), all);
 
     let all = json(&["bench", "budget", "--quick", "--json"]);
+    for gauges in [
+        "8_mean_heights",
+        "8_planes",
+        "32_mean_heights",
+        "32_planes",
+        "32_planes_64_gauges",
+    ] {
+        let row = &all["budget"]["160x120"][gauges];
+        positive(row, "verdict_ms");
+        positive(row, "one_thread_ms");
+    }
     for frames in ["4", "12"] {
         let sizes = &all["budget"]["160x120"];
         let cycle = &sizes[frames];

@@ -12,9 +12,9 @@ fn document(name: &str) -> String {
     fs::read_to_string(root().join("docs").join(name)).unwrap()
 }
 
-/// Members of a recipe, version 2. If this fails, do not change the test without a new version:
+/// Members of a recipe, version 3. If this fails, do not change the test without a new version:
 /// files of this one must stay readable.
-const MEMBERS: [&str; 10] = [
+const MEMBERS: [&str; 11] = [
     "recipe.json",
     "phase_function.npy",
     "golden_phase.npy",
@@ -25,10 +25,11 @@ const MEMBERS: [&str; 10] = [
     "modulation.npy",
     "phase_reach.npy",
     "sequence_offset.npy",
+    "golden_signal.npy",
 ];
 
-/// Keys of `recipe.json`, version 2, in a taught recipe. Do not change these either.
-const KEYS: [&str; 84] = [
+/// Keys of `recipe.json`, version 3, in a taught recipe. Do not change these either.
+const KEYS: [&str; 86] = [
     "alignment",
     "calibration",
     "camera",
@@ -44,21 +45,26 @@ const KEYS: [&str; 84] = [
     "comparison.fixed.coverage",
     "comparison.fixed.frames",
     "comparison.fixed.sigma_mm",
+    "datums",
     "expansion_range_turns",
     "exposing",
     "exposing.exposure_us",
     "exposing.gain",
     "exposures",
+    "features",
+    "features.kind",
+    "features.name",
+    "features.region",
     "fingerprint",
     "format",
     "gauges",
     "gauges.high",
+    "gauges.kind",
     "gauges.low",
-    "gauges.measures",
-    "gauges.measures.kind",
-    "gauges.measures.smoothing_px",
     "gauges.name",
-    "gauges.region",
+    "gauges.of",
+    "gauges.slot",
+    "gauges.smoothing_px",
     "golden_captures",
     "golden_offset_counts",
     "good_parts",
@@ -93,9 +99,6 @@ const KEYS: [&str; 84] = [
     "projector.width",
     "range_mm",
     "read_noise_counts",
-    "regions",
-    "regions.name",
-    "regions.polygon",
     "sequences",
     "sequences.frames",
     "sequences.kind",
@@ -115,18 +118,25 @@ const KEYS: [&str; 84] = [
     "version",
 ];
 /// Keys that `recipe.json` may have in addition, and members of the recipe.
-const OPTIONAL: [&str; 11] = [
+const OPTIONAL: [&str; 18] = [
     "calibration_sigma",
     "height_mm",
     "length_mm",
     "amplitude.npy",
     "smoothing.npy",
     "fringes",
-    "from",
     "tolerance_mm",
     "about",
     "above_mm",
     "component",
+    "datum",
+    "nominal",
+    "golden",
+    "plus",
+    "minus",
+    "master",
+    "master_u",
+    "golden_value",
 ];
 
 fn collect(value: &Value, prefix: &str, keys: &mut BTreeSet<String>) {
@@ -174,7 +184,7 @@ fn a_taught_recipe_has_exactly_the_documented_members_and_keys() {
     let manifest: Value = serde_json::from_str(text).unwrap();
     assert_eq!(
         (&manifest["format"], &manifest["version"]),
-        (&"fringed-recipe".into(), &2.into())
+        (&"fringed-recipe".into(), &3.into())
     );
     let mut keys = BTreeSet::new();
     collect(&manifest, "", &mut keys);
@@ -197,7 +207,7 @@ fn a_taught_recipe_has_exactly_the_documented_members_and_keys() {
 fn every_documented_gauge_is_read_and_written_as_it_stands_there() {
     let documented = document("formats.md");
     let (_, from) = documented
-        .split_once("possible values of `measures`:\n\n```json\n")
+        .split_once("possible values of `kind` with their parameters:\n\n```json\n")
         .unwrap();
     let (list, _) = from.split_once("```").unwrap();
     let documented: Vec<Measure> = serde_json::from_str(list).unwrap();

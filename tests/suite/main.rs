@@ -47,6 +47,7 @@ mod one_click;
 mod outputs;
 mod page;
 mod placement;
+mod planes;
 mod poses;
 mod power;
 mod precision;

@@ -2,7 +2,7 @@
 //! [`super::map`].
 
 use crate::config::WordOrder;
-use crate::station::{Decision, GaugeValue, MAX_GAUGES, ResultRecord};
+use crate::station::{Decision, GaugeValue, ResultRecord};
 
 /// `i32` of a missing value.
 pub const INVALID_I32: u32 = 0x8000_0000;
@@ -97,12 +97,15 @@ impl Item for &str {
     }
 }
 
+/// Gauges that the blocks of results have room for.
+const GAUGES: usize = 16;
+
 /// The item of each gauge of a result, and `missing` where there is no gauge.
 pub(super) fn gauges<T: Copy>(
     record: &ResultRecord,
     missing: T,
     item: impl Fn(&GaugeValue) -> T,
-) -> [T; MAX_GAUGES] {
+) -> [T; GAUGES] {
     let gauges = &record.inspection.gauges;
     std::array::from_fn(|k| gauges.get(k).map_or(missing, &item))
 }

@@ -89,6 +89,16 @@ impl Grid {
         libm::ceil(MIN_SUPPORT * side * side) as i64
     }
 
+    /// The middle of the square of a cell, in pixels of golden's frame.
+    pub fn middle(&self, cell: usize) -> [f64; 2] {
+        let half = (self.side - 1) as f64 / 2.0;
+        let (along, down) = (cell % self.columns, cell / self.columns);
+        [
+            (self.left + along * self.side) as f64 + half,
+            (self.top + down * self.side) as f64 + half,
+        ]
+    }
+
     /// The cell of a pixel of golden's frame; the nearest one for pixels beside the box.
     #[inline(always)]
     pub fn cell(&self, u: i32, v: i32) -> usize {

@@ -271,7 +271,10 @@ impl Production {
 
     /// Fits the planes of features, one per task.
     fn fit(&self, strips: &mut Strips, noisier: f64) {
-        let Strips { strips, fits, .. } = strips;
+        let Strips {
+            strips, fits, pose, ..
+        } = strips;
+        let placed = pose.placed.as_ref();
         let strips = &strips[..];
         for_each_item(fits, |fit: &mut Fit| {
             let patch = &self.gauges.patches[fit.patch];
@@ -279,7 +282,8 @@ impl Production {
             let side = pixels(&patch.taught).isqrt() as usize;
             let smoothed = self.budget.square_variance(side);
             let pixel = pixel_variance(&patch.taught, false);
-            fit.find(&patch.taught, pixel * noisier * noisier * smoothed);
+            let bend = placed.and_then(|placed| fit.bend(&self.golden, &placed.motion));
+            fit.find(patch, pixel * noisier * noisier * smoothed, bend);
         });
     }
 

@@ -31,7 +31,7 @@ impl Production {
                 .gauges
                 .planes
                 .iter()
-                .map(|&patch| Fit::new(patch, &self.gauges.patches[patch].taught))
+                .map(|&patch| Fit::new(patch, &self.gauges.patches[patch], &self.golden))
                 .collect(),
         }
     }

@@ -13,7 +13,7 @@
 //! 4. **accumulate** (`counts`, `coverage`, `squares`): counts, the sums of the gauges' cells
 //!    ([`feature`](super::feature)), and the square with the largest mean deviation along the normal;
 //!    for the squares, the rows before this one are kept (`recent`);
-//! 5. **gauge** (`fits`, `findings`, `deviation`, `uncertainty`): after all strips, the planes of
+//! 5. **gauge** (`fits`, `bend`, `findings`, `deviation`, `uncertainty`): after all strips, the planes of
 //!    features, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few
@@ -36,6 +36,7 @@
 //! `strips_find_what_the_comparison_of_whole_maps_finds`,
 //! `strips_weigh_deviations_as_the_comparison_of_whole_maps_does`.
 
+mod bend;
 mod coordinates;
 mod counts;
 mod coverage;

@@ -18,7 +18,7 @@ use core::ops::Range;
 
 /// Pixels from node to node. A turn by half a degree seen through 22° over 1456 pixels is bent by
 /// 0.003 pixels between them.
-const SPACING: usize = 64;
+pub const SPACING: usize = 64;
 
 /// The points that a node's pixel sees below, at and above the middle height; NaN where it sees
 /// nothing.
@@ -167,18 +167,26 @@ fn displace<'a>(
 
 /// The displacement by a motion of what the node at pixel (u, v) sees.
 fn node(golden: &Golden, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
-    let at = |point: Vector| {
-        let back = motion.undo(point);
-        let to = golden.triangulator.camera().project(back);
-        let (column, row) = to.unwrap_or((f64::NAN, f64::NAN));
-        [column - u as f64, row - v as f64, back.z - point.z]
-    };
+    let at = |point: Vector| displacement(golden, motion, (u, v), point);
     let ([low, middle, high], half) = (sight.map(at), golden.levels.1);
     [
         middle,
         core::array::from_fn(|i| (high[i] - low[i]) / (2.0 * half)),
         core::array::from_fn(|i| (high[i] - 2.0 * middle[i] + low[i]) / (2.0 * half * half)),
     ]
+}
+
+/// The displacement by a motion of a point that pixel (u, v) sees: columns, rows, and mm in height.
+pub fn displacement(
+    golden: &Golden,
+    motion: &Motion,
+    (u, v): (usize, usize),
+    point: Vector,
+) -> [f64; 3] {
+    let back = motion.undo(point);
+    let to = golden.triangulator.camera().project(back);
+    let (column, row) = to.unwrap_or((f64::NAN, f64::NAN));
+    [column - u as f64, row - v as f64, back.z - point.z]
 }
 
 /// Where the point of the part that was seen at (u, v) when it was taught is seen now.

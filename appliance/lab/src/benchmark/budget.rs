@@ -3,6 +3,7 @@
 use super::decoding::{Decoding, Inspecting};
 use super::effort::Effort;
 use super::frames::{FrameSet, Rotation};
+use super::gauges::Gauges;
 use super::median::median;
 use super::timing::{Kernel, rotate};
 use super::words;
@@ -47,6 +48,9 @@ pub struct Budget {
     /// How the part lies, and whether its motion is measured and compensated.
     #[serde(skip)]
     pub lies: Lies,
+    /// What is measured.
+    #[serde(skip)]
+    pub gauges: Gauges,
     /// What a cycle waits for the camera's start, ms: 0, although it takes 500 ms (the imx296
     /// overlay's), because the camera stays on.
     pub start_ms: f64,
@@ -98,7 +102,7 @@ impl Lies {
 
 /// Budgets of a camera of this size: with four frames of one level about the golden map, and with
 /// the full sequence; each without and with compensation of the part's motion, and with that of a
-/// part that was moved.
+/// part that was moved. With the full sequence and a moved part also with many gauges.
 ///
 /// # Errors
 /// If something cannot be simulated or taught.
@@ -134,7 +138,9 @@ pub fn budgets(
     let mut found = Vec::new();
     let cycles = four.into_iter().chain([full]);
     let (part, ..) = stage.placed();
-    for (production, lies) in cycles.flat_map(|at| Lies::ALL.map(|lies| (at, lies))) {
+    let taught_gauges = cycles.flat_map(|at| Lies::ALL.map(|lies| (at, lies, Gauges::Taught)));
+    let many = Gauges::MANY.map(|gauges| (full, Lies::Moved, gauges));
+    for (production, lies, gauges) in taught_gauges.chain(many) {
         progress(
             0.8,
             &format!("{about}: {} frames", sequences[production].frames.len()),
@@ -142,12 +148,14 @@ pub fn budgets(
         let mut file = taught.manifest.clone();
         file.production = production;
         file.alignment = lies.alignment();
+        gauges.replace(&mut file, (width, height));
         let (bytes, _) = archive::pack(&file, &taught.recipe.arrays)?;
         let recipe = Recipe::from_bytes(&bytes)?;
         let plan = Plan::new(recipe, &calibration, true).map_err(words)?;
         stage.place(&part, &lies.placement()).map_err(words)?;
         found.push(Budget {
             lies,
+            gauges,
             ..budget(
                 &plan,
                 &mut head,
@@ -211,6 +219,7 @@ fn budget(
         height,
         frames: frames.len(),
         lies: Lies::AsTaught,
+        gauges: Gauges::Taught,
         start_ms,
         exposure_ms,
         stages,

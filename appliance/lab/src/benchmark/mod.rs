@@ -9,6 +9,7 @@ mod export;
 mod figure;
 mod floor;
 mod frames;
+mod gauges;
 mod kernel;
 mod machine;
 mod median;

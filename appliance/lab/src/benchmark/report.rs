@@ -1,6 +1,7 @@
 //! The results as one JSON object, as CSV, and as tables for people.
 
 use super::budget::{Budget, Lies};
+use super::gauges::Gauges;
 use super::kernel::KernelTable;
 use super::machine::Machine;
 use super::point::{Point, means};
@@ -96,12 +97,20 @@ fn as_means<S: Serializer>(points: &Option<Vec<Point>>, out: S) -> Result<S::Ok,
     points.as_deref().map(means).serialize(out)
 }
 
-/// `{"640x480": {"12": {…}, "4": {…}}}`: sizes, then frames of the sequence.
+/// `{"640x480": {"12": {…}, "4": {…}}}`: sizes, then frames of the sequence, and many gauges.
 fn by_size<S: Serializer>(budgets: &Option<Vec<Budget>>, out: S) -> Result<S::Ok, S::Error> {
     let mut all = Map::new();
     for budget in budgets.iter().flatten() {
         let size = format!("{}x{}", budget.width, budget.height);
         let sizes = all.entry(size).or_insert_with(|| json!({}));
+        if budget.gauges != Gauges::Taught {
+            let key = budget.gauges.words().replace(", ", "_").replace(' ', "_");
+            sizes[key] = json!({
+                "verdict_ms": budget.verdict_ms,
+                "one_thread_ms": budget.one_thread_ms,
+            });
+            continue;
+        }
         if budget.lies == Lies::Aligned {
             sizes[budget.frames.to_string()] = json!(budget);
         }
@@ -210,8 +219,8 @@ fn budget_table(text: &mut String, budgets: &[Budget]) {
     text.push_str(
         "\n### From trigger to verdict\n\nMilliseconds; stages in wall time on all threads, the last three columns in \
          processor time on one.\n\n\
-         | camera | frames | motion | exposure | stages | frames → verdict | trigger → verdict | frames → verdict, one thread | phase kernel alone | ratio |\n\
-         |---|---:|---|---:|---|---:|---:|---:|---:|---:|\n",
+         | camera | frames | motion | gauges | exposure | stages | frames → verdict | trigger → verdict | frames → verdict, one thread | phase kernel alone | ratio |\n\
+         |---|---:|---|---|---:|---|---:|---:|---:|---:|---:|\n",
     );
     for budget in budgets {
         let stages: Vec<String> = budget
@@ -221,7 +230,7 @@ fn budget_table(text: &mut String, budgets: &[Budget]) {
             .collect();
         let _ = writeln!(
             text,
-            "| {}×{} | {} | {} | {:.0} | {} | {:.1} | {:.0} | {:.1} | {:.2} | {:.2} |",
+            "| {}×{} | {} | {} | {} | {:.0} | {} | {:.1} | {:.0} | {:.1} | {:.2} | {:.2} |",
             budget.width,
             budget.height,
             budget.frames,
@@ -230,6 +239,7 @@ fn budget_table(text: &mut String, budgets: &[Budget]) {
                 Lies::Aligned => "taken back",
                 Lies::Moved => "taken back, moved part",
             },
+            budget.gauges.words(),
             budget.exposure_ms,
             stages.join(", "),
             budget.verdict_ms,

@@ -27,7 +27,7 @@ function drawOutlines() {
   if (!state.recipe || !state.result) { over(svg, about, ...rings(about, decisive())); return; }
   const bad = new Map();
   for (const { gauge, kind } of failing()) {
-    for (const name of [gauge.region, gauge.measures.from]) if (name && bad.get(name) !== "fail") bad.set(name, kind);
+    for (const name of [gauge.region, gauge.from]) if (name && bad.get(name) !== "fail") bad.set(name, kind);
   }
   const outline = (region, kind) => {
     const corners = region.polygon.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");

@@ -1,0 +1,275 @@
+//! Distances, angles and heights of planes of parts of the simulated head, against the truth, over
+//! many placements.
+
+use super::gauges::{frames, gauge, plan};
+use super::placement::{Bed, bed, taught_within};
+use algo::geometry::{Pinhole, Vector};
+use algo::inspect::kinds::{Angle, Distance, Z};
+use algo::inspect::{FeatureKind, Measure, Region};
+use appliance::recipe::{FeatureFile, GaugeFile};
+use appliance::station::{GaugeValue, Inspection, Unit};
+use sim::parts::Sawtooth;
+use sim::scenario::Noise;
+use sim::{Part, Placement, Scenario};
+use std::time::Instant;
+use tests::random::Random;
+
+/// Placements of each part, and measurements in each.
+const PLACEMENTS: usize = 12;
+const REPEATS: usize = 6;
+/// Largest displacement of parts in each direction, and largest tilt and rotation.
+const SHIFT_MM: f64 = 1.0;
+const TILT_DEG: f64 = 1.0;
+const TOLERANCE_MM: f64 = 4.0;
+/// Largest mean error over the placements.
+const BIAS_MM: f64 = 0.005;
+const BIAS_DEG: f64 = 0.01;
+/// Scatter of repeated measurements over σ, and least share of errors within U, of all gauges.
+const SCATTER: std::ops::Range<f64> = 0.8..1.2;
+const WITHIN: f64 = 0.93;
+
+/// A face of a part: z = z₀ + slope · x between two x, for |y| up to [`HALF_MM`].
+#[derive(Clone, Copy)]
+struct Flat {
+    z: f64,
+    slope: f64,
+    x: [f64; 2],
+}
+
+const HALF_MM: f64 = 25.0;
+/// Rays per pixel along each side.
+const SUB_RAYS: u32 = 2;
+
+/// A part with two faces.
+struct Sheet {
+    name: String,
+    part: Sawtooth,
+    faces: [Flat; 2],
+}
+
+impl Sheet {
+    /// Bent towards the head along y.
+    fn bent(degrees: f64) -> Self {
+        let slope = (degrees / 2.0).to_radians().tan();
+        let face = |slope, x| Flat { z: 20.0, slope, x };
+        Self {
+            name: format!("bent by {degrees}°"),
+            part: Sawtooth {
+                half_size: 40.0,
+                period: 200.0,
+                rise: 0.5,
+                lo: 20.0 - 100.0 * slope,
+                hi: 20.0,
+                ..Sawtooth::default()
+            },
+            faces: [face(slope, [-35.0, -5.0]), face(-slope, [5.0, 35.0])],
+        }
+    }
+
+    /// Two parallel levels.
+    fn levels() -> Self {
+        let slope = 8.0 / 54.0;
+        let face = |low: f64, x| Flat {
+            z: -4.0 - slope * low,
+            slope,
+            x,
+        };
+        Self {
+            name: "levels".into(),
+            part: Sawtooth {
+                half_size: 60.0,
+                period: 60.0,
+                rise: 0.9,
+                lo: -4.0,
+                hi: 4.0,
+                ..Sawtooth::default()
+            },
+            faces: [face(-40.0, [-35.0, 8.0]), face(20.0, [25.0, 55.0])],
+        }
+    }
+}
+
+impl Flat {
+    /// Its outline in pixels.
+    fn polygon(&self, camera: &Pinhole) -> Vec<[f64; 2]> {
+        let [left, right] = self.x;
+        let corners = [(left, -1.0), (right, -1.0), (right, 1.0), (left, 1.0)];
+        let corners = corners.map(|(x, side)| {
+            let point = Vector::new(x, side * HALF_MM, self.z + self.slope * x);
+            let (u, v) = camera.project(point).unwrap();
+            [u, v]
+        });
+        corners.to_vec()
+    }
+
+    /// The point of the face in the middle of its pixels.
+    fn middle(&self, camera: &Pinhole, size: usize) -> Vector {
+        let corners = self.polygon(camera);
+        let corners: Vec<_> = corners.iter().map(|&[u, v]| (u, v)).collect();
+        let region = Region::polygon(&corners, size, size).unwrap();
+        let eye = camera.centre();
+        let (mut x, mut y) = (0.0, 0.0);
+        for place in region.places(size) {
+            let ray = camera
+                .ray((place % size) as f64, (place / size) as f64)
+                .unwrap();
+            let t = (self.z + self.slope * eye.x - eye.z) / (ray.z - self.slope * ray.x);
+            let point = eye + ray * t;
+            (x, y) = (x + point.x, y + point.y);
+        }
+        let count = region.len() as f64;
+        Vector::new(x / count, y / count, self.z + self.slope * x / count)
+    }
+
+    fn normal(&self) -> Vector {
+        Vector::new(-self.slope, 0.0, 1.0) * (1.0 / self.slope.hypot(1.0))
+    }
+}
+
+/// A gauge of both faces.
+fn of_both(name: &str, measures: impl Into<Measure>) -> GaugeFile {
+    GaugeFile::new(1, name, measures, &["one", "other"])
+}
+
+/// What a gauge measures of the two faces, and its true value.
+fn gauges(sheet: &Sheet, bed: &Bed) -> (Vec<FeatureFile>, Vec<(GaugeFile, f64)>) {
+    let [one, other] = sheet.faces;
+    let size = bed.calibration.frames().0 as usize;
+    let camera = &bed.calibration.camera;
+    let region = |name: &str, face: Flat| FeatureFile {
+        name: name.into(),
+        kind: FeatureKind::Plane,
+        region: face.polygon(camera),
+    };
+    let middle = sheet.faces.map(|face| face.middle(camera, size));
+    let distance = one.normal().dot(middle[1] - middle[0]).abs();
+    let angle = one.normal().dot(other.normal()).acos().to_degrees();
+    let mut gauges = vec![
+        (gauge("z of one", "one", Z {}), middle[0].z),
+        (gauge("z of other", "other", Z {}), middle[1].z),
+        (of_both("distance", Distance {}), distance),
+    ];
+    // Between parallel faces it has a kink.
+    if angle > 1.0 {
+        gauges.push((of_both("angle", Angle {}), angle));
+    }
+    (vec![region("one", one), region("other", other)], gauges)
+}
+
+fn scenario(part: Sawtooth) -> Scenario {
+    let mut scenario = Scenario {
+        part: Part::Sawtooth(part),
+        ..Scenario::default()
+    };
+    scenario.noise.noise_counts = Some(Noise::PAPER);
+    scenario.sub_rays = SUB_RAYS;
+    scenario
+}
+
+/// A random placement.
+fn placement(random: &mut Random) -> Placement {
+    let mut between = |reach: f64| reach * (2.0 * random.share() - 1.0);
+    Placement {
+        shift_mm: [(); 3].map(|()| between(SHIFT_MM)),
+        tilt_deg: [(); 2].map(|()| between(TILT_DEG)),
+        rotation_deg: between(TILT_DEG),
+    }
+}
+
+/// Sums over measurements.
+#[derive(Default)]
+struct Judged {
+    /// Scatter over σ of measurements of the same part in place, squared.
+    ratios: f64,
+    freedom: f64,
+    /// Errors, and those within U.
+    errors: usize,
+    within: usize,
+    /// What is worse than allowed.
+    wrong: Vec<String>,
+}
+
+impl Judged {
+    /// Measures a part again and again in each of random placements.
+    fn measure(&mut self, sheet: &Sheet) {
+        let part = Part::Sawtooth(sheet.part.clone());
+        let mut bed = bed(&scenario(sheet.part.clone()));
+        let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
+        let (regions, gauges) = gauges(sheet, &bed);
+        let mut file = taught.manifest.clone();
+        file.features.extend(regions);
+        file.gauges = gauges.iter().map(|(gauge, _)| gauge.clone()).collect();
+        let plan = plan(&bed, &file, &taught.recipe.arrays);
+        bed.head
+            .load(plan.rasters(&bed.calibration).unwrap())
+            .unwrap();
+        let mut random = Random::new(5);
+        let mut bias = vec![0.0; gauges.len()];
+        for at in 0..=PLACEMENTS {
+            let lies = match at {
+                0 => Placement::default(),
+                _ => placement(&mut random),
+            };
+            bed.stage.place(&part, &lies).unwrap();
+            let inspect = |_| plan.inspect(0, &frames(&mut bed, &plan, 0), Instant::now());
+            let found: Vec<Inspection> = (0..REPEATS).map(inspect).collect();
+            for (at, (gauge, truth)) in gauges.iter().enumerate() {
+                let values = found.iter().map(|found| &found.gauges[at]);
+                let error = self.add(values.collect(), *truth);
+                println!("{} {} {error}", sheet.name, gauge.name);
+                bias[at] += error / (PLACEMENTS + 1) as f64;
+            }
+        }
+        for ((gauge, _), bias) in gauges.iter().zip(bias) {
+            println!("{}, {}: bias {bias:+.5}", sheet.name, gauge.name);
+            let most = match gauge.measures.facts().unit {
+                Unit::Angle => BIAS_DEG,
+                _ => BIAS_MM,
+            };
+            if bias.abs() > most {
+                self.wrong
+                    .push(format!("{}, {}: bias {bias}", sheet.name, gauge.name));
+            }
+        }
+    }
+
+    /// Adds repeated measurements; their mean error.
+    fn add(&mut self, found: Vec<&GaugeValue>, truth: f64) -> f64 {
+        let count = found.len() as f64;
+        let values = found.iter().map(|found| found.value.unwrap());
+        let mean = values.clone().sum::<f64>() / count;
+        let squares: f64 = values.clone().map(|value| (value - mean).powi(2)).sum();
+        let sigmas = found.iter().map(|found| found.sigma.unwrap());
+        let variance = sigmas.map(|sigma| sigma * sigma).sum::<f64>() / count;
+        self.ratios += squares / variance;
+        self.freedom += count - 1.0;
+        for found in &found {
+            let error = found.value.unwrap() - truth;
+            self.errors += 1;
+            self.within += usize::from(error.abs() <= found.uncertainty.unwrap());
+        }
+        println!(
+            "   error {:+.5}, scatter {:.5}, σ {:.5}, U {:.5}",
+            mean - truth,
+            (squares / (count - 1.0)).sqrt(),
+            variance.sqrt(),
+            found[0].uncertainty.unwrap()
+        );
+        mean - truth
+    }
+}
+
+#[test]
+fn distances_and_angles_of_planes_are_true_and_as_uncertain_as_they_say() {
+    let mut judged = Judged::default();
+    judged.measure(&Sheet::levels());
+    for degrees in [5.0, 45.0, 90.0] {
+        judged.measure(&Sheet::bent(degrees));
+    }
+    let scatter = (judged.ratios / judged.freedom).sqrt();
+    let within = judged.within as f64 / judged.errors as f64;
+    println!("scatter / σ {scatter:.3}, {:.1} % within U", 100.0 * within);
+    assert!(judged.wrong.is_empty(), "{:?}", judged.wrong);
+    assert!(SCATTER.contains(&scatter), "{scatter}");
+    assert!(within >= WITHIN, "{within}");
+}
