@@ -225,7 +225,7 @@ fn the_record_of_changes_says_which_limit_went_from_what_to_what() {
     let mut gauges = before["gauges"].clone();
     let high = gauges[0]["high"].as_f64().unwrap();
     gauges[0]["high"] = json!(0.375);
-    gauges.as_array_mut().unwrap().swap(0, 1);
+    (gauges[0]["slot"], gauges[1]["slot"]) = (json!(2), json!(1));
     let edit = json!({
         "fingerprint": before["fingerprint"], "gauges": gauges, "name": "bracket",
     });
@@ -233,7 +233,7 @@ fn the_record_of_changes_says_which_limit_went_from_what_to_what() {
     assert_eq!(status, 200, "{answer}");
     // A PLC reads gauges by their slots.
     let note = answer["note"].as_str().unwrap();
-    assert!(note.contains("\"deviation\" from 0 to 1"), "{note}");
+    assert!(note.contains("\"deviation\" from 1 to 2"), "{note}");
     let change = browser.get("/api/changes")["changes"][0].clone();
     assert_eq!(
         (&change["action"], &change["outcome"]),

@@ -158,7 +158,11 @@ impl GaugeFile {
             true => 0.0,
             false => least,
         };
-        self.low.is_some_and(|low| low > least) || self.high.is_some_and(|high| high < most)
+        // Limits that are worked out later will be some.
+        let later = self.tolerance.is_some() && self.low.is_none() && self.high.is_none();
+        later
+            || self.low.is_some_and(|low| low > least)
+            || self.high.is_some_and(|high| high < most)
     }
 }
 
