@@ -217,8 +217,9 @@ fn the_documentation_holds_the_register_map() {
             Value::String(text) => text.clone(),
             other => other.to_string(),
         };
-        // The OLDEST block has the layout of RESULT, and one sentence documents it.
-        if cell("block") == "OLDEST" {
+        // The blocks of OLDEST have the layouts of others, and one sentence documents them.
+        if cell("block").starts_with("OLDEST") {
+            assert!(documented.contains(&format!("**{}**", cell("block"))));
             continue;
         }
         if block != cell("block") {

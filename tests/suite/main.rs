@@ -67,6 +67,7 @@ mod shiny;
 mod shown;
 mod simulated_board;
 mod simulated_part;
+mod slots;
 mod stalled;
 mod station;
 mod station_plc;

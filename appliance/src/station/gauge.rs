@@ -256,11 +256,19 @@ mod tests {
             reason: Some("closed".into()),
             ..Measured::new(Some(0.5), Some(0.01))
         };
-        let of = |absent| GaugeValue::judged(3, "hole", Unit::Length, measured(absent), (None, Some(1.0)));
+        let of = |absent| {
+            GaugeValue::judged(3, "hole", Unit::Length, measured(absent), (None, Some(1.0)))
+        };
         let (absent, there) = (of(true), of(false));
         assert_eq!((absent.slot, absent.value), (3, None));
-        assert_eq!((absent.decision.bits(), there.decision.bits()), (0b10_0000, 0b11));
-        assert_eq!((absent.reason.as_deref(), there.reason), (Some("closed"), None));
+        assert_eq!(
+            (absent.decision.bits(), there.decision.bits()),
+            (0b10_0000, 0b11)
+        );
+        assert_eq!(
+            (absent.reason.as_deref(), there.reason),
+            (Some("closed"), None)
+        );
         assert!(absent.decision.failed() && !absent.decision.unseen());
         assert!(Decision::default().unseen() && !Decision::default().failed());
     }
