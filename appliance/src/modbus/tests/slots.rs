@@ -180,7 +180,7 @@ fn who_knows_only_16_slots_reads_what_a_recipe_with_only_those_would_give() {
         (u32_at(&result, 34), u32_at(&result, 66), result[97]),
         (0x8000_0000, 0x7FC0_0000, 0)
     );
-    let hidden = words(&snapshot(&[17, 18]), &map::RESULT);
+    let hidden = words(&snapshot(&[18, 19]), &map::RESULT);
     assert_eq!(
         (hidden[27], hidden[8]),
         (0, 2),
