@@ -48,7 +48,7 @@ fn full() -> Place {
                 if slot % 3 == 0 { "bad" } else { "good" }
             );
             if slot % 3 == 0 {
-                (gauge.low, gauge.high) = (Some(5.0), Some(f64::from(slot)));
+                (gauge.low, gauge.high) = (Some(5.0), Some(5.0 + f64::from(slot)));
             }
             gauge
         })
