@@ -18,6 +18,9 @@ from plc import (BUSY, EXPOSURE_DONE, MISSED_TRIGGER, ONLINE, PATIENCE_S, PROCES
 # Cycles of each handshake that are checked in detail.
 STEPS = 3
 SEED = 20261121
+# Slots of gauges, and what an empty one reads as: value, steps, sigma, U.
+SLOTS = 64
+EMPTY = (0x7FC00000, 0x80000000, 0x7FC00000, 0x7FC00000)
 
 
 def result(plc, status):
@@ -34,7 +37,7 @@ def identity(plc):
     expect(long(words, 36) == 0x12345678, "the test pattern is 0x12345678, high word first")
     value = struct.unpack(">f", struct.pack(">HH", *words[38:40]))[0]
     expect(value == struct.unpack(">f", struct.pack(">f", 123.456))[0], "the test pattern is 123.456")
-    expect(plc.status().map_version == 0x0103, "the map has version 1.3")
+    expect(plc.status().map_version == 0x0104, "the map has version 1.4")
     same = plc.answer(plc.client.read_input_registers(900, count=40)).registers
     expect(same == words, "FC4 reads what FC3 reads")
     expect(plc.read(0, 1) == [ONLINE], "CONTROL starts as ONLINE")
@@ -69,6 +72,37 @@ def edge(plc, cycle):
     expect(not acknowledged.bits & RESULT_VALID, "RESULT_ACK takes RESULT_VALID away")
     expect(plc.read(200, 120) == words, "an acknowledged result can still be read")
     plc.write(0, [ONLINE])
+
+
+def in_parts(plc, first, count, parts):
+    """A block of more than 125 registers; both of its numbers are equal unless a result came in between."""
+    size = -(-count // parts)
+    words = [word for at in range(0, count, size) for word in plc.read(first + at, min(size, count - at))]
+    expect(long(words, 0) == long(words, count - 2), f"the parts from {first} on are of one result")
+    return words
+
+
+def slots(plc):
+    """All 64 slots of the last result: decisions in one read, values in two parts, names in nine."""
+    result, gauges = plc.read(200, 120), plc.read(1100, 84)
+    expect(long(gauges, 0) == long(gauges, 82) == long(result, 0), "GAUGES is of the same result")
+    last = gauges[3]
+    expect(gauges[2] == result[8] and gauges[80] == result[2], "VERDICT and TOKEN are those of RESULT")
+    expect(gauges[16:32] == result[96:112], "slots 1 to 16 have the decisions that RESULT has")
+    blocks = {first: in_parts(plc, first, 132, 2) for first in (1200, 1400, 1600, 1800)}
+    names = in_parts(plc, 4000, 1028, 9)
+    for slot in range(1, SLOTS + 1):
+        place, bit = divmod(slot - 1, 16)
+        passed, valid, failed = (gauges[first + place] >> bit & 1 for first in (4, 8, 12))
+        decision = gauges[15 + slot]
+        expect(passed == decision & 1 and valid == decision >> 1 & 1, f"PASS and VALID of slot {slot}")
+        expect(failed == (decision & 0b101100 != 0), f"FAILED of slot {slot}")
+        name = struct.pack(">16H", *names[16 * slot - 14:16 * slot + 2]).rstrip(b"\0")
+        value, steps, sigma, u = (long(words, 2 * slot) for words in blocks.values())
+        expect(steps != 0x80000000 if valid else (value, steps, sigma, u) == EMPTY, f"values of slot {slot}")
+        expect(bool(name) if slot == last else slot < last or not (name or decision), f"the name of slot {slot}")
+        if slot <= 16:
+            expect(value == long(result, 62 + 2 * slot), f"slot {slot} has the value that RESULT has")
 
 
 def token(plc, cycle):
@@ -162,6 +196,7 @@ def main():
             for cycle in range(STEPS):
                 edge(plc, cycle)
                 token(plc, cycle)
+                slots(plc)
             missed(plc)
             other_recipe(plc)
             exceptions(plc)

@@ -69,6 +69,7 @@ mod shiny;
 mod shown;
 mod simulated_board;
 mod simulated_part;
+mod slots;
 mod stalled;
 mod station;
 mod station_plc;

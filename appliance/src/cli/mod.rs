@@ -24,6 +24,7 @@ mod options;
 mod part;
 mod recipe;
 mod record;
+mod registers;
 mod replay;
 mod serve;
 mod teach;
@@ -34,12 +35,10 @@ pub use options::{Files, Output, Quiet, Threads};
 
 use crate::VERSION;
 use crate::error::{Exit, Result};
-use crate::modbus::{registers_csv, registers_json};
 use crate::system::journal::{self, Severity};
 use crate::system::stderr;
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, Parser, Subcommand};
-use options::Json;
 use std::process::ExitCode;
 
 /// The open 3-D smart sensor.
@@ -107,14 +106,8 @@ commands! {
     Config(config::ConfigCommand);
     /// Leave the output lines at their idle levels: no trigger pulse, busy and ok off, fault on.
     Idle(idle::Idle);
-    /// Print the register map as CSV (or JSON with --json).
-    Registers(Registers);
-}
-
-#[derive(Debug, clap::Args)]
-struct Registers {
-    #[command(flatten)]
-    json: Json,
+    /// Print the register map as CSV (or JSON with --json), or as tags to import.
+    Registers(registers::Registers);
 }
 
 /// Commands of `fringed-lab` that `fringed` once had.
@@ -182,17 +175,6 @@ fn run(arguments: Arguments) -> Result<()> {
     match arguments.command {
         None => arguments.serve.run(),
         Some(command) => command.run(),
-    }
-}
-
-impl Registers {
-    fn run(&self) -> Result<()> {
-        if self.json.json {
-            say!("{:#}", registers_json());
-        } else {
-            say!("{}", registers_csv().trim_end());
-        }
-        Ok(())
     }
 }
 

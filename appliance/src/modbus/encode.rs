@@ -15,6 +15,9 @@ pub const UNKNOWN_U16: u16 = 0xFFFF;
 /// "FRNG".
 pub const MAGIC: u32 = 0x4652_4E47;
 
+/// Registers of a text of 32 characters.
+pub(super) const TEXT: u16 = 16;
+
 /// The words of one block, addressed as in the map.
 pub(super) struct Words {
     pub(super) first: u16,
@@ -40,10 +43,15 @@ impl Words {
 
 /// A value of one or more registers.
 pub(super) trait Item {
+    /// How many registers.
+    const WIDTH: u16;
+
     fn put(self, words: &mut Words, address: u16);
 }
 
 impl Item for u16 {
+    const WIDTH: u16 = 1;
+
     fn put(self, words: &mut Words, address: u16) {
         // Every address comes from the table, whose rows lie inside their block (tested there).
         if let Some(place) = address
@@ -56,26 +64,34 @@ impl Item for u16 {
 }
 
 impl Item for u32 {
+    const WIDTH: u16 = 2;
+
     fn put(self, words: &mut Words, address: u16) {
         words.put_halves(address, (self >> 16) as u16, self as u16);
     }
 }
 
 impl Item for u64 {
+    const WIDTH: u16 = 4;
+
     fn put(self, words: &mut Words, address: u16) {
         words.put_halves(address, (self >> 32) as u32, self as u32);
     }
 }
 
 impl<T: Item, const N: usize> Item for [T; N] {
+    const WIDTH: u16 = T::WIDTH * N as u16;
+
     fn put(self, words: &mut Words, address: u16) {
-        for (address, item) in (address..).step_by(size_of::<T>() / 2).zip(self) {
+        for (address, item) in (address..).step_by(T::WIDTH.into()).zip(self) {
             words.put(address, item);
         }
     }
 }
 
 impl Item for &[u8] {
+    const WIDTH: u16 = TEXT;
+
     fn put(self, words: &mut Words, address: u16) {
         let pairs = self.chunks(2);
         for (address, pair) in (address..).zip(pairs) {
@@ -86,34 +102,70 @@ impl Item for &[u8] {
 }
 
 impl Item for &str {
+    const WIDTH: u16 = TEXT;
+
     /// At most 32 characters, NUL padded; characters that are not ASCII become `?`.
     fn put(self, words: &mut Words, address: u16) {
         let ascii: Vec<u8> = self
             .chars()
-            .take(32)
+            .take(2 * usize::from(TEXT))
             .map(|c| u8::try_from(c).ok().filter(u8::is_ascii).unwrap_or(b'?'))
             .collect();
         words.put(address, &*ascii);
     }
 }
 
-/// Gauges that the blocks of results have room for.
-const GAUGES: usize = 16;
-
-/// The item of each gauge of a result, and `missing` where there is no gauge.
-pub(super) fn gauges<T: Copy>(
-    record: &ResultRecord,
-    missing: T,
-    item: impl Fn(&GaugeValue) -> T,
-) -> [T; GAUGES] {
-    let gauges = &record.inspection.gauges;
-    std::array::from_fn(|k| gauges.get(k).map_or(missing, &item))
+/// The item of the gauge in each of the first `N` slots, and `empty` in slots without a gauge.
+pub(super) fn slots<'r, T: Copy, const N: usize>(
+    record: &'r ResultRecord,
+    empty: T,
+    item: impl Fn(&'r GaugeValue) -> T,
+) -> [T; N] {
+    let mut items = [empty; N];
+    for gauge in &record.inspection.gauges {
+        let place = usize::from(gauge.slot).checked_sub(1);
+        if let Some(own) = place.and_then(|place| items.get_mut(place)) {
+            *own = item(gauge);
+        }
+    }
+    items
 }
 
-/// The bits of the gauges for which `set` is true: gauge k is bit k.
+/// The highest occupied of the slots up to `most`; 0 if none is.
+pub(super) fn last_slot(record: &ResultRecord, most: u16) -> u16 {
+    let occupied = record.inspection.gauges.iter().map(|gauge| gauge.slot);
+    occupied.filter(|slot| *slot <= most).max().unwrap_or(0)
+}
+
+/// The bits of the slots for which `set` is true: slot s is bit (s − 1) mod 16 of word (s − 1) / 16.
+pub(super) fn bits(record: &ResultRecord, set: impl Fn(&Decision) -> bool) -> [u16; 4] {
+    let all: [u16; 64] = slots(record, 0, |gauge| set(&gauge.decision).into());
+    let mut words = [0; 4];
+    for (word, bits) in words.iter_mut().zip(all.chunks(16)) {
+        *word = bits.iter().rev().fold(0, |word, bit| word << 1 | bit);
+    }
+    words
+}
+
+/// The bits of the first 16 slots for which `set` is true: slot s is bit s − 1.
 pub(super) fn mask(record: &ResultRecord, set: impl Fn(&Decision) -> bool) -> u32 {
-    let bits = gauges(record, 0, |gauge| u32::from(set(&gauge.decision)));
-    bits.iter().rev().fold(0, |mask, bit| mask << 1 | bit)
+    let [first, ..] = bits(record, set);
+    first.into()
+}
+
+/// The value of each slot in its unit's steps.
+pub(super) fn steps<const N: usize>(record: &ResultRecord) -> [u32; N] {
+    slots(record, INVALID_I32, |gauge| {
+        i32_steps(measured(gauge, gauge.value), gauge.unit.steps())
+    })
+}
+
+/// A number of each slot as `f32`.
+pub(super) fn floats<const N: usize>(
+    record: &ResultRecord,
+    number: impl Fn(&GaugeValue) -> Option<f64>,
+) -> [u32; N] {
+    slots(record, INVALID_F32, |gauge| f32_bits(number(gauge)))
 }
 
 /// A number of a gauge, only if the gauge is valid: a number beside VALID = 0 would be taken for a

@@ -1,7 +1,7 @@
 //! The registers with their present values, as a PLC reads them: for the page.
 
 use super::blocks::block_words;
-use super::map::{Kind, Register, registers};
+use super::map::{CONTROL, Kind, Register, registers};
 use crate::config::WordOrder;
 use crate::station::Snapshot;
 use serde_json::{Value, json};
@@ -9,11 +9,15 @@ use serde_json::{Value, json};
 /// `{"registers": [{"address", "name", "type", "block", "served", "values", "meaning"}]}`; `values`
 /// has one text per item, decoded from the words in their normal order.
 pub fn live(snapshot: &Snapshot) -> Value {
+    let mut words = (CONTROL, block_words(snapshot, &CONTROL, WordOrder::Normal));
     let rows: Vec<Value> = registers()
         .map(|(block, row)| {
-            let words = block_words(snapshot, &block, WordOrder::Normal);
+            if words.0 != block {
+                words = (block, block_words(snapshot, &block, WordOrder::Normal));
+            }
             let first = usize::from(row.address - block.first);
             let own = words
+                .1
                 .get(first..first + usize::from(row.count()))
                 .unwrap_or_default();
             json!({
@@ -32,22 +36,29 @@ pub fn live(snapshot: &Snapshot) -> Value {
 
 fn values(row: &Register, words: &[u16]) -> Vec<String> {
     if row.kind == Kind::Ascii {
-        let bytes = words.iter().flat_map(|word| word.to_be_bytes());
-        let text: Vec<u8> = bytes.take_while(|byte| *byte != 0).collect();
-        return vec![String::from_utf8_lossy(&text).into_owned()];
+        return vec![ascii(words)];
     }
     let items = words.chunks_exact(usize::from(row.kind.width()));
     items.map(|item| text(row.kind, item)).collect()
 }
 
+fn ascii(words: &[u16]) -> String {
+    let bytes = words.iter().flat_map(|word| word.to_be_bytes());
+    let text: Vec<u8> = bytes.take_while(|byte| *byte != 0).collect();
+    String::from_utf8_lossy(&text).into_owned()
+}
+
 fn text(kind: Kind, words: &[u16]) -> String {
+    if kind == Kind::Text {
+        return ascii(words);
+    }
     let wide = words
         .iter()
         .fold(0_u64, |wide, word| wide << 16 | u64::from(*word));
     let low = wide as u32;
     match kind {
         Kind::Bits => format!("{wide:#06x}"),
-        Kind::U16 | Kind::U32 | Kind::U64 | Kind::Ascii => wide.to_string(),
+        Kind::U16 | Kind::U32 | Kind::U64 | Kind::Ascii | Kind::Text => wide.to_string(),
         Kind::I16 => (wide as u16).cast_signed().to_string(),
         Kind::I32 => low.cast_signed().to_string(),
         Kind::F32 => f32::from_bits(low).to_string(),

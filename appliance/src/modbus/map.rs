@@ -1,13 +1,13 @@
-//! The register map, version 1.3: one table, append-only, from which everything else is derived.
+//! The register map, version 1.4: one table, append-only, from which everything else is derived.
 
 use super::encode::{
-    INVALID_F32, INVALID_I32, MAGIC, UNKNOWN_U16, Words, f32_bits, gauges, i32_steps, known, mask,
-    measured, saturated_u16, stored, tenths,
+    MAGIC, TEXT, UNKNOWN_U16, Words, bits, floats, known, last_slot, mask, measured, saturated_u16,
+    slots, steps, stored, tenths,
 };
 use crate::station::{Power, ResultRecord, Snapshot};
 
 /// MAP_VERSION, register 121.
-pub const VERSION: u16 = 0x0103;
+pub const VERSION: u16 = 0x0104;
 
 /// How a register's words are read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +28,8 @@ pub enum Kind {
     F32,
     /// Two characters per register.
     Ascii,
+    /// 32 characters, 16 registers.
+    Text,
 }
 
 impl Kind {
@@ -37,6 +39,7 @@ impl Kind {
             Self::Bits | Self::U16 | Self::I16 | Self::Ascii => 1,
             Self::U32 | Self::I32 | Self::F32 => 2,
             Self::U64 => 4,
+            Self::Text => TEXT,
         }
     }
 
@@ -51,6 +54,7 @@ impl Kind {
             Self::U64 => "u64",
             Self::F32 => "f32",
             Self::Ascii => "ascii",
+            Self::Text => "ascii 32",
         }
     }
 }
@@ -156,7 +160,7 @@ registers! {
         117 BUFFERED U16 x 1 = now.buffered, "results waiting for RESULT_ACK";
         118 UPTIME U32 x 1 = now.uptime_s, "s";
         120 REJECT_REASON U16 x 1 = now.reject_reason, "of the last rejected request: 1 not ready, 2 offline, 3 no recipe, 4 teach not allowed, 5 fault, 6 another recipe is active";
-        121 MAP_VERSION U16 x 1 = VERSION, "0x0103";
+        121 MAP_VERSION U16 x 1 = VERSION, "0x0104";
         122 BOOT_ID U32 x 1 = now.boot_id, "random per start: tokens and counters restarted";
     }
     result RESULT 200..=319, false, record: ResultRecord {
@@ -167,8 +171,8 @@ registers! {
         206 PART_ID U32 x 1 = record.part_id, "as latched at the trigger";
         208 VERDICT U16 x 1 = record.verdict.number(), "0 none, 1 PASS, 2 FAIL, 3 INVALID";
         209 ERROR_CODE U16 x 1 = record.error_code, "of this result, 0 none";
-        210 PASS U32 x 1 = mask(record, |decision| decision.pass && decision.valid), "bits, gauge k = bit k";
-        212 VALID U32 x 1 = mask(record, |decision| decision.valid), "bits, gauge k = bit k";
+        210 PASS U32 x 1 = mask(record, |decision| decision.pass && decision.valid), "bits, gauge k = bit k: slot s is bit s - 1, s = 1-16";
+        212 VALID U32 x 1 = mask(record, |decision| decision.valid), "bits, gauge k = bit k: slot s is bit s - 1, s = 1-16";
         214 TIME U64 x 1 = record.time_utc_us, "us since 1970 UTC of the trigger, 0 if the clock is not synchronised";
         218 EXPOSURE_TIME U32 x 1 = record.exposure_us, "us, trigger to exposure done";
         220 TOTAL_TIME U32 x 1 = record.total_us, "us, trigger to result";
@@ -176,19 +180,19 @@ registers! {
         224 COVERAGE U16 x 1 = record.inspection.coverage_permille, "per mille of the taught surface that is resolved, as min_coverage of the recipe; a gauge of the coverage is of its region";
         225 TEMPERATURE I16 x 1 = tenths(record.inspection.temperature_c), "head, 0.1 degC, 0x8000 not known";
         226 HEIGHT_NOISE U16 x 1 = saturated_u16(record.inspection.height_noise_mm * 10_000.0), "0.1 um, 1 sigma, from the measured modulation";
-        227 GAUGE_COUNT U16 x 1 = record.inspection.gauges.len() as u16, "0-16";
+        227 GAUGE_COUNT U16 x 1 = last_slot(record, 16), "0-16, the highest occupied of slots 1-16";
         228 PRESS_STROKE U32 x 1 = record.press_stroke, "as latched at the trigger";
         230 FITNESS U16 x 1 = record.inspection.fitness_permille, "per mille, 1000 = pattern as taught";
         231 FLAGS Bits x 1 = record.flags(), "0 a pattern was retried, 1 single level used, 2 two levels used, 3 full sequence used, 4 stepped up from a shorter one, 5 simulated head, 6 warm-up, 7 at least one doubtful decision, 8 the recipe judges nothing: no gauge has a limit that a part can miss";
-        232 GAUGE_STEPS I32 x 16 = gauges(record, INVALID_I32, |gauge| i32_steps(measured(gauge, gauge.value), gauge.unit.steps())), "value in the unit's step: length 0.1 um, angle 0.0001 deg, volume 0.01 mm3, share 0.1 per mille; saturates at +-(2^31-1), 0x80000000 invalid";
-        264 GAUGE_VALUE F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.value))), "the same in mm, deg, mm3, share 0-1; NaN (0x7FC00000) invalid";
-        296 GAUGE_DECISION Bits x 16 = gauges(record, 0, |gauge| gauge.decision.bits()), "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma); 1 and 4 without 0, 2, 3: inside its limits, but nearer to one than the recipe's guard band";
+        232 GAUGE_STEPS I32 x 16 = steps::<16>(record), "value in the unit's step: length 0.1 um, angle 0.0001 deg, volume 0.01 mm3, share 0.1 per mille; saturates at +-(2^31-1), 0x80000000 invalid";
+        264 GAUGE_VALUE F32 x 16 = floats::<16>(record, |gauge| measured(gauge, gauge.value)), "the same in mm, deg, mm3, share 0-1; NaN (0x7FC00000) invalid";
+        296 GAUGE_DECISION Bits x 16 = slots::<_, 16>(record, 0, |gauge| gauge.decision.bits()), "0 pass, 1 valid, 2 low, 3 high, 4 doubtful (a limit lies within 2 sigma); 1 and 4 without 0, 2, 3: inside its limits, but nearer to one than the recipe's guard band; 5 absent";
         318 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
     }
     gauge_detail GAUGE_DETAIL 520..=583, false, record: ResultRecord {
         520 SEQ U32 x 1 = record.seq, "number of the result";
-        522 GAUGE_SIGMA F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.sigma))), "1 sigma of each gauge, in mm, deg, mm3, share 0-1; NaN (0x7FC00000) not known";
-        554 GAUGE_UNIT U16 x 16 = gauges(record, 0, |gauge| gauge.unit.number()), "0 none, 1 length, 2 angle, 3 volume, 4 share";
+        522 GAUGE_SIGMA F32 x 16 = floats::<16>(record, |gauge| measured(gauge, gauge.sigma)), "1 sigma of each gauge, in mm, deg, mm3, share 0-1; NaN (0x7FC00000) not known";
+        554 GAUGE_UNIT U16 x 16 = slots::<_, 16>(record, 0, |gauge| gauge.unit.number()), "0 none, 1 length, 2 angle, 3 volume, 4 share";
         582 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
     }
     health HEALTH 600..=639, false, now: Snapshot {
@@ -230,50 +234,137 @@ registers! {
     }
     gauge_uncertainty GAUGE_UNCERTAINTY 1000..=1069, false, record: ResultRecord {
         1000 SEQ U32 x 1 = record.seq, "number of the result";
-        1002 GAUGE_U F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.uncertainty))), "expanded uncertainty of each gauge, k = 2, with the systematic part, in mm, deg, mm3, share 0-1; NaN (0x7FC00000) not known";
-        1034 GAUGE_EXPECTED F32 x 16 = gauges(record, INVALID_F32, |gauge| f32_bits(measured(gauge, gauge.expected))), "magnitude that is expected on a good part, of an extreme, in the same units; NaN (0x7FC00000) where noise does not move the value away from 0";
+        1002 GAUGE_U F32 x 16 = floats::<16>(record, |gauge| measured(gauge, gauge.uncertainty)), "expanded uncertainty of each gauge, k = 2, with the systematic part, in mm, deg, mm3, share 0-1; NaN (0x7FC00000) not known";
+        1034 GAUGE_EXPECTED F32 x 16 = floats::<16>(record, |gauge| measured(gauge, gauge.expected)), "magnitude that is expected on a good part, of an extreme, in the same units; NaN (0x7FC00000) where noise does not move the value away from 0";
         1066 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges GAUGES 1100..=1183, false, record: ResultRecord {
+        1100 SEQ U32 x 1 = record.seq, "number of the result";
+        1102 VERDICT U16 x 1 = record.verdict.number(), "0 none, 1 PASS, 2 FAIL, 3 INVALID; all slots count";
+        1103 LAST_SLOT U16 x 1 = last_slot(record, 64), "0-64, the highest occupied slot";
+        1104 PASS Bits x 4 = bits(record, |decision| decision.pass && decision.valid), "slot s is bit (s - 1) mod 16 of register (s - 1) / 16 of these";
+        1108 VALID Bits x 4 = bits(record, |decision| decision.valid), "slot s is bit (s - 1) mod 16 of register (s - 1) / 16 of these";
+        1112 FAILED Bits x 4 = bits(record, |decision| decision.failed()), "outside a limit, or absent; slot s is bit (s - 1) mod 16 of register (s - 1) / 16 of these";
+        1116 DECISION Bits x 64 = slots::<_, 64>(record, 0, |gauge| gauge.decision.bits()), "of each slot: 0 pass, 1 valid, 2 low, 3 high, 4 doubtful, 5 absent, as GAUGE_DECISION; 0 for an empty slot";
+        1180 TOKEN U16 x 1 = record.token, "token that triggered, 0 for an edge";
+        1182 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges_value GAUGES_VALUE 1200..=1331, false, record: ResultRecord {
+        1200 SEQ U32 x 1 = record.seq, "number of the result";
+        1202 VALUE F32 x 64 = floats::<64>(record, |gauge| measured(gauge, gauge.value)), "of each slot in mm, deg, mm3, share 0-1; NaN (0x7FC00000) invalid";
+        1330 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges_steps GAUGES_STEPS 1400..=1531, false, record: ResultRecord {
+        1400 SEQ U32 x 1 = record.seq, "number of the result";
+        1402 STEPS I32 x 64 = steps::<64>(record), "the same in the unit's step, as GAUGE_STEPS; 0x80000000 invalid";
+        1530 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges_sigma GAUGES_SIGMA 1600..=1731, false, record: ResultRecord {
+        1600 SEQ U32 x 1 = record.seq, "number of the result";
+        1602 SIGMA F32 x 64 = floats::<64>(record, |gauge| measured(gauge, gauge.sigma)), "1 sigma of each slot's value in its unit; NaN (0x7FC00000) not known";
+        1730 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges_u GAUGES_U 1800..=1931, false, record: ResultRecord {
+        1800 SEQ U32 x 1 = record.seq, "number of the result";
+        1802 U F32 x 64 = floats::<64>(record, |gauge| measured(gauge, gauge.uncertainty)), "expanded uncertainty of each slot's value, k = 2, as GAUGE_U; NaN (0x7FC00000) not known";
+        1930 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges_unit GAUGES_UNIT 3000..=3067, false, record: ResultRecord {
+        3000 SEQ U32 x 1 = record.seq, "number of the result";
+        3002 UNIT U16 x 64 = slots::<_, 64>(record, 0, |gauge| gauge.unit.number()), "of each slot: 0 none, 1 length, 2 angle, 3 volume, 4 share";
+        3066 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges_low GAUGES_LOW 3100..=3231, false, record: ResultRecord {
+        3100 SEQ U32 x 1 = record.seq, "number of the result";
+        3102 LOW F32 x 64 = floats::<64>(record, |gauge| gauge.low), "lower limit of each slot in mm, deg, mm3, share 0-1; NaN (0x7FC00000) without one";
+        3230 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges_high GAUGES_HIGH 3300..=3431, false, record: ResultRecord {
+        3300 SEQ U32 x 1 = record.seq, "number of the result";
+        3302 HIGH F32 x 64 = floats::<64>(record, |gauge| gauge.high), "upper limit of each slot, as LOW";
+        3430 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
+    }
+    gauges_name GAUGES_NAME 4000..=5027, false, record: ResultRecord {
+        4000 SEQ U32 x 1 = record.seq, "number of the result";
+        4002 NAME Text x 64 = slots::<_, 64>(record, "", |gauge| &*gauge.name), "of each slot, its first 32 characters";
+        5026 SEQ_AGAIN U32 x 1 = record.seq, "equals SEQ unless two reads were mixed";
     }
 }
 
-/// Block OLDEST: the layout of RESULT, with the oldest unacknowledged result.
-pub const OLDEST: Block = Block {
-    name: "OLDEST",
-    first: 400,
-    last: 519,
-    ..RESULT
-};
+/// A block with the layout of another one, that shows the oldest unacknowledged result.
+const fn oldest(name: &'static str, first: u16, layout: Block) -> Block {
+    Block {
+        name,
+        first,
+        last: first + (layout.last - layout.first),
+        ..layout
+    }
+}
 
-/// Every block with its rows, by address. OLDEST repeats the rows of RESULT, moved by
-/// [`Block::first`].
-pub const BLOCKS: [(Block, &[Register]); 9] = [
-    (CONTROL, at::control::ROWS),
-    (STATUS, at::status::ROWS),
-    (RESULT, at::result::ROWS),
-    (OLDEST, at::result::ROWS),
-    (GAUGE_DETAIL, at::gauge_detail::ROWS),
-    (HEALTH, at::health::ROWS),
-    (RECIPE_DIRECTORY, at::recipe_directory::ROWS),
-    (IDENTITY, at::identity::ROWS),
-    (GAUGE_UNCERTAINTY, at::gauge_uncertainty::ROWS),
+/// Block OLDEST: the layout of RESULT.
+pub const OLDEST: Block = oldest("OLDEST", 400, RESULT);
+/// Block OLDEST_GAUGES: the layout of GAUGES.
+pub const OLDEST_GAUGES: Block = oldest("OLDEST_GAUGES", 2100, GAUGES);
+/// Block OLDEST_GAUGES_VALUE: the layout of GAUGES_VALUE.
+pub const OLDEST_GAUGES_VALUE: Block = oldest("OLDEST_GAUGES_VALUE", 2200, GAUGES_VALUE);
+/// Block OLDEST_GAUGES_STEPS: the layout of GAUGES_STEPS.
+pub const OLDEST_GAUGES_STEPS: Block = oldest("OLDEST_GAUGES_STEPS", 2400, GAUGES_STEPS);
+/// Block OLDEST_GAUGES_SIGMA: the layout of GAUGES_SIGMA.
+pub const OLDEST_GAUGES_SIGMA: Block = oldest("OLDEST_GAUGES_SIGMA", 2600, GAUGES_SIGMA);
+/// Block OLDEST_GAUGES_U: the layout of GAUGES_U.
+pub const OLDEST_GAUGES_U: Block = oldest("OLDEST_GAUGES_U", 2800, GAUGES_U);
+
+/// Every block with the one whose layout it has, and the rows of that, by address.
+pub const BLOCKS: [(Block, Block, &[Register]); 23] = [
+    (CONTROL, CONTROL, at::control::ROWS),
+    (STATUS, STATUS, at::status::ROWS),
+    (RESULT, RESULT, at::result::ROWS),
+    (OLDEST, RESULT, at::result::ROWS),
+    (GAUGE_DETAIL, GAUGE_DETAIL, at::gauge_detail::ROWS),
+    (HEALTH, HEALTH, at::health::ROWS),
+    (
+        RECIPE_DIRECTORY,
+        RECIPE_DIRECTORY,
+        at::recipe_directory::ROWS,
+    ),
+    (IDENTITY, IDENTITY, at::identity::ROWS),
+    (
+        GAUGE_UNCERTAINTY,
+        GAUGE_UNCERTAINTY,
+        at::gauge_uncertainty::ROWS,
+    ),
+    (GAUGES, GAUGES, at::gauges::ROWS),
+    (GAUGES_VALUE, GAUGES_VALUE, at::gauges_value::ROWS),
+    (GAUGES_STEPS, GAUGES_STEPS, at::gauges_steps::ROWS),
+    (GAUGES_SIGMA, GAUGES_SIGMA, at::gauges_sigma::ROWS),
+    (GAUGES_U, GAUGES_U, at::gauges_u::ROWS),
+    (OLDEST_GAUGES, GAUGES, at::gauges::ROWS),
+    (OLDEST_GAUGES_VALUE, GAUGES_VALUE, at::gauges_value::ROWS),
+    (OLDEST_GAUGES_STEPS, GAUGES_STEPS, at::gauges_steps::ROWS),
+    (OLDEST_GAUGES_SIGMA, GAUGES_SIGMA, at::gauges_sigma::ROWS),
+    (OLDEST_GAUGES_U, GAUGES_U, at::gauges_u::ROWS),
+    (GAUGES_UNIT, GAUGES_UNIT, at::gauges_unit::ROWS),
+    (GAUGES_LOW, GAUGES_LOW, at::gauges_low::ROWS),
+    (GAUGES_HIGH, GAUGES_HIGH, at::gauges_high::ROWS),
+    (GAUGES_NAME, GAUGES_NAME, at::gauges_name::ROWS),
 ];
+
+impl Block {
+    /// The block whose layout it has: itself, but for those that show the oldest result.
+    pub fn layout(self) -> Self {
+        let mut blocks = BLOCKS.into_iter();
+        blocks
+            .find(|(block, ..)| *block == self)
+            .map_or(self, |(_, layout, _)| layout)
+    }
+}
 
 /// Every row of the map with its address and block.
 pub fn registers() -> impl Iterator<Item = (Block, Register)> {
-    BLOCKS.into_iter().flat_map(|(block, rows)| {
-        let moved = if block == OLDEST {
-            OLDEST.first - RESULT.first
-        } else {
-            0
-        };
+    BLOCKS.into_iter().flat_map(|(block, layout, rows)| {
         rows.iter().map(move |row| {
-            (
-                block,
-                Register {
-                    address: row.address + moved,
-                    ..*row
-                },
-            )
+            let address = block.first + (row.address - layout.first);
+            (block, Register { address, ..*row })
         })
     })
 }
@@ -282,7 +373,7 @@ pub fn registers() -> impl Iterator<Item = (Block, Register)> {
 pub fn served(address: u16, quantity: u16) -> Option<Block> {
     let last = address.checked_add(quantity.checked_sub(1)?)?;
     let holds = |block: &Block| block.served && block.first <= address && last <= block.last;
-    BLOCKS.into_iter().map(|(block, _)| block).find(holds)
+    BLOCKS.into_iter().map(|(block, ..)| block).find(holds)
 }
 
 #[cfg(test)]

@@ -1,14 +1,14 @@
-//! Modbus TCP: the register map, version 1.3, and the server that shows a
+//! Modbus TCP: the register map, version 1.4, and the server that shows a
 //! [`Snapshot`](crate::station::Snapshot) through it.
 //!
-//! [`map`] is the one table; [`encode`] turns a snapshot into words, [`decode`] words into a write
+//! [`map`] is the one table, which [`render`] and [`tags`] print; [`encode`] turns a snapshot into words, [`decode`] words into a write
 //! of the PLC, [`service`] answers one request, [`guard`] checks one connection's frames and times,
 //! [`places`] limits the connections, [`refusals`] logs what is refused, [`server`] joins them to
 //! `tokio-modbus`.
 //!
 //! Decisions where the map is silent:
 //!
-//! - A gauge slot without a gauge reads as invalid (0x80000000, NaN), and so does the RESULT block
+//! - A slot without a gauge reads as invalid (0x80000000, NaN), and so does the RESULT block
 //!   before the first result: a zero could be taken for a measured height.
 //! - A unit-less gauge has the register step 0.0001.
 //! - A client that may not write gets exception 1 for every FC5, 6, 15, 16 and 23, well-formed or
@@ -31,6 +31,7 @@ pub mod refusals;
 pub mod render;
 pub mod server;
 pub mod service;
+pub mod tags;
 
 #[cfg(test)]
 mod tests;

@@ -13,12 +13,12 @@ fn type_text(row: &Register) -> String {
 }
 
 /// The reference number of the older notation; read-only blocks answer as input registers too.
-fn reference(block: &Block, row: &Register) -> u32 {
+pub(super) fn reference(block: &Block, row: &Register) -> u32 {
     let first = if block.writable { 400_001 } else { 300_001 };
     first + u32::from(row.address)
 }
 
-fn access(block: &Block) -> &'static str {
+pub(super) fn access(block: &Block) -> &'static str {
     if block.writable { "read/write" } else { "read" }
 }
 

@@ -36,6 +36,14 @@ pub(super) struct GaugeLimits {
     pub master: Option<Substitution>,
 }
 
+impl Demands {
+    /// Slot, name and unit of each gauge.
+    pub fn slots(&self) -> impl Iterator<Item = (u16, &str, Unit)> {
+        let slots = (1..).zip(&self.limits);
+        slots.map(|(slot, limits)| (slot, &*limits.name, limits.unit))
+    }
+}
+
 impl From<&RecipeFile> for Demands {
     fn from(file: &RecipeFile) -> Self {
         let limits = file.gauges.iter().map(|gauge| GaugeLimits {

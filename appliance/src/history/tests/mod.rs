@@ -624,7 +624,7 @@ fn a_result_that_does_not_go_into_shared_memory_does_not_bring_its_number_back()
     let (killed, never, next, _) = opened(&state, 1);
     let mut long = (*record(next + 1)).clone();
     let inspection = Inspection {
-        reason: Some("x".repeat(20_000).into()),
+        reason: Some("x".repeat(80_000).into()),
         ..Inspection::default()
     };
     long.inspection = Arc::new(inspection);

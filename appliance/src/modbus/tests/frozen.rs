@@ -119,7 +119,82 @@ const ROWS: &str = "\
 1034 GAUGE_EXPECTED f32x16 GAUGE_UNCERTAINTY
 1066 SEQ_AGAIN u32 GAUGE_UNCERTAINTY";
 
-/// Name, first and last address of every block, and whether it can be written. All of them are
+/// The rows that version 1.4 has added.
+const ROWS_1_4: &str = "\
+1100 SEQ u32 GAUGES
+1102 VERDICT u16 GAUGES
+1103 LAST_SLOT u16 GAUGES
+1104 PASS bitsx4 GAUGES
+1108 VALID bitsx4 GAUGES
+1112 FAILED bitsx4 GAUGES
+1116 DECISION bitsx64 GAUGES
+1180 TOKEN u16 GAUGES
+1182 SEQ_AGAIN u32 GAUGES
+1200 SEQ u32 GAUGES_VALUE
+1202 VALUE f32x64 GAUGES_VALUE
+1330 SEQ_AGAIN u32 GAUGES_VALUE
+1400 SEQ u32 GAUGES_STEPS
+1402 STEPS i32x64 GAUGES_STEPS
+1530 SEQ_AGAIN u32 GAUGES_STEPS
+1600 SEQ u32 GAUGES_SIGMA
+1602 SIGMA f32x64 GAUGES_SIGMA
+1730 SEQ_AGAIN u32 GAUGES_SIGMA
+1800 SEQ u32 GAUGES_U
+1802 U f32x64 GAUGES_U
+1930 SEQ_AGAIN u32 GAUGES_U
+2100 SEQ u32 OLDEST_GAUGES
+2102 VERDICT u16 OLDEST_GAUGES
+2103 LAST_SLOT u16 OLDEST_GAUGES
+2104 PASS bitsx4 OLDEST_GAUGES
+2108 VALID bitsx4 OLDEST_GAUGES
+2112 FAILED bitsx4 OLDEST_GAUGES
+2116 DECISION bitsx64 OLDEST_GAUGES
+2180 TOKEN u16 OLDEST_GAUGES
+2182 SEQ_AGAIN u32 OLDEST_GAUGES
+2200 SEQ u32 OLDEST_GAUGES_VALUE
+2202 VALUE f32x64 OLDEST_GAUGES_VALUE
+2330 SEQ_AGAIN u32 OLDEST_GAUGES_VALUE
+2400 SEQ u32 OLDEST_GAUGES_STEPS
+2402 STEPS i32x64 OLDEST_GAUGES_STEPS
+2530 SEQ_AGAIN u32 OLDEST_GAUGES_STEPS
+2600 SEQ u32 OLDEST_GAUGES_SIGMA
+2602 SIGMA f32x64 OLDEST_GAUGES_SIGMA
+2730 SEQ_AGAIN u32 OLDEST_GAUGES_SIGMA
+2800 SEQ u32 OLDEST_GAUGES_U
+2802 U f32x64 OLDEST_GAUGES_U
+2930 SEQ_AGAIN u32 OLDEST_GAUGES_U
+3000 SEQ u32 GAUGES_UNIT
+3002 UNIT u16x64 GAUGES_UNIT
+3066 SEQ_AGAIN u32 GAUGES_UNIT
+3100 SEQ u32 GAUGES_LOW
+3102 LOW f32x64 GAUGES_LOW
+3230 SEQ_AGAIN u32 GAUGES_LOW
+3300 SEQ u32 GAUGES_HIGH
+3302 HIGH f32x64 GAUGES_HIGH
+3430 SEQ_AGAIN u32 GAUGES_HIGH
+4000 SEQ u32 GAUGES_NAME
+4002 NAME ascii32x64 GAUGES_NAME
+5026 SEQ_AGAIN u32 GAUGES_NAME";
+
+/// The blocks that version 1.4 has added; none can be written.
+const SERVED_1_4: [(&str, u16, u16); 14] = [
+    ("GAUGES", 1100, 1183),
+    ("GAUGES_VALUE", 1200, 1331),
+    ("GAUGES_STEPS", 1400, 1531),
+    ("GAUGES_SIGMA", 1600, 1731),
+    ("GAUGES_U", 1800, 1931),
+    ("OLDEST_GAUGES", 2100, 2183),
+    ("OLDEST_GAUGES_VALUE", 2200, 2331),
+    ("OLDEST_GAUGES_STEPS", 2400, 2531),
+    ("OLDEST_GAUGES_SIGMA", 2600, 2731),
+    ("OLDEST_GAUGES_U", 2800, 2931),
+    ("GAUGES_UNIT", 3000, 3067),
+    ("GAUGES_LOW", 3100, 3231),
+    ("GAUGES_HIGH", 3300, 3431),
+    ("GAUGES_NAME", 4000, 5027),
+];
+
+/// Name, first and last address of every block of version 1.3, and whether it can be written. All of them are
 /// served.
 const SERVED: [(&str, u16, u16, bool); 9] = [
     ("CONTROL", 0, 31, true),
@@ -169,17 +244,18 @@ fn what_is_added_says_more_of_four_rows_and_takes_nothing_back() {
 #[test]
 fn the_version_is_the_same_wherever_it_is_said() {
     let (major, minor) = (VERSION >> 8, VERSION & 0xFF);
-    assert_eq!((major, minor), (1, 3));
+    assert_eq!((major, minor), (1, 4));
     assert_eq!(row(121).meaning, format!("{VERSION:#06x}"));
     assert_eq!(registers_json()["version"], format!("{major}.{minor}"));
 }
 
 #[test]
 fn every_block_of_version_1_is_served_where_it_was() {
-    for (name, first, last, writable) in SERVED {
-        let (block, _) = BLOCKS
+    let added = SERVED_1_4.map(|(name, first, last)| (name, first, last, false));
+    for (name, first, last, writable) in SERVED.into_iter().chain(added) {
+        let (block, ..) = BLOCKS
             .iter()
-            .find(|(block, _)| block.name == name)
+            .find(|(block, ..)| block.name == name)
             .expect(name);
         assert_eq!(
             (block.first, block.last, block.writable, block.served),
@@ -206,7 +282,7 @@ fn version_1_of_the_map_is_frozen_word_for_word() {
         })
         .collect();
     let now: Vec<&str> = rows.iter().map(String::as_str).collect();
-    for frozen in ROWS.lines() {
+    for frozen in ROWS.lines().chain(ROWS_1_4.lines()) {
         assert!(
             now.contains(&frozen),
             "the row {frozen:?} is no longer in the map"
@@ -214,7 +290,7 @@ fn version_1_of_the_map_is_frozen_word_for_word() {
     }
     assert_eq!(
         registers().count(),
-        ROWS.lines().count(),
+        ROWS.lines().count() + ROWS_1_4.lines().count(),
         "a new row raises the version and gets a line here"
     );
 }

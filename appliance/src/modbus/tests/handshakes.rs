@@ -27,7 +27,7 @@ async fn the_edge_handshake_measures_once_and_one_read_holds_the_result() {
     );
     assert_eq!(
         (u32_at(&after, 10), u32_at(&after, 12), after[21]),
-        (1, 1000, 0x0103)
+        (1, 1000, 0x0104)
     );
     let result = plc.read_input_registers(200, 120).await.unwrap().unwrap();
     assert_eq!((u32_at(&result, 0), u32_at(&result, 118)), (1000, 1000));

@@ -7,6 +7,7 @@ mod connections;
 mod exceptions;
 mod frozen;
 mod handshakes;
+mod slots;
 
 use std::net::SocketAddr;
 use std::sync::Arc;
@@ -27,6 +28,22 @@ use crate::station::*;
 use crate::system::logbook::Logbook;
 use crate::system::progress::Progress;
 
+fn settings() -> Settings {
+    let identity = Identity {
+        vendor: "fringed".into(),
+        product: "fringe projection sensor".into(),
+        serial: "SN-0001".into(),
+        version: "1.2.3".into(),
+    };
+    Settings {
+        next_seq: 1000,
+        boot_id: 0xB007_1D00,
+        teach_allowed: false,
+        identity: Arc::new(identity),
+        limits: Limits::default(),
+    }
+}
+
 /// A station behind a real server on a free port, with a worker that carries out orders when asked.
 struct Plant {
     address: SocketAddr,
@@ -45,22 +62,9 @@ impl Plant {
     }
 
     async fn with_places(options: Options, places: usize, buffered: bool) -> Self {
-        let identity = Identity {
-            vendor: "fringed".into(),
-            product: "fringe projection sensor".into(),
-            serial: "SN-0001".into(),
-            version: "1.2.3".into(),
-        };
-        let settings = Settings {
-            next_seq: 1000,
-            boot_id: 0xB007_1D00,
-            teach_allowed: false,
-            identity: Arc::new(identity),
-            limits: Limits::default(),
-        };
         let (sink, orders) = channel();
         let handle = StationHandle::new(
-            Station::new(settings, Micros(0)),
+            Station::new(settings(), Micros(0)),
             Instant::now(),
             move |effect| {
                 // The receiver is gone only in tests that have checked all they wanted.
@@ -142,6 +146,7 @@ fn inspection() -> Inspection {
     let limits = (Some(-0.2), Some(0.2));
     let gauges = [
         GaugeValue::judged(
+            1,
             "dome",
             Unit::Length,
             Measured {
@@ -152,6 +157,7 @@ fn inspection() -> Inspection {
             limits,
         ),
         GaugeValue::judged(
+            2,
             "flange",
             Unit::Angle,
             Measured::new(Some(-0.5), Some(0.01)),

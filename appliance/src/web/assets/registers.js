@@ -5,9 +5,16 @@ import { notice } from "./session.js";
 
 const rows = new Map();
 let timer = 0;
+// Fewer values than these are not one for each slot.
+const SLOTS = 16;
 
 function matches(register, wanted) {
   return !wanted || register.name.toLowerCase().includes(wanted) || register.block.toLowerCase().includes(wanted) || String(register.address).startsWith(wanted);
+}
+
+// The values of a register; those of slots have the number of their slot before them.
+function values({ values: all }) {
+  return all.map((value, at) => (all.length < SLOTS ? value : `${at + 1}: ${value}`)).join("  ");
 }
 
 function build(registers, wanted) {
@@ -35,7 +42,7 @@ async function refresh(fresh) {
   if (fresh || !rows.size) build(registers, $("register-filter").value.trim().toLowerCase());
   for (const register of registers) {
     const cell = rows.get(register.address);
-    const words = register.served ? register.values.join("  ") : "–";
+    const words = register.served ? values(register) : "–";
     if (cell && cell.textContent !== words) cell.textContent = words;
   }
 }
