@@ -213,7 +213,6 @@ impl Judged {
             for (at, (gauge, truth)) in gauges.iter().enumerate() {
                 let values = found.iter().map(|found| &found.gauges[at]);
                 let error = self.add(values.collect(), *truth);
-                println!("{} {} {error}", sheet.name, gauge.name);
                 bias[at] += error / (PLACEMENTS + 1) as f64;
             }
         }

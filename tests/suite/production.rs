@@ -197,15 +197,11 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
     let close = |a: f64, b: f64, share: f64| (a - b).abs() <= share * b.abs();
     for (planned, reading) in recipe.gauges.iter().zip(&found.readings) {
         let reading = reading.unwrap();
-        let expected = expected(
-            &comparison,
-            &planned.measure,
-            &recipe.features[planned.of[0]].region,
-        );
-        let tolerance = if expected.sigma.is_some() {
-            SINGLE_MM
-        } else {
-            0.0
+        let region = &recipe.features[planned.of[0]].region;
+        let expected = expected(&comparison, &planned.measure, region);
+        let tolerance = match expected.sigma {
+            Some(_) => SINGLE_MM,
+            None => 0.0,
         };
         let difference = (reading.value - expected.value).abs();
         assert!(
