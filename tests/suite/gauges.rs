@@ -3,8 +3,8 @@
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use super::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD, long};
 use algo::inspect::kinds::{
-    self, Axis, Component, Coverage, Deviation, Flatness, MeanHeight, OutOfTolerance, PeakToValley,
-    RmsDeviation, Step, Tilt, Volume,
+    self, Angle, Axis, Component, Coverage, Deviation, Distance, Flatness, MeanHeight,
+    OutOfTolerance, PeakToValley, RmsDeviation, Step, Tilt, Volume, Z,
 };
 use algo::inspect::{Findings, Measure, Production};
 use algo::simd::Backend;
@@ -223,6 +223,9 @@ fn findings_of_a_moved_part_depend_neither_on_strips_nor_on_threads_nor_on_the_b
     let taught = taught(&mut bed).unwrap();
     let mut gauges = all_kinds(5, 0.02);
     gauges.push(gauge("coverage", "plate", Coverage {}));
+    gauges.push(gauge("height", "plate", Z {}));
+    gauges.push(from("bead", gauge("distance", "plate", Distance {})));
+    gauges.push(from("bead", gauge("angle", "plate", Angle {})));
     let file = RecipeFile {
         features: features(PLATE, BEAD),
         gauges,

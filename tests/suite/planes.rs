@@ -213,10 +213,9 @@ impl Judged {
             bed.stage.place(&part, &lies).unwrap();
             let inspect = |_| plan.inspect(0, &frames(&mut bed, &plan, 0), Instant::now());
             let found: Vec<Inspection> = (0..REPEATS).map(inspect).collect();
-            for (at, (gauge, truth)) in gauges.iter().enumerate() {
+            for (at, (_, truth)) in gauges.iter().enumerate() {
                 let values = found.iter().map(|found| &found.gauges[at]);
                 let error = self.add(values.collect(), *truth);
-                println!("{} {} {error}", sheet.name, gauge.name);
                 bias[at] += error / (PLACEMENTS + 1) as f64;
             }
         }

@@ -199,10 +199,9 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
         let reading = reading.unwrap();
         let region = &recipe.features[planned.of[0]].region;
         let expected = expected(&comparison, &planned.measure, region);
-        let tolerance = if expected.sigma.is_some() {
-            SINGLE_MM
-        } else {
-            0.0
+        let tolerance = match expected.sigma {
+            Some(_) => SINGLE_MM,
+            None => 0.0,
         };
         let difference = (reading.value - expected.value).abs();
         assert!(

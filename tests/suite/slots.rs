@@ -43,6 +43,7 @@ fn full() -> Place {
     file.gauges = (1..=SLOTS)
         .map(|slot| {
             let mut gauge = taught.clone();
+            gauge.slot = slot;
             gauge.name = format!(
                 "gauge {slot}, \"{}\"",
                 if slot % 3 == 0 { "bad" } else { "good" }

@@ -401,6 +401,6 @@ fn distances_and_angles_of_planes_are_those_of_a_drawing() {
     );
     // An error of all heights moves a level plane by as much; its distance from the middle of
     // another region, beside it, by more.
-    let lever = |kind| value(kind, [0.0, 0.0], [0.0, 0.0]).lever;
+    let lever = |kind: &dyn Kind| value(kind, [0.0, 0.0], [0.0, 0.0]).lever;
     assert!((lever(&Z {}) - 1.0).abs() < 0.1 && lever(&Distance {}) > 2.0);
 }
