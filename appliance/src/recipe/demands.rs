@@ -39,8 +39,8 @@ pub(super) struct GaugeLimits {
 impl Demands {
     /// Slot, name and unit of each gauge.
     pub fn slots(&self) -> impl Iterator<Item = (u16, &str, Unit)> {
-        let slots = (1..).zip(&self.limits);
-        slots.map(|(slot, limits)| (slot, &*limits.name, limits.unit))
+        let limits = self.limits.iter();
+        limits.map(|limits| (limits.slot, &*limits.name, limits.unit))
     }
 }
 
