@@ -14,8 +14,10 @@ use super::site::Site;
 use crate::error::shortened;
 use crate::recipe::incoming::Incoming;
 
-/// Largest body in JSON, bytes: 96 features of 40 corners and 64 gauges take a third of it.
-const MAX_JSON: usize = 256 << 10;
+/// Largest body in JSON, bytes.
+const MAX_JSON: usize = 64 << 10;
+/// Largest change of a recipe, bytes: 96 features of 40 corners and 64 gauges take a third of it.
+const MAX_EDIT: usize = 256 << 10;
 /// Longest wait for it.
 const JSON_TIME: Duration = Duration::from_secs(10);
 /// Largest file, bytes: a recipe for 2048 × 2048 pixels has 160 MB.
@@ -29,6 +31,15 @@ const FILE_TIME: Duration = Duration::from_secs(120);
 /// It is too long, too slow, or not the JSON of a `T`.
 pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
+    parsed(&bytes)
+}
+
+/// Reads a change of a recipe in JSON.
+///
+/// # Errors
+/// As [`json`].
+pub async fn edit<T: DeserializeOwned>(body: Body) -> Result<T> {
+    let bytes = read(body, MAX_EDIT, JSON_TIME).await?;
     parsed(&bytes)
 }
 

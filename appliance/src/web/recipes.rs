@@ -131,7 +131,7 @@ pub(super) async fn edit(
     Path(number): Path<u16>,
     request: Request<Body>,
 ) -> Result<(Extension<Changed>, Json<Value>)> {
-    let wanted: Edit = body::json(request.into_body()).await?;
+    let wanted: Edit = body::edit(request.into_body()).await?;
     let edited = site.change(move |site| {
         let mut note = None;
         let fits = |recipe| {
