@@ -6,7 +6,7 @@ use algo::inspect::kinds::{
     self, Angle, Axis, Component, Coverage, Deviation, Distance, Flatness, MeanHeight,
     OutOfTolerance, PeakToValley, RmsDeviation, Step, Tilt, Volume, Z,
 };
-use algo::inspect::{Findings, Measure, Production};
+use algo::inspect::{FeatureKind, Findings, Measure, Production};
 use algo::simd::Backend;
 use appliance::head::seam;
 use appliance::recipe::archive::{Arrays, pack};
@@ -223,11 +223,18 @@ fn findings_of_a_moved_part_depend_neither_on_strips_nor_on_threads_nor_on_the_b
     let taught = taught(&mut bed).unwrap();
     let mut gauges = all_kinds(5, 0.02);
     gauges.push(gauge("coverage", "plate", Coverage {}));
-    gauges.push(gauge("height", "plate", Z {}));
-    gauges.push(from("bead", gauge("distance", "plate", Distance {})));
-    gauges.push(from("bead", gauge("angle", "plate", Angle {})));
+    let both = ["plane of plate", "plane of bead"];
+    gauges.push(gauge("height", both[0], Z {}));
+    gauges.push(GaugeFile::new(1, "distance", Distance {}, &both));
+    gauges.push(GaugeFile::new(1, "angle", Angle {}, &both));
+    let mut features = features(PLATE, BEAD);
+    for mut feature in features.clone() {
+        feature.name = format!("plane of {}", feature.name);
+        feature.kind = FeatureKind::Plane;
+        features.push(feature);
+    }
     let file = RecipeFile {
-        features: features(PLATE, BEAD),
+        features,
         gauges,
         ..taught.manifest.clone()
     };
