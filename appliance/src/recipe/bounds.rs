@@ -122,6 +122,7 @@ impl GaugeFile {
         length("of", self.of.len(), 0, MAX_PLACES)?;
         let mut names = self.of.iter().chain(&self.datum);
         names.try_for_each(|name| text("of", name, LONGEST_NAME))?;
+        self.check_numbers()?;
         let kind = self.measures.kind();
         let Facts { basis, .. } = kind.facts();
         if let Some(side) = basis.side() {

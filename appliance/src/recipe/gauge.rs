@@ -104,8 +104,11 @@ impl GaugeFile {
         let unit = measures.facts().unit;
         let [least, most] = unit.range();
         let symbol = spaced(unit);
-        self.check_numbers(most)
-            .map_err(|error| format!("gauge {name:?}: {error}"))?;
+        if self.needs_golden() && self.golden_value.is_none() {
+            return Err(format!(
+                "gauge {name:?} has no golden_value: set the gauges again on the head"
+            ));
+        }
         for (which, limit) in [("low", low), ("high", high)] {
             if let Some(limit) = limit.filter(|limit| !(least..=most).contains(limit)) {
                 return Err(no_limit(name, unit, which, limit));
@@ -122,9 +125,13 @@ impl GaugeFile {
         }
     }
 
-    /// Refuses numbers behind the limits that its unit, of which `most` is the largest value, cannot
-    /// have, and golden's value where it is missing.
-    fn check_numbers(&self, most: f64) -> Result<(), String> {
+    /// Refuses numbers behind the limits that its unit cannot have, before anything is worked out
+    /// from them.
+    ///
+    /// # Errors
+    /// In words that name the key, the value and the bounds.
+    pub(super) fn check_numbers(&self) -> Result<(), String> {
+        let [_, most] = self.measures.facts().unit.range();
         if let Some(Tolerance { about, plus, minus }) = self.tolerance {
             if let About::Nominal(nominal) = about {
                 within("nominal", nominal, -most, most)?;
@@ -132,21 +139,20 @@ impl GaugeFile {
             for (key, value) in [("plus", plus), ("minus", minus)] {
                 value.map_or(Ok(()), |value| within(key, value, -2.0 * most, 2.0 * most))?;
             }
+            if let (Some(plus), Some(minus)) = (plus, minus)
+                && plus < -minus
+            {
+                return Err(format!(
+                    "plus is {plus} and minus is {minus}: the lower limit would be above the upper one"
+                ));
+            }
         }
         if let Some(Master { value, u }) = self.master {
             within("master", value, -most, most)?;
             within("master_u", u, 0.0, most)?;
         }
-        match (self.needs_golden(), self.golden_value) {
-            (true, None) => Err(
-                "golden_value is missing: set the gauges again on the head, or teach the recipe again"
-                    .into(),
-            ),
-            (true, Some(value)) if !value.is_finite() => {
-                Err(format!("golden_value is {value}: set the gauges again"))
-            }
-            _ => Ok(()),
-        }
+        let mut golden = self.golden_value.into_iter();
+        golden.try_for_each(|value| within("golden_value", value, f64::MIN, f64::MAX))
     }
 
     /// Whether a part can miss one of its limits: limits at the ends of what its unit can have are
