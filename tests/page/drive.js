@@ -171,7 +171,14 @@ try {
     await page.click("nav a[href='#recipes']");
     await page.click("#recipe-rows tr button:has-text('Edit')");
     await page.waitForSelector("#editor-regions .handle");
-    await page.click("#region-add");
+    const unit = (symbol) => page.waitForFunction((wanted) => document.querySelector("#editor-gauges tr:last-child td:last-child").textContent === wanted, symbol);
+    await page.selectOption("#gauge-kind", "placement");
+    await page.click("#gauge-add");
+    await unit("°");
+    await page.locator("#editor-gauges select[aria-label^=component]").selectOption("z");
+    await unit("mm");
+    await page.selectOption("#gauge-kind", "deviation");
+    await page.click("#gauge-add");
     const handle = page.locator("#editor-regions .handle").first();
     const box = await handle.boundingBox();
     const label = await handle.getAttribute("aria-label");
@@ -190,6 +197,7 @@ try {
     await page.click("nav a[href='#live']");
     await trigger();
     await page.waitForFunction(() => document.querySelector("#gauge-rows").textContent.includes("deviation 1"));
+    assert.match(await page.textContent("#gauge-rows"), /placement 1/);
   });
 
   await recipes({ page, step, verdict, trigger });

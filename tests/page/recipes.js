@@ -29,7 +29,7 @@ export async function recipes({ page, step, verdict, trigger }) {
     await page.waitForSelector("#question:not([hidden])");
     assert.match(await page.textContent("#question-title"), /Replace recipe 1\?/);
     const words = await page.textContent("#question-words");
-    for (const part of [before.name, `${before.regions.length} regions`, `${before.gauges.length} gauges`]) assert.ok(words.includes(part), words);
+    for (const part of [before.name, `${before.features.length} features`, `${before.gauges.length} gauges`]) assert.ok(words.includes(part), words);
     // The focus stays in the dialogue, and Escape changes nothing.
     for (let times = 0; times < 7; times += 1) {
       assert.ok(await page.evaluate(() => document.querySelector("#question").contains(document.activeElement)));
@@ -44,11 +44,11 @@ export async function recipes({ page, step, verdict, trigger }) {
   await step("what was edited stays when a recipe is taught again, if that is asked for", async () => {
     const before = await recipe(1);
     await page.click("#teach button");
-    await page.click("#question-choices button:has-text('keep regions and gauges')");
+    await page.click("#question-choices button:has-text('keep features and gauges')");
     await taught();
     const after = await recipe(1);
     assert.notEqual(after.fingerprint, before.fingerprint);
-    for (const key of ["name", "part_number", "regions", "gauges"]) assert.deepEqual(after[key], before[key], key);
+    for (const key of ["name", "part_number", "features", "gauges"]) assert.deepEqual(after[key], before[key], key);
   });
 
   await step("undo brings back the version before, and undo again takes it back", async () => {

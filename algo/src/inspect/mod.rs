@@ -17,7 +17,10 @@ mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
 pub use feature::{Feature, FeatureKind, Geometry, TooFine};
-pub use gauge::{Basis, Evidence, Facts, Kind, MAX_PLACES, Measure, Reading, Square, Unit, kinds};
+pub use gauge::{
+    Basis, Declared, Domain, Evidence, Facts, Kind, MAX_PLACES, Measure, Parameter, Reading,
+    Square, Unit, Value, kinds,
+};
 pub use largest::Largest;
 pub(crate) use mask::components;
 pub use mask::eroded;

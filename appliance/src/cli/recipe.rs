@@ -1,5 +1,5 @@
 //! `fringed recipe`: lists, exports, imports and deletes the station's recipes, undoes changes, and
-//! changes the gauges of a file.
+//! changes the gauges of a file and lists what gauges can measure.
 //!
 //! A running station uses an imported recipe when it is selected next. Deleting and undoing need a
 //! stopped station or its page, because the recipe may be active.
@@ -12,7 +12,7 @@ use crate::error::{Exit, Failure, Result};
 use crate::production::backend;
 use crate::recipe::exchange::{Destination, Listed};
 use crate::recipe::plan::Plan;
-use crate::recipe::{ChangeError, LoadError, Store};
+use crate::recipe::{ChangeError, Kinds, LoadError, Store};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::state::StateFolder;
 use std::path::PathBuf;
@@ -24,6 +24,11 @@ pub enum RecipeCommand {
     List {
         #[command(flatten)]
         files: Files,
+        #[command(flatten)]
+        json: Json,
+    },
+    /// List what gauges can measure, with the parameters of each kind.
+    Kinds {
         #[command(flatten)]
         json: Json,
     },
@@ -82,6 +87,14 @@ impl RecipeCommand {
         match self {
             Self::List { files, json } => {
                 list(&store(files)?.list(), json.json);
+                Ok(())
+            }
+            Self::Kinds { json } => {
+                let kinds = Kinds::all();
+                match json.json {
+                    true => say!("{:#}", serde_json::json!(kinds)),
+                    false => say!("{}", kinds.table()),
+                }
                 Ok(())
             }
             Self::Export { recipe, file } => {

@@ -7,7 +7,7 @@ use super::part::SimulatedPart;
 use crate::error::{Exit, Result};
 use crate::head::scan::take;
 use crate::head::seam;
-use crate::history::kept;
+use crate::history::{RECIPE, kept};
 use crate::production::backend::{self, Opened};
 use crate::recipe::Recipe;
 use crate::recipe::plan::Plan;
@@ -77,6 +77,10 @@ impl Record {
         opened.dark.iter().for_each(|words| progress.warn(words));
         let recording = taken?;
         recorder::write(&recording, &self.folder).map_err(Exit::CannotCreate.failure())?;
+        if let Some(recipe) = &self.recipe {
+            let copied = std::fs::copy(recipe, self.folder.join(RECIPE));
+            copied.map_err(Exit::CannotCreate.because("copy the recipe into the recording"))?;
+        }
         let count = recording.frames.len();
         self.quiet
             .say(|| format!("recorded {count} frames to {}", self.folder.display()));

@@ -7,10 +7,11 @@ use crate::error::{Exit, Failure, Result};
 use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, GaugeEntry, Reader, difference, seq_of};
 use crate::recipe::plan::PlanError;
-use crate::recipe::{Recipe, Store};
+use crate::recipe::{Outline, Recipe, State, Store};
 use crate::station::result::flag::SIMULATED;
-use crate::station::{Inspection, ResultRecord, Square};
+use crate::station::{Decision, Inspection, ResultRecord, Square};
 use crate::storage::unpack::Unpacked;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
@@ -57,26 +58,28 @@ impl Replay {
             original,
         } = chosen;
         let (number, fingerprint) = (recipe.id.number, recipe.id.fingerprint.clone());
+        let outline = recipe.outline.clone();
         let before = result_of(&state, unpacked.name(), &kept)?;
         let flags = before.as_ref().map_or(0, |entry| entry.flags);
-        let (frames, shots) = (kept.frames(), kept.shots());
         let configured = options.files.configuration()?.threads;
         let judged = options.threads.pool(configured)?.install(|| {
             let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
-            let inspect = |sequence| plan.inspect(sequence, &frames, Instant::now());
-            Ok::<_, PlanError>(plan.sequence_of(&shots).map(inspect))
+            let of = kept.sequence(&plan);
+            let inspect =
+                |(sequence, frames): (_, Vec<_>)| plan.inspect(sequence, &frames, Instant::now());
+            Ok::<_, PlanError>(of.map(inspect))
         });
         let judged = judged.map_err(Exit::Content.failure())?;
         let inspection = judged.ok_or_else(|| {
             let words = format!(
-                "replay {}: recipe {number}, fingerprint {fingerprint:.8}, has no sequence with these frames: name the recipe that the part was judged by",
+                "replay {}: recipe {number}, fingerprint {fingerprint:.8}, has no sequence with these frames: name the recipe that the part was judged by, or record the part with `fringed record --recipe`",
                 self.recording.display()
             );
             Failure::new(Exit::Content, words)
         })?;
         let replayed = entry(inspection, number, &fingerprint);
         let document = serde_json::json!({
-            "replayed": replayed, "stored": before,
+            "replayed": detailed(&replayed, &outline)?, "stored": before,
             "recipe": { "from": from, "number": number, "fingerprint": fingerprint, "same": original },
         });
         let text = || table(&replayed, &from);
@@ -95,6 +98,11 @@ impl Replay {
             return Ok(());
         }
         let Some(before) = before else {
+            if self.recipe.is_some() {
+                let nothing = "the history has no result of this recording: compared with nothing";
+                options.output.remark(|| nothing.into());
+                return Ok(());
+            }
             let message = format!(
                 "compare with the history: it has no result of {} with the recording's recipe and PART_ID: the result above was compared with nothing",
                 self.recording.display()
@@ -198,6 +206,22 @@ fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {
         inspection: Arc::new(inspection),
         ..ResultRecord::default()
     })
+}
+
+/// An entry with the kind of each gauge, and the features.
+fn detailed(entry: &Entry, outline: &Outline) -> Result<Value> {
+    let shown = serde_json::to_value(entry);
+    let mut shown = shown.map_err(Exit::Software.because("write the result"))?;
+    for (gauge, of) in entry.gauges.iter().enumerate() {
+        shown["gauges"][gauge]["kind"] = outline.kind(of.slot).into();
+    }
+    let state = |slot: u16| match entry.gauges.iter().find(|gauge| gauge.slot == slot) {
+        Some(gauge) if gauge.value.is_some() => State::Found,
+        Some(gauge) if gauge.decision & Decision::ABSENT != 0 => State::Absent,
+        _ => State::Unseen,
+    };
+    shown["features"] = serde_json::json!(outline.features(state));
+    Ok(shown)
 }
 
 /// The verdict, the recipe, and a line for each gauge.

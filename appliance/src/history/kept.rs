@@ -41,13 +41,18 @@ impl Kept {
     }
 
     /// Opens a recording that is to be judged by this recipe, which need not have judged it before:
-    /// frames that were imported, for example. The noise of a sample is the recipe's where the
-    /// recording states none.
+    /// frames that were imported, for example. Of several patterns only the recipe's counts. The
+    /// noise of a sample is the recipe's where the recording states none.
     ///
     /// # Errors
-    /// If it is not there (66), damaged, or without models (65).
+    /// If it is not there (66), damaged, without models, of another size or without the recipe's
+    /// pattern (65).
     pub fn judged_by(folder: &Path, recipe: &Recipe) -> Result<Self> {
-        let recording = Recording::open(folder)?;
+        let mut recording = Recording::open(folder)?;
+        let pattern = recipe.pattern_in(&recording);
+        let refused = |reason| Failure::because(Exit::Content, named(folder), reason);
+        let pattern = pattern.map_err(refused)?;
+        recording.frames.retain(|frame| frame.pattern == pattern);
         let noise = recipe.conditions.noise_counts;
         Self::of(folder, recording, Some(noise))
     }
@@ -81,6 +86,19 @@ impl Kept {
     /// PART_ID, as far as the recording says.
     pub fn part_id(&self) -> Option<&str> {
         self.recording.part_id.as_deref()
+    }
+
+    /// The recipe's sequence that the frames are of, and its frames: all of them, or else those of
+    /// the longest sequence whose frames are among them.
+    pub fn sequence(&self, plan: &Plan) -> Option<(usize, Vec<Frame>)> {
+        let shots = self.shots();
+        if let Some(all) = plan.sequence_of(&shots) {
+            return Some((all, self.frames()));
+        }
+        let shown: Vec<Option<Shot>> = shots.into_iter().map(Some).collect();
+        let (sequence, at) = plan.sequence_among(&shown)?;
+        let taken = |&at: &usize| self.recording.frames[at].frame.clone();
+        Some((sequence, at.iter().map(taken).collect()))
     }
 
     /// The frames, in the order of their sequence.
@@ -151,9 +169,12 @@ impl Kept {
 }
 
 fn wrong(folder: &Path, lacks: &str, remedy: &str) -> Failure {
-    let place = folder.join("recording.json");
-    let words = format!("replay {}: it {lacks}: {remedy}", place.display());
+    let words = format!("{}: it {lacks}: {remedy}", named(folder));
     Failure::new(Exit::Content, words)
+}
+
+fn named(folder: &Path) -> String {
+    format!("replay {}", folder.join("recording.json").display())
 }
 
 /// The failure of a command that needs a recipe which the station does not have.

@@ -6,13 +6,10 @@ use crate::head::channel::Expected;
 use crate::head::seam;
 use crate::recipe::{Recipe, SequenceKind, safe};
 use algo::adaptive::ProjectorMap;
-use algo::pattern::{PhaseFunction, Unwrapping};
+use algo::pattern::Unwrapping;
 use algo::units::AbsolutePhase;
 use hal::npy::Array;
 use hal::replay::Recording;
-
-/// Phase functions that differ by no more than this are the same, in turns: files hold `f64`.
-const SAME: f64 = 1e-9;
 
 /// An expected phase map that fits a recording.
 #[derive(Debug)]
@@ -107,58 +104,19 @@ impl Known {
         })
     }
 
-    /// Finds the recipe's pattern among the recording's.
+    /// Golden's phase, of the recipe's pattern among the recording's.
     ///
     /// # Errors
     /// If the frames are of another size, or no pattern is the recipe's; both are named.
     pub fn of(recipe: &Recipe, recording: &Recording) -> Result<Self, AnyError> {
-        let number = recipe.id.number;
-        let (width, height, _) = recipe.conditions.camera;
-        if (width, height) != (recording.width, recording.height) {
-            return Err(format!(
-                "recipe {number} is for frames of {width}x{height}, the recording has {}x{}: name the recipe that \
-                 was taught with this camera",
-                recording.width, recording.height
-            )
-            .into());
-        }
-        let projector = &recording.projector;
-        let mut others = Vec::new();
-        for (pattern, spec) in recording.patterns.iter().enumerate() {
-            let (columns, rows) = (projector.width as usize, projector.height as usize);
-            let function = seam::phase_function(spec, columns, rows)?;
-            let apart = difference(&function, &recipe.function);
-            if apart.is_some_and(|turns| turns <= SAME) {
-                let golden = recipe.arrays.golden_phase.iter();
-                let golden = golden.map(|&turns| AbsolutePhase::from_turns(turns));
-                return Ok(Self {
-                    name: "golden",
-                    pattern,
-                    phase: golden.collect(),
-                    reach: Some(recipe.arrays.phase_reach.clone()),
-                });
-            }
-            others.push(match apart {
-                Some(turns) => format!("{function} (up to {turns:.3e} turns apart)"),
-                None => function.to_string(),
-            });
-        }
-        Err(format!(
-            "the recording was made with {}, recipe {number} with {}: name the recipe of this pattern, or \
-             measure without one",
-            others.join(" and "),
-            recipe.function
-        )
-        .into())
+        let pattern = recipe.pattern_in(recording)?;
+        let golden = recipe.arrays.golden_phase.iter();
+        let golden = golden.map(|&turns| AbsolutePhase::from_turns(turns));
+        Ok(Self {
+            name: "golden",
+            pattern,
+            phase: golden.collect(),
+            reach: Some(recipe.arrays.phase_reach.clone()),
+        })
     }
-}
-
-/// The largest difference of two phase functions over the pixels of the raster, in turns; `None` if
-/// their rasters differ.
-fn difference(a: &PhaseFunction, b: &PhaseFunction) -> Option<f64> {
-    if (a.columns(), a.rows()) != (b.columns(), b.rows()) {
-        return None;
-    }
-    let pairs = a.turns().into_iter().zip(b.turns());
-    Some(pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max))
 }

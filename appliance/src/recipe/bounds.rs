@@ -6,7 +6,7 @@
 use super::file::{LONGEST_NAME, PatternFile, RecipeFile, SequenceFile};
 use super::gauge::GaugeFile;
 use crate::station::MAX_GAUGES;
-use algo::inspect::{Basis, Facts, MAX_PLACES};
+use algo::inspect::MAX_PLACES;
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
     Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, RATIOS, clipped, length, text,
@@ -124,15 +124,7 @@ impl GaugeFile {
         names.try_for_each(|name| text("of", name, LONGEST_NAME))?;
         self.check_numbers()?;
         let kind = self.measures.kind();
-        let Facts { basis, .. } = kind.facts();
-        if let Some(side) = basis.side() {
-            within("smoothing_px", side, 1, largest)?;
-            if basis == Basis::Squares(side) && side % 2 == 0 {
-                return Err(format!(
-                    "smoothing_px is {side}: write an odd number, the square has a middle pixel"
-                ));
-            }
-        }
-        kind.check()
+        let mut parameters = kind.parameters().into_iter();
+        parameters.try_for_each(|parameter| parameter.check(largest))
     }
 }

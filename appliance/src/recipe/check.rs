@@ -6,6 +6,7 @@ use super::feature::FeatureFile;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
+use super::outline::Outline;
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use algo::calibration::LENGTH;
@@ -29,6 +30,8 @@ pub struct Recipe {
     pub conditions: Conditions,
     /// What it demands of a part.
     pub demands: Demands,
+    /// What its gauges and features are called.
+    pub outline: Outline,
     /// Φ_P.
     pub function: PhaseFunction,
     /// The sequences that a part is measured with in turn, until one is good enough: the one for
@@ -247,6 +250,7 @@ impl Recipe {
             id: file.into(),
             conditions: file.into(),
             demands: file.into(),
+            outline: file.into(),
             function,
             arrays,
         })

@@ -2,9 +2,8 @@
 
 use super::tolerance::{About, Master, Tolerance};
 use crate::station::Unit;
-use algo::inspect::{Facts, Measure};
+use algo::inspect::Measure;
 use hal::bounds::within;
-use serde_json::{Value, json};
 use std::fmt::Display;
 
 /// A gauge and its limits. Its keys in files are those of `gauge_keys`.
@@ -48,28 +47,6 @@ impl GaugeFile {
             golden_value: None,
         }
     }
-}
-
-/// All kinds of gauges, for programs that show or edit recipes: an example of each kind, or, if its
-/// unit depends on a field, one for each value of that field.
-pub fn kinds() -> Value {
-    let row = |measures: Measure| {
-        let Facts {
-            unit,
-            words,
-            compares,
-            ..
-        } = measures.facts();
-        let [low, high] = unit.range();
-        json!({
-            "measures": measures, "words": words, "unit": unit.symbol(), "low": low, "high": high, "compares": compares,
-        })
-    };
-    let all = |example: Measure| {
-        let others = example.others();
-        std::iter::once(example).chain(others).map(row)
-    };
-    Measure::examples().into_iter().flat_map(all).collect()
 }
 
 /// Refuses a limit that the unit of its gauge cannot have.
@@ -175,9 +152,7 @@ impl GaugeFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use algo::inspect::Kind;
     use algo::inspect::kinds::*;
-    use std::collections::HashMap;
 
     fn gauge(measures: &Measure, low: Option<f64>, high: Option<f64>) -> GaugeFile {
         GaugeFile {
@@ -240,26 +215,6 @@ mod tests {
     }
 
     #[test]
-    fn every_kind_is_listed_with_its_unit_and_with_words_for_its_fields_alone() {
-        let listed = kinds();
-        let mut units = HashMap::<&str, Vec<&str>>::new();
-        for row in listed.as_array().unwrap() {
-            let (measures, words) = (&row["measures"], row["words"].as_str().unwrap());
-            for field in words.split('{').skip(1) {
-                let (field, _) = field.split_once('}').unwrap();
-                assert!(measures.get(field).is_some(), "{row}");
-            }
-            let of = units.entry(measures["kind"].as_str().unwrap()).or_default();
-            of.push(row["unit"].as_str().unwrap());
-            assert!(row["low"].as_f64() < row["high"].as_f64(), "{row}");
-        }
-        assert_eq!(units.len(), Measure::examples().len());
-        assert_eq!(units["volume"], ["mm³"]);
-        units.get_mut("placement").unwrap().sort_unstable();
-        assert_eq!(units["placement"], ["mm", "mm", "mm", "°", "°", "°"]);
-    }
-
-    #[test]
     fn a_limit_that_every_part_keeps_cannot_fail() {
         let coverage = Coverage {}.into();
         let flatness = Flatness { smoothing_px: 9 }.into();
@@ -296,21 +251,5 @@ mod tests {
         for (limit, number) in [("0.3", Some(0.3)), ("-1", Some(-1.0)), ("null", None)] {
             assert_eq!(read("mean_height", limit), Ok(number));
         }
-    }
-
-    #[test]
-    fn a_tolerance_and_a_plane_lie_within_what_a_register_holds() {
-        let tolerance = |tolerance_mm| OutOfTolerance {
-            smoothing_px: 9,
-            tolerance_mm,
-        };
-        for mm in [0.0, -0.1, f64::NAN, f64::INFINITY, 214_748.365] {
-            assert!(tolerance(mm).check().is_err(), "{mm}");
-        }
-        assert_eq!(tolerance(0.1).check(), Ok(()));
-        for above_mm in [f64::NAN, f64::NEG_INFINITY, 214_748.365, -214_748.365] {
-            assert!(Volume { above_mm }.check().is_err(), "{above_mm}");
-        }
-        assert_eq!(Volume { above_mm: -8.0 }.check(), Ok(()));
     }
 }

@@ -13,8 +13,7 @@ use crate::head::rasters::Illumination;
 use algo::adaptive::phase_reach;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
-use algo::inspect::kinds::{Coverage, Deviation};
-use algo::inspect::{eroded, openings};
+use algo::inspect::{Measure, eroded, openings};
 use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
@@ -305,11 +304,11 @@ fn gauges(seen: &[bool], width: usize) -> (Vec<FeatureFile>, Vec<GaugeFile>) {
         GaugeFile {
             low: Some(-DEVIATION_MM),
             high: Some(DEVIATION_MM),
-            ..GaugeFile::new(1, "deviation", Deviation { smoothing_px }, &["frame"])
+            ..GaugeFile::new(1, "deviation", Measure::of_shape(smoothing_px), &["frame"])
         },
         GaugeFile {
             low: Some(0.0),
-            ..GaugeFile::new(2, "coverage", Coverage {}, &["frame"])
+            ..GaugeFile::new(2, "coverage", Measure::of_seen(), &["frame"])
         },
     ];
     let found = openings(seen, width, OPENING_PIXELS);
@@ -328,7 +327,7 @@ fn gauges(seen: &[bool], width: usize) -> (Vec<FeatureFile>, Vec<GaugeFile>) {
         features.push(FeatureFile::surface(&*name, diamond.to_vec()));
         gauges.push(GaugeFile {
             high: Some(OPENING_COVERAGE),
-            ..GaugeFile::new(2 + number, &name, Coverage {}, &[&name])
+            ..GaugeFile::new(2 + number, &name, Measure::of_seen(), &[&name])
         });
     }
     (features, gauges)

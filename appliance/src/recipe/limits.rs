@@ -8,8 +8,7 @@ use super::proof::{self, COVERAGE_CHANGE, Magnitudes, Proof};
 use super::sides::Farthest;
 use super::{GaugeFile, RecipeFile, SequenceFile};
 use crate::station::Inspection;
-use algo::inspect::Basis;
-use algo::inspect::kinds::Deviation;
+use algo::inspect::{Basis, Measure};
 use algo::pipeline::KnownSurface;
 
 /// What displaced parts deviate by beside their sharpest creases, and how far that scatters from
@@ -108,5 +107,5 @@ fn set_deviation(gauge: &mut GaugeFile, good_parts: &GoodPartsFile) {
     let limit = good_parts.limit_mm;
     (gauge.low, gauge.high) = (Some(-limit), Some(limit));
     let smoothing_px = good_parts.smoothing_px;
-    gauge.measures = Deviation { smoothing_px }.into();
+    gauge.measures = Measure::of_shape(smoothing_px);
 }

@@ -1,13 +1,14 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
 //! - On disk: [`mod@file`] is the manifest, [`feature`] its features and datum systems, `gauge` and
-//!   `gauge_keys` its gauges, [`tolerance`] and `gauge_limits` what their limits come from,
-//!   `references` which features they name, [`bounds`] the bounds of lists and of values that
-//!   depend on others, [`archive`] the ZIP with its fingerprint, [`gauges_toml`] features, datum
-//!   systems and gauges as text for people.
+//!   `gauge_keys` its gauges, `kinds` the table of what they can measure, [`tolerance`] and
+//!   `gauge_limits` what their limits come from, `references` which features they name, [`bounds`]
+//!   the bounds of lists and of values that depend on others, [`archive`] the ZIP with its
+//!   fingerprint, [`gauges_toml`] features, datum systems and gauges as text for people.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot
 //!   judge, [`plan`] joins that with the head's calibration; `light` tells bad light from bad
-//!   parts.
+//!   parts, `recorded` finds the recipe's pattern in a recording,
+//!   `outline` names what was measured.
 //! - Stored: [`store`] keeps the files of a station, [`generations`] previous generations and
 //!   deleted recipes, [`incoming`] files that are being uploaded; [`exchange`] lists, exports and
 //!   imports, [`edit`] changes, `differences` says what was changed.
@@ -43,12 +44,15 @@ pub mod good_parts;
 mod illumination;
 pub mod incoming;
 mod judging;
+mod kinds;
 mod light;
 mod limits;
 mod median;
+mod outline;
 pub mod plan;
 pub mod planner;
 mod proof;
+mod recorded;
 mod references;
 mod regauge;
 pub mod replace;
@@ -66,5 +70,7 @@ pub use feature::{DatumFile, FeatureFile};
 pub use file::{
     AlignmentKind, PatternFile, RecipeFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };
-pub use gauge::{GaugeFile, kinds};
+pub use gauge::GaugeFile;
+pub use kinds::Kinds;
+pub use outline::{Outline, State};
 pub use store::{ChangeError, LoadError, Store};

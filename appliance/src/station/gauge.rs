@@ -44,6 +44,9 @@ impl From<(Option<f64>, Option<f64>)> for GaugeLimits {
 }
 
 impl Decision {
+    /// The bit of what is absent.
+    pub const ABSENT: u16 = 1 << 5;
+
     /// The bits of registers 296–311 and 1116–1179.
     pub fn bits(self) -> u16 {
         [

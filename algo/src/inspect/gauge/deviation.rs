@@ -9,7 +9,7 @@ kind! {
     /// can be compared do not count.
     Deviation {
         /// Side of the squares, pixels, odd; 1 = single pixels.
-        smoothing_px: usize,
+        smoothing_px: usize = Domain::Pixels { odd: true },
     }
 }
 

@@ -10,7 +10,7 @@ kind! {
     /// 12781-1.
     Flatness {
         /// Side of the cells, pixels.
-        smoothing_px: usize,
+        smoothing_px: usize = Domain::Pixels { odd: false },
     }
 }
 

@@ -5,11 +5,10 @@ use super::extreme::motion;
 use crate::inspect::align::Placed;
 use crate::inspect::feature::FeatureKind::{self, Plane, Surface};
 
+pub(super) use super::parameter::{Domain, Parameter, Value, words};
 pub(super) use super::reading::Found;
 pub(super) use super::unit::Unit;
 pub(super) use crate::inspect::feature::{Cell, Geometry};
-pub(super) use alloc::format;
-pub(super) use alloc::string::String;
 pub(super) use alloc::vec::Vec;
 
 /// Most features of a gauge.
@@ -106,28 +105,28 @@ impl Facts {
             noise_limit: None,
         }
     }
+
+    /// Pixels around its region that it needs, where its squares have at least `widest` pixels a
+    /// side.
+    pub fn margin_px(&self, widest: usize) -> usize {
+        let side = self.basis.square_side();
+        side.map_or(0, |side| side.max(widest) / 2)
+    }
+}
+
+/// What the declaration of a kind says of it.
+pub trait Declared {
+    /// What it measures, in words.
+    fn about(&self) -> &'static str;
+
+    /// Its parameters, in the order in which it declares them.
+    fn parameters(&self) -> Vec<Parameter>;
 }
 
 /// A kind of gauge, with the values of its fields.
-pub trait Kind {
+pub trait Kind: Declared {
     /// What it says of itself.
     fn facts(&self) -> Facts;
-
-    /// The same kind with the other values of the field that its unit depends on.
-    fn others(&self) -> Vec<Self>
-    where
-        Self: Sized,
-    {
-        Vec::new()
-    }
-
-    /// Refuses values of its fields; sides are checked by the recipe.
-    ///
-    /// # Errors
-    /// In words that follow the gauge's name.
-    fn check(&self) -> Result<(), String> {
-        Ok(())
-    }
 
     /// The value of a gauge as a function of the geometry of its features, of which there are as
     /// many as it takes; `None` for other gauges.
@@ -142,17 +141,23 @@ pub trait Kind {
     }
 }
 
-/// Declares the struct of a kind, with its fields as recipes have them.
+/// Declares the struct of a kind, with its parameters as recipes have them, each with its domain, as
+/// in `smoothing_px: usize = Domain::Pixels { odd: true }`. The documentation of kind and parameters
+/// is also what people read of them.
 macro_rules! kind {
     // What else is written beside the name of such a kind is ignored.
-    ($(#[$doc:meta])* $kind:ident {}) => {
-        $(#[$doc])*
+    ($(#[doc = $doc:literal])+ $kind:ident {}) => {
+        $(#[doc = $doc])+
         #[derive(Clone, Debug, PartialEq)]
         #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
         pub struct $kind {}
+
+        kind! { @declared $kind concat!($($doc),+); }
     };
-    ($(#[$doc:meta])* $kind:ident { $($(#[$about:meta])* $field:ident: $type:ty,)* }) => {
-        $(#[$doc])*
+    ($(#[doc = $doc:literal])+ $kind:ident {
+        $($(#[doc = $about:literal])+ $field:ident: $type:ty = $domain:expr,)+
+    }) => {
+        $(#[doc = $doc])+
         #[derive(Clone, Debug, PartialEq)]
         #[cfg_attr(
             feature = "serde",
@@ -160,7 +165,27 @@ macro_rules! kind {
             serde(deny_unknown_fields)
         )]
         pub struct $kind {
-            $($(#[$about])* pub $field: $type,)*
+            $($(#[doc = $about])+ pub $field: $type,)+
+        }
+
+        kind! {
+            @declared $kind concat!($($doc),+); $($field: concat!($($about),+), $domain;)+
+        }
+    };
+    (@declared $kind:ident $doc:expr; $($field:ident: $about:expr, $domain:expr;)*) => {
+        impl $crate::inspect::gauge::kind::Declared for $kind {
+            fn about(&self) -> &'static str {
+                $doc.trim_start()
+            }
+
+            fn parameters(&self) -> Vec<Parameter> {
+                Vec::from([$(Parameter {
+                    name: stringify!($field),
+                    about: $about.trim_start(),
+                    domain: $domain,
+                    value: self.$field.into(),
+                }),*])
+            }
         }
     };
 }

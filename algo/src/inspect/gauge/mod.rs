@@ -14,6 +14,7 @@ mod flatness;
 mod kind;
 mod mean_height;
 mod out_of_tolerance;
+mod parameter;
 mod peak_to_valley;
 mod placement;
 mod propagate;
@@ -25,7 +26,8 @@ mod unit;
 mod volume;
 mod z;
 
-pub use kind::{Basis, Evidence, Facts, Kind, MAX_PLACES};
+pub use kind::{Basis, Declared, Evidence, Facts, Kind, MAX_PLACES};
+pub use parameter::{Domain, Parameter, Value};
 pub(super) use propagate::{Sensitive, propagate};
 pub(super) use reading::MIN_SUPPORT;
 pub use reading::{Found, Reading, Square};
@@ -33,7 +35,8 @@ pub use unit::Unit;
 
 use alloc::vec::Vec;
 
-/// The table of all kinds. A row is the file of a kind and an example; the struct's name in snake
+/// The table of all kinds. A row is the file of a kind and an example, whose parameters are the
+/// defaults; the struct's name in snake
 /// case is that of the kind in recipes.
 macro_rules! kinds {
     ($($file:ident: $kind:ident { $($field:ident: $value:expr),* },)*) => {
@@ -62,10 +65,10 @@ macro_rules! kinds {
                 Vec::from([$(kinds::$kind { $($field: $value),* }.into(),)*])
             }
 
-            /// The same kind with the other values of the field that its unit depends on.
-            pub fn others(&self) -> Vec<Self> {
+            /// Its name in recipes.
+            pub fn name(&self) -> &'static str {
                 match self {
-                    $(Self::$kind(kind) => kind.others().into_iter().map(Self::from).collect(),)*
+                    $(Self::$kind(_) => stringify!($file),)*
                 }
             }
 
@@ -105,6 +108,18 @@ kinds! {
     z: Z {},
     distance: Distance {},
     angle: Angle {},
+}
+
+impl Measure {
+    /// What teaching proposes for the shape of the whole part, over squares of so many pixels.
+    pub fn of_shape(smoothing_px: usize) -> Self {
+        kinds::Deviation { smoothing_px }.into()
+    }
+
+    /// What teaching proposes for how much of a region is seen.
+    pub fn of_seen() -> Self {
+        kinds::Coverage {}.into()
+    }
 }
 
 #[cfg(test)]

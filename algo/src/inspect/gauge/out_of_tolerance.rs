@@ -14,9 +14,9 @@ kind! {
     /// The share of the cells that deviate from golden along its normal by more than a tolerance.
     OutOfTolerance {
         /// Side of the cells, pixels.
-        smoothing_px: usize,
+        smoothing_px: usize = Domain::Pixels { odd: false },
         /// The tolerance, mm.
-        tolerance_mm: f64,
+        tolerance_mm: f64 = Domain::Length { positive: true },
     }
 }
 
@@ -30,16 +30,6 @@ impl Kind for OutOfTolerance {
                 Basis::Cells(self.smoothing_px),
                 "of {tolerance_mm} mm over {smoothing_px} px",
             )
-        }
-    }
-
-    fn check(&self) -> Result<(), String> {
-        let (tolerance_mm, [_, most]) = (self.tolerance_mm, Unit::Length.range());
-        match tolerance_mm > 0.0 && tolerance_mm <= most {
-            true => Ok(()),
-            false => Err(format!(
-                "has a tolerance_mm of {tolerance_mm:?}: write more than 0, up to {most} mm"
-            )),
         }
     }
 

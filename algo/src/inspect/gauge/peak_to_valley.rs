@@ -7,7 +7,7 @@ kind! {
     /// The highest less the lowest cell, mm.
     PeakToValley {
         /// Side of the cells, pixels.
-        smoothing_px: usize,
+        smoothing_px: usize = Domain::Pixels { odd: false },
     }
 }
 

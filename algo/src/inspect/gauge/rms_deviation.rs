@@ -7,7 +7,7 @@ kind! {
     /// The root of the mean square of the cells' deviations from golden along its normal, mm.
     RmsDeviation {
         /// Side of the cells, pixels.
-        smoothing_px: usize,
+        smoothing_px: usize = Domain::Pixels { odd: false },
     }
 }
 

@@ -3,18 +3,14 @@
 use super::kind::*;
 use crate::inspect::feature::{Plane, weight};
 
-/// An axis of the world.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-pub enum Axis {
-    /// x.
-    X,
-    /// y.
-    Y,
+words! {
+    /// An axis of the world.
+    Axis {
+        /// x.
+        X: "x",
+        /// y.
+        Y: "y",
+    }
 }
 
 kind! {
@@ -22,7 +18,7 @@ kind! {
     /// the plane z = 0.
     Tilt {
         /// The axis.
-        about: Axis,
+        about: Axis = Axis::WORDS,
     }
 }
 

@@ -6,23 +6,13 @@ kind! {
     /// The volume between the surface and the plane z = `above_mm`, mm³, negative below it.
     Volume {
         /// z of the plane, mm.
-        above_mm: f64,
+        above_mm: f64 = Domain::Length { positive: false },
     }
 }
 
 impl Kind for Volume {
     fn facts(&self) -> Facts {
         Facts::new(Unit::Volume, Basis::Region, "above {above_mm} mm")
-    }
-
-    fn check(&self) -> Result<(), String> {
-        let (above_mm, [least, most]) = (self.above_mm, Unit::Length.range());
-        match (least..=most).contains(&above_mm) {
-            true => Ok(()),
-            false => Err(format!(
-                "measures a volume with above_mm = {above_mm:?}: write {least} to {most} mm"
-            )),
-        }
     }
 
     /// Each cell's area in x and y as taught times its height.

@@ -1,7 +1,6 @@
 //! The gauges of a cycle that is timed: those of the recipe, or many of one kind.
 
-use algo::inspect::kinds::{Distance, MeanHeight, Z};
-use algo::inspect::{FeatureKind, Measure};
+use algo::inspect::{Basis, FeatureKind, Measure};
 use appliance::recipe::{FeatureFile, GaugeFile, RecipeFile};
 
 /// Where the regions lie, as shares of the frame: on the plate of the default part.
@@ -44,11 +43,11 @@ impl Gauges {
 
     /// Gives them to a recipe for frames of (width, height).
     pub fn replace(self, file: &mut RecipeFile, (width, height): (u32, u32)) {
-        let (count, kinds): (usize, &[Measure]) = match self {
+        let (count, kinds) = match self {
             Self::Taught => return,
-            Self::Means(count) => (count, &[Measure::MeanHeight(MeanHeight {})]),
-            Self::Planes(count) => (count, &[Measure::Z(Z {})]),
-            Self::Distances(count) => (count, &[Measure::Z(Z {}), Measure::Distance(Distance {})]),
+            Self::Means(count) => (count, kinds(Basis::Region, &[1])),
+            Self::Planes(count) => (count, kinds(Basis::Geometry, &[1])),
+            Self::Distances(count) => (count, kinds(Basis::Geometry, &[1, 2])),
         };
         let name = |at: usize| format!("region {}", at % count);
         let rows = count.div_ceil(COLUMNS);
@@ -88,4 +87,16 @@ impl Gauges {
         }
         file.judges_nothing = true;
     }
+}
+
+/// The first kind in the table that is worked out from this, for each of these numbers of features.
+fn kinds(basis: Basis, features: &[usize]) -> Vec<Measure> {
+    let first = |&count: &usize| {
+        let mut all = Measure::examples().into_iter();
+        all.find(|kind| {
+            let facts = kind.facts();
+            facts.basis == basis && facts.takes.len() == count
+        })
+    };
+    features.iter().filter_map(first).collect()
 }

@@ -69,6 +69,7 @@ const SHARED: &[(&str, &str, &str)] = &[
     ("recipe list", "config", "names the state"),
     ("recipe list", "state", "where the recipes are"),
     ("recipe list", "json", "the list"),
+    ("recipe kinds", "json", "the table"),
     ("recipe export", "config", "names the state"),
     ("recipe export", "state", "where the recipes are"),
     ("recipe export", "quiet", "no closing line"),

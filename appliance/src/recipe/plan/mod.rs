@@ -125,6 +125,7 @@ impl Plan {
             features,
             gauges,
             mut arrays,
+            ..
         } = recipe;
         let two_frames = sequences
             .iter()

@@ -13,19 +13,21 @@ use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecipeReference};
 
 impl Plan {
-    /// Keeps only the longest sequence whose frames are all among those that show these shots of
-    /// its own pattern (`None` for frames of another one): a head that plays a recording has no
-    /// other frames. If there is no such sequence, nothing changes.
-    pub fn only(mut self, shown: &[Option<Shot>]) -> Self {
+    /// The longest sequence whose frames are all among those that show these shots of its own
+    /// pattern (`None` for frames of another one), and which of them its frames are.
+    pub fn sequence_among(&self, shown: &[Option<Shot>]) -> Option<(usize, Vec<usize>)> {
         let indices = |sequence| -> Option<Vec<usize>> {
             let place = |shot| shown.iter().position(|other| *other == Some(shot));
             self.shots(sequence).map(place).collect()
         };
-        let sequences = (0..self.sequence_count()).rev();
-        let found = sequences
-            .into_iter()
-            .find_map(|at| Some((at, indices(at)?)));
-        if let Some((sequence, indices)) = found {
+        let mut sequences = (0..self.sequence_count()).rev();
+        sequences.find_map(|at| Some((at, indices(at)?)))
+    }
+
+    /// Keeps only the sequence of [`Self::sequence_among`]: a head that plays a recording has no
+    /// other frames. If there is no such sequence, nothing changes.
+    pub fn only(mut self, shown: &[Option<Shot>]) -> Self {
+        if let Some((sequence, indices)) = self.sequence_among(shown) {
             let first = self.shots[self.runs[sequence].indices[0]];
             let run = self.runs.swap_remove(sequence);
             self.runs = vec![Run { indices, ..run }];

@@ -24,8 +24,7 @@ pub(super) fn of(
         false => 0,
     };
     for gauge in gauges {
-        let side = gauge.measure.facts().basis.square_side();
-        let margin = away + side.map_or(0, |side| side.max(widest) / 2);
+        let margin = away + gauge.measure.facts().margin_px(widest);
         let features = gauge.of.iter().filter_map(|&at| features.get(at));
         for (row, columns) in features.flat_map(|feature| feature.region.spans()) {
             let left = columns.start.saturating_sub(margin);

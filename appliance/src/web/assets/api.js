@@ -22,11 +22,14 @@ export async function ask(method, path, body) {
   return response.json().catch(() => null);
 }
 
-// What gauges can measure, and the one of these kinds that a gauge is of: that with the same fields, if its unit depends on them.
-export async function loadKinds() { return (await ask("GET", "/api/kinds")).kinds; }
-export function kindOf(kinds, measures) {
-  const own = kinds.filter((one) => one.measures.kind === measures.kind);
-  return own.find((one) => Object.keys(one.measures).every((key) => one.measures[key] === measures[key])) || own[0];
+// The table of what gauges can measure; the kind of a gauge; and its unit with the limits that it can have, which a word may decide.
+export function loadKinds() { return ask("GET", "/api/kinds"); }
+export function kindOf({ kinds }, gauge) { return kinds.find((one) => one.kind === gauge.kind); }
+export function unitOf(table, gauge) {
+  const { parameters, unit } = kindOf(table, gauge);
+  const chosen = parameters.flatMap(({ name, choices = [] }) => choices.filter(({ word }) => word === gauge[name]));
+  const own = chosen.length ? chosen[0].unit : unit;
+  return table.units.find((one) => one.unit === own);
 }
 
 // A picture, to be drawn on a canvas.

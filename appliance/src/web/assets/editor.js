@@ -1,21 +1,19 @@
-// Edits a recipe: regions by dragging on the picture of the part as taught, limits and names in fields.
+// Edits a recipe: regions of features by dragging on the picture of the part as taught, parameters, limits and names in fields.
 import { $, draw, fill, make, show, text } from "./element.js";
-import { ask, kindOf, loadKinds, map } from "./api.js";
+import { ask, kindOf, loadKinds, map, unitOf } from "./api.js";
 import { paint } from "./colour.js";
 import { change, notice } from "./session.js";
 import { choose } from "./question.js";
 
-const state = { recipe: null, map: null, kinds: [], chosen: [0, 0], drag: null, wide: 1 };
+const state = { recipe: null, map: null, kinds: null, chosen: [0, 0], drag: null, wide: 1 };
 
 // Factor and symbol of a gauge's limits as people write them, and the smallest and largest limit that the station accepts.
 function unit({ unit: symbol, low, high }) {
   return symbol ? [1, symbol, low, high] : [100, "%", 100 * low, 100 * high];
 }
 
-// "deviation over 9 px", "step from other region", "tilt about x".
-function words(measures, kind) {
-  return `${measures.kind.replace(/_/g, " ")} ${kind.words.replace(/\{(\w+)\}/g, (_, key) => measures[key])}`.trim();
-}
+// The name of a kind or word as people read it.
+const spoken = (word) => word.replace(/_/g, " ");
 
 export async function edit(number) {
   try {
@@ -33,6 +31,7 @@ export async function edit(number) {
   state.wide = recipe.camera.width;
   $("editor-regions").setAttribute("viewBox", `0 0 ${recipe.camera.width} ${recipe.camera.height}`);
   state.chosen = [0, 0];
+  fill($("gauge-kind"), ...state.kinds.kinds.map((one) => new Option(spoken(one.kind), one.kind)));
   show("editor", true);
   drawRegions();
   drawGauges();
@@ -61,19 +60,19 @@ function drawRegions() {
   // Camera pixels per pixel of the screen, so that touch targets have the same size on every screen.
   const scale = state.wide / ($("editor-regions").getBoundingClientRect().width || state.wide);
   const parts = [];
-  recipe.regions.forEach((region, at) => {
-    const corners = region.polygon.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
+  recipe.features.forEach(({ region }, at) => {
+    const corners = region.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
     const own = at === chosen[0] ? " chosen" : "";
     const inside = draw("polygon", { points: corners, class: `region${own}`, "vector-effect": "non-scaling-stroke" });
     inside.addEventListener("pointerdown", (event) => begin(event, at, -1));
     parts.push(inside);
   });
-  const region = recipe.regions[chosen[0]];
-  if (region) {
-    region.polygon.forEach(([u, v], corner) => {
+  const feature = recipe.features[chosen[0]];
+  if (feature) {
+    feature.region.forEach(([u, v], corner) => {
       const kind = `handle${corner === chosen[1] ? " chosen" : ""}`;
-      const [x, y] = outside(region.polygon, corner, scale), side = TARGET * scale;
-      const handle = draw("g", { class: kind, tabindex: 0, role: "button", "aria-label": `corner ${corner + 1} of region ${region.name}: column ${u.toFixed(0)}, row ${v.toFixed(0)}` },
+      const [x, y] = outside(feature.region, corner, scale), side = TARGET * scale;
+      const handle = draw("g", { class: kind, tabindex: 0, role: "button", "aria-label": `corner ${corner + 1} of region ${feature.name}: column ${u.toFixed(0)}, row ${v.toFixed(0)}` },
         draw("rect", { x: x - side / 2, y: y - side / 2, width: side, height: side, class: "target" }),
         draw("line", { x1: u + 0.5, y1: v + 0.5, x2: x, y2: y, "vector-effect": "non-scaling-stroke" }),
         draw("circle", { cx: x, cy: y, r: GRIP * scale, class: "grip", "vector-effect": "non-scaling-stroke" }));
@@ -81,7 +80,7 @@ function drawRegions() {
       handle.addEventListener("keydown", (event) => nudge(event, corner));
       parts.push(handle);
     });
-    text("editor-cursor", `region ${region.name}, ${region.polygon.length} corners: drag a corner, or the region by its inside; arrow keys move the chosen corner`);
+    text("editor-cursor", `${feature.kind} ${feature.name}, ${feature.region.length} corners: drag a corner, or the region by its inside; arrow keys move the chosen corner`);
   }
   fill($("editor-regions"), ...parts);
 }
@@ -95,7 +94,7 @@ function place(event) {
 function begin(event, region, corner) {
   event.preventDefault();
   state.chosen = [region, Math.max(0, corner)];
-  state.drag = { region, corner, from: place(event), was: state.recipe.regions[region].polygon.map((point) => point.slice()) };
+  state.drag = { region, corner, from: place(event), was: state.recipe.features[region].region.map((point) => point.slice()) };
   $("editor-regions").setPointerCapture(event.pointerId);
   drawRegions();
 }
@@ -111,7 +110,7 @@ function drag(event) {
   if (!held) return;
   const to = place(event);
   const by = [to[0] - held.from[0], to[1] - held.from[1]];
-  const { polygon } = state.recipe.regions[held.region];
+  const polygon = state.recipe.features[held.region].region;
   held.was.forEach((point, at) => {
     if (held.corner < 0 || held.corner === at) polygon[at] = inside([point[0] + by[0], point[1] + by[1]]);
   });
@@ -123,7 +122,7 @@ function nudge(event, corner) {
   if (!steps) return;
   event.preventDefault();
   const far = event.shiftKey ? 10 : 1;
-  const { polygon } = state.recipe.regions[state.chosen[0]];
+  const polygon = state.recipe.features[state.chosen[0]].region;
   state.chosen = [state.chosen[0], corner];
   polygon[corner] = inside([polygon[corner][0] + far * steps[0], polygon[corner][1] + far * steps[1]]);
   drawRegions();
@@ -143,12 +142,46 @@ function field(value, label, [factor, symbol, least, most], set) {
   return input;
 }
 
+// What limits may come from.
+const SOURCES = ["nominal", "golden", "plus", "minus"];
+
+// "deviation over 9 px": the kind's name and its words, with a field for each parameter in them.
+function measures(gauge, kind) {
+  const fields = kind.words.split(/\{(\w+)\}/).map((part, at) => (at % 2 ? parameter(gauge, kind.parameters.find(({ name }) => name === part)) : part));
+  const cell = make("td", "", `${spoken(gauge.kind)} `, ...fields);
+  cell.title = kind.about;
+  return cell;
+}
+
+// The field of a parameter: a list of its words, or a number.
+function parameter(gauge, { name, about, choices, unit: symbol, above, least = above, most, odd }) {
+  const input = make(choices ? "select" : "input", choices ? "" : "limit");
+  input.setAttribute("aria-label", `${spoken(name)} of ${gauge.name}`);
+  input.title = about;
+  if (choices) {
+    fill(input, ...choices.map(({ word }) => new Option(spoken(word), word)));
+    input.value = gauge[name];
+    input.addEventListener("change", () => { gauge[name] = input.value; drawGauges(); });
+    return input;
+  }
+  const pixels = symbol === "px";
+  const { width, height } = state.recipe.camera;
+  Object.assign(input, { type: "number", required: true, min: least, max: most || Math.max(width, height), step: pixels ? (odd ? 2 : 1) : "any", value: gauge[name] });
+  input.addEventListener("input", () => { gauge[name] = Number(input.value); });
+  return input;
+}
+
 function drawGauges() {
   const { recipe } = state;
   const row = (gauge) => {
-    const kind = kindOf(state.kinds, gauge.measures);
-    const units = unit(kind);
-    const limit = (key) => (value) => { if (value === null) delete gauge[key]; else gauge[key] = value; check(); };
+    const kind = kindOf(state.kinds, gauge);
+    const units = unit(unitOf(state.kinds, gauge));
+    // A limit that is written here comes from nothing else.
+    const limit = (key) => (value) => {
+      for (const source of SOURCES) delete gauge[source];
+      if (value === null) delete gauge[key]; else gauge[key] = value;
+      check();
+    };
     const low = field(gauge.low, `lowest ${gauge.name}`, units, limit("low"));
     const high = field(gauge.high, `highest ${gauge.name}`, units, limit("high"));
     // The browser's own messages do not name the gauge.
@@ -160,10 +193,11 @@ function drawGauges() {
       }
     };
     check();
-    const line = make("tr", "", make("td", "", gauge.name), make("td", "", words(gauge.measures, kind)), make("td", "", gauge.region || "whole part"),
+    const of = gauge.of || [];
+    const line = make("tr", "", make("td", "", String(gauge.slot)), make("td", "", gauge.name), measures(gauge, kind), make("td", "", of.join(", ") || "whole part"),
       make("td", "", low), make("td", "", high), make("td", "", units[1]));
     line.addEventListener("focusin", () => {
-      const at = recipe.regions.findIndex((region) => region.name === gauge.region);
+      const at = recipe.features.findIndex((feature) => feature.name === of[0]);
       if (at >= 0 && at !== state.chosen[0]) { state.chosen = [at, 0]; drawRegions(); }
     });
     return line;
@@ -171,27 +205,36 @@ function drawGauges() {
   fill($("editor-gauges"), ...recipe.gauges.map(row));
 }
 
-// Adds a region in the middle of the part, with a gauge of the deviation there.
-function addRegion() {
+// Adds a gauge of the chosen kind, with its defaults or as one of this kind has them, and a region in the middle of the part for each
+// feature that it takes.
+function addGauge() {
   const { recipe } = state;
   const { width, height } = recipe.camera;
-  const name = (what, taken) => {
+  const kind = kindOf(state.kinds, { kind: $("gauge-kind").value });
+  const named = (what, taken) => {
     let number = 1;
     while (taken.some((other) => other.name === `${what} ${number}`)) number += 1;
     return `${what} ${number}`;
   };
-  const region = name("region", recipe.regions);
-  const box = [[0.4, 0.4], [0.6, 0.4], [0.6, 0.6], [0.4, 0.6]].map(([x, y]) => [Math.round(x * width), Math.round(y * height)]);
-  recipe.regions.push({ name: region, polygon: box });
-  const like = recipe.gauges.find((gauge) => gauge.measures.kind === "deviation");
-  recipe.gauges.push({ name: name("deviation", recipe.gauges), region, measures: like ? Object.assign({}, like.measures) : { kind: "deviation", smoothing_px: 9 }, low: like ? like.low : -0.25, high: like ? like.high : 0.25 });
-  state.chosen = [recipe.regions.length - 1, 0];
+  const of = kind.takes.map(([takes], place) => {
+    const name = named("region", recipe.features);
+    const [left, right] = [0.4, 0.6].map((share) => Math.round((share - 0.25 * place) * width)), [top, bottom] = [0.4, 0.6].map((share) => Math.round(share * height));
+    recipe.features.push({ name, kind: takes, region: [[left, top], [right, top], [right, bottom], [left, bottom]] });
+    return name;
+  });
+  const like = recipe.gauges.find((gauge) => gauge.kind === kind.kind) || {};
+  const gauge = { slot: 1, name: named(spoken(kind.kind), recipe.gauges), kind: kind.kind, of, low: like.low, high: like.high };
+  while (recipe.gauges.some(({ slot }) => slot === gauge.slot)) gauge.slot += 1;
+  for (const { name, default: value } of kind.parameters) gauge[name] = name in like ? like[name] : value;
+  recipe.gauges.push(gauge);
+  recipe.gauges.sort((one, other) => one.slot - other.slot);
+  if (of.length) state.chosen = [recipe.features.length - of.length, 0];
   drawRegions();
   drawGauges();
 }
 
 function addCorner() {
-  const { polygon } = state.recipe.regions[state.chosen[0]];
+  const polygon = state.recipe.features[state.chosen[0]].region;
   const at = state.chosen[1], next = (at + 1) % polygon.length;
   polygon.splice(at + 1, 0, inside([(polygon[at][0] + polygon[next][0]) / 2, (polygon[at][1] + polygon[next][1]) / 2]));
   state.chosen = [state.chosen[0], at + 1];
@@ -199,7 +242,7 @@ function addCorner() {
 }
 
 function removeCorner() {
-  const { polygon } = state.recipe.regions[state.chosen[0]];
+  const polygon = state.recipe.features[state.chosen[0]].region;
   if (polygon.length <= 3) { text("editor-words", "a region has at least three corners"); return; }
   polygon.splice(state.chosen[1], 1);
   state.chosen = [state.chosen[0], 0];
@@ -209,7 +252,7 @@ function removeCorner() {
 function save(event) {
   event.preventDefault();
   const { recipe } = state;
-  const body = { fingerprint: recipe.fingerprint, name: $("editor-name").value, part_number: $("editor-part").value, guard_k: Number($("editor-guard").value), regions: recipe.regions, gauges: recipe.gauges };
+  const body = { fingerprint: recipe.fingerprint, name: $("editor-name").value, part_number: $("editor-part").value, guard_k: Number($("editor-guard").value), features: recipe.features, gauges: recipe.gauges };
   change(async () => {
     if (recipe.gauges.every((gauge) => gauge.low === undefined && gauge.high === undefined)) {
       const words = "No gauge has a limit. Every part that can be measured passes, whatever its shape; each result says so.";
@@ -230,7 +273,7 @@ export function start() {
   svg.addEventListener("pointermove", drag);
   for (const end of ["pointerup", "pointercancel"]) svg.addEventListener(end, () => { state.drag = null; });
   window.addEventListener("resize", () => { if (state.recipe && !$("editor").hidden) drawRegions(); });
-  $("region-add").addEventListener("click", addRegion);
+  $("gauge-add").addEventListener("click", addGauge);
   $("corner-add").addEventListener("click", addCorner);
   $("corner-remove").addEventListener("click", removeCorner);
   $("editor-close").addEventListener("click", () => show("editor", false));

@@ -7,7 +7,7 @@ import { drawScale } from "./scale.js";
 import { signed } from "./number.js";
 
 const UNITS = { mm: 3, counts: 1 };
-const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, kinds: [], recipeKey: "", asked: 0, at: [0, 0] };
+const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, kinds: null, recipeKey: "", asked: 0, at: [0, 0] };
 
 // The recipe's gauges that failed or could not be measured in the result.
 function failing() {
@@ -19,7 +19,7 @@ function failing() {
   });
 }
 
-// Draws the regions; those of failed gauges are emphasised.
+// Draws the regions of the features; those of failed gauges are emphasised.
 function drawOutlines() {
   const svg = $("outlines");
   if (!state.map) { fill(svg); return; }
@@ -27,22 +27,22 @@ function drawOutlines() {
   if (!state.recipe || !state.result) { over(svg, about, ...rings(about, decisive())); return; }
   const bad = new Map();
   for (const { gauge, kind } of failing()) {
-    for (const name of [gauge.region, gauge.from]) if (name && bad.get(name) !== "fail") bad.set(name, kind);
+    for (const name of gauge.of || []) if (bad.get(name) !== "fail") bad.set(name, kind);
   }
-  const outline = (region, kind) => {
-    const corners = region.polygon.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
+  const outline = ({ region }, kind) => {
+    const corners = region.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
     return draw("polygon", { points: corners, class: kind, "vector-effect": "non-scaling-stroke" });
   };
-  const { regions } = state.recipe;
-  const quiet = regions.filter((region) => !bad.has(region.name)).map((region) => outline(region, "quiet"));
-  const loud = regions.filter((region) => bad.has(region.name));
-  over(svg, about, ...quiet, ...loud.map((region) => outline(region, "under")), ...loud.map((region) => outline(region, bad.get(region.name))), ...rings(about, decisive()));
+  const { features } = state.recipe;
+  const quiet = features.filter((one) => !bad.has(one.name)).map((one) => outline(one, "quiet"));
+  const loud = features.filter((one) => bad.has(one.name));
+  over(svg, about, ...quiet, ...loud.map((one) => outline(one, "under")), ...loud.map((one) => outline(one, bad.get(one.name))), ...rings(about, decisive()));
 }
 
 // The regions of failed gauges that compare the part with golden, so that a place in the picture explains why they fail, and have no square of their own.
 function deviating() {
-  const names = failing().filter(({ gauge, kind, square }) => kind === "fail" && !square && kindOf(state.kinds, gauge.measures).compares).map(({ gauge }) => gauge.region);
-  return state.recipe ? state.recipe.regions.filter((region) => names.includes(region.name)) : [];
+  const names = failing().filter(({ gauge, kind, square }) => kind === "fail" && !square && kindOf(state.kinds, gauge).compares).flatMap(({ gauge }) => gauge.of);
+  return state.recipe ? state.recipe.features.filter((one) => names.includes(one.name)) : [];
 }
 
 // Whether a point lies inside a polygon: then an odd number of edges lies on one side of it.
@@ -70,7 +70,7 @@ function most(map) {
   for (let v = 0; v < height; v += 1) {
     for (let u = 0; u < width; u += 1) {
       const size = Math.abs(map.values[v * width + u]);
-      if (size > best && regions.some((region) => inside(region.polygon, u * stride, v * stride))) { best = size; at = { column: u * stride, row: v * stride, side: stride }; }
+      if (size > best && regions.some(({ region }) => inside(region, u * stride, v * stride))) { best = size; at = { column: u * stride, row: v * stride, side: stride }; }
     }
   }
   return at ? [at] : [];

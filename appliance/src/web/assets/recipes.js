@@ -39,11 +39,11 @@ function row(recipe) {
   return line;
 }
 
-// "bracket with 2 regions and 4 gauges"
+// "bracket with 2 features and 4 gauges"
 function content(recipe) {
   if (recipe.error) return "a file that cannot be read";
   const number = (many, what) => `${many} ${what}${many === 1 ? "" : "s"}`;
-  return `${recipe.name} with ${number(recipe.regions, "region")} and ${number(recipe.gauges, "gauge")}`;
+  return `${recipe.name} with ${number(recipe.features, "feature")} and ${number(recipe.gauges, "gauge")}`;
 }
 
 function remover(recipe) {
@@ -130,8 +130,8 @@ async function consent(number) {
   await list();
   const taken = stored.find((recipe) => recipe.number === number);
   if (!taken) return {};
-  const words = `It is ${content(taken)}. Regions and gauges are made anew, or kept; regions that are kept stay where they are in the picture. Name and part number stay, and Undo in the list of recipes brings this version back.`;
-  const keep = taken.error ? [] : [["Replace, keep regions and gauges", { replace: true, keep_gauges: true }]];
+  const words = `It is ${content(taken)}. Features and gauges are made anew, or kept; features that are kept stay where they are in the picture. Name and part number stay, and Undo in the list of recipes brings this version back.`;
+  const keep = taken.error ? [] : [["Replace, keep features and gauges", { replace: true, keep_gauges: true }]];
   return choose(`Replace recipe ${number}?`, words, keep.concat([["Replace, with new gauges", { replace: true }]]));
 }
 

@@ -39,6 +39,13 @@ async fn the_description_names_exactly_the_paths_that_are_answered() {
 }
 
 #[tokio::test]
+async fn the_table_of_kinds_is_the_one_that_the_command_prints() {
+    let served = served().await;
+    let table = serde_json::to_value(crate::recipe::Kinds::all()).unwrap();
+    assert_eq!(served.get("/api/kinds").await.json(), table);
+}
+
+#[tokio::test]
 async fn every_answer_has_a_status_that_the_description_names() {
     let served = served().await;
     let cookie = served.sign_in().await;
