@@ -29,7 +29,7 @@ const MEMBERS: [&str; 11] = [
 ];
 
 /// Keys of `recipe.json`, version 3, in a taught recipe. Do not change these either.
-const KEYS: [&str; 86] = [
+const KEYS: [&str; 103] = [
     "alignment",
     "calibration",
     "camera",
@@ -86,6 +86,23 @@ const KEYS: [&str; 86] = [
     "judges_nothing",
     "least_modulation",
     "min_coverage",
+    "models",
+    "models.camera",
+    "models.camera.cx",
+    "models.camera.cy",
+    "models.camera.distortion",
+    "models.camera.fx",
+    "models.camera.fy",
+    "models.camera.rotation",
+    "models.camera.translation_mm",
+    "models.projector",
+    "models.projector.cx",
+    "models.projector.cy",
+    "models.projector.distortion",
+    "models.projector.fx",
+    "models.projector.fy",
+    "models.projector.rotation",
+    "models.projector.translation_mm",
     "name",
     "noise_counts",
     "number",
@@ -118,7 +135,8 @@ const KEYS: [&str; 86] = [
     "version",
 ];
 /// Keys that `recipe.json` may have in addition, and members of the recipe.
-const OPTIONAL: [&str; 18] = [
+const OPTIONAL: [&str; 19] = [
+    "models.plane",
     "calibration_sigma",
     "height_mm",
     "length_mm",

@@ -324,22 +324,7 @@ fn a_component_that_the_shape_does_not_determine_is_invalid_and_is_named() {
     let mut bed = bed(&scenario(Part::Plane(Plane::default())));
     let taught = taught(&mut bed).unwrap();
     let file = RecipeFile {
-        gauges: vec![
-            gauge(
-                "z",
-                "",
-                kinds::Placement {
-                    component: Component::Z,
-                },
-            ),
-            gauge(
-                "x",
-                "",
-                kinds::Placement {
-                    component: Component::X,
-                },
-            ),
-        ],
+        gauges: vec![of_part("z", Component::Z), of_part("x", Component::X)],
         ..taught.manifest.clone()
     };
     let plan = plan(&bed, &file, &taught.recipe.arrays);

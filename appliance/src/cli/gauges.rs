@@ -1,15 +1,13 @@
 //! `fringed recipe gauges`: features, datum systems and gauges of a recipe's file as text.
 
-use super::options::{Files, Json};
+use super::options::Json;
 use crate::error::{Exit, Failure, Result};
-use crate::head::calibration::Calibration;
-use crate::production::backend;
+use crate::recipe::RecipeFile;
 use crate::recipe::archive::{self, Arrays};
 use crate::recipe::gauges_toml::{Gauging, MAX_TEXT};
 use crate::recipe::golden::TaughtRecipe;
-use crate::recipe::plan::{Plan, PlanError};
-use crate::recipe::{Recipe, RecipeFile};
-use crate::station::{GaugeValue, Inspection};
+use crate::recipe::plan::Plan;
+use crate::station::GaugeValue;
 use crate::storage::folder::write_whole;
 use serde_json::{Value, json};
 use std::fs::File;
@@ -26,12 +24,9 @@ pub struct Gauges {
     /// Print them as TOML.
     #[arg(long)]
     get: bool,
-    /// Replace them by those of this file, and print what the part that was taught has. Limits by
-    /// golden, masters and these values are measured with the calibration of the configured head.
+    /// Replace them by those of this file, and print what the part that was taught has.
     #[arg(long, value_name = "FILE.toml")]
     set: Option<PathBuf>,
-    #[command(flatten)]
-    files: Files,
     #[command(flatten)]
     json: Json,
 }
@@ -64,27 +59,14 @@ impl Gauges {
         let (before, arrays) = self.unpacked()?;
         let what = format!("set the gauges of {}", self.recipe.display());
         let unfit = |error: String| Failure::because(Exit::Content, &what, error);
-        // Opened only once it is known that the text fits the recipe.
-        let mut opened = None;
-        let mut head = || -> Result<Calibration, String> {
-            let calibration = self.calibration().map_err(|error| error.to_string())?;
-            opened = Some(calibration.clone());
-            Ok(calibration)
-        };
-        let taught = gauging
-            .set((before.clone(), arrays), &mut head)
-            .map_err(unfit)?;
-        let head = match opened {
-            Some(calibration) => Ok(calibration),
-            None => self.calibration().map_err(|error| error.to_string()),
-        };
         let TaughtRecipe {
             bytes,
             manifest,
             recipe,
             ..
-        } = taught;
-        let (golden, note) = golden(recipe, head).map_err(unfit)?;
+        } = gauging.set(&before, arrays).map_err(unfit)?;
+        let head = manifest.head().map_err(unfit)?;
+        let golden = Plan::judge_golden(recipe, &head).map_err(|error| unfit(error.to_string()))?;
         let changed = manifest.differences(&before);
         let same = RecipeFile {
             fingerprint: before.fingerprint.clone(),
@@ -98,21 +80,17 @@ impl Gauges {
                 manifest.fingerprint
             }
         };
-        let gauges = golden.iter().flat_map(|golden| &golden.gauges);
         if self.json.json {
-            let gauges: Vec<Value> = gauges.map(of_golden).collect();
+            let gauges: Vec<Value> = golden.gauges.iter().map(of_golden).collect();
             let answer = json!({
-                "fingerprint": fingerprint, "changed": changed, "gauges": gauges, "note": note,
+                "fingerprint": fingerprint, "changed": changed, "gauges": gauges,
             });
             say!("{answer:#}");
             return Ok(());
         }
         say!("fingerprint {fingerprint:.8}: {changed}");
-        for gauge in gauges {
+        for gauge in &golden.gauges {
             say!("{}", words(gauge));
-        }
-        if let Some(note) = note {
-            say!("{note}");
         }
         Ok(())
     }
@@ -123,32 +101,6 @@ impl Gauges {
         let what = format!("read {}", self.recipe.display());
         let size = size.map_err(Exit::Missing.because(&what))?;
         archive::unpack(file, size).map_err(Exit::Content.because(&what))
-    }
-
-    fn calibration(&self) -> Result<Calibration> {
-        backend::calibration(&self.files.head(&self.files.configuration()?))
-    }
-}
-
-/// What golden has; or nothing, and why, if the recipe was not made on this head.
-///
-/// # Errors
-/// In words: the recipe cannot be used.
-fn golden(
-    recipe: Recipe,
-    head: Result<Calibration, String>,
-) -> Result<(Option<Inspection>, Option<String>), String> {
-    let unknown = |reason: String| {
-        Ok((
-            None,
-            Some(format!("what golden has is not known: {reason}")),
-        ))
-    };
-    match head.map(|head| Plan::judge_golden(recipe, &head)) {
-        Ok(Ok(found)) => Ok((Some(found), None)),
-        Ok(Err(error @ PlanError::Unfit { .. })) => Err(error.to_string()),
-        Ok(Err(error)) => unknown(error.to_string()),
-        Err(reason) => unknown(reason),
     }
 }
 

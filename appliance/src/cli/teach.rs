@@ -161,7 +161,7 @@ impl Teach {
             shared.map_err(Exit::CannotCreate.because("teach"))?;
         }
         let pool = options.threads.pool(config.threads)?;
-        let (taught, head) = match &self.golden {
+        let taught = match &self.golden {
             Some(golden) => pool.install(|| self.teach_recordings(golden, &naming))?,
             None => self.teach_head(&config, &pool, &naming)?,
         };
@@ -172,7 +172,7 @@ impl Teach {
         };
         let taught = match replaced.filter(|_| self.keep_gauges) {
             Some(file) => pool
-                .install(|| replace::keep_gauges(taught, &file, &head))
+                .install(|| replace::keep_gauges(taught, &file))
                 .map_err(&unfit)?,
             None => taught,
         };
@@ -231,7 +231,7 @@ impl Teach {
         config: &Config,
         pool: &rayon::ThreadPool,
         naming: &Naming,
-    ) -> Result<(TaughtRecipe, Calibration)> {
+    ) -> Result<TaughtRecipe> {
         let options = &self.measuring;
         let progress = options.output.progress();
         let on_progress = |share: f64| progress.tell(share, "working out the light of the scene");
@@ -254,14 +254,10 @@ impl Teach {
             };
             Failure::new(exit, error)
         })?;
-        Ok((taught, calibration))
+        Ok(taught)
     }
 
-    fn teach_recordings(
-        &self,
-        folder: &Path,
-        naming: &Naming,
-    ) -> Result<(TaughtRecipe, Calibration)> {
+    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<TaughtRecipe> {
         let recording = Recording::open(folder)?;
         let manifest = folder.join("recording.json");
         let wrong = |error: &dyn std::fmt::Display| {
@@ -328,6 +324,6 @@ impl Teach {
             let words = "levels that are unwrapped by beats are for teaching alone: cycles take the finest one, about the golden phase";
             taught.choice.reasons.push(words.into());
         }
-        Ok((taught, calibration))
+        Ok(taught)
     }
 }

@@ -85,7 +85,7 @@ impl Worker {
         })?;
         match kept {
             Some(file) => {
-                let kept = || replace::keep_gauges(taught, file, calibration);
+                let kept = || replace::keep_gauges(taught, file);
                 let kept = self.computing.on(|| self.pool.install(kept));
                 kept.map_err(TeachError::Rig)
             }

@@ -243,6 +243,7 @@ impl Recipe {
             }
         };
         let function = function.map_err(|error| format!("projector and pattern: {error}"))?;
+        file.head()?;
         Ok(Self {
             sequences: sequences(file)?,
             features: features(&file.features, (width, height))?,

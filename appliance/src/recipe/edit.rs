@@ -5,7 +5,6 @@ use super::golden::TaughtRecipe;
 use super::judging::check_unique;
 use super::store::LoadedRecipe;
 use super::{ChangeError, DatumFile, FeatureFile, GaugeFile, Recipe, RecipeFile, Store};
-use crate::head::calibration::Calibration;
 use hal::bounds::clipped;
 use serde::Deserialize;
 
@@ -55,7 +54,6 @@ pub fn edit(
     store: &Store,
     number: u16,
     edit: Edit,
-    head: Option<&Calibration>,
     fits: impl FnOnce(Recipe) -> Result<(), String>,
 ) -> Result<Edited, ChangeError> {
     let LoadedRecipe {
@@ -81,7 +79,7 @@ pub fn edit(
     }
     file.set_gauges_of(&before).map_err(ChangeError::Unfit)?;
     // Tighter limits may need a longer sequence, wider ones a shorter one.
-    let changed = TaughtRecipe::of(file, recipe.arrays, head).map_err(ChangeError::Unfit)?;
+    let changed = TaughtRecipe::of(file, recipe.arrays).map_err(ChangeError::Unfit)?;
     fits(changed.recipe).map_err(ChangeError::Unfit)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
     match store.replace(number, &edit.fingerprint, &changed.bytes) {

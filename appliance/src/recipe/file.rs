@@ -5,7 +5,8 @@ pub use super::feature::LONGEST_NAME;
 use super::feature::{DatumFile, FeatureFile};
 use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
-use crate::head::calibration::CalibrationSigma;
+use super::models::ModelsFile;
+use crate::head::calibration::{Calibration, CalibrationSigma};
 use crate::head::exposing::Exposing;
 use crate::station::control::MAX_RECIPE;
 use algo::pattern::Shot;
@@ -100,6 +101,8 @@ bounded! {
         pub golden_captures: usize = 1..=MAX_CAPTURES,
         /// The least modulation that is trusted, in counts of an 8-bit sample.
         pub least_modulation: f64 = LEAST_MODULATION,
+        /// The models of the head that it was taught with.
+        pub models: ModelsFile = Fields,
         /// σ by the uncertainty of the calibration that the recipe was made for; `None` where it is
         /// not known.
         #[serde(skip_serializing_if = "Option::is_none")]
@@ -193,6 +196,24 @@ pub enum PatternFile {
     },
     /// Φ_P in the member `phase_function.npy`.
     File,
+}
+
+impl RecipeFile {
+    /// The head that it was taught with, as far as it is needed to measure golden.
+    ///
+    /// # Errors
+    /// In words: a model is absurd, and why.
+    pub fn head(&self) -> Result<Calibration, String> {
+        let CameraFile {
+            width,
+            height,
+            bit_depth,
+        } = self.camera;
+        let raster = (self.projector.width, self.projector.height);
+        let frames = (width, height, bit_depth);
+        let (noise, sigma) = (self.noise_counts, self.calibration_sigma);
+        self.models.head(frames, raster, noise, sigma)
+    }
 }
 
 impl PatternFile {

@@ -8,7 +8,6 @@ use super::file::RecipeFile;
 use super::gauge_keys::placeless;
 use super::golden::TaughtRecipe;
 use super::{DatumFile, FeatureFile, GaugeFile};
-use crate::head::calibration::Calibration;
 use hal::bounds::{clipped, shortened};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -103,17 +102,11 @@ impl Gauging {
         text
     }
 
-    /// The recipe with these features, datum systems and gauges; `head` measures golden where a
-    /// gauge needs it.
+    /// The recipe with these features, datum systems and gauges.
     ///
     /// # Errors
     /// In words: they do not fit each other or the recipe.
-    pub fn set(
-        self,
-        recipe: (RecipeFile, Arrays),
-        head: impl FnOnce() -> Result<Calibration, String>,
-    ) -> Result<TaughtRecipe, String> {
-        let (before, arrays) = recipe;
+    pub fn set(self, before: &RecipeFile, arrays: Arrays) -> Result<TaughtRecipe, String> {
         let mut file = RecipeFile {
             features: self.features,
             datums: self.datums,
@@ -121,11 +114,9 @@ impl Gauging {
             ..before.clone()
         };
         file.gauges.sort_by_key(|gauge| gauge.slot);
-        file.set_gauges_of(&before)?;
+        file.set_gauges_of(before)?;
         file.check_bounds()?;
-        let needed = file.gauges.iter().any(GaugeFile::needs_golden);
-        let head = needed.then(head).transpose()?;
-        TaughtRecipe::of(file, arrays, head.as_ref())
+        TaughtRecipe::of(file, arrays)
     }
 }
 

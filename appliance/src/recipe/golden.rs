@@ -5,6 +5,7 @@ use super::captures::Offsets;
 use super::comparison::ComparisonFile;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::good_parts::DEVIATION_MM;
+use super::models::ModelsFile;
 use super::planner::{self, Choice};
 use super::sides::SIDES;
 use super::{AlignmentKind, FeatureFile, GaugeFile, PatternFile, Recipe, RecipeFile};
@@ -196,6 +197,7 @@ impl GoldenPart<'_> {
             golden_offset_counts: self.offset_counts,
             golden_captures: self.captures,
             least_modulation: self.decoder.least_modulation().eight_bit(),
+            models: ModelsFile::of(calibration),
             calibration_sigma: calibration.sigma,
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,

@@ -4,7 +4,7 @@
 //!   `gauge_keys` its gauges, `kinds` the table of what they can measure, [`tolerance`] and
 //!   `gauge_limits` what their limits come from, `references` which features they name, [`bounds`]
 //!   the bounds of lists and of values that depend on others, [`archive`] the ZIP with its
-//!   fingerprint, [`gauges_toml`] features, datum systems and gauges as text for people.
+//!   fingerprint, [`models`] the head that it was taught with, [`gauges_toml`] features, datum systems and gauges as text for people.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot
 //!   judge, [`plan`] joins that with the head's calibration; `light` tells bad light from bad
 //!   parts, `recorded` finds the recipe's pattern in a recording,
@@ -48,6 +48,7 @@ mod kinds;
 mod light;
 mod limits;
 mod median;
+pub mod models;
 mod outline;
 pub mod plan;
 pub mod planner;

@@ -6,7 +6,6 @@ use super::golden::TaughtRecipe;
 use super::plan::Plan;
 use super::planner;
 use super::{GaugeFile, Recipe, RecipeFile};
-use crate::head::calibration::Calibration;
 use algo::inspect::Findings;
 use hal::bounds::clipped;
 
@@ -16,26 +15,20 @@ const TURNS: usize = 3;
 
 impl TaughtRecipe {
     /// Works out limits and masters, chooses the production sequence for the gauges of a manifest,
-    /// and packs it with its arrays. `head` is what golden is measured by, where a gauge needs it.
+    /// and packs it with its arrays.
     ///
     /// # Errors
     /// In words, if they do not fit each other, or golden has no value where one is needed.
-    pub(super) fn of(
-        mut manifest: RecipeFile,
-        arrays: Arrays,
-        head: Option<&Calibration>,
-    ) -> Result<Self, String> {
+    pub(super) fn of(mut manifest: RecipeFile, arrays: Arrays) -> Result<Self, String> {
         manifest.gauges.sort_by_key(|gauge| gauge.slot);
         let choose = |of: &RecipeFile| planner::choose(&of.sequences, &of.gauges, arrays.widest());
         let mut choice = choose(&manifest);
         manifest.production = choice.production;
         if manifest.gauges.iter().any(GaugeFile::needs_golden) {
-            let head = head.ok_or(
-                "no calibrated head is open, by which golden is measured for limits and masters: open one, or write low and high",
-            )?;
+            let head = manifest.head()?;
             for _ in 0..TURNS {
                 let recipe = Recipe::fit(&manifest, arrays.clone())?;
-                let found = Plan::golden(recipe, head).map_err(|error| error.to_string())?;
+                let found = Plan::golden(recipe, &head).map_err(|error| error.to_string())?;
                 manifest.follow(&found)?;
                 choice = choose(&manifest);
                 if choice.production == manifest.production {

@@ -2,7 +2,6 @@
 
 use super::golden::{Naming, TaughtRecipe};
 use super::{RecipeFile, Store};
-use crate::head::calibration::Calibration;
 
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
@@ -87,16 +86,11 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
 
 /// Gives a recipe that was just taught the features, datum systems, gauges, guard band and least
 /// coverage of the one that it replaces, and its two frames if it begins with them. Limits that
-/// come from golden follow the new one, which `head` measured; the production sequence is chosen
-/// again for the limits.
+/// come from golden follow the new one; the production sequence is chosen again for the limits.
 ///
 /// # Errors
 /// In words, if they do not fit what was taught.
-pub fn keep_gauges(
-    taught: TaughtRecipe,
-    replaced: &RecipeFile,
-    head: &Calibration,
-) -> Result<TaughtRecipe, String> {
+pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<TaughtRecipe, String> {
     let TaughtRecipe {
         mut manifest,
         recipe,
@@ -113,5 +107,5 @@ pub fn keep_gauges(
     // The prediction is for the limits that teaching sets.
     manifest.good_parts = None;
     manifest.tried = Vec::new();
-    TaughtRecipe::of(manifest, recipe.arrays, Some(head))
+    TaughtRecipe::of(manifest, recipe.arrays)
 }

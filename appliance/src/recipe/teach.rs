@@ -147,7 +147,7 @@ pub fn teach_while(
     words.extend(proof::hold(&mut taught.manifest, &judged));
     if !words.is_empty() {
         let reasons = taught.choice.reasons;
-        let again = computing.on(|| TaughtRecipe::of(taught.manifest, taught.recipe.arrays, None));
+        let again = computing.on(|| TaughtRecipe::of(taught.manifest, taught.recipe.arrays));
         taught = again.map_err(TeachError::Rig)?;
         taught.choice.reasons = reasons.into_iter().chain(words).collect();
     }

@@ -138,8 +138,7 @@ pub(super) async fn edit(
             note = tried(site, recipe)?;
             Ok(())
         };
-        let head = site.calibration.get();
-        let edited = edit::edit(&site.recipes, number, wanted, head.as_deref(), fits)?;
+        let edited = edit::edit(&site.recipes, number, wanted, fits)?;
         Ok((edited, note))
     });
     let (edited, note) = edited.await?;

@@ -60,8 +60,7 @@ pub fn gauges_toml(data: &[u8]) {
     let again = Gauging::from_toml(&gauging.to_toml()).expect("what was written can be read");
     assert_eq!(again.to_toml(), gauging.to_toml());
     let part = &*PART;
-    let recipe = (part.file.clone(), part.recipe.arrays.clone());
-    if let Ok(taught) = gauging.set(recipe, || Ok(part.calibration.clone()))
+    if let Ok(taught) = gauging.set(&part.file, part.recipe.arrays.clone())
         && let Ok(plan) = Plan::new(taught.recipe, &part.calibration, true)
     {
         part.judge(&plan);
@@ -97,7 +96,7 @@ pub fn edit(data: &[u8]) {
             let tried = Plan::try_out(recipe, &part.calibration);
             tried.map_err(|error| error.to_string())
         };
-        if edit::edit(&stored.store, 1, wanted, Some(&part.calibration), fits).is_ok() {
+        if edit::edit(&stored.store, 1, wanted, fits).is_ok() {
             let loaded = stored.store.load(1).expect("what was taken can be loaded");
             assert_eq!(loaded.fallback, None);
             let plan = Plan::new(loaded.recipe, &part.calibration, true).expect("and planned");

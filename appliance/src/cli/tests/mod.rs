@@ -73,8 +73,6 @@ const SHARED: &[(&str, &str, &str)] = &[
     ("recipe export", "config", "names the state"),
     ("recipe export", "state", "where the recipes are"),
     ("recipe export", "quiet", "no closing line"),
-    ("recipe gauges", "config", "which head"),
-    ("recipe gauges", "state", "where its calibration is"),
     ("recipe gauges", "json", "what golden has"),
     ("recipe import", "config", "which head, and the state"),
     (

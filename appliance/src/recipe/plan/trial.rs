@@ -28,27 +28,24 @@ impl Plan {
     }
 
     /// What the recipe measures of golden, that is, of a part that lies as taught and is seen
-    /// without noise by the first of its sequences; σ is that of one measurement. On one thread as
-    /// [`Plan::try_out`].
+    /// without noise by the first of its sequences; σ is that of one measurement. `head` has the
+    /// models that it was taught with. On one thread as [`Plan::try_out`].
     ///
     /// # Errors
-    /// As [`Plan::new`].
-    pub fn golden(recipe: Recipe, calibration: &Calibration) -> Result<Findings, PlanError> {
+    /// As [`Plan::again`].
+    pub fn golden(recipe: Recipe, head: &Calibration) -> Result<Findings, PlanError> {
         alone(recipe, |recipe| {
-            golden(recipe, calibration).map(|(_, found)| found)
+            golden(recipe, head).map(|(_, found)| found)
         })
     }
 
     /// As [`Plan::golden`], judged as a part is.
     ///
     /// # Errors
-    /// As [`Plan::new`].
-    pub fn judge_golden(
-        recipe: Recipe,
-        calibration: &Calibration,
-    ) -> Result<Inspection, PlanError> {
+    /// As [`Plan::again`].
+    pub fn judge_golden(recipe: Recipe, head: &Calibration) -> Result<Inspection, PlanError> {
         alone(recipe, |recipe| {
-            let (plan, found) = golden(recipe, calibration)?;
+            let (plan, found) = golden(recipe, head)?;
             let mut laps = Laps::since(Instant::now());
             Ok(plan.judged((0, &[]), Ok((found, None)), &mut laps))
         })
@@ -71,14 +68,14 @@ fn alone<T: Send>(
 }
 
 /// A plan, and what it finds of golden.
-fn golden(recipe: Recipe, calibration: &Calibration) -> Result<(Plan, Findings), PlanError> {
+fn golden(recipe: Recipe, head: &Calibration) -> Result<(Plan, Findings), PlanError> {
     let number = recipe.id.number;
     let unfit = |reason: String| PlanError::Unfit { number, reason };
     // Two frames compare pictures, and golden's is by the sequence behind them.
     let planned = recipe.sequences.iter().position(|of| !of.is_pair());
     let sequence = planned.ok_or_else(|| unfit("it has no sequence".into()))?;
     let light = recipe.light(sequence);
-    let plan = Plan::new(recipe, calibration, false)?;
+    let plan = Plan::again(recipe, head, false)?;
     let production = &plan.runs[sequence].production;
     let (map, decoder) = (production.map(), production.decoder());
     let surface = production.cubics().surface();
