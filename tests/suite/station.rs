@@ -78,7 +78,7 @@ fn a_retried_token_measures_once_and_refused_requests_change_nothing() {
     assert_eq!((long(&words, 6), long(&words, 28)), (0x1004D, 0x2004D));
     assert_eq!((done.seq(), done.triggers()), (before.seq() + 1, 1));
     assert_eq!(done.missed(), 0);
-    for (address, count) in [(40, 1), (120, 20), (1100, 1)] {
+    for (address, count) in [(40, 1), (120, 20), (1190, 1)] {
         assert_eq!(
             plc.read(address, count),
             Err(ExceptionCode::IllegalDataAddress)

@@ -160,6 +160,10 @@ mod tests {
 
     /// A small whole recipe.
     fn packed(number: u16, name: &str, calibration: &str) -> Vec<u8> {
+        let device = json!({
+            "fx": 10.0, "fy": 10.0, "cx": 1.5, "cy": 1.5, "distortion": [0.0, 0.0, 0.0, 0.0, 0.0],
+            "rotation": [1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0], "translation_mm": [0.0, 0.0, 600.0],
+        });
         let file = json!({
             "format": FORMAT, "version": VERSION, "fingerprint": "", "number": number, "part_number": "", "name": name,
             "taught_by": "a test", "taught_at_unix_s": 0, "calibration": calibration,
@@ -168,6 +172,7 @@ mod tests {
             "sequences": [{ "kind": "full", "frames": [[1.0, 0.0], [1.0, 0.25], [1.0, 0.5], [1.0, 0.75]], "sigma_mm": 0.01, "safe_share": 1.0 }],
             "production": 0, "two_frames": false, "placement_tolerance_mm": 1.0, "alignment": "none", "range_mm": [0.0, 1.0],
             "exposures": 1, "noise_counts": 1.0, "read_noise_counts": 1.0, "shot_noise": 0.0, "golden_captures": 1,
+            "models": { "camera": device, "projector": device },
             "least_modulation": 16.0, "expansion_range_turns": 0.5, "min_coverage": 0.8, "guard_k": 0.0,
             "judges_nothing": false, "tried": [],
             "features": [{ "name": "frame", "kind": "surface", "region": [[-0.5, -0.5], [3.5, -0.5], [3.5, 3.5], [-0.5, 3.5]] }],
