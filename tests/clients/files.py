@@ -62,6 +62,7 @@ def recipe(program, folder):
         rows, columns = rows_and_columns["camera"]
         others = {
             "phase_function.npy": rows_and_columns["projector"],
+            "golden_signal.npy": (rows, 2 * columns),
             "sequence_offset.npy": ((len(manifest["sequences"]) - 1) * rows, columns),
         }
         arrays = [name for name in archive.namelist() if name.endswith(".npy")]
