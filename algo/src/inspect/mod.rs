@@ -1,7 +1,6 @@
 //! What a height map says about a part: regions, gauges and the comparison with the golden map.
 
 mod align;
-pub mod contour;
 mod feature;
 mod gauge;
 pub mod good;
