@@ -3,7 +3,7 @@
 
 use crate::station_plc::Place;
 use crate::written::program;
-use appliance::recipe::gauges_toml::{Gauging, unpack};
+use appliance::recipe::gauges_toml::Gauging;
 use appliance::recipe::{Recipe, RecipeFile, archive};
 use serde_json::Value;
 use std::fs;
@@ -255,7 +255,7 @@ fn hostile(random: &mut Random, base: &str) -> String {
 fn hostile_texts_are_refused_by_name_at_once_and_nothing_is_written() {
     let bench = Bench::new();
     let (base, bytes) = (bench.get(), fs::read(&bench.recipe).unwrap());
-    let (file, arrays) = unpack(&bytes).unwrap();
+    let (file, arrays) = files::recipe(&bytes);
     let mut random = Random::new(SEED);
     for case in 0..TEXTS {
         let text = hostile(&mut random, &base);
@@ -299,7 +299,7 @@ fn hostile_texts_are_refused_by_name_at_once_and_nothing_is_written() {
 fn hostile_recipes_are_refused_and_the_stored_one_stays() {
     let bench = Bench::new();
     let (base, bytes) = (bench.get(), fs::read(&bench.recipe).unwrap());
-    let (file, arrays) = unpack(&bytes).unwrap();
+    let (file, arrays) = files::recipe(&bytes);
     let stored = fs::read(bench.place.recipe()).unwrap();
     let mut random = Random::new(SEED + 1);
     let mut by_program = 0;

@@ -5,8 +5,9 @@ use super::options::{Files, Json};
 use crate::config::MAX_RESULTS;
 use crate::error::{Exit, Failure, Result};
 use crate::history::{Entry, Filter, HistoryError, Reader, time};
+use crate::station::Verdict;
 use crate::station::control::MAX_RECIPE;
-use crate::station::{Decision, Verdict};
+use crate::station::gauge::decision;
 use crate::system::journal::{self, Severity};
 use std::io::{self, BufWriter, StdoutLock, Write};
 
@@ -187,7 +188,7 @@ fn row(entry: &Entry) -> String {
             Some(value) => format!("{} {value:+.3} {}", gauge.name, gauge.unit)
                 .trim_end()
                 .to_owned(),
-            None if gauge.decision & Decision::ABSENT != 0 => format!("{} absent", gauge.name),
+            None if gauge.decision & decision::ABSENT != 0 => format!("{} absent", gauge.name),
             None => format!("{} not measured", gauge.name),
         })
         .collect();

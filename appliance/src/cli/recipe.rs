@@ -12,7 +12,7 @@ use crate::error::{Exit, Failure, Result};
 use crate::production::backend;
 use crate::recipe::exchange::{Destination, Listed};
 use crate::recipe::plan::Plan;
-use crate::recipe::{ChangeError, Kinds, LoadError, Store};
+use crate::recipe::{ChangeError, LoadError, Store, kinds};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::state::StateFolder;
 use std::path::PathBuf;
@@ -90,10 +90,9 @@ impl RecipeCommand {
                 Ok(())
             }
             Self::Kinds { json } => {
-                let kinds = Kinds::all();
                 match json.json {
-                    true => say!("{:#}", serde_json::json!(kinds)),
-                    false => say!("{}", kinds.table()),
+                    true => say!("{:#}", kinds::json()),
+                    false => say!("{}", kinds::table()),
                 }
                 Ok(())
             }

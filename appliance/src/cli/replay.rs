@@ -8,8 +8,9 @@ use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, GaugeEntry, Reader, difference, seq_of};
 use crate::recipe::plan::PlanError;
 use crate::recipe::{Outline, Recipe, State, Store};
+use crate::station::gauge::decision;
 use crate::station::result::flag::SIMULATED;
-use crate::station::{Decision, Inspection, ResultRecord, Square};
+use crate::station::{Inspection, ResultRecord, Square};
 use crate::storage::unpack::Unpacked;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -217,7 +218,7 @@ fn detailed(entry: &Entry, outline: &Outline) -> Result<Value> {
     }
     let state = |slot: u16| match entry.gauges.iter().find(|gauge| gauge.slot == slot) {
         Some(gauge) if gauge.value.is_some() => State::Found,
-        Some(gauge) if gauge.decision & Decision::ABSENT != 0 => State::Absent,
+        Some(gauge) if gauge.decision & decision::ABSENT != 0 => State::Absent,
         _ => State::Unseen,
     };
     shown["features"] = serde_json::json!(outline.features(state));

@@ -314,56 +314,101 @@ pub const OLDEST_GAUGES_SIGMA: Block = oldest("OLDEST_GAUGES_SIGMA", 2600, GAUGE
 /// Block OLDEST_GAUGES_U: the layout of GAUGES_U.
 pub const OLDEST_GAUGES_U: Block = oldest("OLDEST_GAUGES_U", 2800, GAUGES_U);
 
-/// Every block with the one whose layout it has, and the rows of that, by address.
-pub const BLOCKS: [(Block, Block, &[Register]); 23] = [
-    (CONTROL, CONTROL, at::control::ROWS),
-    (STATUS, STATUS, at::status::ROWS),
-    (RESULT, RESULT, at::result::ROWS),
-    (OLDEST, RESULT, at::result::ROWS),
-    (GAUGE_DETAIL, GAUGE_DETAIL, at::gauge_detail::ROWS),
-    (HEALTH, HEALTH, at::health::ROWS),
+/// What the values of a block come from.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Source {
+    /// What holds now.
+    Now(fn(&mut Words, &Snapshot)),
+    /// The newest result.
+    Newest(fn(&mut Words, &ResultRecord)),
+    /// The oldest result that was not acknowledged.
+    Oldest(fn(&mut Words, &ResultRecord)),
+}
+
+/// Every block with its rows by address, those of its layout, and what its values come from.
+pub(super) const BLOCKS: [(Block, &[Register], Source); 23] = [
+    (CONTROL, at::control::ROWS, Source::Now(control)),
+    (STATUS, at::status::ROWS, Source::Now(status)),
+    (RESULT, at::result::ROWS, Source::Newest(result)),
+    (OLDEST, at::result::ROWS, Source::Oldest(result)),
     (
-        RECIPE_DIRECTORY,
+        GAUGE_DETAIL,
+        at::gauge_detail::ROWS,
+        Source::Newest(gauge_detail),
+    ),
+    (HEALTH, at::health::ROWS, Source::Now(health)),
+    (
         RECIPE_DIRECTORY,
         at::recipe_directory::ROWS,
+        Source::Now(recipe_directory),
     ),
-    (IDENTITY, IDENTITY, at::identity::ROWS),
+    (IDENTITY, at::identity::ROWS, Source::Now(identity)),
     (
         GAUGE_UNCERTAINTY,
-        GAUGE_UNCERTAINTY,
         at::gauge_uncertainty::ROWS,
+        Source::Newest(gauge_uncertainty),
     ),
-    (GAUGES, GAUGES, at::gauges::ROWS),
-    (GAUGES_VALUE, GAUGES_VALUE, at::gauges_value::ROWS),
-    (GAUGES_STEPS, GAUGES_STEPS, at::gauges_steps::ROWS),
-    (GAUGES_SIGMA, GAUGES_SIGMA, at::gauges_sigma::ROWS),
-    (GAUGES_U, GAUGES_U, at::gauges_u::ROWS),
-    (OLDEST_GAUGES, GAUGES, at::gauges::ROWS),
-    (OLDEST_GAUGES_VALUE, GAUGES_VALUE, at::gauges_value::ROWS),
-    (OLDEST_GAUGES_STEPS, GAUGES_STEPS, at::gauges_steps::ROWS),
-    (OLDEST_GAUGES_SIGMA, GAUGES_SIGMA, at::gauges_sigma::ROWS),
-    (OLDEST_GAUGES_U, GAUGES_U, at::gauges_u::ROWS),
-    (GAUGES_UNIT, GAUGES_UNIT, at::gauges_unit::ROWS),
-    (GAUGES_LOW, GAUGES_LOW, at::gauges_low::ROWS),
-    (GAUGES_HIGH, GAUGES_HIGH, at::gauges_high::ROWS),
-    (GAUGES_NAME, GAUGES_NAME, at::gauges_name::ROWS),
+    (GAUGES, at::gauges::ROWS, Source::Newest(gauges)),
+    (
+        GAUGES_VALUE,
+        at::gauges_value::ROWS,
+        Source::Newest(gauges_value),
+    ),
+    (
+        GAUGES_STEPS,
+        at::gauges_steps::ROWS,
+        Source::Newest(gauges_steps),
+    ),
+    (
+        GAUGES_SIGMA,
+        at::gauges_sigma::ROWS,
+        Source::Newest(gauges_sigma),
+    ),
+    (GAUGES_U, at::gauges_u::ROWS, Source::Newest(gauges_u)),
+    (OLDEST_GAUGES, at::gauges::ROWS, Source::Oldest(gauges)),
+    (
+        OLDEST_GAUGES_VALUE,
+        at::gauges_value::ROWS,
+        Source::Oldest(gauges_value),
+    ),
+    (
+        OLDEST_GAUGES_STEPS,
+        at::gauges_steps::ROWS,
+        Source::Oldest(gauges_steps),
+    ),
+    (
+        OLDEST_GAUGES_SIGMA,
+        at::gauges_sigma::ROWS,
+        Source::Oldest(gauges_sigma),
+    ),
+    (
+        OLDEST_GAUGES_U,
+        at::gauges_u::ROWS,
+        Source::Oldest(gauges_u),
+    ),
+    (
+        GAUGES_UNIT,
+        at::gauges_unit::ROWS,
+        Source::Newest(gauges_unit),
+    ),
+    (GAUGES_LOW, at::gauges_low::ROWS, Source::Newest(gauges_low)),
+    (
+        GAUGES_HIGH,
+        at::gauges_high::ROWS,
+        Source::Newest(gauges_high),
+    ),
+    (
+        GAUGES_NAME,
+        at::gauges_name::ROWS,
+        Source::Newest(gauges_name),
+    ),
 ];
-
-impl Block {
-    /// The block whose layout it has: itself, but for those that show the oldest result.
-    pub fn layout(self) -> Self {
-        let mut blocks = BLOCKS.into_iter();
-        blocks
-            .find(|(block, ..)| *block == self)
-            .map_or(self, |(_, layout, _)| layout)
-    }
-}
 
 /// Every row of the map with its address and block.
 pub fn registers() -> impl Iterator<Item = (Block, Register)> {
-    BLOCKS.into_iter().flat_map(|(block, layout, rows)| {
+    BLOCKS.into_iter().flat_map(|(block, rows, _)| {
         rows.iter().map(move |row| {
-            let address = block.first + (row.address - layout.first);
+            let address = block.first + (row.address - rows[0].address);
             (block, Register { address, ..*row })
         })
     })

@@ -14,89 +14,23 @@
 
 use super::map::{Block, Kind, Register, registers};
 use super::render::{access, reference};
+use crate::station::control;
+use crate::station::gauge::decision;
+use crate::station::health::power;
+use crate::station::result::flag;
+use crate::station::snapshot::{status, warning};
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// The names of the bits of a row, from bit 0 on; rows by slot have more bits, one per slot.
 const BITS: [(&str, &[&str]); 9] = [
-    (
-        "CONTROL",
-        &[
-            "ONLINE",
-            "TRIGGER",
-            "RESULT_ACK",
-            "RECIPE_LOAD",
-            "ERROR_RESET",
-            "ABORT",
-            "BUFFERED",
-            "TEACH",
-        ],
-    ),
-    (
-        "STATUS",
-        &[
-            "ONLINE",
-            "READY",
-            "BUSY",
-            "PROCESSING",
-            "EXPOSURE_DONE",
-            "RESULT_VALID",
-            "RESULT_TOGGLE",
-            "TRIGGER_ACK",
-            "RECIPE_LOADING",
-            "RECIPE_OK",
-            "WARNING",
-            "ERROR",
-            "MISSED_TRIGGER",
-            "BUFFER_OVERFLOW",
-            "WARMING_UP",
-            "CALIBRATION_VALID",
-        ],
-    ),
-    (
-        "WARNING",
-        &[
-            "TEMPERATURE",
-            "STORAGE",
-            "PLC_LOST",
-            "CLOCK_UNSYNCED",
-            "LOW_LIGHT",
-            "SATURATION",
-            "PATTERN_UNFIT",
-            "FRAME_SLIP",
-            "POWER",
-            "GEOMETRY",
-        ],
-    ),
-    (
-        "FLAGS",
-        &[
-            "RETRIED",
-            "SINGLE_LEVEL",
-            "TWO_LEVELS",
-            "FULL_SEQUENCE",
-            "STEPPED_UP",
-            "SIMULATED",
-            "WARM_UP",
-            "DOUBTFUL",
-            "JUDGES_NOTHING",
-        ],
-    ),
-    ("GAUGE_DECISION", DECISION),
-    ("DECISION", DECISION),
-    (
-        "POWER",
-        &[
-            "UNDER_VOLTAGE",
-            "CAPPED",
-            "THROTTLED",
-            "SOFT_LIMIT",
-            "UNDER_VOLTAGE_SINCE_START",
-            "CAPPED_SINCE_START",
-            "THROTTLED_SINCE_START",
-            "SOFT_LIMIT_SINCE_START",
-        ],
-    ),
+    ("CONTROL", control::NAMES),
+    ("STATUS", status::NAMES),
+    ("WARNING", warning::NAMES),
+    ("FLAGS", flag::NAMES),
+    ("GAUGE_DECISION", decision::NAMES),
+    ("DECISION", decision::NAMES),
+    ("POWER", power::NAMES),
     (
         "PROJECTOR_FAULT",
         &[
@@ -113,7 +47,6 @@ const BITS: [(&str, &[&str]); 9] = [
     // Numbers of recipes, without names.
     ("STORED_RECIPES", &[]),
 ];
-const DECISION: &[&str] = &["PASS", "VALID", "LOW", "HIGH", "DOUBTFUL", "ABSENT"];
 
 /// A gauge of a recipe, for the descriptions.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -121,7 +121,7 @@ impl Keys {
         let values = values.map(|(key, value)| format!("{}:{value}", json!(key)));
         let text = format!("{{{}}}", values.collect::<Vec<_>>().join(","));
         let measures = serde_json::from_str(&text).map_err(placeless)?;
-        let (_, known) = parameters(&measures);
+        let known = parameters(&measures);
         let unknown = |key: &&(String, _)| key.0 != "kind" && !known.contains_key(&key.0);
         match keys.iter().find(unknown) {
             Some((key, _)) => Err(format!("it has an unknown key {:?}", clipped(key))),
@@ -130,36 +130,18 @@ impl Keys {
     }
 }
 
-/// The name of a kind, and its parameters by their names.
-fn parameters(measure: &Measure) -> (String, Map<String, Value>) {
+/// The parameters of a kind by their names.
+fn parameters(measure: &Measure) -> Map<String, Value> {
     let Ok(Value::Object(mut all)) = serde_json::to_value(measure) else {
-        return Default::default();
+        return Map::new();
     };
-    let kind = all.remove("kind");
-    let name = kind.as_ref().and_then(Value::as_str);
-    (name.unwrap_or_default().to_owned(), all)
+    all.remove("kind");
+    all
 }
 
 impl<'de> Deserialize<'de> for GaugeFile {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         Self::read(Keys::deserialize(from)?).map_err(D::Error::custom)
-    }
-}
-
-/// Why keys make no gauge.
-enum Refused {
-    /// A limit is no number.
-    Limit {
-        unit: crate::station::Unit,
-        which: &'static str,
-        text: String,
-    },
-    Words(String),
-}
-
-impl From<String> for Refused {
-    fn from(words: String) -> Self {
-        Self::Words(words)
     }
 }
 
@@ -169,54 +151,46 @@ impl GaugeFile {
         let name = keys.read("name", "the gauge's name in quotes")?;
         let name: String = name.ok_or("a gauge has no name: add one")?;
         let named = |error: String| format!("gauge {:?}: {error}", clipped(&name));
-        let gauge = Self::of_keys(keys, &name).map_err(|refused| match refused {
-            Refused::Limit { unit, which, text } => {
-                no_limit(&clipped(&name), unit, which, text) + " as a number"
+        let limits = ["low", "high"].map(|which| (which, keys.take(which)));
+        let mut gauge = Self::without_limits(keys, &name).map_err(named)?;
+        for (which, limit) in limits {
+            let Some(text) = limit else { continue };
+            let limit = serde_json::from_str(text.get()).map_err(|_| {
+                let unit = gauge.measures.facts().unit;
+                no_limit(&clipped(&name), unit, which, clipped(text.get())) + " as a number"
+            })?;
+            match which {
+                "low" => gauge.low = limit,
+                _ => gauge.high = limit,
             }
-            Refused::Words(words) => named(words),
-        })?;
+        }
+        if gauge.low.is_none() && gauge.high.is_none() {
+            gauge.set_limits();
+        }
         gauge.check_sources().map_err(named)?;
         Ok(gauge)
     }
 
-    fn of_keys(mut keys: Keys, name: &str) -> Result<Self, Refused> {
+    fn without_limits(mut keys: Keys, name: &str) -> Result<Self, String> {
         let slot = keys.read("slot", "a whole number from 1 to 64")?;
-        let slot = slot.ok_or_else(|| "it has no slot: write 1 to 64".to_owned())?;
+        let slot = slot.ok_or("it has no slot: write 1 to 64")?;
         let of: Vec<String> = keys
             .read("of", "a list of names of features")?
             .unwrap_or_default();
-        let datum = keys.read("datum", "the name of a datum system")?;
-        let limits = [keys.take("low"), keys.take("high")];
-        let (tolerance, master) = (keys.tolerance()?, keys.master()?);
-        let golden_value = keys.number("golden_value")?;
-        let measures = keys.measures()?;
-        let unit = measures.facts().unit;
-        let read = |which, limit: Option<Box<RawValue>>| match limit {
-            None => Ok(None),
-            Some(limit) => serde_json::from_str(limit.get()).map_err(|_| Refused::Limit {
-                unit,
-                which,
-                text: clipped(limit.get()),
-            }),
-        };
-        let [low, high] = limits;
         let mut gauge = Self {
             slot,
             name: name.to_owned(),
-            measures,
             of,
-            datum,
-            low: read("low", low)?,
-            high: read("high", high)?,
-            tolerance,
-            master,
-            golden_value,
+            datum: keys.read("datum", "the name of a datum system")?,
+            low: None,
+            high: None,
+            tolerance: keys.tolerance()?,
+            master: keys.master()?,
+            golden_value: keys.number("golden_value")?,
+            measures: keys.measures()?,
         };
         if !gauge.needs_golden() {
             gauge.golden_value = None;
-        }
-        if gauge.low.is_none() && gauge.high.is_none() {
-            gauge.set_limits();
         }
         Ok(gauge)
     }
@@ -251,20 +225,14 @@ impl GaugeFile {
         Ok(())
     }
 
-    /// The name of its kind in recipes.
-    pub fn kind_name(&self) -> String {
-        parameters(&self.measures).0
-    }
-
     /// Its keys with their values, in the order in which they are written.
     pub(super) fn keys(&self) -> Vec<(String, Value)> {
-        let (kind, parameters) = parameters(&self.measures);
         let mut keys = vec![
             ("slot".to_owned(), json!(self.slot)),
             ("name".to_owned(), json!(self.name)),
-            ("kind".to_owned(), json!(kind)),
+            ("kind".to_owned(), json!(self.measures.name())),
         ];
-        keys.extend(parameters);
+        keys.extend(parameters(&self.measures));
         let (nominal, golden) = match self.tolerance.map(|tolerance| tolerance.about) {
             None => (None, None),
             Some(About::Nominal(nominal)) => (Some(nominal), None),

@@ -3,7 +3,7 @@
 //! What is worked out is left out: limits that come from a nominal value or from golden, and what
 //! golden has. So the text that is written for a recipe is read as what it was written for.
 
-use super::archive::{self, Arrays};
+use super::archive::Arrays;
 use super::file::RecipeFile;
 use super::gauge_keys::placeless;
 use super::golden::TaughtRecipe;
@@ -118,14 +118,6 @@ impl Gauging {
         file.check_bounds()?;
         TaughtRecipe::of(file, arrays)
     }
-}
-
-/// Unpacks a recipe to be changed.
-///
-/// # Errors
-/// As [`archive::unpack`].
-pub fn unpack(bytes: &[u8]) -> Result<(RecipeFile, Arrays), String> {
-    archive::unpack(std::io::Cursor::new(bytes), bytes.len() as u64)
 }
 
 /// A gauge from its table.

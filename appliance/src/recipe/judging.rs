@@ -54,7 +54,7 @@ impl RecipeFile {
             true => Err(format!(
                 "gauge {:?} measures the {} of {region:?} from itself, which is 0 whatever the part: name another feature",
                 gauge.name,
-                gauge.kind_name()
+                gauge.measures.name()
             )),
             false => Ok(()),
         }

@@ -1,7 +1,7 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
 //! - On disk: [`mod@file`] is the manifest, [`feature`] its features and datum systems, `gauge` and
-//!   `gauge_keys` its gauges, `kinds` the table of what they can measure, [`tolerance`] and
+//!   `gauge_keys` its gauges, [`kinds`] the table of what they can measure, [`tolerance`] and
 //!   `gauge_limits` what their limits come from, `references` which features they name, [`bounds`]
 //!   the bounds of lists and of values that depend on others, [`archive`] the ZIP with its
 //!   fingerprint, [`models`] the head that it was taught with, [`gauges_toml`] features, datum systems and gauges as text for people.
@@ -44,7 +44,7 @@ pub mod good_parts;
 mod illumination;
 pub mod incoming;
 mod judging;
-mod kinds;
+pub mod kinds;
 mod light;
 mod limits;
 mod median;
@@ -72,6 +72,5 @@ pub use file::{
     AlignmentKind, PatternFile, RecipeFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };
 pub use gauge::GaugeFile;
-pub use kinds::Kinds;
 pub use outline::{Outline, State};
 pub use store::{ChangeError, LoadError, Store};

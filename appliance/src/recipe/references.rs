@@ -61,7 +61,7 @@ impl RecipeFile {
     fn check_of(&self, gauge: &GaugeFile) -> Result<(), String> {
         let what = format!("gauge {:?}", clipped(&gauge.name));
         let takes = gauge.measures.facts().takes;
-        let kind = gauge.kind_name();
+        let kind = gauge.measures.name();
         if gauge.of.len() != takes.len() {
             return Err(format!(
                 "{what} is of {} features: {kind} takes {}",

@@ -5,6 +5,24 @@ use std::sync::Arc;
 pub use algo::inspect::Unit;
 use serde::{Deserialize, Serialize};
 
+/// Bits of a [`Decision`].
+pub mod decision {
+    bits! {
+        /// See [`Decision::pass`](super::Decision::pass).
+        PASS = 0;
+        /// See [`Decision::valid`](super::Decision::valid).
+        VALID = 1;
+        /// See [`Decision::low`](super::Decision::low).
+        LOW = 2;
+        /// See [`Decision::high`](super::Decision::high).
+        HIGH = 3;
+        /// See [`Decision::doubtful`](super::Decision::doubtful).
+        DOUBTFUL = 4;
+        /// See [`Decision::absent`](super::Decision::absent).
+        ABSENT = 5;
+    }
+}
+
 /// What was decided about one gauge: bits 0–5 of registers 296–311 and 1116–1179.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Decision {
@@ -44,22 +62,18 @@ impl From<(Option<f64>, Option<f64>)> for GaugeLimits {
 }
 
 impl Decision {
-    /// The bit of what is absent.
-    pub const ABSENT: u16 = 1 << 5;
-
     /// The bits of registers 296–311 and 1116–1179.
     pub fn bits(self) -> u16 {
-        [
-            self.pass,
-            self.valid,
-            self.low,
-            self.high,
-            self.doubtful,
-            self.absent,
-        ]
-        .iter()
-        .enumerate()
-        .fold(0, |bits, (k, &set)| bits | (u16::from(set) << k))
+        let all = [
+            (decision::PASS, self.pass),
+            (decision::VALID, self.valid),
+            (decision::LOW, self.low),
+            (decision::HIGH, self.high),
+            (decision::DOUBTFUL, self.doubtful),
+            (decision::ABSENT, self.absent),
+        ];
+        let set = all.iter().filter(|(_, set)| *set);
+        set.fold(0, |bits, (bit, _)| bits | bit)
     }
 
     /// The decision for a value. Without a finite value it is not valid, and no other bit is set

@@ -16,13 +16,25 @@ pub const HOT_PROCESSOR_C: f64 = 80.0;
 /// sheet of the DLP3010, recommended operating conditions).
 pub const HOT_PROJECTOR_C: f64 = 70.0;
 
-/// Bits of [`Power`].
-mod power {
+/// Bits of [`Power`], register 630.
+pub mod power {
     bits! {
+        /// The supply's voltage is too low.
         UNDER_VOLTAGE = 0, "under-voltage";
+        /// The processor's frequency is capped.
         CAPPED = 1, "frequency capped";
+        /// The processor is throttled.
         THROTTLED = 2, "throttled";
+        /// The soft limit of the temperature is reached.
         SOFT_LIMIT = 3, "soft temperature limit";
+        /// The same at any time since the computer's start.
+        UNDER_VOLTAGE_SINCE_START = 4, "under-voltage before";
+        /// The same at any time since the computer's start.
+        CAPPED_SINCE_START = 5, "frequency capped before";
+        /// The same at any time since the computer's start.
+        THROTTLED_SINCE_START = 6, "throttled before";
+        /// The same at any time since the computer's start.
+        SOFT_LIMIT_SINCE_START = 7, "soft temperature limit before";
     }
 }
 
@@ -47,7 +59,7 @@ impl Power {
 
     /// The conditions that hold now, in words.
     pub fn now(self) -> Vec<&'static str> {
-        power::words(self.0).collect()
+        power::words(self.0 & 0xF).collect()
     }
 
     /// The conditions that have held since the computer's start, in words.

@@ -18,7 +18,7 @@ use crate::recipe::edit::{self, Edit, Edited};
 use crate::recipe::exchange::Destination;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
-use crate::recipe::{ChangeError, Kinds, LoadError, Recipe, RecipeFile, Store};
+use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, Store};
 use crate::station::control::MAX_RECIPE;
 
 impl From<LoadError> for Problem {
@@ -55,8 +55,8 @@ pub(super) async fn list(site: Site) -> Result<Json<Value>> {
 }
 
 /// What gauges can measure.
-pub(super) async fn kinds() -> Json<Kinds> {
-    Json(Kinds::all())
+pub(super) async fn kinds() -> Json<Value> {
+    Json(crate::recipe::kinds::json())
 }
 
 fn listed(recipes: &Store) -> Value {
