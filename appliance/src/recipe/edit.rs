@@ -44,9 +44,8 @@ pub struct Edited {
     pub other_slots: Option<String>,
 }
 
-/// Changes a stored recipe; what was stored before stays as the previous generation. Limits that
-/// come from golden are worked out with `head`; `fits` tries the changed recipe on the head and says
-/// in words why it cannot be used there.
+/// Changes a stored recipe; what was stored before stays as the previous generation. `fits` tries
+/// the changed recipe on the head and says in words why it cannot be used there.
 ///
 /// # Errors
 /// The recipe cannot be read, was changed since, would not be usable, or cannot be stored.

@@ -83,7 +83,7 @@ impl GaugeFile {
         let symbol = spaced(unit);
         if self.needs_golden() && self.golden_value.is_none() {
             return Err(format!(
-                "gauge {name:?} has no golden_value: set the gauges again on the head"
+                "gauge {name:?} has no golden_value: set the gauges again"
             ));
         }
         for (which, limit) in [("low", low), ("high", high)] {
