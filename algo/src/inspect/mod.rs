@@ -1,6 +1,7 @@
 //! What a height map says about a part: regions, gauges and the comparison with the golden map.
 
 mod align;
+pub mod contour;
 mod feature;
 mod gauge;
 pub mod good;

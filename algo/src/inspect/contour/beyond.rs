@@ -1,0 +1,83 @@
+//! What is seen beyond a rim: the wall of the sheet, and the part of a floor that is both seen and
+//! lit.
+//!
+//! # Equations
+//! A point z below the plane that is seen at x of the plane lies below x − z v, v = (C − x)/C_z
+//! with the camera's centre C. A floor at depth D is seen and lit at x if four points lie in the
+//! opening: x; x − t v, where the line of sight leaves the sheet of thickness t; and the places
+//! where light on its way to the floor enters the sheet and leaves it. So the signed distance of
+//! the border of the background is the largest of the contour's distances of these points.
+//!
+//! The wall is seen where x − t v lies on the material, over t (−∇d · v) of the plane. It is lit
+//! (n·l)/(n_z·l) times as much as the face, n its normal, l the direction to the light.
+
+use super::shape::Shape;
+use super::view::Setup;
+use crate::geometry::Vector;
+
+/// The wall of a sheet as one piece of its rim shows it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wall {
+    /// How wide it is seen on the plane, mm.
+    pub width: f64,
+    /// Its light over that of the face.
+    pub brightness: f64,
+    /// By how much its phase changes over its width, turns of ratio 1.
+    pub turns: f64,
+}
+
+/// By how much a point moves on the plane for every mm that it rises on its way to a device.
+pub fn slope(device: Vector, x: f64, y: f64) -> (f64, f64) {
+    ((device.x - x) / device.z, (device.y - y) / device.z)
+}
+
+impl Wall {
+    /// The wall at a place with this unit vector into the material; `None` if it is not seen.
+    pub fn at(setup: &Setup, thickness: f64, (x, y): (f64, f64), into: (f64, f64)) -> Option<Self> {
+        let out = |(x, y): (f64, f64)| -(into.0 * x + into.1 * y);
+        let width = thickness * out(slope(setup.camera, x, y));
+        (width > 0.0).then(|| Self {
+            width,
+            brightness: out(slope(setup.projector, x, y)).max(0.0),
+            turns: thickness * setup.turns_per_mm,
+        })
+    }
+}
+
+/// How wide the shadow between an edge and a floor is seen at a place with this unit vector into the
+/// material, mm on the plane per mm of the floor's depth; below 0 if the light reaches under the
+/// edge.
+pub fn shadow(setup: &Setup, (x, y): (f64, f64), into: (f64, f64)) -> f64 {
+    let (seen, lit) = (slope(setup.camera, x, y), slope(setup.projector, x, y));
+    into.0 * (lit.0 - seen.0) + into.1 * (lit.1 - seen.1)
+}
+
+/// The signed distance, mm, of the border of the background as seen at (x, y) of the plane, and the
+/// place on the plane whose distance that is.
+pub fn background<const N: usize>(
+    (shape, p): (&impl Shape<N>, &[f64; N]),
+    setup: &Setup,
+    thickness: f64,
+    (x, y): (f64, f64),
+) -> (f64, (f64, f64)) {
+    let mut largest = (shape.distance(p, x, y), (x, y));
+    let mut also = |x: f64, y: f64| {
+        let d = shape.distance(p, x, y);
+        if d > largest.0 {
+            largest = (d, (x, y));
+        }
+    };
+    let (right, up) = slope(setup.camera, x, y);
+    if thickness > 0.0 {
+        also(x - thickness * right, y - thickness * up);
+    }
+    if let Some(floor) = setup.floor {
+        let (x, y) = (x - floor * right, y - floor * up);
+        let (lamp, height) = (setup.projector, setup.projector.z + floor);
+        for depth in [0.0, thickness] {
+            let share = (floor - depth) / height;
+            also(x + (lamp.x - x) * share, y + (lamp.y - y) * share);
+        }
+    }
+    largest
+}

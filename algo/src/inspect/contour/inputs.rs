@@ -1,0 +1,113 @@
+//! Inputs of a contour's uncertainty beside noise: by how much its parameters are off for one
+//! standard uncertainty of each.
+
+use super::associate::Point;
+use super::beyond::slope;
+use super::find::Contour;
+use super::shape::Shape;
+use super::view::Setup;
+use alloc::vec::Vec;
+
+/// A shift of every edge towards its material, px: by the model of the edge.
+const EDGE_PX: f64 = 0.02;
+/// What the model of the edge between pixels is off in a radius, px: different in each placement.
+const PIXELS_PX: f64 = 0.00125;
+/// The share of the radius of a rounded rim by which its far side is uncertain: the light has
+/// fallen by half there.
+const FAR_SIDE: f64 = 0.2;
+
+/// What is uncertain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source {
+    /// Every edge of the part lies towards its material.
+    Edge,
+    /// The height of the plane: a line of sight that is not along its normal meets it elsewhere.
+    Height,
+    /// The scale of lengths in the plane.
+    Scale,
+    /// The radius of the rim.
+    Rim,
+    /// How an edge lies among the pixels.
+    Pixels,
+    /// Whether a wall is seen.
+    Wall,
+}
+
+impl Source {
+    /// Whether it is the same for all contours of a part.
+    pub fn is_common(self) -> bool {
+        matches!(self, Self::Edge | Self::Height | Self::Scale)
+    }
+}
+
+/// An input of the uncertainty.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Input<const N: usize> {
+    /// What is uncertain.
+    pub source: Source,
+    /// By how much each parameter is off for one standard uncertainty.
+    pub off: [f64; N],
+}
+
+/// What is known of the measurement.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Knowledge {
+    /// σ of the height of the plane by the calibration, mm.
+    pub height: f64,
+    /// σ of lengths by the calibration, of 1.
+    pub scale: f64,
+    /// The radius of the rim, mm.
+    pub rim: f64,
+}
+
+/// The inputs of a contour that was found.
+pub fn inputs<const N: usize>(
+    shape: &impl Shape<N>,
+    contour: &Contour<N>,
+    setup: &Setup,
+    knowledge: Knowledge,
+) -> Vec<Input<N>> {
+    let p = &contour.parameters;
+    let into = |point: &Point| {
+        let along = shape.along(p, point.x, point.y).unwrap_or(0.0);
+        shape.foot(p, along).normal
+    };
+    let dot = |a: (f64, f64), b: (f64, f64)| a.0 * b.0 + a.1 * b.1;
+    let lean = |point: &Point| slope(setup.camera, point.x, point.y);
+    let of = |source, shift: &dyn Fn(&Point) -> f64| Input {
+        source,
+        off: contour.response(shape, shift),
+    };
+    let mut inputs = Vec::new();
+    inputs.push(of(Source::Edge, &|_| EDGE_PX * contour.pixel));
+    inputs.push(of(Source::Height, &|point| {
+        knowledge.height * dot(lean(point), into(point))
+    }));
+    inputs.push(of(Source::Scale, &|point| {
+        knowledge.scale * dot((point.x, point.y), into(point))
+    }));
+    inputs.push(of(Source::Rim, &|point| {
+        // α is how far the line of sight leans over the material.
+        let lean = dot(lean(point), into(point)).max(0.0);
+        let near = 1.0 + lean - libm::sqrt(1.0 + lean * lean);
+        knowledge.rim * near.max(FAR_SIDE) / libm::sqrt(3.0)
+    }));
+    for i in 0..N {
+        let rate = |point: &Point| shape.derivative(p, point.x, point.y)[i];
+        let squares = contour.points.iter().map(|point| rate(point) * rate(point));
+        let mean = squares.sum::<f64>() / contour.points.len() as f64;
+        let mut off = [0.0; N];
+        off[i] = PIXELS_PX * contour.pixel / libm::sqrt(mean);
+        inputs.push(Input {
+            source: Source::Pixels,
+            off,
+        });
+    }
+    if let Some(off) = contour.wall {
+        inputs.push(Input {
+            source: Source::Wall,
+            off,
+        });
+    }
+    inputs
+}

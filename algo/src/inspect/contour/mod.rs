@@ -1,0 +1,45 @@
+//! Contours: where a face ends, in the plane of the face.
+//!
+//! # Idea
+//! Heights near a rim are wrong, because blur mixes phases there, and brightness depends on what
+//! lies behind. But demodulated light is linear in what a pixel sees. Light that is in phase with
+//! the plane of the face is material; where it ends is the contour.
+//!
+//! ```text
+//! Z = B e^{2πiφ}    w = Z e^{−2πi r Φ̂}    w = b · material + a · background
+//! ```
+//!
+//! with Φ̂ the phase that the plane has at the pixel, b and a complex and constant along a piece of
+//! about two pixels.
+//!
+//! # Stages
+//! `sample` demodulates the pixels near the expected contour, `piece` divides them, `fit` finds the
+//! edge of each piece by the profile of `edge` and what `beyond` knows of walls and floors,
+//! `associate` the shape through the edges, `find` does this until nothing moves, and `verdict`
+//! says whether the contour is found, absent or unseen. `inputs` states what else is uncertain.
+//!
+//! # Units
+//! mm in the plane's frame, px in the picture, turns, counts.
+
+mod associate;
+mod beyond;
+mod complex;
+mod edge;
+mod find;
+mod fit;
+mod inputs;
+mod piece;
+mod sample;
+pub mod shape;
+mod verdict;
+mod view;
+
+pub use associate::Point;
+pub use complex::Complex;
+pub use find::{Contour, find};
+pub use inputs::{Input, Knowledge, Source, inputs};
+pub use verdict::{Outcome, State};
+pub use view::{Fringes, Setup, Spot, View};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,148 @@
+//! What became of a piece of a contour, and of all of them.
+
+use super::complex::Complex;
+use super::fit::{Fit, Problem};
+use super::piece::BAND;
+
+/// Fewest pixels of a piece.
+const PIXELS: usize = 8;
+/// Largest χ² per degree of freedom.
+const CHI_SQUARE: f64 = 3.0;
+/// An edge this near to the border of the band is not inside it, px.
+const MARGIN: f64 = 1.5;
+/// Largest σ of an edge, px: more means that there is no contrast.
+const SIGMA: f64 = 0.25;
+/// Largest angle of the material's light from that of the plane, turns.
+const OFF: f64 = 0.125;
+/// The share of the taught modulation that a material which goes on has on both sides.
+const CONTINUES: f64 = 0.8;
+/// A background of less light, of the material's, is dark.
+const LIT: f64 = 0.1;
+/// A narrower shadow does not matter, px: it moves the edge by half of this, less than the model of
+/// the edge is uncertain.
+const NARROW: f64 = 0.03;
+/// Nearer to the contour pixels are mixed, px.
+const MIXED: f64 = 1.5;
+/// The least share of a contour that is found, of its pieces.
+const FOUND: f64 = 0.4;
+/// The least share of pieces in which the material of an absent contour goes on.
+const ABSENT: f64 = 0.5;
+/// The largest share of pieces with an edge of an absent contour.
+const EDGES: f64 = 0.1;
+
+/// What became of a piece.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Its edge is a point of the contour.
+    Accepted,
+    /// The material goes on where it should end.
+    Continues,
+    /// Too few of its pixels are seen without overexposure.
+    Unseen,
+    /// The material is too dark, or its light is not in phase with the plane.
+    Dark,
+    /// There is no contrast, or the edge is not near where it is expected.
+    Edgeless,
+    /// The pixels do not look like an edge: a shadow's border, another edge.
+    Disturbed,
+    /// A lit floor, whose depth is not known, may have a narrow shadow beside the edge, which would
+    /// be taken for a part of the opening or not.
+    Shadowed,
+    /// Its edge lies off the contour of the others.
+    Outlier,
+}
+
+/// What became of a contour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// It has a place and a size.
+    Found,
+    /// The material goes on where it should be.
+    Absent,
+    /// Too little of it is seen.
+    Unseen,
+}
+
+impl Outcome {
+    /// Of a piece that was looked for an edge within `band` px. Its light may be off the model by a
+    /// share `rough` of the material's.
+    pub fn of(problem: &Problem<'_>, fit: Option<&Fit>, (band, rough): (f64, f64)) -> Self {
+        if problem.pixels.len() < PIXELS {
+            return Self::Unseen;
+        }
+        let Some(fit) = fit else {
+            return Self::edgeless(problem);
+        };
+        let is_sharp = fit.variance() <= SIGMA * SIGMA;
+        if !(is_sharp && libm::fabs(fit.edge) <= band - MARGIN) {
+            Self::edgeless(problem)
+        } else if !(fit.material >= problem.setup.least && fit.off <= OFF) {
+            Self::Dark
+        } else if fit.cost > CHI_SQUARE * (fit.freedom + rough * rough * fit.strength) {
+            Self::Disturbed
+        } else if problem.setup.floor.is_none()
+            && fit.background > LIT
+            && problem.piece.shadow * problem.setup.deepest > NARROW
+        {
+            Self::Shadowed
+        } else {
+            Self::Accepted
+        }
+    }
+
+    /// Whether the material goes on: its light is on both sides as it was taught, in every level.
+    fn edgeless(problem: &Problem<'_>) -> Self {
+        for (level, fringes) in problem.setup.levels.iter().enumerate() {
+            let (mut sums, mut counts) = ([Complex::default(); 2], [0.0; 2]);
+            for pixel in problem.pixels {
+                if libm::fabs(pixel.d) < MIXED || libm::fabs(pixel.d) > BAND {
+                    continue;
+                }
+                let side = usize::from(pixel.d > 0.0);
+                sums[side] += problem.samples.light(pixel.sample, level);
+                counts[side] += 1.0;
+            }
+            for (sum, count) in sums.iter().zip(counts) {
+                if count == 0.0 {
+                    return Self::Unseen;
+                }
+                let noise = 2.0 * libm::sqrt(fringes.variance(problem.setup.noise) / count);
+                let least = (CONTINUES * fringes.taught - noise).max(problem.setup.least);
+                if sum.re / count < least {
+                    return match sum.re / count < problem.setup.least {
+                        true => Self::Dark,
+                        false => Self::Edgeless,
+                    };
+                }
+            }
+        }
+        Self::Continues
+    }
+}
+
+/// The state of a contour by its pieces, and the share of pieces with an edge. Nothing longer than
+/// `gap` of it may be missing in one stretch.
+pub fn state(outcomes: &[Outcome], is_closed: bool, gap: f64) -> (State, f64) {
+    let count = outcomes.len().max(1) as f64;
+    let share = |of: Outcome| outcomes.iter().filter(|&&is| is == of).count() as f64 / count;
+    let found = share(Outcome::Accepted);
+    // A stretch of a closed contour may begin before its first piece.
+    let turns = if is_closed { 2 } else { 1 };
+    let (mut missing, mut longest) = (0, 0);
+    for outcome in outcomes.iter().cycle().take(outcomes.len() * turns) {
+        missing = if *outcome == Outcome::Accepted {
+            0
+        } else {
+            missing + 1
+        };
+        longest = longest.max(missing);
+    }
+    let state = if found >= FOUND && longest as f64 <= gap * count {
+        State::Found
+    } else if share(Outcome::Continues) >= ABSENT && found <= EDGES {
+        State::Absent
+    } else {
+        State::Unseen
+    };
+    (state, found)
+}

@@ -1,0 +1,78 @@
+//! What contours need of the caller: how the camera sees a plane, and what the plane's light is.
+
+use super::complex::Complex;
+use crate::geometry::Vector;
+use alloc::vec::Vec;
+
+/// What a pixel's line of sight meets on the plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// Coordinate in the plane's frame, mm.
+    pub x: f64,
+    /// The other one, mm.
+    pub y: f64,
+    /// Φ̂: the phase that the plane has there, of a level of ratio 1, turns.
+    pub phase: f64,
+}
+
+/// A camera that looks at a plane. The plane's frame is right-handed and its z axis points to the
+/// side that the camera is on.
+pub trait View {
+    /// Columns and rows of the frame.
+    fn size(&self) -> (usize, usize);
+
+    /// What the line of sight through (u, v) meets, between pixels too; `None` if it does not meet
+    /// the plane, or nothing is projected there.
+    fn spot(&self, u: f64, v: f64) -> Option<Spot>;
+
+    /// Where the camera sees a point of the plane.
+    fn pixel(&self, x: f64, y: f64) -> Option<(f64, f64)>;
+
+    /// Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) = B e^{2πiφ} of a level at a pixel, in counts;
+    /// `None` where a sample is overexposed.
+    fn signal(&self, u: usize, v: usize, level: usize) -> Option<Complex>;
+}
+
+/// A level's fringes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fringes {
+    /// Its share r of the full phase function.
+    pub ratio: f64,
+    /// N, the number of its shifts.
+    pub shifts: usize,
+    /// The modulation that the material beside the contour was taught with, counts.
+    pub taught: f64,
+}
+
+/// What is known of light, material and camera.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setup {
+    /// The camera's centre in the plane's frame, mm.
+    pub camera: Vector,
+    /// The projector's centre in the plane's frame, mm.
+    pub projector: Vector,
+    /// By how much the phase of ratio 1 is larger, on a pixel's line of sight, for every mm below
+    /// the plane, turns.
+    pub turns_per_mm: f64,
+    /// The levels, in the order in which [`View::signal`] has them.
+    pub levels: Vec<Fringes>,
+    /// σ of one sample, counts.
+    pub noise: f64,
+    /// The least modulation that is trusted, counts.
+    pub least: f64,
+    /// Thickness of the sheet, mm; `None` if it is not known. 0: no wall is seen.
+    pub thickness: Option<f64>,
+    /// How far below the plane a floor lies that may be lit, mm; `None` if it is not known.
+    pub floor: Option<f64>,
+    /// How far below the plane a floor of unknown depth may lie, mm.
+    pub deepest: f64,
+    /// How far from its expected place the contour may lie, mm.
+    pub reach: f64,
+}
+
+impl Fringes {
+    /// Variance of each part of Z, counts².
+    pub fn variance(&self, noise: f64) -> f64 {
+        noise * noise * 2.0 / self.shifts as f64
+    }
+}
