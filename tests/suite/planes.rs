@@ -136,11 +136,8 @@ fn gauges(sheet: &Sheet, bed: &Bed) -> (Vec<FeatureFile>, Vec<(GaugeFile, f64)>)
     let [one, other] = sheet.faces;
     let size = bed.calibration.frames().0 as usize;
     let camera = &bed.calibration.camera;
-    let region = |name: &str, face: Flat| FeatureFile {
-        name: name.into(),
-        kind: FeatureKind::Plane,
-        region: face.polygon(camera),
-    };
+    let region =
+        |name: &str, face: Flat| FeatureFile::new(name, FeatureKind::Plane, face.polygon(camera));
     let middle = sheet.faces.map(|face| face.middle(camera, size));
     let distance = one.normal().dot(middle[1] - middle[0]).abs();
     let angle = one.normal().dot(other.normal()).acos().to_degrees();

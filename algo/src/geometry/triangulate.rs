@@ -174,6 +174,11 @@ impl Triangulator {
         &self.camera
     }
 
+    /// The projector.
+    pub fn projector(&self) -> &Pinhole {
+        &self.projector
+    }
+
     /// The ray of pixel (u, v), if it meets every height once.
     #[inline]
     pub(super) fn falling_ray(&self, u: f64, v: f64) -> Option<Vector> {
@@ -205,7 +210,7 @@ impl Triangulator {
 
     /// Φ_P in turns at the projector point that lights `point`.
     #[inline]
-    pub(super) fn phase_at(&self, point: Vector) -> Option<f64> {
+    pub(crate) fn phase_at(&self, point: Vector) -> Option<f64> {
         let (xi, eta) = self.projector_point(point)?;
         Some(self.function.at(xi, eta))
     }

@@ -17,10 +17,11 @@ mod taught;
 mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
+pub use contour::State;
 pub use feature::{Feature, FeatureKind, Geometry, TooFine};
 pub use gauge::{
     Basis, Declared, Domain, Evidence, Facts, Kind, MAX_PLACES, Measure, Parameter, Reading,
-    Square, Unit, Value, kinds,
+    Square, Unit, Value, kinds, makes_datum,
 };
 pub use largest::Largest;
 pub(crate) use mask::components;
@@ -30,8 +31,9 @@ pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
 pub use strips::{
-    CalibrationError, Findings, Found, Gauge, Input, MAX_FEATURES, MAX_GAUGES, Maps, PairBuffers,
-    PairPlaced, Parts, Picture, Production, Skipped, Strips, Unmeasurable,
+    CalibrationError, Findings, Found, FoundFeature, Gauge, GoldenSignal, Input, Levels, Lost,
+    MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Picture, Production,
+    Signal, Skipped, Strips, Unmeasurable,
 };
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

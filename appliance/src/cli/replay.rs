@@ -7,11 +7,12 @@ use crate::error::{Exit, Failure, Result};
 use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, GaugeEntry, Reader, difference, seq_of};
 use crate::recipe::plan::PlanError;
-use crate::recipe::{Outline, Recipe, State, Store};
+use crate::recipe::{Outline, Recipe, Store};
 use crate::station::gauge::decision;
 use crate::station::result::flag::SIMULATED;
 use crate::station::{Inspection, ResultRecord, Square};
 use crate::storage::unpack::Unpacked;
+use algo::inspect::{FoundFeature, State};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -78,9 +79,10 @@ impl Replay {
             );
             Failure::new(Exit::Content, words)
         })?;
+        let features = inspection.features.clone();
         let replayed = entry(inspection, number, &fingerprint);
         let document = serde_json::json!({
-            "replayed": detailed(&replayed, &outline)?, "stored": before,
+            "replayed": detailed(&replayed, &outline, &features)?, "stored": before,
             "recipe": { "from": from, "number": number, "fingerprint": fingerprint, "same": original },
         });
         let text = || table(&replayed, &from);
@@ -210,7 +212,7 @@ fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {
 }
 
 /// An entry with the kind of each gauge, and the features.
-fn detailed(entry: &Entry, outline: &Outline) -> Result<Value> {
+fn detailed(entry: &Entry, outline: &Outline, found: &[FoundFeature]) -> Result<Value> {
     let shown = serde_json::to_value(entry);
     let mut shown = shown.map_err(Exit::Software.because("write the result"))?;
     for (gauge, of) in entry.gauges.iter().enumerate() {
@@ -221,7 +223,7 @@ fn detailed(entry: &Entry, outline: &Outline) -> Result<Value> {
         Some(gauge) if gauge.decision & decision::ABSENT != 0 => State::Absent,
         _ => State::Unseen,
     };
-    shown["features"] = serde_json::json!(outline.features(state));
+    shown["features"] = serde_json::json!(outline.features(found, state));
     Ok(shown)
 }
 

@@ -247,7 +247,7 @@ impl Recipe {
         Ok(Self {
             sequences: sequences(file)?,
             features: features(&file.features, (width, height))?,
-            gauges: gauges(&file.features, &file.gauges),
+            gauges: gauges(file),
             id: file.into(),
             conditions: file.into(),
             demands: file.into(),
@@ -305,20 +305,36 @@ fn features(
         let corners: Vec<_> = feature.region.iter().map(|&[u, v]| (u, v)).collect();
         let region = Region::polygon(&corners, width, height)
             .map_err(|error| format!("feature {:?}: {error}", feature.name))?;
-        let kind = feature.kind;
-        Ok(Feature { kind, region })
+        let plane = feature.plane.as_ref();
+        let plane = plane.and_then(|name| features.iter().position(|of| of.name == *name));
+        Ok(Feature {
+            kind: feature.kind,
+            region,
+            plane,
+            rim: feature.rim_mm.unwrap_or(0.0),
+            thickness: feature.thickness_mm,
+        })
     };
     features.iter().map(feature).collect()
 }
 
 /// The gauges that are computed; their features were checked to be there.
-fn gauges(features: &[FeatureFile], gauges: &[GaugeFile]) -> Vec<Gauge> {
-    let place = |name: &String| features.iter().position(|feature| feature.name == *name);
+fn gauges(file: &RecipeFile) -> Vec<Gauge> {
+    let place = |name: &String| {
+        file.features
+            .iter()
+            .position(|feature| feature.name == *name)
+    };
+    let datum = |name: &String| file.datums.iter().find(|datum| datum.name == *name);
     let gauge = |gauge: &GaugeFile| Gauge {
         of: gauge.of.iter().filter_map(place).collect(),
+        datum: match gauge.datum.as_ref().and_then(datum) {
+            Some(datum) => datum.of.iter().filter_map(place).collect(),
+            None => Vec::new(),
+        },
         measure: gauge.measures.clone(),
     };
-    gauges.iter().map(gauge).collect()
+    file.gauges.iter().map(gauge).collect()
 }
 
 impl RecipeId {

@@ -10,6 +10,8 @@ use std::sync::Arc;
 pub struct Demands {
     /// In the order of the recipe's gauges.
     pub(super) limits: Vec<GaugeLimits>,
+    /// The names of the recipe's features, in their order.
+    pub(super) features: Vec<String>,
     /// Least share of the golden pixels that must be resolved.
     pub(super) min_coverage: f64,
     /// How far the part may lie from where it was taught, mm.
@@ -57,6 +59,11 @@ impl From<&RecipeFile> for Demands {
         });
         Self {
             limits: limits.collect(),
+            features: file
+                .features
+                .iter()
+                .map(|feature| feature.name.clone())
+                .collect(),
             min_coverage: file.min_coverage,
             tolerance_mm: file.placement_tolerance_mm,
             guard_k: file.guard_k,

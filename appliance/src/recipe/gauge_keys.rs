@@ -74,7 +74,14 @@ impl Keys {
 
     /// What limits come from.
     fn tolerance(&mut self) -> Result<Option<Tolerance>, String> {
-        let nominal = self.number("nominal")?;
+        // A place is a parameter of the kind.
+        let is_place = |(key, value): &(String, Box<RawValue>)| {
+            key == "nominal" && value.get().starts_with('[')
+        };
+        let nominal = match self.0.iter().any(is_place) {
+            true => None,
+            false => self.number("nominal")?,
+        };
         let golden = self
             .read("golden", "true or leave it out")?
             .unwrap_or(false);

@@ -76,13 +76,21 @@ impl Gauging {
     /// Writes the text.
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
-        for FeatureFile { name, kind, region } in &self.features {
+        for feature in &self.features {
             let keys = [
-                ("name", json!(name)),
-                ("kind", json!(kind)),
-                ("region", json!(region)),
+                ("name", Some(json!(feature.name))),
+                ("kind", Some(json!(feature.kind))),
+                ("region", Some(json!(feature.region))),
+                ("plane", feature.plane.as_ref().map(|name| json!(name))),
+                ("rim_mm", feature.rim_mm.map(|mm| json!(mm))),
+                ("thickness_mm", feature.thickness_mm.map(|mm| json!(mm))),
             ];
-            write(&mut text, "feature", keys);
+            let keys = keys.into_iter();
+            write(
+                &mut text,
+                "feature",
+                keys.filter_map(|(key, value)| Some((key, value?))),
+            );
         }
         for DatumFile { name, of } in &self.datums {
             write(
@@ -124,9 +132,13 @@ impl Gauging {
 fn gauge(table: Table) -> Result<GaugeFile, String> {
     let name = table.get("name").and_then(toml::Value::as_str);
     let name = format!("gauge {:?}", clipped(name.unwrap_or_default()));
+    let nominal = table.get("nominal");
     let golden = table.get("golden") == Some(&toml::Value::Boolean(true));
     for (source, there) in [
-        ("nominal", table.contains_key("nominal")),
+        (
+            "nominal",
+            nominal.is_some_and(|nominal| !nominal.is_array()),
+        ),
         ("golden = true", golden),
     ] {
         let limits = ["low", "high"].into_iter();

@@ -51,6 +51,7 @@ fn parameter(example: &Measure, of: &Parameter) -> Value {
     let mut all = match of.domain {
         Domain::Pixels { odd } => json!({ "unit": "px", "least": 1, "odd": odd }),
         Domain::Length { positive: false } => json!({ "unit": unit, "least": least, "most": most }),
+        Domain::Place => json!({ "unit": unit, "least": least, "most": most, "count": 2 }),
         Domain::Length { positive: true } => json!({ "unit": unit, "above": least, "most": most }),
         Domain::Words(words) => {
             json!({ "choices": words.iter().map(choice).collect::<Vec<_>>() })
@@ -108,6 +109,7 @@ fn line(example: &Measure, of: &Parameter) -> String {
         }
         Domain::Length { positive: false } => format!("{least} to {most} {unit}"),
         Domain::Length { positive: true } => format!("more than {least}, up to {most} {unit}"),
+        Domain::Place => format!("two of {least} to {most} {unit}"),
         Domain::Words(words) => words.join(", "),
     };
     let default = match default(example, of) {

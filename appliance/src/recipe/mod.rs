@@ -72,5 +72,5 @@ pub use file::{
     AlignmentKind, PatternFile, RecipeFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };
 pub use gauge::GaugeFile;
-pub use outline::{Outline, State};
+pub use outline::Outline;
 pub use store::{ChangeError, LoadError, Store};

@@ -4,7 +4,7 @@ use super::bounds::each;
 use super::feature::{DatumFile, FeatureFile};
 use super::file::RecipeFile;
 use super::gauge::GaugeFile;
-use algo::inspect::{FeatureKind, MAX_FEATURES};
+use algo::inspect::{FeatureKind, MAX_FEATURES, makes_datum};
 use hal::bounds::{clipped, length};
 
 /// Datum systems of a recipe.
@@ -31,6 +31,36 @@ impl RecipeFile {
         for DatumFile { name, of } in &self.datums {
             let datum = format!("datum {:?}", clipped(name));
             self.check_all_there(&datum, of)?;
+            let kinds = of.iter().filter_map(|name| self.feature(name));
+            let kinds: Vec<FeatureKind> = kinds.map(|feature| feature.kind).collect();
+            if !makes_datum(&kinds) {
+                return Err(format!(
+                    "{datum} is no frame: name a plane, then a circle, slot or line, then another one that is not a plane"
+                ));
+            }
+        }
+        for FeatureFile { name, plane, .. } in &self.features {
+            let Some(plane) = plane else { continue };
+            let found = self.feature(plane).map(|feature| feature.kind);
+            if found != Some(FeatureKind::Plane) {
+                return Err(format!(
+                    "feature {:?} lies in {:?}, which is {}: name a plane",
+                    clipped(name),
+                    clipped(plane),
+                    found.map_or("not there".into(), |kind| format!("a {}", kind.name()))
+                ));
+            }
+        }
+        let is_contour = |name: &String| self.feature(name).is_some_and(|of| of.kind.is_contour());
+        let contours = self
+            .gauges
+            .iter()
+            .find(|gauge| gauge.of.iter().any(is_contour));
+        if let Some(gauge) = contours.filter(|_| self.two_frames) {
+            return Err(format!(
+                "gauge {:?} is of a contour, which needs three shifts or more, and two_frames is true: set it to false",
+                clipped(&gauge.name)
+            ));
         }
         self.gauges
             .iter()
@@ -86,15 +116,26 @@ impl RecipeFile {
                 ));
             }
         }
+        if !gauge.measures.measures(&self.kinds_of(gauge)) {
+            return Err(format!(
+                "{what}: {kind} does not measure such a pair of features"
+            ));
+        }
         match &gauge.datum {
             None => Ok(()),
             Some(name) if !self.datums.iter().any(|datum| datum.name == *name) => Err(format!(
                 "{what} names a datum {:?} that is not there",
                 clipped(name)
             )),
-            Some(_) => Err(format!(
+            Some(_) if !gauge.measures.facts().datum => Err(format!(
                 "{what} has a datum: {kind} takes none, leave it out"
             )),
+            Some(_) => Ok(()),
         }
+    }
+
+    fn kinds_of(&self, gauge: &GaugeFile) -> Vec<FeatureKind> {
+        let of = gauge.of.iter().filter_map(|name| self.feature(name));
+        of.map(|feature| feature.kind).collect()
     }
 }

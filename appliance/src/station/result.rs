@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use algo::inspect::FoundFeature;
 use serde::{Deserialize, Serialize};
 
 use super::gauge::GaugeValue;
@@ -148,6 +149,9 @@ pub struct Inspection {
     pub cpu_us: u32,
     /// The part's pose, if it was aligned.
     pub placement: Option<Placement>,
+    /// Its planes and contours.
+    #[serde(skip)]
+    pub features: Vec<FoundFeature>,
     /// Why the part should be measured again with the next longer sequence, if it should and there
     /// is one.
     #[serde(skip)]

@@ -54,6 +54,8 @@ pub struct Placed {
     pub radius: f64,
     /// Components that the shape does not determine: they are taken as 0.
     pub left_out: [bool; 6],
+    /// Unit vectors of the directions that it does not determine.
+    pub open: heapless::Vec<[f64; 6], 6>,
     /// Points that agree with the motion.
     pub points: usize,
     /// Share of the points that do not.
@@ -211,6 +213,7 @@ impl Fitting<'_> {
             covariance,
             radius: self.plan.radius,
             left_out: solved.directions.left_out,
+            open: solved.directions.free().iter().copied().collect(),
             points: solved.inside,
             outliers: 1.0 - solved.inside as f64 / equations.len() as f64,
             reach,

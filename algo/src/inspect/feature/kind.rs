@@ -14,17 +14,37 @@ pub enum FeatureKind {
     Surface,
     /// The plane that fits best, by least squares.
     Plane,
+    /// A straight edge of a face.
+    Line,
+    /// A round hole in a face.
+    Circle,
+    /// A slot with round ends in a face.
+    Slot,
 }
 
 impl FeatureKind {
     /// All kinds.
-    pub const ALL: [Self; 2] = [Self::Surface, Self::Plane];
+    pub const ALL: [Self; 5] = [
+        Self::Surface,
+        Self::Plane,
+        Self::Line,
+        Self::Circle,
+        Self::Slot,
+    ];
+
+    /// Whether it is the contour of a face: where the face ends, in its plane.
+    pub fn is_contour(self) -> bool {
+        matches!(self, Self::Line | Self::Circle | Self::Slot)
+    }
 
     /// Its name, as recipes have it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Surface => "surface",
             Self::Plane => "plane",
+            Self::Line => "line",
+            Self::Circle => "circle",
+            Self::Slot => "slot",
         }
     }
 }
@@ -34,6 +54,27 @@ impl FeatureKind {
 pub struct Feature {
     /// What.
     pub kind: FeatureKind,
-    /// Where, in golden's frame.
+    /// Where, in golden's frame. Around a contour it has 1.5 mm or more on both sides.
     pub region: Region,
+    /// Of a contour, which of the features is the plane of its face; `None` if the plane is fitted to
+    /// its own region.
+    pub plane: Option<usize>,
+    /// Of a contour, the radius of its rim, mm.
+    pub rim: f64,
+    /// Of a plane, the thickness of its sheet in mm, for the walls of its contours; `None` where it
+    /// is not known, 0 where no wall is seen.
+    pub thickness: Option<f64>,
+}
+
+impl Feature {
+    /// A feature of heights.
+    pub fn new(kind: FeatureKind, region: Region) -> Self {
+        Self {
+            kind,
+            region,
+            plane: None,
+            rim: 0.0,
+            thickness: None,
+        }
+    }
 }

@@ -7,19 +7,23 @@
 //! measured.
 
 mod cells;
+mod face;
 mod geometry;
 mod grid;
 mod kind;
 mod level;
 mod plane;
+mod rim;
 mod taught;
 
 pub use cells::{Cell, Sum, cells};
+pub use face::keep_face;
 pub use geometry::Geometry;
 pub use grid::{Grid, TooFine};
 pub use kind::{Feature, FeatureKind};
 pub use level::{Plane, mean, weight};
 pub use plane::{FittedPlane, Middle};
+pub use rim::{MAX_PARAMETERS, Parameters, PlaneFrame, Rim};
 pub use taught::{TaughtCell, taught_cells};
 
 #[cfg(test)]

@@ -147,9 +147,9 @@ impl FittedPlane {
     /// The geometry of the plane with these parameters.
     pub fn geometry(&self, [c, a, b]: [f64; 3]) -> Geometry {
         let length = libm::sqrt(1.0 + a * a + b * b);
-        Geometry {
+        Geometry::Plane {
             point: Vector::new(self.middle.x, self.middle.y, c),
-            direction: Vector::new(-a, -b, 1.0) * (self.side / length),
+            normal: Vector::new(-a, -b, 1.0) * (self.side / length),
         }
     }
 

@@ -3,15 +3,16 @@
 use super::kind::*;
 
 kind! {
-    /// The angle between the normals of two planes, on the sides that the camera sees, degrees:
-    /// 0 where they are parallel, up to 180.
+    /// The angle between two features, degrees, from 0 where they are parallel to 180. Two planes:
+    /// between their normals, on the sides that the camera sees. Two lines: between their
+    /// directions, with the material on the left as the camera sees it.
     Angle {}
 }
 
 impl Kind for Angle {
     fn facts(&self) -> Facts {
         Facts {
-            takes: PLANES,
+            takes: &[&[Plane, Line], &[Plane, Line]],
             never_negative: true,
             ..Facts::new(Unit::Angle, Basis::Geometry, "")
         }
@@ -19,8 +20,22 @@ impl Kind for Angle {
 
     /// By sine and cosine: the arc cosine alone is inexact near 0.
     fn value(&self, of: &[Geometry]) -> Option<f64> {
-        let [one, other] = of else { return None };
-        let (one, other) = (one.direction, other.direction);
-        Some(libm::atan2(one.cross(other).length(), one.dot(other)).to_degrees())
+        let (one, other) = match of {
+            [
+                Geometry::Plane { normal: one, .. },
+                Geometry::Plane { normal: other, .. },
+            ] => (one, other),
+            [one, other] => match (one, other) {
+                (
+                    Geometry::Line { direction: one, .. },
+                    Geometry::Line {
+                        direction: other, ..
+                    },
+                ) => (one, other),
+                _ => return None,
+            },
+            _ => return None,
+        };
+        Some(libm::atan2(one.cross(*other).length(), one.dot(*other)).to_degrees())
     }
 }

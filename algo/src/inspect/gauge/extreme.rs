@@ -5,9 +5,10 @@
 //! side². The models need the cells' values only; `tests/suite/repeatability.rs` compares them with
 //! the scatter of repeated measurements.
 
-use super::reading::Found;
+use super::reading::{Found, OfRim};
 use crate::inspect::align::{Placed, form};
-use crate::inspect::feature::Cell;
+use crate::inspect::feature::{Cell, Rim};
+use alloc::vec::Vec;
 use core::f64::consts::{PI, SQRT_2};
 
 /// Largest less smallest value, one per cell. Its error is made of those of both ends, each the
@@ -34,6 +35,32 @@ pub(super) fn range(
         pixels: top * top + bottom * bottom,
         motion,
         lever: 2.0,
+    })
+}
+
+/// Largest less smallest distance of the points of a contour from its shape. Each point is
+/// uncertain by its own noise, of which the RMS is taken for all.
+pub(super) fn range_of(rim: &Rim) -> Option<OfRim> {
+    let count = rim.residuals.len();
+    if count < 2 {
+        return None;
+    }
+    let squares = rim.residuals.iter().map(|(_, sigma)| sigma * sigma);
+    let sigma = libm::sqrt(squares.sum::<f64>() / count as f64);
+    let mut values: Vec<f64> = rim.residuals.iter().map(|(off, _)| *off).collect();
+    let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let top = spread_of_largest(&values, sigma);
+    for value in &mut values {
+        *value = -*value;
+    }
+    let bottom = spread_of_largest(&values, sigma);
+    // By noise alone, which has all points at 0.
+    let (mean, _) = largest_of(&[(0.0, count as f64)]);
+    Some(OfRim {
+        value: largest - smallest,
+        variance: top * top + bottom * bottom,
+        expected: Some(2.0 * mean * sigma),
     })
 }
 
@@ -115,6 +142,16 @@ fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
             bins[bin as usize] += 1.0;
         }
     }
+    let bins = bins.iter().enumerate().filter(|(_, count)| **count > 0.0);
+    let bins: heapless::Vec<(f64, f64), BINS> = bins
+        .map(|(bin, count)| (bin as f64 / BINS_PER_SIGMA, *count))
+        .collect();
+    largest_of(&bins).1 * sigma
+}
+
+/// Mean, above the largest true value, and standard deviation of the largest of values with errors
+/// of 1: so many true values lie so far below the largest.
+fn largest_of(below_largest: &[(f64, f64)]) -> (f64, f64) {
     // Integrated from 4 σ below the largest to 6 σ above in intervals of σ/8; the largest of a
     // million reaches 5 σ.
     const STEP: f64 = 0.125;
@@ -122,14 +159,15 @@ fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
     for i in 0..80 {
         let x = -4.0 + STEP * (f64::from(i) + 0.5);
         let mut log = 0.0;
-        for (bin, count) in bins.iter().enumerate().filter(|(_, count)| **count > 0.0) {
-            log += count * libm::log(below(x + bin as f64 / BINS_PER_SIGMA));
+        for (bin, count) in below_largest {
+            log += count * libm::log(below(x + bin));
         }
         let tail = 1.0 - libm::exp(log);
         first += tail * STEP;
         second += 2.0 * (x + 4.0) * tail * STEP;
     }
-    libm::sqrt((second - first * first).max(0.0)) * sigma
+    let scatter = libm::sqrt((second - first * first).max(0.0));
+    (first - 4.0, scatter)
 }
 
 /// Φ, the normal distribution.

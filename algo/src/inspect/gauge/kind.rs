@@ -3,12 +3,14 @@
 use super::component::Component;
 use super::extreme::motion;
 use crate::inspect::align::Placed;
-use crate::inspect::feature::FeatureKind::{self, Plane, Surface};
+use crate::inspect::feature::FeatureKind;
 
+pub(super) use super::extreme::range_of;
 pub(super) use super::parameter::{Domain, Parameter, Value, words};
-pub(super) use super::reading::Found;
+pub(super) use super::reading::{Found, OfRim};
 pub(super) use super::unit::Unit;
-pub(super) use crate::inspect::feature::{Cell, Geometry};
+pub(super) use crate::inspect::feature::FeatureKind::{Circle, Line, Plane, Slot, Surface};
+pub(super) use crate::inspect::feature::{Cell, Geometry, Rim};
 pub(super) use alloc::vec::Vec;
 
 /// Most features of a gauge.
@@ -30,6 +32,8 @@ pub enum Basis {
     Motion(Component),
     /// The geometry of its features ([`Kind::value`]); its error is propagated numerically.
     Geometry,
+    /// The points of a contour ([`Kind::of_rim`]).
+    Rim,
 }
 
 impl Basis {
@@ -37,7 +41,7 @@ impl Basis {
     pub fn side(self) -> Option<usize> {
         match self {
             Self::Squares(side) | Self::Cells(side) => Some(side),
-            Self::Region | Self::Pixels | Self::Motion(_) | Self::Geometry => None,
+            Self::Region | Self::Pixels | Self::Motion(_) | Self::Geometry | Self::Rim => None,
         }
     }
 
@@ -53,8 +57,8 @@ impl Basis {
     pub(in crate::inspect) fn cell_side(self) -> Option<usize> {
         match self {
             Self::Cells(side) => Some(side.max(1)),
-            Self::Region | Self::Geometry => Some(0),
-            Self::Squares(_) | Self::Pixels | Self::Motion(_) => None,
+            Self::Region => Some(0),
+            Self::Squares(_) | Self::Pixels | Self::Motion(_) | Self::Geometry | Self::Rim => None,
         }
     }
 }
@@ -66,10 +70,18 @@ pub type Takes = &'static [&'static [FeatureKind]];
 pub(super) const SURFACE: Takes = &[&[Surface]];
 /// A surface, and a second one.
 pub(super) const SURFACES: Takes = &[&[Surface], &[Surface]];
-/// One plane.
-pub(super) const PLANE: Takes = &[&[Plane]];
-/// A plane, and a second one.
-pub(super) const PLANES: Takes = &[&[Plane], &[Plane]];
+/// A round hole.
+pub(super) const CIRCLE: Takes = &[&[Circle]];
+/// A slot.
+pub(super) const SLOT: Takes = &[&[Slot]];
+/// A straight edge.
+pub(super) const LINE: Takes = &[&[Line]];
+/// A hole or slot.
+pub(super) const OPENING: Takes = &[&[Circle, Slot]];
+/// A contour of any shape.
+pub(super) const CONTOUR: Takes = &[&[Circle, Slot, Line]];
+/// Two features with a geometry, of which some pairs fit ([`Kind::value`]).
+pub(super) const FEATURES: Takes = &[&[Plane, Circle, Slot, Line], &[Plane, Circle, Slot, Line]];
 
 /// What a gauge says of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -83,6 +95,8 @@ pub struct Facts {
     /// What its fields say, in words behind the kind's name; each name of a field in braces stands
     /// for its value.
     pub words: &'static str,
+    /// Whether its value may be that in a datum system.
+    pub datum: bool,
     /// Whether its value is made of deviations from golden along its normal, and not of heights.
     pub compares: bool,
     /// Whether no part can have a value below 0, which the unit does not say.
@@ -100,6 +114,7 @@ impl Facts {
             basis,
             takes: SURFACE,
             words,
+            datum: false,
             compares: false,
             never_negative: false,
             noise_limit: None,
@@ -129,8 +144,18 @@ pub trait Kind: Declared {
     fn facts(&self) -> Facts;
 
     /// The value of a gauge as a function of the geometry of its features, of which there are as
-    /// many as it takes; `None` for other gauges.
+    /// many as it takes; `None` for other gauges, and where it does not measure such a pair.
     fn value(&self, _: &[Geometry]) -> Option<f64> {
+        None
+    }
+
+    /// The value of a gauge of the points of a contour; `None` for other gauges.
+    fn of_rim(&self, _: &Rim) -> Option<OfRim> {
+        None
+    }
+
+    /// Its value where its contour is absent; `None` if it has none then.
+    fn of_absent(&self) -> Option<f64> {
         None
     }
 

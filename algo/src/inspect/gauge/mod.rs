@@ -7,32 +7,45 @@
 mod angle;
 mod component;
 mod coverage;
+mod datum;
 mod deviation;
+mod diameter;
 mod distance;
 mod extreme;
 mod flatness;
+mod found;
 mod kind;
+mod length;
 mod mean_height;
 mod out_of_tolerance;
 mod parameter;
 mod peak_to_valley;
 mod placement;
+mod position;
 mod propagate;
 mod reading;
 mod rms_deviation;
+mod roundness;
 mod step;
+mod straightness;
 mod tilt;
 mod unit;
 mod volume;
+mod width;
+mod x;
+mod y;
 mod z;
 
+pub use datum::makes_datum;
 pub use kind::{Basis, Declared, Evidence, Facts, Kind, MAX_PLACES};
 pub use parameter::{Domain, Parameter, Value};
-pub(super) use propagate::{Sensitive, propagate};
+pub(super) use propagate::{Characteristic, MAX_DATUMS, Propagated, Sensitive, SensitivePlane};
 pub(super) use reading::MIN_SUPPORT;
+pub(super) use reading::OfRim;
 pub use reading::{Found, Reading, Square};
 pub use unit::Unit;
 
+use crate::inspect::feature::{FeatureKind, Geometry};
 use alloc::vec::Vec;
 
 /// The table of all kinds. A row is the file of a kind and an example, whose parameters are the
@@ -105,12 +118,30 @@ kinds! {
     tilt: Tilt { about: kinds::Axis::X },
     volume: Volume { above_mm: 8.0 },
     placement: Placement { component: kinds::Component::AboutZ },
+    x: X {},
+    y: Y {},
     z: Z {},
+    position: Position { nominal: [0.0, 0.0] },
+    diameter: Diameter {},
+    length: Length {},
+    width: Width {},
     distance: Distance {},
     angle: Angle {},
+    roundness: Roundness {},
+    straightness: Straightness {},
+    found: Found {},
 }
 
 impl Measure {
+    /// Whether it has a value of features of these kinds, as many as it takes.
+    pub fn measures(&self, of: &[FeatureKind]) -> bool {
+        let examples = of.iter().enumerate();
+        let examples = examples.map(|(at, &kind)| Geometry::example(kind, at));
+        let examples: Option<Vec<Geometry>> = examples.collect();
+        self.facts().basis != Basis::Geometry
+            || examples.is_some_and(|of| self.kind().value(&of).is_some())
+    }
+
     /// What teaching proposes for the shape of the whole part, over squares of so many pixels.
     pub fn of_shape(smoothing_px: usize) -> Self {
         kinds::Deviation { smoothing_px }.into()

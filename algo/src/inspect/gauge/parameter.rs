@@ -17,6 +17,8 @@ pub enum Domain {
         /// Whether it must be above 0.
         positive: bool,
     },
+    /// Two coordinates that a register can hold, mm.
+    Place,
     /// One of these words.
     Words(&'static [&'static str]),
 }
@@ -26,6 +28,8 @@ pub enum Domain {
 pub enum Value {
     /// A number, in the unit of its domain.
     Number(f64),
+    /// Two numbers.
+    Pair([f64; 2]),
     /// One of the words of its domain.
     Word(&'static str),
 }
@@ -39,6 +43,12 @@ impl From<usize> for Value {
 impl From<f64> for Value {
     fn from(number: f64) -> Self {
         Self::Number(number)
+    }
+}
+
+impl From<[f64; 2]> for Value {
+    fn from(pair: [f64; 2]) -> Self {
+        Self::Pair(pair)
     }
 }
 
@@ -61,7 +71,7 @@ impl Parameter {
     pub fn range(&self, longest: usize) -> Option<[f64; 2]> {
         match self.domain {
             Domain::Pixels { .. } => Some([1.0, longest as f64]),
-            Domain::Length { positive: false } => Some(Unit::Length.range()),
+            Domain::Length { positive: false } | Domain::Place => Some(Unit::Length.range()),
             Domain::Length { positive: true } => Some([0.0, Unit::Length.range()[1]]),
             Domain::Words(_) => None,
         }
@@ -72,10 +82,23 @@ impl Parameter {
     /// # Errors
     /// In words that name the parameter, its value and what to write.
     pub fn check(&self, longest: usize) -> Result<(), String> {
-        let (Value::Number(value), Some([least, most])) = (self.value, self.range(longest)) else {
+        let Some([least, most]) = self.range(longest) else {
             return Ok(());
         };
         let name = self.name;
+        let value = match self.value {
+            Value::Number(value) => value,
+            Value::Pair(pair) => {
+                let outside = pair.iter().any(|value| !(least..=most).contains(value));
+                return match outside {
+                    true => Err(format!(
+                        "{name} is {pair:?}: write two of {least} to {most}"
+                    )),
+                    false => Ok(()),
+                };
+            }
+            Value::Word(_) => return Ok(()),
+        };
         let within = (least..=most).contains(&value);
         match self.domain {
             Domain::Pixels { odd: true } if within && value % 2.0 == 0.0 => Err(format!(

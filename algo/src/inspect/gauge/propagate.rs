@@ -8,85 +8,294 @@
 //! ```
 //!
 //! (JCGM 100:2008, 5.1.3 note 2, with 5.2.2 for covariances). The blocks are the parameters of each
-//! feature, by the noise of its pixels, and the six components of the part's motion, which moves
-//! all features together: what does not change when the part is moved as a whole, like the distance
-//! of two parallel planes, has no error by the motion. As for
-//! [`Evidence::linear`](super::Evidence::linear) the blocks are taken as independent.
+//! plane by the noise of its pixels, those of each contour in its plane, and the six components of
+//! the part's motion. A plane that two contours lie in moves both of them, and the motion all
+//! features together: what does not change when the part is moved as a whole, like the distance of
+//! two holes, has no error by the motion. As for [`Evidence::linear`](super::Evidence::linear) the
+//! blocks are taken as independent.
 //!
 //! Where f has a kink within ± uᵢ, as an angle has at 0, the two halves of the difference have
 //! different signs and would cancel; gᵢ is then the larger of both.
+//!
+//! Along directions that the part's shape leaves open the motion has no covariance. A value of a
+//! contour that depends on them is none.
+//!
+//! What else is uncertain of contours ([`Source`]) is propagated likewise, each input by itself: one
+//! that is common to all contours changes all of them at once.
 //!
 //! # Accuracy
 //! Within 2 % where the value is 10 σ or more from a kink:
 //! `errors_of_geometric_kinds_are_the_scatter_of_random_draws`.
 
+use super::datum::DatumFrame;
 use super::kind::{Kind, MAX_PLACES};
 use super::reading::Found;
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed, form};
-use crate::inspect::feature::{FittedPlane, Geometry};
+use crate::inspect::contour::Source;
+use crate::inspect::feature::{FittedPlane, Geometry, Parameters, Rim};
 
-/// A feature, and how it depends on what was measured.
+/// A plane, and how it depends on what was measured.
 #[derive(Clone, Copy, Debug)]
-pub struct Sensitive<'a> {
-    /// The feature.
+pub struct SensitivePlane<'a> {
+    /// Which plane: two features with the same number share it.
+    pub id: usize,
+    /// The plane.
     pub plane: &'a FittedPlane,
     /// What 1 mm more of each of its cells adds to its parameters.
     pub rows: &'a [[f64; 3]],
 }
 
+/// A feature, and how it depends on what was measured.
+#[derive(Clone, Copy, Debug)]
+pub enum Sensitive<'a> {
+    /// A plane.
+    Plane(SensitivePlane<'a>),
+    /// A contour.
+    Contour {
+        /// Which contour.
+        id: usize,
+        /// What was found of it.
+        rim: &'a Rim,
+        /// The plane that it lies in.
+        plane: SensitivePlane<'a>,
+    },
+}
+
+/// A gauge's value as a function of features: those that it is of, and those of its datum system.
+#[derive(Clone, Copy)]
+pub struct Characteristic<'a> {
+    /// The kind of the gauge.
+    pub kind: &'a dyn Kind,
+    /// Its features, at most [`MAX_PLACES`].
+    pub of: &'a [Sensitive<'a>],
+    /// Those of its datum system, at most [`MAX_DATUMS`]; none: the frame as taught.
+    pub datum: &'a [Sensitive<'a>],
+}
+
+/// Most features of a datum system.
+pub const MAX_DATUMS: usize = 3;
+
+/// A value with its errors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Propagated {
+    /// The value and its error by noise.
+    pub found: Found,
+    /// Variance by inputs that are the same when the part is measured again elsewhere.
+    pub shared: f64,
+    /// Variance by inputs that are others wherever the part lies.
+    pub own: f64,
+}
+
+/// One thing that is otherwise than it was found.
+#[derive(Clone, Copy, Debug)]
+enum Change {
+    None,
+    /// A plane has other parameters.
+    Plane(usize, [f64; 3]),
+    /// A parameter of a contour is larger.
+    Parameter(usize, usize, f64),
+    /// An input of a contour, by its place in the list, is off by so many standard uncertainties.
+    Input(usize, usize, f64),
+    /// The same for an input that is common to all contours.
+    Common(Source, f64),
+    /// The part lies so.
+    Moved(Motion),
+    /// All lengths in planes of contours are larger by this share.
+    Scale(f64),
+}
+
 /// Least step of a difference, in mm, and in mm per mm: much more than rounding.
 const LEAST_STEP: f64 = 1e-7;
+/// A value that changes by more than this share of a motion along an open direction depends on it.
+const OPEN: f64 = 1e-3;
+/// Step of a motion along an open direction, mm: smaller than what matters, far above rounding.
+const OPEN_STEP: f64 = 1e-3;
 
-/// The value of features, at most [`MAX_PLACES`], with its errors; `None` where it is not finite.
-pub fn propagate(kind: &dyn Kind, of: &[Sensitive<'_>], placed: Option<&Placed>) -> Option<Found> {
-    let mut here = [Geometry::default(); MAX_PLACES];
-    let here = here.get_mut(..of.len())?;
-    for (geometry, Sensitive { plane, .. }) in here.iter_mut().zip(of) {
-        *geometry = plane.geometry(plane.parameters);
+impl Sensitive<'_> {
+    fn plane(&self) -> &SensitivePlane<'_> {
+        match self {
+            Self::Plane(plane) | Self::Contour { plane, .. } => plane,
+        }
     }
-    let here = &*here;
-    let value = |of: &[Geometry]| kind.value(of).unwrap_or(f64::NAN);
-    let found = value(here);
-    let (mut pixels, mut lever) = (0.0, 0.0);
-    for (at, Sensitive { plane, rows }) in of.iter().enumerate() {
-        let covariance = &plane.covariance;
-        let g: [f64; 3] = core::array::from_fn(|i| {
-            derivative(found, libm::sqrt(covariance[i][i]), |step| {
-                let mut parameters = plane.parameters;
-                parameters[i] += step;
-                let mut changed = [Geometry::default(); MAX_PLACES];
-                let changed = &mut changed[..here.len()];
-                changed.copy_from_slice(here);
-                changed[at] = plane.geometry(parameters);
-                value(changed)
-            })
-        });
-        let dot = |row: &[f64; 3]| g[0] * row[0] + g[1] * row[1] + g[2] * row[2];
-        pixels += (0..3).map(|i| g[i] * dot(&covariance[i])).sum::<f64>();
-        lever += rows.iter().map(|row| libm::fabs(dot(row))).sum::<f64>();
-    }
-    let motion = placed.map_or(0.0, |placed| {
-        let g = core::array::from_fn(|i| {
-            let sigma = libm::sqrt(placed.covariance[i][i].max(0.0));
-            derivative(found, sigma, |step| {
-                let motion = component(placed, i, step);
-                let mut moved = [Geometry::default(); MAX_PLACES];
-                for (geometry, Sensitive { plane, .. }) in moved.iter_mut().zip(of) {
-                    *geometry = plane.geometry(plane.moved(&motion));
+
+    /// Its geometry after a change.
+    fn geometry(&self, change: &Change) -> Geometry {
+        match self {
+            Self::Plane(SensitivePlane { id, plane, .. }) => match change {
+                Change::Plane(which, parameters) if which == id => plane.geometry(*parameters),
+                Change::Moved(motion) => plane.geometry(plane.moved(motion)),
+                _ => plane.geometry(plane.parameters),
+            },
+            Self::Contour { id, rim, plane } => {
+                let p = &rim.parameters;
+                let normal = rim.frame.normal();
+                let still = |at: Vector| at;
+                let off = |offs: &Parameters, by: f64| {
+                    rim.geometry(
+                        &core::array::from_fn(|i| p[i] + by * offs[i]),
+                        normal,
+                        still,
+                    )
+                };
+                match change {
+                    Change::Plane(which, parameters) if *which == plane.id => {
+                        let of = plane.plane;
+                        rim.geometry(p, of.geometry(*parameters).normal(), |at| {
+                            rim.seen_on(at, of, *parameters)
+                        })
+                    }
+                    Change::Parameter(which, at, step) if which == id => {
+                        let mut unit = Parameters::default();
+                        unit[*at] = 1.0;
+                        off(&unit, *step)
+                    }
+                    Change::Input(which, at, by) if which == id => off(&rim.inputs[*at].1, *by),
+                    Change::Common(source, by) => {
+                        let own = rim.inputs.iter().find(|(own, _)| own == source);
+                        off(&own.map_or(Parameters::default(), |(_, off)| *off), *by)
+                    }
+                    Change::Moved(motion) => {
+                        let turned =
+                            motion.apply(motion.centre + normal) - motion.apply(motion.centre);
+                        rim.geometry(p, turned, |at| motion.apply(at))
+                    }
+                    Change::Scale(by) => rim.geometry(p, normal, |at| at * (1.0 + by)),
+                    _ => rim.geometry(p, normal, still),
                 }
-                value(&moved[..of.len()])
-            })
-        });
-        form(&g, &placed.covariance, &g).max(0.0)
-    });
-    let finite = [found, pixels, motion, lever].iter().all(|x| x.is_finite());
-    finite.then_some(Found {
-        value: found,
-        pixels,
-        motion,
-        lever,
-    })
+            }
+        }
+    }
+}
+
+impl Characteristic<'_> {
+    /// The value after a change; NaN where there is none.
+    fn value(&self, change: &Change) -> f64 {
+        let of: heapless::Vec<Geometry, MAX_PLACES> =
+            self.of.iter().map(|of| of.geometry(change)).collect();
+        let datum: heapless::Vec<Geometry, MAX_DATUMS> =
+            self.datum.iter().map(|of| of.geometry(change)).collect();
+        let value = match self.datum.is_empty() {
+            true => self.kind.value(&of),
+            false => DatumFrame::of(&datum).and_then(|frame| {
+                let of: heapless::Vec<Geometry, MAX_PLACES> =
+                    of.iter().map(|of| frame.coordinates(of)).collect();
+                self.kind.value(&of)
+            }),
+        };
+        value.unwrap_or(f64::NAN)
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Sensitive<'_>> + Clone {
+        self.of.iter().chain(self.datum)
+    }
+
+    /// The value with its errors; `None` where it is not finite, or depends on how the part lies
+    /// along a direction that its shape leaves open. Lengths have the relative uncertainty `length`.
+    pub fn propagate(&self, placed: Option<&Placed>, length: f64) -> Option<Propagated> {
+        let found = self.value(&Change::None);
+        let slope = |step, change: &dyn Fn(f64) -> Change| {
+            derivative(found, step, |by| self.value(&change(by)))
+        };
+        let (mut pixels, mut lever) = (0.0, 0.0);
+        for (at, of) in self.all().enumerate() {
+            let SensitivePlane { id, plane, rows } = *of.plane();
+            let before = || self.all().take(at);
+            if before().any(|other| other.plane().id == id) {
+                continue;
+            }
+            let covariance = &plane.covariance;
+            let g: [f64; 3] = core::array::from_fn(|i| {
+                slope(libm::sqrt(covariance[i][i]), &|by| {
+                    let mut parameters = plane.parameters;
+                    parameters[i] += by;
+                    Change::Plane(id, parameters)
+                })
+            });
+            let dot = |row: &[f64; 3]| g[0] * row[0] + g[1] * row[1] + g[2] * row[2];
+            pixels += (0..3).map(|i| g[i] * dot(&covariance[i])).sum::<f64>();
+            lever += rows.iter().map(|row| libm::fabs(dot(row))).sum::<f64>();
+        }
+        let (mut shared, mut own) = (0.0, 0.0);
+        let (mut is_contour, mut common) = (false, heapless::Vec::<Source, 4>::new());
+        for (at, of) in self.all().enumerate() {
+            let Sensitive::Contour { id, rim, .. } = *of else {
+                continue;
+            };
+            is_contour = true;
+            let is_same = |other: &Sensitive<'_>| matches!(other, Sensitive::Contour { id: of, .. } if *of == id);
+            if self.all().take(at).any(is_same) {
+                continue;
+            }
+            let covariance = &rim.covariance;
+            let mut g = Parameters::default();
+            for (i, g) in g.iter_mut().enumerate().take(rim.count) {
+                *g = slope(libm::sqrt(covariance[i][i]), &|by| {
+                    Change::Parameter(id, i, by)
+                });
+            }
+            let row = |i: usize| (0..rim.count).map(|j| covariance[i][j] * g[j]).sum::<f64>();
+            pixels += (0..rim.count).map(|i| g[i] * row(i)).sum::<f64>();
+            for (input, (source, _)) in rim.inputs.iter().enumerate() {
+                if source.is_common() {
+                    if !common.contains(source) {
+                        // There are fewer common sources than places.
+                        let _ = common.push(*source);
+                    }
+                    continue;
+                }
+                let off = slope(1.0, &|by| Change::Input(id, input, by));
+                match is_of_place(*source) {
+                    true => own += off * off,
+                    false => shared += off * off,
+                }
+            }
+        }
+        for source in common {
+            let off = slope(1.0, &|by| Change::Common(source, by));
+            shared += off * off;
+        }
+        if is_contour {
+            let off = slope(1.0, &|by| Change::Scale(by * length));
+            shared += off * off;
+        }
+        let mut motion = 0.0;
+        if let Some(placed) = placed {
+            let g = core::array::from_fn(|i| {
+                let sigma = libm::sqrt(placed.covariance[i][i].max(0.0));
+                slope(sigma, &|by| {
+                    let mut way = [0.0; 6];
+                    way[i] = by;
+                    Change::Moved(moved(placed, &way))
+                })
+            });
+            motion = form(&g, &placed.covariance, &g).max(0.0);
+            let mut open = placed.open.iter();
+            let depends = |direction: &[f64; 6]| {
+                let along = |by: f64| Change::Moved(moved(placed, &direction.map(|way| way * by)));
+                libm::fabs(slope(OPEN_STEP, &along)) > OPEN
+            };
+            if is_contour && open.any(depends) {
+                return None;
+            }
+        }
+        let finite = [found, pixels, motion, lever, shared, own];
+        finite.iter().all(|x| x.is_finite()).then_some(Propagated {
+            found: Found {
+                value: found,
+                pixels,
+                motion,
+                lever,
+            },
+            shared,
+            own,
+        })
+    }
+}
+
+/// Whether an input is another one wherever the part lies.
+fn is_of_place(source: Source) -> bool {
+    matches!(source, Source::Pixels | Source::Wall)
 }
 
 /// The derivative of a function about 0, where it has the value `here`, over a step of this size.
@@ -101,12 +310,9 @@ fn derivative(here: f64, step: f64, f: impl Fn(f64) -> f64) -> f64 {
     both / (2.0 * step)
 }
 
-/// A motion along one of the components of the covariance: a shift in mm, or a turn as the way of a
-/// point at the part's radius.
-fn component(placed: &Placed, at: usize, way: f64) -> Motion {
-    let mut all = [0.0; 6];
-    all[at] = way;
-    let [x, y, z, about_x, about_y, about_z] = all;
+/// A motion by so much along each of the components of the covariance: shifts in mm, and turns as
+/// the way of a point at the part's radius.
+fn moved(placed: &Placed, &[x, y, z, about_x, about_y, about_z]: &[f64; 6]) -> Motion {
     Motion::new(
         placed.motion.centre,
         Vector::new(x, y, z),

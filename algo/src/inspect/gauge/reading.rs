@@ -48,3 +48,14 @@ pub struct Found {
     /// value.
     pub lever: f64,
 }
+
+/// A value of the points of a contour.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OfRim {
+    /// The value.
+    pub value: f64,
+    /// Variance by the noise of the points; 0 where it is not known.
+    pub variance: f64,
+    /// What it is expected to be on a perfect contour with this noise.
+    pub expected: Option<f64>,
+}

@@ -3,19 +3,21 @@
 use super::kind::*;
 
 kind! {
-    /// z of a plane at the middle of its region as taught, mm.
+    /// z of the centre of a hole or slot, or of a plane at the middle of its region as taught, mm:
+    /// in a datum system, or else in the frame as taught.
     Z {}
 }
 
 impl Kind for Z {
     fn facts(&self) -> Facts {
         Facts {
-            takes: PLANE,
+            takes: &[&[Plane, Circle, Slot]],
+            datum: true,
             ..Facts::new(Unit::Length, Basis::Geometry, "")
         }
     }
 
     fn value(&self, of: &[Geometry]) -> Option<f64> {
-        of.first().map(|plane| plane.point.z)
+        of.first().map(|of| of.point().z)
     }
 }

@@ -51,9 +51,9 @@ pub struct Bend {
 impl SeenPlane {
     /// `None` where the camera does not see it.
     pub fn new(golden: &Golden, plane: &FittedPlane) -> Option<Self> {
-        let middle = plane.geometry(plane.parameters).point;
+        let geometry = plane.geometry(plane.parameters);
+        let (middle, normal) = (geometry.point(), geometry.normal());
         let seen = golden.triangulator.camera().project(middle)?;
-        let normal = plane.geometry(plane.parameters).direction;
         let (u, v) = (seen.0 as usize, seen.1 as usize);
         // How far the plane lies above the middle's height on the ray of a pixel.
         let height = |u: usize, v: usize| {

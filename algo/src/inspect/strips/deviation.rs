@@ -166,6 +166,7 @@ mod tests {
             covariance,
             radius: 50.0,
             left_out: [false; 6],
+            open: heapless::Vec::new(),
             points: 100,
             outliers: 0.0,
             reach: 0.0,

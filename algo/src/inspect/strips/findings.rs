@@ -1,10 +1,11 @@
 //! Stage 5, gauge: the sums of all strips → readings and their errors.
 
+use super::contours::{ContourFit, FoundFeature, Signal};
 use super::counts::TRUSTS;
 use super::coverage;
 use super::decode::Input;
-use super::fits::{Fit, value_of};
-use super::gauges::MAX_GAUGES;
+use super::fits::Fit;
+use super::gauges::{Gauge, MAX_GAUGES};
 use super::plan::Production;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
@@ -12,10 +13,14 @@ use super::squares::rivals::rivals;
 use super::strip::{CellBuffers, Strip, Strips};
 use super::uncertainty::Made;
 use crate::inspect::align::Placed;
+use crate::inspect::contour::State;
 use crate::inspect::feature::{Sum, TaughtCell, cells};
-use crate::inspect::gauge::{Basis, Evidence, Facts, MAX_PLACES, Reading};
+use crate::inspect::gauge::{
+    Basis, Characteristic, Evidence, Facts, MAX_DATUMS, MAX_PLACES, OfRim, Propagated, Reading,
+    Sensitive,
+};
 use crate::phase::Trust;
-use crate::pipeline::{VARIANCE_UNIT_NM, for_each_item};
+use crate::pipeline::{VARIANCE_UNIT_NM, for_each, for_each_item};
 use alloc::vec::Vec;
 
 /// Everything that is known of a part after one cycle.
@@ -23,9 +28,10 @@ use alloc::vec::Vec;
 pub struct Findings {
     /// Per gauge; `None` where there was nothing to measure.
     pub readings: heapless::Vec<Option<Reading>, MAX_GAUGES>,
-    /// Per gauge without a value, of cells or planes, which share of each of its features as taught
-    /// was measured.
-    pub unmeasured: heapless::Vec<Option<[f64; MAX_PLACES]>, MAX_GAUGES>,
+    /// Per gauge without a value, why.
+    pub missing: heapless::Vec<Option<Missing>, MAX_GAUGES>,
+    /// The planes and contours that gauges need.
+    pub features: Vec<FoundFeature>,
     /// Pixels with a height.
     pub resolved: u64,
     /// Share of the compared surface inside the window that has a height.
@@ -40,6 +46,19 @@ pub struct Findings {
     pub placed: Option<Placed>,
     /// What was not computed.
     pub skipped: Skipped,
+}
+
+/// Why a gauge has no value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Missing {
+    /// There was nothing to measure.
+    Nothing,
+    /// Of cells: which share of each of its features as taught was measured.
+    Cells([f64; MAX_PLACES]),
+    /// One of [`Findings::features`] was not found.
+    Feature(usize),
+    /// The value depends on how the part lies along a direction that its shape leaves open.
+    Open,
 }
 
 /// What was not computed, or not by the fast way.
@@ -57,7 +76,11 @@ pub struct Skipped {
 }
 
 impl Production {
-    pub(super) fn findings(&self, input: Input<'_>, strips: &mut Strips) -> Findings {
+    pub(super) fn findings(
+        &self,
+        (input, light): (Input<'_>, Signal<'_>),
+        strips: &mut Strips,
+    ) -> Findings {
         let mut trusts = [0; TRUSTS];
         let mut tally = crate::pipeline::HeightTally::default();
         let mut exact = 0;
@@ -82,19 +105,22 @@ impl Production {
         // From the noise of independent pixels to that of the map.
         let windows = libm::sqrt(self.budget.square_variance(1));
         self.fit(strips, noisier);
+        self.find_contours(strips, light);
+        let features = self.features(strips);
         let readings: heapless::Vec<Option<Reading>, MAX_GAUGES> = (0..self.gauges.list.len())
             .map(|gauge| self.reading(gauge, input, noisier, strips))
             .collect();
-        let without = |(gauge, reading): (usize, &Option<Reading>)| match reading {
+        let missing = |(gauge, reading): (usize, &Option<Reading>)| match reading {
             Some(_) => None,
-            None => self.shares(gauge, &strips.strips),
+            None => Some(self.missing(gauge, &features, &strips.strips)),
         };
-        let unmeasured = readings.iter().enumerate().map(without).collect();
+        let missing = readings.iter().enumerate().map(missing).collect();
         let count = |trust: Trust| trusts[trust as usize];
         let contradicting = count(Trust::Residual);
         Findings {
             readings,
-            unmeasured,
+            missing,
+            features,
             resolved: trusts[Trust::Resolved as usize],
             coverage: tally.compared as f64 / self.golden.compared.max(1) as f64,
             height_noise_mm: height_noise_mm * windows,
@@ -124,6 +150,7 @@ impl Production {
             pose,
             cells,
             fits,
+            contours,
             ..
         } = strips;
         match self.gauges.list[gauge].measure.facts().basis {
@@ -184,11 +211,48 @@ impl Production {
             }
             Basis::Cells(_) | Basis::Region => self.of_cells(gauge, noisier, pose, strips, cells),
             Basis::Geometry => {
-                let own = &self.gauges.patches_of[gauge];
-                let placed = pose.placed.as_ref();
-                let found = value_of(self.gauges.list[gauge].measure.kind(), own, fits, placed)?;
                 let budget = &self.budget;
-                Some(budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed))
+                let Gauge { of, datum, measure } = &self.gauges.list[gauge];
+                let of: heapless::Vec<Sensitive<'_>, MAX_PLACES> = sensitive(of, fits, contours)?;
+                let datum: heapless::Vec<_, MAX_DATUMS> = sensitive(datum, fits, contours)?;
+                let value = Characteristic {
+                    kind: measure.kind(),
+                    of: &of,
+                    datum: &datum,
+                };
+                let placed = pose.placed.as_ref();
+                let Propagated { found, shared, own } =
+                    value.propagate(placed, budget.calibration.length)?;
+                let of = budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed);
+                // Where golden was measured its own inputs were others, too.
+                let with = |error: f64, inputs: f64| libm::sqrt(error * error + inputs);
+                Some(Reading {
+                    systematic: with(of.systematic, shared + own),
+                    compared: with(of.compared, 2.0 * own),
+                    ..of
+                })
+            }
+            Basis::Rim => {
+                let Gauge { of, measure, .. } = &self.gauges.list[gauge];
+                let found = contours.iter().find(|contour| contour.is_of(of))?;
+                let kind = measure.kind();
+                let of = match (&found.rim, found.is_absent()) {
+                    (Some(rim), _) => kind.of_rim(rim)?,
+                    (None, true) => OfRim {
+                        value: kind.of_absent()?,
+                        variance: 0.0,
+                        expected: None,
+                    },
+                    (None, false) => return None,
+                };
+                Some(Reading {
+                    value: of.value,
+                    sigma: Some(libm::sqrt(of.variance)),
+                    expected: of.expected,
+                    systematic: 0.0,
+                    compared: 0.0,
+                    square: None,
+                })
             }
         }
     }
@@ -256,17 +320,77 @@ impl Production {
         )
     }
 
-    /// Which share of the cells of each of a gauge's features was measured; none if it has no cells.
-    fn shares(&self, gauge: usize, strips: &[Strip]) -> Option<[f64; MAX_PLACES]> {
-        let own = self.gauges.patches_of.get(gauge)?;
-        let mut shares = [1.0; MAX_PLACES];
-        for (share, &patch) in shares.iter_mut().zip(own) {
-            let had = pixels(&self.gauges.patches[patch].taught);
-            let sums = strips.iter().flat_map(|strip| &strip.counts.cells[patch]);
-            let has: i64 = sums.map(|sum| sum.count).sum();
-            *share = has as f64 / f64::from(had.max(1));
+    /// Why a gauge has no value, where these features were found.
+    fn missing(&self, gauge: usize, features: &[FoundFeature], strips: &[Strip]) -> Missing {
+        let of = &self.gauges.list[gauge];
+        let own = &self.gauges.patches_of[gauge];
+        if !own.is_empty() {
+            let mut shares = [1.0; MAX_PLACES];
+            for (share, &patch) in shares.iter_mut().zip(own) {
+                let had = pixels(&self.gauges.patches[patch].taught);
+                let sums = strips.iter().flat_map(|strip| &strip.counts.cells[patch]);
+                let has: i64 = sums.map(|sum| sum.count).sum();
+                *share = has as f64 / f64::from(had.max(1));
+            }
+            return Missing::Cells(shares);
         }
-        (!own.is_empty()).then_some(shares)
+        let needed = |feature: &FoundFeature| {
+            of.of
+                .iter()
+                .chain(&of.datum)
+                .any(|&at| at == feature.feature)
+        };
+        let lost = |feature: &&FoundFeature| needed(feature) && feature.state != State::Found;
+        // What is absent makes a part bad only if nothing else is unseen.
+        let mut all = features.iter().filter(lost);
+        let first = all.clone().find(|feature| feature.state == State::Unseen);
+        match first.or(all.next()) {
+            Some(feature) => Missing::Feature(feature.feature),
+            None if of.measure.facts().basis == Basis::Geometry => Missing::Open,
+            None => Missing::Nothing,
+        }
+    }
+
+    /// The planes and contours that gauges need.
+    fn features(&self, strips: &Strips) -> Vec<FoundFeature> {
+        let own = |fit: &&Fit| !strips.contours.iter().any(|of| of.is_of(&[fit.feature]));
+        let planes = strips.fits.iter().filter(own).map(|fit| {
+            let geometry = fit.geometry();
+            FoundFeature {
+                feature: fit.feature,
+                state: match geometry {
+                    Some(_) => State::Found,
+                    None => State::Unseen,
+                },
+                found: fit.share(&self.gauges.patches[fit.patch]),
+                blur_px: None,
+                lost: None,
+                geometry,
+            }
+        });
+        let contours = strips.contours.iter();
+        planes
+            .chain(contours.filter_map(|contour| contour.of.clone()))
+            .collect()
+    }
+
+    /// Finds the contours of features in their planes, one per task.
+    fn find_contours(&self, strips: &mut Strips, light: Signal<'_>) {
+        let Some(contours) = &self.contours else {
+            return;
+        };
+        let Strips {
+            fits,
+            pose,
+            contours: found,
+            ..
+        } = strips;
+        let (fits, placed) = (&fits[..], pose.placed.as_ref());
+        let work: Vec<_> = found.iter_mut().zip(&contours.all).collect();
+        for_each(work, |_, (found, expected)| {
+            let plane = &fits[expected.plane];
+            found.find((contours, expected), &self.golden, plane, placed, light);
+        });
     }
 
     /// Fits the planes of features, one per task.
@@ -297,6 +421,22 @@ impl Production {
         let least = (side > 0).then(|| patch.grid.least());
         cells(sums, &patch.taught, least, out);
     }
+}
+
+/// What values of these features depend on; `None` where one was not found.
+fn sensitive<'a, const N: usize>(
+    features: &[usize],
+    fits: &'a [Fit],
+    contours: &'a [ContourFit],
+) -> Option<heapless::Vec<Sensitive<'a>, N>> {
+    let sensitive = |at: &usize| {
+        if let Some(contour) = contours.iter().find(|contour| contour.is_of(&[*at])) {
+            return contour.sensitive(fits);
+        }
+        let fit = fits.iter().find(|fit| fit.feature == *at)?;
+        Some(Sensitive::Plane(fit.sensitive()?))
+    };
+    features.iter().map(sensitive).collect()
 }
 
 /// The sums of all strips over the cells of a patch.

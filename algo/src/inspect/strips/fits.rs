@@ -6,16 +6,20 @@
 use super::bend::{Bend, SeenPlane};
 use super::gauges::Patch;
 use super::golden::Golden;
-use crate::inspect::align::{Motion, Placed};
-use crate::inspect::feature::{Cell, FittedPlane, Middle, Sum, cells};
-use crate::inspect::gauge::{Found, Kind, MAX_PLACES, Sensitive, propagate};
+use crate::inspect::align::Motion;
+use crate::inspect::feature::{Cell, FittedPlane, Geometry, Middle, Sum, cells};
+use crate::inspect::gauge::SensitivePlane;
 use alloc::vec::Vec;
 
 /// The fit of a plane, with its buffers.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Fit {
     /// Which patch has its cells.
     pub patch: usize,
+    /// Which feature it is.
+    pub feature: usize,
+    /// Thickness of its sheet, mm; `None` where it is not known.
+    pub thickness: Option<f64>,
     middle: Middle,
     /// As taught; `None` if it has no plane.
     seen: Option<SeenPlane>,
@@ -29,13 +33,15 @@ pub struct Fit {
 
 impl Fit {
     /// To the cells of this patch.
-    pub fn new(at: usize, patch: &Patch, golden: &Golden) -> Self {
+    pub fn new(at: usize, patch: &Patch, golden: &Golden, thickness: Option<f64>) -> Self {
         let as_taught = patch.taught.iter().map(|cell| Sum {
             count: i64::from(cell.pixels),
             deviation: 0,
         });
         let mut fit = Self {
             patch: at,
+            feature: patch.feature,
+            thickness,
             middle: Middle::of(&patch.taught),
             seen: None,
             sums: as_taught.collect(),
@@ -68,21 +74,28 @@ impl Fit {
         }
         self.plane = FittedPlane::of(&self.cells, self.middle, variance, &mut self.rows);
     }
-}
 
-/// The value of the planes of these patches, with its errors; `None` where one was not found.
-pub fn value_of(
-    kind: &dyn Kind,
-    patches: &[usize],
-    fits: &[Fit],
-    placed: Option<&Placed>,
-) -> Option<Found> {
-    let mut of = heapless::Vec::<Sensitive<'_>, MAX_PLACES>::new();
-    for patch in patches {
-        let fit = fits.iter().find(|fit| fit.patch == *patch)?;
-        let plane = fit.plane.as_ref()?;
-        let rows = &fit.rows[..];
-        of.push(Sensitive { plane, rows }).ok()?;
+    /// Its geometry; `None` where there is no plane.
+    pub fn geometry(&self) -> Option<Geometry> {
+        let plane = self.plane.as_ref()?;
+        Some(plane.geometry(plane.parameters))
     }
-    propagate(kind, &of, placed)
+
+    /// The plane as values depend on it; `None` where there is none.
+    pub fn sensitive(&self) -> Option<SensitivePlane<'_>> {
+        Some(SensitivePlane {
+            id: self.feature,
+            plane: self.plane.as_ref()?,
+            rows: &self.rows,
+        })
+    }
+
+    /// The share of its cells' pixels as taught that was measured.
+    pub fn share(&self, patch: &Patch) -> f64 {
+        let had: u32 = patch.taught.iter().map(|cell| cell.pixels).sum();
+        let pairs = self.sums.iter().zip(&patch.taught);
+        let has = pairs.filter(|(_, taught)| taught.pixels > 0);
+        let has: i64 = has.map(|(sum, _)| sum.count).sum();
+        has as f64 / f64::from(had.max(1))
+    }
 }

@@ -6,8 +6,10 @@ use super::spans::hull;
 use super::squares::extreme;
 use crate::geometry::Vector;
 use crate::inspect::align::{Alignment, GoldenSurface};
-use crate::inspect::feature::{Feature, FeatureKind, Grid, TaughtCell, TooFine, taught_cells};
-use crate::inspect::gauge::{Basis, Measure};
+use crate::inspect::feature::{
+    Feature, FeatureKind, Grid, TaughtCell, TooFine, keep_face, taught_cells,
+};
+use crate::inspect::gauge::{Basis, Measure, makes_datum};
 use crate::inspect::region::Region;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -17,19 +19,45 @@ use core::ops::Range;
 pub struct Gauge {
     /// Which of the production's features, in the order of the measure's places.
     pub of: Vec<usize>,
+    /// Those of the datum system in which it is measured; none in the frame as taught.
+    pub datum: Vec<usize>,
     /// What.
     pub measure: Measure,
 }
 
 impl Gauge {
+    /// All features that it needs, some of them perhaps twice: its own, those of its datum system,
+    /// and the planes of contours among them.
+    pub fn needs<'a>(&'a self, features: &'a [Feature]) -> impl Iterator<Item = usize> + 'a {
+        let own = self.of.iter().chain(&self.datum).copied();
+        let plane = |at: usize| features.get(at).and_then(|feature| feature.plane);
+        own.flat_map(move |at| plane(at).into_iter().chain([at]))
+    }
+
     /// Whether its kind measures such features.
     fn fits(&self, features: &[Feature]) -> bool {
-        let takes = self.measure.facts().takes;
+        let facts = self.measure.facts();
         let fits = |(kinds, at): (&&[FeatureKind], &usize)| {
             let feature = features.get(*at);
             feature.is_some_and(|feature| kinds.contains(&feature.kind))
         };
-        takes.len() == self.of.len() && takes.iter().zip(&self.of).all(fits)
+        let takes = facts.takes;
+        let kinds = |of: &[usize]| -> Vec<FeatureKind> {
+            of.iter()
+                .filter_map(|&at| features.get(at))
+                .map(|of| of.kind)
+                .collect()
+        };
+        takes.len() == self.of.len()
+            && takes.iter().zip(&self.of).all(fits)
+            && self.datum.iter().all(|&at| at < features.len())
+            && self.measure.measures(&kinds(&self.of))
+            && (self.datum.is_empty() || makes_datum(&kinds(&self.datum)))
+            && self.needs(features).all(|at| {
+                let plane = features[at].plane.and_then(|plane| features.get(plane));
+                features[at].plane.is_none()
+                    || plane.is_some_and(|of| of.kind == FeatureKind::Plane)
+            })
     }
 }
 
@@ -59,6 +87,18 @@ pub enum Unmeasurable {
     Unfit {
         /// Which gauge.
         gauge: usize,
+    },
+    /// A contour that golden does not have.
+    #[error("golden has no contour in the region of feature {}", feature + 1)]
+    NoContour {
+        /// Which feature.
+        feature: usize,
+    },
+    /// A contour where a level has two shifts.
+    #[error("a contour needs three shifts or more, for feature {}", feature + 1)]
+    NoQuadrature {
+        /// Which feature.
+        feature: usize,
     },
     /// A smoothing over so many pixels that sums of heights over them could overflow.
     #[error("a smoothing over {side}x{side} pixels is too wide for the working range")]
@@ -126,8 +166,10 @@ pub struct Gauges {
     pub patches: Vec<Patch>,
     /// Per gauge its patches, in the order of its features; none if it has no cells.
     pub patches_of: Vec<Vec<usize>>,
-    /// The patches that planes are fitted to.
+    /// The patches that planes are fitted to, each of another feature.
     pub planes: Vec<usize>,
+    /// The contours, each with the place of its plane among the planes.
+    pub contours: Vec<(usize, usize)>,
     /// The gauges of pixels.
     pub coverages: Vec<usize>,
     /// The squares of all gauges of deviation, gauge by gauge.
@@ -198,46 +240,71 @@ impl Gauges {
             }
         }
         let about = alignment.map_or((Vector::default(), 1.0), |a| (a.centre, a.radius));
-        let used = |at: usize| list.iter().any(|gauge| gauge.of.contains(&at));
-        let features = features.iter().enumerate();
-        let regions = features.map(|(at, feature)| match used(at) {
-            true => feature.region.clone(),
-            false => Region::default(),
-        });
+        let used = |at: usize| {
+            list.iter()
+                .any(|gauge| gauge.needs(features).any(|of| of == at))
+        };
+        let regions = features
+            .iter()
+            .enumerate()
+            .map(|(at, feature)| match used(at) {
+                true => feature.region.clone(),
+                false => Region::default(),
+            });
         let regions: Vec<Region> = regions.collect();
-        let (mut patches, mut planes): (Vec<Patch>, Vec<usize>) = (Vec::new(), Vec::new());
+        let mut patches: Vec<Patch> = Vec::new();
+        let mut patch_of = |feature: usize, side: usize| {
+            let known = |patch: &Patch| (patch.feature, patch.side) == (feature, side);
+            if let Some(patch) = patches.iter().position(known) {
+                return Ok(patch);
+            }
+            let region = &regions[feature];
+            let grid = Grid::over(region, side).map_err(Unmeasurable::TooFine)?;
+            let mut taught = taught_cells(&grid, region, golden, about);
+            if features[feature].kind != FeatureKind::Surface {
+                let highest = features[feature].kind.is_contour();
+                keep_face(&mut taught, (&grid, region), golden, highest);
+            }
+            patches.push(Patch {
+                feature,
+                side,
+                grid,
+                taught,
+            });
+            Ok(patches.len() - 1)
+        };
         let (mut patches_of, mut coverages) = (Vec::new(), Vec::new());
+        let (mut planes, mut contours) = (Vec::new(), Vec::new());
         for (at, gauge) in list.iter().enumerate() {
             let basis = gauge.measure.facts().basis;
             if basis == Basis::Pixels {
                 coverages.push(at);
             }
             let mut own = Vec::new();
-            for &feature in &gauge.of {
-                let Some(side) = basis.cell_side() else {
-                    break;
-                };
-                let known = |patch: &Patch| (patch.feature, patch.side) == (feature, side);
-                let patch = match patches.iter().position(known) {
-                    Some(patch) => patch,
-                    None => {
-                        let region = &regions[feature];
-                        let grid = Grid::over(region, side).map_err(Unmeasurable::TooFine)?;
-                        patches.push(Patch {
-                            feature,
-                            side,
-                            grid,
-                            taught: taught_cells(&grid, region, golden, about),
-                        });
-                        patches.len() - 1
-                    }
-                };
-                own.push(patch);
-                if basis == Basis::Geometry && !planes.contains(&patch) {
-                    planes.push(patch);
+            if let Some(side) = basis.cell_side() {
+                for &feature in &gauge.of {
+                    own.push(patch_of(feature, side)?);
                 }
             }
             patches_of.push(own);
+            for feature in gauge.needs(features) {
+                let of = &features[feature];
+                if of.kind == FeatureKind::Plane || of.kind.is_contour() && of.plane.is_none() {
+                    let patch = patch_of(feature, 0)?;
+                    if !planes.contains(&patch) {
+                        planes.push(patch);
+                    }
+                }
+            }
+        }
+        for (at, feature) in features.iter().enumerate() {
+            if feature.kind.is_contour() && used(at) {
+                let plane = feature.plane.unwrap_or(at);
+                let plane = planes
+                    .iter()
+                    .position(|&patch| patches[patch].feature == plane);
+                contours.extend(plane.map(|plane| (at, plane)));
+            }
         }
         Ok(Self {
             list,
@@ -245,6 +312,7 @@ impl Gauges {
             patches,
             patches_of,
             planes,
+            contours,
             coverages,
             squares,
             sides,

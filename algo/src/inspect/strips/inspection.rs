@@ -1,8 +1,8 @@
 //! The stages of an inspection in their order, for all strips.
 
+use super::contours::{ContourFit, Signal};
 use super::decode::Input;
 use super::findings::Findings;
-use super::fits::Fit;
 use super::maps::Maps;
 use super::plan::Production;
 use super::pose::PoseField;
@@ -11,6 +11,7 @@ use crate::frame::FrameView;
 use crate::inspect::align::{FitBuffers, Motion, Placed};
 use crate::phase::DecodeError;
 use crate::pipeline::{for_each, for_each_item};
+use alloc::vec;
 use alloc::vec::Vec;
 
 impl Production {
@@ -27,12 +28,11 @@ impl Production {
             samples: Vec::new(),
             fitting: FitBuffers::default(),
             cells: CellBuffers::default(),
-            fits: self
-                .gauges
-                .planes
-                .iter()
-                .map(|&patch| Fit::new(patch, &self.gauges.patches[patch], &self.golden))
-                .collect(),
+            fits: self.planes.clone(),
+            contours: match &self.contours {
+                Some(contours) => vec![ContourFit::default(); contours.all.len()],
+                None => Vec::new(),
+            },
         }
     }
 
@@ -54,7 +54,7 @@ impl Production {
             heights,
             deviation: None,
         };
-        self.inspect_placed(input, strips, placed, maps)
+        self.inspect_placed((input, Signal::Frames(frames)), strips, placed, maps)
     }
 
     /// The first half: how the part lies, from a few rows of each strip. None if parts are not
@@ -94,13 +94,13 @@ impl Production {
     }
 
     /// The second half: the readings of a part that lies so, from the input and strips that it was
-    /// placed with, and `maps` of it.
+    /// placed with, and `maps` of it. Contours are found in `light`.
     ///
     /// # Errors
     /// As [`Self::inspect`].
     pub fn inspect_placed(
         &self,
-        input: Input<'_>,
+        (input, light): (Input<'_>, Signal<'_>),
         strips: &mut Strips,
         placed: Option<Placed>,
         maps: Maps<'_>,
@@ -120,6 +120,6 @@ impl Production {
                 strip.inspect(self, pose, input, maps);
             });
         }
-        Ok(self.findings(input, strips))
+        Ok(self.findings((input, light), strips))
     }
 }

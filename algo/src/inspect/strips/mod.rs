@@ -13,8 +13,8 @@
 //! 4. **accumulate** (`counts`, `coverage`, `squares`): counts, the sums of the gauges' cells
 //!    ([`feature`](super::feature)), and the square with the largest mean deviation along the normal;
 //!    for the squares, the rows before this one are kept (`recent`);
-//! 5. **gauge** (`fits`, `bend`, `findings`, `deviation`, `uncertainty`): after all strips, the planes of
-//!    features, readings and their errors from these sums.
+//! 5. **gauge** (`fits`, `bend`, `contours`, `findings`, `deviation`, `uncertainty`): after all strips, the
+//!    planes of features, the contours in them, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few
 //! points of each are kept: the motion is found from these, in the order of the rows.
@@ -37,6 +37,7 @@
 //! `strips_weigh_deviations_as_the_comparison_of_whole_maps_does`.
 
 mod bend;
+mod contours;
 mod coordinates;
 mod counts;
 mod coverage;
@@ -61,8 +62,9 @@ mod squares;
 mod strip;
 mod uncertainty;
 
+pub use contours::{FoundFeature, GoldenSignal, Levels, Lost, Signal};
 pub use decode::Input;
-pub use findings::{Findings, Skipped};
+pub use findings::{Findings, Missing, Skipped};
 pub use gauges::{Gauge, MAX_FEATURES, MAX_GAUGES, Unmeasurable};
 pub use maps::Maps;
 pub use pair::{Found, PairBuffers, PairPlaced, Picture};

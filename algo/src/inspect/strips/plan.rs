@@ -1,8 +1,10 @@
 //! What inspecting parts needs, worked out once.
 
+use super::contours::{Contours, GoldenSignal, Known, Levels};
 use super::coordinates::Comparison;
 use super::coverage::Threshold;
 use super::decode::PhasePlan;
+use super::fits::Fit;
 use super::gauges::{Gauge, Gauges, Unmeasurable};
 use super::golden::Golden;
 use super::pose::PoseField;
@@ -63,6 +65,8 @@ pub struct Parts {
     pub calibration: CalibrationError,
     /// RMS of the periodic error of a mean height by this sequence, mm.
     pub ripple: f64,
+    /// How contours are demodulated, and golden's light; only read if gauges are of contours.
+    pub light: Option<(Levels, GoldenSignal)>,
 }
 
 /// Everything that inspecting parts needs, worked out once: the plan of each stage.
@@ -73,6 +77,10 @@ pub struct Production {
     /// None where parts are taken to lie as taught.
     pub(super) alignment: Option<Alignment>,
     pub(super) gauges: Gauges,
+    /// The planes of features as taught.
+    pub(super) planes: Vec<Fit>,
+    /// `None` if no gauge is of one.
+    pub(super) contours: Option<Contours>,
     pub(super) budget: ErrorBudget,
 }
 
@@ -80,9 +88,9 @@ impl Production {
     /// Joins what is known of head and part.
     ///
     /// # Errors
-    /// If there are too many gauges or features, a gauge's kind does not measure its features, or
-    /// one's squares are so large that sums of heights over them
-    /// could overflow, or so small that there are too many.
+    /// If there are too many gauges or features, a gauge's kind does not measure its features, one's
+    /// squares are so large that sums of heights over them could overflow, or so small that there
+    /// are too many, or golden does not have a contour that a gauge is of.
     pub fn new(parts: Parts) -> Result<Self, Unmeasurable> {
         let Parts {
             decoder,
@@ -101,6 +109,7 @@ impl Production {
             displaced,
             calibration,
             ripple,
+            light,
         } = parts;
         let turns = decoder.phase_noise(
             Modulation::from_bits(1),
@@ -123,7 +132,29 @@ impl Production {
             span_nm,
             threshold,
         )?;
+        let planes = gauges.planes.iter().map(|&at| {
+            let patch = &gauges.patches[at];
+            Fit::new(at, patch, &golden, features[patch.feature].thickness)
+        });
+        let planes: Vec<Fit> = planes.collect();
+        let full_scale = decoder.full_scale();
+        let contours = match gauges.contours.first() {
+            None => None,
+            Some(&(feature, _)) => {
+                let (levels, signal) = light.ok_or(Unmeasurable::NoContour { feature })?;
+                let known = Known {
+                    levels,
+                    signal,
+                    noise: noise_counts,
+                    least: decoder.least_modulation().counts(full_scale),
+                };
+                let wanted = gauges.contours.iter().copied();
+                Some(Contours::new(wanted, (&features, &planes), &golden, known)?)
+            }
+        };
         Ok(Self {
+            planes,
+            contours,
             budget: ErrorBudget {
                 golden_noise,
                 largest,

@@ -1,5 +1,6 @@
 //! The strips of a frame, each of which takes its rows through the stages one after the other.
 
+use super::contours::ContourFit;
 use super::coordinates::{Comparison, TaughtCoordinates};
 use super::counts::Counts;
 use super::decode::Input;
@@ -31,8 +32,10 @@ pub struct Strips {
     pub(super) samples: Vec<Sample>,
     pub(super) fitting: FitBuffers,
     pub(super) cells: CellBuffers,
-    /// One per plane that a gauge is of.
+    /// One per plane that a gauge needs.
     pub(super) fits: Vec<Fit>,
+    /// One per contour that a gauge needs.
+    pub(super) contours: Vec<ContourFit>,
 }
 
 /// Buffers for the cells of one gauge after the other.

@@ -62,16 +62,13 @@ impl Gauges {
                     share(1, row, rows) * f64::from(height),
                 ]
             };
-            FeatureFile {
-                name: name(at),
-                kind: match self {
-                    Self::Taught | Self::Means(_) => FeatureKind::Surface,
-                    Self::Planes(_) | Self::Distances(_) => FeatureKind::Plane,
-                },
-                region: [(0, 0), (1, 0), (1, 1), (0, 1)]
-                    .map(|(right, down)| corner(right, down))
-                    .to_vec(),
-            }
+            let kind = match self {
+                Self::Taught | Self::Means(_) => FeatureKind::Surface,
+                Self::Planes(_) | Self::Distances(_) => FeatureKind::Plane,
+            };
+            let corners = [(0, 0), (1, 0), (1, 1), (0, 1)];
+            let corners = corners.map(|(right, down)| corner(right, down));
+            FeatureFile::new(name(at), kind, corners.to_vec())
         };
         file.features = (0..count).map(region).collect();
         file.gauges.clear();

@@ -1,14 +1,15 @@
 //! The taught part in the form that production needs: weights, safe maps and the golden surface.
 
 use crate::recipe::archive::Arrays;
-use crate::recipe::{SequenceKind, safe};
+use crate::recipe::{Conditions, RecipeSequence, SequenceKind, safe};
 use algo::adaptive::Field;
 use algo::frame::SampleNoise;
-use algo::inspect::{Taught, Weight};
+use algo::inspect::{Feature, Gauge, GoldenSignal, Taught, Weight};
 use algo::phase::Decoder;
 use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation, PhaseDelta};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// The weight of each pixel's deviation, which lies by these `shares` along the normal, and the
 /// uncertainty of its taught height. The sequence has `brighter` times the modulation of golden;
@@ -83,6 +84,28 @@ fn phase(arrays: &Arrays, offset: &[i16]) -> Vec<AbsolutePhase> {
         full => full + delta(offset, at),
     };
     arrays.golden_phase.par_iter().enumerate().map(by).collect()
+}
+
+/// Golden's signal, which is by the last of the sequences; `None` if no gauge is of a contour.
+pub(super) fn signal(
+    arrays: &mut Arrays,
+    sequences: &[RecipeSequence],
+    (features, gauges): (&[Feature], &[Gauge]),
+    conditions: &Conditions,
+) -> Option<GoldenSignal> {
+    let values = std::mem::take(&mut arrays.golden_signal);
+    let is_contour = |at: usize| features[at].kind.is_contour();
+    let is_needed = gauges
+        .iter()
+        .any(|gauge| gauge.needs(features).any(is_contour));
+    let finest = sequences.last()?.levels.levels().last()?;
+    (is_needed && !values.is_empty()).then(|| GoldenSignal {
+        values: Arc::new(values),
+        ratio: finest.ratio,
+        shifts: finest.shifts(),
+        captures: conditions.golden_captures,
+        brighter: 1.0,
+    })
 }
 
 /// The offset of a pixel.

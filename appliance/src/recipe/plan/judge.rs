@@ -7,7 +7,7 @@ use crate::station::error_code::{BLURRED, GUARD_BAND, NOT_MEASURED, NOT_THE_PART
 use crate::station::{
     COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Unit, Verdict,
 };
-use algo::inspect::{Findings, MAX_PLACES, Placed};
+use algo::inspect::{Findings, FoundFeature, Lost, MAX_PLACES, Missing, Placed, State};
 use hal::bounds::clipped;
 use std::sync::Arc;
 
@@ -39,12 +39,64 @@ const NOTHING: &str = "found nothing to measure";
 /// Less than this share of a feature is not measured.
 const MIN_SHARE: f64 = 0.5;
 
+impl Demands {
+    /// What is known of a gauge without a value.
+    fn without_value(&self, limits: &Limits, missing: Option<Missing>, of: &Findings) -> Measured {
+        let found = |at: usize| of.features.iter().find(|found| found.feature == at);
+        let (absent, reason) = match missing {
+            Some(Missing::Feature(at)) => match found(at) {
+                Some(found) => self.lost(found),
+                None => (false, NOTHING.into()),
+            },
+            Some(Missing::Cells(shares)) => (false, limits.unseen(shares)),
+            Some(Missing::Open) => (
+                false,
+                "the part's shape does not determine how it lies there: give the gauge a datum"
+                    .into(),
+            ),
+            Some(Missing::Nothing) | None => (false, NOTHING.into()),
+        };
+        Measured {
+            absent,
+            reason: Some(reason.into()),
+            ..Measured::default()
+        }
+    }
+
+    /// Whether a feature that was not found is absent, and why it was not found.
+    fn lost(&self, found: &FoundFeature) -> (bool, String) {
+        let name = self.features.get(found.feature);
+        let feature = format!("feature {:?}", clipped(name.map_or("", |name| name)));
+        let percent = found.found * 100.0;
+        match (found.state, found.lost) {
+            (State::Absent, _) => (
+                true,
+                format!("{feature}: the material goes on where its rim should be"),
+            ),
+            (_, Some(Lost::NoPlane)) => (false, format!("{feature}: its plane was not found")),
+            (_, Some(Lost::Face(above))) => (
+                false,
+                format!("{feature}: the face next to its rim lies {above:+.2} mm off the plane"),
+            ),
+            (_, Some(Lost::Rim)) => (
+                false,
+                format!("{feature}: {percent:.0} % of its rim is seen"),
+            ),
+            (_, None) if found.found < MIN_SHARE => (
+                false,
+                format!("{feature}: {percent:.0} % of it was measured"),
+            ),
+            (_, None) => (
+                false,
+                format!("{feature}: too few cells were measured, or they lie on a line"),
+            ),
+        }
+    }
+}
+
 impl Limits {
     /// Why there is no value, where these shares of its features were measured.
-    fn unseen(&self, shares: Option<[f64; MAX_PLACES]>) -> String {
-        let Some(shares) = shares else {
-            return NOTHING.into();
-        };
+    fn unseen(&self, shares: [f64; MAX_PLACES]) -> String {
         let mut features = self.of.iter().zip(shares);
         let few = |(_, share): &(&String, f64)| *share < MIN_SHARE;
         match features.find(few) {
@@ -72,13 +124,10 @@ struct Reason {
 impl Demands {
     /// Judges the findings.
     pub(super) fn judge(&self, findings: &Findings, inspection: &mut Inspection) {
-        let readings = findings.readings.iter().zip(&findings.unmeasured);
-        for (limits, (reading, shares)) in self.limits.iter().zip(readings) {
-            let unseen = || Measured {
-                reason: Some(limits.unseen(*shares).into()),
-                ..Measured::default()
-            };
-            let measured = reading.map_or_else(unseen, |reading| {
+        let readings = findings.readings.iter().zip(&findings.missing);
+        for (limits, (reading, missing)) in self.limits.iter().zip(readings) {
+            let without = || self.without_value(limits, *missing, findings);
+            let measured = reading.map_or_else(without, |reading| {
                 let (value, systematic) = match limits.master {
                     None => (reading.value, reading.systematic),
                     Some(master) => master.of(&reading),
@@ -114,6 +163,7 @@ impl Demands {
         inspection.fitness_permille = (fitness.min(1.0) * 1000.0).round() as u16;
         inspection.skipped = findings.skipped;
         inspection.placement = findings.placed.as_ref().map(placement);
+        inspection.features.clone_from(&findings.features);
         if let Some(Reason { code, words }) = self.not_judged(inspection, findings) {
             inspection.reason = Some(words.into());
             inspection.error_code = code;

@@ -28,7 +28,7 @@ use crate::station::result::flag::{
 use crate::station::{Inspection, Stage, Stages, Verdict};
 use algo::frame::FrameView;
 use algo::geometry::HeightRange;
-use algo::inspect::{Findings, Input, Maps, PairPlaced, Production, Strips, normal_shares};
+use algo::inspect::{Findings, Input, Maps, PairPlaced, Production, Signal, Strips, normal_shares};
 use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
@@ -151,6 +151,7 @@ impl Plan {
         let surface = golden::surface(size.0, &arrays, golden::offset(&arrays, base));
         let shares = normal_shares(&triangulator, &surface);
         let range = triangulator.function().range();
+        let signal = golden::signal(&mut arrays, &sequences, (&features, &gauges), &conditions);
         let golden = (&arrays, &shares[..], base);
         let (prepared, shots) = Prepared::all(sequences, &conditions, golden, range)?;
         drop(shares);
@@ -184,6 +185,7 @@ impl Plan {
             noise_counts,
             golden,
             picture: (modulation, away as f64),
+            signal,
         };
         let runs = prepared
             .into_iter()
@@ -367,7 +369,7 @@ impl Plan {
             let placed = production.place_pair(&views, picture.as_ref(), strips, &mut buffers);
             laps.end(Stage::Alignment);
             let findings = placed.and_then(|PairPlaced { found, placed }| {
-                let input = Input::Phases(buffers.phases());
+                let input = (Input::Phases(buffers.phases()), Signal::None);
                 let findings = production.inspect_placed(input, strips, placed, maps)?;
                 Ok((findings, Some(found.map_or(0.0, |found| found.likeness))))
             });
@@ -377,7 +379,10 @@ impl Plan {
         let placed = production.place(input, strips);
         laps.end(Stage::Alignment);
         let findings = placed
-            .and_then(|placed| production.inspect_placed(input, strips, placed, maps))
+            .and_then(|placed| {
+                let input = (input, Signal::Frames(&views));
+                production.inspect_placed(input, strips, placed, maps)
+            })
             .map_err(|error| error.to_string());
         laps.end(Stage::Strips);
         Ok((findings?, None))

@@ -5,7 +5,7 @@ use super::{Laps, Plan, window};
 use crate::recipe::sides::Farthest;
 use crate::station::Inspection;
 use algo::geometry::Vector;
-use algo::inspect::{Input, Maps, Motion};
+use algo::inspect::{Input, Maps, Motion, Signal};
 use algo::units::Modulation;
 use std::time::Instant;
 
@@ -39,7 +39,7 @@ impl Plan {
             };
             let findings = placed.and_then(|placed| {
                 run.production
-                    .inspect_placed(input, &mut strips, placed, maps)
+                    .inspect_placed((input, Signal::None), &mut strips, placed, maps)
             });
             if let Some(farthest) = &mut farthest {
                 farthest.look(&run.production, &strips, &deviation);

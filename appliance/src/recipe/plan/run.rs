@@ -5,7 +5,9 @@ use crate::recipe::archive::Arrays;
 use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
-use algo::inspect::{Feature, Gauge, Largest, PairBuffers, Parts, Picture, Production, Taught};
+use algo::inspect::{
+    Feature, Gauge, GoldenSignal, Largest, Levels, PairBuffers, Parts, Picture, Production, Taught,
+};
 use algo::pattern::{PhaseRange, Shot};
 use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
@@ -53,6 +55,8 @@ pub(super) struct Shared<'a> {
     /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what
     /// two frames need.
     pub picture: (Vec<f32>, f64),
+    /// What contours need; `None` if no gauge is of one.
+    pub signal: Option<GoldenSignal>,
 }
 
 /// The noise of golden.
@@ -73,6 +77,7 @@ pub(super) struct Prepared {
     kind: SequenceKind,
     indices: Vec<usize>,
     decoder: Decoder,
+    levels: Levels,
     taught: Taught,
     map: Option<Vec<AbsolutePhase>>,
     /// Its modulation over that of golden.
@@ -150,6 +155,7 @@ impl Prepared {
             indices: indices.collect(),
             taught: golden::taught((conditions.noise, brighter), arrays, shares, &decoder),
             map: golden::map(arrays, kind, offsets),
+            levels: Levels::new(&levels, decoder.full_scale()),
             decoder,
             brighter,
             offset,
@@ -216,12 +222,15 @@ impl Prepared {
             kind,
             indices,
             decoder,
+            levels,
             taught,
             map,
             brighter,
             ripple_mm,
             ..
         } = self;
+        let signal = shared.signal.clone();
+        let signal = signal.map(|signal| GoldenSignal { brighter, ..signal });
         let displaced = |gauge: &Gauge| {
             let side = gauge.measure.facts().basis.square_side()?;
             shared.conditions.good_parts?.displaced(side)
@@ -244,6 +253,7 @@ impl Prepared {
             displaced: shared.gauges.iter().map(displaced).collect(),
             calibration: shared.conditions.calibration,
             ripple: ripple_mm,
+            light: signal.map(|signal| (levels, signal)),
         });
         let production = production.map_err(|error| error.to_string())?;
         let (modulation, tolerance_px) = &shared.picture;

@@ -5,7 +5,7 @@ use super::{Laps, Plan, PlanError};
 use crate::head::calibration::Calibration;
 use crate::recipe::Recipe;
 use crate::station::Inspection;
-use algo::inspect::{Findings, Input, Maps};
+use algo::inspect::{Findings, Input, Maps, Signal};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use algo::units::Modulation;
@@ -96,7 +96,10 @@ fn golden(recipe: Recipe, head: &Calibration) -> Result<(Plan, Findings), PlanEr
     let mut strips = plan.strips();
     let placed = production.place(input, &mut strips);
     let found = placed
-        .and_then(|placed| production.inspect_placed(input, &mut strips, placed, Maps::default()))
+        .and_then(|placed| {
+            let input = (input, Signal::Golden);
+            production.inspect_placed(input, &mut strips, placed, Maps::default())
+        })
         .map_err(|error| unfit(error.to_string()))?;
     drop(strips);
     Ok((plan, found))

@@ -25,7 +25,7 @@ pub(super) fn of(
     };
     for gauge in gauges {
         let margin = away + gauge.measure.facts().margin_px(widest);
-        let features = gauge.of.iter().filter_map(|&at| features.get(at));
+        let features = gauge.needs(features).filter_map(|at| features.get(at));
         for (row, columns) in features.flat_map(|feature| feature.region.spans()) {
             let left = columns.start.saturating_sub(margin);
             let right = (columns.end + margin).min(width);

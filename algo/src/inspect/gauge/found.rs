@@ -1,0 +1,30 @@
+//! How much of a contour is seen.
+
+use super::kind::*;
+
+kind! {
+    /// The share of a contour's rim that is seen, 0 where the contour is absent.
+    Found {}
+}
+
+impl Kind for Found {
+    fn facts(&self) -> Facts {
+        Facts {
+            takes: CONTOUR,
+            never_negative: true,
+            ..Facts::new(Unit::Share, Basis::Rim, "")
+        }
+    }
+
+    fn of_rim(&self, rim: &Rim) -> Option<OfRim> {
+        Some(OfRim {
+            value: rim.found,
+            variance: 0.0,
+            expected: None,
+        })
+    }
+
+    fn of_absent(&self) -> Option<f64> {
+        Some(0.0)
+    }
+}

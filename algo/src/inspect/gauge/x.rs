@@ -1,0 +1,22 @@
+//! The x coordinate of an opening.
+
+use super::kind::*;
+
+kind! {
+    /// x of the centre of a hole or slot in a datum system, or else in the frame as taught, mm.
+    X {}
+}
+
+impl Kind for X {
+    fn facts(&self) -> Facts {
+        Facts {
+            takes: OPENING,
+            datum: true,
+            ..Facts::new(Unit::Length, Basis::Geometry, "")
+        }
+    }
+
+    fn value(&self, of: &[Geometry]) -> Option<f64> {
+        of.first()?.centre().map(|centre| centre.x)
+    }
+}

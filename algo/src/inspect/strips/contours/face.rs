@@ -1,0 +1,75 @@
+//! How the camera sees the plane of a face, and what light it has there.
+
+use super::light::{GoldenSignal, Levels, Signal};
+use crate::geometry::{Triangulator, Vector};
+use crate::inspect::contour::{Complex, Spot, View};
+use crate::inspect::feature::PlaneFrame;
+
+/// The plane of a face as it lies now.
+#[derive(Clone, Copy, Debug)]
+pub struct Face<'a> {
+    pub triangulator: &'a Triangulator,
+    /// Columns and rows of the frame.
+    pub size: (usize, usize),
+    /// The frame of the plane in the world.
+    pub frame: PlaneFrame,
+    pub levels: &'a Levels,
+    pub golden: &'a GoldenSignal,
+    pub light: Signal<'a>,
+}
+
+impl Face<'_> {
+    /// The point of a line of sight that lies `below` mm below the plane.
+    fn point(&self, u: f64, v: f64, below: f64) -> Option<Vector> {
+        let camera = self.triangulator.camera();
+        let (eye, ray) = (camera.centre(), camera.ray(u, v)?);
+        let normal = self.frame.normal();
+        let way = (normal.dot(self.frame.origin - eye) - below) / normal.dot(ray);
+        (way > 0.0 && way.is_finite()).then(|| eye + ray * way)
+    }
+
+    /// The length of a pixel at a place of the plane, mm.
+    pub fn spot_size(&self, x: f64, y: f64) -> Option<f64> {
+        let (u, v) = self.pixel(x, y)?;
+        let (here, beside) = (self.spot(u, v)?, self.spot(u + 1.0, v)?);
+        Some(libm::hypot(beside.x - here.x, beside.y - here.y))
+    }
+
+    /// By how much the phase is larger for a mm below the plane at a place of the plane, turns.
+    pub fn turns_per_mm(&self, x: f64, y: f64) -> Option<f64> {
+        let (u, v) = self.pixel(x, y)?;
+        let phase = |below| self.triangulator.phase_at(self.point(u, v, below)?);
+        Some((phase(0.5)? - phase(-0.5)?).clamp(-1e3, 1e3))
+    }
+}
+
+impl View for Face<'_> {
+    fn size(&self) -> (usize, usize) {
+        self.size
+    }
+
+    fn spot(&self, u: f64, v: f64) -> Option<Spot> {
+        let point = self.point(u, v, 0.0)?;
+        let phase = self.triangulator.phase_at(point)?;
+        let from = self.frame.coordinates(point);
+        phase.is_finite().then_some(Spot {
+            x: from.x,
+            y: from.y,
+            phase,
+        })
+    }
+
+    fn pixel(&self, x: f64, y: f64) -> Option<(f64, f64)> {
+        self.triangulator.camera().project(self.frame.point(x, y))
+    }
+
+    fn signal(&self, u: usize, v: usize, level: usize) -> Option<Complex> {
+        match self.light {
+            Signal::Frames(frames) => self.levels.signal(frames, level, (u, v)),
+            Signal::Golden => self
+                .golden
+                .at(v * self.size.0 + u, self.levels.full_scale()),
+            Signal::None => None,
+        }
+    }
+}

@@ -1,0 +1,170 @@
+//! A contour of a part, found in its plane as the plane lies.
+
+use super::face::Face;
+use super::light::Signal;
+use super::shape::Associated;
+use super::taught::{Contours, Expected};
+use crate::geometry::Vector;
+use crate::inspect::align::{Motion, Placed};
+use crate::inspect::contour::{Knowledge, State};
+use crate::inspect::feature::{Geometry, PlaneFrame, Rim};
+use crate::inspect::gauge::Sensitive;
+use crate::inspect::strips::fits::Fit;
+use crate::inspect::strips::golden::Golden;
+
+/// The face does not reach the rim if the phase next to it is off the plane's by more than this
+/// many σ and this many mm.
+const FACE_SIGMA: f64 = 5.0;
+const FACE_MM: f64 = 0.05;
+
+/// Why a contour is not found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Lost {
+    /// Too little of its rim is seen.
+    Rim,
+    /// Its plane was not found.
+    NoPlane,
+    /// The face next to its rim lies so far above the plane, mm.
+    Face(f64),
+}
+
+/// A feature of a part with a geometry.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FoundFeature {
+    /// Which one.
+    pub feature: usize,
+    /// What became of it.
+    pub state: State,
+    /// The share of its rim, or of its surface as taught, that is seen.
+    pub found: f64,
+    /// σ of the camera's blur at the rim of a contour, px; `None` where it is not known.
+    pub blur_px: Option<f64>,
+    /// Why it is not found.
+    pub lost: Option<Lost>,
+    /// Its geometry in the frame as taught; `None` if it is not found.
+    pub geometry: Option<Geometry>,
+}
+
+/// What was found of a contour.
+#[derive(Clone, Debug, Default)]
+pub struct ContourFit {
+    /// `None` before the first part.
+    pub of: Option<FoundFeature>,
+    /// `None` if it is not found.
+    pub rim: Option<Rim>,
+    /// Which of the planes it lies in.
+    plane: usize,
+}
+
+impl ContourFit {
+    /// Whether it is of the first of these features.
+    pub fn is_of(&self, features: &[usize]) -> bool {
+        let own = self.of.as_ref().map(|of| of.feature);
+        own.is_some() && own == features.first().copied()
+    }
+
+    /// Whether it is surely not there.
+    pub fn is_absent(&self) -> bool {
+        self.of.as_ref().is_some_and(|of| of.state == State::Absent)
+    }
+
+    /// The contour as values depend on it; `None` if it is not found.
+    pub fn sensitive<'a>(&'a self, planes: &'a [Fit]) -> Option<Sensitive<'a>> {
+        Some(Sensitive::Contour {
+            id: self.of.as_ref()?.feature,
+            rim: self.rim.as_ref()?,
+            plane: planes.get(self.plane)?.sensitive()?,
+        })
+    }
+
+    /// Finds it on a part that lies so, as taught if `None`.
+    pub fn find(
+        &mut self,
+        (contours, expected): (&Contours, &Expected),
+        golden: &Golden,
+        plane: &Fit,
+        placed: Option<&Placed>,
+        light: Signal<'_>,
+    ) {
+        let mut of = FoundFeature {
+            feature: expected.feature,
+            state: State::Unseen,
+            found: 0.0,
+            blur_px: None,
+            lost: Some(Lost::NoPlane),
+            geometry: None,
+        };
+        self.rim = None;
+        self.plane = expected.plane;
+        if let Some(taught) = contours.frame(expected, plane) {
+            let motion = placed.map(|placed| &placed.motion);
+            let face = Face {
+                triangulator: &golden.triangulator,
+                size: golden.size(),
+                frame: motion.map_or(taught, |motion| moved(&taught, motion)),
+                levels: &contours.levels,
+                golden: &contours.signal,
+                light,
+            };
+            let knowledge = Knowledge {
+                rim: expected.rim,
+                ..Knowledge::default()
+            };
+            let setup = contours.setup(expected, &face);
+            if let Some(setup) = setup {
+                let found = expected.outline.find(&face, &setup, knowledge);
+                of.state = found.contour.state;
+                of.found = found.contour.found;
+                of.lost = (of.state == State::Unseen).then_some(Lost::Rim);
+                let (off, sigma) = found.contour.face;
+                let above = -off / setup.turns_per_mm;
+                if of.state == State::Found {
+                    of.blur_px = Some(found.contour.blur);
+                    if libm::fabs(off) > FACE_SIGMA * sigma && libm::fabs(above) > FACE_MM {
+                        of.state = State::Unseen;
+                        of.lost = Some(Lost::Face(above));
+                    }
+                }
+                if of.state == State::Found {
+                    let eye = golden.triangulator.camera().centre();
+                    let eye = motion.map_or(eye, |motion| motion.undo(eye));
+                    self.rim = Some(rim(expected, taught, eye, found));
+                }
+            }
+        }
+        let rim = self.rim.as_ref();
+        of.geometry = rim.map(|rim| rim.geometry(&rim.parameters, rim.frame.normal(), |at| at));
+        self.of = Some(of);
+    }
+}
+
+fn rim(expected: &Expected, frame: PlaneFrame, eye: Vector, found: Associated) -> Rim {
+    let Associated {
+        contour,
+        count,
+        inputs,
+        residuals,
+    } = found;
+    Rim {
+        kind: expected.kind(),
+        frame,
+        eye,
+        ends: expected.outline.ends(),
+        parameters: contour.parameters,
+        count,
+        covariance: contour.covariance,
+        inputs,
+        found: contour.found,
+        residuals,
+    }
+}
+
+/// A frame of the part as taught, after its motion.
+fn moved(frame: &PlaneFrame, motion: &Motion) -> PlaneFrame {
+    let along = |way| motion.apply(motion.centre + way) - motion.apply(motion.centre);
+    PlaneFrame {
+        origin: motion.apply(frame.origin),
+        x: along(frame.x),
+        y: along(frame.y),
+    }
+}

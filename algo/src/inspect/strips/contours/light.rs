@@ -1,0 +1,129 @@
+//! The demodulated light of pixels: from the frames of a part, or from golden's signal.
+
+use crate::frame::{FrameView, Samples};
+use crate::inspect::contour::Complex;
+use crate::pattern::Sequence;
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::f64::consts::TAU;
+
+/// Steps of golden's signal per count of an 8-bit sample.
+const STEPS: f64 = 64.0;
+/// Counts of an 8-bit sample at full scale.
+const EIGHT_BIT: f64 = 255.0;
+
+/// What the light of a part is known from.
+#[derive(Clone, Copy, Debug)]
+pub enum Signal<'a> {
+    /// All frames of its sequence.
+    Frames(&'a [FrameView<'a>]),
+    /// Golden's signal: the part is golden.
+    Golden,
+    /// Not known: contours are not seen.
+    None,
+}
+
+/// Golden's signal: Z = B e^{2πiφ} of each pixel of the finest level of the full sequence.
+#[derive(Clone, Debug)]
+pub struct GoldenSignal {
+    /// Real and imaginary part of each pixel, row-major, in 1/64 count of an 8-bit sample.
+    pub values: Arc<Vec<i16>>,
+    /// r of its level.
+    pub ratio: f64,
+    /// N, the number of its shifts.
+    pub shifts: usize,
+    /// How many captures it is the mean of.
+    pub captures: usize,
+    /// The modulation by this sequence over that of the signal.
+    pub brighter: f64,
+}
+
+impl GoldenSignal {
+    /// Z of a pixel, in counts of samples that are `full_scale` at most.
+    pub fn at(&self, place: usize, full_scale: f64) -> Option<Complex> {
+        let &[re, im] = self.values.get(2 * place..2 * place + 2)? else {
+            return None;
+        };
+        let unit = full_scale / EIGHT_BIT / STEPS;
+        Some(Complex::new(f64::from(re) * unit, f64::from(im) * unit))
+    }
+}
+
+/// How the levels of a sequence are demodulated.
+#[derive(Clone, Debug)]
+pub struct Levels {
+    all: Vec<Demodulation>,
+    full_scale: f64,
+}
+
+/// A level: its ratio, and the place and the weights of each of its frames.
+#[derive(Clone, Debug)]
+struct Demodulation {
+    ratio: f64,
+    frames: Vec<(usize, Complex)>,
+}
+
+impl Levels {
+    /// Of a sequence, whose samples are `full_scale` at most.
+    pub fn new(sequence: &Sequence, full_scale: u16) -> Self {
+        let all = sequence.levels().iter().map(|level| {
+            let count = level.shifts() as f64;
+            let frames = level.frames.iter().enumerate().map(|(k, &frame)| {
+                let angle = TAU * (level.start + k as f64 / count);
+                let weight = Complex::new(
+                    2.0 / count * libm::sin(angle),
+                    2.0 / count * libm::cos(angle),
+                );
+                (usize::from(frame), weight)
+            });
+            Demodulation {
+                ratio: level.ratio,
+                frames: frames.collect(),
+            }
+        });
+        Self {
+            all: all.collect(),
+            full_scale: f64::from(full_scale),
+        }
+    }
+
+    /// The largest sample.
+    pub fn full_scale(&self) -> f64 {
+        self.full_scale
+    }
+
+    /// Whether all levels have quadrature: two shifts have none.
+    pub fn demodulate(&self) -> bool {
+        self.all.iter().all(|level| level.frames.len() > 2)
+    }
+
+    /// Ratio and number of shifts of each level.
+    pub fn fringes(&self) -> impl Iterator<Item = (f64, usize)> + '_ {
+        self.all
+            .iter()
+            .map(|level| (level.ratio, level.frames.len()))
+    }
+
+    /// Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) of a level at a pixel; `None` where a sample is
+    /// overexposed, or a frame is missing.
+    pub fn signal(
+        &self,
+        frames: &[FrameView<'_>],
+        level: usize,
+        (u, v): (usize, usize),
+    ) -> Option<Complex> {
+        let mut sum = Complex::default();
+        for (frame, weight) in &self.all.get(level)?.frames {
+            let sample = match frames.get(*frame)?.row(v) {
+                Samples::Eight(row) => f64::from(*row.get(u)?),
+                Samples::Sixteen(row) => f64::from(*row.get(u)?),
+            };
+            if sample >= self.full_scale {
+                return None;
+            }
+            sum.re += weight.re * sample;
+            sum.im += weight.im * sample;
+        }
+        Some(sum)
+    }
+}

@@ -1,0 +1,114 @@
+//! The shapes of contours as features have them.
+
+use crate::inspect::contour::shape::{Circle, Line, Shape, Slot};
+use crate::inspect::contour::{Contour, Input, Knowledge, Setup, Source, View, find, inputs};
+use crate::inspect::feature::{FeatureKind, MAX_PARAMETERS, Parameters};
+use alloc::vec::Vec;
+
+/// A contour's shape with its place, in the frame of its plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outline {
+    /// Centre and radius.
+    Circle([f64; 3]),
+    /// Centre, half the distance of the centres of its ends, radius of the ends, angle.
+    Slot([f64; 5]),
+    /// A line, and how far it lies from there.
+    Line(Line, [f64; 2]),
+}
+
+/// What [`find`] makes of any shape.
+#[derive(Clone, Debug)]
+pub struct Associated {
+    pub contour: Contour<MAX_PARAMETERS>,
+    pub count: usize,
+    pub inputs: Vec<(Source, Parameters)>,
+    /// Distance from the shape and error of each point of the rim.
+    pub residuals: Vec<(f64, f64)>,
+}
+
+impl Outline {
+    /// What it is.
+    pub fn kind(&self) -> FeatureKind {
+        match self {
+            Self::Circle(_) => FeatureKind::Circle,
+            Self::Slot(_) => FeatureKind::Slot,
+            Self::Line(..) => FeatureKind::Line,
+        }
+    }
+
+    /// The same with other parameters.
+    pub fn with(&self, &[a, b, c, d, e]: &Parameters) -> Self {
+        match *self {
+            Self::Circle(_) => Self::Circle([a, b, c]),
+            Self::Slot(_) => Self::Slot([a, b, c, d, e]),
+            Self::Line(line, _) => Self::Line(line, [a, b]),
+        }
+    }
+
+    /// Where the ends of a line are expected; of others its centre twice.
+    pub fn ends(&self) -> [(f64, f64); 2] {
+        match self {
+            Self::Circle([x, y, _]) | Self::Slot([x, y, ..]) => [(*x, *y); 2],
+            Self::Line(line, _) => [-0.5, 0.5].map(|part| {
+                let ((x, y), (along, up)) = (line.middle, line.direction);
+                let way = part * line.length;
+                (x + way * along, y + way * up)
+            }),
+        }
+    }
+
+    /// Finds it near where it is.
+    pub fn find(&self, view: &impl View, setup: &Setup, knowledge: Knowledge) -> Associated {
+        match self {
+            Self::Circle(p) => associated(&Circle, p, view, setup, knowledge),
+            Self::Slot(p) => associated(&Slot, p, view, setup, knowledge),
+            Self::Line(line, p) => associated(line, p, view, setup, knowledge),
+        }
+    }
+}
+
+fn associated<const N: usize>(
+    shape: &impl Shape<N>,
+    expected: &[f64; N],
+    view: &impl View,
+    setup: &Setup,
+    knowledge: Knowledge,
+) -> Associated {
+    let contour = find(shape, expected, view, setup);
+    let inputs = inputs(shape, &contour, setup, knowledge);
+    let used = contour.points.iter().filter(|point| point.weight > 0.0);
+    let residuals = used.map(|point| {
+        let off = shape.distance(&contour.parameters, point.x, point.y);
+        (off, libm::sqrt(point.variance))
+    });
+    Associated {
+        count: N,
+        inputs: inputs
+            .into_iter()
+            .map(|Input { source, off }| (source, padded(&off)))
+            .collect(),
+        residuals: residuals.collect(),
+        contour: Contour {
+            state: contour.state,
+            found: contour.found,
+            parameters: padded(&contour.parameters),
+            covariance: core::array::from_fn(|i| {
+                contour
+                    .covariance
+                    .get(i)
+                    .map_or([0.0; MAX_PARAMETERS], padded)
+            }),
+            blur: contour.blur,
+            pixel: contour.pixel,
+            points: contour.points,
+            outcomes: contour.outcomes,
+            face: contour.face,
+            wall: contour.wall.map(|wall| padded(&wall)),
+        },
+    }
+}
+
+/// A shorter list, followed by zeros.
+fn padded<const N: usize>(list: &[f64; N]) -> Parameters {
+    core::array::from_fn(|i| list.get(i).copied().unwrap_or(0.0))
+}
