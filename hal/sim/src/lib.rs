@@ -5,7 +5,9 @@
 //! the rasters that the projector shows.
 
 mod blur;
+mod body;
 pub mod controller;
+mod footprint;
 mod limits;
 pub mod material;
 mod mechanics;

@@ -153,7 +153,7 @@ impl Scene for SimScene {
         blur::gaussian(
             &mut self.picture,
             camera.width as usize,
-            self.scenario.optics.camera_blur_px,
+            self.placed.transport.blur_px,
         );
 
         let (random, exposing) = (self.sensor.next_frame(), self.exposing);

@@ -5,6 +5,7 @@
 //! of |f| divided by that rate crosses nothing. Close to the surface a Newton step is tried and
 //! kept if it brackets the crossing; regula falsi then refines the crossing.
 
+use super::body::{Body, Hit, clip};
 use super::optics::{Vector, along, dot, normalised};
 use super::parts::Surface;
 
@@ -30,78 +31,17 @@ pub(super) struct Traced<'a> {
     slope: f64,
 }
 
-/// Where a ray met the surface.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Hit {
-    pub point: Vector,
-    /// The unit normal, on the side from which the ray came.
-    pub normal: Vector,
-    /// The light that the material reflects, as a share of what white would reflect.
-    pub albedo: f64,
-}
-
 impl<'a> Traced<'a> {
     pub fn new(surface: &'a dyn Surface) -> Self {
+        let [low, high] = surface.bounds();
         Self {
             surface,
-            bounds: surface.bounds(),
+            bounds: [
+                low.map(|edge| edge - MARGIN_MM),
+                high.map(|edge| edge + MARGIN_MM),
+            ],
             slope: surface.slope_bound(),
         }
-    }
-
-    /// The first point of material on the ray from `origin` along the unit vector `direction`.
-    pub fn first_hit(&self, origin: Vector, direction: Vector) -> Option<Hit> {
-        let (start, end) = self.clip(origin, direction)?;
-        let (t, above) = self.crossing(origin, direction, start, end, None)?;
-        let point = along(origin, direction, t);
-        let [x, y, _] = point;
-        let slope = |dx: f64, dy: f64| {
-            let ahead = self.surface.height(x + dx, y + dy);
-            (ahead - self.surface.height(x - dx, y - dy)) / (2.0 * SLOPE_STEP_MM)
-        };
-        let up = normalised([-slope(SLOPE_STEP_MM, 0.0), -slope(0.0, SLOPE_STEP_MM), 1.0]);
-        let normal = if above { up } else { [-up[0], -up[1], -up[2]] };
-        let albedo = self.surface.albedo(x, y);
-        Some(Hit {
-            point,
-            normal,
-            albedo,
-        })
-    }
-
-    /// Whether material lies between `hit` and a distant point in direction `towards`, a unit
-    /// vector on the side of the normal.
-    pub fn shadowed(&self, hit: &Hit, towards: Vector) -> bool {
-        let Some((_, end)) = self.clip(hit.point, towards) else {
-            return false;
-        };
-        let above = hit.normal[2] > 0.0;
-        end > LIFT_MM
-            && self
-                .crossing(hit.point, towards, LIFT_MM, end, Some(above))
-                .is_some()
-    }
-
-    /// The interval of t ≥ 0 in which the ray is inside the box around the material.
-    fn clip(&self, origin: Vector, direction: Vector) -> Option<(f64, f64)> {
-        let (mut start, mut end) = (0.0_f64, f64::INFINITY);
-        for axis in 0..3 {
-            let (low, high) = (
-                self.bounds[0][axis] - MARGIN_MM,
-                self.bounds[1][axis] + MARGIN_MM,
-            );
-            if direction[axis].abs() < 1e-12 {
-                if !(low..=high).contains(&origin[axis]) {
-                    return None;
-                }
-                continue;
-            }
-            let a = (low - origin[axis]) / direction[axis];
-            let b = (high - origin[axis]) / direction[axis];
-            start = start.max(a.min(b));
-            end = end.min(a.max(b));
-        }
-        (start < end && end.is_finite()).then_some((start, end))
     }
 
     /// The first crossing with material in start…end, and whether the ray came from above the
@@ -171,6 +111,39 @@ impl<'a> Traced<'a> {
             (t, value) = (ahead, ahead_value);
         }
         None
+    }
+}
+
+impl Body for Traced<'_> {
+    fn first_hit(&self, origin: Vector, direction: Vector) -> Option<Hit> {
+        let (start, end) = clip(&self.bounds, origin, direction)?;
+        let (t, above) = self.crossing(origin, direction, start, end, None)?;
+        let point = along(origin, direction, t);
+        let [x, y, _] = point;
+        let slope = |dx: f64, dy: f64| {
+            let ahead = self.surface.height(x + dx, y + dy);
+            (ahead - self.surface.height(x - dx, y - dy)) / (2.0 * SLOPE_STEP_MM)
+        };
+        let up = normalised([-slope(SLOPE_STEP_MM, 0.0), -slope(0.0, SLOPE_STEP_MM), 1.0]);
+        let normal = if above { up } else { [-up[0], -up[1], -up[2]] };
+        let albedo = self.surface.albedo(x, y);
+        Some(Hit {
+            point,
+            normal,
+            albedo,
+            face: 0,
+        })
+    }
+
+    fn shadowed(&self, hit: &Hit, towards: Vector) -> bool {
+        let Some((_, end)) = clip(&self.bounds, hit.point, towards) else {
+            return false;
+        };
+        let above = hit.normal[2] > 0.0;
+        end > LIFT_MM
+            && self
+                .crossing(hit.point, towards, LIFT_MM, end, Some(above))
+                .is_some()
     }
 }
 

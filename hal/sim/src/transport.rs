@@ -15,14 +15,16 @@
 
 use rayon::prelude::*;
 
+use super::body::{Body, Hit};
+use super::footprint::Footprint;
 use super::material::Lighting;
 use super::material::Material;
-use super::optics::{Lens, Vector, dot, minus, normalised, plus, turn, turned, turned_back};
+use super::optics::{Lens, Vector, dot, minus, normalised, plus, turned, turned_back};
 use super::parts::Part;
 use super::placement::Placement;
 use super::scenario::Scenario;
 use super::spread::{self, Spread};
-use super::trace::{Hit, Traced, facing};
+use super::trace::{Traced, facing};
 
 /// A pixel has a depth edge if a sub-ray meets the surface farther than this from the tangent plane
 /// at the central ray's hit, measured along the ray, mm.
@@ -58,6 +60,8 @@ pub(super) struct Transport {
     /// Where each pixel's taps end; they start where those of the pixel before end.
     ends: Vec<usize>,
     taps: Vec<Tap>,
+    /// σ with which the lens blurs the finished picture, camera pixels.
+    pub blur_px: f64,
     pub truth: Truth,
 }
 
@@ -79,7 +83,7 @@ struct Placed {
 
 impl Placed {
     fn new(placement: &Placement, camera: &Lens, projector: &Lens) -> Self {
-        let rotation = rotation_of(placement);
+        let rotation = placement.rotation();
         let to_part = |point| turned_back(&rotation, minus(point, placement.shift_mm));
         let (eye, lamp) = (to_part(camera.centre()), to_part(projector.centre()));
         Self {
@@ -93,12 +97,6 @@ impl Placed {
     fn to_world(&self, point: Vector) -> Vector {
         plus(turned(&self.rotation, point), self.shift)
     }
-}
-
-/// Rz(rotation) · Ry(tilt y) · Rx(tilt x).
-pub(crate) fn rotation_of(placement: &Placement) -> [f64; 9] {
-    let [x, y] = placement.tilt_deg;
-    turn([x, y, placement.rotation_deg])
 }
 
 impl Transport {
@@ -116,18 +114,34 @@ impl Transport {
         let projector = scenario.rig.projector.lens();
         let placed = Placed::new(placement, &camera, &projector);
         let surface = part.surface();
+        let thin = surface.as_deref().map(Traced::new);
+        let solid = part.solid();
+        let body = match (&thin, &solid) {
+            (Some(thin), _) => Some(thin as &dyn Body),
+            (None, solid) => solid.as_ref().map(|solid| solid as &dyn Body),
+        };
         let light = &scenario.light;
         let reflection = Reflection::new(&material.map_or(*light, |made| made.under(light)));
-        let tracer = Tracer {
+        let mut tracer = Tracer {
             scenario,
             camera: &camera,
             projector: &projector,
             spread: Spread::new(spread::split(scenario.optics.projector_blur_px).0),
             placed: &placed,
             reflection: &reflection,
-            traced: surface.as_deref().map(Traced::new),
+            body,
+            footprint: Footprint::bare(scenario.sub_rays),
         };
-        let height = scenario.rig.camera.height;
+        let (width, height) = (scenario.rig.camera.width, scenario.rig.camera.height);
+        let lens_px = scenario.optics.camera_blur_px;
+        if solid.is_some() {
+            let pixels = (0..width * height).into_par_iter();
+            let labels: Vec<u16> = pixels
+                .map(|at| tracer.label(at % width, at / width))
+                .collect();
+            let columns = width as usize;
+            tracer.footprint = Footprint::blurred(scenario.sub_rays, lens_px, &labels, columns);
+        }
         let done = std::sync::atomic::AtomicU32::new(0);
         let rows: Vec<Self> = (0..height)
             .into_par_iter()
@@ -140,6 +154,10 @@ impl Transport {
             .collect();
         let mut whole = Self::join(rows);
         whole.unit = reflection.brightest as f32 / WHOLE;
+        whole.blur_px = match solid {
+            Some(_) => 0.0,
+            None => lens_px,
+        };
         whole
     }
 
@@ -164,6 +182,7 @@ impl Transport {
             unit: 0.0,
             ends: Vec::with_capacity(pixels),
             taps: Vec::with_capacity(taps),
+            blur_px: 0.0,
             truth: Truth {
                 height: Vec::with_capacity(pixels),
                 class: Vec::with_capacity(pixels),
@@ -202,7 +221,8 @@ struct Tracer<'a> {
     spread: Spread,
     placed: &'a Placed,
     reflection: &'a Reflection,
-    traced: Option<Traced<'a>>,
+    body: Option<&'a dyn Body>,
+    footprint: Footprint,
 }
 
 /// How a part reflects: shares of the brightest that it can be, so that no weight is larger than
@@ -263,22 +283,22 @@ struct Weights {
 impl Tracer<'_> {
     fn row(&self, v: u32) -> Transport {
         let device = &self.scenario.rig.camera;
-        let n = self.scenario.sub_rays;
-        let share = 1.0 / f64::from(n * n);
         let width = device.width as usize;
         let mut row = Transport::with_capacity(width, width * 12);
-        let mut points: Vec<Lit> = Vec::with_capacity((n * n) as usize);
+        let mut points: Vec<Lit> = Vec::new();
+        let mut rays = Vec::new();
         let mut weights = Weights::default();
         for u in 0..device.width {
             points.clear();
+            self.footprint
+                .rays(v as usize * width + u as usize, &mut rays);
+            let share = 1.0 / rays.len() as f64;
             let (u, v) = (f64::from(u), f64::from(v));
             let centre = self.hit(u, v);
             let mut whole = true;
             let mut bright = 0.0;
-            for sub in 0..n * n {
-                let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(n) - 0.5;
-                let Some((hit, direction)) = self.hit(u + offset(sub % n), v + offset(sub / n))
-                else {
+            for [right, down] in &rays {
+                let Some((hit, direction)) = self.hit(u + right, v + down) else {
                     whole = false;
                     continue;
                 };
@@ -314,11 +334,16 @@ impl Tracer<'_> {
     /// Where the ray of camera point (u, v) meets the part, in the part's coordinates.
     fn hit(&self, u: f64, v: f64) -> Option<(Hit, Vector)> {
         let direction = turned_back(&self.placed.rotation, self.camera.ray(u, v));
-        let hit = self
-            .traced
-            .as_ref()?
-            .first_hit(self.placed.eye, direction)?;
+        let hit = self.body?.first_hit(self.placed.eye, direction)?;
         Some((hit, direction))
+    }
+
+    /// What the central ray of a pixel sees: the same number for the same face in the same light.
+    fn label(&self, u: u32, v: u32) -> u16 {
+        let hit = self.hit(f64::from(u), f64::from(v));
+        hit.map_or(0, |(hit, _)| {
+            1 + 2 * hit.face + u16::from(self.lit(&hit).is_some())
+        })
     }
 
     /// How the projector lights this point; none if it does not.
@@ -332,7 +357,7 @@ impl Tracer<'_> {
         if !on(raster[0], device.width) || !on(raster[1], device.height) {
             return None;
         }
-        (!self.traced.as_ref()?.shadowed(hit, towards)).then_some(Lit { raster, share })
+        (!self.body?.shadowed(hit, towards)).then_some(Lit { raster, share })
     }
 
     /// The taps of a camera pixel whose sub-rays, each of so large a `share`, meet these points.

@@ -43,7 +43,7 @@ impl Dented {
                     half_width: diameter_mm / 2.0,
                 })
             }
-            Defect::MissingHole { .. } | Defect::BentFlange { .. } => None,
+            _ => None,
         };
         let dents = defects.iter().filter_map(dent).collect();
         Self { surface, dents }

@@ -1,5 +1,5 @@
 //! The parts that can be measured: thin surfaces z(x, y) of bounded slope, with nothing behind
-//! them.
+//! them, and solids of sheets over a floor.
 //!
 //! Default sizes are those of the parts in Peng & Gupta's study (2008; docs/measurement.md, *The
 //! study's head and parts*); a scenario may change them.
@@ -10,9 +10,13 @@ mod defect;
 mod dented;
 mod face;
 mod handset;
+mod joint;
+mod plate;
 mod relief;
 mod shapes;
+mod sheet;
 mod sheet_metal;
+mod solid;
 mod spline;
 
 use serde::{Deserialize, Serialize};
@@ -24,8 +28,12 @@ pub use board::Board;
 pub use defect::Defect;
 pub use face::Face;
 pub use handset::Handset;
+pub use joint::{Across, Joint};
+pub use plate::{Hole, Joggle, Plate, Slot};
 pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
 pub use sheet_metal::SheetMetal;
+pub use solid::Floor;
+pub(crate) use solid::Solid;
 pub use spline::Spline;
 
 /// A part by kind, with its measures in mm.
@@ -54,6 +62,10 @@ pub enum Part {
     Board(Board),
     /// A stamped bracket, the default.
     SheetMetal(SheetMetal),
+    /// A flat sheet with holes and slots over a floor.
+    Plate(Plate),
+    /// Two sheets with a gap between them.
+    Joint(Joint),
     /// Nothing at all.
     Empty {},
 }
@@ -88,7 +100,8 @@ pub(crate) trait Surface: Send + Sync {
 }
 
 impl Part {
-    /// One good part of each kind with its default measures.
+    /// One good part of each kind of thin surface with its default measures. Plate and joint are not
+    /// among them.
     #[must_use]
     pub fn stock() -> [Self; 12] {
         [
@@ -137,6 +150,8 @@ impl Part {
             Self::Plane(part) => Fields.check("part", part),
             Self::Board(part) => Fields.check("part", part),
             Self::SheetMetal(part) => part.check(),
+            Self::Plate(part) => part.check(),
+            Self::Joint(part) => part.check(),
             // The measures of these parts are fixed.
             Self::Face(_) | Self::Handset(_) | Self::Empty {} => Ok(()),
         }
@@ -154,9 +169,10 @@ impl Part {
             | Self::Face(Face { defects })
             | Self::Handset(Handset { defects })
             | Self::Plane(Plane { defects, .. })
+            | Self::Plate(Plate { defects, .. })
             | Self::SheetMetal(SheetMetal { defects, .. }) => defects,
             Self::Spline(part) => &part.defects,
-            Self::Board(_) | Self::Empty {} => &[],
+            Self::Board(_) | Self::Joint(_) | Self::Empty {} => &[],
         }
     }
 
@@ -171,9 +187,10 @@ impl Part {
             | Self::Face(Face { defects })
             | Self::Handset(Handset { defects })
             | Self::Plane(Plane { defects, .. })
+            | Self::Plate(Plate { defects, .. })
             | Self::SheetMetal(SheetMetal { defects, .. }) => Some(defects),
             Self::Spline(part) => Some(&mut part.defects),
-            Self::Board(_) | Self::Empty {} => None,
+            Self::Board(_) | Self::Joint(_) | Self::Empty {} => None,
         }
     }
 
@@ -183,15 +200,21 @@ impl Part {
     /// If it cannot; the message says which defects it can have.
     pub fn can_have(&self, defect: &Defect) -> Result<(), &'static str> {
         match (self, defect) {
-            (Self::Board(_) | Self::Empty {}, _) => Err("it can have no defects"),
-            (Self::SheetMetal(_), _) | (_, Defect::Dent { .. }) => Ok(()),
-            (_, Defect::MissingHole { .. } | Defect::BentFlange { .. }) => {
-                Err("it can have dents only: write kind = \"dent\"")
+            (Self::Board(_) | Self::Joint(_) | Self::Empty {}, _) => Err("it can have no defects"),
+            (_, Defect::Dent { .. })
+            | (Self::SheetMetal(_), Defect::MissingHole { .. } | Defect::BentFlange { .. }) => {
+                Ok(())
             }
+            (Self::Plate(_), Defect::BentFlange { .. }) => Err("it has no flange"),
+            (Self::Plate(_), _) => Ok(()),
+            (Self::SheetMetal(_), _) => {
+                Err("its holes can be missing, but not displaced or of another radius")
+            }
+            _ => Err("it can have dents only: write kind = \"dent\""),
         }
     }
 
-    /// The surface to trace; `None` for [`Part::Empty`].
+    /// The thin surface to trace; `None` for those that are solids, and for [`Part::Empty`].
     pub(crate) fn surface(&self) -> Option<Box<dyn Surface>> {
         let good: Box<dyn Surface> = match self {
             Self::Cone(part) => Box::new(part.clone()),
@@ -205,12 +228,21 @@ impl Part {
             Self::Plane(part) => Box::new(part.clone()),
             Self::Board(part) => Box::new(part.clone()),
             Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),
-            Self::Empty {} => return None,
+            Self::Plate(_) | Self::Joint(_) | Self::Empty {} => return None,
         };
         let is_dent = |defect: &Defect| matches!(defect, Defect::Dent { .. });
         Some(match self.defects().iter().any(is_dent) {
             true => Box::new(dented::Dented::new(good, self.defects())),
             false => good,
         })
+    }
+
+    /// The solid to trace, of plate and joint.
+    pub(crate) fn solid(&self) -> Option<Solid> {
+        match self {
+            Self::Plate(part) => Some(part.solid()),
+            Self::Joint(part) => Some(part.solid()),
+            _ => None,
+        }
     }
 }

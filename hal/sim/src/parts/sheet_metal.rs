@@ -55,12 +55,9 @@ impl SheetMetal {
     pub(super) fn check(&self) -> Result<(), String> {
         let mut degrees_more = 0.0;
         for defect in &self.defects {
-            match *defect {
-                Defect::Dent { .. } => {}
-                Defect::MissingHole { index } => {
-                    within("part.defects.index", index, 0, HOLES.len() - 1)?;
-                }
-                Defect::BentFlange { degrees } => degrees_more += degrees,
+            defect.check_hole(HOLES.len())?;
+            if let Defect::BentFlange { degrees } = *defect {
+                degrees_more += degrees;
             }
         }
         within("part.defects.degrees", degrees_more, -FLANGE_DEG, 40.0)
@@ -102,9 +99,9 @@ impl Stamping {
         let mut missing = Vec::new();
         for defect in &part.defects {
             match *defect {
-                Defect::Dent { .. } => {}
                 Defect::MissingHole { index } => missing.push(index),
                 Defect::BentFlange { degrees: more } => degrees += more,
+                _ => {}
             }
         }
         let holes = HOLES

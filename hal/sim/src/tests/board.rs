@@ -2,10 +2,9 @@
 //! recommended pose.
 
 use super::{counts, frames, small};
-use crate::optics::{Lens, plus, turned};
+use crate::optics::Lens;
 use crate::parts::{Board, Part};
 use crate::scenario::Rig;
-use crate::transport::rotation_of;
 use crate::{Placement, Scenario, head};
 
 /// Devices see the outer squares at least this far inside the picture, px.
@@ -23,7 +22,7 @@ fn both_devices_see_all_squares_in_every_recommended_pose() {
                 [-50.0, 70.0, 0.0],
                 [50.0, 70.0, 0.0],
             ] {
-                let world = plus(turned(&rotation_of(pose), corner), pose.shift_mm);
+                let world = pose.to_world(corner);
                 let [u, v] = lens.project(world).unwrap();
                 let inside = |at: f64, pixels: u32| {
                     (MARGIN_PX..f64::from(pixels) - 1.0 - MARGIN_PX).contains(&at)

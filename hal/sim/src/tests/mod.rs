@@ -5,12 +5,13 @@ mod board;
 mod cables;
 mod controller;
 mod light;
+mod solids;
 mod staging;
 mod surfaces;
 
 use std::time::{Duration, Instant};
 
-use super::parts::{Board, Defect};
+use super::parts::{Board, Defect, Joint, Plate};
 use super::{Part, Scenario, head};
 use hal::contract::check_head;
 use hal::frame::{Frame, Samples};
@@ -182,7 +183,8 @@ fn frames_and_truth_are_the_same_for_any_number_of_threads() {
 #[test]
 #[ignore = "a measurement, not a promise: run it alone and in release"]
 fn speed_of_building_a_transport_and_of_one_frame() {
-    for part in all_parts() {
+    let solids = [Part::Plate(Plate::default()), Part::Joint(Joint::default())];
+    for part in all_parts().into_iter().chain(solids) {
         let scenario = Scenario {
             part,
             ..Scenario::default()

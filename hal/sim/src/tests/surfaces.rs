@@ -2,6 +2,7 @@
 //! surface where a march in small steps does.
 
 use super::all_parts;
+use crate::body::Body;
 use crate::optics::{Lens, Vector, along};
 use crate::parts::Defect;
 use crate::trace::Traced;
