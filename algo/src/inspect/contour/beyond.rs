@@ -53,14 +53,15 @@ pub fn shadow(setup: &Setup, (x, y): (f64, f64), into: (f64, f64)) -> f64 {
 }
 
 /// The signed distance, mm, of the border of the background as seen at (x, y) of the plane, and the
-/// place on the plane whose distance that is.
+/// place on the plane whose distance that is; d is that of the contour there.
 pub fn background<const N: usize>(
     (shape, p): (&impl Shape<N>, &[f64; N]),
+    d: f64,
     setup: &Setup,
     thickness: f64,
     (x, y): (f64, f64),
 ) -> (f64, (f64, f64)) {
-    let mut largest = (shape.distance(p, x, y), (x, y));
+    let mut largest = (d, (x, y));
     let mut also = |x: f64, y: f64| {
         let d = shape.distance(p, x, y);
         if d > largest.0 {

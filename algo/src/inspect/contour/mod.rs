@@ -31,6 +31,7 @@ mod inputs;
 mod piece;
 mod sample;
 pub mod shape;
+mod start;
 mod verdict;
 mod view;
 
