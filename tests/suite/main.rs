@@ -12,6 +12,7 @@ mod chains;
 mod changeover;
 mod cli;
 mod commissioning;
+mod contours;
 mod damaged;
 mod doctor;
 mod drift;

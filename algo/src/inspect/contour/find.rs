@@ -94,7 +94,12 @@ pub fn find<const N: usize>(
     let mut search = Search {
         shape,
         signals: Signals::new(view, setup),
-        room: Room { pieces: Pieces::default(), moved: f64::INFINITY, seen: Vec::new(), ratios: Vec::new() },
+        room: Room {
+            pieces: Pieces::default(),
+            moved: f64::INFINITY,
+            seen: Vec::new(),
+            ratios: Vec::new(),
+        },
     };
     let about = (shape, expected);
     if let Some(start) = start(about, &search.signals, pixel, &mut search.room.ratios) {

@@ -205,10 +205,7 @@ impl Piece {
             let range = (d.0.max(t.0), d.1.min(t.1));
             for u in whole(map.middle.0, range, columns) {
                 let du = u as f64 - map.middle.0;
-                let (d, t) = (
-                    map.d.0 * du + map.d.1 * dv,
-                    map.t.0 * du + map.t.1 * dv,
-                );
+                let (d, t) = (map.d.0 * du + map.d.1 * dv, map.t.0 * du + map.t.1 * dv);
                 if libm::fabs(t) > half * (1.0 + curvature * d) + overlap {
                     continue;
                 }

@@ -1,12 +1,13 @@
 //! How the camera sees the plane of a face, and what light it has there.
 
 use super::light::{GoldenSignal, Levels, Signal};
+use super::near::Near;
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::contour::{Complex, Spot, View};
 use crate::inspect::feature::PlaneFrame;
 
 /// The plane of a face as it lies now.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Face<'a> {
     pub triangulator: &'a Triangulator,
     /// Columns and rows of the frame.
@@ -16,9 +17,39 @@ pub struct Face<'a> {
     pub levels: &'a Levels,
     pub golden: &'a GoldenSignal,
     pub light: Signal<'a>,
+    /// What is known of lines of sight near the contour; they are worked out elsewhere.
+    pub near: Near,
 }
 
 impl Face<'_> {
+    /// Works out the lines of sight within `reach` px of these places of the plane.
+    pub fn look_about(&mut self, places: impl Iterator<Item = (f64, f64)>, reach: f64) {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        for (u, v) in places.filter_map(|(x, y)| self.pixel(x, y)) {
+            low = [low[0].min(u - reach), low[1].min(v - reach)];
+            high = [high[0].max(u + reach), high[1].max(v + reach)];
+        }
+        // The frame, and what lies beside its border.
+        let low = low.map(|low| libm::floor(low).max(-1.0));
+        let (width, height) = (self.size.0 as f64, self.size.1 as f64);
+        let high = (high[0].min(width), high[1].min(height));
+        if low[0] < high.0 && low[1] < high.1 {
+            self.near = Near::new((low[0], low[1]), high, |u, v| self.exact(u, v));
+        }
+    }
+
+    /// What the line of sight through (u, v) meets.
+    fn exact(&self, u: f64, v: f64) -> Option<Spot> {
+        let point = self.point(u, v, 0.0)?;
+        let phase = self.triangulator.phase_at(point)?;
+        let from = self.frame.coordinates(point);
+        phase.is_finite().then_some(Spot {
+            x: from.x,
+            y: from.y,
+            phase,
+        })
+    }
+
     /// The point of a line of sight that lies `below` mm below the plane.
     fn point(&self, u: f64, v: f64, below: f64) -> Option<Vector> {
         let camera = self.triangulator.camera();
@@ -48,15 +79,9 @@ impl View for Face<'_> {
         self.size
     }
 
+    #[inline]
     fn spot(&self, u: f64, v: f64) -> Option<Spot> {
-        let point = self.point(u, v, 0.0)?;
-        let phase = self.triangulator.phase_at(point)?;
-        let from = self.frame.coordinates(point);
-        phase.is_finite().then_some(Spot {
-            x: from.x,
-            y: from.y,
-            phase,
-        })
+        self.near.at(u, v).or_else(|| self.exact(u, v))
     }
 
     fn pixel(&self, x: f64, y: f64) -> Option<(f64, f64)> {

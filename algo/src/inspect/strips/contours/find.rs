@@ -2,8 +2,9 @@
 
 use super::face::Face;
 use super::light::Signal;
+use super::near::Near;
 use super::shape::Associated;
-use super::taught::{Contours, Expected};
+use super::taught::{Contours, Expected, REACH_MM};
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed};
 use crate::inspect::contour::{Knowledge, State};
@@ -16,6 +17,9 @@ use crate::inspect::strips::golden::Golden;
 /// many σ and this many mm.
 const FACE_SIGMA: f64 = 5.0;
 const FACE_MM: f64 = 0.05;
+
+/// Pixels about a contour that are looked at beside those where it may lie.
+const AROUND_PX: f64 = 9.0;
 
 /// Why a contour is not found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,14 +102,18 @@ impl ContourFit {
         self.plane = expected.plane;
         if let Some(taught) = contours.frame(expected, plane) {
             let motion = placed.map(|placed| &placed.motion);
-            let face = Face {
+            let mut face = Face {
                 triangulator: &golden.triangulator,
                 size: golden.size(),
                 frame: motion.map_or(taught, |motion| moved(&taught, motion)),
                 levels: &contours.levels,
                 golden: &contours.signal,
                 light,
+                near: Near::default(),
             };
+            if let Some(pixel) = face.spot_size(0.0, 0.0) {
+                face.look_about(expected.outline.places(), AROUND_PX + REACH_MM / pixel);
+            }
             let knowledge = Knowledge {
                 rim: expected.rim,
                 ..Knowledge::default()

@@ -57,6 +57,19 @@ impl Outline {
         }
     }
 
+    /// Places along it.
+    pub fn places(&self) -> impl Iterator<Item = (f64, f64)> {
+        const COUNT: u32 = 32;
+        (0..=COUNT).map(|at| {
+            let share = f64::from(at) / f64::from(COUNT);
+            match self {
+                Self::Circle(p) => place(&Circle, p, share),
+                Self::Slot(p) => place(&Slot, p, share),
+                Self::Line(line, p) => place(line, p, share),
+            }
+        })
+    }
+
     /// Finds it near where it is.
     pub fn find(&self, view: &impl View, setup: &Setup, knowledge: Knowledge) -> Associated {
         match self {
@@ -106,6 +119,12 @@ fn associated<const N: usize>(
             wall: contour.wall.map(|wall| padded(&wall)),
         },
     }
+}
+
+/// The place of a contour at a share of its length.
+fn place<const N: usize>(shape: &impl Shape<N>, p: &[f64; N], share: f64) -> (f64, f64) {
+    let foot = shape.foot(p, share * shape.length(p));
+    (foot.x, foot.y)
 }
 
 /// A shorter list, followed by zeros.

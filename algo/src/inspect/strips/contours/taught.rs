@@ -2,6 +2,7 @@
 
 use super::face::Face;
 use super::light::{GoldenSignal, Levels, Signal};
+use super::near::Near;
 use super::outline::{Start, start};
 use super::shape::Outline;
 use crate::geometry::Vector;
@@ -13,7 +14,7 @@ use crate::inspect::strips::golden::Golden;
 use alloc::vec::Vec;
 
 /// How far from its expected place a contour is looked for, mm.
-const REACH_MM: f64 = 0.5;
+pub const REACH_MM: f64 = 0.5;
 /// The same on golden, where only its outline is known, px and mm.
 const FIRST_REACH_PX: f64 = 3.0;
 const FIRST_REACH_MM: f64 = 0.75;
@@ -109,6 +110,7 @@ impl Contours {
             levels: &self.levels,
             golden: &self.signal,
             light: Signal::Golden,
+            near: Near::default(),
         };
         let about = start(of.kind, &of.region, golden, &view(point))?;
         let [from, to] = about.outline.ends();
