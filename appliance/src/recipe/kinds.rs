@@ -35,6 +35,7 @@ fn kind(example: &Measure) -> Value {
         "unit": facts.unit.symbol(),
         "takes": takes(example),
         "negative": negative(example),
+        "datum": facts.datum,
         "compares": facts.compares,
         "margin_px": facts.margin_px(0),
         "parameters": parameters.collect::<Vec<_>>(),

@@ -14,12 +14,15 @@ use crate::math::solve::Normal;
 use alloc::vec;
 use alloc::vec::Vec;
 
-/// Neighbours whose heights differ by less belong to one surface, mm.
-const STEP_MM: f64 = 0.3;
+/// Neighbours whose heights differ by less belong to one surface, mm: more than those of a face at
+/// 60° with half a mm per pixel, and less than a floor is below a sheet.
+const STEP_MM: f64 = 1.0;
 /// What lies farther from the plane of the face is no part of it, mm.
 const OFF_MM: f64 = 1.0;
 /// A surface with this share of the pixels of the largest one is a large one.
 const LARGE: f64 = 0.1;
+/// The largest surface of a plane's region is its face if it has this share of the pixels.
+const MOST: f64 = 0.5;
 
 /// Leaves out the cells with a pixel that is not on the face: of the surface that is the highest, or
 /// else the largest.
@@ -54,7 +57,10 @@ pub fn keep_face(
         false => pixels[*of],
     };
     let large = (0..count).filter(|&of| pixels[of] >= LARGE * largest);
-    let Some(face) = large.max_by(|a, b| rank(a).total_cmp(&rank(b))) else {
+    let face = large.max_by(|a, b| rank(a).total_cmp(&rank(b)));
+    // A face of many pieces is steeper, or rough: all of it is taken.
+    let is_whole = |face: &usize| highest || pixels[*face] >= MOST * all.len() as f64;
+    let Some(face) = face.filter(is_whole) else {
         return;
     };
     let on_face = surface.iter().zip(&all).filter(|(of, _)| **of == face);

@@ -1,11 +1,11 @@
 //! Stage 5, gauge: the sums of all strips → readings and their errors.
 
-use super::contours::{ContourFit, FoundFeature, Signal};
+use super::contours::{FoundFeature, Signal};
 use super::counts::TRUSTS;
 use super::coverage;
 use super::decode::Input;
 use super::fits::Fit;
-use super::gauges::{Gauge, MAX_GAUGES};
+use super::gauges::MAX_GAUGES;
 use super::plan::Production;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
@@ -15,12 +15,9 @@ use super::uncertainty::Made;
 use crate::inspect::align::Placed;
 use crate::inspect::contour::State;
 use crate::inspect::feature::{Sum, TaughtCell, cells};
-use crate::inspect::gauge::{
-    Basis, Characteristic, Evidence, Facts, MAX_DATUMS, MAX_PLACES, OfRim, Propagated, Reading,
-    Sensitive,
-};
+use crate::inspect::gauge::{Basis, Evidence, Facts, MAX_PLACES, Reading};
 use crate::phase::Trust;
-use crate::pipeline::{VARIANCE_UNIT_NM, for_each, for_each_item};
+use crate::pipeline::{VARIANCE_UNIT_NM, for_each_item};
 use alloc::vec::Vec;
 
 /// Everything that is known of a part after one cycle.
@@ -210,50 +207,8 @@ impl Production {
                 })
             }
             Basis::Cells(_) | Basis::Region => self.of_cells(gauge, noisier, pose, strips, cells),
-            Basis::Geometry => {
-                let budget = &self.budget;
-                let Gauge { of, datum, measure } = &self.gauges.list[gauge];
-                let of: heapless::Vec<Sensitive<'_>, MAX_PLACES> = sensitive(of, fits, contours)?;
-                let datum: heapless::Vec<_, MAX_DATUMS> = sensitive(datum, fits, contours)?;
-                let value = Characteristic {
-                    kind: measure.kind(),
-                    of: &of,
-                    datum: &datum,
-                };
-                let placed = pose.placed.as_ref();
-                let Propagated { found, shared, own } =
-                    value.propagate(placed, budget.calibration.length)?;
-                let of = budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed);
-                // Where golden was measured its own inputs were others, too.
-                let with = |error: f64, inputs: f64| libm::sqrt(error * error + inputs);
-                Some(Reading {
-                    systematic: with(of.systematic, shared + own),
-                    compared: with(of.compared, 2.0 * own),
-                    ..of
-                })
-            }
-            Basis::Rim => {
-                let Gauge { of, measure, .. } = &self.gauges.list[gauge];
-                let found = contours.iter().find(|contour| contour.is_of(of))?;
-                let kind = measure.kind();
-                let of = match (&found.rim, found.is_absent()) {
-                    (Some(rim), _) => kind.of_rim(rim)?,
-                    (None, true) => OfRim {
-                        value: kind.of_absent()?,
-                        variance: 0.0,
-                        expected: None,
-                    },
-                    (None, false) => return None,
-                };
-                Some(Reading {
-                    value: of.value,
-                    sigma: Some(libm::sqrt(of.variance)),
-                    expected: of.expected,
-                    systematic: 0.0,
-                    compared: 0.0,
-                    square: None,
-                })
-            }
+            Basis::Geometry => self.of_geometry(gauge, noisier, pose, (fits, contours)),
+            Basis::Rim => self.of_rim(gauge, contours),
         }
     }
 
@@ -351,48 +306,6 @@ impl Production {
         }
     }
 
-    /// The planes and contours that gauges need.
-    fn features(&self, strips: &Strips) -> Vec<FoundFeature> {
-        let own = |fit: &&Fit| !strips.contours.iter().any(|of| of.is_of(&[fit.feature]));
-        let planes = strips.fits.iter().filter(own).map(|fit| {
-            let geometry = fit.geometry();
-            FoundFeature {
-                feature: fit.feature,
-                state: match geometry {
-                    Some(_) => State::Found,
-                    None => State::Unseen,
-                },
-                found: fit.share(&self.gauges.patches[fit.patch]),
-                blur_px: None,
-                lost: None,
-                geometry,
-            }
-        });
-        let contours = strips.contours.iter();
-        planes
-            .chain(contours.filter_map(|contour| contour.of.clone()))
-            .collect()
-    }
-
-    /// Finds the contours of features in their planes, one per task.
-    fn find_contours(&self, strips: &mut Strips, light: Signal<'_>) {
-        let Some(contours) = &self.contours else {
-            return;
-        };
-        let Strips {
-            fits,
-            pose,
-            contours: found,
-            ..
-        } = strips;
-        let (fits, placed) = (&fits[..], pose.placed.as_ref());
-        let work: Vec<_> = found.iter_mut().zip(&contours.all).collect();
-        for_each(work, |_, (found, expected)| {
-            let plane = &fits[expected.plane];
-            found.find((contours, expected), &self.golden, plane, placed, light);
-        });
-    }
-
     /// Fits the planes of features, one per task.
     fn fit(&self, strips: &mut Strips, noisier: f64) {
         let Strips {
@@ -421,22 +334,6 @@ impl Production {
         let least = (side > 0).then(|| patch.grid.least());
         cells(sums, &patch.taught, least, out);
     }
-}
-
-/// What values of these features depend on; `None` where one was not found.
-fn sensitive<'a, const N: usize>(
-    features: &[usize],
-    fits: &'a [Fit],
-    contours: &'a [ContourFit],
-) -> Option<heapless::Vec<Sensitive<'a>, N>> {
-    let sensitive = |at: &usize| {
-        if let Some(contour) = contours.iter().find(|contour| contour.is_of(&[*at])) {
-            return contour.sensitive(fits);
-        }
-        let fit = fits.iter().find(|fit| fit.feature == *at)?;
-        Some(Sensitive::Plane(fit.sensitive()?))
-    };
-    features.iter().map(sensitive).collect()
 }
 
 /// The sums of all strips over the cells of a patch.

@@ -185,6 +185,7 @@ impl Plan {
             noise_counts,
             golden,
             picture: (modulation, away as f64),
+            names: &demands.features,
             signal,
         };
         let runs = prepared

@@ -7,11 +7,13 @@ use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
     Feature, Gauge, GoldenSignal, Largest, Levels, PairBuffers, Parts, Picture, Production, Taught,
+    Unmeasurable,
 };
 use algo::pattern::{PhaseRange, Shot};
 use algo::phase::{Arrived, Decoder};
 use algo::pipeline::HeightCubics;
 use algo::units::{AbsolutePhase, Modulation};
+use hal::bounds::clipped;
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
 
@@ -55,6 +57,8 @@ pub(super) struct Shared<'a> {
     /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what
     /// two frames need.
     pub picture: (Vec<f32>, f64),
+    /// The names of the features, in their order.
+    pub names: &'a [String],
     /// What contours need; `None` if no gauge is of one.
     pub signal: Option<GoldenSignal>,
 }
@@ -255,7 +259,7 @@ impl Prepared {
             ripple: ripple_mm,
             light: signal.map(|signal| (levels, signal)),
         });
-        let production = production.map_err(|error| error.to_string())?;
+        let production = production.map_err(|error| refusal(error, shared))?;
         let (modulation, tolerance_px) = &shared.picture;
         let pair = (kind == SequenceKind::TwoFrames).then(|| Pair {
             picture: production.picture(modulation, *tolerance_px),
@@ -269,5 +273,26 @@ impl Prepared {
             pair,
             arrived: Mutex::new(None),
         })
+    }
+}
+
+/// Why gauges cannot be measured, with the name of a feature that is why.
+fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> String {
+    let Unmeasurable::NoContour { feature } = error else {
+        return error.to_string();
+    };
+    let kind = shared
+        .features
+        .get(feature)
+        .map_or("contour", |of| of.kind.name());
+    let name = shared.names.get(feature).map_or("", |name| name);
+    let name = clipped(name);
+    match shared.signal {
+        None => format!(
+            "feature {name:?} is a {kind}, and the recipe has no golden_signal, in which it is found: teach again, gauges can be kept"
+        ),
+        Some(_) => format!(
+            "feature {name:?}: golden has no {kind} in its region, or too little of its rim is seen: draw the region around it, with 1.5 mm or more on both sides"
+        ),
     }
 }

@@ -1,0 +1,130 @@
+//! Stage 5, gauge: contours of features, and the readings of gauges of geometry.
+
+use super::contours::{ContourFit, FoundFeature, Signal};
+use super::fits::Fit;
+use super::gauges::Gauge;
+use super::plan::Production;
+use super::pose::PoseField;
+use super::strip::Strips;
+use super::uncertainty::Made;
+use crate::inspect::contour::State;
+use crate::inspect::gauge::{
+    Characteristic, MAX_DATUMS, MAX_PLACES, OfRim, Propagated, Reading, Sensitive,
+};
+use crate::pipeline::for_each;
+use alloc::vec::Vec;
+
+impl Production {
+    /// The planes and contours that gauges need.
+    pub(super) fn features(&self, strips: &Strips) -> Vec<FoundFeature> {
+        let own = |fit: &&Fit| !strips.contours.iter().any(|of| of.is_of(&[fit.feature]));
+        let planes = strips.fits.iter().filter(own).map(|fit| {
+            let geometry = fit.geometry();
+            FoundFeature {
+                feature: fit.feature,
+                state: match geometry {
+                    Some(_) => State::Found,
+                    None => State::Unseen,
+                },
+                found: fit.share(&self.gauges.patches[fit.patch]),
+                blur_px: None,
+                lost: None,
+                geometry,
+            }
+        });
+        let contours = strips.contours.iter();
+        planes
+            .chain(contours.filter_map(|contour| contour.of.clone()))
+            .collect()
+    }
+
+    /// Finds the contours of features in their planes, one per task.
+    pub(super) fn find_contours(&self, strips: &mut Strips, light: Signal<'_>) {
+        let Some(contours) = &self.contours else {
+            return;
+        };
+        let Strips {
+            fits,
+            pose,
+            contours: found,
+            ..
+        } = strips;
+        let (fits, placed) = (&fits[..], pose.placed.as_ref());
+        let work: Vec<_> = found.iter_mut().zip(&contours.all).collect();
+        for_each(work, |_, (found, expected)| {
+            let plane = &fits[expected.plane];
+            found.find((contours, expected), &self.golden, plane, placed, light);
+        });
+    }
+
+    /// The reading of a gauge of the geometry of features; `noisier` is the ratio of σ_z to that as
+    /// taught.
+    pub(super) fn of_geometry(
+        &self,
+        gauge: usize,
+        noisier: f64,
+        pose: &PoseField,
+        (fits, contours): (&[Fit], &[ContourFit]),
+    ) -> Option<Reading> {
+        let budget = &self.budget;
+        let Gauge { of, datum, measure } = &self.gauges.list[gauge];
+        let of: heapless::Vec<_, MAX_PLACES> = sensitive(of, fits, contours)?;
+        let datum: heapless::Vec<_, MAX_DATUMS> = sensitive(datum, fits, contours)?;
+        let value = Characteristic {
+            kind: measure.kind(),
+            of: &of,
+            datum: &datum,
+        };
+        let placed = pose.placed.as_ref();
+        let propagated = value.propagate(placed, budget.calibration.length)?;
+        let Propagated { found, shared, own } = propagated;
+        let of = budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed);
+        // Where golden was measured its own inputs were others, too.
+        let with = |error: f64, inputs: f64| libm::sqrt(error * error + inputs);
+        Some(Reading {
+            systematic: with(of.systematic, shared + own),
+            compared: with(of.compared, 2.0 * own),
+            ..of
+        })
+    }
+
+    /// The reading of a gauge of the points of a contour.
+    pub(super) fn of_rim(&self, gauge: usize, contours: &[ContourFit]) -> Option<Reading> {
+        let Gauge { of, measure, .. } = &self.gauges.list[gauge];
+        let found = contours.iter().find(|contour| contour.is_of(of))?;
+        let kind = measure.kind();
+        let of = match (&found.rim, found.is_absent()) {
+            (Some(rim), _) => kind.of_rim(rim)?,
+            (None, true) => OfRim {
+                value: kind.of_absent()?,
+                variance: 0.0,
+                expected: None,
+            },
+            (None, false) => return None,
+        };
+        Some(Reading {
+            value: of.value,
+            sigma: Some(libm::sqrt(of.variance)),
+            expected: of.expected,
+            systematic: 0.0,
+            compared: 0.0,
+            square: None,
+        })
+    }
+}
+
+/// What values of these features depend on; `None` where one was not found.
+fn sensitive<'a, const N: usize>(
+    features: &[usize],
+    fits: &'a [Fit],
+    contours: &'a [ContourFit],
+) -> Option<heapless::Vec<Sensitive<'a>, N>> {
+    let sensitive = |at: &usize| {
+        if let Some(contour) = contours.iter().find(|contour| contour.is_of(&[*at])) {
+            return contour.sensitive(fits);
+        }
+        let fit = fits.iter().find(|fit| fit.feature == *at)?;
+        Some(Sensitive::Plane(fit.sensitive()?))
+    };
+    features.iter().map(sensitive).collect()
+}
