@@ -11,6 +11,7 @@
 //!
 //! away from the material: the exact distance to an edge between face and wall, and never too
 //! large, as sphere tracing needs it (J. C. Hart, 1996). A sheet without thickness is the face alone.
+//! Dents change s by their depth, which divides the bound by 1 + their slopes.
 
 use super::bump::{BUMP_SLOPE, bump};
 use crate::body::clip;
@@ -23,7 +24,6 @@ const TOLERANCE_MM: f64 = 1e-5;
 const MARGIN_MM: f64 = 5e-6;
 /// Most steps along a ray; a ray that takes them all meets nothing.
 const MAX_RAY_STEPS: usize = 10_000;
-
 /// Half the distance over which slopes are computed, mm.
 const SLOPE_STEP_MM: f64 = 1e-5;
 /// How many numbers the faces of a sheet have.
@@ -56,7 +56,7 @@ pub(super) struct Opening {
     pub half_width: f64,
 }
 
-/// The upper side falls by `drop` between x = `from` and `to`.
+/// The upper side falls by `drop`, not 0, between x = `from` and `to`.
 #[derive(Clone, Debug)]
 pub(super) struct Fall {
     pub from: f64,
@@ -136,22 +136,23 @@ impl Sheet {
         })
     }
 
-    /// At most the signed distance from the upper side.
+    /// The signed distance from the upper side, with dents at most [`Sheet::steepness`] times that.
     fn above(&self, [x, y, z]: Vector) -> f64 {
         let flat = match &self.joggle {
             Some(fall) => fall.above(x, z),
             None => z,
         };
-        if self.dents.is_empty() {
-            return flat;
-        }
         let drop = |dent: &Dent| {
             let [cx, cy] = dent.centre;
             dent.depth * bump(length(x - cx, y - cy), dent.half_width)
         };
+        flat + self.dents.iter().map(drop).sum::<f64>()
+    }
+
+    /// How fast [`Sheet::above`] changes at most.
+    fn steepness(&self) -> f64 {
         let slope = |dent: &Dent| dent.depth.abs() * BUMP_SLOPE / dent.half_width;
-        let (drops, slopes) = (self.dents.iter().map(drop), self.dents.iter().map(slope));
-        (flat + drops.sum::<f64>()) / (1.0 + slopes.sum::<f64>())
+        1.0 + self.dents.iter().map(slope).sum::<f64>()
     }
 
     /// The signed distance from upper side, rims and walls.
@@ -170,13 +171,14 @@ impl Sheet {
             high.map(|edge| edge + MARGIN_MM),
         ];
         let (mut t, end) = clip(&bounds, origin, direction)?;
+        let steepness = self.steepness();
         for _ in 0..MAX_RAY_STEPS {
             if t > end {
                 return None;
             }
             let at @ [x, y, z] = along(origin, direction, t);
             let below = -self.above([x, y, z + self.thickness]);
-            let distance = self.skin(at).max(below);
+            let distance = self.skin(at).max(below) / steepness;
             if distance < TOLERANCE_MM {
                 return Some(t);
             }

@@ -4,8 +4,8 @@
 mod board;
 mod cables;
 mod controller;
-mod joints;
 mod light;
+mod sections;
 mod solids;
 mod staging;
 mod surfaces;
@@ -168,12 +168,14 @@ fn frames_and_truth_are_the_same_for_any_number_of_threads() {
             .build()
             .unwrap();
         pool.install(|| {
-            let mut scenario = small(Part::default());
-            scenario.optics.camera_blur_px = 0.7;
-            let (mut head, stage) = head(&scenario).unwrap();
-            let frames: Vec<_> = frames(&mut head, &[200, 50]).iter().map(counts).collect();
-            let bits: Vec<u32> = stage.truth().height.iter().map(|z| z.to_bits()).collect();
-            (frames, bits, stage.truth().class)
+            [Part::default(), Part::Plate(Plate::default())].map(|part| {
+                let mut scenario = small(part);
+                scenario.optics.camera_blur_px = 0.7;
+                let (mut head, stage) = head(&scenario).unwrap();
+                let frames: Vec<_> = frames(&mut head, &[200, 50]).iter().map(counts).collect();
+                let bits: Vec<u32> = stage.truth().height.iter().map(|z| z.to_bits()).collect();
+                (frames, bits, stage.truth().class)
+            })
         })
     };
     assert!(with_threads(1) == with_threads(2));

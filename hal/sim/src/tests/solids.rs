@@ -47,7 +47,7 @@ pub(super) fn on_plane(lens: &Lens, [u, v]: [f64; 2], z: f64) -> Vector {
 }
 
 /// Column and row of each pixel.
-fn pixels() -> impl Iterator<Item = [f64; 2]> {
+pub(super) fn pixels() -> impl Iterator<Item = [f64; 2]> {
     (0..SIDE * SIDE).map(|at| [f64::from(at % SIDE), f64::from(at / SIDE)])
 }
 
@@ -60,7 +60,7 @@ fn area(lens: &Lens, [u, v]: [f64; 2]) -> f64 {
 }
 
 /// A thin plate in z = 0 over nothing, with one hole.
-fn with_hole(x: f64, y: f64, radius: f64) -> Plate {
+pub(super) fn with_hole(x: f64, y: f64, radius: f64) -> Plate {
     Plate {
         holes: vec![Hole { x, y, radius }],
         slots: Vec::new(),

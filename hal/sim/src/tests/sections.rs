@@ -1,7 +1,7 @@
-//! Joints: their sections have the gap, flush and radii that they state.
+//! Sections of joints, rims and dents have the measures that they state.
 
-use super::solids::{SIDE, on_plane, rig, seen};
-use crate::parts::{Across, Joint};
+use super::solids::{SIDE, on_plane, pixels, rig, seen, with_hole};
+use crate::parts::{Across, Defect, Joint};
 use crate::{Part, Placement};
 
 /// Where points are (s, z), the middle and direction of the line through them.
@@ -93,4 +93,40 @@ fn a_joints_section_has_its_gap_and_flush() {
             );
         }
     }
+}
+
+#[test]
+fn rims_are_quarter_circles_and_dents_as_deep_as_they_say() {
+    let scenario = rig();
+    let eye = scenario.rig.camera.lens();
+    let mut plate = with_hole(-6.0, 0.0, 4.0);
+    plate.rim_mm = 2.5;
+    plate.defects = vec![Defect::Dent {
+        x: 9.0,
+        y: 1.0,
+        depth_mm: 0.7,
+        diameter_mm: 12.0,
+    }];
+    let (_, truth) = seen(&scenario, Part::Plate(plate), Placement::default());
+    let (mut rim, mut dent) = (0, 0);
+    for (at, z) in pixels().zip(truth.height) {
+        let [x, y, _] = on_plane(&eye, at, f64::from(z));
+        let beside = 4.0 + 2.5 - (x + 6.0).hypot(y);
+        let off = (x - 9.0).hypot(y - 1.0) / 6.0;
+        let expected = if z.is_nan() {
+            continue;
+        } else if beside > 0.0 {
+            rim += 1;
+            (2.5_f64 * 2.5 - beside * beside).sqrt() - 2.5
+        } else if off < 1.0 {
+            dent += 1;
+            -0.7 * (std::f64::consts::FRAC_PI_2 * off).cos().powi(2)
+        } else {
+            0.0
+        };
+        // The steepest places of the rim double an error of the ray.
+        let off = f64::from(z) - expected;
+        assert!(off.abs() < 2e-4, "{at:?}: {z} instead of {expected}");
+    }
+    assert!(rim > 200 && dent > 500, "{rim} and {dent} pixels");
 }
