@@ -67,8 +67,8 @@ impl Joint {
             // Both edges of a sheet are rounded.
             within(key, radius, 0.0, self.width.min(self.length) / 2.0)?;
         }
-        let corners = self.sheets().into_iter().flat_map(|sheet| sheet.corners());
-        let lowest = corners.fold(self.z, |low, [_, _, z]| low.min(z));
+        let lowest = self.sheets().map(|sheet| sheet.lowest());
+        let lowest = lowest[0].min(lowest[1]);
         match self.floor.albedo > 0.0 {
             true => within(
                 "part.floor.depth",

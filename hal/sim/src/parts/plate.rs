@@ -158,11 +158,14 @@ impl Plate {
             axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             outline: [half.map(|half| -half), half],
             openings: holes.chain(slots).collect(),
-            joggle: self.joggle.map(|joggle| Fall {
-                from: joggle.x - joggle.run / 2.0,
-                to: joggle.x + joggle.run / 2.0,
-                drop: joggle.drop,
-            }),
+            joggle: self
+                .joggle
+                .filter(|joggle| joggle.drop != 0.0)
+                .map(|joggle| Fall {
+                    from: joggle.x - joggle.run / 2.0,
+                    to: joggle.x + joggle.run / 2.0,
+                    drop: joggle.drop,
+                }),
             dents: dents.collect(),
             thickness: self.sheet(),
             rim: self.rim_mm,

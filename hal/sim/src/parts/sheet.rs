@@ -10,11 +10,20 @@
 //! ```
 //!
 //! away from the material: the exact distance to an edge between face and wall, and never too
-//! large (J. C. Hart, "Sphere tracing", 1996). A sheet without thickness is the face alone.
+//! large, as sphere tracing needs it (J. C. Hart, 1996). A sheet without thickness is the face alone.
+//! Dents change s by their depth, which divides the bound by 1 + their slopes.
 
 use super::bump::{BUMP_SLOPE, bump};
-use crate::optics::{Vector, dot, minus, normalised};
+use crate::body::clip;
+use crate::optics::{Vector, along, dot, minus, normalised};
 
+/// A ray meets what it comes this close to, mm.
+const TOLERANCE_MM: f64 = 1e-5;
+/// The box around the material is widened by this, mm: by less than the tolerance, so that rays meet
+/// the highest face at once, and than shadow rays are lifted, so that those from there end at once.
+const MARGIN_MM: f64 = 5e-6;
+/// Most steps along a ray; a ray that takes them all meets nothing.
+const MAX_RAY_STEPS: usize = 10_000;
 /// Half the distance over which slopes are computed, mm.
 const SLOPE_STEP_MM: f64 = 1e-5;
 /// How many numbers the faces of a sheet have.
@@ -47,7 +56,7 @@ pub(super) struct Opening {
     pub half_width: f64,
 }
 
-/// The upper side falls by `drop` between x = `from` and `to`.
+/// The upper side falls by `drop`, not 0, between x = `from` and `to`.
 #[derive(Clone, Debug)]
 pub(super) struct Fall {
     pub from: f64,
@@ -69,16 +78,16 @@ impl Opening {
     fn distance(&self, [x, y]: [f64; 2], beyond: f64) -> f64 {
         let run = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
         let at = [x - self.from[0], y - self.from[1]];
-        let length = run[0] * run[0] + run[1] * run[1];
-        let along = match length > 0.0 {
-            true => ((at[0] * run[0] + at[1] * run[1]) / length).clamp(0.0, 1.0),
+        let squared = run[0] * run[0] + run[1] * run[1];
+        let along = match squared > 0.0 {
+            true => ((at[0] * run[0] + at[1] * run[1]) / squared).clamp(0.0, 1.0),
             false => 0.0,
         };
         let off = [at[0] - along * run[0], at[1] - along * run[1]];
         let nearest = off[0].abs().max(off[1].abs()) - self.half_width;
         match nearest > beyond {
             true => nearest,
-            false => off[0].hypot(off[1]) - self.half_width,
+            false => length(off[0], off[1]) - self.half_width,
         }
     }
 }
@@ -90,9 +99,9 @@ impl Fall {
         let at = [x - self.from, z];
         let along = (at[0] * run[0] + at[1] * run[1]) / (run[0] * run[0] + run[1] * run[1]);
         let along = along.clamp(0.0, 1.0);
-        let ramp = (at[0] - along * run[0]).hypot(at[1] - along * run[1]);
-        let before = (x - self.from).max(0.0).hypot(z);
-        let behind = (self.to - x).max(0.0).hypot(z + self.drop);
+        let ramp = length(at[0] - along * run[0], at[1] - along * run[1]);
+        let before = length((x - self.from).max(0.0), z);
+        let behind = length((self.to - x).max(0.0), z + self.drop);
         let height = match x {
             _ if x <= self.from => 0.0,
             _ if x >= self.to => -self.drop,
@@ -103,10 +112,14 @@ impl Fall {
 }
 
 impl Sheet {
+    /// The components of a vector in the coordinates of the sheet.
+    fn turned(&self, vector: Vector) -> Vector {
+        self.axes.map(|axis| dot(axis, vector))
+    }
+
     /// `point` in the coordinates of the sheet.
     fn own(&self, point: Vector) -> Vector {
-        let off = minus(point, self.origin);
-        self.axes.map(|axis| dot(axis, off))
+        self.turned(minus(point, self.origin))
     }
 
     /// Distance from the contour in the plane, positive on the material.
@@ -114,7 +127,7 @@ impl Sheet {
         let [low, high] = &self.outline;
         let [x, y] = [0, 1].map(|axis| (low[axis] - at[axis]).max(at[axis] - high[axis]));
         let outline = match x.min(y) > 0.0 {
-            true => x.hypot(y),
+            true => length(x, y),
             false => x.max(y),
         };
         let openings = self.openings.iter();
@@ -123,36 +136,55 @@ impl Sheet {
         })
     }
 
-    /// At most the signed distance from the upper side.
+    /// The signed distance from the upper side, with dents at most [`Sheet::steepness`] times that.
     fn above(&self, [x, y, z]: Vector) -> f64 {
         let flat = match &self.joggle {
             Some(fall) => fall.above(x, z),
             None => z,
         };
-        if self.dents.is_empty() {
-            return flat;
-        }
         let drop = |dent: &Dent| {
             let [cx, cy] = dent.centre;
-            dent.depth * bump((x - cx).hypot(y - cy), dent.half_width)
+            dent.depth * bump(length(x - cx, y - cy), dent.half_width)
         };
+        flat + self.dents.iter().map(drop).sum::<f64>()
+    }
+
+    /// How fast [`Sheet::above`] changes at most.
+    fn steepness(&self) -> f64 {
         let slope = |dent: &Dent| dent.depth.abs() * BUMP_SLOPE / dent.half_width;
-        let (drops, slopes) = (self.dents.iter().map(drop), self.dents.iter().map(slope));
-        (flat + drops.sum::<f64>()) / (1.0 + slopes.sum::<f64>())
+        1.0 + self.dents.iter().map(slope).sum::<f64>()
     }
 
     /// The signed distance from upper side, rims and walls.
     fn skin(&self, own: Vector) -> f64 {
         let above = self.above(own) + self.rim;
         let beside = self.rim - self.inside([own[0], own[1]]);
-        above.max(beside).min(0.0) + above.max(0.0).hypot(beside.max(0.0)) - self.rim
+        above.max(beside).min(0.0) + length(above.max(0.0), beside.max(0.0)) - self.rim
     }
 
-    /// A distance from `point` that no material is nearer than.
-    pub fn distance(&self, point: Vector) -> f64 {
-        let own @ [x, y, z] = self.own(point);
-        let below = -self.above([x, y, z + self.thickness]);
-        self.skin(own).max(below)
+    /// Where on the ray from `origin` along the unit vector `direction` it is met first, mm.
+    pub fn meets(&self, origin: Vector, direction: Vector) -> Option<f64> {
+        let (origin, direction) = (self.own(origin), self.turned(direction));
+        let [low, high] = self.bounds();
+        let bounds = [
+            low.map(|edge| edge - MARGIN_MM),
+            high.map(|edge| edge + MARGIN_MM),
+        ];
+        let (mut t, end) = clip(&bounds, origin, direction)?;
+        let steepness = self.steepness();
+        for _ in 0..MAX_RAY_STEPS {
+            if t > end {
+                return None;
+            }
+            let at @ [x, y, z] = along(origin, direction, t);
+            let below = -self.above([x, y, z + self.thickness]);
+            let distance = self.skin(at).max(below) / steepness;
+            if distance < TOLERANCE_MM {
+                return Some(t);
+            }
+            t += distance;
+        }
+        None
     }
 
     /// The outward normal at a point of upper side, rim or wall, and the number of the face.
@@ -178,25 +210,29 @@ impl Sheet {
         ([0, 1, 2].map(turned), face)
     }
 
-    /// The corners of a box around it.
-    pub fn corners(&self) -> [Vector; 8] {
+    /// Lowest and highest corner of a box around it, in its own coordinates.
+    fn bounds(&self) -> [Vector; 2] {
         let drop = self.joggle.as_ref().map_or(0.0, |fall| fall.drop);
-        let dents = |sign: f64| {
-            self.dents
-                .iter()
-                .map(move |dent| (sign * dent.depth).max(0.0))
-        };
-        let deepest = drop.max(0.0) + self.thickness + dents(1.0).sum::<f64>();
-        let highest = (-drop).max(0.0) + dents(-1.0).sum::<f64>();
-        std::array::from_fn(|corner| {
-            let [x, y] = [0, 1].map(|axis| self.outline[corner >> axis & 1][axis]);
-            let own = [x, y, [-deepest, highest][corner >> 2]];
-            [0, 1, 2].map(|axis| {
-                let along = |of: usize| own[of] * self.axes[of][axis];
-                self.origin[axis] + along(0) + along(1) + along(2)
-            })
-        })
+        let (mut low, mut high) = (-drop.max(0.0) - self.thickness, (-drop).max(0.0));
+        for dent in &self.dents {
+            low -= dent.depth.max(0.0);
+            high += (-dent.depth).max(0.0);
+        }
+        let [[left, front], [right, back]] = self.outline;
+        [[left, front, low], [right, back, high]]
     }
+
+    /// z of its lowest corner, in the coordinates of its part.
+    pub fn lowest(&self) -> f64 {
+        let [low, high] = self.bounds();
+        let end = |of: usize| (low[of] * self.axes[of][2]).min(high[of] * self.axes[of][2]);
+        self.origin[2] + end(0) + end(1) + end(2)
+    }
+}
+
+/// √(x² + y²) of lengths that neither overflow nor vanish, faster than `hypot`.
+fn length(x: f64, y: f64) -> f64 {
+    (x * x + y * y).sqrt()
 }
 
 /// The unit vector along which `value` grows.

@@ -5,6 +5,7 @@ mod board;
 mod cables;
 mod controller;
 mod light;
+mod sections;
 mod solids;
 mod staging;
 mod surfaces;
@@ -167,12 +168,14 @@ fn frames_and_truth_are_the_same_for_any_number_of_threads() {
             .build()
             .unwrap();
         pool.install(|| {
-            let mut scenario = small(Part::default());
-            scenario.optics.camera_blur_px = 0.7;
-            let (mut head, stage) = head(&scenario).unwrap();
-            let frames: Vec<_> = frames(&mut head, &[200, 50]).iter().map(counts).collect();
-            let bits: Vec<u32> = stage.truth().height.iter().map(|z| z.to_bits()).collect();
-            (frames, bits, stage.truth().class)
+            [Part::default(), Part::Plate(Plate::default())].map(|part| {
+                let mut scenario = small(part);
+                scenario.optics.camera_blur_px = 0.7;
+                let (mut head, stage) = head(&scenario).unwrap();
+                let frames: Vec<_> = frames(&mut head, &[200, 50]).iter().map(counts).collect();
+                let bits: Vec<u32> = stage.truth().height.iter().map(|z| z.to_bits()).collect();
+                (frames, bits, stage.truth().class)
+            })
         })
     };
     assert!(with_threads(1) == with_threads(2));
@@ -184,7 +187,7 @@ fn frames_and_truth_are_the_same_for_any_number_of_threads() {
 #[ignore = "a measurement, not a promise: run it alone and in release"]
 fn speed_of_building_a_transport_and_of_one_frame() {
     let solids = [Part::Plate(Plate::default()), Part::Joint(Joint::default())];
-    for part in all_parts().into_iter().chain(solids) {
+    for part in solids.into_iter().chain(all_parts()) {
         let scenario = Scenario {
             part,
             ..Scenario::default()
