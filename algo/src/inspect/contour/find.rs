@@ -1,7 +1,6 @@
 //! A contour from pixels: pieces about where it is expected, their edges, the shape through them,
 //! and again about that, until nothing moves.
 
-use super::associate::{Point, associate, response};
 use super::edge::Edge;
 use super::fit::{Buffers, Fit, Problem};
 use super::piece::{BAND, Pieces, pixel_size};
@@ -9,6 +8,7 @@ use super::sample::Samples;
 use super::shape::Shape;
 use super::verdict::{Outcome, State, state};
 use super::view::{Setup, View};
+use crate::math::associate::{Point, associate, response};
 use alloc::vec::Vec;
 
 /// Blur of the camera that is looked for, σ in px.

@@ -13,9 +13,6 @@
 //! of two parallel planes, has no error by the motion. As for
 //! [`Evidence::linear`](super::Evidence::linear) the blocks are taken as independent.
 //!
-//! Where f has a kink within ± uᵢ, as an angle has at 0, the two halves of the difference have
-//! different signs and would cancel; gᵢ is then the larger of both.
-//!
 //! # Accuracy
 //! Within 2 % where the value is 10 σ or more from a kink:
 //! `errors_of_geometric_kinds_are_the_scatter_of_random_draws`.
@@ -25,6 +22,7 @@ use super::reading::Found;
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed, form};
 use crate::inspect::feature::{FittedPlane, Geometry};
+use crate::math::derivative::derivative;
 
 /// A feature, and how it depends on what was measured.
 #[derive(Clone, Copy, Debug)]
@@ -34,9 +32,6 @@ pub struct Sensitive<'a> {
     /// What 1 mm more of each of its cells adds to its parameters.
     pub rows: &'a [[f64; 3]],
 }
-
-/// Least step of a difference, in mm, and in mm per mm: much more than rounding.
-const LEAST_STEP: f64 = 1e-7;
 
 /// The value of features, at most [`MAX_PLACES`], with its errors; `None` where it is not finite.
 pub fn propagate(kind: &dyn Kind, of: &[Sensitive<'_>], placed: Option<&Placed>) -> Option<Found> {
@@ -87,18 +82,6 @@ pub fn propagate(kind: &dyn Kind, of: &[Sensitive<'_>], placed: Option<&Placed>)
         motion,
         lever,
     })
-}
-
-/// The derivative of a function about 0, where it has the value `here`, over a step of this size.
-fn derivative(here: f64, step: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let step = step.max(LEAST_STEP);
-    let (up, down) = (f(step) - here, here - f(-step));
-    let both = match up * down < 0.0 {
-        true if libm::fabs(up) > libm::fabs(down) => 2.0 * up,
-        true => 2.0 * down,
-        false => up + down,
-    };
-    both / (2.0 * step)
 }
 
 /// A motion along one of the components of the covariance: a shift in mm, or a turn as the way of a
