@@ -22,10 +22,10 @@
 
 use super::bins::{Bin, Zone};
 use super::line::Line;
-use super::profile::{Directions, Rounded, Stated};
+use super::profile::{Blurred, Directions, Rounded, Stated};
 use super::reason::Why;
 use super::request::Optics;
-use crate::math::associate::{Point, associate};
+use crate::math::associate::{Distance, Point, associate};
 use crate::math::solve::Normal;
 use alloc::vec::Vec;
 
@@ -38,9 +38,14 @@ const LEAVES: f64 = 3.0;
 /// A ray passes inside the silhouette by at least so many blurs.
 const CLEAR: f64 = 1.5;
 /// Least cosine of the angle between the surface's normal and the line of sight.
+const MIX: f64 = 1.0;
+const DARK: f64 = 0.1;
+const LIT: f64 = 6.0;
 const FACING: f64 = 0.3;
 /// The share of δ by which it is uncertain.
 pub const BLUR: f64 = 0.15;
+/// An edge falls, from where it leaves the line, at least at this share of its steepest slope.
+const STEEPER: f64 = 0.8;
 /// Fewest bins of an edge.
 const BINS: usize = 3;
 /// Radii that are looked for, mm, and their ratio.
@@ -84,13 +89,20 @@ pub fn edge(
     optics: &Optics,
     stated: Option<f64>,
 ) -> Result<Edge, Why> {
+    let all = zone.bins(|_, _, _| true);
+    let connected = zone.connected(&all, optics);
+    let arc = leaving(&all[..connected]);
+    let next = all.get(connected).zip(arc.last());
+    let lit = next.is_some_and(|(next, last)| next.x - last.x < LIT * optics.blur);
     let search = Search {
         line: zone.line,
+        mix: if lit { MIX } else { DARK },
         rounded: Rounded(directions),
-        blur: optics.blur,
+        seen: Blurred {
+            rounded: Rounded(directions),
+            blur: optics.blur,
+        },
     };
-    let all = zone.bins(|_, _, _| true);
-    let arc = leaving(&all[..zone.connected(&all, optics)]);
     if arc.len() < BINS {
         return Err(Why::Edgeless);
     }
@@ -100,17 +112,27 @@ pub fn edge(
     search.solve(leaving(&bins), stated)
 }
 
-/// The bins behind the last that does not leave the line.
+/// The bins behind the last that does not leave the line, as long as they fall ever more steeply.
 fn leaving(bins: &[Bin]) -> &[Bin] {
     let leaves = |bin: &Bin| bin.y > LEAVES * libm::sqrt(bin.variance);
-    let from = bins.iter().rposition(|bin| !leaves(bin));
-    &bins[from.map_or(0, |last| last + 1)..]
+    let last = bins.iter().rposition(|bin| !leaves(bin));
+    let (from, behind) = last.map_or((0.0, bins), |last| (bins[last].x, &bins[last + 1..]));
+    let mut steepest = 0.0_f64;
+    let flat = behind.iter().position(|bin| {
+        let far = bin.x - from;
+        let noise = LEAVES * libm::sqrt(bin.variance);
+        let is_flat = bin.y + noise < STEEPER * steepest * far;
+        steepest = steepest.max((bin.y - noise) / far);
+        is_flat
+    });
+    &behind[..flat.unwrap_or(behind.len())]
 }
 
 struct Search<'a> {
     line: &'a Line,
+    mix: f64,
     rounded: Rounded,
-    blur: f64,
+    seen: Blurred,
 }
 
 impl Search<'_> {
@@ -148,9 +170,9 @@ impl Search<'_> {
                 });
             }
             let found = match stated {
-                None => associate(&self.rounded, &mut p, &mut points, &mut ratios).map(|_| ()),
+                None => associate(&self.seen, &mut p, &mut points, &mut ratios).map(|_| ()),
                 Some(r) => {
-                    let (mut t, stated) = ([p[0]], Stated(self.rounded, r));
+                    let (mut t, stated) = ([p[0]], Stated(self.seen, r));
                     let found = associate(&stated, &mut t, &mut points, &mut ratios);
                     p[0] = t[0];
                     found.map(|_| ())
@@ -165,67 +187,86 @@ impl Search<'_> {
             .ok_or(Why::NotRound)
     }
 
-    /// The circle on which most bins lie.
+    /// The circle on which most bins lie, with what blur does to them.
     fn start(&self, bins: &[Bin], stated: Option<f64>) -> Option<[f64; 2]> {
         let mut best: Option<(f64, [f64; 2])> = None;
-        let mut places = Vec::new();
+        let (mut points, mut seen, mut places) = (Vec::new(), Vec::new(), Vec::new());
         let mut r = stated.unwrap_or(RADII[0]);
-        while r <= RADII[1] || stated.is_some() {
-            places.clear();
-            let placing = bins.iter().filter(|bin| bin.y < PLACES * r);
-            places.extend(placing.map(|bin| bin.x - libm::sqrt((2.0 * r - bin.y) * bin.y)));
-            if !places.is_empty() {
-                let middle = places.len() / 2;
-                let (_, &mut t, _) = places.select_nth_unstable_by(middle, f64::total_cmp);
-                // What blur does where the arc begins.
-                let slack = self.blur * self.blur / (2.0 * r);
-                let cost = bins.iter().map(|bin| {
-                    let Some(hit) = self.rounded.hit([t, r], bin.x, bin.y) else {
-                        return 1.0;
-                    };
-                    let square = OFF * OFF * (bin.variance + slack * slack);
-                    (hit.way * hit.way / square).min(1.0)
-                });
-                let cost = cost.sum();
-                if best.is_none_or(|(least, _)| cost < least) {
-                    best = Some((cost, [t, r]));
+        loop {
+            points.clear();
+            let all = bins.iter().map(|bin| (bin.x, bin.y));
+            let Some(mut t) = place(all, r, &mut places) else {
+                r *= RATIO;
+                if r > RADII[1] || stated.is_some() {
+                    break;
                 }
+                continue;
+            };
+            for _ in 0..2 {
+                self.usable(bins, [t, r], &mut points, &mut seen);
+                let up = self.rounded.0.sight.1;
+                let moved = points.iter().zip(&seen);
+                let moved = moved.map(|(point, seen)| (point.x, point.y + seen.off * up));
+                t = place(moved, r, &mut places).unwrap_or(t);
             }
-            if stated.is_some() {
-                break;
+            let missing = self.usable(bins, [t, r], &mut points, &mut seen);
+            let costs = points.iter().zip(&seen).map(|(point, seen)| {
+                let square = seen.way * seen.way / point.variance;
+                square.min(OFF * OFF) + libm::log(point.variance / seen.noise)
+            });
+            let cost = missing + costs.sum::<f64>();
+            #[cfg(test)]
+            if tests_truth().is_some() {
+                std::println!(
+                    "r {r:.3} t {t:.3} cost {cost:.2} of {} missing {missing}",
+                    bins.len()
+                );
+            }
+            if best.is_none_or(|(least, _)| cost < least) {
+                best = Some((cost, [t, r]));
             }
             r *= RATIO;
+            if r > RADII[1] || stated.is_some() {
+                break;
+            }
         }
         best.map(|(_, p)| p)
     }
 
-    /// The bins that a ray meets well inside the silhouette, moved back by δ, and how they are seen.
-    fn usable(&self, bins: &[Bin], p: [f64; 2], points: &mut Vec<Point>, seen: &mut Vec<Seen>) {
+    /// The bins that a ray meets, and how they are seen; and what the others cost.
+    fn usable(
+        &self,
+        bins: &[Bin],
+        p: [f64; 2],
+        points: &mut Vec<Point>,
+        seen: &mut Vec<Seen>,
+    ) -> f64 {
         points.clear();
         seen.clear();
-        let (along, up) = self.rounded.0.sight;
+        let mut missed = 0.0;
         for bin in bins {
+            let inside = self.rounded.inside(p, bin.x, bin.y) / self.seen.blur;
+            let leak = self.mix * 0.5 * libm::erfc(inside * core::f64::consts::FRAC_1_SQRT_2);
             let Some(hit) = self.rounded.hit(p, bin.x, bin.y) else {
+                missed += libm::log(1.0 + leak * leak / bin.variance)
+                    + if inside < -2.0 { OFF * OFF } else { 1.0 };
                 continue;
             };
-            let facing = hit.normal.0 * along + hit.normal.1 * up;
-            let inside = self.rounded.inside(p, bin.x, bin.y);
-            if facing < FACING || inside < CLEAR * self.blur {
-                continue;
-            }
-            let off = self.rounded.blurred(p, (bin.x, bin.y), hit.way, self.blur);
+            let off = self.seen.distance(&p, bin.x, bin.y) + hit.way;
             points.push(Point {
-                x: bin.x - off * along,
-                y: bin.y + off * up,
-                variance: bin.variance + BLUR * BLUR * off * off,
+                x: bin.x,
+                y: bin.y,
+                variance: bin.variance + BLUR * BLUR * off * off + leak * leak,
                 weight: 1.0,
             });
             seen.push(Seen {
                 noise: bin.variance,
                 off,
+                way: off - hit.way,
                 arc: libm::asin(hit.normal.0.clamp(-1.0, 1.0)),
             });
         }
+        missed
     }
 
     /// Whether a point is near enough to the profile to be a part of it.
@@ -235,7 +276,7 @@ impl Search<'_> {
         };
         // What blur does grows with the slope of the surface.
         let facing = hit.normal.0 * self.rounded.0.sight.0 + hit.normal.1 * self.rounded.0.sight.1;
-        let slack = self.blur * self.blur / (p[1] * facing * facing * facing);
+        let slack = self.seen.blur * self.seen.blur / (p[1] * facing * facing * facing);
         libm::fabs(hit.way) <= OUTSIDE * libm::sqrt(variance) + slack
     }
 
@@ -275,7 +316,7 @@ impl Search<'_> {
                 }
                 blurred[2 + i] += row_i * BLUR * seen.off;
             }
-            if point.weight > COUNTS {
+            if point.weight > COUNTS && point.variance < 10.0 * seen.noise {
                 arc = arc.max(seen.arc);
             }
         }
@@ -319,24 +360,23 @@ impl Search<'_> {
 
     /// How a point's residual changes with c, a, t, r.
     fn rates(&self, p: [f64; 2], point: &Point) -> [f64; 4] {
-        let Some(hit) = self.rounded.hit(p, point.x, point.y) else {
-            return [0.0; 4];
-        };
         let (h, a) = (self.line.stretch(), self.line.slope);
-        let sight = self.rounded.0.sight;
-        let (along, up) = hit.normal;
-        let facing = along * sight.0 + up * sight.1;
+        let (x, y) = (point.x, point.y);
+        let [t, r] = self.seen.derivative(&p, x, y);
+        let lift = self.seen.lifted(&p, x, y);
         // The line lifts the profile by 1/h and moves it along by a/h for each mm, and turns it
         // about its middle by 1/h² for each unit of slope.
-        let moved = |x: f64, lift: f64| -(along * x + up * lift) / facing;
-        let (x, y) = (point.x, point.y);
-        [
-            moved(a / h, 1.0 / h),
-            moved(y / (h * h), x / (h * h)),
-            moved(1.0, 0.0),
-            -(1.0 - up) / facing,
-        ]
+        [(t * a + lift) / h, (t * y + lift * x) / (h * h), t, r]
     }
+}
+
+/// The tangent point of circles of radius r through points of an edge: the median.
+fn place(points: impl Iterator<Item = (f64, f64)>, r: f64, places: &mut Vec<f64>) -> Option<f64> {
+    places.clear();
+    let placing = points.filter(|(_, y)| (0.0..PLACES * r).contains(y));
+    places.extend(placing.map(|(x, y)| x - libm::sqrt((2.0 * r - y) * y)));
+    let middle = places.len() / 2;
+    (!places.is_empty()).then(|| *places.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
 /// How a bin is seen.
@@ -346,6 +386,15 @@ struct Seen {
     noise: f64,
     /// δ, mm.
     off: f64,
+    /// Its residual, mm.
+    way: f64,
     /// Where on the arc, rad from the tangent point.
     arc: f64,
+}
+
+#[cfg(test)]
+std::thread_local! { pub static TRUTH: core::cell::Cell<Option<[f64; 2]>> = const { core::cell::Cell::new(None) }; }
+#[cfg(test)]
+fn tests_truth() -> Option<[f64; 2]> {
+    TRUTH.with(|t| t.get())
 }

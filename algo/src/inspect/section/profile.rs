@@ -28,6 +28,9 @@ const NODES: i32 = 4;
 /// Distance of nodes, of σ.
 const NODE: f64 = 0.6;
 
+/// Step of derivatives, mm.
+const STEP: f64 = 0.02;
+
 /// Directions to the camera and to the projector in the line's frame, unit vectors: along, up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Directions {
@@ -46,13 +49,13 @@ pub struct Hit {
     pub normal: (f64, f64),
 }
 
-/// What is fitted: t and r of a profile that is seen along a direction.
+/// A line and a circle tangent to it, with t and r, in these directions.
 #[derive(Clone, Copy, Debug)]
 pub struct Rounded(pub Directions);
 
 /// The same with a stated radius.
 #[derive(Clone, Copy, Debug)]
-pub struct Stated(pub Rounded, pub f64);
+pub struct Stated(pub Blurred, pub f64);
 
 impl Rounded {
     /// Where the ray through a point meets the profile; `None` where it passes.
@@ -78,15 +81,28 @@ impl Rounded {
         let (along, up) = self.0.sight;
         r - ((x - t) * up + (y - r) * along)
     }
+}
 
-    /// δ of a pixel whose ray passes through a point and meets the profile after `way`, mm.
-    pub fn blurred(&self, p: [f64; 2], (x, y): (f64, f64), way: f64, blur: f64) -> f64 {
-        let (sight, light) = (self.0.sight, self.0.light);
+/// What is fitted: t and r of a profile as pixels see it.
+#[derive(Clone, Copy, Debug)]
+pub struct Blurred {
+    /// The profile.
+    pub rounded: Rounded,
+    /// σ of what a pixel averages, mm.
+    pub blur: f64,
+}
+
+impl Blurred {
+    /// −λ of the surface and as it is seen; `None` if no part of the pixel's footprint meets it.
+    fn seen(&self, p: [f64; 2], x: f64, y: f64) -> Option<f64> {
+        let Directions { sight, light } = self.rounded.0;
         let (mut light_sum, mut way_sum) = (0.0, 0.0);
         for node in -NODES..=NODES {
-            let off = NODE * f64::from(node);
-            let across = off * blur;
-            let Some(hit) = self.hit(p, x + across * sight.1, y + across * sight.0) else {
+            let across = NODE * f64::from(node) * self.blur;
+            let Some(hit) = self
+                .rounded
+                .hit(p, x + across * sight.1, y + across * sight.0)
+            else {
                 continue;
             };
             let lit = hit.normal.0 * light.0 + hit.normal.1 * light.1;
@@ -94,10 +110,12 @@ impl Rounded {
             light_sum += share;
             way_sum += share * hit.way;
         }
-        match light_sum > 0.0 {
-            true => way_sum / light_sum - way,
-            false => 0.0,
-        }
+        (light_sum > 0.0).then(|| -way_sum / light_sum)
+    }
+
+    /// How the distance changes if the whole profile is lifted.
+    pub fn lifted(&self, p: &[f64; 2], x: f64, y: f64) -> f64 {
+        (self.distance(p, x, y + STEP) - self.distance(p, x, y - STEP)) / (-2.0 * STEP)
     }
 }
 
@@ -110,23 +128,22 @@ const DENSITY: [f64; NODES as usize + 1] = [
     0.056_134_762_834_133_72,
 ];
 
-impl Distance<2> for Rounded {
-    /// A ray that passes the circle counts as one that touches it.
+impl Distance<2> for Blurred {
+    /// Where the whole footprint passes, of the ray as if it touched the circle.
     fn distance(&self, p: &[f64; 2], x: f64, y: f64) -> f64 {
-        let (along, up) = self.0.sight;
+        let (along, up) = self.rounded.0.sight;
         let touching = || (x - p[0]) * along - (y - p[1]) * up;
-        self.hit(*p, x, y).map_or_else(touching, |hit| -hit.way)
+        self.seen(*p, x, y).unwrap_or_else(touching)
     }
 
-    /// With the surface f(x, y) = 0 met along u, dλ = −df / (n·u): t moves the circle along, r moves
-    /// its centre down and its rim outwards.
+    /// Over a step at which nodes that leave the silhouette do not matter.
     fn derivative(&self, p: &[f64; 2], x: f64, y: f64) -> [f64; 2] {
-        let Some(hit) = self.hit(*p, x, y) else {
-            return [0.0; 2];
-        };
-        let (along, up) = hit.normal;
-        let facing = along * self.0.sight.0 + up * self.0.sight.1;
-        [-along / facing, -(1.0 - up) / facing]
+        let by = |t: f64, r: f64| self.distance(&[p[0] + t, p[1] + r], x, y);
+        [
+            by(STEP, 0.0) - by(-STEP, 0.0),
+            by(0.0, STEP) - by(0.0, -STEP),
+        ]
+        .map(|d| d / (2.0 * STEP))
     }
 }
 

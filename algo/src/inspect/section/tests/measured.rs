@@ -70,3 +70,16 @@ fn explore() {
         }
     }
 }
+
+#[test]
+fn debug() {
+    let mut chance = Chance::new(3);
+    let mut joint = Joint::draw(0.41, &mut chance);
+    joint.floor = None;
+    joint.rises = [0.0; 2];
+    std::println!("{joint:?} {:?}", joint.optics());
+    let r = joint.radii[1];
+    super::super::edge::TRUTH
+        .with(|t| t.set(Some([-joint.place - joint.gap / 2.0 - r + 10.75, r])));
+    section(&joint.rendered(), 1, 0.1);
+}
