@@ -73,13 +73,35 @@ fn explore() {
 
 #[test]
 fn debug() {
-    let mut chance = Chance::new(3);
-    let mut joint = Joint::draw(0.41, &mut chance);
-    joint.floor = None;
-    joint.rises = [0.0; 2];
-    std::println!("{joint:?} {:?}", joint.optics());
-    let r = joint.radii[1];
-    super::super::edge::TRUTH
-        .with(|t| t.set(Some([-joint.place - joint.gap / 2.0 - r + 10.75, r])));
-    section(&joint.rendered(), 1, 0.1);
+    for noise in [0.05, 1.0] {
+        for seed in 0..12 {
+            let mut chance = Chance::new(seed);
+            let joint = Joint::draw(0.41, &mut chance);
+            let points = joint.rendered().capture(seed, noise);
+            let section = Section::new(&points, &joint.request(), &joint.optics());
+            match section {
+                Ok(section) => {
+                    for (i, edge) in section.edges.iter().enumerate() {
+                        let [.., t, r] = edge.parameters;
+                        let is = -joint.gap / 2.0 + joint.place * [1.0, -1.0][i] + 10.75;
+                        std::println!(
+                            "{noise} {seed} r {:.3} found {r:.3} sigma {:.3} arc {:.0} extreme off {:.3} light {:.2} turn {:.3}",
+                            joint.radii[i],
+                            edge.covariance[3][3].sqrt(),
+                            edge.arc.to_degrees(),
+                            t + r - is,
+                            joint.light * [1.0, -1.0][i],
+                            joint.turn
+                        );
+                    }
+                }
+                Err(why) => std::println!(
+                    "{noise} {seed} {why} {:?} light {:.2} turn {:.3}",
+                    joint.radii,
+                    joint.light,
+                    joint.turn
+                ),
+            }
+        }
+    }
 }
