@@ -11,6 +11,7 @@ mod normal_shares;
 mod openings;
 mod region;
 mod ripple;
+pub mod section;
 mod strips;
 mod table;
 mod taught;

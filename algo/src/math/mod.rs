@@ -1,5 +1,8 @@
-//! Rounding to whole numbers, neighbours in a frame, and least squares for a few unknowns.
+//! Rounding to whole numbers, neighbours in a frame, derivatives, and least squares for a few
+//! unknowns.
 
+pub mod associate;
+pub(crate) mod derivative;
 pub(crate) mod nearest;
 pub mod solve;
 

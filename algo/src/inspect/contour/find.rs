@@ -1,7 +1,6 @@
 //! A contour from pixels: pieces about where it is expected, their edges, the shape through them,
 //! and again about that, until nothing moves.
 
-use super::associate::{Point, associate, response};
 use super::complex::Complex;
 use super::edge::Edge;
 use super::fit::{Fit, Problem, Seen};
@@ -11,6 +10,7 @@ use super::shape::Shape;
 use super::start::start;
 use super::verdict::{Outcome, State, state};
 use super::view::{Setup, View};
+use crate::math::associate::{Point, associate, response};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 

@@ -1,11 +1,11 @@
 //! Inputs of a contour's uncertainty beside noise: by how much its parameters are off for one
 //! standard uncertainty of each.
 
-use super::associate::Point;
 use super::beyond::slope;
 use super::find::Contour;
 use super::shape::Shape;
 use super::view::Setup;
+use crate::math::associate::Point;
 use alloc::vec::Vec;
 
 /// A shift of every edge towards its material, px: by the model of the edge.

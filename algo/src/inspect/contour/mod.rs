@@ -15,13 +15,13 @@
 //! # Stages
 //! `sample` demodulates the pixels near the expected contour, `piece` divides them, `fit` finds the
 //! edge of each piece by the profile of `edge` and what `beyond` knows of walls and floors,
-//! `associate` the shape through the edges, `find` does this until nothing moves, and `verdict`
-//! says whether the contour is found, absent or unseen. `inputs` states what else is uncertain.
+//! [`associate`](crate::math::associate) the shape through the edges, `find` does this until nothing
+//! moves, and `verdict` says whether the contour is found, absent or unseen. `inputs` states what
+//! else is uncertain.
 //!
 //! # Units
 //! mm in the plane's frame, px in the picture, turns, counts.
 
-mod associate;
 mod beyond;
 mod complex;
 mod edge;
@@ -35,7 +35,7 @@ mod start;
 mod verdict;
 mod view;
 
-pub use associate::Point;
+pub use crate::math::associate::Point;
 pub use complex::Complex;
 pub use find::{Contour, find};
 pub use inputs::{Input, Knowledge, Source, inputs};

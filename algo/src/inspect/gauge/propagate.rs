@@ -14,9 +14,6 @@
 //! two holes, has no error by the motion. As for [`Evidence::linear`](super::Evidence::linear) the
 //! blocks are taken as independent.
 //!
-//! Where f has a kink within ± uᵢ, as an angle has at 0, the two halves of the difference have
-//! different signs and would cancel; gᵢ is then the larger of both.
-//!
 //! Along directions that the part's shape leaves open the motion has no covariance. A value of a
 //! contour that depends on them is none.
 //!
@@ -34,6 +31,7 @@ use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed, form};
 use crate::inspect::contour::Source;
 use crate::inspect::feature::{FittedPlane, Geometry, Parameters, Rim};
+use crate::math::derivative::derivative;
 
 /// A plane, and how it depends on what was measured.
 #[derive(Clone, Copy, Debug)]
@@ -105,8 +103,6 @@ enum Change {
     Scale(f64),
 }
 
-/// Least step of a difference, in mm, and in mm per mm: much more than rounding.
-const LEAST_STEP: f64 = 1e-7;
 /// A value that changes by more than this share of a motion along an open direction depends on it.
 const OPEN: f64 = 1e-3;
 /// Step of a motion along an open direction, mm: smaller than what matters, far above rounding.
@@ -296,18 +292,6 @@ impl Characteristic<'_> {
 /// Whether an input is another one wherever the part lies.
 fn is_of_place(source: Source) -> bool {
     matches!(source, Source::Pixels | Source::Wall)
-}
-
-/// The derivative of a function about 0, where it has the value `here`, over a step of this size.
-fn derivative(here: f64, step: f64, f: impl Fn(f64) -> f64) -> f64 {
-    let step = step.max(LEAST_STEP);
-    let (up, down) = (f(step) - here, here - f(-step));
-    let both = match up * down < 0.0 {
-        true if libm::fabs(up) > libm::fabs(down) => 2.0 * up,
-        true => 2.0 * down,
-        false => up + down,
-    };
-    both / (2.0 * step)
 }
 
 /// A motion by so much along each of the components of the covariance: shifts in mm, and turns as

@@ -1,6 +1,7 @@
 //! A round hole.
 
 use super::distance::{Foot, Shape};
+use crate::math::associate::Distance;
 use crate::math::solve::Normal;
 use core::f64::consts::{PI, TAU};
 
@@ -28,12 +29,14 @@ impl Circle {
     }
 }
 
-impl Shape<3> for Circle {
+impl Distance<3> for Circle {
     fn distance(&self, &[cx, cy, r]: &[f64; 3], x: f64, y: f64) -> f64 {
         let (x, y) = (x - cx, y - cy);
         libm::sqrt(x * x + y * y) - r
     }
+}
 
+impl Shape<3> for Circle {
     fn length(&self, &[_, _, r]: &[f64; 3]) -> f64 {
         TAU * r
     }

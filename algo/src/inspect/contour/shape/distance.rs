@@ -1,4 +1,6 @@
-//! What a shape is: a signed distance with N parameters.
+//! What a contour's shape is: a signed distance with N parameters, and its places.
+
+use crate::math::associate::Distance;
 
 /// A place of a contour.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,15 +15,8 @@ pub struct Foot {
     pub curvature: f64,
 }
 
-/// Step of the numeric derivatives, mm and rad: distances are smooth near a contour, so that the
-/// error of the second order is below 1e-9.
-const STEP: f64 = 1e-5;
-
-/// A contour in a plane, with N parameters p in mm and rad. One solver serves all.
-pub trait Shape<const N: usize> {
-    /// The signed distance d(x, y; p) of a point in mm: positive on the material.
-    fn distance(&self, p: &[f64; N], x: f64, y: f64) -> f64;
-
+/// A contour in a plane, with N parameters p in mm and rad.
+pub trait Shape<const N: usize>: Distance<N> {
     /// Length of the contour, mm.
     fn length(&self, p: &[f64; N]) -> f64;
 
@@ -37,15 +32,5 @@ pub trait Shape<const N: usize> {
     /// The largest share of the contour that may be missing in one stretch.
     fn largest_gap(&self) -> f64 {
         1.0
-    }
-
-    /// How the distance changes with each parameter.
-    fn derivative(&self, p: &[f64; N], x: f64, y: f64) -> [f64; N] {
-        core::array::from_fn(|i| {
-            let (mut less, mut more) = (*p, *p);
-            less[i] -= STEP;
-            more[i] += STEP;
-            (self.distance(&more, x, y) - self.distance(&less, x, y)) / (2.0 * STEP)
-        })
     }
 }

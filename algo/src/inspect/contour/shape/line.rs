@@ -1,6 +1,7 @@
 //! A straight edge.
 
 use super::distance::{Foot, Shape};
+use crate::math::associate::Distance;
 
 /// A straight edge with the material on its left, seen from the side that the camera is on; p =
 /// distance to the left of where it was expected, mm, and angle to the left, rad, both at its
@@ -42,12 +43,14 @@ impl Line {
     }
 }
 
-impl Shape<2> for Line {
+impl Distance<2> for Line {
     fn distance(&self, p: &[f64; 2], x: f64, y: f64) -> f64 {
         let (direction, middle) = (self.direction(p), self.middle(p));
         direction.0 * (y - middle.1) - direction.1 * (x - middle.0)
     }
+}
 
+impl Shape<2> for Line {
     fn length(&self, _: &[f64; 2]) -> f64 {
         self.length
     }

@@ -1,6 +1,7 @@
 //! A slot with round ends.
 
 use super::distance::{Foot, Shape};
+use crate::math::associate::Distance;
 use core::f64::consts::PI;
 
 /// A slot with the material around it; p = centre x, centre y, half the distance of the centres of
@@ -85,13 +86,15 @@ fn axis(outline: &[(f64, f64)], near: (f64, f64)) -> Option<(f64, f64, f64)> {
     Some((first.0 + x, first.1 + y, angle))
 }
 
-impl Shape<5> for Slot {
+impl Distance<5> for Slot {
     fn distance(&self, p: &[f64; 5], x: f64, y: f64) -> f64 {
         let (along, across) = Self::own(p, x, y);
         let beyond = (libm::fabs(along) - p[2]).max(0.0);
         libm::sqrt(beyond * beyond + across * across) - p[3]
     }
+}
 
+impl Shape<5> for Slot {
     fn length(&self, p: &[f64; 5]) -> f64 {
         4.0 * p[2] + 2.0 * PI * p[3]
     }

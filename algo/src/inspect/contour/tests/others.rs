@@ -2,8 +2,9 @@
 
 use super::placed::sheet;
 use super::scene::{Chance, Noise, Rendered, Scene};
-use crate::inspect::contour::shape::{Line, Shape, Slot};
+use crate::inspect::contour::shape::{Line, Slot};
 use crate::inspect::contour::{State, find};
+use crate::math::associate::Distance;
 
 const PLACEMENTS: u64 = 4;
 /// Of every parameter in mm, and of angles over half a length.

@@ -1,12 +1,11 @@
-//! The shape that edge points lie on.
+//! The shape that points lie on.
 //!
 //! Gauss–Newton over Σ ρ(d/σ): d the signed distance of a point, σ² its variance by noise, ρ
 //! Tukey's biweight (J. W. Tukey; P. W. Holland & R. E. Welsch, Commun. Stat. A 6, 1977: c = 4.685),
 //! scaled by the median of |d|/σ where points scatter by more than their noise. Covariance C =
 //! (JᵀWJ)⁻¹, W weights over variances.
 
-use super::shape::Shape;
-use crate::math::solve::{Normal, solve_symmetric};
+use super::solve::{Normal, solve_symmetric};
 use alloc::vec::Vec;
 
 /// Tukey's c: 95 % efficient on normal errors.
@@ -14,23 +13,43 @@ const TUKEY: f64 = 4.685;
 /// The median of |x| of a standard normal x.
 const MEDIAN: f64 = 0.674_489_750_196_081_7;
 
-/// A point of a contour.
+/// A point that was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
     /// x, mm.
     pub x: f64,
     /// y, mm.
     pub y: f64,
-    /// Variance across the contour by noise, mm².
+    /// Variance of its distance by noise, mm².
     pub variance: f64,
     /// Tukey's weight, 0 to 1.
     pub weight: f64,
 }
 
+/// Step of the numeric derivatives, mm and rad: distances are smooth near a shape, so that the error
+/// of the second order is below 1e-9.
+const STEP: f64 = 1e-5;
+
+/// What points can lie on: a shape with N parameters p in mm and rad. One solver serves all.
+pub trait Distance<const N: usize> {
+    /// The signed distance d(x, y; p) of a point in mm: of a contour, positive on the material.
+    fn distance(&self, p: &[f64; N], x: f64, y: f64) -> f64;
+
+    /// How the distance changes with each parameter.
+    fn derivative(&self, p: &[f64; N], x: f64, y: f64) -> [f64; N] {
+        core::array::from_fn(|i| {
+            let (mut less, mut more) = (*p, *p);
+            less[i] -= STEP;
+            more[i] += STEP;
+            (self.distance(&more, x, y) - self.distance(&less, x, y)) / (2.0 * STEP)
+        })
+    }
+}
+
 /// Moves p to where the points' distances are least, and sets their weights. The covariance of p;
 /// `None` if the points do not determine it.
 pub fn associate<const N: usize>(
-    shape: &impl Shape<N>,
+    shape: &impl Distance<N>,
     p: &mut [f64; N],
     points: &mut [Point],
     ratios: &mut Vec<f64>,
@@ -73,7 +92,7 @@ pub fn associate<const N: usize>(
 
 /// JᵀWJ at p.
 fn information<const N: usize>(
-    shape: &impl Shape<N>,
+    shape: &impl Distance<N>,
     p: &[f64; N],
     points: &[Point],
 ) -> [[f64; N]; N] {
@@ -102,7 +121,7 @@ fn inverse<const N: usize>(matrix: &[[f64; N]; N]) -> Option<[[f64; N]; N]> {
 
 /// By how much p changes if every point lies farther along d by `shift` mm.
 pub fn response<const N: usize>(
-    shape: &impl Shape<N>,
+    shape: &impl Distance<N>,
     p: &[f64; N],
     covariance: &[[f64; N]; N],
     points: &[Point],

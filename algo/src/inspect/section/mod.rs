@@ -1,0 +1,39 @@
+//! Sections: gap and flush of a joint of two sheets with rounded edges.
+//!
+//! # Idea
+//! Of an edge that turns away from the camera the extreme point is never seen, and the heights next
+//! to the rim are wrong by hundreds of µm, because blur mixes phases there. Both ends of a gap are
+//! therefore extrapolated from geometry: each side is a line through its flat stretch and a circle
+//! tangent to it through what is seen of its edge.
+//!
+//! # Definitions
+//! Flush is the distance of the right tangent point from the left line, gap the distance of the
+//! circles' extreme points along the mean direction of both lines.
+//!
+//! # Stages
+//! `find` sorts points in one pass, `line` fits a stretch, `bins` averages what lies beyond it,
+//! `edge` fits the circle by `profile` with what pixels average of it, `geometry` has gap, flush and
+//! radius, and `inputs` their uncertainty. `reason` says why a section is not measured.
+//!
+//! # Units
+//! mm along the section (s) and of height (z), mm², rad.
+
+mod bins;
+mod edge;
+mod find;
+mod geometry;
+mod inputs;
+mod line;
+mod profile;
+mod reason;
+mod request;
+
+pub use edge::Edge;
+pub use find::Section;
+pub use geometry::{Geometry, Round, flush, gap, radius};
+pub use inputs::{Input, Knowledge, Source, Value};
+pub use reason::{Side, Unseen, Why};
+pub use request::{Optics, Point, Request};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,4 @@
+//! Sections of synthetic joints: errors, noise, and what is found.
+
+mod joint;
+mod measured;
