@@ -19,7 +19,7 @@ mod weight;
 
 pub use align::{Facet, GoldenSurface, Motion, Placed};
 pub use contour::State;
-pub use feature::{Feature, FeatureKind, Geometry, TooFine};
+pub use feature::{Cut, Feature, FeatureKind, Geometry, TooFine};
 pub use gauge::{
     Basis, Declared, Domain, Evidence, Facts, Kind, MAX_PLACES, Measure, Parameter, Reading,
     Square, Unit, Value, kinds, makes_datum,

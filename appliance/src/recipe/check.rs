@@ -303,8 +303,13 @@ fn features(
 ) -> Result<Vec<Feature>, String> {
     let feature = |feature: &FeatureFile| {
         let corners: Vec<_> = feature.region.iter().map(|&[u, v]| (u, v)).collect();
-        let region = Region::polygon(&corners, width, height)
-            .map_err(|error| format!("feature {:?}: {error}", feature.name))?;
+        let cut = feature.cut();
+        // That of a section is as wide as the part's distance makes it, which is planned.
+        let region = match cut {
+            Some(_) => Region::default(),
+            None => Region::polygon(&corners, width, height)
+                .map_err(|error| format!("feature {:?}: {error}", feature.name))?,
+        };
         let plane = feature.plane.as_ref();
         let plane = plane.and_then(|name| features.iter().position(|of| of.name == *name));
         Ok(Feature {
@@ -313,6 +318,7 @@ fn features(
             plane,
             rim: feature.rim_mm.unwrap_or(0.0),
             thickness: feature.thickness_mm,
+            cut,
         })
     };
     features.iter().map(feature).collect()

@@ -80,10 +80,19 @@ impl Gauging {
             let keys = [
                 ("name", Some(json!(feature.name))),
                 ("kind", Some(json!(feature.kind))),
-                ("region", Some(json!(feature.region))),
+                (
+                    "region",
+                    Some(json!(feature.region)).filter(|_| !feature.region.is_empty()),
+                ),
                 ("plane", feature.plane.as_ref().map(|name| json!(name))),
                 ("rim_mm", feature.rim_mm.map(|mm| json!(mm))),
                 ("thickness_mm", feature.thickness_mm.map(|mm| json!(mm))),
+                ("from", feature.from.map(|place| json!(place))),
+                ("to", feature.to.map(|place| json!(place))),
+                ("width_mm", feature.width_mm.map(|mm| json!(mm))),
+                ("left", feature.left.map(|at| json!(at))),
+                ("right", feature.right.map(|at| json!(at))),
+                ("edge_mm", feature.edge_mm.map(|mm| json!(mm))),
             ];
             let keys = keys.into_iter();
             write(

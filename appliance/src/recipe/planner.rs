@@ -53,10 +53,11 @@ pub fn allowed_sigma(gauges: &[GaugeFile], widest: usize) -> f64 {
 /// `widest` is as for [`allowed_sigma`].
 pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile], widest: usize) -> Choice {
     let allowed = allowed_sigma(gauges, widest);
-    // Only the full sequence resolves material where golden has none.
-    let looks_for_more = gauges
-        .iter()
-        .any(|gauge| gauge.measures.facts().basis == Basis::Pixels && gauge.high.is_some());
+    // Only the full sequence resolves material where golden has none, as beside a gap.
+    let looks_for_more = gauges.iter().any(|gauge| {
+        let basis = gauge.measures.facts().basis;
+        basis == Basis::Section || basis == Basis::Pixels && gauge.high.is_some()
+    });
     let good = |sequence: &SequenceFile| {
         let full = sequence.kind == SequenceKind::Full;
         let safe = full || (!looks_for_more && sequence.safe_share >= SAFE_SHARE);
@@ -69,7 +70,7 @@ pub fn choose(sequences: &[SequenceFile], gauges: &[GaugeFile], widest: usize) -
     let reason = |(at, sequence): (usize, &SequenceFile)| {
         let word = match at.cmp(&taken) {
             std::cmp::Ordering::Less if sequence.sigma_mm > allowed => "too noisy",
-            std::cmp::Ordering::Less if looks_for_more => "blind where an opening must stay open",
+            std::cmp::Ordering::Less if looks_for_more => "blind where golden has nothing",
             std::cmp::Ordering::Less => "not safe enough",
             std::cmp::Ordering::Equal => "taken",
             std::cmp::Ordering::Greater => "better, not needed",

@@ -145,7 +145,7 @@ impl Geometry {
         let normal = Vector::new(0.0, 0.0, 1.0);
         let direction = Vector::new(libm::cos(turn), libm::sin(turn), 0.0);
         Some(match kind {
-            FeatureKind::Surface => return None,
+            FeatureKind::Surface | FeatureKind::Section => return None,
             FeatureKind::Plane => Self::Plane { point, normal },
             FeatureKind::Line => Self::Line {
                 middle: point,

@@ -20,16 +20,19 @@ pub enum FeatureKind {
     Circle,
     /// A slot with round ends in a face.
     Slot,
+    /// A cut across a joint of two sheets.
+    Section,
 }
 
 impl FeatureKind {
     /// All kinds.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Surface,
         Self::Plane,
         Self::Line,
         Self::Circle,
         Self::Slot,
+        Self::Section,
     ];
 
     /// Whether it is the contour of a face: where the face ends, in its plane.
@@ -45,6 +48,7 @@ impl FeatureKind {
             Self::Line => "line",
             Self::Circle => "circle",
             Self::Slot => "slot",
+            Self::Section => "section",
         }
     }
 }
@@ -64,6 +68,25 @@ pub struct Feature {
     /// Of a plane, the thickness of its sheet in mm, for the walls of its contours; `None` where it
     /// is not known, 0 where no wall is seen.
     pub thickness: Option<f64>,
+    /// Of a section, where it is.
+    pub cut: Option<Cut>,
+}
+
+/// Where a section is: along a way across a joint, over a width.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cut {
+    /// The pixel of golden's frame in which it begins.
+    pub from: [f64; 2],
+    /// The one in which it ends.
+    pub to: [f64; 2],
+    /// Its width across that way, mm.
+    pub width_mm: f64,
+    /// From where to where the left side is flat, mm from its beginning.
+    pub left: [f64; 2],
+    /// The same of the right side.
+    pub right: [f64; 2],
+    /// The radius of both edges where it is stated, mm.
+    pub edge_mm: Option<f64>,
 }
 
 impl Feature {
@@ -75,6 +98,7 @@ impl Feature {
             plane: None,
             rim: 0.0,
             thickness: None,
+            cut: None,
         }
     }
 }

@@ -20,7 +20,7 @@ pub use cells::{Cell, Sum, cells};
 pub use face::keep_face;
 pub use geometry::Geometry;
 pub use grid::{Grid, TooFine};
-pub use kind::{Feature, FeatureKind};
+pub use kind::{Cut, Feature, FeatureKind};
 pub use level::{Plane, mean, weight};
 pub use plane::{FittedPlane, Middle};
 pub use rim::{MAX_PARAMETERS, Parameters, PlaneFrame, Rim};

@@ -4,12 +4,15 @@ use super::component::Component;
 use super::extreme::motion;
 use crate::inspect::align::Placed;
 use crate::inspect::feature::FeatureKind;
+use crate::inspect::section;
 
 pub(super) use super::extreme::range_of;
 pub(super) use super::parameter::{Domain, Parameter, Value, words};
 pub(super) use super::reading::{Found, OfRim};
 pub(super) use super::unit::Unit;
-pub(super) use crate::inspect::feature::FeatureKind::{Circle, Line, Plane, Slot, Surface};
+pub(super) use crate::inspect::feature::FeatureKind::{
+    Circle, Line, Plane, Section, Slot, Surface,
+};
 pub(super) use crate::inspect::feature::{Cell, Geometry, Rim};
 pub(super) use alloc::vec::Vec;
 
@@ -34,6 +37,8 @@ pub enum Basis {
     Geometry,
     /// The points of a contour ([`Kind::of_rim`]).
     Rim,
+    /// A joint that a section crosses ([`Kind::of_section`]).
+    Section,
 }
 
 impl Basis {
@@ -41,7 +46,7 @@ impl Basis {
     pub fn side(self) -> Option<usize> {
         match self {
             Self::Squares(side) | Self::Cells(side) => Some(side),
-            Self::Region | Self::Pixels | Self::Motion(_) | Self::Geometry | Self::Rim => None,
+            _ => None,
         }
     }
 
@@ -58,7 +63,7 @@ impl Basis {
         match self {
             Self::Cells(side) => Some(side.max(1)),
             Self::Region => Some(0),
-            Self::Squares(_) | Self::Pixels | Self::Motion(_) | Self::Geometry | Self::Rim => None,
+            _ => None,
         }
     }
 }
@@ -80,6 +85,8 @@ pub(super) const LINE: Takes = &[&[Line]];
 pub(super) const OPENING: Takes = &[&[Circle, Slot]];
 /// A contour of any shape.
 pub(super) const CONTOUR: Takes = &[&[Circle, Slot, Line]];
+/// A section.
+pub(super) const SECTION: Takes = &[&[Section]];
 /// Two features with a geometry, of which some pairs fit ([`Kind::value`]).
 pub(super) const FEATURES: Takes = &[&[Plane, Circle, Slot, Line], &[Plane, Circle, Slot, Line]];
 
@@ -151,6 +158,11 @@ pub trait Kind: Declared {
 
     /// The value of a gauge of the points of a contour; `None` for other gauges.
     fn of_rim(&self, _: &Rim) -> Option<OfRim> {
+        None
+    }
+
+    /// The value of a gauge of a section; `None` for other gauges.
+    fn of_section(&self, _: &section::Geometry) -> Option<f64> {
         None
     }
 

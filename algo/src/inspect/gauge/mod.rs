@@ -13,7 +13,9 @@ mod diameter;
 mod distance;
 mod extreme;
 mod flatness;
+mod flush;
 mod found;
+mod gap;
 mod kind;
 mod length;
 mod mean_height;
@@ -23,6 +25,7 @@ mod peak_to_valley;
 mod placement;
 mod position;
 mod propagate;
+mod radius;
 mod reading;
 mod rms_deviation;
 mod roundness;
@@ -56,6 +59,7 @@ macro_rules! kinds {
         /// Every kind of gauge, each in its own file.
         pub mod kinds {
             pub use crate::inspect::gauge::component::Component;
+            pub use crate::inspect::gauge::radius::Side;
             pub use crate::inspect::gauge::tilt::Axis;
             $(pub use crate::inspect::gauge::$file::$kind;)*
         }
@@ -130,6 +134,9 @@ kinds! {
     roundness: Roundness {},
     straightness: Straightness {},
     found: Found {},
+    gap: Gap {},
+    flush: Flush {},
+    radius: Radius { side: kinds::Side::Left },
 }
 
 impl Measure {

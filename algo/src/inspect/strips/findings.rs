@@ -5,7 +5,7 @@ use super::counts::TRUSTS;
 use super::coverage;
 use super::decode::Input;
 use super::fits::Fit;
-use super::gauges::MAX_GAUGES;
+use super::gauges::{Gauge, MAX_GAUGES};
 use super::plan::Production;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
@@ -103,6 +103,7 @@ impl Production {
         let windows = libm::sqrt(self.budget.square_variance(1));
         self.fit(strips, noisier);
         self.find_contours(strips, light);
+        self.find_sections(strips);
         let features = self.features(strips);
         let readings: heapless::Vec<Option<Reading>, MAX_GAUGES> = (0..self.gauges.list.len())
             .map(|gauge| self.reading(gauge, input, noisier, strips))
@@ -148,6 +149,7 @@ impl Production {
             cells,
             fits,
             contours,
+            sections,
             ..
         } = strips;
         match self.gauges.list[gauge].measure.facts().basis {
@@ -209,6 +211,11 @@ impl Production {
             Basis::Cells(_) | Basis::Region => self.of_cells(gauge, noisier, pose, strips, cells),
             Basis::Geometry => self.of_geometry(gauge, noisier, pose, (fits, contours)),
             Basis::Rim => self.of_rim(gauge, contours),
+            Basis::Section => {
+                let Gauge { of, measure, .. } = &self.gauges.list[gauge];
+                let found = sections.iter().find(|section| section.is_of(of))?;
+                found.reading(measure.kind(), self.budget.golden_variance(noisier))
+            }
         }
     }
 

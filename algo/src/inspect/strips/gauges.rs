@@ -88,6 +88,12 @@ pub enum Unmeasurable {
         /// Which gauge.
         gauge: usize,
     },
+    /// A section that golden does not see.
+    #[error("golden does not see feature {}, a section", feature + 1)]
+    NoSection {
+        /// Which feature.
+        feature: usize,
+    },
     /// A contour that golden does not have.
     #[error("golden has no contour in the region of feature {}", feature + 1)]
     NoContour {
@@ -170,6 +176,8 @@ pub struct Gauges {
     pub planes: Vec<usize>,
     /// The contours, each with the place of its plane among the planes.
     pub contours: Vec<(usize, usize)>,
+    /// The sections.
+    pub sections: Vec<usize>,
     /// The gauges of pixels.
     pub coverages: Vec<usize>,
     /// The squares of all gauges of deviation, gauge by gauge.
@@ -306,7 +314,9 @@ impl Gauges {
                 contours.extend(plane.map(|plane| (at, plane)));
             }
         }
+        let is_section = |at: &usize| features[*at].kind == FeatureKind::Section && used(*at);
         Ok(Self {
+            sections: (0..features.len()).filter(is_section).collect(),
             list,
             regions,
             patches,

@@ -32,10 +32,9 @@ impl Production {
                 geometry,
             }
         });
-        let contours = strips.contours.iter();
-        planes
-            .chain(contours.filter_map(|contour| contour.of.clone()))
-            .collect()
+        let contours = strips.contours.iter().filter_map(|of| of.of.clone());
+        let sections = strips.sections.iter().filter_map(|of| of.of.clone());
+        planes.chain(contours).chain(sections).collect()
     }
 
     /// Finds the contours of features in their planes, one per task.
@@ -54,6 +53,16 @@ impl Production {
         for_each(work, |_, (found, expected)| {
             let plane = &fits[expected.plane];
             found.find((contours, expected), &self.golden, plane, placed, light);
+        });
+    }
+
+    /// Finds the joints of sections in the points of all strips, one per task.
+    pub(super) fn find_sections(&self, strips: &mut Strips) {
+        let (found, strips) = (&mut strips.sections, &strips.strips);
+        let work: Vec<_> = found.iter_mut().zip(&self.sections.all).collect();
+        for_each(work, |at, (found, expected)| {
+            let points = strips.iter().map(|strip| &strip.sections.all[at][..]);
+            found.find(expected, points, &self.budget);
         });
     }
 

@@ -6,6 +6,7 @@ use super::findings::Findings;
 use super::maps::Maps;
 use super::plan::Production;
 use super::pose::PoseField;
+use super::sections::{SectionFit, SectionSight};
 use super::strip::{CellBuffers, Strip, Strips};
 use crate::frame::FrameView;
 use crate::inspect::align::{FitBuffers, Motion, Placed};
@@ -33,6 +34,8 @@ impl Production {
                 Some(contours) => vec![ContourFit::default(); contours.all.len()],
                 None => Vec::new(),
             },
+            sights: vec![SectionSight::default(); self.sections.all.len()],
+            sections: vec![SectionFit::default(); self.sections.all.len()],
         }
     }
 
@@ -108,16 +111,30 @@ impl Production {
         self.phase.check(input, self.golden.size())?;
         let regions = &self.gauges.regions;
         strips.pose.set(&self.golden, regions, placed);
-        let pose = &strips.pose;
+        let Strips {
+            strips: all,
+            rows,
+            pose,
+            sights,
+            ..
+        } = &mut *strips;
+        let pose = &*pose;
+        let work: Vec<_> = sights.iter_mut().zip(&self.sections.all).collect();
+        for_each(work, |_, (sight, expected)| {
+            let region = pose.region(regions, expected.feature);
+            let motion = pose.placed.as_ref().map(|placed| &placed.motion);
+            sight.set(expected, &self.golden, region, motion);
+        });
+        let part = (pose, &sights[..]);
         if maps.is_empty() {
-            for_each_item(&mut strips.strips, |strip| {
-                strip.inspect(self, pose, input, Maps::default());
+            for_each_item(all, |strip| {
+                strip.inspect(self, part, input, Maps::default());
             });
         } else {
-            let maps = maps.split((strips.rows * self.golden.size().0).max(1));
-            let work = strips.strips.iter_mut().zip(maps).collect();
+            let maps = maps.split((*rows * self.golden.size().0).max(1));
+            let work = all.iter_mut().zip(maps).collect();
             for_each(work, |_, (strip, maps)| {
-                strip.inspect(self, pose, input, maps);
+                strip.inspect(self, part, input, maps);
             });
         }
         Ok(self.findings((input, light), strips))

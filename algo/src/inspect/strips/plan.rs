@@ -8,6 +8,7 @@ use super::fits::Fit;
 use super::gauges::{Gauge, Gauges, Unmeasurable};
 use super::golden::Golden;
 use super::pose::PoseField;
+use super::sections::Sections;
 use super::uncertainty::{CalibrationError, ErrorBudget};
 use crate::frame::SampleNoise;
 use crate::geometry::{Triangulator, Vector};
@@ -81,6 +82,7 @@ pub struct Production {
     pub(super) planes: Vec<Fit>,
     /// `None` if no gauge is of one.
     pub(super) contours: Option<Contours>,
+    pub(super) sections: Sections,
     pub(super) budget: ErrorBudget,
 }
 
@@ -152,7 +154,10 @@ impl Production {
                 Some(Contours::new(wanted, (&features, &planes), &golden, known)?)
             }
         };
+        let sections = Sections::new(gauges.sections.iter().copied(), &features, &golden);
+        let sections = sections.map_err(|feature| Unmeasurable::NoSection { feature })?;
         Ok(Self {
+            sections,
             planes,
             contours,
             budget: ErrorBudget {

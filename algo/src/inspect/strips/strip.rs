@@ -11,6 +11,7 @@ use super::maps::Maps;
 use super::plan::Production;
 use super::pose::PoseField;
 use super::recent::RecentRows;
+use super::sections::{SectionFit, SectionPoints, SectionSight};
 use super::spans::common;
 use super::squares::Squares;
 use super::squares::extreme::Extreme;
@@ -36,6 +37,9 @@ pub struct Strips {
     pub(super) fits: Vec<Fit>,
     /// One per contour that a gauge needs.
     pub(super) contours: Vec<ContourFit>,
+    /// One per section that a gauge needs: what pixels see of it, and what was found.
+    pub(super) sights: Vec<SectionSight>,
+    pub(super) sections: Vec<SectionFit>,
 }
 
 /// Buffers for the cells of one gauge after the other.
@@ -57,6 +61,7 @@ pub struct Strip {
     recent: RecentRows,
     pub counts: Counts,
     pub squares: Squares,
+    pub sections: SectionPoints,
     /// Points that the part's motion is found from.
     pub samples: Vec<Sample>,
 }
@@ -72,6 +77,7 @@ impl Strip {
             recent: RecentRows::new(width, gauges.largest_side()),
             counts: Counts::new(gauges),
             squares: Squares::new(gauges, width, &rows),
+            sections: SectionPoints::new(gauges),
             samples: Vec::new(),
             rows,
         }
@@ -82,13 +88,14 @@ impl Strip {
     pub fn inspect(
         &mut self,
         plan: &Production,
-        pose: &PoseField,
+        (pose, sights): (&PoseField, &[SectionSight]),
         input: Input<'_>,
         mut maps: Maps<'_>,
     ) {
         self.recent.overflow = None;
         self.counts.clear();
         self.squares.clear();
+        self.sections.clear();
         let (golden, gauges) = (&plan.golden, &plan.gauges);
         let with = plan.comparison(pose);
         let width = golden.size().0;
@@ -104,6 +111,7 @@ impl Strip {
                     let measured = (&self.decoded, &self.heights);
                     let aligned = (&self.coordinates, self.recent.extent(v));
                     self.counts.add(with, gauges, v, measured, aligned);
+                    self.sections.add(plan, (pose, sights), v, measured);
                     if let Some(heights) = &mut maps.heights {
                         let row = (v - self.rows.start) * width;
                         self.heights

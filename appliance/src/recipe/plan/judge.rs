@@ -78,6 +78,7 @@ impl Demands {
                 false,
                 format!("{feature}: the face next to its rim lies {above:+.2} mm off the plane"),
             ),
+            (_, Some(Lost::Section(unseen))) => (false, format!("{feature}: {unseen}")),
             (_, Some(Lost::Rim)) => (
                 false,
                 format!("{feature}: {percent:.0} % of its rim is seen"),

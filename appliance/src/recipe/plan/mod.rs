@@ -122,7 +122,7 @@ impl Plan {
             demands,
             function,
             sequences,
-            features,
+            mut features,
             gauges,
             mut arrays,
             ..
@@ -142,6 +142,7 @@ impl Plan {
         let [low, high] = conditions.range_mm;
         let triangulator = calibration.triangulator(function, Some(HeightRange { low, high }));
         let triangulator = triangulator.map_err(|error| error.to_string())?;
+        window::of_sections(&mut features, size, &triangulator)?;
         let (window, away) =
             window::of((&features, &gauges), size, &triangulator, &demands, &arrays);
         // The golden surface is by the sequence that is projected first, so that deviations by that

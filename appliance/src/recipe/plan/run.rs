@@ -278,8 +278,16 @@ impl Prepared {
 
 /// Why gauges cannot be measured, with the name of a feature that is why.
 fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> String {
-    let Unmeasurable::NoContour { feature } = error else {
-        return error.to_string();
+    let feature = match error {
+        Unmeasurable::NoContour { feature } => feature,
+        Unmeasurable::NoSection { feature } => {
+            let name = shared.names.get(feature).map_or("", |name| name);
+            let name = clipped(name);
+            return format!(
+                "feature {name:?}: golden sees nothing where it begins or ends: move it"
+            );
+        }
+        _ => return error.to_string(),
     };
     let kind = shared
         .features

@@ -3,9 +3,14 @@
 use crate::recipe::Demands;
 use crate::recipe::archive::Arrays;
 use algo::geometry::Triangulator;
-use algo::inspect::{Feature, Gauge};
+use algo::inspect::{Cut, Feature, Gauge, Region};
 use algo::units::Height;
 use std::ops::Range;
+
+/// The region of a section is so many times as wide as the section, and some pixels wider: pixels
+/// are not of the same size everywhere.
+const WIDER: f64 = 1.2;
+const BESIDE_PX: f64 = 2.0;
 
 /// The columns of each row of a frame of (width, height) that some gauge needs: its region, half of
 /// its smoothing square and around it as many pixels as the part may be displaced by, which are the
@@ -45,6 +50,41 @@ pub(super) fn of(
         }
     }
     (window, away)
+}
+
+/// Gives sections the region that sees them: about their way, somewhat wider than they are.
+///
+/// # Errors
+/// In words: one lies outside of the frame.
+pub(super) fn of_sections(
+    features: &mut [Feature],
+    (width, height): (usize, usize),
+    triangulator: &Triangulator,
+) -> Result<(), String> {
+    let pitch = pitch(triangulator).ok_or("the camera sees no plane in its middle")?;
+    for feature in features {
+        let Some(Cut {
+            from: [u0, v0],
+            to: [u1, v1],
+            width_mm,
+            ..
+        }) = feature.cut
+        else {
+            continue;
+        };
+        let (along, down) = (u1 - u0, v1 - v0);
+        let length = along.hypot(down);
+        let half = WIDER * width_mm / 2.0 / pitch + BESIDE_PX;
+        let (along, down) = (along / length * half, down / length * half);
+        let corners = [
+            (u0 - down, v0 + along),
+            (u1 - down, v1 + along),
+            (u1 + down, v1 - along),
+            (u0 + down, v0 - along),
+        ];
+        feature.region = Region::polygon(&corners, width, height).map_err(|e| e.to_string())?;
+    }
+    Ok(())
 }
 
 fn widen(columns: &mut Range<usize>, by: Range<usize>) {

@@ -1,10 +1,10 @@
 //! How the camera sees the plane of a face, and what light it has there.
 
 use super::light::{GoldenSignal, Levels, Signal};
-use super::near::Near;
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::contour::{Complex, Spot, View};
 use crate::inspect::feature::PlaneFrame;
+use crate::inspect::strips::near::Near;
 
 /// The plane of a face as it lies now.
 #[derive(Clone, Debug)]
@@ -18,7 +18,7 @@ pub struct Face<'a> {
     pub golden: &'a GoldenSignal,
     pub light: Signal<'a>,
     /// What is known of lines of sight near the contour; they are worked out elsewhere.
-    pub near: Near,
+    pub near: Near<3>,
 }
 
 impl Face<'_> {
@@ -38,16 +38,12 @@ impl Face<'_> {
         }
     }
 
-    /// What the line of sight through (u, v) meets.
-    fn exact(&self, u: f64, v: f64) -> Option<Spot> {
+    /// What the line of sight through (u, v) meets: x, y and phase.
+    fn exact(&self, u: f64, v: f64) -> Option<[f64; 3]> {
         let point = self.point(u, v, 0.0)?;
         let phase = self.triangulator.phase_at(point)?;
         let from = self.frame.coordinates(point);
-        phase.is_finite().then_some(Spot {
-            x: from.x,
-            y: from.y,
-            phase,
-        })
+        phase.is_finite().then_some([from.x, from.y, phase])
     }
 
     /// The point of a line of sight that lies `below` mm below the plane.
@@ -81,7 +77,9 @@ impl View for Face<'_> {
 
     #[inline]
     fn spot(&self, u: f64, v: f64) -> Option<Spot> {
-        self.near.at(u, v).or_else(|| self.exact(u, v))
+        let near = self.near.at(u, v);
+        near.or_else(|| self.exact(u, v))
+            .map(|[x, y, phase]| Spot { x, y, phase })
     }
 
     fn pixel(&self, x: f64, y: f64) -> Option<(f64, f64)> {

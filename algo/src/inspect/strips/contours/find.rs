@@ -2,7 +2,6 @@
 
 use super::face::Face;
 use super::light::Signal;
-use super::near::Near;
 use super::shape::Associated;
 use super::taught::{Contours, Expected, REACH_MM};
 use crate::geometry::Vector;
@@ -10,8 +9,10 @@ use crate::inspect::align::{Motion, Placed};
 use crate::inspect::contour::{Knowledge, State};
 use crate::inspect::feature::{Geometry, PlaneFrame, Rim};
 use crate::inspect::gauge::Sensitive;
+use crate::inspect::section::Unseen;
 use crate::inspect::strips::fits::Fit;
 use crate::inspect::strips::golden::Golden;
+use crate::inspect::strips::near::Near;
 
 /// The face does not reach the rim if the phase next to it is off the plane's by more than this
 /// many σ and this many mm.
@@ -21,7 +22,7 @@ const FACE_MM: f64 = 0.05;
 /// Pixels about a contour that are looked at beside those where it may lie.
 const AROUND_PX: f64 = 9.0;
 
-/// Why a contour is not found.
+/// Why a contour or section is not found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lost {
     /// Too little of its rim is seen.
@@ -30,6 +31,8 @@ pub enum Lost {
     NoPlane,
     /// The face next to its rim lies so far above the plane, mm.
     Face(f64),
+    /// The joint of a section was not found.
+    Section(Unseen),
 }
 
 /// A feature of a part with a geometry.

@@ -3,14 +3,13 @@
 //! What [`contour`](crate::inspect::contour) needs of a part is filled in here: where a contour is
 //! expected is known from golden (`taught`, which begins with the outline of the opening in golden's
 //! heights, `outline`), how the camera sees its plane follows from the models and from how the part
-//! lies (`face`, `near`), and the demodulated light comes from the frames (`light`). `find` joins them.
+//! lies (`face`), and the demodulated light comes from the frames (`light`). `find` joins them.
 //!
 //! Each contour is found by one thread, so the bits do not depend on the number of threads.
 
 mod face;
 mod find;
 mod light;
-mod near;
 mod outline;
 mod shape;
 mod taught;

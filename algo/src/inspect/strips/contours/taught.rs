@@ -2,7 +2,6 @@
 
 use super::face::Face;
 use super::light::{GoldenSignal, Levels, Signal};
-use super::near::Near;
 use super::outline::{Start, start};
 use super::shape::Outline;
 use crate::geometry::Vector;
@@ -11,6 +10,7 @@ use crate::inspect::feature::{Feature, FeatureKind, PlaneFrame};
 use crate::inspect::strips::fits::Fit;
 use crate::inspect::strips::gauges::Unmeasurable;
 use crate::inspect::strips::golden::Golden;
+use crate::inspect::strips::near::Near;
 use alloc::vec::Vec;
 
 /// How far from its expected place a contour is looked for, mm.

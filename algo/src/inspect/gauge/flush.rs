@@ -1,0 +1,22 @@
+//! The flush of a joint.
+
+use super::kind::*;
+use crate::inspect::section;
+
+kind! {
+    /// How far the right edge's tangent point lies above the left side's line, mm.
+    Flush {}
+}
+
+impl Kind for Flush {
+    fn facts(&self) -> Facts {
+        Facts {
+            takes: SECTION,
+            ..Facts::new(Unit::Length, Basis::Section, "")
+        }
+    }
+
+    fn of_section(&self, of: &section::Geometry) -> Option<f64> {
+        Some(section::flush(of))
+    }
+}

@@ -1,0 +1,23 @@
+//! The gap of a joint.
+
+use super::kind::*;
+use crate::inspect::section;
+
+kind! {
+    /// The distance of the extreme points of both edges along the mean direction of both sides, mm;
+    /// less than 0 where the sides overlap.
+    Gap {}
+}
+
+impl Kind for Gap {
+    fn facts(&self) -> Facts {
+        Facts {
+            takes: SECTION,
+            ..Facts::new(Unit::Length, Basis::Section, "")
+        }
+    }
+
+    fn of_section(&self, of: &section::Geometry) -> Option<f64> {
+        Some(section::gap(of))
+    }
+}

@@ -1,0 +1,42 @@
+//! The radius of an edge of a joint.
+
+use super::kind::*;
+use crate::inspect::section;
+
+words! {
+    /// A side of a joint.
+    Side {
+        /// The one at the section's beginning.
+        Left: "left",
+        /// The one at its end.
+        Right: "right",
+    }
+}
+
+kind! {
+    /// The radius of the edge of one side, mm.
+    Radius {
+        /// Which side.
+        side: Side = Side::WORDS,
+    }
+}
+
+impl Kind for Radius {
+    fn facts(&self) -> Facts {
+        Facts {
+            takes: SECTION,
+            never_negative: true,
+            ..Facts::new(Unit::Length, Basis::Section, "{side}")
+        }
+    }
+
+    fn of_section(&self, of: &section::Geometry) -> Option<f64> {
+        Some(section::radius(
+            of,
+            match self.side {
+                Side::Left => section::Side::Left,
+                Side::Right => section::Side::Right,
+            },
+        ))
+    }
+}
