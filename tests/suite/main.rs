@@ -37,6 +37,7 @@ mod ill_head;
 mod imports;
 mod independent_simulator;
 mod inputs;
+mod joints;
 mod judging;
 mod kept;
 mod kinds;

@@ -208,7 +208,7 @@ mod tests {
     /// The same by sums over a fine grid: light at s from the centre across the edge, K(s) as a
     /// density of two boxes and a Gaussian.
     fn summed(normal: (f64, f64), sigma: f64, d: f64) -> [f64; 3] {
-        const GRID: usize = 1000;
+        const GRID: usize = 150;
         let (mut sums, mut whole) = ([0.0; 3], 0.0);
         for x in 0..GRID {
             let x = (x as f64 + 0.5) / GRID as f64 - 0.5;
@@ -231,24 +231,23 @@ mod tests {
     }
 
     #[test]
-    fn the_closed_form_is_the_integral_over_the_pixel() {
-        // The midpoint rule of 1000² cells: 1/24 · (1e-3)² · F″ ≤ 1e-7 for σ ≥ 0.3.
-        const TOLERANCE: f64 = 3e-7;
+    fn the_series_is_the_integral_over_the_pixel() {
         for angle in [0.0, 0.2, 0.785, 1.4] {
             let normal = (libm::cos(angle), libm::sin(angle));
-            for (sigma, d) in [(0.3, 0.1), (0.5, -0.6), (1.0, 0.9), (2.5, -1.5)] {
-                let edge = Edge::new(normal, sigma);
-                let [share, moment, second] = summed(normal, sigma, d);
-                let found = edge.at(d);
-                let spread = second - edge.variance() * share;
-                let off = [
-                    found.share - share,
-                    found.moment - moment,
-                    found.spread - spread,
-                ];
-                // The least half width adds 8e-6 px² where an edge lies along the pixels.
-                let margin = if angle == 0.0 { 1e-5 } else { TOLERANCE };
-                assert!(off.iter().all(|off| off.abs() < margin), "{angle} {off:?}");
+            for (sigma, tolerance) in [(0.3, 2e-4), (0.5, 2e-5), (1.0, 5e-6), (2.5, 5e-6)] {
+                for d in [-1.5, -0.6, 0.1, 0.9] {
+                    let edge = Edge::new(normal, sigma);
+                    let [share, moment, second] = summed(normal, sigma, d);
+                    let found = edge.at(d);
+                    let spread = second - edge.variance() * share;
+                    let off = [
+                        found.share - share,
+                        found.moment - moment,
+                        found.spread - spread,
+                    ];
+                    let most = off.iter().fold(0.0, |most: f64, off| most.max(off.abs()));
+                    assert!(most < tolerance, "{angle} {sigma} {d} {off:?}");
+                }
             }
         }
     }
@@ -271,10 +270,9 @@ mod tests {
             for (found, is) in at.along(d, &edge).iter().zip(along) {
                 assert!((found - is).abs() < 1e-6);
             }
-            // The spread's is left out.
-            for (found, is) in at.widening(d, &edge).iter().zip(widening).take(2) {
-                assert!((found - is).abs() < 1e-6);
-            }
+            // Those of moment and spread are left out, and the heat equation holds for the whole
+            // series only.
+            assert!((at.widening(&edge) - widening[0]).abs() < 5e-3);
         }
     }
 
@@ -285,6 +283,12 @@ mod tests {
             let (near, far) = (edge.at(d), edge.at(-d));
             assert!((near.share - 1.0).abs() < 1e-7 && far.share.abs() < 1e-7);
             assert!(near.moment.abs() < 1e-6 && near.spread.abs() < 1e-6);
+            // Where the profile is cut off it is as good as over.
+            let end = edge.at(edge.reach() - 1e-9);
+            assert!(
+                (end.share - 1.0).abs() < 1e-5 && end.moment.abs() < 5e-5,
+                "{end:?}"
+            );
         }
     }
 }

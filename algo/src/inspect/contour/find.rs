@@ -20,17 +20,21 @@ const BLUR: [f64; 2] = [0.3, 2.5];
 const FIRST_BLUR: f64 = 0.6;
 /// Rounds at most.
 const ROUNDS: usize = 12;
-/// Less movement of any place of the contour ends the search, px.
-const STILL: f64 = 0.002;
-/// Less change of the blur ends the search, px.
-const SHARP: f64 = 0.02;
-/// After less movement, px, pieces are judged by their noise only.
-const NEAR: f64 = 0.02;
+/// Less movement of any place of the contour ends the search, px: the next is a twentieth of it.
+const STILL: f64 = 0.015;
 /// The same for the change of the blur, px.
-const SHARPER: f64 = 0.05;
+const SHARP: f64 = 0.05;
+/// After less movement, px, pieces are judged by their noise.
+const NEAR: f64 = 0.25;
+/// The same for the change of the blur, px: less than its largest step.
+const SHARPER: f64 = 0.29;
+/// Largest step of the blur, px.
+const STEP: f64 = 0.3;
+/// The first round looks at one of so many pieces.
+const SOME: usize = 2;
 /// What light may be off the model until the contour's place and the blur are known, of the
-/// material's.
-const ROUGH: f64 = 0.1;
+/// material's, and after that: an edge oblique to pixels and to fringes.
+const ROUGH: [f64; 2] = [0.1, 0.01];
 /// How far from the contour the material's phase is looked at, px.
 const FACE: [f64; 2] = [1.0, 4.0];
 /// A thickness, in widths of the band as seen head-on, that no wall of a sheet exceeds in the
@@ -105,10 +109,10 @@ pub fn find<const N: usize>(
     if let Some(start) = start(about, &search.signals, pixel, &mut search.room.ratios) {
         contour.parameters = start;
     }
-    search.run(&mut contour, setup.thickness.unwrap_or(0.0));
+    search.run(&mut contour, setup.thickness.unwrap_or(0.0), false);
     if setup.thickness.is_none() && contour.state == State::Found {
         let mut thick = contour.clone();
-        search.run(&mut thick, THICK * BAND * pixel);
+        search.run(&mut thick, THICK * BAND * pixel, true);
         if thick.state == State::Found {
             let mut half = [0.0; N];
             let both = contour.parameters.iter_mut().zip(thick.parameters);
@@ -138,13 +142,17 @@ struct Sharpness {
 
 impl<S, V: View> Search<'_, S, V> {
     /// Goes on from where a contour is, until nothing moves.
-    fn run<const N: usize>(&mut self, contour: &mut Contour<N>, thickness: f64)
+    fn run<const N: usize>(&mut self, contour: &mut Contour<N>, thickness: f64, is_near: bool)
     where
         S: Shape<N>,
     {
         let shape = self.shape;
-        let (mut rough, mut rounds) = (ROUGH, 0..ROUNDS);
-        while rounds.next().is_some() {
+        let (mut rough, mut some) = if is_near {
+            (ROUGH[1], 1)
+        } else {
+            (ROUGH[0], SOME)
+        };
+        for _ in 0..ROUNDS {
             let before = (contour.parameters, contour.blur);
             let room = &mut self.room;
             let of = (shape, &contour.parameters);
@@ -153,13 +161,17 @@ impl<S, V: View> Search<'_, S, V> {
                 room.moved = 0.0;
             }
             room.pieces.place(of, self.signals.setup, thickness);
-            self.look(contour, rough);
+            self.look(contour, rough, some);
             let room = &mut self.room;
             let points = &mut contour.points;
             let found = associate(shape, &mut contour.parameters, points, &mut room.ratios);
             let Some(covariance) = found else {
                 contour.parameters = before.0;
-                break;
+                if some == 1 {
+                    break;
+                }
+                some = 1;
+                continue;
             };
             contour.covariance = covariance;
             let mut moved = 0.0_f64;
@@ -169,23 +181,25 @@ impl<S, V: View> Search<'_, S, V> {
             }
             room.moved += moved;
             let sharper = libm::fabs(contour.blur - before.1);
-            if rough == 0.0 && moved < STILL && sharper < SHARP {
+            let is_last = rough == ROUGH[1] && some == 1;
+            if is_last && moved < STILL && sharper < SHARP {
                 break;
             }
             if moved < NEAR && sharper < SHARPER {
-                rough = 0.0;
+                rough = ROUGH[1];
             }
+            some = 1;
         }
         self.judge(contour);
     }
 
-    /// Fits the edges of all pieces, makes points of them, and adapts the blur.
-    fn look<const N: usize>(&mut self, contour: &mut Contour<N>, rough: f64) {
+    /// Fits the edges of one of `some` pieces, makes points of them, and adapts the blur.
+    fn look<const N: usize>(&mut self, contour: &mut Contour<N>, rough: f64, some: usize) {
         contour.points.clear();
         contour.outcomes.clear();
         let (mut sharpness, mut face) = (Sharpness::default(), [0.0; 2]);
         let Room { pieces, seen, .. } = &mut self.room;
-        for piece in &pieces.all {
+        for piece in pieces.all.iter().step_by(some) {
             let problem = Problem {
                 piece,
                 pixels: &pieces.pixels[piece.pixels.clone()],
@@ -258,7 +272,7 @@ impl Sharpness {
         if !(self.matrix > 0.0) {
             return blur;
         }
-        let step = (self.right / self.matrix).clamp(-0.3, 0.3);
+        let step = (self.right / self.matrix).clamp(-STEP, STEP);
         (blur + step).clamp(BLUR[0], BLUR[1])
     }
 }

@@ -15,13 +15,14 @@
 //! ```text
 //! w = b (m + q W) + a n
 //! m = G_k(d) = F + i k M − k² S / 2       material
-//! n = 1 − (the same at the background's border)
+//! n = 1 − (the same at the nearest border of the background, or at two that face each other)
 //! W = ⟨e^{−iκd − (κ² − 2kκ) σ_t²/2} [G_k−κ(d + width) − G_k−κ(d)]⟩     wall, κ: its phase per px
 //! ```
 //!
 //! M is where in a pixel the material lies, S how far it spreads: a pixel that the edge cuts has
-//! its phase at the middle of its share, and averages over less of the fringe than a whole one. Of a
-//! wall a whole pixel averages over another phase than of the face, which is the real exponent. ⟨⟩
+//! its phase at the middle of its share, and averages over less of the fringe than a whole one. The
+//! levels of a floor differ in phase, so that of a n, i k M has ⟨r a⟩ for r a, which pixels beyond
+//! the edge show. Of a wall a whole pixel averages over another phase than of the face, which is the real exponent. ⟨⟩
 //! is the mean over levels; elsewhere the levels' mean of r stands for it.
 //!
 //! # Shapes and units
@@ -51,7 +52,7 @@ const SMALL: f64 = 0.03;
 pub struct Seen {
     whole: [Complex; 2],
     along: [Complex; 2],
-    wider: [Complex; 2],
+    wider: [f64; 2],
     light: Complex,
 }
 
@@ -134,6 +135,7 @@ impl<V: View> Problem<'_, V> {
         let reach = self.edge.reach();
         let wall = self.piece.wall.map_or(0.0, |wall| wall.width);
         let (mut equations, mut power, mut count) = (Equations::default(), 0.0, 0.0);
+        let rated = self.rated(edge);
         for pixel in self.pixels {
             if libm::fabs(pixel.d) > BAND {
                 continue;
@@ -141,7 +143,7 @@ impl<V: View> Problem<'_, V> {
             count += 1.0;
             power += pixel.light.square();
             let d = pixel.d - edge;
-            let border = d + pixel.behind + (1.0 - pixel.follow) * edge;
+            let border = pixel.border - pixel.follow.max(0.0) * edge;
             if d >= reach {
                 equations.mm += 1.0;
                 equations.right[0] += pixel.light;
@@ -149,7 +151,7 @@ impl<V: View> Problem<'_, V> {
                 equations.nn += 1.0;
                 equations.right[1] += pixel.light;
             } else {
-                let seen = self.seen(pixel, d, border);
+                let seen = self.seen(pixel, d, border, rated);
                 equations.add(&seen);
                 buffer.push(seen);
             }
@@ -163,7 +165,8 @@ impl<V: View> Problem<'_, V> {
         for seen in buffer.iter() {
             let [m, n] = seen.whole;
             let rest = seen.light - b * m - a * n;
-            let [e, s] = [seen.along, seen.wider].map(|[m, n]| b * m + a * n);
+            let e = b * seen.along[0] + a * seen.along[1];
+            let s = b * seen.wider[0] + a * seen.wider[1];
             let terms = [e.square(), e.dot(s), s.square(), e.dot(rest), s.dot(rest)];
             for (sum, term) in sums.iter_mut().zip(terms) {
                 *sum += term;
@@ -194,31 +197,60 @@ impl<V: View> Problem<'_, V> {
         })
     }
 
-    /// What a pixel at this distance from the edge, and at this one from the background's border,
-    /// sees.
-    fn seen(&self, pixel: &Pixel, d: f64, border: f64) -> Seen {
-        let k = TAU * self.signals.ratio * self.piece.gradient;
-        let light = |[share, moment, spread]: [f64; 3]| {
+    /// The light of the background with each level times its share of the mean ratio; `None` if
+    /// no pixel sees it alone.
+    fn rated(&self, edge: f64) -> Option<Complex> {
+        let half = self.edge.reach() / 2.0;
+        let (mut sum, mut count) = (Complex::default(), 0.0);
+        for pixel in self.pixels {
+            if (-BAND..edge - half).contains(&pixel.d) && pixel.border < -half {
+                sum += pixel.rated;
+                count += 1.0;
+            }
+        }
+        (count > 0.0).then(|| sum * (1.0 / count))
+    }
+
+    /// What a pixel at this distance from the edge, and at this one from another border of the
+    /// background, sees.
+    fn seen(&self, pixel: &Pixel, d: f64, border: f64, rated: Option<Complex>) -> Seen {
+        let real = |re: f64| Complex::new(re, 0.0);
+        let light = |[share, moment, spread]: [f64; 3], gradient: f64| {
+            let k = TAU * self.signals.ratio * gradient;
             Complex::new(share - k * k / 2.0 * spread, k * moment)
         };
+        let gradient = self.piece.gradient;
         let profile = self.edge.at(d);
-        let real = |re: f64| Complex::new(re, 0.0);
-        let material = light(profile.parts());
+        let material = light(profile.parts(), gradient);
         // The derivatives with e are those with d, less.
-        let along = light(profile.along(d, &self.edge)) * -1.0;
-        let wider = real(profile.widening(&self.edge));
-        let mut seen = Seen {
-            whole: [material, real(1.0) - material],
-            along: [along, along * -1.0],
-            wider: [wider, wider * -1.0],
-            light: pixel.light,
-        };
-        if pixel.behind > 0.0 {
+        let along = light(profile.along(d, &self.edge), gradient) * -1.0;
+        let wider = profile.widening(&self.edge);
+        // What the background loses, and how that changes.
+        let (mut less, mut follow, mut widens) = (material, along, wider);
+        let faces = pixel.follow < 0.0;
+        if border > d || faces {
             let profile = self.edge.at(border);
-            seen.whole[1] = real(1.0) - light(profile.parts());
-            seen.along[1] = light(profile.along(border, &self.edge)) * pixel.follow;
-            seen.wider[1] = real(-profile.widening(&self.edge));
+            let whole = light(profile.parts(), pixel.gradient);
+            let wider = profile.widening(&self.edge);
+            if faces {
+                less += whole;
+                widens += wider;
+            } else {
+                let along = light(profile.along(border, &self.edge), pixel.gradient);
+                (less, follow, widens) = (whole, along * -pixel.follow, wider);
+            }
         }
+        let shifted = rated.map(|rated| rated * Complex::new(0.0, less.im));
+        let background = match shifted {
+            Some(_) => real(1.0 - less.re),
+            None => real(1.0) - less,
+        };
+        let mut seen = Seen {
+            whole: [material, background],
+            along: [along, follow * -1.0],
+            wider: [wider, -widens],
+            light: pixel.light + shifted.unwrap_or_default(),
+        };
         if let Some(wall) = &self.piece.wall {
             self.add_wall(wall, d, profile, &mut seen);
         }
@@ -245,7 +277,7 @@ impl<V: View> Problem<'_, V> {
         let phase = whole * Complex::new(0.0, self.signals.ratio * per_px);
         seen.whole[0] += whole;
         seen.along[0] += phase - along;
-        seen.wider[0] += turned * (far.widening(edge) - near.widening(edge));
+        seen.wider[0] += turned.re * (far.widening(edge) - near.widening(edge));
     }
 }
 

@@ -1,6 +1,6 @@
 //! A contour in pieces of about two pixels, each with the pixels across it.
 
-use super::beyond::{Wall, background, shadow};
+use super::beyond::{Wall, border, shadow};
 use super::complex::Complex;
 use super::sample::Signals;
 use super::shape::{Foot, Shape};
@@ -13,7 +13,7 @@ const LENGTH: f64 = 2.0;
 /// How far from the contour pixels are looked at, px.
 pub const BAND: f64 = 5.0;
 /// How far a contour may move until its pixels are gathered anew, px.
-pub const MARGIN: f64 = 0.4;
+pub const MARGIN: f64 = 0.25;
 /// By how much pieces overlap in the picture before their pixels are told apart on the plane, px.
 const OVERLAP: f64 = 0.1;
 
@@ -26,12 +26,16 @@ pub struct Pixel {
     pub spot: Spot,
     /// w, the sum of levels.
     pub light: Complex,
+    /// The same with each level times its share of the mean ratio.
+    pub rated: Complex,
     /// Signed distance from the contour, px.
     pub d: f64,
-    /// By how much larger that of the background's border is, px.
-    pub behind: f64,
-    /// By how much that border moves when the contour moves by 1 along d.
+    /// Signed distance from another border of the background, px; −∞ if there is none near.
+    pub border: f64,
+    /// The cosine between both.
     pub follow: f64,
+    /// By how much the plane's phase changes across that border, turns of ratio 1 per px.
+    pub gradient: f64,
 }
 
 /// A piece of a contour.
@@ -39,6 +43,12 @@ pub struct Pixel {
 pub struct Piece {
     /// Its middle.
     pub foot: Foot,
+    /// By how much d changes with u and with v, mm per px.
+    across: (f64, f64),
+    /// By how much the way along the contour changes with u and with v, mm per px.
+    along: (f64, f64),
+    /// By how much the plane's phase changes with u and with v, turns of ratio 1 per px.
+    phase: (f64, f64),
     /// mm per px along d.
     pub scale: f64,
     /// The unit vector along d in the picture (u, v).
@@ -61,14 +71,6 @@ pub struct Pieces {
     pub all: Vec<Piece>,
     /// The pixels of all, piece by piece.
     pub pixels: Vec<Pixel>,
-}
-
-/// How coordinates of the plane, along d and along the contour in mm, change with u and with v.
-#[derive(Clone, Copy, Debug)]
-struct Map {
-    middle: (f64, f64),
-    d: (f64, f64),
-    t: (f64, f64),
 }
 
 /// mm per px in the picture at a place of the plane: the lengths of the sides of a pixel.
@@ -106,6 +108,9 @@ impl Pieces {
             let start = self.pixels.len();
             let mut piece = Piece {
                 foot,
+                across: (0.0, 0.0),
+                along: (0.0, 0.0),
+                phase: (0.0, 0.0),
                 scale: pixel,
                 normal: (1.0, 0.0),
                 gradient: 0.0,
@@ -113,9 +118,9 @@ impl Pieces {
                 shadow: 0.0,
                 pixels: start..start,
             };
-            if let Some(map) = piece.orient(signals) {
+            if let Some(middle) = piece.orient(signals) {
                 let half = length / count as f64 / 2.0;
-                piece.gather(&map, half, signals, &mut self.pixels);
+                piece.gather(middle, half, signals, &mut self.pixels);
                 piece.pixels.end = self.pixels.len();
             }
             self.all.push(piece);
@@ -145,8 +150,8 @@ impl Pieces {
 }
 
 impl Piece {
-    /// Works out how it lies in the picture; `None` if it is not seen.
-    fn orient(&mut self, signals: &Signals<'_, impl View>) -> Option<Map> {
+    /// Works out how it lies in the picture, and where its middle does; `None` if it is not seen.
+    fn orient(&mut self, signals: &Signals<'_, impl View>) -> Option<(f64, f64)> {
         let Foot { x, y, normal, .. } = self.foot;
         let middle = signals.view.pixel(x, y)?;
         let [along_u, along_v] = frame(signals.view, middle)?;
@@ -154,22 +159,20 @@ impl Piece {
             let of = |(x, y, _): (f64, f64, f64)| n.0 * x + n.1 * y;
             (of(along_u), of(along_v))
         };
-        let (d, t) = (part(normal), part((-normal.1, normal.0)));
-        let square = d.0 * d.0 + d.1 * d.1;
-        if !(square > 0.0) {
-            return None;
-        }
-        self.scale = libm::sqrt(square);
-        self.normal = (d.0 / self.scale, d.1 / self.scale);
-        self.gradient = self.normal.0 * along_u.2 + self.normal.1 * along_v.2;
+        self.across = part(normal);
+        self.along = part((-normal.1, normal.0));
+        self.phase = (along_u.2, along_v.2);
+        self.scale = libm::sqrt(dot(self.across, self.across));
+        self.normal = (self.across.0 / self.scale, self.across.1 / self.scale);
+        self.gradient = dot(self.normal, self.phase);
         self.shadow = shadow(signals.setup, (x, y), normal) / self.scale;
-        Some(Map { middle, d, t })
+        (self.scale > 0.0).then_some(middle)
     }
 
     /// Gathers the pixels within the band that look at places nearest to it, `half` mm to each side.
     fn gather(
         &self,
-        map: &Map,
+        middle: (f64, f64),
         half: f64,
         signals: &Signals<'_, impl View>,
         pixels: &mut Vec<Pixel>,
@@ -180,6 +183,7 @@ impl Piece {
             normal,
             curvature,
         } = self.foot;
+        let (across, along) = (self.across, self.along);
         let band = (BAND + MARGIN) * self.scale;
         // Borders of pieces pass through the centre of curvature.
         let half = match curvature > 0.0 {
@@ -188,11 +192,11 @@ impl Piece {
         };
         let overlap = OVERLAP * self.scale;
         let wide = half * (1.0 + curvature * band) + overlap;
-        let determinant = libm::fabs(map.d.0 * map.t.1 - map.d.1 * map.t.0);
-        let tall = (libm::fabs(map.t.0) * band + libm::fabs(map.d.0) * wide) / determinant;
+        let determinant = libm::fabs(across.0 * along.1 - across.1 * along.0);
+        let tall = (libm::fabs(along.0) * band + libm::fabs(across.0) * wide) / determinant;
         let (columns, rows) = signals.view.size();
-        for v in whole(map.middle.1, (-tall, tall), rows) {
-            let dv = v as f64 - map.middle.1;
+        for v in whole(middle.1, (-tall, tall), rows) {
+            let dv = v as f64 - middle.1;
             // Where a row is within `reach` of a line.
             let within = |rate: (f64, f64), reach: f64| {
                 let (one, other) = (
@@ -201,11 +205,11 @@ impl Piece {
                 );
                 (one.min(other), one.max(other))
             };
-            let (d, t) = (within(map.d, band), within(map.t, wide));
+            let (d, t) = (within(across, band), within(along, wide));
             let range = (d.0.max(t.0), d.1.min(t.1));
-            for u in whole(map.middle.0, range, columns) {
-                let du = u as f64 - map.middle.0;
-                let (d, t) = (map.d.0 * du + map.d.1 * dv, map.t.0 * du + map.t.1 * dv);
+            for u in whole(middle.0, range, columns) {
+                let du = u as f64 - middle.0;
+                let (d, t) = (across.0 * du + across.1 * dv, along.0 * du + along.1 * dv);
                 if libm::fabs(t) > half * (1.0 + curvature * d) + overlap {
                     continue;
                 }
@@ -218,14 +222,16 @@ impl Piece {
                 if !(-end..end).contains(&t) {
                     continue;
                 }
-                if let Some(light) = signals.light((u, v), &spot) {
+                if let Some([light, rated]) = signals.light((u, v), &spot) {
                     pixels.push(Pixel {
                         at: (u, v),
                         spot,
                         light,
+                        rated,
                         d: 0.0,
-                        behind: 0.0,
+                        border: f64::NEG_INFINITY,
                         follow: 1.0,
+                        gradient: 0.0,
                     });
                 }
             }
@@ -249,19 +255,32 @@ impl Pixel {
         piece: &Piece,
     ) {
         let (x, y) = (self.spot.x, self.spot.y);
-        let d = shape.distance(p, x, y);
-        self.d = d / piece.scale;
-        if thickness == 0.0 && setup.floor.is_none() {
+        self.d = shape.distance(p, x, y) / piece.scale;
+        self.border = f64::NEG_INFINITY;
+        let Some((border, at)) = border((shape, p), setup, thickness, (x, y)) else {
+            return;
+        };
+        if border < -BAND * piece.scale {
             return;
         }
-        let (farther, at) = background((shape, p), d, setup, thickness, (x, y));
-        (self.behind, self.follow) = ((farther - d) / piece.scale, 1.0);
-        if farther > d {
-            // The step is along the contour's normal, so this is the cosine between both borders.
-            let step = 0.1 * piece.scale;
-            let (x, y) = piece.foot.normal;
+        // How the border's distance changes along the contour's normal, and along the contour.
+        let step = 1e-3 * piece.scale;
+        let change = |(x, y): (f64, f64)| {
             let ahead = shape.distance(p, at.0 + step * x, at.1 + step * y);
-            self.follow = ((ahead - farther) / step).clamp(0.0, 1.0);
-        }
+            (ahead - border) / step
+        };
+        let normal = piece.foot.normal;
+        let (n, t) = (change(normal), change((-normal.1, normal.0)));
+        let across = (
+            n * piece.across.0 + t * piece.along.0,
+            n * piece.across.1 + t * piece.along.1,
+        );
+        let scale = libm::sqrt(dot(across, across));
+        (self.border, self.follow) = (border / scale, n);
+        self.gradient = dot(across, piece.phase) / scale;
     }
+}
+
+fn dot(a: (f64, f64), b: (f64, f64)) -> f64 {
+    a.0 * b.0 + a.1 * b.1
 }

@@ -57,13 +57,16 @@ impl<'a, V: View> Signals<'a, V> {
         })
     }
 
-    /// The sum of levels of a pixel that looks at this spot; `None` if one is overexposed.
-    pub fn light(&self, (u, v): (usize, usize), spot: &Spot) -> Option<Complex> {
-        let mut sum = Complex::default();
+    /// The sum of levels of a pixel that looks at this spot, and the same with each times its share
+    /// of the mean ratio; `None` if one is overexposed.
+    pub fn light(&self, at: (usize, usize), spot: &Spot) -> Option<[Complex; 2]> {
+        let mut sums = [Complex::default(); 2];
         for (level, weight) in self.weights.iter().enumerate() {
-            sum += self.level((u, v), spot, level)? * *weight;
+            let light = self.level(at, spot, level)? * *weight;
+            sums[0] += light;
+            sums[1] += light * (self.setup.levels[level].ratio / self.ratio);
         }
-        Some(sum)
+        Some(sums)
     }
 
     /// w of one level of such a pixel.

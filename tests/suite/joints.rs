@@ -1,0 +1,197 @@
+//! Gap and flush of joints of the simulated head, against the truth, over many placements.
+
+use super::gauges::{frames, plan};
+use super::placement::{Bed, bed, taught_within};
+use algo::geometry::Vector;
+use algo::inspect::kinds::{Flush, Gap, Radius, Side};
+use algo::inspect::{FeatureKind, Measure};
+use appliance::recipe::plan::Plan;
+use appliance::recipe::{FeatureFile, GaugeFile};
+use appliance::station::{Inspection, Verdict};
+use sim::parts::{Across, Joint};
+use sim::scenario::Noise;
+use sim::{Part, Placement, Scenario};
+use std::time::Instant;
+use tests::random::Random;
+
+const PLACEMENTS: usize = 12;
+const REPEATS: usize = 4;
+const SHIFT_MM: f64 = 1.0;
+const TILT_DEG: f64 = 1.0;
+const TOLERANCE_MM: f64 = 5.0;
+/// Half the length of the section, and its width, mm.
+const HALF_MM: f64 = 20.0;
+const WIDTH_MM: f64 = 10.0;
+/// Largest bias at 0.41 mm per px, µm: of gap and of flush.
+const BIAS_UM: [f64; 2] = [120.0, 25.0];
+
+fn placement(random: &mut Random) -> Placement {
+    let mut between = |reach: f64| reach * (2.0 * random.share() - 1.0);
+    Placement {
+        shift_mm: [(); 3].map(|()| between(SHIFT_MM)),
+        tilt_deg: [(); 2].map(|()| between(TILT_DEG)),
+        rotation_deg: between(TILT_DEG),
+    }
+}
+
+/// A joint that was taught, with a section across its middle.
+struct Line {
+    bed: Bed,
+    plan: Plan,
+}
+
+impl Line {
+    fn new(joint: &Joint, edge_mm: Option<f64>) -> Self {
+        let mut scenario = Scenario {
+            part: Part::Joint(joint.clone()),
+            ..Scenario::default()
+        };
+        scenario.noise.noise_counts = Some(Noise::PAPER);
+        let mut bed = bed(&scenario);
+        let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
+        let camera = &bed.calibration.camera;
+        let pixel = |s: f64| {
+            let at = match joint.across {
+                Across::X => Vector::new(s, 0.0, joint.z),
+                Across::Y => Vector::new(0.0, s, joint.z),
+            };
+            let (u, v) = camera.project(at).unwrap();
+            Some([u, v])
+        };
+        let beside = joint.gap / 2.0 + joint.left_radius.max(joint.right_radius) + 1.0;
+        let section = FeatureFile {
+            from: pixel(-HALF_MM),
+            to: pixel(HALF_MM),
+            width_mm: Some(WIDTH_MM),
+            left: Some([2.0, HALF_MM - beside]),
+            right: Some([HALF_MM + beside, 2.0 * HALF_MM - 2.0]),
+            edge_mm,
+            ..FeatureFile::new("joint", FeatureKind::Section, Vec::new())
+        };
+        let gauge =
+            |slot, name: &str, measures: Measure| GaugeFile::new(slot, name, measures, &["joint"]);
+        let mut file = taught.manifest.clone();
+        file.features.push(section);
+        file.gauges = vec![
+            gauge(1, "gap", Gap {}.into()),
+            gauge(2, "flush", Flush {}.into()),
+            gauge(3, "radius", Radius { side: Side::Left }.into()),
+        ];
+        let plan = plan(&bed, &file, &taught.recipe.arrays);
+        bed.head
+            .load(plan.rasters(&bed.calibration).unwrap())
+            .unwrap();
+        Self { bed, plan }
+    }
+
+    fn inspect(&mut self, joint: &Joint, lies: &Placement) -> Inspection {
+        let part = Part::Joint(joint.clone());
+        self.bed.stage.place(&part, lies).unwrap();
+        self.again()
+    }
+
+    fn again(&mut self) -> Inspection {
+        let frames = frames(&mut self.bed, &self.plan, 0);
+        self.plan.inspect(0, &frames, Instant::now())
+    }
+}
+
+fn joints() -> Vec<Joint> {
+    let joint = |across, gap, flush, [left_radius, right_radius]: [f64; 2], tilt_deg| Joint {
+        across,
+        gap,
+        flush,
+        left_radius,
+        right_radius,
+        tilt_deg,
+        ..Joint::default()
+    };
+    vec![
+        joint(Across::X, 4.0, 0.5, [1.5, 1.5], 0.0),
+        joint(Across::Y, 3.0, -0.6, [2.0, 1.2], 1.0),
+        joint(Across::X, 6.0, -1.0, [1.0, 2.0], 0.0),
+        joint(Across::Y, 2.0, 1.0, [1.2, 1.6], -1.0),
+    ]
+}
+
+#[test]
+fn gap_and_flush_are_true_and_as_uncertain_as_they_say() {
+    let (mut ratios, mut freedom, mut errors, mut within) = (0.0, 0.0, 0.0, 0.0);
+    let mut wrong = Vec::new();
+    for joint in joints().into_iter().take(2) {
+        let mut line = Line::new(&joint, None);
+        let mut random = Random::new(5);
+        let truth = [joint.gap, joint.flush, joint.left_radius];
+        let (mut bias, mut seen) = ([0.0; 3], 0.0);
+        for at in 0..PLACEMENTS {
+            let lies = match at {
+                0 => Placement::default(),
+                _ => placement(&mut random),
+            };
+            line.inspect(&joint, &lies);
+            let found: Vec<Inspection> = (0..REPEATS).map(|_| line.again()).collect();
+            if found
+                .iter()
+                .any(|found| found.verdict() == Verdict::Invalid)
+            {
+                println!("{at}: {:?}", found[0].reason);
+                wrong.push(format!("{at}: {:?}", found[0].reason));
+                continue;
+            }
+            seen += 1.0;
+            for (gauge, truth) in truth.iter().enumerate() {
+                let all = found.iter().map(|found| &found.gauges[gauge]);
+                let values: Vec<f64> = all.clone().filter_map(|of| of.value).collect();
+                let count = values.len() as f64;
+                let mean = values.iter().sum::<f64>() / count;
+                let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+                let sigma = all.clone().filter_map(|of| of.sigma).sum::<f64>() / count;
+                ratios += squares / (sigma * sigma);
+                freedom += count - 1.0;
+                bias[gauge] += mean - truth;
+                for of in all {
+                    let error = (of.value.unwrap() - truth).abs();
+                    errors += 1.0;
+                    within += f64::from(u8::from(error <= of.uncertainty.unwrap()));
+                }
+                println!(
+                    "   {at} {gauge} error {:+.1} µm, σ {:.1}, U {:.1}",
+                    (mean - truth) * 1e3,
+                    sigma * 1e3,
+                    found[0].gauges[gauge].uncertainty.unwrap() * 1e3
+                );
+            }
+        }
+        let bias = bias.map(|sum| sum / seen * 1e3);
+        println!("{joint:?}: bias of gap, flush and radius {bias:.1?} µm");
+        if bias[0].abs() > BIAS_UM[0] || bias[1].abs() > BIAS_UM[1] {
+            wrong.push(format!("{joint:?}: {bias:?}"));
+        }
+    }
+    let (scatter, within): (f64, f64) = (f64::sqrt(ratios / freedom), within / errors);
+    println!("scatter/σ {scatter:.2}, within U {within:.3}");
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!((0.8..1.25).contains(&scatter), "{scatter}");
+    assert!(within >= 0.93, "{within}");
+}
+
+#[test]
+fn a_change_of_gap_or_flush_is_found_with_its_sign() {
+    let joint = joints().swap_remove(0);
+    let mut line = Line::new(&joint, None);
+    let mut random = Random::new(8);
+    for _ in 0..3 {
+        let lies = placement(&mut random);
+        let before = line.inspect(&joint, &lies);
+        for change in [-0.1, 0.1] {
+            let (mut wider, mut higher) = (joint.clone(), joint.clone());
+            (wider.gap, higher.flush) = (joint.gap + change, joint.flush + change);
+            for (at, other) in [wider, higher].iter().enumerate() {
+                let found = line.inspect(other, &lies);
+                let [now, before] = [&found, &before].map(|of| of.gauges[at].value.unwrap());
+                let share = (now - before) / change;
+                assert!((0.3..1.7).contains(&share), "{at}: {share}");
+            }
+        }
+    }
+}
