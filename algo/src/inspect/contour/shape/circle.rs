@@ -34,6 +34,12 @@ impl Distance<3> for Circle {
         let (x, y) = (x - cx, y - cy);
         libm::sqrt(x * x + y * y) - r
     }
+
+    fn derivative(&self, &[cx, cy, _]: &[f64; 3], x: f64, y: f64) -> [f64; 3] {
+        let (x, y) = (x - cx, y - cy);
+        let away = libm::sqrt(x * x + y * y);
+        [-x / away, -y / away, -1.0]
+    }
 }
 
 impl Shape<3> for Circle {
@@ -54,12 +60,6 @@ impl Shape<3> for Circle {
             normal,
             curvature: 1.0 / r,
         }
-    }
-
-    fn derivative(&self, &[cx, cy, _]: &[f64; 3], x: f64, y: f64) -> [f64; 3] {
-        let (x, y) = (x - cx, y - cy);
-        let away = libm::sqrt(x * x + y * y);
-        [-x / away, -y / away, -1.0]
     }
 
     fn is_closed(&self) -> bool {
