@@ -34,7 +34,7 @@ pub use ripple::ripple;
 pub use strips::{
     CalibrationError, Findings, Found, FoundFeature, Gauge, GoldenSignal, Input, Levels, Lost,
     MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Picture, Production,
-    Signal, Skipped, Strips, Unmeasurable,
+    SeenRim, Signal, Skipped, Strips, Unmeasurable,
 };
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

@@ -171,11 +171,10 @@ impl Teach {
             None => taught,
         };
         let taught = match replaced.filter(|_| self.keep_gauges) {
-            Some(file) => pool
-                .install(|| replace::keep_gauges(taught, &file))
-                .map_err(&unfit)?,
-            None => taught,
+            Some(file) => pool.install(|| replace::keep_gauges(taught, &file)),
+            None => pool.install(|| taught.with_circles()),
         };
+        let taught = taught.map_err(&unfit)?;
         let place = target.store(&taught)?;
         let file = &taught.manifest;
         let summary = serde_json::json!({

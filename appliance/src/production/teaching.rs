@@ -89,7 +89,11 @@ impl Worker {
                 let kept = self.computing.on(|| self.pool.install(kept));
                 kept.map_err(TeachError::Rig)
             }
-            None => Ok(taught),
+            None => {
+                let circles = || taught.with_circles();
+                let circles = self.computing.on(|| self.pool.install(circles));
+                circles.map_err(TeachError::Rig)
+            }
         }
     }
 

@@ -57,6 +57,7 @@ mod recorded;
 mod references;
 mod regauge;
 pub mod replace;
+mod rounds;
 mod shots;
 mod sides;
 pub mod signal;

@@ -100,7 +100,7 @@ impl Outline {
                 kind: feature.kind,
                 state: word(state.or_else(|| by_gauges(feature))?),
                 found: found.map(|found| found.found),
-                blur_px: found.and_then(|found| found.blur_px),
+                blur_px: found.and_then(|found| found.rim).map(|rim| rim.blur_px),
                 centre: geometry.map(|of| list(of.point())),
                 direction: geometry.map(direction),
                 size: geometry.map_or(Vec::new(), |of| of.sizes().into_iter().flatten().collect()),

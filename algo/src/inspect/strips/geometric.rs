@@ -27,7 +27,7 @@ impl Production {
                     None => State::Unseen,
                 },
                 found: fit.share(&self.gauges.patches[fit.patch]),
-                blur_px: None,
+                rim: None,
                 lost: None,
                 geometry,
             }

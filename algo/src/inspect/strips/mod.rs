@@ -65,7 +65,7 @@ mod squares;
 mod strip;
 mod uncertainty;
 
-pub use contours::{FoundFeature, GoldenSignal, Levels, Lost, Signal};
+pub use contours::{FoundFeature, GoldenSignal, Levels, Lost, SeenRim, Signal};
 pub use decode::Input;
 pub use findings::{Findings, Missing, Skipped};
 pub use gauges::{Gauge, MAX_FEATURES, MAX_GAUGES, Unmeasurable};

@@ -35,6 +35,15 @@ pub enum Lost {
     Section(Unseen),
 }
 
+/// How the camera sees a rim.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SeenRim {
+    /// σ of its blur, px.
+    pub blur_px: f64,
+    /// What a pixel sees of the plane, mm.
+    pub pixel_mm: f64,
+}
+
 /// A feature of a part with a geometry.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundFeature {
@@ -44,8 +53,8 @@ pub struct FoundFeature {
     pub state: State,
     /// The share of its rim, or of its surface as taught, that is seen.
     pub found: f64,
-    /// σ of the camera's blur at the rim of a contour, px; `None` where it is not known.
-    pub blur_px: Option<f64>,
+    /// How the camera sees the rim of a contour; `None` where it is not found.
+    pub rim: Option<SeenRim>,
     /// Why it is not found.
     pub lost: Option<Lost>,
     /// Its geometry in the frame as taught; `None` if it is not found.
@@ -97,7 +106,7 @@ impl ContourFit {
             feature: expected.feature,
             state: State::Unseen,
             found: 0.0,
-            blur_px: None,
+            rim: None,
             lost: Some(Lost::NoPlane),
             geometry: None,
         };
@@ -130,7 +139,10 @@ impl ContourFit {
                 let (off, sigma) = found.contour.face;
                 let above = -off / setup.turns_per_mm;
                 if of.state == State::Found {
-                    of.blur_px = Some(found.contour.blur);
+                    of.rim = Some(SeenRim {
+                        blur_px: found.contour.blur,
+                        pixel_mm: found.contour.pixel,
+                    });
                     if libm::fabs(off) > FACE_SIGMA * sigma && libm::fabs(above) > FACE_MM {
                         of.state = State::Unseen;
                         of.lost = Some(Lost::Face(above));

@@ -14,6 +14,6 @@ mod outline;
 mod shape;
 mod taught;
 
-pub use find::{ContourFit, FoundFeature, Lost};
+pub use find::{ContourFit, FoundFeature, Lost, SeenRim};
 pub use light::{GoldenSignal, Levels, Signal};
 pub use taught::{Contours, Known};

@@ -57,7 +57,7 @@ impl SectionFit {
                 Some(_) => State::Unseen,
             },
             found: f64::from(u8::from(lost.is_none())),
-            blur_px: None,
+            rim: None,
             lost: lost.map(Lost::Section),
             geometry: None,
         });
