@@ -6,7 +6,8 @@
 //! the thickness and ρ the radius of the rims, a point is at least
 //!
 //! ```text
-//! max(round(s, −d, ρ), −s(z + t))      round(a, b, ρ) = min(max(a + ρ, b + ρ), 0) + |max(a + ρ, 0), max(b + ρ, 0)| − ρ
+//! max(round(s + ρ, ρ − d) − ρ, −s(z + t))
+//! round(a, b) = min(max(a, b), 0) + √(max(a, 0)² + max(b, 0)²)
 //! ```
 //!
 //! away from the material: the exact distance to an edge between face and wall, and never too
