@@ -16,7 +16,7 @@ mod table;
 mod taught;
 mod weight;
 
-pub use align::{Facet, GoldenSurface, Motion, Placed};
+pub use align::{Facet, Found, GoldenSurface, Motion, Picture, Placed};
 pub use feature::{Feature, FeatureKind, Geometry, TooFine};
 pub use gauge::{
     Basis, Declared, Domain, Evidence, Facts, Kind, MAX_PLACES, Measure, Parameter, Reading,
@@ -30,8 +30,8 @@ pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
 pub use strips::{
-    CalibrationError, Findings, Found, Gauge, Input, MAX_FEATURES, MAX_GAUGES, Maps, PairBuffers,
-    PairPlaced, Parts, Picture, Production, Skipped, Strips, Unmeasurable,
+    CalibrationError, Findings, Gauge, Input, MAX_FEATURES, MAX_GAUGES, Maps, PairBuffers,
+    PairPlaced, Parts, Production, Skipped, Strips, Unmeasurable,
 };
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

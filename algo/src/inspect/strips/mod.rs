@@ -65,7 +65,7 @@ pub use decode::Input;
 pub use findings::{Findings, Skipped};
 pub use gauges::{Gauge, MAX_FEATURES, MAX_GAUGES, Unmeasurable};
 pub use maps::Maps;
-pub use pair::{Found, PairBuffers, PairPlaced, Picture};
+pub use pair::{PairBuffers, PairPlaced};
 pub use plan::{Parts, Production};
 pub use strip::Strips;
 pub use uncertainty::CalibrationError;

@@ -1,12 +1,10 @@
 //! How a part lies by a pair of frames, and its phases.
 
-use super::coarse::Coarse;
 use super::expected::Expectation;
-use super::picture::{Found, Picture};
 use super::terms::SIDE;
 use super::window::{BAND_ROWS, Band, Windows};
 use crate::frame::FrameView;
-use crate::inspect::align::{Alignment, Placed, Spot};
+use crate::inspect::align::{Alignment, Coarse, Found, Picture, Placed, Spot};
 use crate::inspect::strips::decode::Input;
 use crate::inspect::strips::displaced::BlockNumbers;
 use crate::inspect::strips::plan::Production;

@@ -21,9 +21,9 @@
 //! proves the fringe order. Tilts are taken as 0: they are found by the phases.
 
 use super::coarse::Coarse;
+use super::motion::Motion;
 use crate::frame::FrameView;
 use crate::geometry::{Triangulator, Vector};
-use crate::inspect::align::Motion;
 use crate::math::solve::Normal;
 use crate::pipeline::KnownSurface;
 use alloc::vec::Vec;
@@ -109,7 +109,7 @@ impl Picture {
     }
 
     /// Finds the part in the mean of a pair; none where the edges do not determine it.
-    pub(super) fn find(
+    pub fn find(
         &self,
         triangulator: &Triangulator,
         frames: [FrameView<'_>; 2],
