@@ -235,6 +235,8 @@ fn lying(covariance: [[f64; 6]; 6]) -> Placed {
         covariance,
         radius: 50.0,
         left_out: [false; 6],
+        free: heapless::Vec::new(),
+        steered: false,
         points: 100,
         outliers: 0.0,
         reach: 0.0,

@@ -166,6 +166,8 @@ mod tests {
             covariance,
             radius: 50.0,
             left_out: [false; 6],
+            free: heapless::Vec::new(),
+            steered: false,
             points: 100,
             outliers: 0.0,
             reach: 0.0,
