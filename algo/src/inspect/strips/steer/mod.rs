@@ -10,7 +10,9 @@
 use super::decode::Input;
 use super::plan::Production;
 use super::strip::Strips;
-use crate::inspect::align::{Picture, Placed};
+use crate::inspect::align::{Alignment, Motion, Picture, Placed};
+use crate::phase::DecodeError;
+use crate::pipeline::PhaseMap;
 
 impl Production {
     /// With golden's picture, from its modulation in counts (row-major), for parts within
@@ -29,6 +31,29 @@ impl Production {
             Picture::new(triangulator, surface, modulation, centre, tolerance_px)
         });
         self
+    }
+
+    /// As [`Self::place`], of phases that were worked out of a part after this motion
+    /// ([`Self::rendered`]): where production would look at its picture, that finds the motion.
+    ///
+    /// # Errors
+    /// As [`Self::place`].
+    pub fn place_rendered(
+        &self,
+        phases: &PhaseMap,
+        strips: &mut Strips,
+        motion: &Motion,
+    ) -> Result<Option<Placed>, DecodeError> {
+        let open = self.alignment.as_ref().filter(|_| self.picture.is_some());
+        let from = open.map(|&Alignment { centre, .. }| {
+            let shift = motion.apply(centre) - centre;
+            Motion::new(centre, shift, motion.turn)
+        });
+        let mut placed = self.place_from(Input::Phases(phases), strips, from)?;
+        if let (Some(placed), Some(_)) = (&mut placed, from) {
+            placed.steered = !placed.free.is_empty();
+        }
+        Ok(placed)
     }
 
     /// How a part lies that was placed by its heights, whose points the strips still have; none

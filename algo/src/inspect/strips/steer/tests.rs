@@ -10,7 +10,7 @@ use crate::inspect::{Largest, Region, Taught, Weight};
 use crate::pattern::{PhaseFunction, Sequence, Shot};
 use crate::phase::Decoder;
 use crate::pipeline::{HeightCubics, KnownSurface, arrive, for_each_row};
-use crate::units::{AbsolutePhase, Height};
+use crate::units::{AbsolutePhase, Height, Modulation};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::sync::Arc;
@@ -364,6 +364,26 @@ fn a_picture_without_edges_or_of_another_part_steers_nothing() {
         let (found, before) = (inspected(&with, &frames), inspected(&plain, &frames));
         assert_eq!(found, before);
         assert!(!found.0.steered);
+    }
+}
+
+#[test]
+fn a_plate_that_is_worked_out_lies_where_it_was_moved_to_if_it_has_a_picture() {
+    let head = Head::new();
+    let plain = head.production(&PLATE);
+    let with = head.production(&PLATE);
+    let with = with.with_picture(&head.modulation(&PLATE), AWAY);
+    let moved = motion(Vector::default(), [0.7, 0.4, -0.3], [0.3, -0.2, 0.6]);
+    let light = vec![Modulation::from_bits(20_000); SIDE * SIDE];
+    let phases = with.rendered(&moved, &light, None);
+    let corner = with.corners()[7];
+    for (production, steered) in [(&with, true), (&plain, false)] {
+        let mut strips = production.strips(64);
+        let placed = production.place_rendered(&phases, &mut strips, &moved);
+        let placed = placed.unwrap().unwrap();
+        assert_eq!(placed.steered, steered);
+        let off = (placed.motion.apply(corner) - moved.apply(corner)).length();
+        assert_eq!(off < 2e-3, steered, "{off}");
     }
 }
 
