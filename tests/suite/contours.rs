@@ -76,6 +76,7 @@ fn around(camera: View<'_>, [x, y]: [f64; 2], [a, b]: [f64; 2]) -> Vec<[f64; 2]>
 fn gauging(
     plate: &Plate,
     camera: &Pinhole,
+    lies: &Placement,
 ) -> (Vec<FeatureFile>, Vec<DatumFile>, Vec<(GaugeFile, f64)>) {
     let camera = (camera, lies);
     let (right, top) = (plate.width / 2.0 - 3.0, plate.height / 2.0 - 3.0);
@@ -237,7 +238,7 @@ impl Setting {
         scenario.noise.noise_counts = self.noise;
         scenario.optics.camera_blur_px = self.blur[0];
         scenario.optics.projector_blur_px = self.blur[1];
-        scenario.lighting.ambient = self.ambient;
+        scenario.light.ambient = self.ambient;
         scenario
     }
 

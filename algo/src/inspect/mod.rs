@@ -17,7 +17,7 @@ mod table;
 mod taught;
 mod weight;
 
-pub use align::{Facet, GoldenSurface, Motion, Placed};
+pub use align::{Facet, Found, GoldenSurface, Motion, Picture, Placed};
 pub use contour::State;
 pub use feature::{Cut, Feature, FeatureKind, Geometry, TooFine};
 pub use gauge::{
@@ -32,9 +32,9 @@ pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
 pub use strips::{
-    CalibrationError, Findings, Found, FoundFeature, Gauge, GoldenSignal, Input, Levels, Lost,
-    MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Picture, Production,
-    SeenRim, Signal, Skipped, Strips, Unmeasurable,
+    CalibrationError, Findings, FoundFeature, Gauge, GoldenSignal, Input, Levels, Lost,
+    MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Production, SeenRim,
+    Signal, Skipped, Strips, Unmeasurable,
 };
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

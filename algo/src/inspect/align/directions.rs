@@ -112,7 +112,7 @@ impl Directions {
     }
 
     /// Unit vectors of the directions that are not determined.
-    pub fn free(&self) -> &[[f64; 6]] {
+    pub fn free(&self) -> &heapless::Vec<[f64; 6], 6> {
         &self.free
     }
 

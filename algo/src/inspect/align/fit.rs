@@ -52,10 +52,15 @@ pub struct Placed {
     pub covariance: Matrix6,
     /// The part's radius, mm.
     pub radius: f64,
-    /// Components that the shape does not determine: they are taken as 0.
+    /// Components that the shape does not determine: they are taken as 0, or are `steered`.
     pub left_out: [bool; 6],
-    /// Unit vectors of the directions that it does not determine.
-    pub open: heapless::Vec<[f64; 6], 6>,
+    /// The directions that the shape does not determine: unit vectors in the coordinates of the
+    /// covariance, which is 0 along them though their variance is infinite. What depends on them is
+    /// not known.
+    pub free: heapless::Vec<[f64; 6], 6>,
+    /// Whether the picture says how far the part is moved along them, so that regions follow; else
+    /// it is taken not to be.
+    pub steered: bool,
     /// Points that agree with the motion.
     pub points: usize,
     /// Share of the points that do not.
@@ -213,7 +218,8 @@ impl Fitting<'_> {
             covariance,
             radius: self.plan.radius,
             left_out: solved.directions.left_out,
-            open: solved.directions.free().iter().copied().collect(),
+            free: solved.directions.free().clone(),
+            steered: false,
             points: solved.inside,
             outliers: 1.0 - solved.inside as f64 / equations.len() as f64,
             reach,

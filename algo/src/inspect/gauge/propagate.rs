@@ -266,7 +266,7 @@ impl Characteristic<'_> {
                 })
             });
             motion = form(&g, &placed.covariance, &g).max(0.0);
-            let mut open = placed.open.iter();
+            let mut open = placed.free.iter();
             let depends = |direction: &[f64; 6]| {
                 let along = |by: f64| Change::Moved(moved(placed, &direction.map(|way| way * by)));
                 libm::fabs(slope(OPEN_STEP, &along)) > OPEN

@@ -2,6 +2,7 @@
 
 use super::golden::Golden;
 use crate::frame::{FrameView, SampleNoise};
+use crate::pattern::MAX_SHIFTS;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow};
 use crate::pipeline::PhaseMap;
 use crate::units::{AbsolutePhase, Modulation};
@@ -52,6 +53,18 @@ impl PhasePlan {
                 expected,
                 given,
             }),
+        }
+    }
+
+    /// The frames of the finest level; none of phases.
+    pub fn finest<'a>(&self, input: Input<'a>) -> Option<heapless::Vec<FrameView<'a>, MAX_SHIFTS>> {
+        match input {
+            Input::Frames(frames) => {
+                let places = self.decoder.levels().last()?;
+                places.iter().map(|&at| frames.get(at).copied()).collect()
+            }
+            Input::Finest(_, frames) => heapless::Vec::from_slice(frames).ok(),
+            Input::Phases(_) => None,
         }
     }
 

@@ -28,6 +28,7 @@ impl Production {
             pose: PoseField::new(&self.golden, &self.gauges.regions, self.alignment.is_some()),
             samples: Vec::new(),
             fitting: FitBuffers::default(),
+            pictures: Vec::new(),
             cells: CellBuffers::default(),
             fits: self.planes.clone(),
             contours: match &self.contours {
@@ -60,8 +61,8 @@ impl Production {
         self.inspect_placed((input, Signal::Frames(frames)), strips, placed, maps)
     }
 
-    /// The first half: how the part lies, from a few rows of each strip. None if parts are not
-    /// aligned ([`Parts::aligned`](super::Parts::aligned)), or if too few points are resolved.
+    /// The first half: how the part lies, from a few rows of each strip, and by the picture where
+    /// heights do not determine it ([`Self::with_picture`]). None if parts are not aligned ([`Parts::aligned`](super::Parts::aligned)), or if too few points are resolved.
     ///
     /// # Errors
     /// As [`Self::inspect`].
@@ -70,7 +71,10 @@ impl Production {
         input: Input<'_>,
         strips: &mut Strips,
     ) -> Result<Option<Placed>, DecodeError> {
-        self.place_from(input, strips, None)
+        let placed = self.place_from(input, strips, None)?;
+        let steered = placed.as_ref();
+        let steered = steered.and_then(|placed| self.steer(input, placed, strips));
+        Ok(steered.or(placed))
     }
 
     /// As [`Self::place`], from a motion that is nearly right.

@@ -17,7 +17,8 @@
 //!    planes of features, the contours in them, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few
-//! points of each are kept: the motion is found from these, in the order of the rows.
+//! points of each are kept: the motion is found from these, in the order of the rows, and where
+//! they leave it open, by the picture without fringes (`steer`).
 //!
 //! What a stage has to know beforehand is worked out once, in a plan of its own: `Golden` (what all
 //! of them count from and compare with), `PhasePlan`, `Alignment`, `Gauges`, `ErrorBudget`. All
@@ -62,6 +63,7 @@ mod sections;
 mod spans;
 mod square_means;
 mod squares;
+mod steer;
 mod strip;
 mod uncertainty;
 
@@ -70,7 +72,7 @@ pub use decode::Input;
 pub use findings::{Findings, Missing, Skipped};
 pub use gauges::{Gauge, MAX_FEATURES, MAX_GAUGES, Unmeasurable};
 pub use maps::Maps;
-pub use pair::{Found, PairBuffers, PairPlaced, Picture};
+pub use pair::{PairBuffers, PairPlaced};
 pub use plan::{Parts, Production};
 pub use strip::Strips;
 pub use uncertainty::CalibrationError;

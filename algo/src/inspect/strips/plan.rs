@@ -12,7 +12,7 @@ use super::sections::Sections;
 use super::uncertainty::{CalibrationError, ErrorBudget};
 use crate::frame::SampleNoise;
 use crate::geometry::{Triangulator, Vector};
-use crate::inspect::align::Alignment;
+use crate::inspect::align::{Alignment, Picture};
 use crate::inspect::feature::Feature;
 use crate::inspect::largest::Largest;
 use crate::inspect::taught::Taught;
@@ -77,6 +77,8 @@ pub struct Production {
     pub(super) phase: PhasePlan,
     /// None where parts are taken to lie as taught.
     pub(super) alignment: Option<Alignment>,
+    /// None where the motion is found without it.
+    pub(super) picture: Option<Picture>,
     pub(super) gauges: Gauges,
     /// The planes of features as taught.
     pub(super) planes: Vec<Fit>,
@@ -178,6 +180,7 @@ impl Production {
             },
             golden,
             alignment,
+            picture: None,
             gauges,
         })
     }

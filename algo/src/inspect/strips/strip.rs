@@ -15,7 +15,7 @@ use super::sections::{SectionFit, SectionPoints, SectionSight};
 use super::spans::common;
 use super::squares::Squares;
 use super::squares::extreme::Extreme;
-use crate::inspect::align::{Alignment, FitBuffers, Sample};
+use crate::inspect::align::{Alignment, Coarse, FitBuffers, Sample};
 use crate::inspect::feature::{Cell, Sum};
 use crate::pipeline::{NO_OFFSET, PhaseMap};
 use alloc::vec::Vec;
@@ -32,6 +32,8 @@ pub struct Strips {
     /// Points of all strips that the part's motion is found from.
     pub(super) samples: Vec<Sample>,
     pub(super) fitting: FitBuffers,
+    /// The picture without fringes, from fine to coarse.
+    pub(super) pictures: Vec<Coarse>,
     pub(super) cells: CellBuffers,
     /// One per plane that a gauge needs.
     pub(super) fits: Vec<Fit>,

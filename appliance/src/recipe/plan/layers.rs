@@ -146,7 +146,7 @@ impl Plan {
     pub(super) fn modulation(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<Modulation>> {
         let run = self.runs.get(sequence)?;
         if let Some(pair) = &run.pair {
-            let buffers = pair.buffers.lock().unwrap_or_else(PoisonError::into_inner);
+            let buffers = pair.lock().unwrap_or_else(PoisonError::into_inner);
             return Some(buffers.phases().modulation.clone());
         }
         let production = &run.production;

@@ -33,7 +33,7 @@ use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
 use hal::frame::Frame;
-use run::{Pair, Prepared, Run, Shared};
+use run::{Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -127,9 +127,6 @@ impl Plan {
             mut arrays,
             ..
         } = recipe;
-        let two_frames = sequences
-            .iter()
-            .any(|sequence| sequence.kind == SequenceKind::TwoFrames);
         // Large arrays that production does not read.
         arrays.phase_function = Vec::new();
         let illumination = Illumination {
@@ -158,7 +155,7 @@ impl Plan {
         drop(shares);
         let golden_light = GoldenLight::of(&arrays, conditions.golden_offset_counts);
         let noise_counts = golden::even_noise(conditions.noise, &arrays);
-        let modulation = match two_frames {
+        let modulation = match demands.aligned {
             true => std::mem::take(&mut arrays.modulation),
             false => Vec::new(),
         };
@@ -366,9 +363,9 @@ impl Plan {
             None => Input::Frames(&views),
         };
         let production = &run.production;
-        if let Some(Pair { picture, buffers }) = &run.pair {
+        if let Some(buffers) = &run.pair {
             let mut buffers = buffers.lock().unwrap_or_else(PoisonError::into_inner);
-            let placed = production.place_pair(&views, picture.as_ref(), strips, &mut buffers);
+            let placed = production.place_pair(&views, strips, &mut buffers);
             laps.end(Stage::Alignment);
             let findings = placed.and_then(|PairPlaced { found, placed }| {
                 let input = (Input::Phases(buffers.phases()), Signal::None);

@@ -32,7 +32,7 @@ impl Plan {
             let mut laps = Laps::since(Instant::now());
             let mut strips = self.strips();
             let input = Input::Phases(&phases);
-            let placed = run.production.place(input, &mut strips);
+            let placed = run.production.place_rendered(&phases, &mut strips, motion);
             let maps = Maps {
                 heights: None,
                 deviation: farthest.is_some().then_some(&mut deviation[..]),

@@ -6,7 +6,7 @@ use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
-    Feature, Gauge, GoldenSignal, Largest, Levels, PairBuffers, Parts, Picture, Production, Taught,
+    Feature, Gauge, GoldenSignal, Largest, Levels, PairBuffers, Parts, Production, Taught,
     Unmeasurable,
 };
 use algo::pattern::{PhaseRange, Shot};
@@ -27,20 +27,12 @@ pub(super) struct Run {
     /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
-    /// Of two frames.
-    pub pair: Option<Pair>,
+    /// The buffers of two frames.
+    pub pair: Option<Mutex<PairBuffers>>,
     /// Memory for the levels that are decoded on arrival, allocated by the first cycle.
     pub arrived: Mutex<Option<Arrived>>,
     /// Bytes of its maps.
     pub bytes: usize,
-}
-
-/// What a run of two frames has beside the others.
-#[derive(Debug)]
-pub(super) struct Pair {
-    /// Golden's picture; none if it has no edges, and then every cycle falls back.
-    pub picture: Option<Picture>,
-    pub buffers: Mutex<PairBuffers>,
 }
 
 /// What all runs of a recipe share.
@@ -54,8 +46,8 @@ pub(super) struct Shared<'a> {
     pub window: Vec<Range<usize>>,
     pub noise_counts: f64,
     pub golden: GoldenNoise,
-    /// Golden's modulation in counts and how far the image of a part may be displaced, pixels: what
-    /// two frames need.
+    /// Golden's modulation in counts, empty where parts are not aligned, and how far the image of a
+    /// part may be displaced, pixels.
     pub picture: (Vec<f32>, f64),
     /// The names of the features, in their order.
     pub names: &'a [String],
@@ -261,16 +253,14 @@ impl Prepared {
         });
         let production = production.map_err(|error| refusal(error, shared))?;
         let (modulation, tolerance_px) = &shared.picture;
-        let pair = (kind == SequenceKind::TwoFrames).then(|| Pair {
-            picture: production.picture(modulation, *tolerance_px),
-            buffers: Mutex::new(production.pair_buffers()),
-        });
+        let production = production.with_picture(modulation, *tolerance_px);
+        let pair = (kind == SequenceKind::TwoFrames).then(|| production.pair_buffers());
         Ok(Run {
             kind,
             indices,
             bytes,
             production,
-            pair,
+            pair: pair.map(Mutex::new),
             arrived: Mutex::new(None),
         })
     }

@@ -1,6 +1,6 @@
 //! Measuring with a pair of frames, the fringe and its complement, about the golden part.
 //!
-//! 1. **picture** (`picture`): the mean of both frames has no fringes; its edges tell where the
+//! 1. **picture** (`align/picture.rs`): the mean of both frames has no fringes; its edges tell where the
 //!    part lies.
 //! 2. **expected** (`expected`): the phase that golden would have there.
 //! 3. **window** (`window`): half the difference is the fringe alone; fitted in a window about each
@@ -14,9 +14,7 @@
 //! alone, which is right for means over areas that are large against the window; means over smaller
 //! squares are less noisy (`shared`).
 
-mod coarse;
 mod expected;
-mod picture;
 mod place;
 pub(super) mod shared;
 mod solve;
@@ -24,7 +22,6 @@ mod sums;
 mod terms;
 mod window;
 
-pub use picture::{Found, Picture};
 pub use place::{PairBuffers, PairPlaced};
 
 #[cfg(test)]

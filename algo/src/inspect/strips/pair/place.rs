@@ -1,12 +1,10 @@
 //! How a part lies by a pair of frames, and its phases.
 
-use super::coarse::Coarse;
 use super::expected::Expectation;
-use super::picture::{Found, Picture};
 use super::terms::SIDE;
 use super::window::{BAND_ROWS, Band, Windows};
 use crate::frame::FrameView;
-use crate::inspect::align::{Alignment, Placed, Spot};
+use crate::inspect::align::{Alignment, Found, Placed, Spot};
 use crate::inspect::strips::decode::Input;
 use crate::inspect::strips::displaced::BlockNumbers;
 use crate::inspect::strips::plan::Production;
@@ -24,7 +22,6 @@ pub struct PairBuffers {
     phases: PhaseMap,
     /// Of each band of rows: the buffers of its windows, and the displacements along a row.
     bands: Vec<(Band, Vec<BlockNumbers>)>,
-    pictures: Vec<Coarse>,
 }
 
 impl PairBuffers {
@@ -59,26 +56,17 @@ impl Production {
             bands: (0..height.div_ceil(BAND_ROWS))
                 .map(|_| (Band::default(), blocks_of_row(width)))
                 .collect(),
-            pictures: Vec::new(),
         }
     }
 
-    /// Golden's picture, from its modulation in counts (row-major), for parts within `tolerance_px`
-    /// pixels. None where parts are not aligned, or the picture has no edges.
-    pub fn picture(&self, modulation: &[f32], tolerance_px: f64) -> Option<Picture> {
-        let centre = self.alignment.as_ref()?.centre;
-        let (triangulator, surface) = (&self.golden.triangulator, self.golden.cubics.surface());
-        Picture::new(triangulator, surface, modulation, centre, tolerance_px)
-    }
-
-    /// Finds how the part lies, and measures its phases into the buffers.
+    /// Finds how the part lies, from its picture on ([`Self::with_picture`]), and measures its phases
+    /// into the buffers.
     ///
     /// # Errors
     /// If the frames are not two of this size and bit depth.
     pub fn place_pair(
         &self,
         frames: &[FrameView<'_>],
-        picture: Option<&Picture>,
         strips: &mut Strips,
         buffers: &mut PairBuffers,
     ) -> Result<PairPlaced, DecodeError> {
@@ -91,8 +79,11 @@ impl Production {
         };
         let frames = [plus, minus];
         let triangulator = &self.golden.triangulator;
-        let found =
-            picture.and_then(|picture| picture.find(triangulator, frames, &mut buffers.pictures));
+        let shown = (self.phase.decoder.backend(), &frames[..]);
+        let found = self
+            .picture
+            .as_ref()
+            .and_then(|picture| picture.find(triangulator, shown, &mut strips.pictures));
         let motion = found.map(|found| found.motion);
         if let Some(motion) = &motion {
             strips.pose.displace(&self.golden, motion);
@@ -101,7 +92,10 @@ impl Production {
         if let Some(alignment) = &self.alignment {
             self.fit_pair(frames, pose, buffers, Some(alignment));
         }
-        let placed = self.place_from(Input::Phases(&buffers.phases), strips, motion)?;
+        let mut placed = self.place_from(Input::Phases(&buffers.phases), strips, motion)?;
+        if let Some(placed) = &mut placed {
+            placed.steered = found.is_some() && !placed.free.is_empty();
+        }
         if let Some(placed) = &placed {
             strips.pose.displace(&self.golden, &placed.motion);
         }

@@ -1,6 +1,11 @@
-//! The mean of a pair at a fraction of its resolution.
+//! The picture without fringes, the mean of frames, at a fraction of its resolution.
+//!
+//! Sums of samples are whole numbers below 2²⁴ and so exact; rows are summed in parallel, with the
+//! same bits for any number of threads.
 
 use crate::frame::{FrameView, Sample, Samples};
+use crate::pipeline::for_each_row;
+use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec::Vec;
 
 /// A picture at one scale.
@@ -13,37 +18,43 @@ pub struct Coarse {
 }
 
 impl Coarse {
-    /// Becomes the mean of a pair at half its resolution, in counts.
-    pub fn become_mean(&mut self, frames: [FrameView<'_>; 2]) {
-        self.clear(frames[0].width() / 2, frames[0].height() / 2);
-        for (v, row) in self.brightness.chunks_mut(self.width.max(1)).enumerate() {
+    /// Becomes the mean of frames of one size at half their resolution, in counts. There are 64 at
+    /// most.
+    pub fn become_mean(&mut self, backend: Backend, frames: &[FrameView<'_>]) {
+        let size = frames.first().map_or((0, 0), |f| (f.width(), f.height()));
+        self.resize(size.0 / 2, size.1 / 2);
+        let samples = (4 * frames.len()) as f32;
+        for_each_row(&mut self.brightness, self.width, |v, row| {
+            row.fill(0.0);
             for frame in frames {
                 for v in [2 * v, 2 * v + 1] {
                     match frame.row(v) {
-                        Samples::Eight(samples) => add(samples, row),
-                        Samples::Sixteen(samples) => add(samples, row),
+                        Samples::Eight(samples) => add_pairs(backend, samples, row),
+                        Samples::Sixteen(samples) => add_pairs(backend, samples, row),
                     }
                 }
             }
-        }
+            for sum in row {
+                *sum /= samples;
+            }
+        });
     }
 
     /// Becomes another one at half its resolution.
     pub fn become_half(&mut self, of: &Self) {
-        self.clear(of.width / 2, of.height / 2);
-        for (v, row) in self.brightness.chunks_mut(self.width.max(1)).enumerate() {
+        self.resize(of.width / 2, of.height / 2);
+        for_each_row(&mut self.brightness, self.width, |v, row| {
             let rows = &of.brightness[2 * v * of.width..][..2 * of.width];
             let (upper, lower) = rows.split_at(of.width);
             let (upper, lower) = (upper.as_chunks::<2>().0, lower.as_chunks::<2>().0);
             for ((out, [a, b]), [c, d]) in row.iter_mut().zip(upper).zip(lower) {
                 *out = (a + b + c + d) / 4.0;
             }
-        }
+        });
     }
 
-    fn clear(&mut self, width: usize, height: usize) {
+    fn resize(&mut self, width: usize, height: usize) {
         (self.width, self.height) = (width, height);
-        self.brightness.clear();
         self.brightness.resize(width * height, 0.0);
     }
 
@@ -64,9 +75,14 @@ impl Coarse {
     }
 }
 
-/// Adds an eighth of each two samples.
-fn add<T: Sample>(samples: &[T], row: &mut [f32]) {
-    for (sum, pair) in row.iter_mut().zip(samples.chunks_exact(2)) {
-        *sum += (pair[0].count() + pair[1].count()) as f32 / 8.0;
+back_end_entry! {
+    /// Adds each two samples to a sum.
+    fn add_pairs [T: Sample] = sum_pairs(samples: &[T], sums: &mut [f32])
+}
+
+#[inline(always)]
+fn sum_pairs<V: Lanes, T: Sample>(_: V, samples: &[T], sums: &mut [f32]) {
+    for (sum, [first, second]) in sums.iter_mut().zip(samples.as_chunks::<2>().0) {
+        *sum += (first.count() + second.count()) as f32;
     }
 }
