@@ -118,11 +118,15 @@ pub fn edge(
     search.solve(leaving(&bins), stated, from)
 }
 
-/// The bins behind the last that does not leave the line, as long as they fall ever more steeply.
+/// The bins from the first few that all leave the line, as long as they fall ever more steeply. Light
+/// ends along an edge, so the last may be too noisy to leave it.
 fn leaving(bins: &[Bin]) -> &[Bin] {
     let leaves = |bin: &Bin| bin.y > LEAVES * libm::sqrt(bin.variance);
-    let last = bins.iter().rposition(|bin| !leaves(bin));
-    let (from, behind) = last.map_or((0.0, bins), |last| (bins[last].x, &bins[last + 1..]));
+    let Some(first) = bins.windows(BINS).position(|run| run.iter().all(leaves)) else {
+        return &[];
+    };
+    let (before, behind) = bins.split_at(first);
+    let from = before.last().map_or(0.0, |bin| bin.x);
     let mut steepest = 0.0_f64;
     let flat = behind.iter().position(|bin| {
         let far = bin.x - from;

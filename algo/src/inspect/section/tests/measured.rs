@@ -9,7 +9,9 @@ const PIXELS: [f64; 2] = [0.145, 0.41];
 const FLOORS: [Option<(f64, f64)>; 4] =
     [None, Some((18.0, 1.0)), Some((13.0, 0.5)), Some((4.0, 0.5))];
 /// Placements of each floor.
-const PLACEMENTS: u64 = 24;
+const PLACEMENTS: u64 = 40;
+/// The first: none of them was looked at when the constants of the fit were chosen.
+const FIRST: u64 = 1000;
 const NAMES: [&str; 4] = ["gap", "flush", "left radius", "right radius"];
 /// σ of a stated radius, mm.
 const STATED: f64 = 0.03;
@@ -22,7 +24,9 @@ fn values(
 ) -> Result<[Value; 4], Unseen> {
     let mut request = joint.request();
     if stated {
-        request.edge_mm = joint.radii.map(Some);
+        let (left, right) = Chance::new(seed + 7).normal();
+        let [one, other] = joint.radii;
+        request.edge_mm = [Some(one + STATED * left), Some(other + STATED * right)];
     }
     let section = Section::new(&rendered.capture(seed, 1.0), &request, &joint.optics())?;
     let known = Knowledge {
@@ -42,7 +46,7 @@ fn values(
 /// Errors in µm over placements, the share inside U, and the share of sections that are measured.
 fn errors(pixel: f64, floor: Option<(f64, f64)>, stated: bool) -> ([Vec<f64>; 4], [f64; 4], f64) {
     let (mut all, mut inside): ([Vec<f64>; 4], _) = (Default::default(), [0.0; 4]);
-    for seed in 0..PLACEMENTS {
+    for seed in FIRST..FIRST + PLACEMENTS {
         let mut joint = Joint::draw(pixel, &mut Chance::new(seed));
         joint.floor = floor;
         let values = match values(&joint, &joint.rendered(), seed, stated) {
@@ -82,8 +86,11 @@ fn check(pixel: f64, stated: bool, most: [f64; 2], least: f64) {
                 NAMES[i],
                 inside[i]
             );
-            within += inside[i] * n;
-            count += n;
+            // A stated radius says nothing of what is measured.
+            if i < 2 || !stated {
+                within += inside[i] * n;
+                count += n;
+            }
             if i < 2 {
                 worst[i] = worst[i].max(bias.abs());
             }
