@@ -96,7 +96,7 @@ pub fn edge(
 ) -> Result<Edge, Why> {
     let all = zone.bins(|_, _, _| true);
     let connected = zone.connected(&all, optics);
-    let arc = leaving(&all[..connected]);
+    let arc = leaving(&all[..connected], optics.blur);
     let next = all.get(connected).zip(arc.last());
     let lit = next.is_some_and(|(next, last)| next.x - last.x < LIT * optics.blur);
     let search = Search {
@@ -115,18 +115,19 @@ pub fn edge(
     let [.., t, r] = first.parameters;
     let bins = zone.bins(|x, y, variance| search.is_near([t, r], (x, y), variance));
     let from = (!first.is_stated).then_some([t, r]);
-    search.solve(leaving(&bins), stated, from)
+    search.solve(leaving(&bins, optics.blur), stated, from)
 }
 
 /// The bins from the first few that all leave the line, as long as they fall ever more steeply. Light
 /// ends along an edge, so the last may be too noisy to leave it.
-fn leaving(bins: &[Bin]) -> &[Bin] {
+fn leaving(bins: &[Bin], blur: f64) -> &[Bin] {
     let leaves = |bin: &Bin| bin.y > LEAVES * libm::sqrt(bin.variance);
     let Some(first) = bins.windows(BINS).position(|run| run.iter().all(leaves)) else {
         return &[];
     };
     let (before, behind) = bins.split_at(first);
-    let from = before.last().map_or(0.0, |bin| bin.x);
+    // From a little before, so that the slopes of the first are not those of their noise.
+    let from = before.last().map_or(0.0, |bin| bin.x) - blur;
     let mut steepest = 0.0_f64;
     let flat = behind.iter().position(|bin| {
         let far = bin.x - from;

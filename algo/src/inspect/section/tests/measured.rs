@@ -10,7 +10,7 @@ const FLOORS: [Option<(f64, f64)>; 4] =
     [None, Some((18.0, 1.0)), Some((13.0, 0.5)), Some((4.0, 0.5))];
 /// Placements of each floor.
 const PLACEMENTS: u64 = 40;
-/// The first: none of them was looked at when the constants of the fit were chosen.
+/// The first: the constants of the fit were chosen on others.
 const FIRST: u64 = 1000;
 const NAMES: [&str; 4] = ["gap", "flush", "left radius", "right radius"];
 /// σ of a stated radius, mm.
