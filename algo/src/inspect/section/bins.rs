@@ -110,7 +110,7 @@ impl Zone<'_> {
             if !is_edge {
                 return at;
             }
-            deepest = deepest.max(bin.y);
+            deepest = deepest.max(bin.y - RISE * libm::sqrt(bin.variance));
             last = *bin;
         }
         bins.len()

@@ -2,22 +2,22 @@
 //!
 //! # Idea
 //! Heights near the rim are wrong: a pixel there averages the phase of a curved surface, and
-//! beyond the silhouette of a floor. The first is known from the profile itself and taken back
-//! ([`Rounded::blurred`]); how well decides what a height counts. The second is not known: rays
-//! that pass nearer to the silhouette than [`CLEAR`] blurs are left out, and what is still off the
-//! circle loses its weight (Tukey).
+//! beyond the silhouette of a floor. The first follows from the profile and is a part of what is
+//! fitted ([`Blurred`]); a share [`BLUR`] of it is uncertain. The second is not known: a height
+//! gets the variance that the floor's share of the pixel makes, less if no heights follow behind
+//! the edge, so that the floor is dark. What is still off the circle loses its weight (Tukey).
 //!
 //! # Stages
-//! The bins that are one surface and leave the line by more than 3 σ; the circle on which most of
-//! them lie, among radii in steps of a fifth; least squares about it, with δ anew in each of a few
-//! rounds; the same again from bins without the points that are off that circle.
+//! The bins that are one surface, leave the line by more than 3 σ and fall ever more steeply, which
+//! a floor does not; the circle on which most of them lie, among radii in steps of a fifth; least
+//! squares about it; the same from bins without the points that are off that circle.
 //!
 //! # Covariance
 //! With p the fitted of (t, r), ρ_i = N⁻¹ w_i j_i by how much a residual changes it, N = Σ w j jᵀ,
 //! and the line's parameters L,
 //!
 //! ```text
-//! ∂p/∂L = −Σ ρ_i ∂d_i/∂L = −G      C_p = Σ ρ_i ρ_iᵀ σ_i² + G C_L Gᵀ      C_pL = −G C_L
+//! ∂p/∂L = −Σ ρ_i ∂d_i/∂L = G      C_p = Σ ρ_i ρ_iᵀ σ_i² + G C_L Gᵀ      C_pL = G C_L
 //! ```
 
 use super::bins::{Bin, Zone};
@@ -35,17 +35,22 @@ const ARC: f64 = 30.0;
 const STATED_ARC: f64 = 10.0;
 /// A height leaves the line by more σ than this.
 const LEAVES: f64 = 3.0;
-/// A ray passes inside the silhouette by at least so many blurs.
-const CLEAR: f64 = 1.5;
-/// Least cosine of the angle between the surface's normal and the line of sight.
-const MIX: f64 = 1.0;
-const DARK: f64 = 0.1;
-const LIT: f64 = 6.0;
-const FACING: f64 = 0.3;
 /// The share of δ by which it is uncertain.
 pub const BLUR: f64 = 0.15;
 /// An edge falls, from where it leaves the line, at least at this share of its steepest slope.
 const STEEPER: f64 = 0.8;
+/// A bin of more variance than so many times that by noise is not seen well enough to count.
+const KNOWN: f64 = 3.0;
+/// What a lit floor adds to a height, mm: its share of the pixel times a turn's depth over 2π.
+const MIX: f64 = 1.0;
+/// The same of a floor too dark for heights.
+const DARK: f64 = 0.1;
+/// Heights follow within so many blurs behind an edge above a lit floor.
+const LIT: f64 = 6.0;
+/// The largest σ of a radius that is found, of it: above, several circles fit as pixels see them.
+const CERTAIN: f64 = 0.04;
+/// A ray that passes the circle farther away than this, in blurs, sees something else.
+const PASSES: f64 = 2.0;
 /// Fewest bins of an edge.
 const BINS: usize = 3;
 /// Radii that are looked for, mm, and their ratio.
@@ -57,8 +62,8 @@ const PLACES: f64 = 0.6;
 const OFF: f64 = 4.0;
 /// A point's residual beyond which it is left out of its bin, σ.
 const OUTSIDE: f64 = 5.0;
-/// Rounds of δ: each leaves less than a third of the error.
-const ROUNDS: usize = 5;
+/// Rounds of the weights that follow from the profile.
+const ROUNDS: usize = 3;
 /// A bin of less weight does not end the arc.
 const COUNTS: f64 = 0.1;
 
@@ -91,7 +96,7 @@ pub fn edge(
 ) -> Result<Edge, Why> {
     let all = zone.bins(|_, _, _| true);
     let connected = zone.connected(&all, optics);
-    let arc = leaving(&all[..connected]);
+    let arc = leaving(&all[..connected], optics.blur);
     let next = all.get(connected).zip(arc.last());
     let lit = next.is_some_and(|(next, last)| next.x - last.x < LIT * optics.blur);
     let search = Search {
@@ -106,17 +111,23 @@ pub fn edge(
     if arc.len() < BINS {
         return Err(Why::Edgeless);
     }
-    let first = search.solve(arc, stated)?;
+    let first = search.solve(arc, stated, None)?;
     let [.., t, r] = first.parameters;
     let bins = zone.bins(|x, y, variance| search.is_near([t, r], (x, y), variance));
-    search.solve(leaving(&bins), stated)
+    let from = (!first.is_stated).then_some([t, r]);
+    search.solve(leaving(&bins, optics.blur), stated, from)
 }
 
-/// The bins behind the last that does not leave the line, as long as they fall ever more steeply.
-fn leaving(bins: &[Bin]) -> &[Bin] {
+/// The bins from the first few that all leave the line, as long as they fall ever more steeply. Light
+/// ends along an edge, so the last may be too noisy to leave it.
+fn leaving(bins: &[Bin], blur: f64) -> &[Bin] {
     let leaves = |bin: &Bin| bin.y > LEAVES * libm::sqrt(bin.variance);
-    let last = bins.iter().rposition(|bin| !leaves(bin));
-    let (from, behind) = last.map_or((0.0, bins), |last| (bins[last].x, &bins[last + 1..]));
+    let Some(first) = bins.windows(BINS).position(|run| run.iter().all(leaves)) else {
+        return &[];
+    };
+    let (before, behind) = bins.split_at(first);
+    // From a little before, so that the slopes of the first are not those of their noise.
+    let from = before.last().map_or(0.0, |bin| bin.x) - blur;
     let mut steepest = 0.0_f64;
     let flat = behind.iter().position(|bin| {
         let far = bin.x - from;
@@ -137,11 +148,25 @@ struct Search<'a> {
 
 impl Search<'_> {
     /// The edge by the radius that is found, or the stated one if too little of the arc is seen.
-    fn solve(&self, bins: &[Bin], stated: Option<f64>) -> Result<Edge, Why> {
-        let found = self.with(bins, None);
+    fn solve(
+        &self,
+        bins: &[Bin],
+        stated: Option<f64>,
+        from: Option<[f64; 2]>,
+    ) -> Result<Edge, Why> {
+        let found = self.with(bins, None, from);
+        let found = found.and_then(|edge| {
+            let (r, sigma) = (edge.parameters[3], libm::sqrt(edge.covariance[3][3]));
+            let uncertain = Why::Uncertain { sigma, r };
+            if sigma <= CERTAIN * r {
+                Ok(edge)
+            } else {
+                Err(uncertain)
+            }
+        });
         let enough = found.is_ok_and(|edge| edge.arc.to_degrees() >= ARC);
         let (edge, needs) = match stated {
-            Some(r) if !enough => (self.with(bins, Some(r))?, STATED_ARC),
+            Some(r) if !enough => (self.with(bins, Some(r), None)?, STATED_ARC),
             _ => (found?, ARC),
         };
         let degrees = edge.arc.to_degrees();
@@ -155,8 +180,9 @@ impl Search<'_> {
         }
     }
 
-    fn with(&self, bins: &[Bin], stated: Option<f64>) -> Result<Edge, Why> {
-        let mut p = self.start(bins, stated).ok_or(Why::NotRound)?;
+    fn with(&self, bins: &[Bin], stated: Option<f64>, from: Option<[f64; 2]>) -> Result<Edge, Why> {
+        let start = from.or_else(|| self.start(bins, stated));
+        let mut p = start.ok_or(Why::NotRound)?;
         let (mut points, mut seen) = (Vec::new(), Vec::new());
         let mut ratios = Vec::new();
         for _ in 0..ROUNDS {
@@ -165,7 +191,7 @@ impl Search<'_> {
                 let arc = seen.iter().map(|seen| seen.arc).fold(0.0, f64::max);
                 return Err(Why::ShortArc {
                     degrees: arc.to_degrees(),
-                    needs: ARC,
+                    needs: if stated.is_some() { STATED_ARC } else { ARC },
                     stated: stated.is_some(),
                 });
             }
@@ -215,13 +241,6 @@ impl Search<'_> {
                 square.min(OFF * OFF) + libm::log(point.variance / seen.noise)
             });
             let cost = missing + costs.sum::<f64>();
-            #[cfg(test)]
-            if tests_truth().is_some() {
-                std::println!(
-                    "r {r:.3} t {t:.3} cost {cost:.2} of {} missing {missing}",
-                    bins.len()
-                );
-            }
             if best.is_none_or(|(least, _)| cost < least) {
                 best = Some((cost, [t, r]));
             }
@@ -249,7 +268,7 @@ impl Search<'_> {
             let leak = self.mix * 0.5 * libm::erfc(inside * core::f64::consts::FRAC_1_SQRT_2);
             let Some(hit) = self.rounded.hit(p, bin.x, bin.y) else {
                 missed += libm::log(1.0 + leak * leak / bin.variance)
-                    + if inside < -2.0 { OFF * OFF } else { 1.0 };
+                    + if inside < -PASSES { OFF * OFF } else { 1.0 };
                 continue;
             };
             let off = self.seen.distance(&p, bin.x, bin.y) + hit.way;
@@ -282,8 +301,6 @@ impl Search<'_> {
 
     /// The edge with its covariance.
     fn edge(&self, p: [f64; 2], points: &[Point], seen: &[Seen], is_stated: bool) -> Option<Edge> {
-        let h = self.line.stretch();
-        let a = self.line.slope;
         let mut normal = Normal::<2>::default();
         let rates = |point: &Point| self.rates(p, point);
         for point in points {
@@ -316,7 +333,7 @@ impl Search<'_> {
                 }
                 blurred[2 + i] += row_i * BLUR * seen.off;
             }
-            if point.weight > COUNTS && point.variance < 10.0 * seen.noise {
+            if point.weight > COUNTS && point.variance < KNOWN * seen.noise {
                 arc = arc.max(seen.arc);
             }
         }
@@ -341,7 +358,6 @@ impl Search<'_> {
             true => [0.0, 0.0, by[0][2], 1.0],
             false => [0.0; 4],
         };
-        let _ = (h, a);
         let edge = Edge {
             parameters: [self.line.height, self.line.slope, p[0], p[1]],
             covariance,
@@ -390,11 +406,4 @@ struct Seen {
     way: f64,
     /// Where on the arc, rad from the tangent point.
     arc: f64,
-}
-
-#[cfg(test)]
-std::thread_local! { pub static TRUTH: core::cell::Cell<Option<[f64; 2]>> = const { core::cell::Cell::new(None) }; }
-#[cfg(test)]
-fn tests_truth() -> Option<[f64; 2]> {
-    TRUTH.with(|t| t.get())
 }

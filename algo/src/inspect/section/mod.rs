@@ -15,6 +15,10 @@
 //! `edge` fits the circle by `profile` with what pixels average of it, `geometry` has gap, flush and
 //! radius, and `inputs` their uncertainty. `reason` says why a section is not measured.
 //!
+//! # Accuracy
+//! `tests/measured.rs`: radii of 1 to 2 mm, gaps of 2 to 6 mm, at 0.145 mm per px and, where the
+//! radius is stated, at 0.41.
+//!
 //! # Units
 //! mm along the section (s) and of height (z), mm², rad.
 

@@ -18,8 +18,8 @@
 //! δ = ∫ g (n·l) λ(ξ) dξ / ∫ g (n·l) dξ − λ(0)        g: normal density of σ = blur
 //! ```
 //!
-//! is by how much it sees the surface elsewhere. Its part beyond the silhouette is dark or a floor:
-//! the integral leaves it out.
+//! is by how much it sees the surface elsewhere. The integral ends at the silhouette, beyond which
+//! is nothing or a floor.
 
 use crate::math::associate::Distance;
 

@@ -52,6 +52,13 @@ pub enum Why {
     Edgeless,
     /// What leaves the line is no circle's arc that is tangent to it.
     NotRound,
+    /// Pixels are too coarse or too few to tell the edge's radius.
+    Uncertain {
+        /// σ of the radius by noise, mm.
+        sigma: f64,
+        /// The radius, mm.
+        r: f64,
+    },
     /// Too little of the edge is seen.
     ShortArc {
         /// The arc that is seen, °.
@@ -105,6 +112,11 @@ impl fmt::Display for Unseen {
             Why::NotRound => write!(
                 f,
                 "what is seen of the {side} edge is not an arc tangent to its stretch"
+            ),
+            Why::Uncertain { sigma, r } => write!(
+                f,
+                "the radius of the {side} edge is {r:.2} mm with a σ of {sigma:.2} mm, too much \
+                 to say where it ends: state edge_mm"
             ),
             Why::ShortArc {
                 degrees,
