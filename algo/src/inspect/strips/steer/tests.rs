@@ -358,7 +358,6 @@ fn a_picture_without_edges_or_of_another_part_steers_nothing() {
     let with = with.with_picture(&head.modulation(&PLATE), AWAY);
     let other = Plate {
         holes: OTHERS,
-        half: (30.0, 36.0),
         ..PLATE
     };
     for plate in [BLANK, other] {
