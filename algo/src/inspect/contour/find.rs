@@ -17,11 +17,11 @@ use core::f64::consts::TAU;
 /// Blur of the camera that is looked for, σ in px.
 const BLUR: [f64; 2] = [0.3, 2.5];
 /// With which the search begins.
-const FIRST_BLUR: f64 = 0.6;
+const FIRST_BLUR: f64 = 0.45;
 /// Rounds at most.
 const ROUNDS: usize = 12;
 /// Less movement of any place of the contour ends the search, px: the next is a twentieth of it.
-const STILL: f64 = 0.015;
+const STILL: f64 = 0.02;
 /// The same for the change of the blur, px.
 const SHARP: f64 = 0.05;
 /// After less movement, px, pieces are judged by their noise.
@@ -98,7 +98,12 @@ pub fn find<const N: usize>(
     let mut search = Search {
         shape,
         signals: Signals::new(view, setup),
-        room: Room { pieces: Pieces::default(), moved: f64::INFINITY, seen: Vec::new(), ratios: Vec::new() },
+        room: Room {
+            pieces: Pieces::default(),
+            moved: f64::INFINITY,
+            seen: Vec::new(),
+            ratios: Vec::new(),
+        },
     };
     let about = (shape, expected);
     if let Some(start) = start(about, &search.signals, pixel, &mut search.room.ratios) {
@@ -142,7 +147,11 @@ impl<S, V: View> Search<'_, S, V> {
         S: Shape<N>,
     {
         let shape = self.shape;
-        let (mut rough, mut some) = if is_near { (ROUGH[1], 1) } else { (ROUGH[0], SOME) };
+        let (mut rough, mut some) = if is_near {
+            (ROUGH[1], 1)
+        } else {
+            (ROUGH[0], SOME)
+        };
         for _ in 0..ROUNDS {
             let before = (contour.parameters, contour.blur);
             let room = &mut self.room;
