@@ -13,7 +13,7 @@
 //! (n·l)/(n_z·l) times as much as the face, n its normal, l the direction to the light.
 
 use super::shape::Shape;
-use super::view::Setup;
+use super::view::{Setup, View};
 use crate::geometry::Vector;
 
 /// The wall of a sheet as one piece of its rim shows it.
@@ -43,6 +43,21 @@ impl Wall {
             turns: thickness * setup.turns_per_mm,
         })
     }
+}
+
+/// By how much the phase of a floor that is seen at a place of the plane is larger than the plane's
+/// there, turns of ratio 1; `None` if its depth is not known or nothing tells.
+pub fn floor_phase(view: &impl View, setup: &Setup, (x, y): (f64, f64)) -> Option<f64> {
+    let floor = setup.floor?;
+    let (right, up) = slope(setup.camera, x, y);
+    // Where the light that reaches the floor passes the plane.
+    let (u, v) = (x - floor * right, y - floor * up);
+    let (lamp, share) = (setup.projector, floor / (setup.projector.z + floor));
+    let phase = |x: f64, y: f64| {
+        let (u, v) = view.pixel(x, y)?;
+        Some(view.spot(u, v)?.phase)
+    };
+    Some(phase(u + (lamp.x - u) * share, v + (lamp.y - v) * share)? - phase(x, y)?)
 }
 
 /// How wide the shadow between an edge and a floor is seen at a place with this unit vector into the

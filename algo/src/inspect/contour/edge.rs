@@ -254,7 +254,9 @@ mod tests {
 
     #[test]
     fn derivatives_are_those_of_the_profile() {
-        const STEP: f64 = 1e-4;
+        // The step's error is of second order, and that of Φ is divided by the step.
+        const STEP: f64 = 5e-3;
+        const TOLERANCE: f64 = 2e-4;
         let normal = (0.6, 0.8);
         for (sigma, d) in [(0.3, 0.2), (0.6, -0.8), (1.5, 1.3)] {
             let edge = Edge::new(normal, sigma);
@@ -268,7 +270,7 @@ mod tests {
             let wider = Edge::new(normal, sigma + STEP).at(d);
             let widening = rate(wider, Edge::new(normal, sigma - STEP).at(d));
             for (found, is) in at.along(d, &edge).iter().zip(along) {
-                assert!((found - is).abs() < 1e-6);
+                assert!((found - is).abs() < TOLERANCE);
             }
             // Those of moment and spread are left out, and the heat equation holds for the whole
             // series only.

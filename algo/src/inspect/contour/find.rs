@@ -17,11 +17,11 @@ use core::f64::consts::TAU;
 /// Blur of the camera that is looked for, σ in px.
 const BLUR: [f64; 2] = [0.3, 2.5];
 /// With which the search begins.
-const FIRST_BLUR: f64 = 0.6;
+const FIRST_BLUR: f64 = 0.45;
 /// Rounds at most.
 const ROUNDS: usize = 12;
 /// Less movement of any place of the contour ends the search, px: the next is a twentieth of it.
-const STILL: f64 = 0.015;
+const STILL: f64 = 0.02;
 /// The same for the change of the blur, px.
 const SHARP: f64 = 0.05;
 /// After less movement, px, pieces are judged by their noise.

@@ -21,8 +21,8 @@
 //!
 //! M is where in a pixel the material lies, S how far it spreads: a pixel that the edge cuts has
 //! its phase at the middle of its share, and averages over less of the fringe than a whole one. The
-//! levels of a floor differ in phase, so that of a n, i k M has ⟨r a⟩ for r a, which pixels beyond
-//! the edge show. Of a wall a whole pixel averages over another phase than of the face, which is the real exponent. ⟨⟩
+//! levels of a floor differ in phase, so that what changes its phase, i k M and its own gradient
+//! beyond the plane's, has ⟨r a⟩ for r a, which pixels beyond the edge show. Of a wall a whole pixel averages over another phase than of the face, which is the real exponent. ⟨⟩
 //! is the mean over levels; elsewhere the levels' mean of r stands for it.
 //!
 //! # Shapes and units
@@ -45,6 +45,11 @@ const STEP: f64 = 1.0;
 /// A smaller step is the last, and is taken without looking again, px: what it leaves is of second
 /// order.
 const SMALL: f64 = 0.03;
+
+/// Largest χ² per degree of freedom.
+pub const CHI_SQUARE: f64 = 3.0;
+/// What light may be off the model, of the material's, until other places are looked at.
+const ODD: f64 = 0.05;
 
 /// What one pixel sees at one place of the edge, and how that changes with e and with σ: each of
 /// material and of background.
@@ -103,6 +108,16 @@ impl<V: View> Problem<'_, V> {
     /// The best place of the edge; `None` if nothing determines it.
     pub fn solve(&self, seen: &mut Vec<Seen>) -> Option<Fit> {
         let mut best = self.at(0.0, seen)?;
+        // A narrow shadow is deeper than the edge beside it, so that the least squares are several.
+        if best.cost > CHI_SQUARE * (best.freedom + ODD * ODD * best.strength) {
+            for edge in [-1.0, 1.0] {
+                if let Some(other) = self.at(edge, seen)
+                    && other.cost < best.cost
+                {
+                    best = other;
+                }
+            }
+        }
         for _ in 0..12 {
             let step = (best.right[0] / best.matrix[0]).clamp(-STEP, STEP);
             if !step.is_finite() {
@@ -141,20 +156,23 @@ impl<V: View> Problem<'_, V> {
                 continue;
             }
             count += 1.0;
-            power += pixel.light.square();
             let d = pixel.d - edge;
             let border = pixel.border - pixel.follow.max(0.0) * edge;
-            if d >= reach {
+            power += if d >= reach {
                 equations.mm += 1.0;
                 equations.right[0] += pixel.light;
+                pixel.light.square()
             } else if border.max(d + wall) <= -reach {
+                let light = pixel.light + self.shifted(pixel, Complex::default(), rated);
                 equations.nn += 1.0;
-                equations.right[1] += pixel.light;
+                equations.right[1] += light;
+                light.square()
             } else {
                 let seen = self.seen(pixel, d, border, rated);
                 equations.add(&seen);
                 buffer.push(seen);
-            }
+                seen.light.square()
+            };
         }
         equations.lift(RIDGE * count);
         let scale = equations.scale()?;
@@ -211,6 +229,14 @@ impl<V: View> Problem<'_, V> {
         (count > 0.0).then(|| sum * (1.0 / count))
     }
 
+    /// What the levels' sum of background lacks to be a times its share, which is less than 1 by
+    /// `less`.
+    fn shifted(&self, pixel: &Pixel, less: Complex, rated: Option<Complex>) -> Complex {
+        let ramp = TAU * self.signals.ratio * self.piece.ramp;
+        let angle = less.im - ramp * pixel.d * (1.0 - less.re);
+        rated.unwrap_or_default() * Complex::new(0.0, angle)
+    }
+
     /// What a pixel at this distance from the edge, and at this one from another border of the
     /// background, sees.
     fn seen(&self, pixel: &Pixel, d: f64, border: f64, rated: Option<Complex>) -> Seen {
@@ -240,8 +266,7 @@ impl<V: View> Problem<'_, V> {
                 (less, follow, widens) = (whole, along * -pixel.follow, wider);
             }
         }
-        let shifted = rated.map(|rated| rated * Complex::new(0.0, less.im));
-        let background = match shifted {
+        let background = match rated {
             Some(_) => real(1.0 - less.re),
             None => real(1.0) - less,
         };
@@ -249,7 +274,7 @@ impl<V: View> Problem<'_, V> {
             whole: [material, background],
             along: [along, follow * -1.0],
             wider: [wider, -widens],
-            light: pixel.light + shifted.unwrap_or_default(),
+            light: pixel.light + self.shifted(pixel, less, rated),
         };
         if let Some(wall) = &self.piece.wall {
             self.add_wall(wall, d, profile, &mut seen);

@@ -1,6 +1,6 @@
 //! A contour in pieces of about two pixels, each with the pixels across it.
 
-use super::beyond::{Wall, border, shadow};
+use super::beyond::{Wall, border, floor_phase, shadow};
 use super::complex::Complex;
 use super::sample::Signals;
 use super::shape::{Foot, Shape};
@@ -55,6 +55,8 @@ pub struct Piece {
     pub normal: (f64, f64),
     /// By how much the plane's phase changes along d, turns of ratio 1 per px.
     pub gradient: f64,
+    /// By how much more a floor's phase changes along d, turns of ratio 1 per px; 0 if not known.
+    pub ramp: f64,
     /// The wall, if it is seen; its width in px.
     pub wall: Option<Wall>,
     /// How wide a shadow lies between the edge and a floor, px per mm of the floor's depth; 0 or
@@ -103,6 +105,10 @@ impl Pieces {
         let count = count.clamp(1, (columns * rows).max(1));
         self.all.clear();
         self.pixels.clear();
+        let ramp = ramp(
+            signals,
+            &[0.0, 0.5].map(|share| shape.foot(p, share * length)),
+        );
         for number in 0..count {
             let foot = shape.foot(p, length * (number as f64 + 0.5) / count as f64);
             let start = self.pixels.len();
@@ -114,11 +120,13 @@ impl Pieces {
                 scale: pixel,
                 normal: (1.0, 0.0),
                 gradient: 0.0,
+                ramp: 0.0,
                 wall: None,
                 shadow: 0.0,
                 pixels: start..start,
             };
             if let Some(middle) = piece.orient(signals) {
+                piece.ramp = dot(ramp, foot.normal) * piece.scale;
                 let half = length / count as f64 / 2.0;
                 piece.gather(middle, half, signals, &mut self.pixels);
                 piece.pixels.end = self.pixels.len();
@@ -237,6 +245,21 @@ impl Piece {
             }
         }
     }
+}
+
+/// By how much more the phase of a floor changes than the plane's, between two places of a contour,
+/// turns of ratio 1 per mm along x and y; 0 where it is not known.
+fn ramp(signals: &Signals<'_, impl View>, [one, other]: &[Foot; 2]) -> (f64, f64) {
+    let (x, y) = ((one.x + other.x) / 2.0, (one.y + other.y) / 2.0);
+    let phase = |x, y| floor_phase(signals.view, signals.setup, (x, y));
+    let change = |dx: f64, dy: f64| {
+        let (less, more) = (phase(x - dx, y - dy)?, phase(x + dx, y + dy)?);
+        Some(more - less)
+    };
+    (
+        change(0.5, 0.0).unwrap_or(0.0),
+        change(0.0, 0.5).unwrap_or(0.0),
+    )
 }
 
 /// The whole numbers below `end` that lie within a range about a place.

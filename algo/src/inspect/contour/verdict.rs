@@ -1,14 +1,12 @@
 //! What became of a piece of a contour, and of all of them.
 
 use super::complex::Complex;
-use super::fit::{Fit, Problem};
+use super::fit::{CHI_SQUARE, Fit, Problem};
 use super::piece::BAND;
 use super::view::View;
 
 /// Fewest pixels of a piece.
 const PIXELS: usize = 8;
-/// Largest χ² per degree of freedom.
-const CHI_SQUARE: f64 = 3.0;
 /// An edge this near to the border of the band is not inside it, px.
 const MARGIN: f64 = 1.5;
 /// Largest σ of an edge, px: more means that there is no contrast.

@@ -11,9 +11,9 @@ use crate::pattern::{PhaseFunction, Sequence, Shot};
 use crate::phase::Decoder;
 use crate::pipeline::{HeightCubics, KnownSurface, arrive, for_each_row};
 use crate::units::{AbsolutePhase, Height, Modulation};
+use alloc::sync::Arc;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
-use std::sync::Arc;
 use std::vec;
 use std::vec::Vec;
 

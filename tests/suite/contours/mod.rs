@@ -1,0 +1,196 @@
+//! Holes, slots and edges of plates of the simulated head, against the truth, over many placements.
+
+mod line;
+mod plates;
+
+use appliance::station::Verdict;
+use line::{Judged, Line};
+use plates::{Setting, plate};
+use sim::parts::{Defect, Floor, Plate};
+use tests::random::Random;
+
+/// Placements of a plate.
+const PLACEMENTS: usize = 12;
+
+fn bright(plate: Plate) -> Plate {
+    let floor = Floor {
+        albedo: 1.0,
+        ..Floor::default()
+    };
+    Plate { floor, ..plate }
+}
+
+fn thick(plate: Plate) -> Plate {
+    let thickness_mm = 1.0;
+    Plate {
+        thickness_mm,
+        ..plate
+    }
+}
+
+/// The settings that a row of the promise names, with the largest bias in µm.
+fn settings() -> Vec<(&'static str, Setting, f64)> {
+    let plain = Setting::default();
+    let of = |plate: Plate| Setting {
+        plate,
+        ..plain.clone()
+    };
+    let all = Setting {
+        plate: bright(thick(plate())),
+        blur: [0.5, 1.0],
+        ambient: 0.2,
+        thickness_mm: Some(1.0),
+        ..plain.clone()
+    };
+    vec![
+        ("plain", plain.clone(), 8.0),
+        (
+            "1 mm thick",
+            Setting {
+                thickness_mm: Some(1.0),
+                ..of(thick(plate()))
+            },
+            20.0,
+        ),
+        (
+            "real optics",
+            Setting {
+                blur: [0.5, 1.0],
+                ..plain.clone()
+            },
+            20.0,
+        ),
+        ("bright floor", of(bright(plate())), 35.0),
+        (
+            "ambient light",
+            Setting {
+                ambient: 0.2,
+                ..plain.clone()
+            },
+            20.0,
+        ),
+        ("all together", all.clone(), 35.0),
+        (
+            "tilted",
+            Setting {
+                tilt_deg: 12.0,
+                thickness_mm: Some(1.0),
+                ..of(thick(plate()))
+            },
+            30.0,
+        ),
+        (
+            "tilted, thickness not told",
+            Setting {
+                tilt_deg: -12.0,
+                thickness_mm: None,
+                ..of(thick(plate()))
+            },
+            60.0,
+        ),
+        (
+            "quiet",
+            Setting {
+                noise: None,
+                ..plain
+            },
+            8.0,
+        ),
+    ]
+}
+
+#[test]
+fn holes_slots_and_edges_are_true_and_as_uncertain_as_they_say() {
+    let mut judged = Judged::default();
+    Line::new(&Setting::default()).judge("plain", PLACEMENTS, &mut judged);
+    let [scatter, within, _] = judged.figures();
+    assert_eq!(judged.missing, 0);
+    assert!(judged.bias <= 8.0, "{}", judged.bias);
+    assert!((0.8..1.2).contains(&scatter), "{scatter}");
+    assert!(within >= 0.93, "{within}");
+}
+
+#[test]
+#[ignore = "minutes"]
+fn contours_are_true_with_thick_sheets_bright_floors_real_optics_and_tilts() {
+    let mut wrong = Vec::new();
+    for (name, setting, most) in settings() {
+        let mut judged = Judged::default();
+        Line::new(&setting).judge(name, PLACEMENTS, &mut judged);
+        let [scatter, within, _] = judged.figures();
+        let good = judged.bias <= most && (0.7..1.3).contains(&scatter) && within >= 0.93;
+        if !good || judged.missing > 0 {
+            wrong.push((name, judged.bias, scatter, within, judged.missing));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+#[test]
+fn a_closed_hole_is_absent_and_changes_nothing_else() {
+    let mut line = Line::new(&Setting::default());
+    let mut random = Random::new(9);
+    for at in 0..4 {
+        let lies = line.setting.placement((at > 0).then_some(&mut random));
+        let closed: &[usize] = if at % 2 == 0 { &[1] } else { &[0, 2] };
+        let mut plate = line.setting.plate.clone();
+        line.bed.stage.reseed(7);
+        let open = line.inspect(plate.clone(), &lies);
+        plate.defects = closed
+            .iter()
+            .map(|&index| Defect::MissingHole { index })
+            .collect();
+        line.bed.stage.reseed(7);
+        let found = line.inspect(plate, &lies);
+        assert_eq!(found.verdict(), Verdict::Fail, "{:?}", found.reason);
+        let names: Vec<String> = closed.iter().map(|at| format!("hole {}", at + 1)).collect();
+        for (((gauge, _), found), open) in line.gauges.iter().zip(&found.gauges).zip(&open.gauges) {
+            let datum = ["sheet", "hole 1", "hole 2"].map(String::from);
+            let datum = datum.iter().filter(|_| gauge.datum.is_some());
+            let is_of_closed = gauge.of.iter().chain(datum).any(|of| names.contains(of));
+            assert_eq!(
+                found.decision.absent, is_of_closed,
+                "{} {found:?}",
+                gauge.name
+            );
+            if let (Some(value), Some(open), Some(sigma)) = (found.value, open.value, open.sigma) {
+                let change = (value - open).abs();
+                assert!(
+                    change <= 2.0 * sigma,
+                    "{}: {change} of σ {sigma}",
+                    gauge.name
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_displaced_hole_and_a_larger_one_fail_and_good_plates_pass() {
+    let mut line = Line::with_limits(&Setting::default(), |gauge, truth| {
+        (gauge.low, gauge.high) = (Some(truth - 0.06), Some(truth + 0.06));
+        if gauge.datum.is_some() && gauge.name == "position" {
+            (gauge.low, gauge.high) = (None, Some(0.3));
+        }
+    });
+    let mut random = Random::new(11);
+    for at in 0..6 {
+        let lies = line.setting.placement((at > 0).then_some(&mut random));
+        let good = line.setting.plate.clone();
+        let verdict = |line: &mut Line, defects: Vec<Defect>| {
+            let plate = Plate {
+                defects,
+                ..good.clone()
+            };
+            let found = line.inspect(plate, &lies);
+            (found.verdict(), found.reason.clone())
+        };
+        assert_eq!(verdict(&mut line, vec![]), (Verdict::Pass, None));
+        let (index, radius) = (2, good.holes[2].radius + 0.05);
+        let larger = verdict(&mut line, vec![Defect::HoleRadius { index, radius }]);
+        assert_eq!(larger.0, Verdict::Fail, "{larger:?}");
+        let (dx, dy) = (0.1, 0.0);
+        let displaced = verdict(&mut line, vec![Defect::DisplacedHole { index: 3, dx, dy }]);
+        assert_eq!(displaced.0, Verdict::Fail, "{displaced:?}");
+    }
+}
