@@ -64,7 +64,7 @@ pub fn associate<const N: usize>(
             *p += step;
             largest = largest.max(libm::fabs(step));
         }
-        if largest < 1e-7 {
+        if largest < 3e-6 {
             break;
         }
     }

@@ -5,14 +5,15 @@
 //! A point z below the plane that is seen at x of the plane lies below x − z v, v = (C − x)/C_z
 //! with the camera's centre C. A floor at depth D is seen and lit at x if four points lie in the
 //! opening: x; x − t v, where the line of sight leaves the sheet of thickness t; and the places
-//! where light on its way to the floor enters the sheet and leaves it. So the signed distance of
-//! the border of the background is the largest of the contour's distances of these points.
+//! where light on its way to the floor enters the sheet and leaves it. So the background has the
+//! contour's border and others, whose distances are the contour's at these points; the largest
+//! counts. Borders that face each other take from the background what lies beyond each.
 //!
 //! The wall is seen where x − t v lies on the material, over t (−∇d · v) of the plane. It is lit
 //! (n·l)/(n_z·l) times as much as the face, n its normal, l the direction to the light.
 
 use super::shape::Shape;
-use super::view::Setup;
+use super::view::{Setup, View};
 use crate::geometry::Vector;
 
 /// The wall of a sheet as one piece of its rim shows it.
@@ -44,6 +45,21 @@ impl Wall {
     }
 }
 
+/// By how much the phase of a floor that is seen at a place of the plane is larger than the plane's
+/// there, turns of ratio 1; `None` if its depth is not known or nothing tells.
+pub fn floor_phase(view: &impl View, setup: &Setup, (x, y): (f64, f64)) -> Option<f64> {
+    let floor = setup.floor?;
+    let (right, up) = slope(setup.camera, x, y);
+    // Where the light that reaches the floor passes the plane.
+    let (u, v) = (x - floor * right, y - floor * up);
+    let (lamp, share) = (setup.projector, floor / (setup.projector.z + floor));
+    let phase = |x: f64, y: f64| {
+        let (u, v) = view.pixel(x, y)?;
+        Some(view.spot(u, v)?.phase)
+    };
+    Some(phase(u + (lamp.x - u) * share, v + (lamp.y - v) * share)? - phase(x, y)?)
+}
+
 /// How wide the shadow between an edge and a floor is seen at a place with this unit vector into the
 /// material, mm on the plane per mm of the floor's depth; below 0 if the light reaches under the
 /// edge.
@@ -52,19 +68,19 @@ pub fn shadow(setup: &Setup, (x, y): (f64, f64), into: (f64, f64)) -> f64 {
     into.0 * (lit.0 - seen.0) + into.1 * (lit.1 - seen.1)
 }
 
-/// The signed distance, mm, of the border of the background as seen at (x, y) of the plane, and the
-/// place on the plane whose distance that is.
-pub fn background<const N: usize>(
+/// The signed distance, mm, of what borders the background beside the contour, as seen at (x, y) of
+/// the plane, and the place on the plane whose distance that is; `None` if there is nothing.
+pub fn border<const N: usize>(
     (shape, p): (&impl Shape<N>, &[f64; N]),
     setup: &Setup,
     thickness: f64,
     (x, y): (f64, f64),
-) -> (f64, (f64, f64)) {
-    let mut largest = (shape.distance(p, x, y), (x, y));
+) -> Option<(f64, (f64, f64))> {
+    let mut largest = None;
     let mut also = |x: f64, y: f64| {
         let d = shape.distance(p, x, y);
-        if d > largest.0 {
-            largest = (d, (x, y));
+        if largest.is_none_or(|(largest, _)| d > largest) {
+            largest = Some((d, (x, y)));
         }
     };
     let (right, up) = slope(setup.camera, x, y);
@@ -74,9 +90,13 @@ pub fn background<const N: usize>(
     if let Some(floor) = setup.floor {
         let (x, y) = (x - floor * right, y - floor * up);
         let (lamp, height) = (setup.projector, setup.projector.z + floor);
-        for depth in [0.0, thickness] {
+        let mut lit = |depth: f64| {
             let share = (floor - depth) / height;
             also(x + (lamp.x - x) * share, y + (lamp.y - y) * share);
+        };
+        lit(0.0);
+        if thickness > 0.0 {
+            lit(thickness);
         }
     }
     largest

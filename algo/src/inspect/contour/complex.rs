@@ -18,15 +18,36 @@ impl Complex {
         Self { re, im }
     }
 
-    /// The number of length 1 at an angle in turns.
+    /// The number of length 1 at an angle in turns, |turns| < 2⁴⁰: Taylor's series about the nearest
+    /// quarter of a turn, within 2e-9.
     pub fn turned(turns: f64) -> Self {
-        let angle = TAU * turns;
-        Self::new(libm::cos(angle), libm::sin(angle))
+        // Added and taken away again, this rounds to whole numbers.
+        const WHOLE: f64 = 6_755_399_441_055_744.0;
+        let quarters = 4.0 * turns;
+        let whole = (quarters + WHOLE) - WHOLE;
+        let x = TAU / 4.0 * (quarters - whole);
+        let y = x * x;
+        let sin = y * (1.0 / 120.0 - y * (1.0 / 5_040.0 - y / 362_880.0));
+        let sin = x * (1.0 - y * (1.0 / 6.0 - sin));
+        let cos = y * (1.0 / 720.0 - y * (1.0 / 40_320.0 - y / 3_628_800.0));
+        let cos = 1.0 - y * (0.5 - y * (1.0 / 24.0 - cos));
+        // Casts keep to the range of their type.
+        match whole as i64 & 3 {
+            0 => Self::new(cos, sin),
+            1 => Self::new(-sin, cos),
+            2 => Self::new(-cos, -sin),
+            _ => Self::new(sin, -cos),
+        }
     }
 
     /// The conjugate.
     pub const fn conj(self) -> Self {
         Self::new(self.re, -self.im)
+    }
+
+    /// The scalar product of two numbers as vectors.
+    pub fn dot(self, other: Self) -> f64 {
+        self.re * other.re + self.im * other.im
     }
 
     /// The square of the length.
@@ -79,5 +100,20 @@ impl Mul<f64> for Complex {
     type Output = Self;
     fn mul(self, factor: f64) -> Self {
         Self::new(self.re * factor, self.im * factor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_turned_within_what_is_promised() {
+        for i in -4000..4000 {
+            let turns = f64::from(i) * 0.001_7;
+            let (found, angle) = (Complex::turned(turns), TAU * turns);
+            assert!((found.re - libm::cos(angle)).abs() < 2e-9, "{turns}");
+            assert!((found.im - libm::sin(angle)).abs() < 2e-9, "{turns}");
+        }
     }
 }

@@ -2,32 +2,39 @@
 //! and again about that, until nothing moves.
 
 use super::associate::{Point, associate, response};
+use super::complex::Complex;
 use super::edge::Edge;
-use super::fit::{Buffers, Fit, Problem};
-use super::piece::{BAND, Pieces, pixel_size};
-use super::sample::Samples;
+use super::fit::{Fit, Problem, Seen};
+use super::piece::{BAND, MARGIN, Pieces, pixel_size};
+use super::sample::Signals;
 use super::shape::Shape;
+use super::start::start;
 use super::verdict::{Outcome, State, state};
 use super::view::{Setup, View};
 use alloc::vec::Vec;
+use core::f64::consts::TAU;
 
 /// Blur of the camera that is looked for, σ in px.
 const BLUR: [f64; 2] = [0.3, 2.5];
 /// With which the search begins.
-const FIRST_BLUR: f64 = 0.6;
+const FIRST_BLUR: f64 = 0.45;
 /// Rounds at most.
 const ROUNDS: usize = 12;
-/// Less movement of any place of the contour ends the search, px.
-const STILL: f64 = 0.002;
-/// Less change of the blur ends the search, px.
-const SHARP: f64 = 0.02;
-/// After less movement, px, pieces are judged by their noise only.
-const NEAR: f64 = 0.02;
+/// Less movement of any place of the contour ends the search, px: the next is a twentieth of it.
+const STILL: f64 = 0.02;
 /// The same for the change of the blur, px.
-const SHARPER: f64 = 0.05;
+const SHARP: f64 = 0.05;
+/// After less movement, px, pieces are judged by their noise.
+const NEAR: f64 = 0.25;
+/// The same for the change of the blur, px: less than its largest step.
+const SHARPER: f64 = 0.29;
+/// Largest step of the blur, px.
+const STEP: f64 = 0.3;
+/// The first round looks at one of so many pieces.
+const SOME: usize = 2;
 /// What light may be off the model until the contour's place and the blur are known, of the
-/// material's.
-const ROUGH: f64 = 0.1;
+/// material's, and after that: an edge oblique to pixels and to fringes.
+const ROUGH: [f64; 2] = [0.1, 0.01];
 /// How far from the contour the material's phase is looked at, px.
 const FACE: [f64; 2] = [1.0, 4.0];
 /// A thickness, in widths of the band as seen head-on, that no wall of a sheet exceeds in the
@@ -71,38 +78,59 @@ pub fn find<const N: usize>(
     view: &impl View,
     setup: &Setup,
 ) -> Contour<N> {
-    let search = Search {
-        shape,
-        view,
-        setup,
-        expected,
+    let mut contour = Contour {
+        state: State::Unseen,
+        found: 0.0,
+        parameters: *expected,
+        covariance: [[0.0; N]; N],
+        blur: FIRST_BLUR,
+        pixel: 0.0,
+        points: Vec::new(),
+        outcomes: Vec::new(),
+        face: (0.0, f64::INFINITY),
+        wall: None,
     };
-    if let Some(thickness) = setup.thickness {
-        return search.run(thickness);
+    let middle = shape.foot(expected, 0.0);
+    let Some(pixel) = pixel_size(view, (middle.x, middle.y)) else {
+        return contour;
+    };
+    contour.pixel = pixel;
+    let mut search = Search {
+        shape,
+        signals: Signals::new(view, setup),
+        room: Room {
+            pieces: Pieces::default(),
+            moved: f64::INFINITY,
+            seen: Vec::new(),
+            ratios: Vec::new(),
+        },
+    };
+    let about = (shape, expected);
+    if let Some(start) = start(about, &search.signals, pixel, &mut search.room.ratios) {
+        contour.parameters = start;
     }
-    let mut thin = search.run(0.0);
-    let thick = search.run(THICK * BAND * thin.pixel);
-    if thin.state == State::Found && thick.state == State::Found {
-        let mut half = [0.0; N];
-        for ((half, thin), thick) in half
-            .iter_mut()
-            .zip(&mut thin.parameters)
-            .zip(thick.parameters)
-        {
-            *half = (thick - *thin) / 2.0;
-            *thin += *half;
+    search.run(&mut contour, setup.thickness.unwrap_or(0.0), false);
+    if setup.thickness.is_none() && contour.state == State::Found {
+        let mut thick = contour.clone();
+        search.run(&mut thick, THICK * BAND * pixel, true);
+        if thick.state == State::Found {
+            let mut half = [0.0; N];
+            let both = contour.parameters.iter_mut().zip(thick.parameters);
+            for (half, (thin, thick)) in half.iter_mut().zip(both) {
+                *half = (thick - *thin) / 2.0;
+                *thin += *half;
+            }
+            contour.wall = Some(half);
         }
-        thin.wall = Some(half);
     }
-    thin
+    contour
 }
 
 /// A search for a contour.
-struct Search<'a, const N: usize, S, V> {
+struct Search<'a, S, V> {
     shape: &'a S,
-    view: &'a V,
-    setup: &'a Setup,
-    expected: &'a [f64; N],
+    signals: Signals<'a, V>,
+    room: Room,
 }
 
 /// How the blur would have to change, from all pieces.
@@ -112,97 +140,77 @@ struct Sharpness {
     right: f64,
 }
 
-impl<const N: usize, S: Shape<N>, V: View> Search<'_, N, S, V> {
-    fn run(&self, thickness: f64) -> Contour<N> {
-        let mut contour = Contour {
-            state: State::Unseen,
-            found: 0.0,
-            parameters: *self.expected,
-            covariance: [[0.0; N]; N],
-            blur: FIRST_BLUR,
-            pixel: 0.0,
-            points: Vec::new(),
-            outcomes: Vec::new(),
-            face: (0.0, f64::INFINITY),
-            wall: None,
+impl<S, V: View> Search<'_, S, V> {
+    /// Goes on from where a contour is, until nothing moves.
+    fn run<const N: usize>(&mut self, contour: &mut Contour<N>, thickness: f64, is_near: bool)
+    where
+        S: Shape<N>,
+    {
+        let shape = self.shape;
+        let (mut rough, mut some) = if is_near {
+            (ROUGH[1], 1)
+        } else {
+            (ROUGH[0], SOME)
         };
-        let middle = self.shape.foot(self.expected, 0.0);
-        let Some(pixel) = pixel_size(self.view, (middle.x, middle.y)) else {
-            return contour;
-        };
-        contour.pixel = pixel;
-        let reach = self.setup.reach / pixel;
-        let about = (self.shape, self.expected);
-        let looked = (BAND + 2.0 * reach + 2.0) * pixel;
-        let samples = Samples::about(about, self.view, self.setup, looked);
-        let mut room = Room::default();
-        // The first time the edge may lie anywhere within reach.
-        let (mut reach, mut rough) = (reach, ROUGH);
         for _ in 0..ROUNDS {
             let before = (contour.parameters, contour.blur);
-            let limits = (reach, rough);
-            self.look(&mut contour, thickness, &samples, limits, &mut room);
-            let shape = self.shape;
+            let room = &mut self.room;
+            let of = (shape, &contour.parameters);
+            if !(room.moved < MARGIN) {
+                room.pieces.divide(of, &self.signals, contour.pixel);
+                room.moved = 0.0;
+            }
+            room.pieces.place(of, self.signals.setup, thickness);
+            self.look(contour, rough, some);
+            let room = &mut self.room;
             let points = &mut contour.points;
             let found = associate(shape, &mut contour.parameters, points, &mut room.ratios);
             let Some(covariance) = found else {
                 contour.parameters = before.0;
-                break;
+                if some == 1 {
+                    break;
+                }
+                some = 1;
+                continue;
             };
             contour.covariance = covariance;
             let mut moved = 0.0_f64;
-            for point in &contour.points {
-                let d = |p| shape.distance(p, point.x, point.y);
-                moved = moved.max(libm::fabs(d(&contour.parameters) - d(&before.0)));
+            for piece in &room.pieces.all {
+                let d = shape.distance(&contour.parameters, piece.foot.x, piece.foot.y);
+                moved = moved.max(libm::fabs(d) / contour.pixel);
             }
+            room.moved += moved;
             let sharper = libm::fabs(contour.blur - before.1);
-            let is_still = moved < STILL * pixel && sharper < SHARP;
-            if is_still && rough == 0.0 {
+            let is_last = rough == ROUGH[1] && some == 1;
+            if is_last && moved < STILL && sharper < SHARP {
                 break;
             }
-            if is_still || moved < NEAR * pixel && sharper < SHARPER {
-                rough = 0.0;
+            if moved < NEAR && sharper < SHARPER {
+                rough = ROUGH[1];
             }
-            reach = 0.0;
+            some = 1;
         }
-        self.judge(&mut contour);
-        contour
+        self.judge(contour);
     }
 
-    /// Divides the contour into pieces, fits their edges, makes points of them, and adapts the
-    /// blur.
-    fn look(
-        &self,
-        contour: &mut Contour<N>,
-        thickness: f64,
-        samples: &Samples,
-        (reach, rough): (f64, f64),
-        room: &mut Room,
-    ) {
-        let band = BAND + reach;
-        room.pieces.divide(
-            (self.shape, &contour.parameters),
-            self.view,
-            (self.setup, thickness),
-            samples,
-            (contour.pixel, band),
-        );
+    /// Fits the edges of one of `some` pieces, makes points of them, and adapts the blur.
+    fn look<const N: usize>(&mut self, contour: &mut Contour<N>, rough: f64, some: usize) {
         contour.points.clear();
         contour.outcomes.clear();
         let (mut sharpness, mut face) = (Sharpness::default(), [0.0; 2]);
-        for piece in &room.pieces.all {
+        let Room { pieces, seen, .. } = &mut self.room;
+        for piece in pieces.all.iter().step_by(some) {
             let problem = Problem {
                 piece,
-                pixels: &room.pieces.pixels[piece.pixels.clone()],
-                samples,
-                setup: self.setup,
-                blur: contour.blur,
+                pixels: &pieces.pixels[piece.pixels.clone()],
+                signals: &self.signals,
+                edge: Edge::new(piece.normal, contour.blur),
             };
             let fit = match problem.pixels.is_empty() {
                 true => None,
-                false => problem.solve(reach, &mut room.fit),
+                false => problem.solve(seen),
             };
-            let outcome = Outcome::of(&problem, fit.as_ref(), (band, rough));
+            let outcome = Outcome::of(&problem, fit.as_ref(), rough);
             contour.outcomes.push(outcome);
             if let Some(fit) = fit.filter(|_| outcome == Outcome::Accepted) {
                 sharpness.add(&fit);
@@ -215,7 +223,10 @@ impl<const N: usize, S: Shape<N>, V: View> Search<'_, N, S, V> {
     }
 
     /// Says what became of the contour.
-    fn judge(&self, contour: &mut Contour<N>) {
+    fn judge<const N: usize>(&self, contour: &mut Contour<N>)
+    where
+        S: Shape<N>,
+    {
         let mut points = contour.points.iter();
         for outcome in &mut contour.outcomes {
             if *outcome == Outcome::Accepted && points.next().is_none_or(|p| p.weight == 0.0) {
@@ -242,10 +253,11 @@ impl<const N: usize> Contour<N> {
 }
 
 /// Buffers of a search.
-#[derive(Default)]
 struct Room {
     pieces: Pieces,
-    fit: Buffers,
+    /// How far the contour has moved since its pieces' pixels were gathered, px.
+    moved: f64,
+    seen: Vec<Seen>,
     ratios: Vec<f64>,
 }
 
@@ -260,17 +272,17 @@ impl Sharpness {
         if !(self.matrix > 0.0) {
             return blur;
         }
-        let step = (self.right / self.matrix).clamp(-0.3, 0.3);
+        let step = (self.right / self.matrix).clamp(-STEP, STEP);
         (blur + step).clamp(BLUR[0], BLUR[1])
     }
 }
 
 /// The edge of a piece as a point of the plane. Blur moves what is seen of a curved edge towards
 /// its centre of curvature by κσ²/2, dark or bright.
-fn point(problem: &Problem<'_>, fit: &Fit) -> Point {
+fn point(problem: &Problem<'_, impl View>, fit: &Fit) -> Point {
     let piece = problem.piece;
     let (foot, scale) = (piece.foot, piece.scale);
-    let variance = Edge::new(piece.normal, problem.blur).variance();
+    let variance = problem.edge.variance();
     let off = fit.edge * scale + foot.curvature * variance * scale * scale / 2.0;
     Point {
         x: foot.x + off * foot.normal.0,
@@ -282,18 +294,19 @@ fn point(problem: &Problem<'_>, fit: &Fit) -> Point {
 
 /// Adds what the phase of the material next to the rim is off the plane's: the sum with weights
 /// one over the variance, and the weights.
-fn add_face(problem: &Problem<'_>, fit: &Fit, sums: &mut [f64; 2]) {
-    for (level, fringes) in problem.setup.levels.iter().enumerate() {
-        let variance = fringes.variance(problem.setup.noise);
-        for pixel in problem.pixels {
-            let d = pixel.d - fit.edge;
-            if (FACE[0]..FACE[1]).contains(&d) {
-                let light = problem.samples.light(pixel.sample, level);
-                let per_turn = core::f64::consts::TAU * fringes.ratio;
-                let weight = light.square() / variance * per_turn * per_turn;
-                sums[0] += weight * light.turns() / fringes.ratio;
-                sums[1] += weight;
-            }
+fn add_face(problem: &Problem<'_, impl View>, fit: &Fit, sums: &mut [f64; 2]) {
+    let (mut light, mut count) = (Complex::default(), 0.0);
+    for pixel in problem.pixels {
+        if (FACE[0]..FACE[1]).contains(&(pixel.d - fit.edge)) {
+            light += pixel.light;
+            count += 1.0;
         }
+    }
+    if count > 0.0 {
+        let per_turn = TAU * problem.signals.ratio;
+        let variance = count * problem.signals.variance;
+        let weight = light.square() / variance * per_turn * per_turn;
+        sums[0] += weight * light.turns() / problem.signals.ratio;
+        sums[1] += weight;
     }
 }

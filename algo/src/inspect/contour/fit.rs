@@ -3,9 +3,10 @@
 //! # Idea
 //! The demodulated light of a pixel is linear in what the pixel sees: its share of the material, of
 //! the wall of the sheet, and of the background. With the place e of the edge given, the complex
-//! brightness of material and background follow by linear least squares, level by level; what is
-//! left is one unknown, by Gauss–Newton on the projected residuals (G. Golub & V. Pereyra, SIAM J.
-//! Numer. Anal. 10, 1973, with the approximation of L. Kaufman, BIT 15, 1975).
+//! brightness of material and background follow by linear least squares; what is left is one
+//! unknown, by Gauss–Newton on the projected residuals (G. Golub & V. Pereyra, SIAM J. Numer. Anal.
+//! 10, 1973, with the approximation of L. Kaufman, BIT 15, 1975). Pixels that see one side only
+//! enter as sums.
 //!
 //! # Equations
 //! With F, M, S of [`super::edge`] at d − e, and k = 2π r times the gradient of the plane's phase
@@ -13,57 +14,51 @@
 //!
 //! ```text
 //! w = b (m + q W) + a n
-//! m = F + i k M − k² S / 2                material
-//! n = 1 − (the same at the background's border)
-//! W = Σ_j [F(d + s_j+1) − F(d + s_j)] e^{2πi r z_j / h}     the wall's slices
+//! m = G_k(d) = F + i k M − k² S / 2       material
+//! n = 1 − (the same at the nearest border of the background, or at two that face each other)
+//! W = ⟨e^{−iκd − (κ² − 2kκ) σ_t²/2} [G_k−κ(d + width) − G_k−κ(d)]⟩     wall, κ: its phase per px
 //! ```
 //!
 //! M is where in a pixel the material lies, S how far it spreads: a pixel that the edge cuts has
-//! its phase at the middle of its share, and averages over less of the fringe than a whole one.
+//! its phase at the middle of its share, and averages over less of the fringe than a whole one. The
+//! levels of a floor differ in phase, so that what changes its phase, i k M and its own gradient
+//! beyond the plane's, has ⟨r a⟩ for r a, which pixels beyond the edge show. Of a wall a whole pixel averages over another phase than of the face, which is the real exponent. ⟨⟩
+//! is the mean over levels; elsewhere the levels' mean of r stands for it.
 //!
 //! # Shapes and units
 //! e and distances in px of the picture along d. w in counts.
 
+use super::beyond::Wall;
 use super::complex::Complex;
 use super::edge::{Edge, Profile};
-use super::piece::{Piece, Pixel};
-use super::sample::Samples;
-use super::view::Setup;
+use super::piece::{BAND, Piece, Pixel};
+use super::sample::Signals;
+use super::view::View;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
 /// Share of the pixels' number that is added to a normal matrix's diagonal, so that a background
 /// that is not seen has no brightness.
-const RIDGE: f64 = 1e-7;
+const RIDGE: f64 = 1e-9;
 /// Largest step, px.
 const STEP: f64 = 1.0;
 /// A smaller step is the last, and is taken without looking again, px: what it leaves is of second
 /// order.
-const SMALL: f64 = 2e-3;
-/// Width of a slice of the wall, px.
-const SLICE: f64 = 0.5;
-/// Slices of the wall: more than the band is wide are not seen.
-const SLICES: f64 = 16.0;
+const SMALL: f64 = 0.03;
 
-/// How one border's share, moment and spread are, and change with e and with σ.
-type Parts = [[f64; 3]; 3];
+/// Largest χ² per degree of freedom.
+pub const CHI_SQUARE: f64 = 3.0;
+/// What light may be off the model, of the material's, until other places are looked at.
+const ODD: f64 = 0.05;
 
-/// What one pixel sees at one place of the edge.
+/// What one pixel sees at one place of the edge, and how that changes with e and with σ: each of
+/// material and of background.
 #[derive(Clone, Copy, Debug)]
-struct Seen {
-    material: Parts,
-    background: Parts,
-    sample: usize,
-}
-
-/// Buffers of a fit.
-#[derive(Clone, Debug, Default)]
-pub struct Buffers {
-    seen: Vec<Seen>,
-    /// Share of each slice of the wall at each pixel, and how it changes with e and with σ.
-    slices: Vec<[f64; 3]>,
-    /// m, n and w of one level.
-    basis: Vec<[Complex; 3]>,
+pub struct Seen {
+    whole: [Complex; 2],
+    along: [Complex; 2],
+    wider: [f64; 2],
+    light: Complex,
 }
 
 /// The fit at one place of the edge.
@@ -79,13 +74,13 @@ pub struct Fit {
     pub matrix: [f64; 3],
     /// Its right side.
     pub right: [f64; 2],
-    /// The least of the levels' brightness of the material, b's real part, counts.
+    /// The brightness of the material, b's real part, counts.
     pub material: f64,
-    /// The largest brightness of the background over the material's.
+    /// The brightness of the background over the material's.
     pub background: f64,
     /// What the cost would be if all of the material's light were left.
     pub strength: f64,
-    /// The largest angle of b, turns.
+    /// The angle of b, turns.
     pub off: f64,
 }
 
@@ -98,34 +93,30 @@ impl Fit {
 
 /// A piece that is fitted.
 #[derive(Clone, Copy, Debug)]
-pub struct Problem<'a> {
+pub struct Problem<'a, V> {
     /// The piece.
     pub piece: &'a Piece,
     /// Its pixels.
     pub pixels: &'a [Pixel],
-    /// What they saw.
-    pub samples: &'a Samples,
     /// Light and noise.
-    pub setup: &'a Setup,
-    /// σ of the camera's blur, px.
-    pub blur: f64,
+    pub signals: &'a Signals<'a, V>,
+    /// What its pixels see.
+    pub edge: Edge,
 }
 
-impl Problem<'_> {
-    /// The best place within `reach` px of the contour, looked for pixel by pixel first if that is
-    /// more than one; `None` if nothing determines it.
-    pub fn solve(&self, reach: f64, buffers: &mut Buffers) -> Option<Fit> {
-        let mut best = self.at(0.0, buffers)?;
-        let mut away = 1.0;
-        while away <= reach {
-            for edge in [-away, away] {
-                if let Some(other) = self.at(edge, buffers)
+impl<V: View> Problem<'_, V> {
+    /// The best place of the edge; `None` if nothing determines it.
+    pub fn solve(&self, seen: &mut Vec<Seen>) -> Option<Fit> {
+        let mut best = self.at(0.0, seen)?;
+        // A narrow shadow is deeper than the edge beside it, so that the least squares are several.
+        if best.cost > CHI_SQUARE * (best.freedom + ODD * ODD * best.strength) {
+            for edge in [-1.0, 1.0] {
+                if let Some(other) = self.at(edge, seen)
                     && other.cost < best.cost
                 {
                     best = other;
                 }
             }
-            away += 1.0;
         }
         for _ in 0..12 {
             let step = (best.right[0] / best.matrix[0]).clamp(-STEP, STEP);
@@ -134,15 +125,16 @@ impl Problem<'_> {
             }
             if libm::fabs(step) < SMALL {
                 best.edge += step;
+                best.cost -= step * step * best.matrix[0];
                 break;
             }
-            let (mut next, mut step) = (self.at(best.edge + step, buffers)?, step);
+            let (mut next, mut step) = (self.at(best.edge + step, seen)?, step);
             for _ in 0..3 {
                 if next.cost <= best.cost {
                     break;
                 }
                 step /= 4.0;
-                next = self.at(best.edge + step, buffers)?;
+                next = self.at(best.edge + step, seen)?;
             }
             if next.cost > best.cost {
                 break;
@@ -153,181 +145,186 @@ impl Problem<'_> {
     }
 
     /// The fit with the edge at `edge`.
-    fn at(&self, edge: f64, buffers: &mut Buffers) -> Option<Fit> {
-        let slices = self.look(edge, buffers);
-        let levels = self.setup.levels.len();
-        let count = self.pixels.len();
-        let mut fit = Fit {
-            edge,
-            freedom: (2 * count * levels) as f64 - (4 * levels) as f64 - 1.0,
-            material: f64::INFINITY,
-            ..Fit::default()
-        };
-        for level in 0..levels {
-            self.add_level(level, slices, buffers, &mut fit)?;
-        }
-        Some(fit)
-    }
-
-    /// Works out what each pixel sees; how many slices the wall has.
-    fn look(&self, at: f64, buffers: &mut Buffers) -> usize {
-        let edge = Edge::new(self.piece.normal, self.blur);
-        let parts = |d: f64, follow: f64| {
-            let profile = edge.at(d);
-            let Profile {
-                share,
-                moment,
-                spread,
-                ..
-            } = profile;
-            let along = profile.along(d, &edge).map(|part| -follow * part);
-            [[share, moment, spread], along, profile.widening(d, &edge)]
-        };
-        let (slices, width) = self.piece.wall.map_or((0, 0.0), |wall| {
-            let slices = libm::ceil(wall.width / SLICE).min(SLICES);
-            (slices as usize, (wall.width / slices).min(SLICE))
-        });
-        buffers.seen.clear();
-        buffers.slices.clear();
+    fn at(&self, edge: f64, buffer: &mut Vec<Seen>) -> Option<Fit> {
+        buffer.clear();
+        let reach = self.edge.reach();
+        let wall = self.piece.wall.map_or(0.0, |wall| wall.width);
+        let (mut equations, mut power, mut count) = (Equations::default(), 0.0, 0.0);
+        let rated = self.rated(edge);
         for pixel in self.pixels {
-            let d = pixel.d - at;
-            let material = parts(d, 1.0);
-            let border = pixel.d + pixel.behind - pixel.follow * at;
-            let background = match pixel.behind > 0.0 {
-                true => parts(border, pixel.follow),
-                false => material,
+            if libm::fabs(pixel.d) > BAND {
+                continue;
+            }
+            count += 1.0;
+            let d = pixel.d - edge;
+            let border = pixel.border - pixel.follow.max(0.0) * edge;
+            power += if d >= reach {
+                equations.mm += 1.0;
+                equations.right[0] += pixel.light;
+                pixel.light.square()
+            } else if border.max(d + wall) <= -reach {
+                let light = pixel.light + self.shifted(pixel, Complex::default(), rated);
+                equations.nn += 1.0;
+                equations.right[1] += light;
+                light.square()
+            } else {
+                let seen = self.seen(pixel, d, border, rated);
+                equations.add(&seen);
+                buffer.push(seen);
+                seen.light.square()
             };
-            let mut last = material;
-            for slice in 1..=slices {
-                let next = parts(d + width * slice as f64, 1.0);
-                buffers
-                    .slices
-                    .push([0, 1, 2].map(|i| next[i][0] - last[i][0]));
-                last = next;
-            }
-            buffers.seen.push(Seen {
-                material,
-                background,
-                sample: pixel.sample,
-            });
         }
-        slices
-    }
-
-    /// Adds a level's residuals and normal equations.
-    fn add_level(
-        &self,
-        level: usize,
-        slices: usize,
-        buffers: &mut Buffers,
-        fit: &mut Fit,
-    ) -> Option<()> {
-        let Buffers {
-            seen,
-            slices: all,
-            basis,
-        } = buffers;
-        let fringes = &self.setup.levels[level];
-        let k = TAU * fringes.ratio * self.piece.gradient;
-        let light = |part: [f64; 3]| Complex::new(part[0] - k * k / 2.0 * part[2], k * part[1]);
-        // The wall's light in each slice.
-        let mut walls = [Complex::default(); SLICES as usize];
-        if let Some(wall) = self.piece.wall {
-            let share = (SLICE / wall.width).min(1.0 / slices as f64);
-            for (slice, light) in walls.iter_mut().enumerate() {
-                let depth = share * (slice as f64 + 0.5);
-                *light = Complex::turned(fringes.ratio * wall.turns * depth) * wall.brightness;
-            }
-        }
-        let material = |at: usize, what: usize| {
-            let mut sum = light(seen[at].material[what]);
-            for (slice, wall) in all[at * slices..][..slices].iter().zip(&walls) {
-                sum += *wall * slice[what];
-            }
-            sum
-        };
-        let background = |at: usize, what: usize| {
-            let whole = if what == 0 { 1.0 } else { 0.0 };
-            Complex::new(whole, 0.0) - light(seen[at].background[what])
-        };
-        basis.clear();
-        let mut equations = Equations::default();
-        for (at, seen) in seen.iter().enumerate() {
-            let (m, n) = (material(at, 0), background(at, 0));
-            equations.add(m, n);
-            basis.push([m, n, self.samples.light(seen.sample, level)]);
-        }
-        equations.lift(RIDGE * seen.len() as f64);
-        let [b, a] = equations.solve(basis.iter().map(|&[m, n, w]| (m, n, w)))?;
-        let mut sums = [0.0; 6];
-        for (at, &[m, n, w]) in basis.iter().enumerate() {
-            let rest = w - b * m - a * n;
-            let [e, s] = [1, 2].map(|what| b * material(at, what) + a * background(at, what));
-            let dot = |x: Complex, y: Complex| x.re * y.re + x.im * y.im;
-            for (sum, term) in sums.iter_mut().zip([
-                rest.square(),
-                e.square(),
-                dot(e, s),
-                s.square(),
-                dot(e, rest),
-                dot(s, rest),
-            ]) {
+        equations.lift(RIDGE * count);
+        let scale = equations.scale()?;
+        let [b, a] = equations.solve(equations.right, scale);
+        let rest = power - b.dot(equations.right[0]) - a.dot(equations.right[1]);
+        // What material and background can take up of a change tells nothing of e and σ.
+        let (mut sums, mut taken) = ([0.0; 5], [[Complex::default(); 2]; 2]);
+        for seen in buffer.iter() {
+            let [m, n] = seen.whole;
+            let rest = seen.light - b * m - a * n;
+            let e = b * seen.along[0] + a * seen.along[1];
+            let s = b * seen.wider[0] + a * seen.wider[1];
+            let terms = [e.square(), e.dot(s), s.square(), e.dot(rest), s.dot(rest)];
+            for (sum, term) in sums.iter_mut().zip(terms) {
                 *sum += term;
             }
+            for (taken, change) in taken.iter_mut().zip([e, s]) {
+                taken[0] += m.conj() * change;
+                taken[1] += n.conj() * change;
+            }
         }
-        // What material and background can take up of a change tells nothing of e and σ.
-        let taken = |what: usize| {
-            let changes = basis
-                .iter()
-                .enumerate()
-                .map(|(at, &[m, n, _])| (m, n, b * material(at, what) + a * background(at, what)));
-            equations.project(changes)
+        let [e, s] = taken.map(|right| equations.solve(right, scale));
+        let product = |x: [Complex; 2], y: [Complex; 2]| x[0].dot(y[0]) + x[1].dot(y[1]);
+        let weight = 1.0 / self.signals.variance;
+        Some(Fit {
+            edge,
+            cost: weight * rest,
+            // Of two complex brightnesses and a place.
+            freedom: 2.0 * count - 5.0,
+            matrix: [
+                weight * (sums[0] - product(taken[0], e)),
+                weight * (sums[1] - product(taken[0], s)),
+                weight * (sums[2] - product(taken[1], s)),
+            ],
+            right: [weight * sums[3], weight * sums[4]],
+            material: b.re,
+            background: a.length() / b.length(),
+            strength: weight * b.square() * count,
+            off: libm::fabs(b.turns()),
+        })
+    }
+
+    /// The light of the background with each level times its share of the mean ratio; `None` if
+    /// no pixel sees it alone.
+    fn rated(&self, edge: f64) -> Option<Complex> {
+        let half = self.edge.reach() / 2.0;
+        let (mut sum, mut count) = (Complex::default(), 0.0);
+        for pixel in self.pixels {
+            if (-BAND..edge - half).contains(&pixel.d) && pixel.border < -half {
+                sum += pixel.rated;
+                count += 1.0;
+            }
+        }
+        (count > 0.0).then(|| sum * (1.0 / count))
+    }
+
+    /// What the levels' sum of background lacks to be a times its share, which is less than 1 by
+    /// `less`.
+    fn shifted(&self, pixel: &Pixel, less: Complex, rated: Option<Complex>) -> Complex {
+        let ramp = TAU * self.signals.ratio * self.piece.ramp;
+        let angle = less.im - ramp * pixel.d * (1.0 - less.re);
+        rated.unwrap_or_default() * Complex::new(0.0, angle)
+    }
+
+    /// What a pixel at this distance from the edge, and at this one from another border of the
+    /// background, sees.
+    fn seen(&self, pixel: &Pixel, d: f64, border: f64, rated: Option<Complex>) -> Seen {
+        let real = |re: f64| Complex::new(re, 0.0);
+        let light = |[share, moment, spread]: [f64; 3], gradient: f64| {
+            let k = TAU * self.signals.ratio * gradient;
+            Complex::new(share - k * k / 2.0 * spread, k * moment)
         };
-        let (e, s) = (taken(1)?, taken(2)?);
-        let weight = 1.0 / fringes.variance(self.setup.noise);
-        fit.cost += weight * sums[0];
-        fit.matrix[0] += weight * (sums[1] - e.of(&e));
-        fit.matrix[1] += weight * (sums[2] - e.of(&s));
-        fit.matrix[2] += weight * (sums[3] - s.of(&s));
-        fit.right[0] += weight * sums[4];
-        fit.right[1] += weight * sums[5];
-        fit.strength += weight * b.square() * basis.len() as f64;
-        fit.material = fit.material.min(b.re);
-        fit.background = fit.background.max(a.length() / b.length());
-        fit.off = fit.off.max(libm::fabs(b.turns()));
-        Some(())
+        let gradient = self.piece.gradient;
+        let profile = self.edge.at(d);
+        let material = light(profile.parts(), gradient);
+        // The derivatives with e are those with d, less.
+        let along = light(profile.along(d, &self.edge), gradient) * -1.0;
+        let wider = profile.widening(&self.edge);
+        // What the background loses, and how that changes.
+        let (mut less, mut follow, mut widens) = (material, along, wider);
+        let faces = pixel.follow < 0.0;
+        if border > d || faces {
+            let profile = self.edge.at(border);
+            let whole = light(profile.parts(), pixel.gradient);
+            let wider = profile.widening(&self.edge);
+            if faces {
+                less += whole;
+                widens += wider;
+            } else {
+                let along = light(profile.along(border, &self.edge), pixel.gradient);
+                (less, follow, widens) = (whole, along * -pixel.follow, wider);
+            }
+        }
+        let background = match rated {
+            Some(_) => real(1.0 - less.re),
+            None => real(1.0) - less,
+        };
+        let mut seen = Seen {
+            whole: [material, background],
+            along: [along, follow * -1.0],
+            wider: [wider, -widens],
+            light: pixel.light + self.shifted(pixel, less, rated),
+        };
+        if let Some(wall) = &self.piece.wall {
+            self.add_wall(wall, d, profile, &mut seen);
+        }
+        seen
+    }
+
+    /// Adds the light of the wall.
+    fn add_wall(&self, wall: &Wall, d: f64, near: Profile, seen: &mut Seen) {
+        let per_px = TAU * wall.turns / wall.width;
+        let k = self.signals.ratio * (TAU * self.piece.gradient - per_px);
+        let damping = per_px * (TAU * 2.0 * self.piece.gradient - per_px) / 2.0;
+        let damping = damping * self.edge.variance();
+        let turned = self.signals.sum(|ratio| {
+            Complex::turned(-ratio * per_px / TAU * d) * libm::exp(ratio * ratio * damping)
+        }) * wall.brightness;
+        let (edge, beyond) = (&self.edge, d + wall.width);
+        let far = edge.at(beyond);
+        let light = |far: [f64; 3], near: [f64; 3]| {
+            let [share, moment, spread] = [0, 1, 2].map(|i| far[i] - near[i]);
+            turned * Complex::new(share - k * k / 2.0 * spread, k * moment)
+        };
+        let whole = light(far.parts(), near.parts());
+        let along = light(far.along(beyond, edge), near.along(d, edge));
+        let phase = whole * Complex::new(0.0, self.signals.ratio * per_px);
+        seen.whole[0] += whole;
+        seen.along[0] += phase - along;
+        seen.wider[0] += turned.re * (far.widening(edge) - near.widening(edge));
     }
 }
 
-/// Normal equations of two complex unknowns.
+/// Normal equations of two complex unknowns, the brightness of material and of background.
 #[derive(Clone, Copy, Debug, Default)]
 struct Equations {
     mm: f64,
     nn: f64,
     /// Σ m̄ n.
     mn: Complex,
-}
-
-/// A vector's right side in the normal equations, and the solution.
-#[derive(Clone, Copy, Debug)]
-struct Projection {
+    /// Σ m̄ w and Σ n̄ w.
     right: [Complex; 2],
-    solution: [Complex; 2],
-}
-
-impl Projection {
-    /// The scalar product of two projected vectors.
-    fn of(&self, other: &Self) -> f64 {
-        let dot = |x: Complex, y: Complex| x.re * y.re + x.im * y.im;
-        dot(self.right[0], other.solution[0]) + dot(self.right[1], other.solution[1])
-    }
 }
 
 impl Equations {
-    fn add(&mut self, m: Complex, n: Complex) {
+    fn add(&mut self, seen: &Seen) {
+        let [m, n] = seen.whole;
         self.mm += m.square();
         self.nn += n.square();
         self.mn += m.conj() * n;
+        self.right[0] += m.conj() * seen.light;
+        self.right[1] += n.conj() * seen.light;
     }
 
     fn lift(&mut self, by: f64) {
@@ -335,26 +332,17 @@ impl Equations {
         self.nn += by;
     }
 
-    /// The least-squares solution for a vector, given with m and n.
-    fn project(&self, of: impl Iterator<Item = (Complex, Complex, Complex)>) -> Option<Projection> {
-        let mut right = [Complex::default(); 2];
-        for (m, n, w) in of {
-            right[0] += m.conj() * w;
-            right[1] += n.conj() * w;
-        }
+    /// One over the determinant; `None` if nothing determines the unknowns.
+    fn scale(&self) -> Option<f64> {
         let determinant = self.mm * self.nn - self.mn.square();
-        if !(determinant > 0.0) {
-            return None;
-        }
-        let scale = 1.0 / determinant;
-        let solution = [
-            (right[0] * self.nn - self.mn * right[1]) * scale,
-            (right[1] * self.mm - self.mn.conj() * right[0]) * scale,
-        ];
-        Some(Projection { right, solution })
+        (determinant > 0.0).then(|| 1.0 / determinant)
     }
 
-    fn solve(&self, of: impl Iterator<Item = (Complex, Complex, Complex)>) -> Option<[Complex; 2]> {
-        self.project(of).map(|found| found.solution)
+    /// The solution for a right side.
+    fn solve(&self, right: [Complex; 2], scale: f64) -> [Complex; 2] {
+        [
+            (right[0] * self.nn - self.mn * right[1]) * scale,
+            (right[1] * self.mm - self.mn.conj() * right[0]) * scale,
+        ]
     }
 }

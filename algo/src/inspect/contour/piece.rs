@@ -1,9 +1,10 @@
 //! A contour in pieces of about two pixels, each with the pixels across it.
 
-use super::beyond::{Wall, background, shadow};
-use super::sample::Samples;
+use super::beyond::{Wall, border, floor_phase, shadow};
+use super::complex::Complex;
+use super::sample::Signals;
 use super::shape::{Foot, Shape};
-use super::view::{Setup, View};
+use super::view::{Setup, Spot, View};
 use alloc::vec::Vec;
 use core::ops::Range;
 
@@ -11,18 +12,30 @@ use core::ops::Range;
 const LENGTH: f64 = 2.0;
 /// How far from the contour pixels are looked at, px.
 pub const BAND: f64 = 5.0;
+/// How far a contour may move until its pixels are gathered anew, px.
+pub const MARGIN: f64 = 0.25;
+/// By how much pieces overlap in the picture before their pixels are told apart on the plane, px.
+const OVERLAP: f64 = 0.1;
 
 /// A pixel of a piece.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixel {
-    /// Which of the samples.
-    pub sample: usize,
+    /// Column and row.
+    pub at: (usize, usize),
+    /// Where it looks.
+    pub spot: Spot,
+    /// w, the sum of levels.
+    pub light: Complex,
+    /// The same with each level times its share of the mean ratio.
+    pub rated: Complex,
     /// Signed distance from the contour, px.
     pub d: f64,
-    /// By how much larger that of the background's border is, px.
-    pub behind: f64,
-    /// By how much that border moves when the contour moves by 1 along d.
+    /// Signed distance from another border of the background, px; −∞ if there is none near.
+    pub border: f64,
+    /// The cosine between both.
     pub follow: f64,
+    /// By how much the plane's phase changes across that border, turns of ratio 1 per px.
+    pub gradient: f64,
 }
 
 /// A piece of a contour.
@@ -30,12 +43,20 @@ pub struct Pixel {
 pub struct Piece {
     /// Its middle.
     pub foot: Foot,
+    /// By how much d changes with u and with v, mm per px.
+    across: (f64, f64),
+    /// By how much the way along the contour changes with u and with v, mm per px.
+    along: (f64, f64),
+    /// By how much the plane's phase changes with u and with v, turns of ratio 1 per px.
+    phase: (f64, f64),
     /// mm per px along d.
     pub scale: f64,
     /// The unit vector along d in the picture (u, v).
     pub normal: (f64, f64),
     /// By how much the plane's phase changes along d, turns of ratio 1 per px.
     pub gradient: f64,
+    /// By how much more a floor's phase changes along d, turns of ratio 1 per px; 0 if not known.
+    pub ramp: f64,
     /// The wall, if it is seen; its width in px.
     pub wall: Option<Wall>,
     /// How wide a shadow lies between the edge and a floor, px per mm of the floor's depth; 0 or
@@ -52,8 +73,6 @@ pub struct Pieces {
     pub all: Vec<Piece>,
     /// The pixels of all, piece by piece.
     pub pixels: Vec<Pixel>,
-    /// Number and piece of each sample, a buffer.
-    order: Vec<(usize, usize)>,
 }
 
 /// mm per px in the picture at a place of the plane: the lengths of the sides of a pixel.
@@ -76,105 +95,215 @@ impl Pieces {
     pub fn divide<const N: usize>(
         &mut self,
         (shape, p): (&impl Shape<N>, &[f64; N]),
-        view: &impl View,
-        (setup, thickness): (&Setup, f64),
-        samples: &Samples,
-        (pixel, band): (f64, f64),
+        signals: &Signals<'_, impl View>,
+        pixel: f64,
     ) {
         let length = shape.length(p);
-        // Casts keep to the range of their type; a contour has fewer pieces than samples.
+        let (columns, rows) = signals.view.size();
+        // Casts keep to the range of their type; a contour has fewer pieces than the frame pixels.
         let count = (length / (LENGTH * pixel) + 0.5) as usize;
-        let count = count.clamp(1, samples.all.len().max(1));
-        self.order.clear();
-        for (at, sample) in samples.all.iter().enumerate() {
-            if libm::fabs(shape.distance(p, sample.x, sample.y)) > (band + 2.0) * pixel {
-                continue;
-            }
-            if let Some(along) = shape.along(p, sample.x, sample.y) {
-                let piece = (along / length * count as f64) as usize;
-                self.order.push((piece.min(count - 1), at));
-            }
-        }
-        self.order.sort_unstable();
+        let count = count.clamp(1, (columns * rows).max(1));
         self.all.clear();
         self.pixels.clear();
-        let mut next = 0;
+        let ramp = ramp(
+            signals,
+            &[0.0, 0.5].map(|share| shape.foot(p, share * length)),
+        );
         for number in 0..count {
             let foot = shape.foot(p, length * (number as f64 + 0.5) / count as f64);
-            let here = next;
-            while self.order.get(next).is_some_and(|of| of.0 == number) {
-                next += 1;
-            }
             let start = self.pixels.len();
             let mut piece = Piece {
                 foot,
+                across: (0.0, 0.0),
+                along: (0.0, 0.0),
+                phase: (0.0, 0.0),
                 scale: pixel,
                 normal: (1.0, 0.0),
                 gradient: 0.0,
+                ramp: 0.0,
                 wall: None,
                 shadow: 0.0,
                 pixels: start..start,
             };
-            if piece.orient(view, setup, thickness).is_some() {
-                for &(_, at) in &self.order[here..next] {
-                    let seen = Pixel::of((shape, p), (setup, thickness), samples, (at, &piece));
-                    if libm::fabs(seen.d) <= band {
-                        self.pixels.push(seen);
-                    }
-                }
+            if let Some(middle) = piece.orient(signals) {
+                piece.ramp = dot(ramp, foot.normal) * piece.scale;
+                let half = length / count as f64 / 2.0;
+                piece.gather(middle, half, signals, &mut self.pixels);
                 piece.pixels.end = self.pixels.len();
             }
             self.all.push(piece);
         }
     }
+
+    /// Moves pieces to a contour that has hardly moved, and works out the distances of their pixels.
+    pub fn place<const N: usize>(
+        &mut self,
+        of: (&impl Shape<N>, &[f64; N]),
+        setup: &Setup,
+        thickness: f64,
+    ) {
+        for piece in &mut self.all {
+            let Foot { x, y, normal, .. } = piece.foot;
+            let off = of.0.distance(of.1, x, y);
+            (piece.foot.x, piece.foot.y) = (x - off * normal.0, y - off * normal.1);
+            piece.wall = Wall::at(setup, thickness, (x, y), normal);
+            if let Some(wall) = &mut piece.wall {
+                wall.width /= piece.scale;
+            }
+            for pixel in &mut self.pixels[piece.pixels.clone()] {
+                pixel.place(of, (setup, thickness), piece);
+            }
+        }
+    }
 }
 
 impl Piece {
-    /// Works out how it lies in the picture; `None` if it is not seen.
-    fn orient(&mut self, view: &impl View, setup: &Setup, thickness: f64) -> Option<()> {
+    /// Works out how it lies in the picture, and where its middle does; `None` if it is not seen.
+    fn orient(&mut self, signals: &Signals<'_, impl View>) -> Option<(f64, f64)> {
         let Foot { x, y, normal, .. } = self.foot;
-        let [along_u, along_v] = frame(view, view.pixel(x, y)?)?;
-        let d = |(x, y, _): (f64, f64, f64)| normal.0 * x + normal.1 * y;
-        let rate = (d(along_u), d(along_v));
-        let square = rate.0 * rate.0 + rate.1 * rate.1;
-        if !(square > 0.0) {
-            return None;
+        let middle = signals.view.pixel(x, y)?;
+        let [along_u, along_v] = frame(signals.view, middle)?;
+        let part = |n: (f64, f64)| {
+            let of = |(x, y, _): (f64, f64, f64)| n.0 * x + n.1 * y;
+            (of(along_u), of(along_v))
+        };
+        self.across = part(normal);
+        self.along = part((-normal.1, normal.0));
+        self.phase = (along_u.2, along_v.2);
+        self.scale = libm::sqrt(dot(self.across, self.across));
+        self.normal = (self.across.0 / self.scale, self.across.1 / self.scale);
+        self.gradient = dot(self.normal, self.phase);
+        self.shadow = shadow(signals.setup, (x, y), normal) / self.scale;
+        (self.scale > 0.0).then_some(middle)
+    }
+
+    /// Gathers the pixels within the band that look at places nearest to it, `half` mm to each side.
+    fn gather(
+        &self,
+        middle: (f64, f64),
+        half: f64,
+        signals: &Signals<'_, impl View>,
+        pixels: &mut Vec<Pixel>,
+    ) {
+        let Foot {
+            x: x0,
+            y: y0,
+            normal,
+            curvature,
+        } = self.foot;
+        let (across, along) = (self.across, self.along);
+        let band = (BAND + MARGIN) * self.scale;
+        // Borders of pieces pass through the centre of curvature.
+        let half = match curvature > 0.0 {
+            true => libm::tan(half * curvature) / curvature,
+            false => half,
+        };
+        let overlap = OVERLAP * self.scale;
+        let wide = half * (1.0 + curvature * band) + overlap;
+        let determinant = libm::fabs(across.0 * along.1 - across.1 * along.0);
+        let tall = (libm::fabs(along.0) * band + libm::fabs(across.0) * wide) / determinant;
+        let (columns, rows) = signals.view.size();
+        for v in whole(middle.1, (-tall, tall), rows) {
+            let dv = v as f64 - middle.1;
+            // Where a row is within `reach` of a line.
+            let within = |rate: (f64, f64), reach: f64| {
+                let (one, other) = (
+                    (-reach - rate.1 * dv) / rate.0,
+                    (reach - rate.1 * dv) / rate.0,
+                );
+                (one.min(other), one.max(other))
+            };
+            let (d, t) = (within(across, band), within(along, wide));
+            let range = (d.0.max(t.0), d.1.min(t.1));
+            for u in whole(middle.0, range, columns) {
+                let du = u as f64 - middle.0;
+                let (d, t) = (across.0 * du + across.1 * dv, along.0 * du + along.1 * dv);
+                if libm::fabs(t) > half * (1.0 + curvature * d) + overlap {
+                    continue;
+                }
+                let Some(spot) = signals.view.spot(u as f64, v as f64) else {
+                    continue;
+                };
+                let (x, y) = (spot.x - x0, spot.y - y0);
+                let t = normal.0 * y - normal.1 * x;
+                let end = half * (1.0 + curvature * (normal.0 * x + normal.1 * y));
+                if !(-end..end).contains(&t) {
+                    continue;
+                }
+                if let Some([light, rated]) = signals.light((u, v), &spot) {
+                    pixels.push(Pixel {
+                        at: (u, v),
+                        spot,
+                        light,
+                        rated,
+                        d: 0.0,
+                        border: f64::NEG_INFINITY,
+                        follow: 1.0,
+                        gradient: 0.0,
+                    });
+                }
+            }
         }
-        self.scale = libm::sqrt(square);
-        self.normal = (rate.0 / self.scale, rate.1 / self.scale);
-        self.gradient = self.normal.0 * along_u.2 + self.normal.1 * along_v.2;
-        self.shadow = shadow(setup, (x, y), normal) / self.scale;
-        self.wall = Wall::at(setup, thickness, (x, y), normal);
-        if let Some(wall) = &mut self.wall {
-            wall.width /= self.scale;
-        }
-        Some(())
     }
 }
 
+/// By how much more the phase of a floor changes than the plane's, between two places of a contour,
+/// turns of ratio 1 per mm along x and y; 0 where it is not known.
+fn ramp(signals: &Signals<'_, impl View>, [one, other]: &[Foot; 2]) -> (f64, f64) {
+    let (x, y) = ((one.x + other.x) / 2.0, (one.y + other.y) / 2.0);
+    let phase = |x, y| floor_phase(signals.view, signals.setup, (x, y));
+    let change = |dx: f64, dy: f64| {
+        let (less, more) = (phase(x - dx, y - dy)?, phase(x + dx, y + dy)?);
+        Some(more - less)
+    };
+    (
+        change(0.5, 0.0).unwrap_or(0.0),
+        change(0.0, 0.5).unwrap_or(0.0),
+    )
+}
+
+/// The whole numbers below `end` that lie within a range about a place.
+fn whole(middle: f64, (low, high): (f64, f64), end: usize) -> Range<usize> {
+    // Casts cut off, and keep to the range of their type.
+    let after = |at: f64| ((middle + at).max(-1.0) + 1.0) as usize;
+    let (low, high) = (after(low), after(high));
+    low.min(end)..high.min(end)
+}
+
 impl Pixel {
-    fn of<const N: usize>(
+    fn place<const N: usize>(
+        &mut self,
         (shape, p): (&impl Shape<N>, &[f64; N]),
         (setup, thickness): (&Setup, f64),
-        samples: &Samples,
-        (sample, piece): (usize, &Piece),
-    ) -> Self {
-        let (x, y) = (samples.all[sample].x, samples.all[sample].y);
-        let d = shape.distance(p, x, y);
-        let (farther, at) = background((shape, p), setup, thickness, (x, y));
-        let mut follow = 1.0;
-        if farther > d {
-            // The step is along the contour's normal, so this is the cosine between both borders.
-            let step = 0.1 * piece.scale;
-            let (x, y) = piece.foot.normal;
+        piece: &Piece,
+    ) {
+        let (x, y) = (self.spot.x, self.spot.y);
+        self.d = shape.distance(p, x, y) / piece.scale;
+        self.border = f64::NEG_INFINITY;
+        let Some((border, at)) = border((shape, p), setup, thickness, (x, y)) else {
+            return;
+        };
+        if border < -BAND * piece.scale {
+            return;
+        }
+        // How the border's distance changes along the contour's normal, and along the contour.
+        let step = 1e-3 * piece.scale;
+        let change = |(x, y): (f64, f64)| {
             let ahead = shape.distance(p, at.0 + step * x, at.1 + step * y);
-            follow = ((ahead - farther) / step).clamp(0.0, 1.0);
-        }
-        Self {
-            sample,
-            d: d / piece.scale,
-            behind: (farther - d) / piece.scale,
-            follow,
-        }
+            (ahead - border) / step
+        };
+        let normal = piece.foot.normal;
+        let (n, t) = (change(normal), change((-normal.1, normal.0)));
+        let across = (
+            n * piece.across.0 + t * piece.along.0,
+            n * piece.across.1 + t * piece.along.1,
+        );
+        let scale = libm::sqrt(dot(across, across));
+        (self.border, self.follow) = (border / scale, n);
+        self.gradient = dot(across, piece.phase) / scale;
     }
+}
+
+fn dot(a: (f64, f64), b: (f64, f64)) -> f64 {
+    a.0 * b.0 + a.1 * b.1
 }

@@ -1,130 +1,77 @@
-//! The pixels about an expected contour, demodulated by the phase that the plane has at each.
+//! What a pixel tells of a contour: its light, demodulated by the phase that the plane has there.
 //!
+//! # Idea
 //! w = Z e^{−2πi r Φ̂}: light from the plane is real and positive, light from elsewhere has another
-//! phase, and light that is not projected has no Z.
+//! phase, and light that is not projected has no Z. Material is in phase in every level, so levels
+//! are added once per pixel, with weights N r over their sum: N is for the noise, r for coarse
+//! fringes, in which a floor hardly differs from the sheet.
 
 use super::complex::Complex;
-use super::shape::Shape;
-use super::view::{Setup, View};
+use super::view::{Fringes, Setup, Spot, View};
 use alloc::vec::Vec;
 
-/// Pixels of a side of the blocks that are looked at first.
-const BLOCK: usize = 8;
-
-/// A pixel whose signal is known.
-#[derive(Clone, Copy, Debug)]
-pub struct Sample {
-    /// Where it looks on the plane, x in mm.
-    pub x: f64,
-    /// y in mm.
-    pub y: f64,
+/// A view with what is known of its light.
+#[derive(Clone, Debug)]
+pub struct Signals<'a, V> {
+    /// The camera.
+    pub view: &'a V,
+    /// Light, material and camera.
+    pub setup: &'a Setup,
+    /// The weight of each level, 1 together.
+    weights: Vec<f64>,
+    /// The levels' mean ratio.
+    pub ratio: f64,
+    /// Variance of each part of the sum of levels, counts².
+    pub variance: f64,
 }
 
-/// Pixels about a contour.
-#[derive(Clone, Debug, Default)]
-pub struct Samples {
-    /// In rows of blocks, from the top left.
-    pub all: Vec<Sample>,
-    /// w of every level of every pixel.
-    light: Vec<Complex>,
-    levels: usize,
-}
-
-impl Samples {
-    /// The pixels that look at places within `reach` mm of a contour.
-    pub fn about<const N: usize>(
-        (shape, p): (&impl Shape<N>, &[f64; N]),
-        view: &impl View,
-        setup: &Setup,
-        reach: f64,
-    ) -> Self {
-        let mut samples = Self {
-            levels: setup.levels.len(),
-            ..Self::default()
+impl<'a, V: View> Signals<'a, V> {
+    /// Of this view.
+    pub fn new(view: &'a V, setup: &'a Setup) -> Self {
+        let weight = |of: &Fringes| of.shifts as f64 * of.ratio;
+        let whole: f64 = setup.levels.iter().map(weight).sum();
+        let weights: Vec<f64> = setup.levels.iter().map(|of| weight(of) / whole).collect();
+        let mut signals = Self {
+            view,
+            setup,
+            weights,
+            ratio: 0.0,
+            variance: 0.0,
         };
-        let Some((columns, rows)) = bounds((shape, p), view, reach) else {
-            return samples;
-        };
-        for top in rows.clone().step_by(BLOCK) {
-            for left in columns.clone().step_by(BLOCK) {
-                let (u, v) = (left as f64, top as f64);
-                let half = BLOCK as f64 / 2.0;
-                let middle = view.spot(u + half, v + half);
-                let near = middle.zip(view.spot(u, v)).is_none_or(|(middle, corner)| {
-                    // Half a diagonal, and a margin for perspective.
-                    let (x, y) = (middle.x - corner.x, middle.y - corner.y);
-                    let away = libm::fabs(shape.distance(p, middle.x, middle.y));
-                    away < reach + 1.5 * libm::sqrt(x * x + y * y)
-                });
-                if near {
-                    for v in top..(top + BLOCK).min(rows.end) {
-                        for u in left..(left + BLOCK).min(columns.end) {
-                            samples.add((shape, p), view, setup, (u, v), reach);
-                        }
-                    }
-                }
-            }
-        }
-        samples
+        signals.variance = signals.mean(|of| weight(of) / whole * of.variance(setup.noise));
+        signals.ratio = signals.mean(|of| of.ratio);
+        signals
     }
 
-    /// Adds a pixel if it looks near the contour and has a signal.
-    fn add<const N: usize>(
-        &mut self,
-        (shape, p): (&impl Shape<N>, &[f64; N]),
-        view: &impl View,
-        setup: &Setup,
-        (u, v): (usize, usize),
-        reach: f64,
-    ) {
-        let Some(spot) = view.spot(u as f64, v as f64) else {
-            return;
-        };
-        if libm::fabs(shape.distance(p, spot.x, spot.y)) > reach {
-            return;
-        }
-        let known = self.light.len();
-        for (level, fringes) in setup.levels.iter().enumerate() {
-            let Some(signal) = view.signal(u, v, level) else {
-                self.light.truncate(known);
-                return;
-            };
-            let back = Complex::turned(-fringes.ratio * spot.phase);
-            self.light.push(signal * back);
-        }
-        let (x, y) = (spot.x, spot.y);
-        self.all.push(Sample { x, y });
+    /// The weighted mean of something of levels.
+    pub fn mean(&self, of: impl Fn(&Fringes) -> f64) -> f64 {
+        let levels = self.weights.iter().zip(&self.setup.levels);
+        levels.map(|(weight, level)| weight * of(level)).sum()
     }
 
-    /// w of a level of a pixel.
-    pub fn light(&self, sample: usize, level: usize) -> Complex {
-        self.light[sample * self.levels + level]
+    /// The weighted mean of what levels of these ratios have.
+    pub fn sum(&self, of: impl Fn(f64) -> Complex) -> Complex {
+        let levels = self.weights.iter().zip(&self.setup.levels);
+        levels.fold(Complex::default(), |sum, (weight, level)| {
+            sum + of(level.ratio) * *weight
+        })
     }
-}
 
-/// Columns and rows of the frame about a contour; `None` if none of it is in the frame.
-fn bounds<const N: usize>(
-    (shape, p): (&impl Shape<N>, &[f64; N]),
-    view: &impl View,
-    reach: f64,
-) -> Option<(core::ops::Range<usize>, core::ops::Range<usize>)> {
-    const PLACES: u32 = 64;
-    let (width, height) = view.size();
-    let mut low = (f64::INFINITY, f64::INFINITY);
-    let mut high = (f64::NEG_INFINITY, f64::NEG_INFINITY);
-    for at in 0..=PLACES {
-        let foot = shape.foot(p, shape.length(p) * f64::from(at) / f64::from(PLACES));
-        for (x, y) in [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)] {
-            if let Some((u, v)) = view.pixel(foot.x + x * reach, foot.y + y * reach) {
-                low = (low.0.min(u), low.1.min(v));
-                high = (high.0.max(u), high.1.max(v));
-            }
+    /// The sum of levels of a pixel that looks at this spot, and the same with each times its share
+    /// of the mean ratio; `None` if one is overexposed.
+    pub fn light(&self, at: (usize, usize), spot: &Spot) -> Option<[Complex; 2]> {
+        let mut sums = [Complex::default(); 2];
+        for (level, weight) in self.weights.iter().enumerate() {
+            let light = self.level(at, spot, level)? * *weight;
+            sums[0] += light;
+            sums[1] += light * (self.setup.levels[level].ratio / self.ratio);
         }
+        Some(sums)
     }
-    // Casts cut off, and keep to the range of their type.
-    let range = |low: f64, high: f64, end: usize| {
-        let range = low.max(0.0) as usize..((high.max(-1.0) + 1.0) as usize).min(end);
-        (low.is_finite() && !range.is_empty()).then_some(range)
-    };
-    Some((range(low.0, high.0, width)?, range(low.1, high.1, height)?))
+
+    /// w of one level of such a pixel.
+    pub fn level(&self, (u, v): (usize, usize), spot: &Spot, level: usize) -> Option<Complex> {
+        let back = Complex::turned(-self.setup.levels[level].ratio * spot.phase);
+        Some(self.view.signal(u, v, level)? * back)
+    }
 }

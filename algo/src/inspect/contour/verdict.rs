@@ -1,13 +1,12 @@
 //! What became of a piece of a contour, and of all of them.
 
 use super::complex::Complex;
-use super::fit::{Fit, Problem};
+use super::fit::{CHI_SQUARE, Fit, Problem};
 use super::piece::BAND;
+use super::view::View;
 
 /// Fewest pixels of a piece.
 const PIXELS: usize = 8;
-/// Largest χ² per degree of freedom.
-const CHI_SQUARE: f64 = 3.0;
 /// An edge this near to the border of the band is not inside it, px.
 const MARGIN: f64 = 1.5;
 /// Largest σ of an edge, px: more means that there is no contrast.
@@ -64,9 +63,8 @@ pub enum State {
 }
 
 impl Outcome {
-    /// Of a piece that was looked for an edge within `band` px. Its light may be off the model by a
-    /// share `rough` of the material's.
-    pub fn of(problem: &Problem<'_>, fit: Option<&Fit>, (band, rough): (f64, f64)) -> Self {
+    /// Of a piece whose light may be off the model by a share `rough` of the material's.
+    pub fn of(problem: &Problem<'_, impl View>, fit: Option<&Fit>, rough: f64) -> Self {
         if problem.pixels.len() < PIXELS {
             return Self::Unseen;
         }
@@ -74,15 +72,15 @@ impl Outcome {
             return Self::edgeless(problem);
         };
         let is_sharp = fit.variance() <= SIGMA * SIGMA;
-        if !(is_sharp && libm::fabs(fit.edge) <= band - MARGIN) {
+        if !(is_sharp && libm::fabs(fit.edge) <= BAND - MARGIN) {
             Self::edgeless(problem)
-        } else if !(fit.material >= problem.setup.least && fit.off <= OFF) {
+        } else if !(fit.material >= problem.signals.setup.least && fit.off <= OFF) {
             Self::Dark
         } else if fit.cost > CHI_SQUARE * (fit.freedom + rough * rough * fit.strength) {
             Self::Disturbed
-        } else if problem.setup.floor.is_none()
+        } else if problem.signals.setup.floor.is_none()
             && fit.background > LIT
-            && problem.piece.shadow * problem.setup.deepest > NARROW
+            && problem.piece.shadow * problem.signals.setup.deepest > NARROW
         {
             Self::Shadowed
         } else {
@@ -91,25 +89,28 @@ impl Outcome {
     }
 
     /// Whether the material goes on: its light is on both sides as it was taught, in every level.
-    fn edgeless(problem: &Problem<'_>) -> Self {
-        for (level, fringes) in problem.setup.levels.iter().enumerate() {
+    fn edgeless(problem: &Problem<'_, impl View>) -> Self {
+        let (signals, setup) = (problem.signals, problem.signals.setup);
+        for (level, fringes) in setup.levels.iter().enumerate() {
             let (mut sums, mut counts) = ([Complex::default(); 2], [0.0; 2]);
             for pixel in problem.pixels {
                 if libm::fabs(pixel.d) < MIXED || libm::fabs(pixel.d) > BAND {
                     continue;
                 }
                 let side = usize::from(pixel.d > 0.0);
-                sums[side] += problem.samples.light(pixel.sample, level);
-                counts[side] += 1.0;
+                if let Some(light) = signals.level(pixel.at, &pixel.spot, level) {
+                    sums[side] += light;
+                    counts[side] += 1.0;
+                }
             }
             for (sum, count) in sums.iter().zip(counts) {
                 if count == 0.0 {
                     return Self::Unseen;
                 }
-                let noise = 2.0 * libm::sqrt(fringes.variance(problem.setup.noise) / count);
-                let least = (CONTINUES * fringes.taught - noise).max(problem.setup.least);
+                let noise = 2.0 * libm::sqrt(fringes.variance(setup.noise) / count);
+                let least = (CONTINUES * fringes.taught - noise).max(setup.least);
                 if sum.re / count < least {
-                    return match sum.re / count < problem.setup.least {
+                    return match sum.re / count < setup.least {
                         true => Self::Dark,
                         false => Self::Edgeless,
                     };

@@ -53,6 +53,12 @@ impl Shape<3> for Circle {
         }
     }
 
+    fn derivative(&self, &[cx, cy, _]: &[f64; 3], x: f64, y: f64) -> [f64; 3] {
+        let (x, y) = (x - cx, y - cy);
+        let away = libm::sqrt(x * x + y * y);
+        [-x / away, -y / away, -1.0]
+    }
+
     fn is_closed(&self) -> bool {
         true
     }

@@ -8,6 +8,8 @@ use std::vec::Vec;
 const BIAS_PX: f64 = 0.012;
 /// The same where a thick wall is seen and lit.
 const BIAS_WALL_PX: f64 = 0.018;
+/// Largest mean uncertainty over the root mean square of errors. 2 would be the least that holds.
+const WIDE: f64 = 3.5;
 const FLOOR: Option<(f64, f64)> = Some((18.0, 1.0));
 
 fn report(name: &str, scene: &Scene<'_>, r: f64, many: Many) -> Figures {
@@ -66,26 +68,28 @@ fn check(all: &[(f64, Figures)], bias: f64, rim: f64) {
     let mean = |of: fn(&Figures) -> f64| all.iter().map(|(_, f)| of(f)).sum::<f64>() / count;
     let scatter = mean(|f| f.scatter * f.scatter).sqrt();
     let within = mean(|f| f.within);
-    std::println!("together: scatter/σ {scatter:.2}, within U {within:.3}");
+    let wide = mean(|f| f.u) / mean(|f| f.error);
+    std::println!("together: scatter/σ {scatter:.2}, within U {within:.3}, U/error {wide:.1}");
     assert!((0.8..1.2).contains(&scatter), "{scatter}");
     assert!(within >= 0.93, "{within}");
+    assert!(wide <= WIDE, "{wide}");
 }
 
 #[test]
 fn holes_above_nothing() {
-    check(&cases("dark", 4, |_| {}), BIAS_PX, 0.95);
+    check(&cases("dark", 3, |_| {}), BIAS_PX, 0.95);
 }
 
 #[test]
 fn holes_in_a_thick_sheet_before_a_real_lens() {
     let change = |scene: &mut Scene<'_>| (scene.thickness, scene.blur) = (1.0, 0.5);
-    check(&cases("1 mm, blur", 4, change), BIAS_PX, 0.95);
+    check(&cases("1 mm, blur", 3, change), BIAS_PX, 0.95);
 }
 
 #[test]
 fn holes_above_a_floor_as_bright_as_the_sheet() {
     let change = |scene: &mut Scene<'_>| scene.floor = FLOOR;
-    check(&cases("bright", 4, change), BIAS_PX, 0.75);
+    check(&cases("bright", 3, change), BIAS_PX, 0.75);
 }
 
 #[test]
@@ -94,7 +98,7 @@ fn holes_in_everything_together() {
         (scene.floor, scene.thickness) = (FLOOR, 1.0);
         (scene.blur, scene.ambient) = (0.5, 0.2);
     };
-    check(&cases("all", 4, change), BIAS_PX, 0.70);
+    check(&cases("all", 3, change), BIAS_PX, 0.70);
 }
 
 #[test]
@@ -119,7 +123,7 @@ fn large_holes() {
         let mut scene = sheet(0.41);
         scene.floor = floor;
         let many = Many {
-            placements: 3,
+            placements: 2,
             captures: 4,
             is_told: true,
         };
@@ -138,7 +142,7 @@ fn a_thickness_that_is_not_told_widens_the_uncertainty_as_far_as_it_moves_the_ed
             let mut scene = sheet(px);
             (scene.thickness, scene.tilt) = (thickness, (tilt, 0.0));
             let many = Many {
-                placements: 4,
+                placements: 3,
                 captures: 1,
                 is_told: false,
             };
@@ -147,4 +151,34 @@ fn a_thickness_that_is_not_told_widens_the_uncertainty_as_far_as_it_moves_the_ed
     }
     let mean = within.iter().sum::<f64>() / within.len() as f64;
     assert!(mean >= 0.93, "{within:?}");
+}
+
+#[test]
+#[ignore = "minutes: many placements, of which the tests above see a few"]
+fn uncertainties_in_many_placements() {
+    let mut all = Vec::new();
+    for tilt in [0.0, 12.0, -12.0] {
+        for (floor, blur) in [(None, 0.3), (FLOOR, 0.5)] {
+            for (thickness, is_told) in [(0.0, true), (1.0, true), (1.0, false)] {
+                for noise in [Noise::Quiet, Noise::Uniform] {
+                    for (px, r) in [(0.41, 3.0), (0.41, 5.0), (0.145, 3.0)] {
+                        let mut scene = sheet(px);
+                        (scene.tilt, scene.floor, scene.blur) = ((tilt, 0.0), floor, blur);
+                        (scene.thickness, scene.noise) = (thickness, noise);
+                        let many = Many {
+                            placements: 12,
+                            captures: 1,
+                            is_told,
+                        };
+                        let name = std::format!("{tilt} {thickness} {is_told}");
+                        all.push(report(&name, &scene, r, many));
+                    }
+                }
+            }
+        }
+    }
+    let mean = |of: fn(&Figures) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+    let (within, wide) = (mean(|f| f.within), mean(|f| f.u) / mean(|f| f.error));
+    std::println!("together: within U {within:.3}, U/error {wide:.1}");
+    assert!(within >= 0.95 && wide <= WIDE, "{within} {wide}");
 }

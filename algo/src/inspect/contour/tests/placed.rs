@@ -74,7 +74,8 @@ pub fn figures(scene: &Scene<'_>, r: f64, many: Many) -> Figures {
         scene.opening = &opening;
         scene.tilt.0 += chance.within(1.0);
         scene.tilt.1 += chance.within(1.0);
-        let reach = 10.0 * scene.mm_per_px + 1.3;
+        // What is looked at: the band about places within reach of where the hole is expected.
+        let reach = 6.0 * scene.mm_per_px + 1.0;
         let rendered = Rendered::new(scene, reach, placement);
         let mut setup = rendered.setup();
         if !many.is_told {

@@ -28,7 +28,8 @@ fn look_with(
     scene.opening = if is_open { &hole } else { NOTHING };
     scene.tilt.0 += chance.within(1.0);
     scene.tilt.1 += chance.within(1.0);
-    let rendered = Rendered::new(scene, f64::MAX, seed);
+    let reach = if is_open { 3.6 } else { f64::MAX };
+    let rendered = Rendered::new(scene, reach, seed);
     let mut setup = rendered.setup();
     change(&mut setup);
     let expected = [x + chance.within(0.25), y + chance.within(0.25), r];
