@@ -16,7 +16,7 @@ const EDGE_PX: f64 = 0.0025;
 /// Diameters and centres of these holes scatter from placement to placement by 0.0075 px of a piece,
 /// above a bright floor by a quarter more.
 const PIECE_PX: f64 = 0.01;
-/// The shift of edges beside a wall of known thickness, px for a wall as bright as the face. Tilted
+/// The shift of edges beside a wall, px for a wall as bright as the face. Tilted
 /// by 12°, where walls have 0.09 of the light, edges are off by 0.005 to 0.008 px.
 const WALL_PX: f64 = 0.07;
 /// The share of the radius of a rounded rim by which its far side is uncertain: the light has
@@ -109,12 +109,12 @@ pub fn inputs<const N: usize>(
             off,
         });
     }
-    if let Some(thickness) = setup.thickness {
-        inputs.push(of(Source::Wall, &|point| {
-            let wall = Wall::at(setup, thickness, (point.x, point.y), into(point));
-            WALL_PX * contour.pixel * wall.map_or(0.0, |wall| wall.brightness)
-        }));
-    }
+    // Where it is not known whether there is a wall there may be one.
+    let thickness = setup.thickness.unwrap_or(1.0);
+    inputs.push(of(Source::Wall, &|point| {
+        let wall = Wall::at(setup, thickness, (point.x, point.y), into(point));
+        WALL_PX * contour.pixel * wall.map_or(0.0, |wall| wall.brightness)
+    }));
     if let Some(off) = contour.wall {
         inputs.push(Input {
             source: Source::Wall,

@@ -13,7 +13,8 @@
 //! about two pixels.
 //!
 //! # Stages
-//! `sample` demodulates the pixels near the expected contour, `piece` divides them, `fit` finds the
+//! `start` finds the contour to a tenth of a pixel on some of its normals. `piece` divides it and
+//! gathers the pixels of each piece, whose levels `sample` demodulates and adds. `fit` finds the
 //! edge of each piece by the profile of `edge` and what `beyond` knows of walls and floors,
 //! [`associate`](crate::math::associate) the shape through the edges, `find` does this until nothing
 //! moves, and `verdict` says whether the contour is found, absent or unseen. `inputs` states what

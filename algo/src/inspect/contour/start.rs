@@ -50,7 +50,10 @@ pub fn start<const N: usize>(
             signals.view.pixel(x, y)
         };
         let d = |x, y| shape.distance(expected, x, y) / pixel;
-        read((at(0.0), at(1.0)), d, reach + BEYOND, signals, &mut line);
+        let Some(places) = at(0.0).zip(at(1.0)) else {
+            continue;
+        };
+        read(places, d, reach + BEYOND, signals, &mut line);
         if let Some(edge) = split(&line, signals) {
             let off = edge * pixel;
             points.push(Point {
@@ -73,16 +76,13 @@ pub fn start<const N: usize>(
 
 /// Reads the pixels along a normal, which passes through two places of the picture.
 fn read(
-    (from, to): (Option<(f64, f64)>, Option<(f64, f64)>),
+    ((u, v), to): ((f64, f64), (f64, f64)),
     d: impl Fn(f64, f64) -> f64,
     reach: f64,
     signals: &Signals<'_, impl View>,
     line: &mut Vec<OnNormal>,
 ) {
     line.clear();
-    let Some(((u, v), to)) = from.zip(to) else {
-        return;
-    };
     let (columns, rows) = signals.view.size();
     let way = (to.0 - u, to.1 - v);
     let length = libm::sqrt(way.0 * way.0 + way.1 * way.1);
