@@ -229,6 +229,8 @@ impl Setting {
         scenario.noise.noise_counts = self.noise;
         scenario.optics.camera_blur_px = self.blur[0];
         scenario.optics.projector_blur_px = self.blur[1];
+        // The camera is not overexposed.
+        scenario.light.diffuse -= self.ambient - scenario.light.ambient;
         scenario.light.ambient = self.ambient;
         scenario
     }

@@ -15,7 +15,7 @@ use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
 /// Blur of the camera that is looked for, σ in px.
-const BLUR: [f64; 2] = [0.3, 2.5];
+const BLUR: [f64; 2] = [0.05, 2.5];
 /// With which the search begins.
 const FIRST_BLUR: f64 = 0.45;
 /// Rounds at most.
