@@ -5,6 +5,7 @@
 
 use super::line::Line;
 use super::request::Optics;
+use alloc::vec;
 use alloc::vec::Vec;
 
 /// Width of a bin, of the blur.
@@ -12,7 +13,7 @@ const WIDTH: f64 = 0.5;
 /// Least and largest width, mm.
 const WIDTHS: [f64; 2] = [0.02, 0.2];
 /// Most bins.
-const MOST: usize = 2048;
+const MOST: f64 = 2048.0;
 /// Points of one surface are less apart than this, of the blur: three pixels of a sharp camera.
 const APART: f64 = 8.0;
 /// σ by which a height rises that does not belong to an edge.
@@ -21,17 +22,6 @@ const RISE: f64 = 5.0;
 const RIPPLE: f64 = 0.02;
 /// The steepest fall of an edge from bin to bin: 80°.
 const STEEPEST: f64 = 5.7;
-
-/// A point beyond a stretch, as seen from its side: x towards the joint.
-#[derive(Clone, Copy, Debug)]
-pub struct Beyond {
-    /// s, mm.
-    pub s: f64,
-    /// z, mm.
-    pub z: f64,
-    /// 1 over the variance of z, 1/mm².
-    pub weight: f64,
-}
 
 /// The mean of the points of a bin, in the line's frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -44,60 +34,70 @@ pub struct Bin {
     pub variance: f64,
 }
 
-/// What is binned of a side.
-#[derive(Clone, Copy, Debug)]
-pub struct Zone<'a> {
-    /// The points between both stretches.
-    pub points: &'a [Beyond],
-    /// 1 on the left, −1 on the right: x = sign · s.
-    pub sign: f64,
-    /// The side's line.
-    pub line: &'a Line,
-    /// Where its stretch ends, along the line, mm.
-    pub from: f64,
+/// The points between both stretches, in bins along the section.
+#[derive(Clone, Debug)]
+pub struct Bins {
+    from: f64,
     /// Width of a bin, mm.
-    pub width: f64,
+    width: f64,
+    /// Σw, Σw (s − from), Σw z of each.
+    sums: Vec<[f64; 3]>,
 }
 
-impl Zone<'_> {
-    /// The width of bins.
-    pub fn width(optics: &Optics) -> f64 {
-        (WIDTH * optics.blur).clamp(WIDTHS[0], WIDTHS[1])
+impl Bins {
+    /// Empty ones between two places of the section, mm.
+    pub fn new(from: f64, to: f64, optics: &Optics) -> Self {
+        // Not a number is the least.
+        let width = (WIDTH * optics.blur).max(WIDTHS[0]).min(WIDTHS[1]);
+        let width = width.max((to - from) / MOST);
+        // Casts keep to the range of their type.
+        let count = ((to - from) / width) as usize + 1;
+        Self {
+            from,
+            width,
+            sums: vec![[0.0; 3]; count],
+        }
     }
 
-    /// The means of bins, in their order from the stretch, of the points that are kept: by place in
-    /// the line's frame and variance. The first that is too far, steep or high for an edge ends
-    /// them.
-    pub fn bins(&self, keep: impl Fn(f64, f64, f64) -> bool) -> Vec<Bin> {
-        let mut bins: Vec<Bin> = Vec::new();
-        for point in self.points {
-            let (x, y) = self.line.own(self.sign * point.s, point.z);
-            let at = (x - self.from) / self.width;
-            if !(0.0..MOST as f64).contains(&at) || !keep(x, y, 1.0 / point.weight) {
-                continue;
-            }
-            let at = at as usize;
-            if at >= bins.len() {
-                bins.resize(at + 1, Bin::default());
-            }
-            bins[at].x += point.weight * x;
-            bins[at].y += point.weight * y;
-            bins[at].variance += point.weight;
-        }
-        bins.retain(|bin| bin.variance > 0.0);
-        for bin in &mut bins {
-            bin.variance = 1.0 / bin.variance;
-            bin.x *= bin.variance;
-            bin.y *= bin.variance;
-        }
-        bins
+    /// Without their points.
+    pub fn clear(&mut self) {
+        self.sums.fill([0.0; 3]);
     }
 
-    /// How many of the first bins are one surface that falls from the line.
-    pub fn connected(&self, bins: &[Bin], optics: &Optics) -> usize {
+    /// Adds a point at s with its height and weight; one that is not between the places does not
+    /// count.
+    #[inline]
+    pub fn add(&mut self, s: f64, z: f64, weight: f64) {
+        let s = s - self.from;
+        let Some(sums) = self.sums.get_mut((s / self.width) as usize) else {
+            return;
+        };
+        sums[0] += weight;
+        sums[1] += weight * s;
+        sums[2] += weight * z;
+    }
+
+    /// The means of one side, from its stretch on: `sign` is 1 on the left, −1 on the right, x =
+    /// sign · s.
+    pub fn side(&self, line: &Line, sign: f64) -> Vec<Bin> {
+        let mean = |&[weight, s, z]: &[f64; 3]| {
+            let variance = 1.0 / weight;
+            let (x, y) = line.own(sign * (self.from + s * variance), z * variance);
+            (weight > 0.0).then_some(Bin { x, y, variance })
+        };
+        let all = self.sums.iter();
+        match sign > 0.0 {
+            true => all.filter_map(mean).collect(),
+            false => all.rev().filter_map(mean).collect(),
+        }
+    }
+
+    /// How many of the first bins of a side are one surface that falls from the line, whose stretch
+    /// ends here along it.
+    pub fn connected(&self, bins: &[Bin], from: f64, optics: &Optics) -> usize {
         let apart = APART * (optics.blur).max(self.width);
         let mut last = Bin {
-            x: self.from,
+            x: from,
             ..Bin::default()
         };
         let mut deepest = 0.0_f64;

@@ -1,14 +1,13 @@
-//! A section from its points: sorted to stretches and joint in one pass, then a line and an edge of
-//! each side.
+//! A section from its points: one pass sorts them to stretches and joint, for a line and a rough
+//! circle of each side; a second leaves out those that are off both circles, for the edges.
 
-use super::bins::{Beyond, Zone};
-use super::edge::{Edge, edge};
+use super::bins::Bins;
+use super::edge::Edge;
 use super::geometry::Geometry;
-use super::line::{Line, Moments};
-use super::profile::Directions;
+use super::line::Moments;
 use super::reason::{Side, Unseen, Why};
 use super::request::{Optics, Point, Request};
-use alloc::vec::Vec;
+use super::rough::Rough;
 
 /// A section as it was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,22 +41,25 @@ impl Section {
                 return refuse(Why::Radius);
             }
         }
-        let (moments, beyond) = sorted(points, request);
-        let find = |(side, stretch, sign, edge_mm): (Side, [f64; 2], f64, _), moments: Moments| {
-            let found = moments.line().and_then(|line| {
-                let zone = Zone {
-                    points: &beyond,
-                    sign,
-                    line: &line,
-                    from: line.stretch() * (stretch[1] - stretch[0]) / 2.0,
-                    width: Zone::width(optics),
-                };
-                edge(&zone, directions(&line, sign, optics), optics, edge_mm)
+        let (moments, mut bins) = sorted(points, request, optics);
+        let rough = |(side, stretch, sign, edge_mm): (Side, [f64; 2], f64, _), of: Moments| {
+            let found = of.line().and_then(|line| {
+                let end = line.stretch() * (stretch[1] - stretch[0]) / 2.0;
+                Rough::new(&bins, line, sign, end, optics, edge_mm)
             });
             found.map_err(|why| Unseen { side, why })
         };
+        let rough = [rough(sides[0], moments[0])?, rough(sides[1], moments[1])?];
+        bins.clear();
+        for &Point { s, z, variance } in points {
+            let is_between = left[1] < s && s < right[0] && is_point(z, variance);
+            if is_between && rough.iter().any(|side| side.is_near(s, z, variance)) {
+                bins.add(s, z, 1.0 / variance);
+            }
+        }
+        let edge = |side, rough: &Rough| rough.edge(&bins).map_err(|why| Unseen { side, why });
         Ok(Self {
-            edges: [find(sides[0], moments[0])?, find(sides[1], moments[1])?],
+            edges: [edge(Side::Left, &rough[0])?, edge(Side::Right, &rough[1])?],
         })
     }
 
@@ -73,39 +75,29 @@ impl Section {
     }
 }
 
+/// Whether a height and its variance say something; not a number does not.
+fn is_point(z: f64, variance: f64) -> bool {
+    variance > 1.0 / f64::MAX && variance < f64::INFINITY && libm::fabs(z) < f64::MAX
+}
+
 /// The sums of both stretches, and the points between them. Seen from its own side, towards the
 /// joint, a point of the right one is at x = −s.
-fn sorted(points: &[Point], request: &Request) -> ([Moments; 2], Vec<Beyond>) {
+fn sorted(points: &[Point], request: &Request, optics: &Optics) -> ([Moments; 2], Bins) {
     let (left, right) = (request.left, request.right);
     let mut moments = [Moments::new(left), Moments::new([-right[1], -right[0]])];
-    let mut beyond = Vec::new();
+    let mut bins = Bins::new(left[1], right[0], optics);
     for &Point { s, z, variance } in points {
-        let weight = 1.0 / variance;
-        // Not a number fails, too.
-        if !(weight > 0.0 && weight < f64::MAX && libm::fabs(z) < f64::MAX) {
+        if !is_point(z, variance) {
             continue;
         }
+        let weight = 1.0 / variance;
         if moments[0].holds(s) {
             moments[0].add(s, z, weight);
         } else if moments[1].holds(-s) {
             moments[1].add(-s, z, weight);
         } else if left[1] < s && s < right[0] {
-            beyond.push(Beyond { s, z, weight });
+            bins.add(s, z, weight);
         }
     }
-    (moments, beyond)
-}
-
-/// The directions to camera and projector in the frame of a line.
-fn directions(line: &Line, sign: f64, optics: &Optics) -> Directions {
-    let unit = |slope: f64| {
-        let slope = if slope.is_finite() { slope } else { 0.0 };
-        let (along, depth) = line.turned(sign * slope, 1.0);
-        let length = libm::sqrt(along * along + depth * depth);
-        (along / length, -depth / length)
-    };
-    Directions {
-        sight: unit(optics.sight),
-        light: unit(optics.light),
-    }
+    (moments, bins)
 }

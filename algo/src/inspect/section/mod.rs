@@ -25,12 +25,16 @@
 mod bins;
 mod edge;
 mod find;
+mod fit;
 mod geometry;
 mod inputs;
 mod line;
 mod profile;
 mod reason;
 mod request;
+mod rough;
+mod search;
+mod view;
 
 pub use edge::Edge;
 pub use find::Section;

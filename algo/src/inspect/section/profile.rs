@@ -2,26 +2,31 @@
 //!
 //! # Equations
 //! In the frame of the line, x along it towards the joint and y the depth below it: y = 0 up to the
-//! tangent point t, then the circle about (t, r) of radius r. With u the direction to the camera,
-//! the ray through a point q meets the profile at q + λ u,
+//! tangent point t, then the circle about (t, r) of radius r. Light comes to the camera along u =
+//! (u_x, u_up), so a place is given by how far along u and across it, towards the joint, it lies
+//! from the tangent point:
 //!
 //! ```text
-//! λ = y / u_up                      on the line
-//! λ = −b + √(b² − c)                on the circle: m = q − (t, r), b = m·u, c = m·m − r²
+//! way = (x − t) u_x − y u_up        across = (x − t) u_up + y u_x        i = r (1 + u_x) − across
 //! ```
 //!
-//! A point is measured along its ray, so −λ is its residual. A pixel averages the phase over a
-//! footprint across the line of sight, by the light that each part sends. With l the direction to
-//! the projector, n the surface's normal, and a matt surface,
+//! i says how far inside the silhouette the place's ray passes. It meets the profile at
 //!
 //! ```text
-//! δ = ∫ g (n·l) λ(ξ) dξ / ∫ g (n·l) dξ − λ(0)        g: normal density of σ = blur
+//! S(i) = across u_x / u_up                       on the line, where across ≤ 0
+//! S(i) = −r u_up + √(2 r i − i²)                 on the circle
 //! ```
 //!
-//! is by how much it sees the surface elsewhere. The integral ends at the silhouette, beyond which
-//! is nothing or a floor.
-
-use crate::math::associate::Distance;
+//! along u. A point is measured along its ray, so way − S is its residual. A pixel averages the
+//! phase over a footprint across the line of sight, by the light that each part sends. With l the
+//! direction to the projector, n the surface's normal, and a matt surface, it sees
+//!
+//! ```text
+//! B(i) = ∫ g(ξ) (n·l) S(i − ξ) dξ / ∫ g(ξ) (n·l) dξ        g: normal density of σ = blur
+//! ```
+//!
+//! The integral ends at the silhouette, beyond which is nothing or a floor. B depends on i and r
+//! only, so three values of it have its derivatives by all parameters.
 
 /// Half the width of what a pixel averages, of its σ: (1 − ξ²/reach²)⁴ has the variance reach²/11,
 /// and is a normal density within 3 % of its largest.
@@ -37,130 +42,150 @@ const NODES: [(f64, f64); 8] = [
     (0.796_666_477_413_626_7, 0.222_381_034_453_374_5),
     (0.960_289_856_497_536_3, 0.101_228_536_290_376_3),
 ];
-/// Step of derivatives, mm.
-const STEP: f64 = 1e-3;
+/// Step of differences, mm: B is smooth over a blur, and rounding adds less than 1e-8.
+const STEP: f64 = 1e-6;
 
-/// Directions to the camera and to the projector in the line's frame, unit vectors: along, up.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Directions {
-    /// u.
-    pub sight: (f64, f64),
-    /// l.
-    pub light: (f64, f64),
+/// A direction or place in the frame of a line: along, up.
+type Pair = (f64, f64);
+
+/// A line and a circle tangent to it, as a camera and a projector in some directions see them.
+#[derive(Clone, Copy, Debug)]
+pub struct Profile {
+    /// u, of length 1.
+    sight: Pair,
+    /// l, of length 1: along the line and up; across u and along it.
+    light: Pair,
+    turned: Pair,
+    /// Half the width of what a pixel averages, mm.
+    reach: f64,
 }
 
-/// Where a ray meets the profile.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// λ, mm.
+/// Where a point is, from the tangent point.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Along u, mm.
     pub way: f64,
-    /// The surface's normal: along, up. (sin θ, cos θ) at θ of the arc.
-    pub normal: (f64, f64),
+    /// How far inside the silhouette, mm.
+    pub inside: f64,
 }
 
-/// A line and a circle tangent to it, with t and r, in these directions.
-#[derive(Clone, Copy, Debug)]
-pub struct Rounded(pub Directions);
+/// What changes a residual: the tangent point, the radius, and lifting the whole profile.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Rates {
+    /// ∂/∂t.
+    pub t: f64,
+    /// ∂/∂r.
+    pub r: f64,
+    /// By the profile's height.
+    pub lift: f64,
+}
 
-/// The same with a stated radius.
-#[derive(Clone, Copy, Debug)]
-pub struct Stated(pub Blurred, pub f64);
-
-impl Rounded {
-    /// Where the ray through a point meets the profile; `None` where it passes.
-    pub fn hit(&self, [t, r]: [f64; 2], x: f64, y: f64) -> Option<Hit> {
-        let (along, up) = self.0.sight;
-        let way = y / up;
-        if x + way * along <= t {
-            let normal = (0.0, 1.0);
-            return Some(Hit { way, normal });
+impl Profile {
+    /// With unit vectors to camera and projector, and σ of what a pixel averages, mm.
+    pub fn new(sight: Pair, light: Pair, blur: f64) -> Self {
+        Self {
+            sight,
+            light,
+            turned: (
+                light.0 * sight.1 - light.1 * sight.0,
+                light.0 * sight.0 + light.1 * sight.1,
+            ),
+            reach: REACH * blur,
         }
-        let (x, y) = (x - t, y - r);
-        let b = x * along - y * up;
-        let root = b * b - (x * x + y * y - r * r);
-        (root >= 0.0).then(|| {
-            let way = libm::sqrt(root) - b;
-            let normal = ((x + way * along) / r, (way * up - y) / r);
-            Hit { way, normal }
-        })
     }
 
-    /// How far inside the silhouette the ray through a point passes, mm.
-    pub fn inside(&self, [t, r]: [f64; 2], x: f64, y: f64) -> f64 {
-        let (along, up) = self.0.sight;
-        r - ((x - t) * up + (y - r) * along)
+    /// The ray through a point of the line's frame.
+    pub fn ray(&self, [t, r]: [f64; 2], x: f64, y: f64) -> Ray {
+        let (along, up) = self.sight;
+        let x = x - t;
+        Ray {
+            way: x * along - y * up,
+            inside: r * (1.0 + along) - (x * up + y * along),
+        }
     }
-}
 
-/// What is fitted: t and r of a profile as pixels see it.
-#[derive(Clone, Copy, Debug)]
-pub struct Blurred {
-    /// The profile.
-    pub rounded: Rounded,
-    /// σ of what a pixel averages, mm.
-    pub blur: f64,
-}
+    /// u_up.
+    pub fn up(&self) -> f64 {
+        self.sight.1
+    }
 
-impl Blurred {
-    /// −λ of the surface and as it is seen; `None` if no part of the pixel's footprint meets it.
-    fn seen(&self, p: [f64; 2], x: f64, y: f64) -> Option<f64> {
-        let Directions { sight, light } = self.rounded.0;
-        let inside = self.rounded.inside(p, x, y);
-        let reach = REACH * self.blur;
-        // ξ = inside − v²: at the silhouette the surface is a parabola of v.
+    /// S(i); `None` beyond the silhouette.
+    pub fn surface(&self, inside: f64, r: f64) -> Option<f64> {
+        let (along, up) = self.sight;
+        let across = r * (1.0 + along) - inside;
+        match across <= 0.0 {
+            true => Some(across * along / up),
+            false if inside >= 0.0 => Some(libm::sqrt(inside * (2.0 * r - inside)) - r * up),
+            false => None,
+        }
+    }
+
+    /// The sine of the angle to the tangent point at which the ray meets the circle.
+    pub fn sine(&self, inside: f64, r: f64) -> f64 {
+        let (along, up) = self.sight;
+        let across = 1.0 - inside / r;
+        across * up + libm::sqrt((1.0 - across * across).max(0.0)) * along
+    }
+
+    /// The cosine of the angle between the surface of the circle and the line of sight.
+    pub fn facing(&self, inside: f64, r: f64) -> f64 {
+        let across = (1.0 - inside / r).max(-self.sight.0);
+        libm::sqrt((1.0 - across * across).max(0.0))
+    }
+
+    /// The share of a pixel's footprint that lies beyond the silhouette.
+    pub fn missing(&self, inside: f64) -> f64 {
+        let x = (inside / self.reach).clamp(-1.0, 1.0);
+        let square = x * x;
+        // The integral of (1 − x²)⁴.
+        let inner =
+            1.0 - square * (4.0 / 3.0 - square * (1.2 - square * (4.0 / 7.0 - square / 9.0)));
+        0.5 - x * inner * (315.0 / 256.0)
+    }
+
+    /// B(i). Where no part of the footprint is lit, the height of the silhouette.
+    pub fn seen(&self, inside: f64, r: f64) -> f64 {
+        let (along, up) = self.sight;
+        let (reach, inverse) = (self.reach, 1.0 / self.reach);
+        // i − ξ = v²: at the silhouette the surface is a parabola of v.
         let low = libm::sqrt((inside - reach).max(0.0));
         let high = libm::sqrt((inside + reach).max(0.0));
-        let (mut light_sum, mut way_sum) = (0.0, 0.0);
+        let (middle, half) = ((low + high) / 2.0, (high - low) / 2.0);
+        let tangent = r * (1.0 + along);
+        let (across, way) = (self.turned.0 / r, self.turned.1 / r);
+        let (mut light, mut sum) = (0.0, 0.0);
         for (node, weight) in NODES {
-            let v = (low + high + node * (high - low)) / 2.0;
-            let across = inside - v * v;
-            let Some(hit) = self
-                .rounded
-                .hit(p, x + across * sight.1, y + across * sight.0)
-            else {
-                continue;
-            };
-            let off = across / reach;
+            let v = middle + node * half;
+            let square = v * v;
+            let off = (inside - square) * inverse;
             let density = (1.0 - off * off).max(0.0);
-            let density = density * density * density * density;
-            let lit = hit.normal.0 * light.0 + hit.normal.1 * light.1;
-            let share = weight * v * density * lit.max(0.0);
-            light_sum += share;
-            way_sum += share * hit.way;
+            let density = density * density;
+            // On the line and on the circle.
+            let beside = tangent - square;
+            let root = v * libm::sqrt((2.0 * r - square).max(0.0));
+            let (at, lit) = match beside <= 0.0 {
+                true => (beside * along / up, self.light.1),
+                false => (root - r * up, (r - square) * across + root * way),
+            };
+            let share = weight * v * density * density * lit.max(0.0);
+            light += share;
+            sum += share * at;
         }
-        (light_sum > 0.0).then(|| -way_sum / light_sum)
+        match light > 0.0 {
+            true => sum / light,
+            false => -r * up,
+        }
     }
 
-    /// How the distance changes if the whole profile is lifted.
-    pub fn lifted(&self, p: &[f64; 2], x: f64, y: f64) -> f64 {
-        (self.distance(p, x, y + STEP) - self.distance(p, x, y - STEP)) / (-2.0 * STEP)
-    }
-}
-
-impl Distance<2> for Blurred {
-    /// Where the whole footprint passes, of the ray as if it touched the circle.
-    fn distance(&self, p: &[f64; 2], x: f64, y: f64) -> f64 {
-        let (along, up) = self.rounded.0.sight;
-        let touching = || (x - p[0]) * along - (y - p[1]) * up;
-        self.seen(*p, x, y).unwrap_or_else(touching)
-    }
-
-    fn derivative(&self, p: &[f64; 2], x: f64, y: f64) -> [f64; 2] {
-        let by = |t: f64, r: f64| self.distance(&[p[0] + t, p[1] + r], x, y);
-        [
-            by(STEP, 0.0) - by(-STEP, 0.0),
-            by(0.0, STEP) - by(0.0, -STEP),
-        ]
-        .map(|d| d / (2.0 * STEP))
-    }
-}
-
-impl Distance<1> for Stated {
-    fn distance(&self, &[t]: &[f64; 1], x: f64, y: f64) -> f64 {
-        self.0.distance(&[t, self.1], x, y)
-    }
-
-    fn derivative(&self, &[t]: &[f64; 1], x: f64, y: f64) -> [f64; 1] {
-        [self.0.derivative(&[t, self.1], x, y)[0]]
+    /// How a residual changes, where B(i) is this.
+    pub fn rates(&self, inside: f64, r: f64, seen: f64) -> Rates {
+        let (along, up) = self.sight;
+        let slope = (self.seen(inside + STEP, r) - seen) / STEP;
+        let swell = (self.seen(inside, r + STEP) - seen) / STEP;
+        Rates {
+            t: -along - slope * up,
+            r: -swell - slope * (1.0 + along),
+            lift: slope * along - up,
+        }
     }
 }

@@ -18,8 +18,8 @@ pub struct Request {
     pub left: [f64; 2],
     /// The same of the right side.
     pub right: [f64; 2],
-    /// Radius of the left and of the right edge, mm, where it is stated: it is taken where too
-    /// little of an edge is seen to find it.
+    /// Radius of the left and of the right edge, mm, where it is stated: it is taken as it is, and
+    /// only where its circle lies is found.
     pub edge_mm: [Option<f64>; 2],
 }
 

@@ -1,0 +1,121 @@
+//! Least squares of a circle that is tangent to a line.
+//!
+//! Gauss–Newton over Σ ρ(d/σ), ρ Tukey's biweight (J. W. Tukey; P. W. Holland & R. E. Welsch, Commun.
+//! Stat. A 6, 1977: c = 4.685), scaled by the median of |d|/σ where bins scatter by more than σ,
+//! which follows from the circle and is worked out anew in each round.
+
+use super::bins::Bin;
+use super::profile::Rates;
+use super::search::{RADII, median};
+use super::view::{Seen, View};
+use crate::math::solve::Normal;
+use alloc::vec::Vec;
+
+/// Fewest bins of an edge.
+pub const BINS: usize = 3;
+/// Tukey's c: 95 % efficient on normal errors.
+const TUKEY: f64 = 4.685;
+/// The median of |x| of a standard normal x.
+const MEDIAN: f64 = 0.674_489_750_196_081_7;
+/// The largest step of an end, mm.
+const STILL: f64 = 1e-5;
+/// The largest change of a radius in a round, of it.
+const CHANGE: f64 = 0.5;
+
+/// What a bin says about the circle.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// The bin.
+    pub bin: Bin,
+    /// How it sees the circle.
+    pub seen: Seen,
+    /// How its residual changes.
+    pub rates: Rates,
+    /// Tukey's weight, 0 to 1.
+    pub weight: f64,
+}
+
+/// A circle and what it was fitted to.
+#[derive(Clone, Debug, Default)]
+pub struct Fit {
+    /// t, r.
+    pub p: [f64; 2],
+    /// Its bins, as they see it.
+    pub rows: Vec<Row>,
+    ratios: Vec<f64>,
+}
+
+impl Fit {
+    /// From this circle.
+    pub fn new(p: [f64; 2]) -> Self {
+        Self {
+            p,
+            ..Self::default()
+        }
+    }
+
+    /// Moves the circle to where its bins' residuals are least, in so many rounds at most; a stated
+    /// radius is kept. `None` where the bins do not determine it.
+    pub fn solve(
+        &mut self,
+        view: &View,
+        bins: &[Bin],
+        is_stated: bool,
+        rounds: usize,
+    ) -> Option<()> {
+        for _ in 0..rounds {
+            self.look(view, bins);
+            let mut normal = Normal::<2>::default();
+            for row in &self.rows {
+                let root = libm::sqrt(row.weight / row.seen.variance);
+                let r = if is_stated { 0.0 } else { row.rates.r };
+                normal.add(&[row.rates.t * root, r * root], -row.seen.way * root);
+            }
+            if is_stated {
+                normal.matrix[1][1] = 1.0;
+            }
+            let [t, r] = normal.solve()?;
+            let most = CHANGE * self.p[1];
+            self.p[0] += t;
+            self.p[1] += r.clamp(-most, most);
+            let is_sound = self.p[1] > RADII[0] / 2.0 && self.p[1] < 2.0 * RADII[1];
+            if !(self.p[0].is_finite() && (is_sound || is_stated)) {
+                return None;
+            }
+            if libm::fabs(t).max(libm::fabs(r)) < STILL {
+                break;
+            }
+        }
+        self.look(view, bins);
+        (self.rows.len() >= BINS).then_some(())
+    }
+
+    /// How the bins see the circle where it is, and their weights.
+    fn look(&mut self, view: &View, bins: &[Bin]) {
+        let (p, profile) = (self.p, &view.profile);
+        self.rows.clear();
+        self.rows.extend(bins.iter().filter_map(|&bin| {
+            let seen = view.seen(p, &bin)?;
+            let rates = profile.rates(seen.ray.inside, p[1], seen.seen);
+            let weight = 1.0;
+            Some(Row {
+                bin,
+                seen,
+                rates,
+                weight,
+            })
+        }));
+        let ratio = |row: &Row| libm::fabs(row.seen.way) / libm::sqrt(row.seen.variance);
+        self.ratios.clear();
+        self.ratios.extend(self.rows.iter().map(ratio));
+        let scale = match median(&mut self.ratios) {
+            Some(median) => (median / MEDIAN).max(1.0),
+            None => 1.0,
+        };
+        for row in &mut self.rows {
+            let outside = ratio(row) / (scale * TUKEY);
+            let inside = (1.0 - outside * outside).max(0.0);
+            row.weight = inside * inside;
+        }
+    }
+}
