@@ -3,7 +3,7 @@
 use super::gauges::{frames, plan};
 use super::placement::{Bed, bed, taught_within};
 use algo::geometry::Vector;
-use algo::inspect::kinds::{Flush, Gap, Radius, Side};
+use algo::inspect::kinds::{Flush, Gap};
 use algo::inspect::{FeatureKind, Measure};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::{FeatureFile, GaugeFile};
@@ -41,7 +41,7 @@ struct Line {
 }
 
 impl Line {
-    fn new(joint: &Joint, edge_mm: Option<f64>) -> Self {
+    fn new(joint: &Joint) -> Self {
         let mut scenario = Scenario {
             part: Part::Joint(joint.clone()),
             ..Scenario::default()
@@ -65,7 +65,8 @@ impl Line {
             width_mm: Some(WIDTH_MM),
             left: Some([2.0, HALF_MM - beside]),
             right: Some([HALF_MM + beside, 2.0 * HALF_MM - 2.0]),
-            edge_mm,
+            // At 0.4 mm per px too little of an edge is seen.
+            edge_mm: Some(joint.left_radius),
             ..FeatureFile::new("joint", FeatureKind::Section, Vec::new())
         };
         let gauge =
@@ -75,7 +76,6 @@ impl Line {
         file.gauges = vec![
             gauge(1, "gap", Gap {}.into()),
             gauge(2, "flush", Flush {}.into()),
-            gauge(3, "radius", Radius { side: Side::Left }.into()),
         ];
         let plan = plan(&bed, &file, &taught.recipe.arrays);
         bed.head
@@ -97,20 +97,18 @@ impl Line {
 }
 
 fn joints() -> Vec<Joint> {
-    let joint = |across, gap, flush, [left_radius, right_radius]: [f64; 2], tilt_deg| Joint {
+    let joint = |across, gap, flush, radius, tilt_deg| Joint {
         across,
         gap,
         flush,
-        left_radius,
-        right_radius,
+        left_radius: radius,
+        right_radius: radius,
         tilt_deg,
         ..Joint::default()
     };
     vec![
-        joint(Across::X, 4.0, 0.5, [1.5, 1.5], 0.0),
-        joint(Across::Y, 3.0, -0.6, [2.0, 1.2], 1.0),
-        joint(Across::X, 6.0, -1.0, [1.0, 2.0], 0.0),
-        joint(Across::Y, 2.0, 1.0, [1.2, 1.6], -1.0),
+        joint(Across::X, 4.0, 0.5, 1.5, 0.0),
+        joint(Across::Y, 3.0, -0.6, 2.0, 1.0),
     ]
 }
 
@@ -118,11 +116,11 @@ fn joints() -> Vec<Joint> {
 fn gap_and_flush_are_true_and_as_uncertain_as_they_say() {
     let (mut ratios, mut freedom, mut errors, mut within) = (0.0, 0.0, 0.0, 0.0);
     let mut wrong = Vec::new();
-    for joint in joints().into_iter().take(2) {
-        let mut line = Line::new(&joint, None);
+    for joint in joints() {
+        let mut line = Line::new(&joint);
         let mut random = Random::new(5);
-        let truth = [joint.gap, joint.flush, joint.left_radius];
-        let (mut bias, mut seen) = ([0.0; 3], 0.0);
+        let truth = [joint.gap, joint.flush];
+        let (mut bias, mut seen) = ([0.0; 2], 0.0);
         for at in 0..PLACEMENTS {
             let lies = match at {
                 0 => Placement::default(),
@@ -163,7 +161,7 @@ fn gap_and_flush_are_true_and_as_uncertain_as_they_say() {
             }
         }
         let bias = bias.map(|sum| sum / seen * 1e3);
-        println!("{joint:?}: bias of gap, flush and radius {bias:.1?} µm");
+        println!("{joint:?}: bias of gap and flush {bias:.1?} µm");
         if bias[0].abs() > BIAS_UM[0] || bias[1].abs() > BIAS_UM[1] {
             wrong.push(format!("{joint:?}: {bias:?}"));
         }
@@ -178,7 +176,7 @@ fn gap_and_flush_are_true_and_as_uncertain_as_they_say() {
 #[test]
 fn a_change_of_gap_or_flush_is_found_with_its_sign() {
     let joint = joints().swap_remove(0);
-    let mut line = Line::new(&joint, None);
+    let mut line = Line::new(&joint);
     let mut random = Random::new(8);
     for _ in 0..3 {
         let lies = placement(&mut random);

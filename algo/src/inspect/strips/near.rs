@@ -104,25 +104,25 @@ impl<const N: usize> Near<N> {
     /// The first of the three nodes about a column, and their weights.
     #[inline]
     fn column(&self, u: f64) -> Option<(usize, [f64; 3])> {
-        let (first, weights) = three(u - self.left)?;
-        (first + 2 < self.columns).then_some((first, weights))
+        three(u - self.left, self.columns)
     }
 
     #[inline]
     fn row(&self, v: f64) -> Option<(usize, [f64; 3])> {
-        three(v - self.top)
+        three(v - self.top, self.nodes.len() / self.columns.max(1))
     }
 }
 
-/// The first of the three nodes about a place, px from the first of all, and their weights.
+/// The first of the three nodes about a place, px from the first of all, and their weights; `None`
+/// beside them.
 #[inline]
-fn three(from_first: f64) -> Option<(usize, [f64; 3])> {
-    let at = from_first / SPACING;
-    if !(at >= 0.0) {
+fn three(from_first: f64, count: usize) -> Option<(usize, [f64; 3])> {
+    let (at, last) = (from_first / SPACING, count.checked_sub(3)?);
+    if !(at >= 0.0 && at <= (last + 2) as f64) {
         return None;
     }
     // Casts cut off.
-    let first = at as usize / 2 * 2;
+    let first = (at as usize / 2 * 2).min(last);
     Some((first, weights(at - first as f64)))
 }
 

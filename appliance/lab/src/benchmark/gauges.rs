@@ -1,5 +1,7 @@
 //! The gauges of a cycle that is timed: those of the recipe, or many of one kind.
 
+use algo::geometry::Vector;
+use algo::inspect::kinds::Diameter;
 use algo::inspect::{Basis, FeatureKind, Measure};
 use appliance::recipe::{FeatureFile, GaugeFile, RecipeFile};
 
@@ -19,16 +21,20 @@ pub enum Gauges {
     Planes(usize),
     /// The same, and the distance of each plane from the next.
     Distances(usize),
+    /// The diameter of so many holes, those of the part again and again.
+    Holes(usize),
 }
 
 impl Gauges {
     /// Those that are timed beside the taught ones: planes, and the same regions as mean heights.
-    pub const MANY: [Self; 5] = [
+    pub const MANY: [Self; 6] = [
         Self::Means(8),
         Self::Planes(8),
         Self::Means(32),
         Self::Planes(32),
         Self::Distances(32),
+        // Their rims are as long together as those of 32 holes of 3 mm.
+        Self::Holes(12),
     ];
 
     /// In words, for tables.
@@ -38,16 +44,19 @@ impl Gauges {
             Self::Means(count) => format!("{count} mean heights"),
             Self::Planes(count) => format!("{count} planes"),
             Self::Distances(count) => format!("{count} planes, {} gauges", 2 * count),
+            Self::Holes(count) => format!("{count} holes"),
         }
     }
 
     /// Gives them to a recipe for frames of (width, height).
     pub fn replace(self, file: &mut RecipeFile, (width, height): (u32, u32)) {
-        let (count, kinds) = match self {
+        let surface = FeatureKind::Surface;
+        let (count, kind, kinds) = match self {
             Self::Taught => return,
-            Self::Means(count) => (count, kinds(Basis::Region, &[1])),
-            Self::Planes(count) => (count, kinds(Basis::Geometry, &[1])),
-            Self::Distances(count) => (count, kinds(Basis::Geometry, &[1, 2])),
+            Self::Holes(count) => return holes(file, count),
+            Self::Means(count) => (count, surface, kinds(Basis::Region, surface, &[1])),
+            Self::Planes(count) => (count, FeatureKind::Plane, planes(&[1])),
+            Self::Distances(count) => (count, FeatureKind::Plane, planes(&[1, 2])),
         };
         let name = |at: usize| format!("region {}", at % count);
         let rows = count.div_ceil(COLUMNS);
@@ -61,10 +70,6 @@ impl Gauges {
                     share(0, column, COLUMNS) * f64::from(width),
                     share(1, row, rows) * f64::from(height),
                 ]
-            };
-            let kind = match self {
-                Self::Taught | Self::Means(_) => FeatureKind::Surface,
-                Self::Planes(_) | Self::Distances(_) => FeatureKind::Plane,
             };
             let corners = [(0, 0), (1, 0), (1, 1), (0, 1)];
             let corners = corners.map(|(right, down)| corner(right, down));
@@ -86,13 +91,51 @@ impl Gauges {
     }
 }
 
-/// The first kind in the table that is worked out from this, for each of these numbers of features.
-fn kinds(basis: Basis, features: &[usize]) -> Vec<Measure> {
+/// The holes of the default part: x, y and radius, and z of its plate, mm.
+const HOLES: [[f64; 3]; 3] = [[-60.0, 40.0, 6.0], [-60.0, -40.0, 6.0], [24.0, 2.0, 11.0]];
+const PLATE_MM: f64 = 8.0;
+/// A region reaches so far beyond a hole, mm.
+const AROUND_MM: f64 = 2.5;
+
+/// Gives a recipe of the default part the diameters of so many holes. A head that cannot be modelled
+/// has none.
+fn holes(file: &mut RecipeFile, count: usize) {
+    let Ok(head) = file.head() else { return };
+    file.features.clear();
+    file.gauges.clear();
+    for (slot, [x, y, radius]) in (1..).zip(HOLES.into_iter().cycle().take(count)) {
+        let reach = radius + AROUND_MM;
+        let corner = |at: usize| {
+            let (sin, cos) = (std::f64::consts::TAU * at as f64 / 16.0).sin_cos();
+            let point = Vector::new(x + reach * cos, y + reach * sin, PLATE_MM);
+            let (u, v) = head.camera.project(point)?;
+            Some([u, v])
+        };
+        let name = format!("hole {slot}");
+        let region = (0..16).filter_map(corner).collect();
+        file.features
+            .push(FeatureFile::new(&*name, FeatureKind::Circle, region));
+        let gauge = format!("gauge {slot}");
+        file.gauges
+            .push(GaugeFile::new(slot, &gauge, Diameter {}, &[&name]));
+    }
+    file.judges_nothing = true;
+}
+
+/// The first kinds of geometry that are of so many planes.
+fn planes(features: &[usize]) -> Vec<Measure> {
+    kinds(Basis::Geometry, FeatureKind::Plane, features)
+}
+
+/// The first kind in the table that is worked out from this, of features of this kind, for each of
+/// these numbers of features.
+fn kinds(basis: Basis, of: FeatureKind, features: &[usize]) -> Vec<Measure> {
     let first = |&count: &usize| {
         let mut all = Measure::examples().into_iter();
         all.find(|kind| {
             let facts = kind.facts();
-            facts.basis == basis && facts.takes.len() == count
+            let takes = facts.takes;
+            facts.basis == basis && takes.len() == count && takes.iter().all(|at| at.contains(&of))
         })
     };
     features.iter().filter_map(first).collect()
