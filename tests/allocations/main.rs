@@ -112,15 +112,20 @@ fn features(region: &[[f64; 2]]) -> Vec<FeatureFile> {
         let name = format!("{} {place}", kind.name());
         FeatureFile::new(name, kind, [region, &smaller][place].to_vec())
     };
-    // A contour is found into lists as long as its rim.
     let kinds = FeatureKind::ALL.into_iter();
-    let kinds = kinds.filter(|kind| !kind.is_contour());
     kinds
+        .filter(is_of_heights)
         .flat_map(|kind| [feature(kind, 0), feature(kind, 1)])
         .collect()
 }
 
-/// One gauge of every kind.
+/// Whether a feature is made of heights: a contour is found into lists as long as its rim, and a
+/// section into one as long as it has points.
+fn is_of_heights(kind: &FeatureKind) -> bool {
+    matches!(kind, FeatureKind::Surface | FeatureKind::Plane)
+}
+
+/// One gauge of every kind that is of heights.
 fn gauges() -> Vec<GaugeFile> {
     let gauge = |(slot, measures): (u16, Measure)| {
         let takes = measures.facts().takes.iter().enumerate();
@@ -130,7 +135,9 @@ fn gauges() -> Vec<GaugeFile> {
             ..GaugeFile::new(slot, &format!("gauge {slot}"), measures, &[])
         }
     };
-    (1..).zip(Measure::examples()).map(gauge).collect()
+    let mut kinds = Measure::examples();
+    kinds.retain(|kind| kind.facts().takes.iter().all(|of| is_of_heights(&of[0])));
+    (1..).zip(kinds).map(gauge).collect()
 }
 
 /// The allocations of the station for the measuring task's events of a cycle with twelve frames.

@@ -158,11 +158,7 @@ mod tests {
         let sequences = sequences([0.05, 0.045, 0.03], [1.0; 3]);
         let choice = choose(&sequences, &gauges, 0);
         assert_eq!(choice.production, 2);
-        assert!(
-            choice.reasons[0].contains("opening"),
-            "{:?}",
-            choice.reasons
-        );
+        assert!(choice.reasons[0].contains("blind"), "{:?}", choice.reasons);
     }
 
     #[test]

@@ -13,9 +13,9 @@ use std::f64::consts::TAU;
 /// An opening is round if its rim is off a circle by at most this much, beside what noise makes, px.
 const ROUND_PX: f64 = 0.5;
 /// A region reaches so far beyond the opening, px.
-const AROUND_PX: f64 = 10.0;
+const AROUND_PX: f64 = 12.0;
 /// Corners of a region.
-const CORNERS: usize = 24;
+const CORNERS: usize = 8;
 /// The least share of a rim that good parts have.
 const LEAST_FOUND: f64 = 0.4;
 

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use algo::inspect::FoundFeature;
+use algo::inspect::{FoundFeature, MAX_FEATURES};
 use serde::{Deserialize, Serialize};
 
 use super::gauge::GaugeValue;
@@ -151,7 +151,7 @@ pub struct Inspection {
     pub placement: Option<Placement>,
     /// Its planes and contours.
     #[serde(skip)]
-    pub features: Vec<FoundFeature>,
+    pub features: heapless::Vec<FoundFeature, MAX_FEATURES>,
     /// Why the part should be measured again with the next longer sequence, if it should and there
     /// is one.
     #[serde(skip)]

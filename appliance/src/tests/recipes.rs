@@ -99,18 +99,33 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
             feature.name = format!("{} {place}", kind.name());
             feature.kind = kind;
             feature.region[0][0] += place as f64;
+            if kind == FeatureKind::Plane {
+                feature.thickness_mm = Some(1.0);
+            } else if kind.is_contour() {
+                (feature.plane, feature.rim_mm) = (Some("plane 0".into()), Some(0.1));
+            } else if kind == FeatureKind::Section {
+                feature.region.clear();
+                (feature.from, feature.to) = (Some([5.0, 9.0]), Some([40.0, 30.0]));
+                (feature.left, feature.right) = (Some([0.0, 3.0]), Some([6.0, 9.0]));
+                (feature.width_mm, feature.edge_mm) = (Some(10.0), Some(1.5));
+            }
             full.features.push(feature);
         }
     }
     full.datums.push(DatumFile {
         name: "datum".into(),
-        of: vec!["plane 0".into()],
+        of: ["plane 0", "circle 0", "circle 1"].map(Into::into).to_vec(),
     });
     let mut kinds = Measure::examples();
+    // Golden has no contours and no joint in these regions: nothing measures them.
+    let of_heights = |kind: &Measure| {
+        let heights = [FeatureKind::Surface, FeatureKind::Plane];
+        let takes = kind.facts().takes;
+        takes.iter().all(|place| heights.contains(&place[0]))
+    };
     kinds.retain(|kind| {
-        file.gauges
-            .iter()
-            .all(|of| discriminant(&of.measures) != discriminant(kind))
+        let mut taught = file.gauges.iter();
+        of_heights(kind) && taught.all(|of| discriminant(&of.measures) != discriminant(kind))
     });
     for (at, kind) in kinds.into_iter().enumerate() {
         let mut gauge = full.gauges[0].clone();

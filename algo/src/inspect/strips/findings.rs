@@ -5,7 +5,7 @@ use super::counts::TRUSTS;
 use super::coverage;
 use super::decode::Input;
 use super::fits::Fit;
-use super::gauges::{Gauge, MAX_GAUGES};
+use super::gauges::{Gauge, MAX_FEATURES, MAX_GAUGES};
 use super::plan::Production;
 use super::pose::PoseField;
 use super::squares::extreme::Extreme;
@@ -28,7 +28,7 @@ pub struct Findings {
     /// Per gauge without a value, why.
     pub missing: heapless::Vec<Option<Missing>, MAX_GAUGES>,
     /// The planes and contours that gauges need.
-    pub features: Vec<FoundFeature>,
+    pub features: heapless::Vec<FoundFeature, MAX_FEATURES>,
     /// Pixels with a height.
     pub resolved: u64,
     /// Share of the compared surface inside the window that has a height.

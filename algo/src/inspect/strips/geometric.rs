@@ -2,7 +2,7 @@
 
 use super::contours::{ContourFit, FoundFeature, Signal};
 use super::fits::Fit;
-use super::gauges::Gauge;
+use super::gauges::{Gauge, MAX_FEATURES};
 use super::plan::Production;
 use super::pose::PoseField;
 use super::strip::Strips;
@@ -16,7 +16,7 @@ use alloc::vec::Vec;
 
 impl Production {
     /// The planes and contours that gauges need.
-    pub(super) fn features(&self, strips: &Strips) -> Vec<FoundFeature> {
+    pub(super) fn features(&self, strips: &Strips) -> heapless::Vec<FoundFeature, MAX_FEATURES> {
         let own = |fit: &&Fit| !strips.contours.iter().any(|of| of.is_of(&[fit.feature]));
         let planes = strips.fits.iter().filter(own).map(|fit| {
             let geometry = fit.geometry();

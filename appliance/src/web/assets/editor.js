@@ -1,6 +1,6 @@
 // Edits a recipe: regions of features by dragging on the picture of the part as taught, parameters, limits and names in fields.
 import { $, draw, fill, make, show, text } from "./element.js";
-import { ask, kindOf, loadKinds, map, unitOf } from "./api.js";
+import { ask, cornersOf, kindOf, loadKinds, map, unitOf } from "./api.js";
 import { paint } from "./colour.js";
 import { change, notice } from "./session.js";
 import { choose } from "./question.js";
@@ -31,7 +31,9 @@ export async function edit(number) {
   state.wide = recipe.camera.width;
   $("editor-regions").setAttribute("viewBox", `0 0 ${recipe.camera.width} ${recipe.camera.height}`);
   state.chosen = [0, 0];
-  fill($("gauge-kind"), ...state.kinds.kinds.map((one) => new Option(spoken(one.kind), one.kind)));
+  // A region cannot say where a section is.
+  const drawn = state.kinds.kinds.filter(({ takes }) => !takes.some((place) => place.includes("section")));
+  fill($("gauge-kind"), ...drawn.map((one) => new Option(spoken(one.kind), one.kind)));
   show("editor", true);
   drawRegions();
   drawGauges();
@@ -60,15 +62,16 @@ function drawRegions() {
   // Camera pixels per pixel of the screen, so that touch targets have the same size on every screen.
   const scale = state.wide / ($("editor-regions").getBoundingClientRect().width || state.wide);
   const parts = [];
-  recipe.features.forEach(({ region }, at) => {
-    const corners = region.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
+  recipe.features.forEach((feature, at) => {
+    const corners = cornersOf(feature).map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
     const own = at === chosen[0] ? " chosen" : "";
     const inside = draw("polygon", { points: corners, class: `region${own}`, "vector-effect": "non-scaling-stroke" });
-    inside.addEventListener("pointerdown", (event) => begin(event, at, -1));
+    // A section is not drawn, only shown.
+    if (feature.region) inside.addEventListener("pointerdown", (event) => begin(event, at, -1));
     parts.push(inside);
   });
   const feature = recipe.features[chosen[0]];
-  if (feature) {
+  if (feature && feature.region) {
     feature.region.forEach(([u, v], corner) => {
       const kind = `handle${corner === chosen[1] ? " chosen" : ""}`;
       const [x, y] = outside(feature.region, corner, scale), side = TARGET * scale;
@@ -153,10 +156,22 @@ function measures(gauge, kind) {
   return cell;
 }
 
-// The field of a parameter: a list of its words, or a number.
-function parameter(gauge, { name, about, choices, unit: symbol, above, least = above, most, odd }) {
+// The field of a parameter: a list of its words, a number, or two.
+function parameter(gauge, of) {
+  const { name, about, choices, unit: symbol, above, least = above, most, odd, count } = of;
+  if (count) {
+    const both = make("span");
+    gauge[name].forEach((value, at) => {
+      const one = { ...gauge[name], name: gauge.name };
+      const input = parameter(one, { ...of, name: at, count: 0 });
+      input.setAttribute("aria-label", `${spoken(name)} ${at + 1} of ${gauge.name}`);
+      input.addEventListener("input", () => { gauge[name][at] = one[at]; });
+      both.append(input);
+    });
+    return both;
+  }
   const input = make(choices ? "select" : "input", choices ? "" : "limit");
-  input.setAttribute("aria-label", `${spoken(name)} of ${gauge.name}`);
+  input.setAttribute("aria-label", `${spoken(String(name))} of ${gauge.name}`);
   input.title = about;
   if (choices) {
     fill(input, ...choices.map(({ word }) => new Option(spoken(word), word)));
@@ -225,7 +240,7 @@ function addGauge() {
   const like = recipe.gauges.find((gauge) => gauge.kind === kind.kind) || {};
   const gauge = { slot: 1, name: named(spoken(kind.kind), recipe.gauges), kind: kind.kind, of, low: like.low, high: like.high };
   while (recipe.gauges.some(({ slot }) => slot === gauge.slot)) gauge.slot += 1;
-  for (const { name, default: value } of kind.parameters) gauge[name] = name in like ? like[name] : value;
+  for (const { name, default: value } of kind.parameters) gauge[name] = structuredClone(name in like ? like[name] : value);
   recipe.gauges.push(gauge);
   recipe.gauges.sort((one, other) => one.slot - other.slot);
   if (of.length) state.chosen = [recipe.features.length - of.length, 0];
@@ -235,6 +250,7 @@ function addGauge() {
 
 function addCorner() {
   const polygon = state.recipe.features[state.chosen[0]].region;
+  if (!polygon) return;
   const at = state.chosen[1], next = (at + 1) % polygon.length;
   polygon.splice(at + 1, 0, inside([(polygon[at][0] + polygon[next][0]) / 2, (polygon[at][1] + polygon[next][1]) / 2]));
   state.chosen = [state.chosen[0], at + 1];
@@ -243,6 +259,7 @@ function addCorner() {
 
 function removeCorner() {
   const polygon = state.recipe.features[state.chosen[0]].region;
+  if (!polygon) return;
   if (polygon.length <= 3) { text("editor-words", "a region has at least three corners"); return; }
   polygon.splice(state.chosen[1], 1);
   state.chosen = [state.chosen[0], 0];

@@ -1,6 +1,6 @@
 // The maps of the last part, with scale, cursor and the outlines of the recipe's regions.
 import { $, draw, fill, show, text } from "./element.js";
-import { ask, kindOf, loadKinds, map } from "./api.js";
+import { ask, cornersOf, kindOf, loadKinds, map } from "./api.js";
 import { paint } from "./colour.js";
 import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
@@ -29,8 +29,8 @@ function drawOutlines() {
   for (const { gauge, kind } of failing()) {
     for (const name of gauge.of || []) if (bad.get(name) !== "fail") bad.set(name, kind);
   }
-  const outline = ({ region }, kind) => {
-    const corners = region.map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
+  const outline = (feature, kind) => {
+    const corners = cornersOf(feature).map(([u, v]) => `${u + 0.5},${v + 0.5}`).join(" ");
     return draw("polygon", { points: corners, class: kind, "vector-effect": "non-scaling-stroke" });
   };
   const { features } = state.recipe;
@@ -70,7 +70,7 @@ function most(map) {
   for (let v = 0; v < height; v += 1) {
     for (let u = 0; u < width; u += 1) {
       const size = Math.abs(map.values[v * width + u]);
-      if (size > best && regions.some(({ region }) => inside(region, u * stride, v * stride))) { best = size; at = { column: u * stride, row: v * stride, side: stride }; }
+      if (size > best && regions.some((one) => inside(cornersOf(one), u * stride, v * stride))) { best = size; at = { column: u * stride, row: v * stride, side: stride }; }
     }
   }
   return at ? [at] : [];
