@@ -10,6 +10,13 @@ fn at(place: &Place, name: &str) -> String {
     place.path(name).to_str().unwrap().to_owned()
 }
 
+/// A head with all pixels of the default one, in front of which this part lies.
+fn whole_head(part: &str) -> Place {
+    let place = Place::new();
+    fs::write(place.path("small.toml"), format!("sub_rays = 2\n{part}")).unwrap();
+    place
+}
+
 /// Teaches the part that the head of a place sees, with default settings.
 fn taught(place: &Place, more: &[&str]) -> String {
     let (recipe, config) = (at(place, "1.recipe"), at(place, "fringed.toml"));
@@ -42,7 +49,7 @@ fn circles(judged: &Value) -> Vec<&str> {
 
 #[test]
 fn holes_of_the_stock_part_are_circles_by_default_and_a_closed_one_is_absent() {
-    let place = Place::new();
+    let place = whole_head("");
     let recipe = taught(&place, &["--part", "sheet_metal"]);
     let lies = ["--shift", "0.3,-0.4,0.2", "--rotate", "0.2"];
     let good = judged(&place, &recipe, "good", &lies);
@@ -65,15 +72,7 @@ fn holes_of_the_stock_part_are_circles_by_default_and_a_closed_one_is_absent() {
 
 #[test]
 fn gauges_of_a_plate_that_are_set_by_file_read_what_the_plate_has() {
-    let place = Place::new();
-    let config = fs::read_to_string(place.path("fringed.toml")).unwrap();
-    fs::write(place.path("plate.toml"), "[part]\nkind = \"plate\"\n").unwrap();
-    let with = config.replacen("[head]", "[head]\nscenario = \"plate.toml\"", 1);
-    let with = match with == config {
-        true => format!("{config}\n[head]\nscenario = \"plate.toml\"\n"),
-        false => with,
-    };
-    fs::write(place.path("fringed.toml"), with).unwrap();
+    let place = whole_head("[part]\nkind = \"plate\"\n");
     let recipe = taught(&place, &["--tolerance", "5"]);
     let text = program().run(&["recipe", "gauges", &recipe, "--get"]);
     let text = text.succeeded().stdout;

@@ -23,8 +23,8 @@
 //! What a stage has to know beforehand is worked out once, in a plan of its own: `Golden` (what all
 //! of them count from and compare with), `PhasePlan`, `Alignment`, `Gauges`, `ErrorBudget`. All
 //! plans together are [`Production`]; only these files know all of them: `strip` and `inspection`,
-//! which take rows through the stages, `findings` for the sums of all strips, `pair` and `rendered`
-//! for phases from elsewhere.
+//! which take rows through the stages, `sections` for the points of a row, `findings` and `geometric`
+//! for the sums of all strips, `steer`, `pair` and `rendered` for phases from elsewhere.
 //!
 //! # Shapes and units
 //! No map of the whole frame is written, except those that are asked for (`maps`). Strips overlap

@@ -139,7 +139,9 @@ pub fn budgets(
     let cycles = four.into_iter().chain([full]);
     let (part, ..) = stage.placed();
     let taught_gauges = cycles.flat_map(|at| Lies::ALL.map(|lies| (at, lies, Gauges::Taught)));
-    let many = Gauges::MANY.map(|gauges| (full, Lies::Moved, gauges));
+    let many = Gauges::MANY.into_iter();
+    let many = many.filter(|gauges| gauges.need_columns() <= width);
+    let many = many.map(|gauges| (full, Lies::Moved, gauges));
     for (production, lies, gauges) in taught_gauges.chain(many) {
         progress(
             0.8,

@@ -37,6 +37,14 @@ impl Gauges {
         Self::Holes(12),
     ];
 
+    /// Columns that a frame has at least: with fewer, holes have no rim.
+    pub fn need_columns(self) -> u32 {
+        match self {
+            Self::Holes(_) => 512,
+            _ => 0,
+        }
+    }
+
     /// In words, for tables.
     pub fn words(self) -> String {
         match self {
