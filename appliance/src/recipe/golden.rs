@@ -110,6 +110,10 @@ impl TaughtRecipe {
     /// What is said of recipes whose cycles begin with two frames.
     pub(super) const TWO_FRAMES: &str = "2 frames are tried first, the sequence taken follows in the same cycle where they do not hold";
 
+    /// What is said of recipes with gauges of contours.
+    pub(super) const CONTOURS: &str =
+        "contours need three shifts or more: cycles do not begin with two frames";
+
     /// The same recipe, whose cycles begin with two frames.
     ///
     /// # Errors

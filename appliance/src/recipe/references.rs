@@ -51,12 +51,7 @@ impl RecipeFile {
                 ));
             }
         }
-        let is_contour = |name: &String| self.feature(name).is_some_and(|of| of.kind.is_contour());
-        let contours = self
-            .gauges
-            .iter()
-            .find(|gauge| gauge.of.iter().any(is_contour));
-        if let Some(gauge) = contours.filter(|_| self.two_frames) {
+        if let Some(gauge) = self.gauge_of_contour().filter(|_| self.two_frames) {
             return Err(format!(
                 "gauge {:?} is of a contour, which needs three shifts or more, and two_frames is true: set it to false",
                 clipped(&gauge.name)
@@ -65,6 +60,13 @@ impl RecipeFile {
         self.gauges
             .iter()
             .try_for_each(|gauge| self.check_of(gauge))
+    }
+
+    /// A gauge that is of a contour, if there is one.
+    pub(super) fn gauge_of_contour(&self) -> Option<&GaugeFile> {
+        let is_contour = |name: &String| self.feature(name).is_some_and(|of| of.kind.is_contour());
+        let mut gauges = self.gauges.iter();
+        gauges.find(|gauge| gauge.of.iter().any(is_contour))
     }
 
     /// A feature by its name.

@@ -6,7 +6,7 @@ use super::golden::TaughtRecipe;
 use super::plan::Plan;
 use super::planner;
 use super::{GaugeFile, Recipe, RecipeFile};
-use algo::inspect::Findings;
+use algo::inspect::{Findings, Missing};
 use hal::bounds::clipped;
 
 /// Limits decide on the sequence, and this on golden's own value by some micrometres, which moves
@@ -24,7 +24,8 @@ impl TaughtRecipe {
         let choose = |of: &RecipeFile| planner::choose(&of.sequences, &of.gauges, arrays.widest());
         let mut choice = choose(&manifest);
         manifest.production = choice.production;
-        if manifest.gauges.iter().any(GaugeFile::needs_golden) {
+        let is_of_contour = manifest.gauge_of_contour().is_some();
+        if is_of_contour || manifest.gauges.iter().any(GaugeFile::needs_golden) {
             let head = manifest.head()?;
             for _ in 0..TURNS {
                 let recipe = Recipe::fit(&manifest, arrays.clone())?;
@@ -40,6 +41,9 @@ impl TaughtRecipe {
         if manifest.two_frames {
             choice.reasons.push(Self::TWO_FRAMES.into());
         }
+        if is_of_contour {
+            choice.reasons.push(Self::CONTOURS.into());
+        }
         Self::sealed(manifest, arrays, choice)
     }
 }
@@ -48,10 +52,17 @@ impl RecipeFile {
     /// Takes over what is found of golden.
     ///
     /// # Errors
-    /// In words: a gauge that needs golden's value has none.
+    /// In words: a gauge that needs golden's value has none, or one can never have a value.
     fn follow(&mut self, golden: &Findings) -> Result<(), String> {
-        for (gauge, reading) in self.gauges.iter_mut().zip(&golden.readings) {
+        let found = golden.readings.iter().zip(&golden.missing);
+        for (gauge, (reading, missing)) in self.gauges.iter_mut().zip(found) {
             gauge.set_golden(reading.as_ref());
+            if *missing == Some(Missing::Open) {
+                return Err(format!(
+                    "gauge {:?} depends on how the part lies along a direction that its shape does not determine: give it a datum",
+                    clipped(&gauge.name)
+                ));
+            }
             if gauge.needs_golden() && gauge.golden_value.is_none() {
                 return Err(format!(
                     "gauge {:?} finds nothing to measure in golden: move its feature, or write its limits and leave golden and master out",

@@ -58,10 +58,8 @@ impl TaughtRecipe {
         }
         manifest.tried.retain(|tried| !names.contains(&tried.gauge));
         let mut reasons = choice.reasons;
-        reasons.push(format!(
-            "{}: round, found by the rim, which needs three shifts or more",
-            names.join(", ")
-        ));
+        reasons.push(format!("{}: round, found by the rim", names.join(", ")));
+        reasons.push(Self::CONTOURS.into());
         let mut taught = Self::of(manifest, arrays)?;
         taught.choice.reasons = reasons;
         Ok(taught)
