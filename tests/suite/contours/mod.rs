@@ -4,10 +4,13 @@ mod commands;
 mod line;
 mod plates;
 
+use crate::gauges::frames;
 use appliance::station::Verdict;
 use line::{Judged, Line};
 use plates::{Setting, plate};
+use sim::Part;
 use sim::parts::{Defect, Floor, Plate};
+use std::time::Instant;
 use tests::random::Random;
 
 /// Placements of a plate.
@@ -193,5 +196,25 @@ fn a_displaced_hole_and_a_larger_one_fail_and_good_plates_pass() {
         let (dx, dy) = (0.1, 0.0);
         let displaced = verdict(&mut line, vec![Defect::DisplacedHole { index: 3, dx, dy }]);
         assert_eq!(displaced.0, Verdict::Fail, "{displaced:?}");
+    }
+}
+
+#[test]
+fn any_number_of_threads_finds_the_same_bits() {
+    let mut line = Line::new(&Setting::default());
+    let lies = line.setting.placement(Some(&mut Random::new(3)));
+    let part = Part::Plate(line.setting.plate.clone());
+    line.bed.stage.place(&part, &lies).unwrap();
+    let frames = frames(&mut line.bed, &line.plan, 0);
+    let found = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+        let inspect = || line.plan.inspect(0, &frames, Instant::now());
+        let found = pool.build().unwrap().install(inspect);
+        (found.gauges.clone(), found.features)
+    };
+    let alone = found(1);
+    assert!(alone.0.iter().all(|gauge| gauge.value.is_some()));
+    for threads in [2, 3, 16] {
+        assert_eq!(found(threads), alone);
     }
 }
