@@ -40,6 +40,7 @@ pub struct Bins {
     from: f64,
     /// Width of a bin, mm.
     width: f64,
+    per_mm: f64,
     /// Σw, Σw (s − from), Σw z of each.
     sums: Vec<[f64; 3]>,
 }
@@ -55,6 +56,7 @@ impl Bins {
         Self {
             from,
             width,
+            per_mm: 1.0 / width,
             sums: vec![[0.0; 3]; count],
         }
     }
@@ -69,7 +71,7 @@ impl Bins {
     #[inline]
     pub fn add(&mut self, s: f64, z: f64, weight: f64) {
         let s = s - self.from;
-        let Some(sums) = self.sums.get_mut((s / self.width) as usize) else {
+        let Some(sums) = self.sums.get_mut((s * self.per_mm) as usize) else {
             return;
         };
         sums[0] += weight;
