@@ -48,8 +48,8 @@ pub struct Bins {
 impl Bins {
     /// Empty ones between two places of the section, mm.
     pub fn new(from: f64, to: f64, optics: &Optics) -> Self {
-        // Not a number is the least.
-        let width = (WIDTH * optics.blur).max(WIDTHS[0]).min(WIDTHS[1]);
+        let width = (WIDTH * optics.blur).clamp(WIDTHS[0], WIDTHS[1]);
+        // Of a blur that is not a number, too, there are no more than so many.
         let width = width.max((to - from) / MOST);
         // Casts keep to the range of their type.
         let count = ((to - from) / width) as usize + 1;
