@@ -40,6 +40,7 @@ pub struct Bins {
     from: f64,
     /// Width of a bin, mm.
     width: f64,
+    per_mm: f64,
     /// Σw, Σw (s − from), Σw z of each.
     sums: Vec<[f64; 3]>,
 }
@@ -47,14 +48,15 @@ pub struct Bins {
 impl Bins {
     /// Empty ones between two places of the section, mm.
     pub fn new(from: f64, to: f64, optics: &Optics) -> Self {
-        // Not a number is the least.
-        let width = (WIDTH * optics.blur).max(WIDTHS[0]).min(WIDTHS[1]);
+        let width = (WIDTH * optics.blur).clamp(WIDTHS[0], WIDTHS[1]);
+        // Of a blur that is not a number, too, there are no more than so many.
         let width = width.max((to - from) / MOST);
         // Casts keep to the range of their type.
         let count = ((to - from) / width) as usize + 1;
         Self {
             from,
             width,
+            per_mm: 1.0 / width,
             sums: vec![[0.0; 3]; count],
         }
     }
@@ -69,7 +71,7 @@ impl Bins {
     #[inline]
     pub fn add(&mut self, s: f64, z: f64, weight: f64) {
         let s = s - self.from;
-        let Some(sums) = self.sums.get_mut((s / self.width) as usize) else {
+        let Some(sums) = self.sums.get_mut((s * self.per_mm) as usize) else {
             return;
         };
         sums[0] += weight;

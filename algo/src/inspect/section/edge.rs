@@ -39,6 +39,11 @@ pub struct Edge {
 }
 
 impl Edge {
+    /// σ of the radius by noise and blur, mm.
+    pub fn radius_sigma(&self) -> f64 {
+        libm::sqrt(self.covariance[3][3] + self.blurred[3] * self.blurred[3])
+    }
+
     /// Of a fit; `None` if it has no finite covariance.
     pub fn new(line: &Line, view: &View, fit: &Fit, is_stated: bool) -> Option<Self> {
         // How a row's residual changes with t and the r that is fitted.

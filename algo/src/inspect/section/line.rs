@@ -71,7 +71,12 @@ impl Moments {
             self.level = z;
         }
         self.count += 1;
-        self.reach = [self.reach[0].min(x), self.reach[1].max(x)];
+        if x < self.reach[0] {
+            self.reach[0] = x;
+        }
+        if x > self.reach[1] {
+            self.reach[1] = x;
+        }
         let (x, z) = (x - self.middle, z - self.level);
         let (wx, wz) = (w * x, w * z);
         self.w += w;
@@ -110,6 +115,7 @@ impl Moments {
             middle: self.middle,
             height: c + self.level,
             slope: a,
+            along: (1.0 / libm::sqrt(1.0 + a * a), a / libm::sqrt(1.0 + a * a)),
             covariance: [[cc, ca], [ca, aa]],
         })
     }
@@ -125,6 +131,8 @@ pub struct Line {
     pub height: f64,
     /// a, mm per mm.
     pub slope: f64,
+    /// The line's direction, of length 1.
+    along: (f64, f64),
     /// Of c and a by noise.
     pub covariance: [[f64; 2]; 2],
 }
@@ -137,8 +145,8 @@ impl Line {
 
     /// A direction or difference of x and z in the line's frame: along and depth.
     pub fn turned(&self, x: f64, z: f64) -> (f64, f64) {
-        let h = self.stretch();
-        ((x + self.slope * z) / h, (self.slope * x - z) / h)
+        let (s, t) = self.along;
+        (x * s + z * t, x * t - z * s)
     }
 
     /// A point in the line's frame.

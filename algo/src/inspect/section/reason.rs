@@ -52,9 +52,9 @@ pub enum Why {
     Edgeless,
     /// What leaves the line is no circle's arc that is tangent to it.
     NotRound,
-    /// Pixels are too coarse or too few to tell the edge's radius.
+    /// Pixels are too coarse or too few to tell the edge's radius, and it is not stated.
     Uncertain {
-        /// σ of the radius by noise, mm.
+        /// σ of the radius by noise and blur, mm.
         sigma: f64,
         /// The radius, mm.
         r: f64,
@@ -65,7 +65,7 @@ pub enum Why {
         degrees: f64,
         /// The arc that is needed, °.
         needs: f64,
-        /// Whether its radius is stated.
+        /// Whether its radius is stated, which needs less.
         stated: bool,
     },
 }

@@ -25,7 +25,8 @@ const LEAVES: f64 = 3.0;
 const STEEPER: f64 = 0.8;
 /// Heights follow within so many blurs behind an edge above a lit floor.
 const LIT: f64 = 6.0;
-/// The largest σ of a radius that is found, of it: above, several circles fit as pixels see them.
+/// The largest σ of a radius that is found, by noise and blur, of it: above, several circles fit as
+/// pixels see them.
 const CERTAIN: f64 = 0.04;
 /// A point's residual beyond which it is left out of its bin, σ.
 const OUTSIDE: f64 = 5.0;
@@ -38,7 +39,6 @@ pub struct Rough {
     line: Line,
     /// 1 on the left, −1 on the right.
     sign: f64,
-    blur: f64,
     stated: Option<f64>,
     view: View,
     p: [f64; 2],
@@ -76,7 +76,6 @@ impl Rough {
         Ok(Self {
             line,
             sign,
-            blur: optics.blur,
             stated,
             view,
             p: fit.p,
@@ -92,10 +91,12 @@ impl Rough {
         let Some(surface) = profile.surface(ray.inside, r) else {
             return false;
         };
+        let off = libm::fabs(ray.way - surface) - OUTSIDE * libm::sqrt(variance);
         // What blur does grows with the slope of the surface.
-        let facing = profile.facing(ray.inside, r);
-        let slack = self.blur * self.blur / (r * facing * facing * facing);
-        libm::fabs(ray.way - surface) <= OUTSIDE * libm::sqrt(variance) + slack
+        off <= 0.0 || {
+            let facing = profile.facing(ray.inside, r);
+            off * r * facing * facing * facing <= self.view.blur * self.view.blur
+        }
     }
 
     /// The edge, of bins of the points that are near.
@@ -103,11 +104,16 @@ impl Rough {
         let all = bins.side(&self.line, self.sign);
         let is_stated = self.stated.is_some();
         let mut fit = Fit::new(self.p);
-        let found = fit.solve(&self.view, leaving(&all, self.blur), is_stated, ROUNDS[1]);
+        let found = fit.solve(
+            &self.view,
+            leaving(&all, self.view.blur),
+            is_stated,
+            ROUNDS[1],
+        );
         let edge = found.and_then(|()| Edge::new(&self.line, &self.view, &fit, is_stated));
         let edge = edge.ok_or(Why::NotRound)?;
         let needs = if is_stated { STATED_ARC } else { ARC };
-        let (r, sigma) = (edge.parameters[3], libm::sqrt(edge.covariance[3][3]));
+        let (r, sigma) = (edge.parameters[3], edge.radius_sigma());
         let degrees = edge.arc.to_degrees();
         if degrees < needs {
             return Err(Why::ShortArc {

@@ -64,6 +64,54 @@ fn an_edge_that_is_seen_too_little_of_needs_its_radius() {
 }
 
 #[test]
+fn a_stated_radius_is_taken_however_much_of_the_edge_is_seen() {
+    let (joint, points) = joint();
+    let mut request = joint.request();
+    // As far off as a caller may be who states it for another part.
+    let stated = 1.03 * joint.radii[0];
+    request.edge_mm = [Some(stated), None];
+    let section = Section::new(&points, &request, &joint.optics()).unwrap();
+    let [left, right] = section.edges;
+    assert!(left.is_stated && !right.is_stated);
+    assert_eq!(left.parameters[3], stated);
+    assert_eq!(left.covariance[3], [0.0; 4]);
+    let free = find(&joint, &points).unwrap().edges;
+    assert!((free[0].parameters[3] - joint.radii[0]).abs() < 0.02);
+    assert_eq!(free[1], right);
+}
+
+/// How far the slopes of an edge's parameters may be from those of fixed weights, which move with
+/// the circle.
+const FOLLOWS: f64 = 0.25;
+
+/// C_pL = ∂p/∂L C_L, so a stretch whose heights are lifted shows whether it is true.
+#[test]
+fn an_edge_follows_its_line_as_the_covariance_says() {
+    let (joint, points) = joint();
+    let lifted = |lift: f64, tilt: f64| {
+        let mut points = points.clone();
+        for point in points.iter_mut().filter(|point| point.s < -6.0) {
+            point.z += lift + tilt * (point.s + 10.75);
+        }
+        find(&joint, &points).unwrap().edges[0]
+    };
+    let edge = lifted(0.0, 0.0);
+    let c = edge.covariance;
+    let determinant = c[0][0] * c[1][1] - c[0][1] * c[1][0];
+    for (i, lift, tilt) in [(0, 5e-4, 0.0), (1, 0.0, 5e-5)] {
+        let [more, less] = [1.0, -1.0].map(|sign| lifted(sign * lift, sign * tilt).parameters);
+        for k in [2, 3] {
+            let found = (more[k] - less[k]) / (2.0 * (lift + tilt));
+            let says = (c[k][i] * c[1 - i][1 - i] - c[k][1 - i] * c[0][1]) / determinant;
+            assert!(
+                (found - says).abs() < FOLLOWS * says.abs(),
+                "{i} {k}: {found} {says}"
+            );
+        }
+    }
+}
+
+#[test]
 fn a_stretch_that_reaches_over_the_edge_is_not_flat() {
     let (joint, points) = joint();
     let mut request = joint.request();
