@@ -74,9 +74,12 @@ pub fn start<const N: usize>(
     (points.iter().filter(agree).count() as f64 >= AGREED * count as f64).then_some(p)
 }
 
+/// A place of the picture, px.
+type Place = (f64, f64);
+
 /// Reads the pixels along a normal, which passes through two places of the picture.
 fn read(
-    ((u, v), to): ((f64, f64), (f64, f64)),
+    ((u, v), to): (Place, Place),
     d: impl Fn(f64, f64) -> f64,
     reach: f64,
     signals: &Signals<'_, impl View>,

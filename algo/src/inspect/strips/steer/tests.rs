@@ -311,9 +311,10 @@ fn a_plate_with_holes_is_followed_by_its_picture_where_heights_leave_it_free() {
         assert_eq!((found.free.len(), found.component(0)), (3, None));
         // What heights determine is theirs, whatever the picture says.
         let heights = motion.values();
-        for component in 2..5 {
+        let values = found.motion.values();
+        for (component, (value, height)) in values.iter().zip(heights).enumerate().take(5).skip(2) {
             let way = if component == 2 { 1.0 } else { found.radius };
-            let error = found.motion.values()[component] - heights[component];
+            let error = value - height;
             assert!((error * way).abs() < 2e-3, "{component}: {error}");
             let sigma = [&found, &plain].map(|placed| placed.component(component).unwrap().1);
             assert!((sigma[0] / sigma[1] - 1.0).abs() < 0.1, "{sigma:?}");
