@@ -65,6 +65,9 @@ const LEAST_POINTS: usize = 48;
 /// a little more than 1 at most; that of a picture without contrast is any number.
 const ALIKE: core::ops::RangeInclusive<f64> = 0.8..=1.0001;
 const SHOWN: f64 = 0.5;
+/// Only a picture whose brightness changes by this share of its largest from one pixel of the finest
+/// scale to the next has edges that place a part: shading alone does not.
+const EDGE: f64 = 0.1;
 /// Steps of the derivatives.
 const STEP_MM: f64 = 0.01;
 const STEP_RAD: f64 = 1e-4;
@@ -81,6 +84,8 @@ pub struct Picture {
 struct Scale {
     /// Fine pixels per coarse one.
     pixels: usize,
+    /// The steepest gradient over the largest brightness, per coarse pixel.
+    steepest: f64,
     points: Vec<Point>,
 }
 
@@ -150,6 +155,13 @@ impl Picture {
         }
         scales.reverse();
         (!scales.is_empty()).then_some(Self { centre, scales })
+    }
+
+    /// Whether it has edges that can place a part that heights leave free.
+    pub fn has_edges(&self) -> bool {
+        self.scales
+            .last()
+            .is_some_and(|finest| finest.steepest >= EDGE)
     }
 
     /// Finds a part that is hardly tilted in the mean of these frames; none where the edges do not
@@ -262,7 +274,9 @@ impl Scale {
         let gradient = |at: usize| [slope(at, 1), slope(at, picture.width)];
         let steep = |at: usize| libm::hypot(gradient(at)[0], gradient(at)[1]);
         let places = || (0..picture.brightness.len()).filter(inside);
-        let least = STEEP * places().map(steep).fold(0.0, f64::max);
+        let steepest = places().map(steep).fold(0.0, f64::max);
+        let brightest = picture.brightness.iter().copied().fold(0.0, f32::max);
+        let least = STEEP * steepest;
         let chosen: Vec<usize> = places()
             .filter(|&at| least > 0.0 && steep(at) >= least)
             .collect();
@@ -296,6 +310,7 @@ impl Scale {
         };
         Self {
             pixels,
+            steepest: steepest / f64::from(brightest).max(f64::MIN_POSITIVE),
             points: chosen.iter().step_by(every).filter_map(point).collect(),
         }
     }

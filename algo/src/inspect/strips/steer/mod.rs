@@ -25,11 +25,12 @@ impl Production {
         let needed = |open: &[bool; 6]| pair || open.contains(&true);
         let alignment = self.alignment.as_ref();
         let alignment = alignment.filter(|alignment| needed(&alignment.left_out));
-        self.picture = alignment.and_then(|alignment| {
+        let picture = alignment.and_then(|alignment| {
             let (triangulator, surface) = (&self.golden.triangulator, self.golden.cubics.surface());
             let centre = alignment.centre;
             Picture::new(triangulator, surface, modulation, centre, tolerance_px)
         });
+        self.picture = picture.filter(|picture| pair || picture.has_edges());
         self
     }
 
