@@ -172,21 +172,3 @@ fn the_scatter_of_repeats_is_what_sigma_says() {
     std::println!("scatter over σ {ratios:.2?}, of all {all:.2}");
     assert!((0.8..1.25).contains(&all), "{ratios:?}");
 }
-
-#[test]
-#[ignore = "prints what it costs"]
-fn cost() {
-    for pixel in PIXELS {
-        let joint = Joint::draw(pixel, &mut Chance::new(1));
-        let points = joint.rendered().capture(1, 1.0);
-        let start = std::time::Instant::now();
-        for _ in 0..16 {
-            let _ = std::hint::black_box(Section::new(&points, &joint.request(), &joint.optics()));
-        }
-        std::println!(
-            "{pixel}: 16 sections of {} points: {:?}",
-            points.len(),
-            start.elapsed()
-        );
-    }
-}
