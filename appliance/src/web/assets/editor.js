@@ -240,7 +240,10 @@ function addGauge() {
   const like = recipe.gauges.find((gauge) => gauge.kind === kind.kind) || {};
   const gauge = { slot: 1, name: named(spoken(kind.kind), recipe.gauges), kind: kind.kind, of, low: like.low, high: like.high };
   while (recipe.gauges.some(({ slot }) => slot === gauge.slot)) gauge.slot += 1;
-  for (const { name, default: value } of kind.parameters) gauge[name] = structuredClone(name in like ? like[name] : value);
+  for (const { name, default: usual } of kind.parameters) {
+    const value = name in like ? like[name] : usual;
+    gauge[name] = Array.isArray(value) ? value.slice() : value;
+  }
   recipe.gauges.push(gauge);
   recipe.gauges.sort((one, other) => one.slot - other.slot);
   if (of.length) state.chosen = [recipe.features.length - of.length, 0];
