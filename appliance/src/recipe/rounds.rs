@@ -7,11 +7,14 @@ use super::plan::Plan;
 use super::{FeatureFile, GaugeFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use algo::inspect::kinds::{Found, Roundness};
-use algo::inspect::{Basis, FeatureKind, SeenRim as Rim};
+use algo::inspect::{Basis, FeatureKind, FoundFeature, SeenRim};
 use std::f64::consts::TAU;
 
 /// An opening is round if its rim is off a circle by at most this much, beside what noise makes, px.
 const ROUND_PX: f64 = 0.5;
+/// It is only found by its rim if golden shows this share of it: where pixels are coarse, or the rim
+/// is disturbed, good parts would come near the least share.
+const GOLDEN_FOUND: f64 = 0.8;
 /// A region reaches so far beyond the opening, px.
 const AROUND_PX: f64 = 12.0;
 /// Corners of a region.
@@ -110,8 +113,9 @@ fn is_round(
     let found = Recipe::fit(&alone, arrays.clone())
         .and_then(|recipe| Plan::golden(recipe, head).map_err(|error| error.to_string()));
     let Ok(found) = found else { return false };
-    let rim = found.features.iter().find_map(|feature| feature.rim);
-    let (Some(reading), Some(Rim { pixel_mm, .. })) = (found.readings[0], rim) else {
+    let seen = |feature: &&FoundFeature| feature.found >= GOLDEN_FOUND;
+    let rim = found.features.iter().filter(seen).find_map(|of| of.rim);
+    let (Some(reading), Some(SeenRim { pixel_mm, .. })) = (found.readings[0], rim) else {
         return false;
     };
     let off = reading.value - reading.expected.unwrap_or(0.0);

@@ -4,7 +4,6 @@ use super::joint::{Chance, Joint, truth};
 use crate::inspect::section::{Knowledge, Section, Side, Unseen, Value, Why, flush, gap, radius};
 use std::vec::Vec;
 
-const PIXELS: [f64; 2] = [0.145, 0.41];
 /// Nothing, or depth and light of a floor below.
 const FLOORS: [Option<(f64, f64)>; 4] =
     [None, Some((18.0, 1.0)), Some((13.0, 0.5)), Some((4.0, 0.5))];
