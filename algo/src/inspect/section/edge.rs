@@ -32,7 +32,7 @@ pub struct Edge {
     pub arc: f64,
     /// Whether the radius is the stated one.
     pub is_stated: bool,
-    /// By how much the parameters are off if what blur does is by [`BLUR`] of it.
+    /// By how much the parameters are off if what blur does is by `BLUR` of it.
     pub blurred: [f64; 4],
     /// By how much they are off for 1 mm of a stated radius.
     pub stated: [f64; 4],
