@@ -28,23 +28,12 @@ const FAR_SIDE: f64 = 0.2;
 pub enum Source {
     /// Every edge of the part lies towards its material.
     Edge,
-    /// The height of the plane: a line of sight that is not along its normal meets it elsewhere.
-    Height,
-    /// The scale of lengths in the plane.
-    Scale,
     /// The radius of the rim.
     Rim,
     /// How an edge lies among the pixels.
     Pixels,
     /// What is seen of a wall.
     Wall,
-}
-
-impl Source {
-    /// Whether it is the same for all contours of a part.
-    pub fn is_common(self) -> bool {
-        matches!(self, Self::Edge | Self::Height | Self::Scale)
-    }
 }
 
 /// An input of the uncertainty.
@@ -56,23 +45,14 @@ pub struct Input<const N: usize> {
     pub off: [f64; N],
 }
 
-/// What is known of the measurement.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Knowledge {
-    /// σ of the height of the plane by the calibration, mm.
-    pub height: f64,
-    /// σ of lengths by the calibration, of 1.
-    pub scale: f64,
-    /// The radius of the rim, mm.
-    pub rim: f64,
-}
-
-/// The inputs of a contour that was found.
+/// The inputs of a contour that was found, whose rim has this radius, mm. What is uncertain of the
+/// plane and of all lengths is not among them: it is the same for planes and contours
+/// (`gauge/propagate.rs`).
 pub fn inputs<const N: usize>(
     shape: &impl Shape<N>,
     contour: &Contour<N>,
     setup: &Setup,
-    knowledge: Knowledge,
+    rim: f64,
 ) -> Vec<Input<N>> {
     let p = &contour.parameters;
     let into = |point: &Point| {
@@ -87,17 +67,11 @@ pub fn inputs<const N: usize>(
     };
     let mut inputs = Vec::new();
     inputs.push(of(Source::Edge, &|_| EDGE_PX * contour.pixel));
-    inputs.push(of(Source::Height, &|point| {
-        knowledge.height * dot(lean(point), into(point))
-    }));
-    inputs.push(of(Source::Scale, &|point| {
-        knowledge.scale * dot((point.x, point.y), into(point))
-    }));
     inputs.push(of(Source::Rim, &|point| {
         // α is how far the line of sight leans over the material.
         let lean = dot(lean(point), into(point)).max(0.0);
         let near = 1.0 + lean - libm::sqrt(1.0 + lean * lean);
-        knowledge.rim * near.max(FAR_SIDE) / libm::sqrt(3.0)
+        rim * near.max(FAR_SIDE) / libm::sqrt(3.0)
     }));
     for i in 0..N {
         let rate = |point: &Point| shape.derivative(p, point.x, point.y)[i];

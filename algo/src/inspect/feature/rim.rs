@@ -58,7 +58,8 @@ impl PlaneFrame {
     }
 }
 
-/// What of the parameters of a contour is what. Each shape has its own list.
+/// The parameters of a contour, in the order of its shape (`contour/shape`);
+/// those behind its own are 0.
 pub type Parameters = [f64; MAX_PARAMETERS];
 
 /// A contour that was found.
@@ -82,8 +83,7 @@ pub struct Rim {
     pub inputs: Vec<(Source, Parameters)>,
     /// The share of its rim that is seen.
     pub found: f64,
-    /// Largest less smallest distance of a point of the rim from the shape, mm, of points with the
-    /// error σ.
+    /// Of each point of the rim its distance from the shape and the σ of that by noise, mm.
     pub residuals: Vec<(f64, f64)>,
 }
 

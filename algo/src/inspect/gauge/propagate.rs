@@ -17,8 +17,8 @@
 //! Along directions that the part's shape leaves open the motion has no covariance. A value of a
 //! contour that depends on them is none.
 //!
-//! What else is uncertain of contours ([`Source`]) is propagated likewise, each input by itself: one
-//! that is common to all contours changes all of them at once.
+//! What else is uncertain of contours ([`Source`]) is propagated likewise, each input by itself;
+//! a shift of all edges towards their material changes all contours at once.
 //!
 //! # Accuracy
 //! Within 2 % where the value is 10 σ or more from a kink:
@@ -95,8 +95,8 @@ enum Change {
     Parameter(usize, usize, f64),
     /// An input of a contour, by its place in the list, is off by so many standard uncertainties.
     Input(usize, usize, f64),
-    /// The same for an input that is common to all contours.
-    Common(Source, f64),
+    /// All edges of the part lie so many standard uncertainties towards their material.
+    Edges(f64),
     /// The part lies so.
     Moved(Motion),
     /// All lengths in planes of contours are larger by this share.
@@ -147,8 +147,8 @@ impl Sensitive<'_> {
                         off(&unit, *step)
                     }
                     Change::Input(which, at, by) if which == id => off(&rim.inputs[*at].1, *by),
-                    Change::Common(source, by) => {
-                        let own = rim.inputs.iter().find(|(own, _)| own == source);
+                    Change::Edges(by) => {
+                        let own = rim.inputs.iter().find(|(own, _)| *own == Source::Edge);
                         off(&own.map_or(Parameters::default(), |(_, off)| *off), *by)
                     }
                     Change::Moved(motion) => {
@@ -213,7 +213,7 @@ impl Characteristic<'_> {
             lever += rows.iter().map(|row| libm::fabs(dot(row))).sum::<f64>();
         }
         let (mut shared, mut own) = (0.0, 0.0);
-        let (mut is_contour, mut common) = (false, heapless::Vec::<Source, 4>::new());
+        let mut is_contour = false;
         for (at, of) in self.all().enumerate() {
             let Sensitive::Contour { id, rim, .. } = *of else {
                 continue;
@@ -233,11 +233,8 @@ impl Characteristic<'_> {
             let row = |i: usize| (0..rim.count).map(|j| covariance[i][j] * g[j]).sum::<f64>();
             pixels += (0..rim.count).map(|i| g[i] * row(i)).sum::<f64>();
             for (input, (source, _)) in rim.inputs.iter().enumerate() {
-                if source.is_common() {
-                    if !common.contains(source) {
-                        // There are fewer common sources than places.
-                        let _ = common.push(*source);
-                    }
+                // That of all contours at once follows.
+                if *source == Source::Edge {
                     continue;
                 }
                 let off = slope(1.0, &|by| Change::Input(id, input, by));
@@ -247,13 +244,10 @@ impl Characteristic<'_> {
                 }
             }
         }
-        for source in common {
-            let off = slope(1.0, &|by| Change::Common(source, by));
-            shared += off * off;
-        }
         if is_contour {
-            let off = slope(1.0, &|by| Change::Scale(by * length));
-            shared += off * off;
+            let edges = slope(1.0, &Change::Edges);
+            let scale = slope(1.0, &|by| Change::Scale(by * length));
+            shared += edges * edges + scale * scale;
         }
         let mut motion = 0.0;
         if let Some(placed) = placed {

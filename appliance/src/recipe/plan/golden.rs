@@ -1,7 +1,7 @@
 //! The taught part in the form that production needs: weights, safe maps and the golden surface.
 
 use crate::recipe::archive::Arrays;
-use crate::recipe::{Conditions, RecipeSequence, SequenceKind, safe};
+use crate::recipe::{RecipeSequence, SequenceKind, safe};
 use algo::adaptive::Field;
 use algo::frame::SampleNoise;
 use algo::inspect::{Feature, Gauge, GoldenSignal, Taught, Weight};
@@ -91,7 +91,6 @@ pub(super) fn signal(
     arrays: &mut Arrays,
     sequences: &[RecipeSequence],
     (features, gauges): (&[Feature], &[Gauge]),
-    conditions: &Conditions,
 ) -> Option<GoldenSignal> {
     let values = std::mem::take(&mut arrays.golden_signal);
     let is_contour = |at: usize| features[at].kind.is_contour();
@@ -103,7 +102,6 @@ pub(super) fn signal(
         values: Arc::new(values),
         ratio: finest.ratio,
         shifts: finest.shifts(),
-        captures: conditions.golden_captures,
         brighter: 1.0,
     })
 }

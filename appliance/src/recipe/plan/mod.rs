@@ -149,7 +149,7 @@ impl Plan {
         let surface = golden::surface(size.0, &arrays, golden::offset(&arrays, base));
         let shares = normal_shares(&triangulator, &surface);
         let range = triangulator.function().range();
-        let signal = golden::signal(&mut arrays, &sequences, (&features, &gauges), &conditions);
+        let signal = golden::signal(&mut arrays, &sequences, (&features, &gauges));
         let golden = (&arrays, &shares[..], base);
         let (prepared, shots) = Prepared::all(sequences, &conditions, golden, range)?;
         drop(shares);

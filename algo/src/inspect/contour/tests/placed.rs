@@ -2,7 +2,7 @@
 
 use super::scene::{Chance, Noise, Rendered, Scene};
 use crate::inspect::contour::shape::Circle;
-use crate::inspect::contour::{Knowledge, State, find, inputs};
+use crate::inspect::contour::{State, find, inputs};
 use std::vec::Vec;
 
 pub const LEVELS: &[f64] = &[1.0, 15.0 / 16.0, 0.75];
@@ -95,7 +95,7 @@ pub fn figures(scene: &Scene<'_>, r: f64, many: Many) -> Figures {
             let off = [p[0] - x, p[1] - y, 2.0 * (p[2] - r)].map(|mm| mm * 1e3);
             let of = |i: usize, mm: f64| if i == 2 { 2e3 * mm } else { 1e3 * mm };
             let sigma = [0, 1, 2].map(|i| of(i, libm::sqrt(contour.covariance[i][i])));
-            let inputs = inputs(&Circle, &contour, &setup, Knowledge::default());
+            let inputs = inputs(&Circle, &contour, &setup, 0.0);
             for i in 0..3 {
                 let systematic = inputs.iter().map(|input| of(i, input.off[i]).powi(2));
                 let u = 2.0 * (sigma[i] * sigma[i] + systematic.sum::<f64>()).sqrt();

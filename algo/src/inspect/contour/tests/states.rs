@@ -3,7 +3,7 @@
 use super::placed::{LEVELS, NOTHING, sheet};
 use super::scene::{Chance, Noise, Rendered, Scene};
 use crate::inspect::contour::shape::Circle;
-use crate::inspect::contour::{Contour, Knowledge, Outcome, Setup, State, find, inputs};
+use crate::inspect::contour::{Contour, Outcome, Setup, State, find, inputs};
 
 const SINGLE: &[f64] = &[1.0];
 /// Placements of each case.
@@ -34,7 +34,7 @@ fn look_with(
     change(&mut setup);
     let expected = [x + chance.within(0.25), y + chance.within(0.25), r];
     let contour = find(&Circle, &expected, &rendered.capture(seed), &setup);
-    let inputs = inputs(&Circle, &contour, &setup, Knowledge::default());
+    let inputs = inputs(&Circle, &contour, &setup, 0.0);
     let u = [0, 1, 2].map(|i| {
         let systematic = inputs.iter().map(|input| input.off[i] * input.off[i]);
         2.0 * (contour.covariance[i][i] + systematic.sum::<f64>()).sqrt()

@@ -6,7 +6,7 @@ use super::shape::Associated;
 use super::taught::{Contours, Expected, REACH_MM};
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed};
-use crate::inspect::contour::{Knowledge, State};
+use crate::inspect::contour::State;
 use crate::inspect::feature::{Geometry, PlaneFrame, Rim};
 use crate::inspect::gauge::Sensitive;
 use crate::inspect::section::Unseen;
@@ -126,13 +126,9 @@ impl ContourFit {
             if let Some(pixel) = face.spot_size(0.0, 0.0) {
                 face.look_about(expected.outline.places(), AROUND_PX + REACH_MM / pixel);
             }
-            let knowledge = Knowledge {
-                rim: expected.rim,
-                ..Knowledge::default()
-            };
             let setup = contours.setup(expected, &face);
             if let Some(setup) = setup {
-                let found = expected.outline.find(&face, &setup, knowledge);
+                let found = expected.outline.find(&face, &setup, expected.rim);
                 of.state = found.contour.state;
                 of.found = found.contour.found;
                 of.lost = (of.state == State::Unseen).then_some(Lost::Rim);

@@ -32,8 +32,6 @@ pub struct GoldenSignal {
     pub ratio: f64,
     /// N, the number of its shifts.
     pub shifts: usize,
-    /// How many captures it is the mean of.
-    pub captures: usize,
     /// The modulation by this sequence over that of the signal.
     pub brighter: f64,
 }

@@ -1,7 +1,7 @@
 //! The shapes of contours as features have them.
 
 use crate::inspect::contour::shape::{Circle, Line, Shape, Slot};
-use crate::inspect::contour::{Contour, Input, Knowledge, Setup, Source, View, find, inputs};
+use crate::inspect::contour::{Contour, Input, Setup, Source, View, find, inputs};
 use crate::inspect::feature::{FeatureKind, MAX_PARAMETERS, Parameters};
 use alloc::vec::Vec;
 
@@ -71,11 +71,11 @@ impl Outline {
     }
 
     /// Finds it near where it is.
-    pub fn find(&self, view: &impl View, setup: &Setup, knowledge: Knowledge) -> Associated {
+    pub fn find(&self, view: &impl View, setup: &Setup, rim: f64) -> Associated {
         match self {
-            Self::Circle(p) => associated(&Circle, p, view, setup, knowledge),
-            Self::Slot(p) => associated(&Slot, p, view, setup, knowledge),
-            Self::Line(line, p) => associated(line, p, view, setup, knowledge),
+            Self::Circle(p) => associated(&Circle, p, view, setup, rim),
+            Self::Slot(p) => associated(&Slot, p, view, setup, rim),
+            Self::Line(line, p) => associated(line, p, view, setup, rim),
         }
     }
 }
@@ -85,10 +85,10 @@ fn associated<const N: usize>(
     expected: &[f64; N],
     view: &impl View,
     setup: &Setup,
-    knowledge: Knowledge,
+    rim: f64,
 ) -> Associated {
     let contour = find(shape, expected, view, setup);
-    let inputs = inputs(shape, &contour, setup, knowledge);
+    let inputs = inputs(shape, &contour, setup, rim);
     let used = contour.points.iter().filter(|point| point.weight > 0.0);
     let residuals = used.map(|point| {
         let off = shape.distance(&contour.parameters, point.x, point.y);

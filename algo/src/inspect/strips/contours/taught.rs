@@ -5,7 +5,7 @@ use super::light::{GoldenSignal, Levels, Signal};
 use super::outline::{Start, start};
 use super::shape::Outline;
 use crate::geometry::Vector;
-use crate::inspect::contour::{Complex, Fringes, Knowledge, Setup, Spot, State, View};
+use crate::inspect::contour::{Complex, Fringes, Setup, Spot, State, View};
 use crate::inspect::feature::{Feature, FeatureKind, PlaneFrame};
 use crate::inspect::strips::fits::Fit;
 use crate::inspect::strips::gauges::Unmeasurable;
@@ -139,7 +139,7 @@ impl Contours {
         let mut setup = self.setup(&expected, &face)?;
         let pixel = face.spot_size(0.0, 0.0)?;
         setup.reach = FIRST_REACH_MM.max(FIRST_REACH_PX * pixel);
-        let found = expected.outline.find(&face, &setup, Knowledge::default());
+        let found = expected.outline.find(&face, &setup, 0.0);
         if found.contour.state != State::Found {
             return None;
         }
