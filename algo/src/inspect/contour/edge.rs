@@ -52,6 +52,9 @@ const LEAST_HALF: f64 = 0.005;
 /// Beyond so many σ_t from the edge nothing of it is seen: 4e-6 of the light.
 const REACH: f64 = 4.5;
 
+/// Beyond so many σ 2e-11 of a normal distribution are left.
+const OVER: f64 = 6.7;
+
 /// Coefficients of z^0, z^2, … in brackets above, times those of 1, c_4, c_6 and c_8.
 type Series = [[f64; 5]; 4];
 const SHARE: Series = [
@@ -215,6 +218,18 @@ impl Edge {
 /// Φ, P′, P, Q and R for σ = 1.
 fn integrals(z: f64) -> [f64; 5] {
     let square = z * z;
+    if square >= OVER * OVER {
+        // All of the light, or none.
+        let [share, first, second] = [
+            (square + 1.0) / 2.0,
+            z * (square + 3.0) / 6.0,
+            (square * (square + 6.0) + 3.0) / 24.0,
+        ];
+        return match z > 0.0 {
+            true => [1.0, z, share, first, second],
+            false => [0.0; 5],
+        };
+    }
     let density = libm::exp(-0.5 * square) / libm::sqrt(TAU);
     let below = 0.5 * libm::erfc(-z * FRAC_1_SQRT_2);
     [

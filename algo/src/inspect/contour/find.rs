@@ -3,8 +3,8 @@
 
 use super::complex::Complex;
 use super::edge::Edge;
-use super::fit::{Fit, Problem, Seen};
-use super::piece::{BAND, MARGIN, Pieces, pixel_size};
+use super::fit::{Fit, Problem, Seen, damp};
+use super::piece::{BAND, LENGTH, MARGIN, Pieces, pixel_size};
 use super::sample::Signals;
 use super::shape::Shape;
 use super::start::start;
@@ -30,8 +30,11 @@ const NEAR: f64 = 0.25;
 const SHARPER: f64 = 0.29;
 /// Largest step of the blur, px.
 const STEP: f64 = 0.3;
-/// The first round looks at one of so many pieces.
-const SOME: usize = 2;
+/// Until the contour lies still one of so many pieces is looked at, but so many pieces at least.
+const FEW: usize = 4;
+const LEAST: usize = 16;
+/// The rounds with all pieces end after less movement, px: those before were off by their noise.
+const LAST: f64 = 0.1;
 /// What light may be off the model until the contour's place and the blur are known, of the
 /// material's, and after that: an edge oblique to pixels and to fringes.
 const ROUGH: [f64; 2] = [0.1, 0.01];
@@ -102,6 +105,7 @@ pub fn find<const N: usize>(
             pieces: Pieces::default(),
             moved: f64::INFINITY,
             seen: Vec::new(),
+            damped: Vec::new(),
             ratios: Vec::new(),
         },
     };
@@ -109,16 +113,22 @@ pub fn find<const N: usize>(
     if let Some(start) = start(about, &search.signals, pixel, &mut search.room.ratios) {
         contour.parameters = start;
     }
-    search.run(&mut contour, setup.thickness.unwrap_or(0.0), false);
+    let (few, thin) = search.run(&mut contour, setup.thickness.unwrap_or(0.0));
     if setup.thickness.is_none() && contour.state == State::Found {
-        let mut thick = contour.clone();
-        search.run(&mut thick, THICK * BAND * pixel, true);
+        // What a wall changes is seen on few pieces as well as on all: the noise of both ends is one.
+        let mut thick = Contour {
+            parameters: thin,
+            ..contour.clone()
+        };
+        search.approach(&mut thick, THICK * BAND * pixel, ROUGH[1], few, STILL);
+        search.judge(&mut thick);
         if thick.state == State::Found {
             let mut half = [0.0; N];
-            let both = contour.parameters.iter_mut().zip(thick.parameters);
-            for (half, (thin, thick)) in half.iter_mut().zip(both) {
-                *half = (thick - *thin) / 2.0;
-                *thin += *half;
+            let both = thin.iter().zip(thick.parameters);
+            for ((half, p), (thin, thick)) in half.iter_mut().zip(&mut contour.parameters).zip(both)
+            {
+                *half = (thick - thin) / 2.0;
+                *p += *half;
             }
             contour.wall = Some(half);
         }
@@ -141,17 +151,43 @@ struct Sharpness {
 }
 
 impl<S, V: View> Search<'_, S, V> {
-    /// Goes on from where a contour is, until nothing moves.
-    fn run<const N: usize>(&mut self, contour: &mut Contour<N>, thickness: f64, is_near: bool)
+    /// Goes on from where a contour is until nothing moves, with few pieces and then with all. Which
+    /// pieces the few were, as a step, and the parameters by them.
+    fn run<const N: usize>(&mut self, contour: &mut Contour<N>, thickness: f64) -> (usize, [f64; N])
+    where
+        S: Shape<N>,
+    {
+        let pieces = self.shape.length(&contour.parameters) / (LENGTH * contour.pixel);
+        // Casts cut off, and keep to the range of their type.
+        let few = (pieces as usize / LEAST).clamp(1, FEW);
+        let near = self.approach(contour, thickness, ROUGH[0], few, STILL);
+        let by_few = contour.parameters;
+        if few > 1 && near {
+            self.approach(contour, thickness, ROUGH[1], 1, LAST);
+        } else if few > 1 {
+            self.approach(contour, thickness, ROUGH[0], 1, STILL);
+        }
+        self.judge(contour);
+        match near {
+            true => (few, by_few),
+            false => (1, contour.parameters),
+        }
+    }
+
+    /// The same with one of `some` pieces, until no place moves by `still` px. Whether the pieces
+    /// determine the contour.
+    fn approach<const N: usize>(
+        &mut self,
+        contour: &mut Contour<N>,
+        thickness: f64,
+        mut rough: f64,
+        some: usize,
+        still: f64,
+    ) -> bool
     where
         S: Shape<N>,
     {
         let shape = self.shape;
-        let (mut rough, mut some) = if is_near {
-            (ROUGH[1], 1)
-        } else {
-            (ROUGH[0], SOME)
-        };
         for _ in 0..ROUNDS {
             let before = (contour.parameters, contour.blur);
             let room = &mut self.room;
@@ -160,37 +196,31 @@ impl<S, V: View> Search<'_, S, V> {
                 room.pieces.divide(of, &self.signals, contour.pixel);
                 room.moved = 0.0;
             }
-            room.pieces.place(of, self.signals.setup, thickness);
+            room.pieces.place(of, self.signals.setup, thickness, some);
             self.look(contour, rough, some);
             let room = &mut self.room;
             let points = &mut contour.points;
             let found = associate(shape, &mut contour.parameters, points, &mut room.ratios);
             let Some(covariance) = found else {
                 contour.parameters = before.0;
-                if some == 1 {
-                    break;
-                }
-                some = 1;
-                continue;
+                return false;
             };
             contour.covariance = covariance;
             let mut moved = 0.0_f64;
-            for piece in &room.pieces.all {
+            for piece in room.pieces.all.iter().step_by(some) {
                 let d = shape.distance(&contour.parameters, piece.foot.x, piece.foot.y);
                 moved = moved.max(libm::fabs(d) / contour.pixel);
             }
             room.moved += moved;
             let sharper = libm::fabs(contour.blur - before.1);
-            let is_last = rough == ROUGH[1] && some == 1;
-            if is_last && moved < STILL && sharper < SHARP {
+            if rough == ROUGH[1] && moved < still && sharper < SHARP {
                 break;
             }
             if moved < NEAR && sharper < SHARPER {
                 rough = ROUGH[1];
             }
-            some = 1;
         }
-        self.judge(contour);
+        true
     }
 
     /// Fits the edges of one of `some` pieces, makes points of them, and adapts the blur.
@@ -198,13 +228,21 @@ impl<S, V: View> Search<'_, S, V> {
         contour.points.clear();
         contour.outcomes.clear();
         let (mut sharpness, mut face) = (Sharpness::default(), [0.0; 2]);
-        let Room { pieces, seen, .. } = &mut self.room;
+        let Room {
+            pieces,
+            seen,
+            damped,
+            ..
+        } = &mut self.room;
         for piece in pieces.all.iter().step_by(some) {
+            let edge = Edge::new(piece.normal, contour.blur);
+            damp(piece, &edge, &self.signals.setup.levels, damped);
             let problem = Problem {
                 piece,
                 pixels: &pieces.pixels[piece.pixels.clone()],
                 signals: &self.signals,
-                edge: Edge::new(piece.normal, contour.blur),
+                edge,
+                damped,
             };
             let fit = match problem.pixels.is_empty() {
                 true => None,
@@ -258,6 +296,7 @@ struct Room {
     /// How far the contour has moved since its pieces' pixels were gathered, px.
     moved: f64,
     seen: Vec<Seen>,
+    damped: Vec<f64>,
     ratios: Vec<f64>,
 }
 

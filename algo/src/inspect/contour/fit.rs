@@ -33,7 +33,7 @@ use super::complex::Complex;
 use super::edge::{Edge, Profile};
 use super::piece::{BAND, Piece, Pixel};
 use super::sample::Signals;
-use super::view::View;
+use super::view::{Fringes, View};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
@@ -102,6 +102,18 @@ pub struct Problem<'a, V> {
     pub signals: &'a Signals<'a, V>,
     /// What its pixels see.
     pub edge: Edge,
+    /// What blur leaves of the wall's light, in each level; empty without a wall.
+    pub damped: &'a [f64],
+}
+
+/// What blur leaves of the light of a piece's wall, in each level.
+pub fn damp(piece: &Piece, edge: &Edge, levels: &[Fringes], damped: &mut Vec<f64>) {
+    damped.clear();
+    let Some(wall) = &piece.wall else { return };
+    let per_px = TAU * wall.turns / wall.width;
+    let damping = per_px * (TAU * 2.0 * piece.gradient - per_px) / 2.0 * edge.variance();
+    let levels = levels.iter();
+    damped.extend(levels.map(|level| libm::exp(level.ratio * level.ratio * damping)));
 }
 
 impl<V: View> Problem<'_, V> {
@@ -286,11 +298,11 @@ impl<V: View> Problem<'_, V> {
     fn add_wall(&self, wall: &Wall, d: f64, near: Profile, seen: &mut Seen) {
         let per_px = TAU * wall.turns / wall.width;
         let k = self.signals.ratio * (TAU * self.piece.gradient - per_px);
-        let damping = per_px * (TAU * 2.0 * self.piece.gradient - per_px) / 2.0;
-        let damping = damping * self.edge.variance();
-        let turned = self.signals.sum(|ratio| {
-            Complex::turned(-ratio * per_px / TAU * d) * libm::exp(ratio * ratio * damping)
-        }) * wall.brightness;
+        let angle = -per_px / TAU * d;
+        let turned = self
+            .signals
+            .sum(self.damped, |ratio| Complex::turned(ratio * angle))
+            * wall.brightness;
         let (edge, beyond) = (&self.edge, d + wall.width);
         let far = edge.at(beyond);
         let light = |far: [f64; 3], near: [f64; 3]| {

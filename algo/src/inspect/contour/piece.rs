@@ -9,7 +9,7 @@ use alloc::vec::Vec;
 use core::ops::Range;
 
 /// Length of a piece, px.
-const LENGTH: f64 = 2.0;
+pub const LENGTH: f64 = 2.0;
 /// How far from the contour pixels are looked at, px.
 pub const BAND: f64 = 5.0;
 /// How far a contour may move until its pixels are gathered anew, px.
@@ -135,14 +135,16 @@ impl Pieces {
         }
     }
 
-    /// Moves pieces to a contour that has hardly moved, and works out the distances of their pixels.
+    /// Moves one of `some` pieces to a contour that has hardly moved, and works out the distances of
+    /// its pixels.
     pub fn place<const N: usize>(
         &mut self,
         of: (&impl Shape<N>, &[f64; N]),
         setup: &Setup,
         thickness: f64,
+        some: usize,
     ) {
-        for piece in &mut self.all {
+        for piece in self.all.iter_mut().step_by(some) {
             let Foot { x, y, normal, .. } = piece.foot;
             let off = of.0.distance(of.1, x, y);
             (piece.foot.x, piece.foot.y) = (x - off * normal.0, y - off * normal.1);

@@ -49,11 +49,11 @@ impl<'a, V: View> Signals<'a, V> {
         levels.map(|(weight, level)| weight * of(level)).sum()
     }
 
-    /// The weighted mean of what levels of these ratios have.
-    pub fn sum(&self, of: impl Fn(f64) -> Complex) -> Complex {
-        let levels = self.weights.iter().zip(&self.setup.levels);
-        levels.fold(Complex::default(), |sum, (weight, level)| {
-            sum + of(level.ratio) * *weight
+    /// The weighted mean of what levels of these ratios have, each times a factor of its own.
+    pub fn sum(&self, factors: &[f64], of: impl Fn(f64) -> Complex) -> Complex {
+        let levels = self.weights.iter().zip(&self.setup.levels).zip(factors);
+        levels.fold(Complex::default(), |sum, ((weight, level), factor)| {
+            sum + of(level.ratio) * (weight * factor)
         })
     }
 
