@@ -165,8 +165,18 @@ fn missing_holes_and_bent_flanges_fail_with_two_frames() {
     }
 }
 
+/// The samples of a frame, row by row.
+pub(crate) fn samples(frame: &Frame) -> Vec<u8> {
+    let view = seam::view(frame).unwrap();
+    let rows = (0..view.height()).map(|v| match view.row(v) {
+        algo::frame::Samples::Eight(row) => row.to_vec(),
+        algo::frame::Samples::Sixteen(_) => Vec::new(),
+    });
+    rows.flatten().collect()
+}
+
 /// A frame with other samples in its left half.
-fn with_left(frame: &Frame, sample: impl Fn(usize, u8) -> u8) -> Frame {
+pub(crate) fn with_left(frame: &Frame, sample: impl Fn(usize, u8) -> u8) -> Frame {
     let view = seam::view(frame).unwrap();
     let (width, height) = (view.width(), view.height());
     let mut samples = Vec::with_capacity(width * height);
@@ -202,16 +212,8 @@ fn a_cycle_goes_on_with_more_frames_where_half_the_picture_is_disturbed() {
         .load(line.plan.rasters(&line.bed.calibration).unwrap())
         .unwrap();
     let other = other.pair(&Part::Sphere(Sphere::default()));
-    let left = |frame: &Frame| -> Vec<u8> {
-        let view = seam::view(frame).unwrap();
-        let rows = (0..view.height()).map(|v| match view.row(v) {
-            algo::frame::Samples::Eight(row) => row.to_vec(),
-            algo::frame::Samples::Sixteen(_) => Vec::new(),
-        });
-        rows.flatten().collect()
-    };
     let [first, second] = [0, 1].map(|at| {
-        let left = left(&other[at]);
+        let left = samples(&other[at]);
         with_left(&good[at], |place, _| left[place])
     });
     let why = inspect(&[first, second]).step_up;

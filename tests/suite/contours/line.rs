@@ -21,6 +21,8 @@ pub(super) struct Line {
     pub(super) bed: Bed,
     pub(super) plan: Plan,
     pub(super) gauges: Vec<(GaugeFile, f64)>,
+    /// Names of all features.
+    pub(super) features: Vec<String>,
 }
 
 impl Line {
@@ -53,6 +55,7 @@ impl Line {
             bed,
             plan,
             gauges,
+            features: file.features.iter().map(|of| of.name.clone()).collect(),
         }
     }
 

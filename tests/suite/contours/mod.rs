@@ -1,7 +1,9 @@
 //! Holes, slots and edges of plates of the simulated head, against the truth, over many placements.
 
 mod commands;
+mod hidden;
 mod line;
+mod many;
 mod plates;
 
 use crate::gauges::frames;
@@ -32,18 +34,22 @@ fn thick(plate: Plate) -> Plate {
     }
 }
 
+/// A lit floor, walls, lenses and ambient light at once.
+fn all_together() -> Setting {
+    Setting {
+        plate: bright(thick(plate())),
+        blur: [0.5, 1.0],
+        ambient: 0.2,
+        thickness_mm: Some(1.0),
+        ..Setting::default()
+    }
+}
+
 /// The settings that a row of the promise names, with the largest bias in µm.
 fn settings() -> Vec<(&'static str, Setting, f64)> {
     let plain = Setting::default();
     let of = |plate: Plate| Setting {
         plate,
-        ..plain.clone()
-    };
-    let all = Setting {
-        plate: bright(thick(plate())),
-        blur: [0.5, 1.0],
-        ambient: 0.2,
-        thickness_mm: Some(1.0),
         ..plain.clone()
     };
     vec![
@@ -73,7 +79,7 @@ fn settings() -> Vec<(&'static str, Setting, f64)> {
             },
             20.0,
         ),
-        ("all together", all.clone(), 35.0),
+        ("all together", all_together(), 35.0),
         (
             "tilted",
             Setting {
@@ -82,6 +88,15 @@ fn settings() -> Vec<(&'static str, Setting, f64)> {
                 ..of(thick(plate()))
             },
             30.0,
+        ),
+        (
+            "tilted, bright floor",
+            Setting {
+                tilt_deg: 12.0,
+                thickness_mm: Some(1.0),
+                ..of(bright(thick(plate())))
+            },
+            35.0,
         ),
         (
             "tilted, thickness not told",
@@ -132,9 +147,14 @@ fn contours_are_true_with_thick_sheets_bright_floors_real_optics_and_tilts() {
 
 #[test]
 fn a_closed_hole_is_absent_and_changes_nothing_else() {
+    closed_holes_are_absent(4);
+}
+
+/// Closes one hole, or two, in so many placements.
+fn closed_holes_are_absent(placements: usize) {
     let mut line = Line::new(&Setting::default());
     let mut random = Random::new(9);
-    for at in 0..4 {
+    for at in 0..placements {
         let lies = line.setting.placement((at > 0).then_some(&mut random));
         let closed: &[usize] = if at % 2 == 0 { &[1] } else { &[0, 2] };
         let mut plate = line.setting.plate.clone();
@@ -171,6 +191,11 @@ fn a_closed_hole_is_absent_and_changes_nothing_else() {
 
 #[test]
 fn a_displaced_hole_and_a_larger_one_fail_and_good_plates_pass() {
+    defects_fail(6);
+}
+
+/// Measures good plates, larger holes and displaced ones in so many placements.
+fn defects_fail(placements: usize) {
     let mut line = Line::with_limits(&Setting::default(), |gauge, truth| {
         (gauge.low, gauge.high) = (Some(truth - 0.06), Some(truth + 0.06));
         if gauge.datum.is_some() && gauge.name == "position" {
@@ -178,7 +203,7 @@ fn a_displaced_hole_and_a_larger_one_fail_and_good_plates_pass() {
         }
     });
     let mut random = Random::new(11);
-    for at in 0..6 {
+    for at in 0..placements {
         let lies = line.setting.placement((at > 0).then_some(&mut random));
         let good = line.setting.plate.clone();
         let verdict = |line: &mut Line, defects: Vec<Defect>| {

@@ -79,6 +79,7 @@ pub(super) fn gauging(
     )];
     let in_sheet = |of: FeatureFile| FeatureFile {
         plane: Some("sheet".into()),
+        rim_mm: (plate.rim_mm > 0.0).then_some(plate.rim_mm),
         ..of
     };
     let mut all: Vec<(GaugeFile, f64)> = Vec::new();
@@ -196,6 +197,8 @@ pub(super) fn gauging(
 #[derive(Clone)]
 pub(super) struct Setting {
     pub(super) plate: Plate,
+    /// Columns and rows of the camera.
+    pub(super) size: (u32, u32),
     /// σ of the blur of camera and projector, px.
     pub(super) blur: [f64; 2],
     /// Ambient light over the part's.
@@ -211,6 +214,7 @@ impl Default for Setting {
     fn default() -> Self {
         Self {
             plate: plate(),
+            size: (512, 512),
             blur: [0.0, 0.5],
             ambient: 0.04,
             tilt_deg: 0.0,
@@ -227,6 +231,14 @@ impl Setting {
             ..Scenario::default()
         };
         scenario.noise.noise_counts = self.noise;
+        let camera = &mut scenario.rig.camera;
+        (camera.width, camera.height) = self.size;
+        // Pixels are square.
+        let share = f64::from(self.size.1) / f64::from(self.size.0);
+        camera.fov_deg[1] = 2.0
+            * (share * (camera.fov_deg[0] / 2.0).to_radians().tan())
+                .atan()
+                .to_degrees();
         scenario.optics.camera_blur_px = self.blur[0];
         scenario.optics.projector_blur_px = self.blur[1];
         // The camera is not overexposed.
