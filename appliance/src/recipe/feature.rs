@@ -1,20 +1,20 @@
 //! The features of a recipe in its file, and datum systems of them.
 
-use algo::inspect::{Cut, FeatureKind};
+use algo::inspect::{Cut, FeatureKind, Region};
 use hal::bounded;
 use hal::bounds::{Bound, Fields, Longest, MAX_SIDE, length, text, within};
 
 /// The longest name of a recipe, feature, datum system or gauge, in characters.
 pub const LONGEST_NAME: usize = 64;
 /// Features of a datum system.
-const MAX_OF: usize = 3;
+pub(super) const MAX_OF: usize = 3;
 /// Largest radius of a rim and largest thickness of a sheet, mm.
-const MAX_RIM_MM: f64 = 10.0;
-const MAX_THICKNESS_MM: f64 = 20.0;
+pub(super) const MAX_RIM_MM: f64 = 10.0;
+pub(super) const MAX_THICKNESS_MM: f64 = 20.0;
 /// Longest and widest section, mm.
-const MAX_SECTION_MM: f64 = 1000.0;
+pub(super) const MAX_SECTION_MM: f64 = 1000.0;
 /// Corners of a region.
-const MAX_CORNERS: usize = 256;
+pub(super) const MAX_CORNERS: usize = 256;
 
 bounded! {
     /// Geometry of the part, by what is measured of a region.
@@ -182,6 +182,20 @@ impl FeatureFile {
                 Err("left ends behind the beginning of right: both lie beside the joint".into())
             }
         }
+    }
+
+    /// The pixels of its region in frames of (width, height); none of a section, whose region is as
+    /// wide as the part's distance makes it, which is planned.
+    ///
+    /// # Errors
+    /// In words, with its name: its region is none.
+    pub(super) fn pixels(&self, (width, height): (usize, usize)) -> Result<Region, String> {
+        if self.cut().is_some() {
+            return Ok(Region::default());
+        }
+        let corners: Vec<_> = self.region.iter().map(|&[u, v]| (u, v)).collect();
+        Region::polygon(&corners, width, height)
+            .map_err(|error| format!("feature {:?}: {error}", self.name))
     }
 
     /// Where a section is; `None` of other kinds, and where a key is missing.

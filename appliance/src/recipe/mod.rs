@@ -1,10 +1,11 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
 //! - On disk: [`mod@file`] is the manifest, [`feature`] its features and datum systems, `gauge` and
-//!   `gauge_keys` its gauges, [`kinds`] the table of what they can measure, [`tolerance`] and
-//!   `gauge_limits` what their limits come from, `references` which features they name, [`bounds`]
-//!   the bounds of lists and of values that depend on others, [`archive`] the ZIP with its
-//!   fingerprint, [`models`] the head that it was taught with, [`gauges_toml`] features, datum systems and gauges as text for people.
+//!   `gauge_keys` its gauges, [`kinds`] the table of what they can measure, `forms` what a form for
+//!   features and limits needs, [`tolerance`] and `gauge_limits` what their limits come from,
+//!   `references` which features they name, [`bounds`] the bounds of lists and of values that depend
+//!   on others, [`archive`] the ZIP with its fingerprint, [`models`] the head that it was taught
+//!   with, [`gauges_toml`] features, datum systems and gauges as text for people.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot
 //!   judge, [`plan`] joins that with the head's calibration; `light` tells bad light from bad
 //!   parts, `recorded` finds the recipe's pattern in a recording,
@@ -19,6 +20,9 @@
 //!   `limits` sets and `proof` tries the limits of all gauges, `signal` is golden's light as it was
 //!   demodulated; [`replace`] keeps names and gauges of a recipe that is taught again, `regauge`
 //!   works out limits that follow golden.
+//! - Shown: `outline` says what became of the features of a part, `lost` why one was not found,
+//!   `drawn` what is drawn of it; [`trying`] measures an edit before it is stored, `wrong` names all
+//!   that is wrong with it.
 
 pub mod adaptive;
 pub mod archive;
@@ -29,11 +33,13 @@ pub mod check;
 pub mod comparison;
 mod demands;
 mod differences;
+mod drawn;
 pub mod edit;
 pub mod exchange;
 mod failure;
 pub mod feature;
 pub mod file;
+mod forms;
 mod gauge;
 mod gauge_keys;
 mod gauge_limits;
@@ -47,6 +53,7 @@ mod judging;
 pub mod kinds;
 mod light;
 mod limits;
+mod lost;
 mod median;
 pub mod models;
 mod outline;
@@ -64,6 +71,8 @@ pub mod signal;
 pub mod store;
 pub mod teach;
 pub mod tolerance;
+pub mod trying;
+mod wrong;
 
 pub use archive::short;
 pub use check::{Conditions, Recipe, RecipeId, RecipeSequence};
@@ -73,5 +82,6 @@ pub use file::{
     AlignmentKind, PatternFile, RecipeFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };
 pub use gauge::GaugeFile;
-pub use outline::Outline;
+pub use outline::{Outline, Seen};
 pub use store::{ChangeError, LoadError, Store};
+pub use wrong::{Part, Wrong};
