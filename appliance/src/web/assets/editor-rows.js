@@ -123,14 +123,16 @@ function drawOffers() {
   }), ...(fit.length ? [] : [make("span", "quiet", "no gauge takes these together")]));
 }
 
-// Draws the lists anew; the focus stays where it was.
+// Draws the lists anew; the focus stays in its row, or at its place in the open form.
 export function drawRows() {
-  const held = document.activeElement && document.activeElement.id;
+  const { id } = document.activeElement, inForm = () => Array.from($("editor-form").querySelectorAll(".form input, .form select, .form button"));
+  const at = inForm().indexOf(document.activeElement);
   shown = [];
-  for (const what of Object.keys(LISTS)) fill($(LISTS[what]), ...state.list[what].map((one, at) => row(what, one, at)));
+  for (const what of Object.keys(LISTS)) fill($(LISTS[what]), ...state.list[what].map((one, place) => row(what, one, place)));
   drawOffers();
   showFound();
-  if (held && document.activeElement.id !== held && document.getElementById(held)) document.getElementById(held).focus();
+  const again = id ? document.getElementById(id) : inForm()[at];
+  if (again && again !== document.activeElement) again.focus();
 }
 
 // Shows which features are chosen, without drawing the rows anew.

@@ -114,10 +114,16 @@ export function outside(points, at, all, { target, grip }) {
   return [0, 1].map((axis) => centre[axis] + 0.5 + by[axis] / reach * wanted);
 }
 
-// The smallest of some features around a region, of which at least half of it lies in; else the one with most of it; else none.
+// The name of the smallest of some features of which at least half of a region lies in; else of the one with most of it. A strip along
+// an edge may lie beside all of them: then what counts is where one reaches that is three times as wide. Null if there is none.
 export function around(region, features) {
-  const share = (one) => Math.min(0.5, region.filter((point) => inside(one.region, point)).length / region.length);
-  const sorted = features.map((one) => [share(one), area(one.region), one.name]).filter(([found]) => found > 0);
-  sorted.sort((one, other) => other[0] - one[0] || one[1] - other[1]);
-  return sorted.length ? sorted[0][2] : null;
+  const centre = middle(region), sides = region.map((point, at) => middle([point, region[(at + 1) % region.length]]));
+  const wide = sides.map((point) => point.map((value, axis) => centre[axis] + 3 * (value - centre[axis])));
+  for (const points of [region, wide]) {
+    const share = (one) => Math.min(0.5, points.filter((point) => inside(one.region, point)).length / points.length);
+    const sorted = features.map((one) => [share(one), area(one.region), one.name]).filter(([found]) => found > 0);
+    sorted.sort((one, other) => other[0] - one[0] || one[1] - other[1]);
+    if (sorted.length) return sorted[0][2];
+  }
+  return null;
 }
