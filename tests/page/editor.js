@@ -116,6 +116,38 @@ async function build(hand, pixel) {
   await offer("flatness");
 }
 
+// Runs in the page: 50 edits chosen at random, then 50 steps back. Answers with the list before, at the end, and in between.
+async function scramble(seed) {
+  const { snapshot, state } = await import("/editor-list.js");
+  let word = seed * 2654435761 >>> 0;
+  const random = (most) => { word ^= word << 13; word >>>= 0; word ^= word >>> 17; word ^= word << 5; word >>>= 0; return word % most; };
+  const any = (selector) => { const all = Array.from(document.querySelectorAll(selector)).filter((one) => !one.disabled); return all[random(Math.max(1, all.length))]; };
+  const type = (input, value) => { if (input) { input.focus(); input.value = value; input.dispatchEvent(new Event("input", { bubbles: true })); input.dispatchEvent(new Event("change", { bubbles: true })); } };
+  const press = (node, key) => { if (node) node.dispatchEvent(new KeyboardEvent("keydown", { key, shiftKey: true, bubbles: true, cancelable: true })); };
+  const click = (node) => { if (node) node.click(); };
+  const edits = [
+    () => { const box = any(".pick input"); if (box) { state.chosen.slice().forEach((at) => document.querySelector(`#choose-${at}`).click()); box.click(); } click(any("#gauge-kinds button")); },
+    () => { click(any("#editor-features .row[aria-expanded=false]")); press(any("#editor-regions .chosen, #editor-regions .handle"), ["ArrowLeft", "ArrowUp", "ArrowDown"][random(3)]); },
+    () => { click(any(".rows .row[aria-expanded=false]")); type(any(".form input:not([type=number])"), `name ${random(1000)}`); },
+    () => { click(any("#editor-gauges .row[aria-expanded=false]")); type(any(".form input.limit"), String(random(100) / 50)); },
+    () => { click(any("#editor-gauges .row[aria-expanded=false]")); const one = any(".form select"); if (one) { one.selectedIndex = random(one.options.length); one.dispatchEvent(new Event("change", { bubbles: true })); } },
+    () => { click(any("#editor-features .row[aria-expanded=false]")); click(any(".form .line button:not(:last-child)")); },
+    () => { click(any(".rows .row[aria-expanded=false]")); click(document.querySelector(".form .line button:last-child")); click(document.querySelector("#question:not([hidden]) button.strong")); },
+    () => type(document.querySelector("#editor-name"), `part ${random(1000)}`),
+    () => click(document.querySelector(random(2) ? "#editor-undo" : "#editor-redo")),
+  ];
+  while (!document.querySelector("#editor-undo").disabled) click(document.querySelector("#editor-undo"));
+  const before = snapshot();
+  for (let edit = 0; edit < 50; edit += 1) {
+    edits[random(edits.length)]();
+    // A question is answered, and acted on, before the next edit.
+    await new Promise((next) => setTimeout(next));
+  }
+  const between = snapshot();
+  for (let times = 0; times < 50; times += 1) click(document.querySelector("#editor-undo"));
+  return [before, snapshot(), between];
+}
+
 export async function editor({ browser, program, step, folder, running = null }) {
   const place = running ? null : new Place();
   if (place) place.put("plate", PLATE);
@@ -266,6 +298,69 @@ export async function editor({ browser, program, step, folder, running = null })
       await page.click("#editor-undo");
     });
 
+    await step("fifty edits at random and fifty steps back give the list of before, byte by byte", async () => {
+      for (let round = 0; round < 20; round += 1) {
+        const [before, after, between] = await page.evaluate(scramble, round + 1);
+        assert.notEqual(between, before, "nothing was edited");
+        assert.equal(after, before, `round ${round}`);
+      }
+    });
+
+    await step("a drag follows at 30 pictures a second with as many gauges and features as a recipe can have", async () => {
+      const other = await open({ viewport: PHONE, hasTouch: true });
+      await other.route("**/api/recipes/1", async (route) => {
+        const whole = await (await route.fetch()).json(), [hole] = whole.features.filter(({ kind }) => kind === "circle");
+        const moved = (at) => hole.region.map(([u, v]) => [200 + (u - hole.region[0][0]) / 2 + 22 * (at % 10), 60 + (v - hole.region[0][1]) / 2 + 40 * Math.floor(at / 10)]);
+        while (whole.features.length < 96) whole.features.push(Object.assign({}, hole, { name: `more ${whole.features.length}`, region: moved(whole.features.length) }));
+        while (whole.gauges.length < 64) whole.gauges.push({ slot: whole.gauges.length + 1, name: `more ${whole.gauges.length}`, kind: "found", of: [whole.features[whole.gauges.length].name], low: 0.4 });
+        await route.fulfill({ json: whole });
+      });
+      await other.route("**/try", (route) => {
+        const { features } = JSON.parse(route.request().postData());
+        const around = ({ region }) => Array.from({ length: 96 }, (_, at) => { const [u, v] = region[at % region.length], [p, q] = region[(at + 1) % region.length], share = Math.floor(at / region.length) * region.length / 96; return [u + share * (p - u), v + share * (q - v)]; });
+        const found = features.map((one) => { const outline = around(one); return { name: one.name, kind: one.kind, state: "found", size: [], found: 1, fit: { outline, closed: true, centre: outline[0] }, pieces: outline.map((at, place) => ({ at, accepted: place % 7 > 0, why: "dark" })) }; });
+        return route.fulfill({ json: { ms: 1, features: found, gauges: [], problems: [], parts: [] } });
+      });
+      await edit(other);
+      assert.equal(await other.locator("#editor-gauges > li").count() + await other.locator("#editor-features > li").count(), 64 + 96);
+      await other.click("#row-features-80");
+      await other.locator("#editor-plate").scrollIntoViewIfNeeded();
+      const box = await other.locator("#editor-regions .region.chosen").boundingBox();
+      const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+      await other.mouse.move(x, y);
+      await other.mouse.down();
+      await other.evaluate(() => { window.pictures = []; const note = (at) => { window.pictures.push(at); requestAnimationFrame(note); }; requestAnimationFrame(note); });
+      for (let at = 0; at < 60; at += 1) await other.mouse.move(x + 40 * Math.sin(at / 9), y - at / 2);
+      const [moved, times] = await other.evaluate(() => [document.querySelector("#editor-regions .region.chosen").getBoundingClientRect().y, window.pictures]);
+      await other.mouse.up();
+      assert.ok(Math.abs(moved - box.y) > 10, "nothing was dragged");
+      const gaps = times.slice(1).map((at, place) => at - times[place]).sort((one, more) => one - more), median = gaps[Math.floor(gaps.length / 2)];
+      console.log(`  a picture each ${median.toFixed(1)} ms, 90 % within ${gaps[Math.floor(0.9 * gaps.length)].toFixed(1)} ms`);
+      assert.ok(median <= FRAME_MS, `${median} ms`);
+      await leave(other);
+      await other.context().close();
+    });
+
+    await step("the editor is accessible, light and dark, on a phone and a desktop", async () => {
+      for (const viewport of [DESKTOP, PHONE]) {
+        for (const colorScheme of ["light", "dark"]) {
+          const other = await open({ viewport, colorScheme }), where = `${viewport.width} ${colorScheme}`;
+          await edit(other);
+          for (const opened of ["features", "gauges"]) {
+            await other.click(`#row-${opened}-1`);
+            await accessible(other, `${opened} at ${where}`);
+          }
+          if (folder) await other.screenshot({ path: `${folder}/edit-form-${viewport === PHONE ? "phone" : "desktop"}-${colorScheme}.png`, fullPage: true });
+          await other.click("#datum-add");
+          await accessible(other, `the datum system at ${where}`);
+          if (folder) await other.screenshot({ path: `${folder}/edit-datum-${viewport === PHONE ? "phone" : "desktop"}-${colorScheme}.png` });
+          await other.keyboard.press("Escape");
+          await leave(other);
+          await other.context().close();
+        }
+      }
+    });
+
     await step("unsaved changes are not lost unasked, and two people do not undo each other", async () => {
       await page.click("#editor-close");
       await page.waitForSelector("#question:not([hidden])");
@@ -303,6 +398,20 @@ export async function editor({ browser, program, step, folder, running = null })
   } finally {
     for (const context of contexts) await context.close();
     if (place) { await daemon.end("SIGKILL"); place.remove(); }
+  }
+
+  // No serious finding, nothing wider than the screen, and every target large enough for a finger.
+  async function accessible(page, where) {
+    await page.evaluate(axe);
+    const { violations } = await page.evaluate(() => window.axe.run("main, #datum", { runOnly: ["wcag2a", "wcag2aa", "wcag21aa", "wcag22aa", "best-practice"] }));
+    const bad = violations.filter(({ impact }) => impact === "serious" || impact === "critical");
+    assert.deepEqual(bad.map(({ id, nodes }) => [id, nodes.map(({ html }) => html.slice(0, 120))]), [], where);
+    const small = await page.evaluate(() => Array.from(document.querySelectorAll("#editor a, #editor button, #editor input, #editor select, #datum button, #datum input, #datum select, #editor .target")).filter((one) => one.getClientRects().length).filter((one) => {
+      const box = (one.type === "checkbox" ? one.closest("label") : one).getBoundingClientRect();
+      return box.width < 24 || box.height < 24;
+    }).map((one) => one.outerHTML.slice(0, 120)));
+    assert.deepEqual(small, [], where);
+    assert.ok(await page.evaluate(() => document.documentElement.scrollWidth <= window.innerWidth), `the page is too wide at ${where}`);
   }
 
   // Brings the recipe of before back, as soon as the station takes it.

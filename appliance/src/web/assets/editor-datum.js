@@ -61,15 +61,15 @@ function axes([, second, third]) {
 }
 
 function drawAxes(of) {
-  const { width, height } = state.recipe.camera, size = width / 26, reach = width / 5, parts = [];
-  const svg = $("datum-drawing");
-  svg.setAttribute("viewBox", `${-size} ${-size} ${width + 2 * size} ${height + 2 * size}`);
-  const label = ([u, v], words, kind) => draw("text", { x: u, y: v, "font-size": 1.5 * size, class: kind }, words);
+  const { width, height } = state.recipe.camera, parts = [], svg = $("datum-drawing"), all = [].concat(...of.map((name) => placed(name).corners));
+  const [left, top, right, low] = all.length ? [0, 1, 2, 3].map((side) => Math[side < 2 ? "min" : "max"](...all.map((point) => point[side % 2]))) : [0, 0, width, height];
+  const reach = Math.max(right - left, low - top) / 4, size = reach / 5;
+  svg.setAttribute("viewBox", `${left - reach} ${top - reach} ${right - left + 2 * reach} ${low - top + 2 * reach}`);
+  const label = ([u, v], words, kind) => draw("text", { x: u, y: v, "font-size": 1.6 * size, class: kind }, words);
   of.forEach((name, at) => {
     const { corners, at: middle } = placed(name);
     parts.push(draw("polygon", { points: corners.map((point) => point.join(",")).join(" "), class: "region", "vector-effect": "non-scaling-stroke" }));
-    const [u, v] = at ? middle : corners[0];
-    parts.push(label([u + size / 2, v + 1.6 * size], `${LETTERS[at]} ${name}`, "name"));
+    parts.push(at ? label([middle[0] + size, middle[1] + 2 * size], LETTERS[at], "name") : label([Math.max(...corners.map(([u]) => u)) - 2 * size, Math.max(...corners.map(([, v]) => v)) - size], LETTERS[at], "name"));
   });
   const found = axes(of);
   if (found) {
@@ -105,7 +105,7 @@ export function openDatum(datum = null) {
   fill($("datum-about"), make("span", "", state.kinds.datums.about));
   offer(of);
   show("datum", true);
-  $("datum-A").focus();
+  $($("datum-A").disabled ? "datum-cancel" : "datum-A").focus();
 }
 
 function use(event) {

@@ -17,7 +17,7 @@ export function marks(features, arm) {
     if (fit.closed) centres.push(`M${at([fit.centre[0] - arm, fit.centre[1]])}h${2 * arm}m${-arm} ${-arm}v${2 * arm}`);
   }
   const dots = seen.map((one) => `M${at(one)}h0`).join(""), crosses = lost.map(cross).join("");
-  return [path("fit", fits.join("") + centres.join("")), path("lost under", crosses), path("lost", crosses), path("seen under", dots), path("seen", dots)];
+  return [path("fit", fits.join("") + centres.join("")), path("lost shade", crosses), path("lost", crosses), path("seen shade", dots), path("seen", dots)];
 }
 
 // The profile of a section: points, both lines and circles, and between which points gap and flush are measured. s and z have one scale.
