@@ -190,9 +190,11 @@ function press(event) {
   const grip = event.target.closest("[data-corner]"), shape = event.target.closest("[data-at]"), frame = $("editor-plate");
   const feature = grip ? subject() : shape ? Number(shape.dataset.at) : -1;
   view.corner = grip ? Number(grip.dataset.corner) : 0;
+  // In a part of the picture a drag moves the picture, unless it begins on what is chosen.
+  const held = grip || view.zoom === 1 || state.chosen.includes(feature);
   if (feature >= 0 && !grip) view.choose(feature, event.shiftKey || event.ctrlKey);
   if (grip) placeHandles();
-  view.drag = { feature, corner: grip ? view.corner : -1, from, at, before: snapshot(), scroll: [frame.scrollLeft, frame.scrollTop], moving: false };
+  view.drag = { feature: held ? feature : -1, corner: grip ? view.corner : -1, from, at, before: snapshot(), scroll: [frame.scrollLeft, frame.scrollTop], moving: false };
   if (feature >= 0) view.drag.was = JSON.parse(JSON.stringify(state.list.features[feature]));
 }
 
