@@ -81,6 +81,7 @@ mod stress;
 mod technician;
 mod together;
 mod triangulation;
+mod trying;
 mod twin;
 mod two_clients;
 mod two_frames;

@@ -7,14 +7,14 @@ use hal::bounds::{Bound, Fields, Longest, MAX_SIDE, length, text, within};
 /// The longest name of a recipe, feature, datum system or gauge, in characters.
 pub const LONGEST_NAME: usize = 64;
 /// Features of a datum system.
-const MAX_OF: usize = 3;
+pub(super) const MAX_OF: usize = 3;
 /// Largest radius of a rim and largest thickness of a sheet, mm.
-const MAX_RIM_MM: f64 = 10.0;
-const MAX_THICKNESS_MM: f64 = 20.0;
+pub(super) const MAX_RIM_MM: f64 = 10.0;
+pub(super) const MAX_THICKNESS_MM: f64 = 20.0;
 /// Longest and widest section, mm.
-const MAX_SECTION_MM: f64 = 1000.0;
+pub(super) const MAX_SECTION_MM: f64 = 1000.0;
 /// Corners of a region.
-const MAX_CORNERS: usize = 256;
+pub(super) const MAX_CORNERS: usize = 256;
 
 bounded! {
     /// Geometry of the part, by what is measured of a region.

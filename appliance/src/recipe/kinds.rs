@@ -1,18 +1,22 @@
 //! The table of kinds as data: what gauges can measure, for programs that show or edit recipes, and
 //! for people.
 
+use super::forms;
 use algo::inspect::{Domain, FeatureKind, Measure, Parameter, Unit};
 use serde_json::{Value, json};
 
 /// All kinds of gauges in their order, with their default parameters, and the units that they have
-/// with the smallest and the largest limit in each (docs/api.md, `GET /api/kinds`).
+/// with the smallest and the largest limit in each, and what forms need (docs/api.md, `GET /api/kinds`).
 pub fn json() -> Value {
     let kinds: Vec<Value> = Measure::examples().iter().map(kind).collect();
     let units = [Unit::Length, Unit::Angle, Unit::Volume, Unit::Share].map(|unit| {
         let [low, high] = unit.range();
         json!({ "unit": unit.symbol(), "low": low, "high": high })
     });
-    json!({ "kinds": kinds, "units": units })
+    json!({
+        "kinds": kinds, "units": units, "limits": forms::limits(), "features": forms::features(),
+        "datums": forms::datums(), "bounds": forms::bounds(),
+    })
 }
 
 /// The same for people: a line for each kind, what it measures, and a line for each parameter.
@@ -34,6 +38,7 @@ fn kind(example: &Measure) -> Value {
         "words": facts.words,
         "unit": facts.unit.symbol(),
         "takes": takes(example),
+        "pairs": forms::pairs(example),
         "negative": negative(example),
         "datum": facts.datum,
         "compares": facts.compares,

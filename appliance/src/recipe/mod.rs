@@ -1,10 +1,11 @@
 //! Recipes: everything that one part number needs, in one file.
 //!
 //! - On disk: [`mod@file`] is the manifest, [`feature`] its features and datum systems, `gauge` and
-//!   `gauge_keys` its gauges, [`kinds`] the table of what they can measure, [`tolerance`] and
-//!   `gauge_limits` what their limits come from, `references` which features they name, [`bounds`]
-//!   the bounds of lists and of values that depend on others, [`archive`] the ZIP with its
-//!   fingerprint, [`models`] the head that it was taught with, [`gauges_toml`] features, datum systems and gauges as text for people.
+//!   `gauge_keys` its gauges, [`kinds`] the table of what they can measure, `forms` what a form for
+//!   features and limits needs, [`tolerance`] and `gauge_limits` what their limits come from,
+//!   `references` which features they name, [`bounds`] the bounds of lists and of values that depend
+//!   on others, [`archive`] the ZIP with its fingerprint, [`models`] the head that it was taught
+//!   with, [`gauges_toml`] features, datum systems and gauges as text for people.
 //! - Checked: [`check`] turns manifest and arrays into a [`Recipe`], `judging` refuses what cannot
 //!   judge, [`plan`] joins that with the head's calibration; `light` tells bad light from bad
 //!   parts, `recorded` finds the recipe's pattern in a recording,
@@ -38,6 +39,7 @@ pub mod exchange;
 mod failure;
 pub mod feature;
 pub mod file;
+mod forms;
 mod gauge;
 mod gauge_keys;
 mod gauge_limits;

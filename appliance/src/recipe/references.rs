@@ -8,7 +8,7 @@ use algo::inspect::{FeatureKind, MAX_FEATURES, makes_datum};
 use hal::bounds::{clipped, length};
 
 /// Datum systems of a recipe.
-const MAX_DATUMS: usize = 8;
+pub(super) const MAX_DATUMS: usize = 8;
 
 impl RecipeFile {
     /// Checks features and datum systems, each by itself.

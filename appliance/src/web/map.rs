@@ -314,6 +314,36 @@ mod tests {
     }
 
     #[test]
+    fn the_planes_of_a_surface_stand_behind_each_other_each_with_its_own_steps() {
+        let (width, rows, stride) = (10, 6, 2);
+        let values: Vec<f32> = (0..width * rows).map(|at| at as f32).collect();
+        let far: Vec<f32> = values.iter().map(|value| value * 1000.0).collect();
+        let of = (width, stride);
+        let planes = [
+            Plane::of("a", "mm", (&values, of), Drawn::Plain),
+            Plane::of("b", "counts", (&far, of), Drawn::Plain),
+        ];
+        let map = surface(&planes, of, Some(4));
+        let described = &map.description;
+        assert_eq!(
+            (&described["width"], &described["height"]),
+            (&5.into(), &3.into())
+        );
+        assert_eq!(map.words.len(), 2 * 2 * 15);
+        for (plane, larger) in [(0, 1.0), (1, 1000.0)] {
+            let of = &described["planes"][plane];
+            let [low, step] = ["low", "step"].map(|key| of[key].as_f64().unwrap());
+            for at in 0..15 {
+                let from = 2 * (15 * plane + at);
+                let word = u16::from_le_bytes([map.words[from], map.words[from + 1]]);
+                let wanted = (20 * (at / 5) + 2 * (at % 5)) as f64 * larger;
+                let value = low + step * f64::from(word);
+                assert!((value - wanted).abs() <= step, "{plane} {at}: {value}");
+            }
+        }
+    }
+
+    #[test]
     fn a_map_without_any_value_is_still_a_map() {
         for values in [&[f32::NAN; 6][..], &[]] {
             let map = map(values, 3, "mm", Drawn::Deviation { limit: None }, None);

@@ -301,3 +301,47 @@ fn kept(site: &Site, (open, tried): (&Opened, &Tried), seq: u32) -> Result<(Valu
         entry.verdict.word().into(),
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_one_session_the_newest_try_is_open_and_other_sessions_do_not_matter() {
+        let tries = Tries::default();
+        let is_over = |turn: &Turn| turn.open.has_changed().is_err();
+        let (first, other) = (tries.begin("a"), tries.begin("b"));
+        assert!(!is_over(&first) && !is_over(&other));
+        let second = tries.begin("a");
+        assert!(is_over(&first) && !is_over(&second) && !is_over(&other));
+        // One that was given up does not end the newer one.
+        drop(first);
+        assert!(!is_over(&second));
+        drop((second, other));
+        assert!(tries.inside().running.is_empty());
+    }
+
+    #[test]
+    fn an_edit_keeps_the_refusals_of_its_own_keys_beside_what_it_is_tried_on() {
+        let asked = |text: &str| serde_json::from_str::<Asked>(text);
+        let sound = asked(r#"{"fingerprint": "f", "on": [4, 5]}"#).unwrap();
+        assert_eq!(sound.on.json(), json!([4, 5]));
+        assert_eq!(sound.edit.fingerprint, "f");
+        assert_eq!(
+            asked(r#"{"fingerprint": "f"}"#).unwrap().on.json(),
+            "golden"
+        );
+        for (text, words) in [
+            (r#"{"on": "last"}"#, "fingerprint"),
+            (r#"{"fingerprint": "f", "other": 1}"#, "other"),
+            (r#"{"fingerprint": "f", "on": "first"}"#, "on: write"),
+            (
+                r#"{"fingerprint": "f", "gauges": [{"name": "g", "slot": 1, "kind": "none"}]}"#,
+                "none",
+            ),
+        ] {
+            let error = asked(text).unwrap_err().to_string();
+            assert!(error.contains(words), "{text}: {error}");
+        }
+    }
+}
