@@ -60,6 +60,8 @@ export function parameter(holder, of, key) {
   }
   const { width, height } = state.recipe.camera, pixels = unit === "px";
   const bounds = { about, unit, optional, least: of.least, above: of.above, most: of.most || (pixels ? Math.max(width, height) : undefined), whole: pixels, odd: of.odd };
+  // Two coordinates of the picture are drawn.
+  if (count && pixels) return [];
   if (!count) return [number(words, called, holder[name], bounds, (value) => set(value, true))];
   return Array.from({ length: count }, (_, at) => number(`${words} ${at + 1}`, `${words} ${at + 1} of ${holder.name}`, (holder[name] || [])[at], bounds, (value) => {
     alter(`${key} ${name} ${at}`, () => { holder[name] = (holder[name] || [0, 0]).map((other, place) => (place === at ? value : other)); });
