@@ -62,10 +62,11 @@ export function drawShapes() {
   features.forEach((feature, at) => placeShape(at));
   const size = (at) => area(outline(features[at], view.mm));
   const order = features.map((_, at) => at).sort((one, other) => size(other) - size(one));
-  view.handles = [];
-  fill(svg(), ...order.map((at) => view.nodes[at]));
+  const held = svg().contains(document.activeElement) ? document.activeElement : null;
+  fill(svg(), ...order.map((at) => view.nodes[at]), ...view.handles);
   if (view.tool) svg().append(view.tool.draft, view.tool.cross);
   markChosen();
+  if (held) (svg().contains(held) ? held : view.nodes[held.getAttribute("data-at")] || svg()).focus({ preventScroll: true });
 }
 
 // Shows which features are chosen, and the corners if it is one.

@@ -27,6 +27,8 @@ export async function edit(number) {
   text("editor-number", String(number));
   text("editor-words", "");
   show("editor", true);
+  // Its size is known before the picture is.
+  Object.assign($("editor-map"), { width: recipe.camera.width, height: recipe.camera.height });
   showTools();
   useTool(null);
   drawAll();
