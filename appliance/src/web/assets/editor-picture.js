@@ -46,6 +46,9 @@ function zoom(to, focus) {
   const middle = focus || [box.left + box.width / 2, box.top + box.height / 2];
   const at = [middle[0] - box.left, middle[1] - box.top], by = to / view.zoom;
   const was = [frame.scrollLeft, frame.scrollTop];
+  // A part of the picture has the room of the whole.
+  if (view.zoom === 1) view.height = box.height;
+  frame.style.height = to > 1 ? `${view.height}px` : "";
   view.zoom = to;
   $("editor-stage").style.width = `${100 * to}%`;
   frame.scrollLeft = (was[0] + at[0]) * by - at[0];
@@ -149,6 +152,7 @@ const HINTS = {
 };
 
 function draft() {
+  if (!view.tool) return;
   const { kind, shape, points: all, at, draft: node, cross } = view.tool;
   const arm = 14 * scale(), [u, v] = [at[0] + 0.5, at[1] + 0.5];
   cross.setAttribute("d", `M${u - arm} ${v}H${u + arm}M${u} ${v - arm}V${v + arm}`);
