@@ -4,6 +4,7 @@
 import { strict as assert } from "node:assert";
 import { chromium } from "playwright-core";
 import { Daemon, Place } from "./daemon.js";
+import { editor } from "./editor.js";
 import { forms } from "./forms.js";
 import { pictures } from "./pictures.js";
 import { recipes } from "./recipes.js";
@@ -143,6 +144,7 @@ try {
     await page.click("nav a[href='#recipes']");
     await page.click("#recipe-rows tr button:has-text('Edit')");
     await page.waitForSelector("#editor-regions .handle");
+    await page.click("#editor-gauges .row:has-text('deviation')");
     const limits = page.locator("#editor-gauges input[aria-label^='lowest deviation']");
     // A text that is not a number is refused at its field, naming the gauge.
     await limits.first().fill("");
@@ -151,9 +153,9 @@ try {
     assert.match(await limits.first().evaluate((field) => field.validationMessage), /^lowest deviation.* in mm: write a number from -214748\.3647 to 214748\.3647$/);
     assert.ok(await page.isVisible("#editor"));
     await limits.first().fill("0.2");
-    // A lower limit above the upper one: no part would pass. The field shows this, and nothing is sent.
+    // A lower limit above the upper one: no part would pass. The page says so, and nothing is stored.
     await page.click("#editor-form button[type=submit]");
-    assert.match(await limits.first().evaluate((field) => field.validationMessage), /above/);
+    await page.waitForFunction(() => /deviation.*passes no part/.test(document.querySelector("#editor-problems").textContent) && document.querySelector("#editor-words").textContent !== "");
     await page.locator("#editor-gauges input[aria-label^='highest deviation']").first().fill("0.3");
     await page.click("#editor-form button[type=submit]");
     await page.waitForFunction(() => document.querySelector("#notice").textContent.includes("stored"));
@@ -171,14 +173,15 @@ try {
     await page.click("nav a[href='#recipes']");
     await page.click("#recipe-rows tr button:has-text('Edit')");
     await page.waitForSelector("#editor-regions .handle");
-    const unit = (symbol) => page.waitForFunction((wanted) => document.querySelector("#editor-gauges tr:last-child td:last-child").textContent === wanted, symbol);
-    await page.selectOption("#gauge-kind", "placement");
-    await page.click("#gauge-add");
+    const offer = (kind) => page.locator("#gauge-kinds button", { hasText: new RegExp(`^${kind}$`) }).click();
+    const unit = (symbol) => page.waitForSelector(`#editor-gauges .opened label:has-text("up to + (${symbol})")`);
+    await page.uncheck("#choose-0");
+    await offer("placement");
     await unit("°");
     await page.locator("#editor-gauges select[aria-label^=component]").selectOption("z");
     await unit("mm");
-    await page.selectOption("#gauge-kind", "deviation");
-    await page.click("#gauge-add");
+    await page.check("#choose-0");
+    await offer("deviation");
     const handle = page.locator("#editor-regions .handle").first();
     const box = await handle.boundingBox();
     const label = await handle.getAttribute("aria-label");
@@ -196,7 +199,7 @@ try {
     await page.waitForSelector("#state[data-state=ready]");
     await page.click("nav a[href='#live']");
     await trigger();
-    await page.waitForFunction(() => document.querySelector("#gauge-rows").textContent.includes("deviation 1"));
+    await page.waitForFunction(() => document.querySelector("#gauge-rows").textContent.includes("frame deviation"));
     assert.match(await page.textContent("#gauge-rows"), /placement 1/);
   });
 
@@ -412,6 +415,7 @@ try {
   });
 
   assert.deepEqual(complaints, [], "the browser complains");
+  await editor({ browser, program, step, folder });
   await wizard({ browser, program, step, folder });
   if (folder) await step("pictures", () => pictures(browser, program, folder));
   console.log("the page does what it promises");

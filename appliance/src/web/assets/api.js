@@ -6,6 +6,7 @@ async function failure(response) {
   const error = new Error(content && content.error ? content.error : `the sensor answers ${response.status}`);
   error.status = response.status;
   error.taken = content && content.taken;
+  error.why = content && content.why;
   return error;
 }
 

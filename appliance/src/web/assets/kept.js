@@ -2,6 +2,7 @@
 import { $, fill, make, show, text } from "./element.js";
 import { ask, map } from "./api.js";
 import { paint } from "./colour.js";
+import { marks } from "./found.js";
 import { about, limits, measures, milliseconds, moment, quantity, signed } from "./number.js";
 import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
@@ -9,7 +10,7 @@ import { nameOf } from "./times.js";
 import { decided, named, tag, uncertainty } from "./verdict.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
-const state = { seq: 0, layer: "height", asked: 0, failed: [] };
+const state = { seq: 0, layer: "height", asked: 0, failed: [], found: null };
 
 function gauge(entry) {
   const decision = decided(entry);
@@ -62,14 +63,19 @@ async function picture() {
   const turn = state.asked += 1;
   empty("computing the picture");
   let loaded;
-  try { loaded = await map(`/api/history/${state.seq}/picture/${state.layer}`); } catch (error) {
+  let found;
+  try {
+    // The contours are asked for once for all of its pictures.
+    state.found = state.found || ask("GET", `/api/history/${state.seq}/features`).then(({ features }) => features, () => []);
+    [loaded, found] = await Promise.all([map(`/api/history/${state.seq}/picture/${state.layer}`), state.found]);
+  } catch (error) {
     if (turn === state.asked) empty(error.message);
     return;
   }
   if (turn !== state.asked) return;
   paint($("kept-map"), loaded, state.layer);
   drawScale($("kept-scale"), loaded.about, state.layer);
-  over($("kept-ring"), loaded.about, ...rings(loaded.about, state.failed));
+  over($("kept-ring"), loaded.about, ...marks(found, loaded.about.width * loaded.about.stride / 200), ...rings(loaded.about, state.failed));
   text("kept-shown", loaded.about.words);
   show("kept-words", false);
 }
@@ -77,6 +83,7 @@ async function picture() {
 // Shows the result of a SEQ.
 export async function openKept(seq, boot) {
   state.seq = seq;
+  state.found = null;
   state.asked += 1;
   let found;
   try { found = await ask("GET", `/api/history/${seq}`); } catch (error) {

@@ -2,12 +2,14 @@
 import { $, draw, fill, show, text } from "./element.js";
 import { ask, cornersOf, kindOf, loadKinds, map } from "./api.js";
 import { paint } from "./colour.js";
+import { marks } from "./found.js";
 import { over, rings } from "./ring.js";
+import { inside } from "./editor-shapes.js";
 import { drawScale } from "./scale.js";
 import { signed } from "./number.js";
 
 const UNITS = { mm: 3, counts: 1 };
-const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, kinds: null, recipeKey: "", asked: 0, at: [0, 0] };
+const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, kinds: null, recipeKey: "", found: [], asked: 0, at: [0, 0] };
 
 // The recipe's gauges that failed or could not be measured in the result.
 function failing() {
@@ -24,7 +26,8 @@ function drawOutlines() {
   const svg = $("outlines");
   if (!state.map) { fill(svg); return; }
   const { about } = state.map;
-  if (!state.recipe || !state.result) { over(svg, about, ...rings(about, decisive())); return; }
+  const found = marks(state.found, about.width * about.stride / 200);
+  if (!state.recipe || !state.result) { over(svg, about, ...found, ...rings(about, decisive())); return; }
   const bad = new Map();
   for (const { gauge, kind } of failing()) {
     for (const name of gauge.of || []) if (bad.get(name) !== "fail") bad.set(name, kind);
@@ -36,23 +39,13 @@ function drawOutlines() {
   const { features } = state.recipe;
   const quiet = features.filter((one) => !bad.has(one.name)).map((one) => outline(one, "quiet"));
   const loud = features.filter((one) => bad.has(one.name));
-  over(svg, about, ...quiet, ...loud.map((one) => outline(one, "under")), ...loud.map((one) => outline(one, bad.get(one.name))), ...rings(about, decisive()));
+  over(svg, about, ...quiet, ...found, ...loud.map((one) => outline(one, "under")), ...loud.map((one) => outline(one, bad.get(one.name))), ...rings(about, decisive()));
 }
 
 // The regions of failed gauges that compare the part with golden, so that a place in the picture explains why they fail, and have no square of their own.
 function deviating() {
   const names = failing().filter(({ gauge, kind, square }) => kind === "fail" && !square && kindOf(state.kinds, gauge).compares).flatMap(({ gauge }) => gauge.of);
   return state.recipe ? state.recipe.features.filter((one) => names.includes(one.name)) : [];
-}
-
-// Whether a point lies inside a polygon: then an odd number of edges lies on one side of it.
-function inside(polygon, u, v) {
-  let within = false;
-  polygon.forEach(([u1, v1], at) => {
-    const [u0, v0] = polygon[(at || polygon.length) - 1];
-    if ((v1 > v) !== (v0 > v) && u < u1 + (u0 - u1) * (v - v1) / (v0 - v1)) within = !within;
-  });
-  return within;
 }
 
 // What decided: the squares of the deviations that failed; without any, where other gauges failed that compare with golden, the pixel of
@@ -70,7 +63,7 @@ function most(map) {
   for (let v = 0; v < height; v += 1) {
     for (let u = 0; u < width; u += 1) {
       const size = Math.abs(map.values[v * width + u]);
-      if (size > best && regions.some((one) => inside(cornersOf(one), u * stride, v * stride))) { best = size; at = { column: u * stride, row: v * stride, side: stride }; }
+      if (size > best && regions.some((one) => inside(cornersOf(one), [u * stride, v * stride]))) { best = size; at = { column: u * stride, row: v * stride, side: stride }; }
     }
   }
   return at ? [at] : [];
@@ -121,6 +114,8 @@ async function load() {
     try { deviation = layer === "deviation" ? loaded : await map(`/api/picture/deviation?seq=${result.seq}`); } catch (none) { /* No ring then. */ }
     if (turn !== state.asked) return;
   }
+  state.found = await contours(result);
+  if (turn !== state.asked) return;
   if (loaded.about.seq !== result.seq) { empty(`the frames of no. ${result.seq} are gone`); return; }
   state.map = loaded;
   state.deviation = deviation;
@@ -129,6 +124,16 @@ async function load() {
   text("shown", loaded.about.words);
   drawScale($("scale"), state.map.about, state.layer);
   drawOutlines();
+}
+
+// What was found of the contours of a result's recipe; nothing if it has none, or its frames are gone.
+async function contours(result) {
+  const { kinds, recipe } = state;
+  if (!recipe || !recipe.features.some(({ kind }) => kinds.features.find((one) => one.kind === kind).around_mm)) return [];
+  try {
+    const found = await ask("GET", "/api/last/features");
+    return found && found.seq === result.seq ? found.features : [];
+  } catch (none) { return []; }
 }
 
 function empty(words) {

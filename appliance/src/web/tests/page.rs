@@ -90,3 +90,26 @@ fn the_scripts_stay_within_what_old_tablets_understand() {
         }
     }
 }
+
+#[test]
+fn the_editor_has_no_list_of_characteristics_units_or_parameters() {
+    let table = crate::recipe::kinds::json();
+    let list = |key: &str| table[key].as_array().unwrap().clone();
+    let word = |of: &Value, key: &str| of[key].as_str().unwrap().to_owned();
+    let mut words: Vec<String> = list("units").iter().map(|of| word(of, "unit")).collect();
+    for kind in list("kinds") {
+        words.push(word(&kind, "kind"));
+        let parameters = kind["parameters"].as_array().unwrap();
+        words.extend(parameters.iter().map(|of| word(of, "name")));
+    }
+    // Axes have single letters; a feature is found, and limits have a nominal value.
+    words.retain(|word| word.len() > 1 && !["found", "nominal"].contains(&word.as_str()));
+    let editor = assets::ALL
+        .iter()
+        .filter(|asset| asset.path.starts_with("/editor"));
+    for (asset, word) in editor.flat_map(|asset| words.iter().map(move |word| (asset, word))) {
+        let named = asset.text().contains(&format!("\"{word}\""));
+        assert!(!named, "{} names {word}", asset.path);
+    }
+    assert!(words.len() > 20, "{words:?}");
+}
