@@ -7,9 +7,10 @@ import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
 import { nameOf } from "./times.js";
 import { decided, named, tag, uncertainty } from "./verdict.js";
+import { viewOf } from "./view.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
-const state = { seq: 0, layer: "height", asked: 0, failed: [] };
+const state = { seq: 0, layer: "height", asked: 0, failed: [], points: 0, view: null };
 
 function gauge(entry) {
   const decision = decided(entry);
@@ -56,6 +57,7 @@ function empty(words) {
   text("kept-shown", "");
   text("kept-words", words);
   show("kept-words", true);
+  state.view.show(null);
 }
 
 async function picture() {
@@ -72,6 +74,7 @@ async function picture() {
   over($("kept-ring"), loaded.about, ...rings(loaded.about, state.failed));
   text("kept-shown", loaded.about.words);
   show("kept-words", false);
+  state.view.show({ path: `/api/history/${state.seq}/picture/surface?`, seq: state.seq, points: state.points, stride: loaded.about.stride });
 }
 
 // Shows the result of a SEQ.
@@ -86,6 +89,7 @@ export async function openKept(seq, boot) {
   if (state.seq !== seq) return;
   const { result, no_frames } = found;
   state.failed = result.gauges.filter((one) => one.square && !decided(one).pass).map((one) => one.square);
+  state.points = result.valid_points;
   text("kept-number", `no. ${seq}`);
   $("kept-verdict").className = `tag ${result.verdict.toLowerCase()}`;
   text("kept-verdict", result.verdict);
@@ -102,6 +106,7 @@ export async function openKept(seq, boot) {
 }
 
 export function start() {
+  state.view = viewOf($("kept-map"), $("kept-ring"), document.querySelector("#kept-pictures .choice"));
   $("kept-close").addEventListener("click", () => { state.asked += 1; state.seq = 0; show("kept", false); });
   for (const choice of document.querySelectorAll("[data-kept]")) {
     choice.addEventListener("click", () => {
