@@ -74,7 +74,7 @@ async function picture() {
   over($("kept-ring"), loaded.about, ...rings(loaded.about, state.failed));
   text("kept-shown", loaded.about.words);
   show("kept-words", false);
-  state.view.show({ path: `/api/history/${state.seq}/picture/surface?`, seq: state.seq, points: state.points, stride: loaded.about.stride });
+  state.view.show({ path: `/api/history/${state.seq}/picture/surface`, seq: state.seq, points: state.points });
 }
 
 // Shows the result of a SEQ.
@@ -106,7 +106,7 @@ export async function openKept(seq, boot) {
 }
 
 export function start() {
-  state.view = viewOf($("kept-map"), $("kept-ring"), document.querySelector("#kept-pictures .choice"));
+  state.view = viewOf($("kept-map"));
   $("kept-close").addEventListener("click", () => { state.asked += 1; state.seq = 0; show("kept", false); });
   for (const choice of document.querySelectorAll("[data-kept]")) {
     choice.addEventListener("click", () => {

@@ -130,7 +130,7 @@ async function load() {
   text("shown", loaded.about.words);
   drawScale($("scale"), state.map.about, state.layer);
   drawOutlines();
-  state.view.show({ path: `/api/picture/surface?seq=${result.seq}&`, seq: result.seq, points: result.valid_points, stride: loaded.about.stride });
+  state.view.show({ path: "/api/picture/surface", seq: result.seq, points: result.valid_points });
 }
 
 function empty(words) {
@@ -186,7 +186,7 @@ export function start() {
     });
   }
   const canvas = $("map");
-  state.view = viewOf(canvas, $("outlines"), document.querySelector("#picture .choice"));
+  state.view = viewOf(canvas);
   canvas.addEventListener("pointermove", point);
   canvas.addEventListener("pointerdown", point);
   canvas.addEventListener("keydown", move);

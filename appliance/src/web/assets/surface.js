@@ -1,4 +1,4 @@
-// A surface in WebGL 2: heights under the picture that lies on them, and lines. It is drawn when somebody asks, never by itself.
+// A surface in WebGL 2: heights with a picture on them, and lines. It is drawn when somebody asks, never by itself.
 
 const GROUND = `#version 300 es
 layout(location = 0) in float x;
@@ -7,13 +7,13 @@ layout(location = 2) in float z;
 uniform mat3 turn;
 uniform vec3 low, mm, middle;
 uniform vec4 fit, texel;
-uniform float near;
-uniform int columns;
+uniform float near, columns;
 out vec3 place;
 out vec2 at;
 void main() {
   place = turn * (low + mm * vec3(x, y, z) - middle);
-  at = vec2(gl_VertexID % columns, gl_VertexID / columns) * texel.xy + texel.zw;
+  int wide = int(columns);
+  at = vec2(gl_VertexID % wide, gl_VertexID / wide) * texel.xy + texel.zw;
   gl_Position = vec4(place.xy * fit.xy + fit.zw, -place.z * near, 1);
 }`;
 // Each triangle has its own normal; the light comes from above on the left.
@@ -28,7 +28,7 @@ void main() {
   float light = abs(dot(normal, normalize(vec3(-0.5, 0.6, 1))));
   colour = vec4(texture(picture, at).rgb * (0.35 + 0.7 * light), 1);
 }`;
-// A piece of a line is a strip of four corners, as wide on the screen at any distance, and a little in front of the surface.
+// A piece of a line is a strip of four corners, equally wide at any distance, a little in front of the surface.
 const STRIP = `#version 300 es
 layout(location = 0) in vec3 from;
 layout(location = 1) in vec3 to;
@@ -55,7 +55,7 @@ flat in vec4 ink;
 out vec4 colour;
 void main() { colour = ink; }`;
 
-// The attributes of a piece of a line: numbers of both ends, colour with opacity, and width.
+// A piece of a line has so many numbers: both ends, colour with opacity, width.
 const PIECE = [3, 3, 4, 1], SIZE = 11;
 
 function program(gl, vertex, fragment) {
@@ -71,8 +71,8 @@ function program(gl, vertex, fragment) {
 }
 
 // What draws on a canvas for as long as its context lives; null where there is no WebGL 2.
-export function surface(canvas) {
-  const gl = canvas.getContext("webgl2");
+export function surface(canvas, antialias) {
+  const gl = canvas.getContext("webgl2", { antialias });
   if (!gl) return null;
   const ground = program(gl, GROUND, SHADE), pieces = program(gl, STRIP, INK);
   const [words, corners, lines] = [gl.createBuffer(), gl.createBuffer(), gl.createBuffer()];
@@ -89,6 +89,7 @@ export function surface(canvas) {
     return offset + 4 * size;
   }, 0);
   gl.enable(gl.DEPTH_TEST);
+  gl.enable(gl.BLEND);
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   let shown = null, count = 0, strokes = 0;
 
@@ -101,46 +102,43 @@ export function surface(canvas) {
   }
 
   return {
-    // Shows heights with the corners of their triangles, and the picture on them, of which a pixel is `stride` pixels of the camera wide.
-    put(heights, triangles, picture, stride) {
-      const [u, v] = [1 / (stride * picture.width), 1 / (stride * picture.height)];
-      shown = { low: heights.low, mm: heights.mm, texel: [heights.stride * u, heights.stride * v, 0.5 * u, 0.5 * v] };
+    // Shows heights with the corners of their triangles, and a picture of the same frame on them.
+    put(heights, triangles, picture) {
+      const { low, mm, width, height, stride } = heights, pixel = Math.round(stride * width / picture.width);
+      const [u, v] = [1 / (pixel * picture.width), 1 / (pixel * picture.height)];
+      shown = { low, mm, columns: [width], texel: [stride * u, stride * v, 0.5 * u, 0.5 * v] };
       count = triangles.length;
       gl.bindVertexArray(sheet);
       gl.bindBuffer(gl.ARRAY_BUFFER, words);
       gl.bufferData(gl.ARRAY_BUFFER, heights.words, gl.STATIC_DRAW);
       for (let at = 0; at < 3; at += 1) {
         gl.enableVertexAttribArray(at);
-        gl.vertexAttribPointer(at, 1, gl.UNSIGNED_SHORT, false, 2, 2 * at * heights.width * heights.height);
+        gl.vertexAttribPointer(at, 1, gl.UNSIGNED_SHORT, false, 2, 2 * at * width * height);
       }
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, corners);
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, picture);
-      gl.useProgram(ground);
-      gl.uniform1i(gl.getUniformLocation(ground, "columns"), heights.width);
     },
-    // Shows the pieces of lines, one behind the other.
+    // Shows pieces of lines.
     line(numbers) {
       strokes = numbers.length / SIZE;
       gl.bindBuffer(gl.ARRAY_BUFFER, lines);
       gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(numbers), gl.STATIC_DRAW);
     },
-    // Draws once, as seen with `turn` about `middle`, `fit` to the canvas, and `near`: depth per mm. `ratio`: pixels of the canvas per pixel.
-    draw({ turn, middle, fit, near, ratio }) {
+    // Draws once: turned about the middle, fit to the canvas; `near` is depth per mm, `pixel` the size of one of the screen.
+    draw({ turn, middle, fit, near, pixel }) {
       const { width, height } = canvas;
       gl.viewport(0, 0, width, height);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
       if (!shown) return;
-      use(ground, Object.assign({ turn, middle, fit, near: [near] }, shown));
+      use(ground, Object.assign({ turn, middle, fit, near }, shown));
       gl.bindVertexArray(sheet);
       gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
-      use(pieces, { turn, middle, fit, near: [near], pixel: [2 * ratio / width, 2 * ratio / height] });
+      use(pieces, { turn, middle, fit, near, pixel });
       // Of lines that cross, the later one lies above.
       gl.depthMask(false);
-      gl.enable(gl.BLEND);
       gl.bindVertexArray(strips);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, strokes);
-      gl.disable(gl.BLEND);
       gl.depthMask(true);
     },
     // Shows nothing more.
