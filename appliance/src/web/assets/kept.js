@@ -74,7 +74,7 @@ async function picture() {
   over($("kept-ring"), loaded.about, ...rings(loaded.about, state.failed));
   text("kept-shown", loaded.about.words);
   show("kept-words", false);
-  state.view.show({ path: `/api/history/${state.seq}/picture/surface`, seq: state.seq, points: state.points });
+  state.view.show({ path: `/api/history/${state.seq}/picture/surface?seq=${state.seq}`, seq: state.seq, points: state.points });
 }
 
 // Shows the result of a SEQ.

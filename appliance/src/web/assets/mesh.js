@@ -1,11 +1,11 @@
 // The triangles of a part's heights, and lines that lie on them.
 import { draw } from "./element.js";
 
-// A triangle whose z differ by more than this many distances of neighbours lies across a jump.
+// A triangle lies across a jump if its z differ by more than this many distances of neighbours.
 const JUMP = 3;
 // The word for "no value".
 const NONE = 65535;
-// How far around a point of a line heights are looked for, in their own distances.
+// How far around a line heights are looked for, in their own distances.
 const FAR = [1.5, 5, 12];
 
 // The heights of an answer: three planes of words, x, y and z, and what they are in mm.
@@ -83,7 +83,7 @@ function onto(heights, { right, down }, u, v) {
   return [x + over * right[0] + below * down[0], y + over * right[1] + below * down[1], z];
 }
 
-// What is drawn over a picture as pieces of lines on the surface: both ends in mm, colour with opacity, width in pixels of the screen.
+// What is drawn over a picture, as pieces of lines on the surface: both ends in mm, colour with opacity, width in pixels of the screen.
 export function linesOn(heights, mesh, frame) {
   const pieces = [], most = heights.stride / 2;
   for (const shape of frame.querySelectorAll("svg polygon, svg circle, svg path")) {

@@ -130,7 +130,7 @@ async function load() {
   text("shown", loaded.about.words);
   drawScale($("scale"), state.map.about, state.layer);
   drawOutlines();
-  state.view.show({ path: "/api/picture/surface", seq: result.seq, points: result.valid_points });
+  state.view.show({ path: `/api/picture/surface?seq=${result.seq}`, seq: result.seq, points: result.valid_points });
 }
 
 function empty(words) {

@@ -1,4 +1,4 @@
-// A surface in WebGL 2: heights with a picture on them, and lines. It is drawn when somebody asks, never by itself.
+// A surface in WebGL 2: heights with a picture on them, and lines. It draws only when asked.
 
 const GROUND = `#version 300 es
 layout(location = 0) in float x;
@@ -12,8 +12,7 @@ out vec3 place;
 out vec2 at;
 void main() {
   place = turn * (low + mm * vec3(x, y, z) - middle);
-  int wide = int(columns);
-  at = vec2(gl_VertexID % wide, gl_VertexID / wide) * texel.xy + texel.zw;
+  at = vec2(gl_VertexID % int(columns), gl_VertexID / int(columns)) * texel.xy + texel.zw;
   gl_Position = vec4(place.xy * fit.xy + fit.zw, -place.z * near, 1);
 }`;
 // Each triangle has its own normal; the light comes from above on the left.
@@ -28,7 +27,7 @@ void main() {
   float light = abs(dot(normal, normalize(vec3(-0.5, 0.6, 1))));
   colour = vec4(texture(picture, at).rgb * (0.35 + 0.7 * light), 1);
 }`;
-// A piece of a line is a strip of four corners, equally wide at any distance, a little in front of the surface.
+// A piece of a line is a strip of four corners, a little in front of the surface.
 const STRIP = `#version 300 es
 layout(location = 0) in vec3 from;
 layout(location = 1) in vec3 to;
@@ -70,15 +69,14 @@ function program(gl, vertex, fragment) {
   return made;
 }
 
-// What draws on a canvas for as long as its context lives; null where there is no WebGL 2.
+// What draws on a canvas while its context lives; null without WebGL 2.
 export function surface(canvas, antialias) {
   const gl = canvas.getContext("webgl2", { antialias });
   if (!gl) return null;
   const ground = program(gl, GROUND, SHADE), pieces = program(gl, STRIP, INK);
-  const [words, corners, lines] = [gl.createBuffer(), gl.createBuffer(), gl.createBuffer()];
+  const [words, corners, lines] = [1, 2, 3].map(() => gl.createBuffer());
   const [sheet, strips] = [gl.createVertexArray(), gl.createVertexArray()];
   gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-  for (const side of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, side, gl.CLAMP_TO_EDGE);
   gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
   gl.bindVertexArray(strips);
   gl.bindBuffer(gl.ARRAY_BUFFER, lines);
@@ -91,7 +89,7 @@ export function surface(canvas, antialias) {
   gl.enable(gl.DEPTH_TEST);
   gl.enable(gl.BLEND);
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-  let shown = null, count = 0, strokes = 0;
+  let shown, count = 0, strokes = 0;
 
   function use(made, values) {
     gl.useProgram(made);
@@ -119,18 +117,18 @@ export function surface(canvas, antialias) {
       gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, triangles, gl.STATIC_DRAW);
       gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, gl.RGBA, gl.UNSIGNED_BYTE, picture);
     },
-    // Shows pieces of lines.
     line(numbers) {
       strokes = numbers.length / SIZE;
       gl.bindBuffer(gl.ARRAY_BUFFER, lines);
       gl.bufferData(gl.ARRAY_BUFFER, new Float32Array(numbers), gl.STATIC_DRAW);
     },
-    // Draws once: turned about the middle, fit to the canvas; `near` is depth per mm, `pixel` the size of one of the screen.
-    draw({ turn, middle, fit, near, pixel }) {
+    // Draws once, or nothing: turned about the middle, fit to the canvas; `near` is depth per mm, `pixel` the size of one of the screen.
+    draw(seen) {
       const { width, height } = canvas;
       gl.viewport(0, 0, width, height);
       gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
-      if (!shown) return;
+      if (!seen) return;
+      const { turn, middle, fit, near, pixel } = seen;
       use(ground, Object.assign({ turn, middle, fit, near }, shown));
       gl.bindVertexArray(sheet);
       gl.drawElements(gl.TRIANGLES, count, gl.UNSIGNED_INT, 0);
@@ -141,8 +139,6 @@ export function surface(canvas, antialias) {
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, strokes);
       gl.depthMask(true);
     },
-    // Shows nothing more.
-    clear() { shown = null; },
     // Gives all of its memory back.
     free() {
       const held = gl.getExtension("WEBGL_lose_context");

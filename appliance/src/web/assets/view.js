@@ -1,17 +1,16 @@
 // The part of a picture in 3-D: its heights as a surface, on which lies all that the picture shows.
-import { make } from "./element.js";
+import { button, make } from "./element.js";
 import { words } from "./api.js";
 import { heightsOf, linesOn, meshOf } from "./mesh.js";
 import { surface } from "./surface.js";
 
-// A phone or a tablet: it draws fewer triangles, and its pixels are so fine that edges need no smoothing.
+// A phone or a tablet draws fewer triangles, and its pixels are so fine that edges need no smoothing.
 const FINGERS = matchMedia("(pointer: coarse)").matches;
 const TRIANGLES = FINGERS ? 100000 : 200000, LEVELS = 5;
-// The view at first, turned about z and from above (radians), of a part that is not known yet; and how far a key or a button goes.
+// The view at first, turned about z and from above (radians), of no part yet; and how far a key or a button goes.
 const FIRST = { yaw: -0.35, tilt: 0.85, zoom: 1, pan: [0, 0], middle: [Infinity, 0, 0], radius: 1 };
 const TURN = Math.PI / 18, MOVE = 0.15, ZOOM = 1.25, ZOOMS = [0.5, 60];
-const WAYS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
-const PAD = [["\u2190", "left", "ArrowLeft"], ["\u2192", "right", "ArrowRight"], ["\u2191", "up", "ArrowUp"], ["\u2193", "down", "ArrowDown"], ["+", "nearer", "+"], ["\u2212", "farther", "-"]];
+const WAYS = { Left: [-1, 0], Right: [1, 0], Up: [0, 1], Down: [0, -1] };
 const KEYS = "Arrow keys turn, with Shift they move; + and \u2212 zoom, 0 resets.";
 const HELP = FINGERS ? "One finger turns, two move and zoom." : `Drag to turn, with Shift to move; the wheel zooms. ${KEYS}`;
 const NO_WEBGL = "No 3-D view: this browser has no WebGL 2. The picture shows the same part.";
@@ -25,16 +24,8 @@ function part(name, kind, attributes, ...children) {
   return made;
 }
 
-// A button. A sign is no word, so it is not part of the button's text.
-function button(words, act, label) {
-  const made = label ? part("button", "", { "data-sign": words, "aria-label": label }) : make("button", "", words);
-  made.type = "button";
-  made.addEventListener("click", act);
-  return made;
-}
-
-// Adds the view to a picture: a button behind the choice of its layers, and the view in the picture's frame while that is pressed. A view
-// that is not looked at asks for nothing and holds nothing.
+// Adds the view to a picture: a button behind the choice of its layers, and the view in its frame while that is pressed. A view that is not
+// looked at asks for nothing and holds nothing.
 export function viewOf(picture) {
   const frame = picture.parentElement, plate = frame.parentElement, pointers = new Map();
   const seen = Object.assign({}, FIRST);
@@ -42,10 +33,10 @@ export function viewOf(picture) {
   let open = false, near = false, moving = false, loading = false, due = 0, wanted = null, held = null, draws = null, canvas = null;
   const place = part("div", "space", { tabindex: 0, role: "application", "aria-label": `the part in 3-D. ${KEYS}` });
   const help = part("p", "quiet", { role: "status" });
-  const toggle = button("3-D", () => { open = !open; wake(); });
-  const mover = button("Move", () => { moving = !moving; tell(); });
-  const keys = PAD.map(([sign, label, key]) => button(sign, () => act(key, moving), label));
-  const pad = part("div", "pad", { role: "group", "aria-label": "3-D view" }, ...keys, mover, button("Reset", () => act("0")));
+  const toggle = button("3-D", "", () => { open = !open; wake(); });
+  const mover = button("Move", "", () => { moving = !moving; tell(); });
+  const keys = Object.keys(WAYS).concat("+", "\u2212").map((key) => button(key, "", () => { act(key, moving); }));
+  const pad = part("div", "pad", { role: "group", "aria-label": "3-D view" }, ...keys, mover, button("Reset", "", () => { act("0"); }));
 
   function tell(problem) {
     toggle.setAttribute("aria-pressed", open);
@@ -67,7 +58,7 @@ export function viewOf(picture) {
     const { yaw, tilt, zoom, pan, radius, middle } = seen;
     const [c, s, cos, sin] = [Math.cos(yaw), Math.sin(yaw), Math.cos(tilt), Math.sin(tilt)];
     const x = Math.min(1, high / wide), y = Math.min(1, wide / high);
-    draws.draw({
+    draws.draw(held && {
       turn: [c, s * cos, -s * sin, -s, c * cos, -c * sin, 0, sin, cos], middle,
       fit: [x * zoom / radius, y * zoom / radius, x * pan[0], y * pan[1]], near: [0.25 / radius], pixel: [2 * ratio / wide, 2 * ratio / high],
     });
@@ -91,19 +82,19 @@ export function viewOf(picture) {
   // One request at a time; of the parts that come meanwhile the newest is next.
   async function load() {
     if (loading || !draws || document.hidden) return;
-    if (!wanted) { held = null; draws.clear(); redraw(); return; }
+    if (!wanted) { held = null; redraw(); return; }
     const { path, points, seq } = wanted;
-    const others = () => !wanted || wanted.path !== path || wanted.seq !== seq;
-    if (held && held.path === path && held.seq === seq) { put(); return; }
+    if (held && held.path === path) { put(); return; }
+    const others = () => !wanted || wanted.path !== path;
     const level = within(Math.ceil(Math.log2(2 * points / TRIANGLES) / 2), [0, LEVELS]);
     let problem = "";
     loading = true;
     try {
-      const answer = await words(`${path}?seq=${seq}&level=${level}`);
+      const answer = await words(`${path}&level=${level}`);
       if (draws && !others()) {
         if (answer.about.seq !== seq) throw new Error(`the frames of no. ${seq} are gone`);
         const heights = heightsOf(answer);
-        held = { path, seq, heights, mesh: meshOf(heights) };
+        held = { path, heights, mesh: meshOf(heights) };
         put();
       }
     } catch (error) { problem = error.message; }
@@ -114,7 +105,7 @@ export function viewOf(picture) {
   function begin() {
     draws = surface(canvas, !FINGERS);
     held = null;
-    if (!draws) { canvas = null; open = false; toggle.disabled = true; }
+    if (!draws) { canvas.remove(); canvas = null; open = false; }
     tell(draws ? "" : NO_WEBGL);
     load();
   }
@@ -150,13 +141,13 @@ export function viewOf(picture) {
     seen.zoom = larger;
   }
 
-  // Does what a key stands for; whether it stands for something.
+  // Does what a key stands for, if it stands for something.
   function act(key, shift) {
-    const way = WAYS[key];
+    const way = WAYS[key.replace("Arrow", "")];
     if (way && shift) move(MOVE * way[0], MOVE * way[1]);
     else if (way) turn(TURN * way[0], TURN * way[1]);
-    else if (key === "+" || key === "=") zoom(ZOOM);
-    else if (key === "-") zoom(1 / ZOOM);
+    else if (key === "+") zoom(ZOOM);
+    else if (key === "-" || key === "\u2212") zoom(1 / ZOOM);
     else if (key === "0") { Object.assign(seen, FIRST); if (held) put(); } else return false;
     redraw();
     return true;
@@ -189,7 +180,7 @@ export function viewOf(picture) {
   const on = (kind, act, options) => place.addEventListener(kind, act, options);
   on("pointerdown", (event) => { place.setPointerCapture(event.pointerId); hold(event); });
   on("pointermove", drag);
-  for (const end of ["pointerup", "pointercancel"]) on(end, (event) => pointers.delete(event.pointerId));
+  on("lostpointercapture", (event) => pointers.delete(event.pointerId));
   on("wheel", (event) => { event.preventDefault(); zoom(Math.pow(ZOOM, -Math.sign(event.deltaY)), pointOf(event)); redraw(); }, { passive: false });
   on("keydown", (event) => { if (!event.ctrlKey && !event.altKey && !event.metaKey && act(event.key, event.shiftKey)) event.preventDefault(); });
   window.addEventListener("resize", redraw);
@@ -202,7 +193,7 @@ export function viewOf(picture) {
   tell();
 
   return {
-    // What the picture shows, after each change of it: where the surface of its part is, the part's SEQ, and how many points it has; or null.
+    // What the picture shows, after each change of it: the path of the part's surface with its SEQ, and its number of points; or null.
     show(shown) { wanted = shown; load(); },
   };
 }
