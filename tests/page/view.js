@@ -280,7 +280,7 @@ async function serious({ page }, where) {
   assert.deepEqual(found.map(({ id, nodes }) => [id, nodes.map(({ html }) => html)]), [], where);
 }
 
-export async function view({ browser, browserPath, page, url, step, folder }) {
+export async function view({ browserPath, page, url, step, folder }) {
   const cookies = await page.context().cookies();
   const software = await chromium.launch({ executablePath: browserPath, args: SOFTWARE });
   const within = async (run, ...how) => {
