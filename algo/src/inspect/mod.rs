@@ -32,9 +32,9 @@ pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
 pub use strips::{
-    CalibrationError, Findings, FoundFeature, Gauge, GoldenSignal, Input, Levels, Lost,
-    MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Production, SeenRim,
-    Signal, Skipped, Strips, Unmeasurable,
+    CalibrationError, Drawing, Drawn, Findings, FoundFeature, Gauge, GoldenSignal, Input, Levels,
+    Lost, MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Place,
+    Production, Profile, SeenRim, Signal, Skipped, Strips, Unmeasurable,
 };
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

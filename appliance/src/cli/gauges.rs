@@ -66,7 +66,9 @@ impl Gauges {
             ..
         } = gauging.set(&before, arrays).map_err(unfit)?;
         let head = manifest.head().map_err(unfit)?;
-        let golden = Plan::judge_golden(recipe, &head).map_err(|error| unfit(error.to_string()))?;
+        let golden = Plan::golden(recipe, &head).map_err(|error| unfit(error.to_string()));
+        let mut golden = golden?;
+        let (golden, features) = golden.judged((&manifest).into());
         let changed = manifest.differences(&before);
         let same = RecipeFile {
             fingerprint: before.fingerprint.clone(),
@@ -83,7 +85,7 @@ impl Gauges {
         if self.json.json {
             let gauges: Vec<Value> = golden.gauges.iter().map(of_golden).collect();
             let answer = json!({
-                "fingerprint": fingerprint, "changed": changed, "gauges": gauges,
+                "fingerprint": fingerprint, "changed": changed, "gauges": gauges, "features": features,
             });
             say!("{answer:#}");
             return Ok(());

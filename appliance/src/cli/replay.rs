@@ -8,15 +8,12 @@ use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, GaugeEntry, Reader, difference, seq_of};
 use crate::recipe::plan::PlanError;
 use crate::recipe::{Outline, Recipe, Store};
-use crate::station::gauge::decision;
 use crate::station::result::flag::SIMULATED;
 use crate::station::{Inspection, ResultRecord, Square};
 use crate::storage::unpack::Unpacked;
-use algo::inspect::{FoundFeature, State};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 /// Judge a part that did not pass again, from its recorded frames, or any recording by a recipe.
 #[derive(Debug, clap::Args)]
@@ -67,22 +64,23 @@ impl Replay {
         let judged = options.threads.pool(configured)?.install(|| {
             let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
             let of = kept.sequence(&plan);
-            let inspect =
-                |(sequence, frames): (_, Vec<_>)| plan.inspect(sequence, &frames, Instant::now());
-            Ok::<_, PlanError>(of.map(inspect))
+            let look = |(sequence, frames): (_, Vec<_>)| {
+                let (inspection, features) = plan.look(sequence, &frames);
+                (inspection, serde_json::json!(features))
+            };
+            Ok::<_, PlanError>(of.map(look))
         });
         let judged = judged.map_err(Exit::Content.failure())?;
-        let inspection = judged.ok_or_else(|| {
+        let (inspection, features) = judged.ok_or_else(|| {
             let words = format!(
                 "replay {}: recipe {number}, fingerprint {fingerprint:.8}, has no sequence with these frames: name the recipe that the part was judged by, or record the part with `fringed record --recipe`",
                 self.recording.display()
             );
             Failure::new(Exit::Content, words)
         })?;
-        let features = inspection.features.clone();
         let replayed = entry(inspection, number, &fingerprint);
         let document = serde_json::json!({
-            "replayed": detailed(&replayed, &outline, &features)?, "stored": before,
+            "replayed": detailed(&replayed, &outline, features)?, "stored": before,
             "recipe": { "from": from, "number": number, "fingerprint": fingerprint, "same": original },
         });
         let text = || table(&replayed, &from);
@@ -212,18 +210,13 @@ fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {
 }
 
 /// An entry with the kind of each gauge, and the features.
-fn detailed(entry: &Entry, outline: &Outline, found: &[FoundFeature]) -> Result<Value> {
+fn detailed(entry: &Entry, outline: &Outline, features: Value) -> Result<Value> {
     let shown = serde_json::to_value(entry);
     let mut shown = shown.map_err(Exit::Software.because("write the result"))?;
     for (gauge, of) in entry.gauges.iter().enumerate() {
         shown["gauges"][gauge]["kind"] = outline.kind(of.slot).into();
     }
-    let state = |slot: u16| match entry.gauges.iter().find(|gauge| gauge.slot == slot) {
-        Some(gauge) if gauge.value.is_some() => State::Found,
-        Some(gauge) if gauge.decision & decision::ABSENT != 0 => State::Absent,
-        _ => State::Unseen,
-    };
-    shown["features"] = serde_json::json!(outline.features(found, state));
+    shown["features"] = features;
     Ok(shown)
 }
 

@@ -25,6 +25,22 @@ impl RecipeFile {
     /// # Errors
     /// In words that name the key, the value and the bounds.
     pub fn check_bounds(&self) -> Result<(), String> {
+        self.check_whole()?;
+        self.check_features()?;
+        self.check_count()?;
+        let largest = self.longest();
+        each("gauges", ": ", &self.gauges, |gauge| {
+            gauge.check_bounds(largest)
+        })?;
+        check_slots(&self.gauges)?;
+        self.check_references()
+    }
+
+    /// As [`Self::check_bounds`], of what is neither feature nor datum system nor gauge.
+    ///
+    /// # Errors
+    /// As above.
+    pub(super) fn check_whole(&self) -> Result<(), String> {
         Fields.check("", self)?;
         if !self.part_number.is_ascii() {
             let key = format!("part_number {:?}", self.part_number);
@@ -50,19 +66,25 @@ impl RecipeFile {
             let full_scale = f64::from((1_u32 << self.camera.bit_depth) - 1);
             within("golden_offset_counts", counts, 0.0, full_scale)?;
         }
-        self.check_features()?;
-        length("gauges", self.gauges.len(), 1, MAX_GAUGES)?;
-        let largest = self.camera.width.max(self.camera.height) as usize;
-        each("gauges", ": ", &self.gauges, |gauge| {
-            gauge.check_bounds(largest)
-        })?;
-        check_slots(&self.gauges)?;
-        self.check_references()
+        Ok(())
+    }
+
+    /// Checks how many gauges there are.
+    ///
+    /// # Errors
+    /// As above.
+    pub(super) fn check_count(&self) -> Result<(), String> {
+        length("gauges", self.gauges.len(), 1, MAX_GAUGES)
+    }
+
+    /// Pixels of the longer side of the camera's frames.
+    pub(super) fn longest(&self) -> usize {
+        self.camera.width.max(self.camera.height) as usize
     }
 }
 
 /// Refuses slots that two gauges have, and gauges that are not in the order of their slots.
-fn check_slots(gauges: &[GaugeFile]) -> Result<(), String> {
+pub(super) fn check_slots(gauges: &[GaugeFile]) -> Result<(), String> {
     let mut pairs = gauges.iter().zip(gauges.iter().skip(1));
     let Some((first, second)) = pairs.find(|(first, second)| first.slot >= second.slot) else {
         return Ok(());
@@ -116,7 +138,7 @@ impl GaugeFile {
     ///
     /// # Errors
     /// In words that name the key, the value and the bounds.
-    fn check_bounds(&self, largest: usize) -> Result<(), String> {
+    pub(super) fn check_bounds(&self, largest: usize) -> Result<(), String> {
         text("name", &self.name, LONGEST_NAME)?;
         within("slot", self.slot, 1, MAX_SLOT)?;
         length("of", self.of.len(), 0, MAX_PLACES)?;

@@ -11,7 +11,7 @@ use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
-use algo::inspect::{CalibrationError, Feature, Gauge, Region};
+use algo::inspect::{CalibrationError, Feature, Gauge};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
 use algo::units::Modulation;
@@ -302,14 +302,7 @@ fn features(
     (width, height): (usize, usize),
 ) -> Result<Vec<Feature>, String> {
     let feature = |feature: &FeatureFile| {
-        let corners: Vec<_> = feature.region.iter().map(|&[u, v]| (u, v)).collect();
-        let cut = feature.cut();
-        // That of a section is as wide as the part's distance makes it, which is planned.
-        let region = match cut {
-            Some(_) => Region::default(),
-            None => Region::polygon(&corners, width, height)
-                .map_err(|error| format!("feature {:?}: {error}", feature.name))?,
-        };
+        let region = feature.pixels((width, height))?;
         let plane = feature.plane.as_ref();
         let plane = plane.and_then(|name| features.iter().position(|of| of.name == *name));
         Ok(Feature {
@@ -318,7 +311,7 @@ fn features(
             plane,
             rim: feature.rim_mm.unwrap_or(0.0),
             thickness: feature.thickness_mm,
-            cut,
+            cut: feature.cut(),
         })
     };
     features.iter().map(feature).collect()

@@ -62,26 +62,18 @@ pub fn edit(
     if file.fingerprint != edit.fingerprint {
         return Err(ChangeError::Outdated(number));
     }
-    file.name = edit.name.map_or(file.name, |name| name.trim().to_owned());
-    if let Some(part_number) = edit.part_number {
-        let shared = store.refuse_shared(number, &part_number);
+    if let Some(part_number) = &edit.part_number {
+        let shared = store.refuse_shared(number, part_number);
         shared.map_err(ChangeError::Unfit)?;
-        file.part_number = part_number;
     }
-    file.min_coverage = edit.min_coverage.unwrap_or(file.min_coverage);
-    file.guard_k = edit.guard_k.unwrap_or(file.guard_k);
-    file.features = edit.features.unwrap_or(file.features);
-    file.datums = edit.datums.unwrap_or(file.datums);
-    file.gauges = edit.gauges.unwrap_or(file.gauges);
-    if let Some(judges_nothing) = edit.judges_nothing {
-        file.judges_nothing = judges_nothing;
-    }
+    let fingerprint = edit.fingerprint.clone();
+    edit.apply(&mut file);
     file.set_gauges_of(&before).map_err(ChangeError::Unfit)?;
     // Tighter limits may need a longer sequence, wider ones a shorter one.
     let changed = TaughtRecipe::of(file, recipe.arrays).map_err(ChangeError::Unfit)?;
     fits(changed.recipe).map_err(ChangeError::Unfit)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
-    match store.replace(number, &edit.fingerprint, &changed.bytes) {
+    match store.replace(number, &fingerprint, &changed.bytes) {
         Ok(true) => Ok(Edited {
             changed: changed.manifest.differences(&before),
             other_slots: changed.manifest.other_slots(&before),
@@ -89,6 +81,25 @@ pub fn edit(
         }),
         Ok(false) => Err(ChangeError::Outdated(number)),
         Err(error) => Err(ChangeError::Store(error)),
+    }
+}
+
+impl Edit {
+    /// Takes over what it changes, unchecked.
+    pub(super) fn apply(self, file: &mut RecipeFile) {
+        fn set<T>(of: &mut T, new: Option<T>) {
+            if let Some(new) = new {
+                *of = new;
+            }
+        }
+        set(&mut file.name, self.name.map(|name| name.trim().to_owned()));
+        set(&mut file.part_number, self.part_number);
+        set(&mut file.min_coverage, self.min_coverage);
+        set(&mut file.guard_k, self.guard_k);
+        set(&mut file.features, self.features);
+        set(&mut file.datums, self.datums);
+        set(&mut file.gauges, self.gauges);
+        set(&mut file.judges_nothing, self.judges_nothing);
     }
 }
 
@@ -116,7 +127,11 @@ impl RecipeFile {
     }
 }
 
-fn check_names<'a>(
+/// Refuses a name that is empty, too long, or there twice.
+///
+/// # Errors
+/// In words.
+pub(super) fn check_names<'a>(
     what: &str,
     names: impl Iterator<Item = &'a String> + Clone,
 ) -> Result<(), String> {

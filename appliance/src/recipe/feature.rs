@@ -1,6 +1,6 @@
 //! The features of a recipe in its file, and datum systems of them.
 
-use algo::inspect::{Cut, FeatureKind};
+use algo::inspect::{Cut, FeatureKind, Region};
 use hal::bounded;
 use hal::bounds::{Bound, Fields, Longest, MAX_SIDE, length, text, within};
 
@@ -182,6 +182,20 @@ impl FeatureFile {
                 Err("left ends behind the beginning of right: both lie beside the joint".into())
             }
         }
+    }
+
+    /// The pixels of its region in frames of (width, height); none of a section, whose region is as
+    /// wide as the part's distance makes it, which is planned.
+    ///
+    /// # Errors
+    /// In words, with its name: its region is none.
+    pub(super) fn pixels(&self, (width, height): (usize, usize)) -> Result<Region, String> {
+        if self.cut().is_some() {
+            return Ok(Region::default());
+        }
+        let corners: Vec<_> = self.region.iter().map(|&[u, v]| (u, v)).collect();
+        Region::polygon(&corners, width, height)
+            .map_err(|error| format!("feature {:?}: {error}", self.name))
     }
 
     /// Where a section is; `None` of other kinds, and where a key is missing.

@@ -16,13 +16,20 @@ impl RecipeFile {
     /// In words, with the name of the first such gauge and the remedy.
     pub(super) fn check_judging(&self) -> Result<(), String> {
         for gauge in &self.gauges {
-            let refused = gauge.check_limits();
-            refused.map_err(|error| format!("{error}: change the limits"))?;
+            gauge.check_judging()?;
             self.check_step(gauge)?;
         }
         check_unique("feature", self.features.iter().map(|feature| &feature.name))?;
         check_unique("datum", self.datums.iter().map(|datum| &datum.name))?;
         check_unique("gauge", self.gauges.iter().map(|gauge| &gauge.name))?;
+        self.check_limited()
+    }
+
+    /// Refuses a recipe without any limit that does not say so, and one that says so and has some.
+    ///
+    /// # Errors
+    /// In words, with the remedy.
+    pub(super) fn check_limited(&self) -> Result<(), String> {
         let limited = self.gauges.iter().find(|gauge| gauge.can_fail());
         match (limited, self.judges_nothing) {
             (None, false) => Err(
@@ -43,7 +50,10 @@ impl RecipeFile {
     }
 
     /// Refuses what a feature has from itself, under whatever name: it is 0 for every part.
-    fn check_step(&self, gauge: &GaugeFile) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// In words, with the gauge's name.
+    pub(super) fn check_step(&self, gauge: &GaugeFile) -> Result<(), String> {
         let [region, from] = &gauge.of[..] else {
             return Ok(());
         };
@@ -58,6 +68,17 @@ impl RecipeFile {
             )),
             false => Ok(()),
         }
+    }
+}
+
+impl GaugeFile {
+    /// Refuses limits that no part can keep or miss.
+    ///
+    /// # Errors
+    /// In words, with the gauge's name and the remedy.
+    pub(super) fn check_judging(&self) -> Result<(), String> {
+        let refused = self.check_limits();
+        refused.map_err(|error| format!("{error}: change the limits"))
     }
 }
 

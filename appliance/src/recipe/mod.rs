@@ -19,6 +19,9 @@
 //!   `limits` sets and `proof` tries the limits of all gauges, `signal` is golden's light as it was
 //!   demodulated; [`replace`] keeps names and gauges of a recipe that is taught again, `regauge`
 //!   works out limits that follow golden.
+//! - Shown: `outline` says what became of the features of a part, `lost` why one was not found,
+//!   `drawn` what is drawn of it; [`trying`] measures an edit before it is stored, `wrong` names all
+//!   that is wrong with it.
 
 pub mod adaptive;
 pub mod archive;
@@ -29,6 +32,7 @@ pub mod check;
 pub mod comparison;
 mod demands;
 mod differences;
+mod drawn;
 pub mod edit;
 pub mod exchange;
 mod failure;
@@ -47,6 +51,7 @@ mod judging;
 pub mod kinds;
 mod light;
 mod limits;
+mod lost;
 mod median;
 pub mod models;
 mod outline;
@@ -64,6 +69,8 @@ pub mod signal;
 pub mod store;
 pub mod teach;
 pub mod tolerance;
+pub mod trying;
+mod wrong;
 
 pub use archive::short;
 pub use check::{Conditions, Recipe, RecipeId, RecipeSequence};
@@ -73,5 +80,6 @@ pub use file::{
     AlignmentKind, PatternFile, RecipeFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };
 pub use gauge::GaugeFile;
-pub use outline::Outline;
+pub use outline::{Outline, Seen};
 pub use store::{ChangeError, LoadError, Store};
+pub use wrong::{Part, Wrong};

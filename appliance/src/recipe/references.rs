@@ -16,10 +16,18 @@ impl RecipeFile {
     /// # Errors
     /// In words that name the key, the value and the bounds.
     pub(super) fn check_features(&self) -> Result<(), String> {
-        length("features", self.features.len(), 0, MAX_FEATURES)?;
+        self.check_counts()?;
         each("features", ".", &self.features, FeatureFile::check_bounds)?;
-        length("datums", self.datums.len(), 0, MAX_DATUMS)?;
         each("datums", ".", &self.datums, DatumFile::check_bounds)
+    }
+
+    /// Checks how many features and datum systems there are.
+    ///
+    /// # Errors
+    /// As above.
+    pub(super) fn check_counts(&self) -> Result<(), String> {
+        length("features", self.features.len(), 0, MAX_FEATURES)?;
+        length("datums", self.datums.len(), 0, MAX_DATUMS)
     }
 
     /// Checks that what datum systems and gauges name is there, once in each, and of a kind that
@@ -28,45 +36,75 @@ impl RecipeFile {
     /// # Errors
     /// In words, with the name of the first that does not fit.
     pub(super) fn check_references(&self) -> Result<(), String> {
-        for DatumFile { name, of } in &self.datums {
-            let datum = format!("datum {:?}", clipped(name));
-            self.check_all_there(&datum, of)?;
-            let kinds = of.iter().filter_map(|name| self.feature(name));
-            let kinds: Vec<FeatureKind> = kinds.map(|feature| feature.kind).collect();
-            if !makes_datum(&kinds) {
-                return Err(format!(
-                    "{datum} is no frame: name a plane, then a circle, slot or line, then another one that is not a plane"
-                ));
-            }
-        }
-        for FeatureFile { name, plane, .. } in &self.features {
-            let Some(plane) = plane else { continue };
-            let found = self.feature(plane).map(|feature| feature.kind);
-            if found != Some(FeatureKind::Plane) {
-                return Err(format!(
-                    "feature {:?} lies in {:?}, which is {}: name a plane",
-                    clipped(name),
-                    clipped(plane),
-                    found.map_or("not there".into(), |kind| format!("a {}", kind.name()))
-                ));
-            }
-        }
-        if let Some(gauge) = self.gauge_of_contour().filter(|_| self.two_frames) {
-            return Err(format!(
-                "gauge {:?} is of a contour, which needs three shifts or more, and two_frames is true: set it to false",
-                clipped(&gauge.name)
-            ));
-        }
+        self.datums.iter().try_for_each(|of| self.check_frame(of))?;
+        self.features
+            .iter()
+            .try_for_each(|of| self.check_plane(of))?;
         self.gauges
             .iter()
-            .try_for_each(|gauge| self.check_of(gauge))
+            .try_for_each(|of| self.check_shifts(of))?;
+        self.gauges.iter().try_for_each(|of| self.check_of(of))
+    }
+
+    /// Checks that the features of a datum system are there and make a frame.
+    ///
+    /// # Errors
+    /// In words, with its name.
+    pub(super) fn check_frame(&self, datum: &DatumFile) -> Result<(), String> {
+        let DatumFile { name, of } = datum;
+        let datum = format!("datum {:?}", clipped(name));
+        self.check_all_there(&datum, of)?;
+        let kinds = of.iter().filter_map(|name| self.feature(name));
+        let kinds: Vec<FeatureKind> = kinds.map(|feature| feature.kind).collect();
+        match makes_datum(&kinds) {
+            true => Ok(()),
+            false => Err(format!(
+                "{datum} is no frame: name a plane, then a circle, slot or line, then another one that is not a plane"
+            )),
+        }
+    }
+
+    /// Checks that what a feature lies in is there and a plane.
+    ///
+    /// # Errors
+    /// In words, with its name.
+    pub(super) fn check_plane(&self, feature: &FeatureFile) -> Result<(), String> {
+        let Some(plane) = &feature.plane else {
+            return Ok(());
+        };
+        match self.feature(plane).map(|feature| feature.kind) {
+            Some(FeatureKind::Plane) => Ok(()),
+            found => Err(format!(
+                "feature {:?} lies in {:?}, which is {}: name a plane",
+                clipped(&feature.name),
+                clipped(plane),
+                found.map_or("not there".into(), |kind| format!("a {}", kind.name()))
+            )),
+        }
+    }
+
+    /// Refuses a gauge of a contour where two frames are used.
+    ///
+    /// # Errors
+    /// In words, with its name.
+    pub(super) fn check_shifts(&self, gauge: &GaugeFile) -> Result<(), String> {
+        match self.two_frames && self.is_of_contour(gauge) {
+            true => Err(format!(
+                "gauge {:?} is of a contour, which needs three shifts or more, and two_frames is true: set it to false",
+                clipped(&gauge.name)
+            )),
+            false => Ok(()),
+        }
     }
 
     /// A gauge that is of a contour, if there is one.
     pub(super) fn gauge_of_contour(&self) -> Option<&GaugeFile> {
+        self.gauges.iter().find(|gauge| self.is_of_contour(gauge))
+    }
+
+    fn is_of_contour(&self, gauge: &GaugeFile) -> bool {
         let is_contour = |name: &String| self.feature(name).is_some_and(|of| of.kind.is_contour());
-        let mut gauges = self.gauges.iter();
-        gauges.find(|gauge| gauge.of.iter().any(is_contour))
+        gauge.of.iter().any(is_contour)
     }
 
     /// A feature by its name.
@@ -90,7 +128,10 @@ impl RecipeFile {
     }
 
     /// Checks the features and the datum system of a gauge.
-    fn check_of(&self, gauge: &GaugeFile) -> Result<(), String> {
+    ///
+    /// # Errors
+    /// In words, with its name.
+    pub(super) fn check_of(&self, gauge: &GaugeFile) -> Result<(), String> {
         let what = format!("gauge {:?}", clipped(&gauge.name));
         let takes = gauge.measures.facts().takes;
         let kind = gauge.measures.name();

@@ -3,9 +3,9 @@
 
 use super::archive::Arrays;
 use super::golden::TaughtRecipe;
-use super::plan::Plan;
-use super::planner;
-use super::{GaugeFile, Recipe, RecipeFile};
+use super::plan::{Golden, Plan, PlanError};
+use super::planner::{self, Choice};
+use super::{GaugeFile, Part, Recipe, RecipeFile};
 use algo::inspect::{Findings, Missing};
 use hal::bounds::clipped;
 
@@ -20,55 +20,104 @@ impl TaughtRecipe {
     /// # Errors
     /// In words, if they do not fit each other, or golden has no value where one is needed.
     pub(super) fn of(mut manifest: RecipeFile, arrays: Arrays) -> Result<Self, String> {
-        manifest.gauges.sort_by_key(|gauge| gauge.slot);
-        let choose = |of: &RecipeFile| planner::choose(&of.sequences, &of.gauges, arrays.widest());
-        let mut choice = choose(&manifest);
-        manifest.production = choice.production;
-        let is_of_contour = manifest.gauge_of_contour().is_some();
-        if is_of_contour || manifest.gauges.iter().any(GaugeFile::needs_golden) {
-            let head = manifest.head()?;
-            for _ in 0..TURNS {
-                let recipe = Recipe::fit(&manifest, arrays.clone())?;
-                let found = Plan::golden(recipe, &head).map_err(|error| error.to_string())?;
-                manifest.follow(&found)?;
-                choice = choose(&manifest);
-                if choice.production == manifest.production {
-                    break;
-                }
-                manifest.production = choice.production;
-            }
-        }
+        let settled = manifest.settle(&arrays);
+        let (mut choice, _) = settled.map_err(|error| error.words)?;
         if manifest.two_frames {
             choice.reasons.push(Self::TWO_FRAMES.into());
         }
-        if is_of_contour {
+        if manifest.gauge_of_contour().is_some() {
             choice.reasons.push(Self::CONTOURS.into());
         }
         Self::sealed(manifest, arrays, choice)
     }
 }
 
+/// Why a recipe's limits and sequence cannot be settled.
+#[derive(Clone, Debug)]
+pub(super) struct Unsettled {
+    /// In words.
+    pub words: String,
+    /// The feature or gauge that is why, by its name.
+    pub of: Option<(Part, String)>,
+}
+
+impl From<String> for Unsettled {
+    fn from(words: String) -> Self {
+        let of = None;
+        Self { words, of }
+    }
+}
+
 impl RecipeFile {
+    /// Sorts the gauges by their slots, works out limits and masters, and chooses the production
+    /// sequence. The answer also has golden as the recipe measures it, where that was needed.
+    ///
+    /// # Errors
+    /// In words, if they do not fit each other, or golden has no value where one is needed.
+    pub(super) fn settle(
+        &mut self,
+        arrays: &Arrays,
+    ) -> Result<(Choice, Option<Golden>), Unsettled> {
+        self.gauges.sort_by_key(|gauge| gauge.slot);
+        let choose = |of: &Self| planner::choose(&of.sequences, &of.gauges, arrays.widest());
+        let mut choice = choose(self);
+        self.production = choice.production;
+        if self.gauge_of_contour().is_none() && !self.gauges.iter().any(GaugeFile::needs_golden) {
+            return Ok((choice, None));
+        }
+        for _ in 0..TURNS {
+            let golden = self.golden(arrays)?;
+            self.follow(&golden.findings)?;
+            choice = choose(self);
+            if choice.production == self.production {
+                return Ok((choice, Some(golden)));
+            }
+            self.production = choice.production;
+        }
+        Ok((choice, None))
+    }
+
+    /// Golden as the recipe measures it.
+    ///
+    /// # Errors
+    /// In words: manifest and arrays do not fit each other, or golden does not have a feature.
+    pub(super) fn golden(&self, arrays: &Arrays) -> Result<Golden, Unsettled> {
+        let recipe = Recipe::fit(self, arrays.clone())?;
+        let name = |at: usize| {
+            let feature = self.features.get(at)?;
+            Some((Part::Feature, feature.name.clone()))
+        };
+        Plan::golden(recipe, &self.head()?).map_err(|error| Unsettled {
+            words: error.to_string(),
+            of: match error {
+                PlanError::Unfit { feature, .. } => feature.and_then(name),
+                _ => None,
+            },
+        })
+    }
+
     /// Takes over what is found of golden.
     ///
     /// # Errors
     /// In words: a gauge that needs golden's value has none, or one can never have a value.
-    fn follow(&mut self, golden: &Findings) -> Result<(), String> {
+    fn follow(&mut self, golden: &Findings) -> Result<(), Unsettled> {
         let found = golden.readings.iter().zip(&golden.missing);
         for (gauge, (reading, missing)) in self.gauges.iter_mut().zip(found) {
             gauge.set_golden(reading.as_ref());
-            if *missing == Some(Missing::Open) {
-                return Err(format!(
-                    "gauge {:?} depends on how the part lies along a direction that its shape does not determine: give it a datum",
-                    clipped(&gauge.name)
-                ));
-            }
-            if gauge.needs_golden() && gauge.golden_value.is_none() {
-                return Err(format!(
-                    "gauge {:?} finds nothing to measure in golden: move its feature, or write its limits and leave golden and master out",
-                    clipped(&gauge.name)
-                ));
-            }
+            let name = clipped(&gauge.name);
+            let words = if *missing == Some(Missing::Open) {
+                format!(
+                    "gauge {name:?} depends on how the part lies along a direction that its shape does not determine: give it a datum"
+                )
+            } else if gauge.needs_golden() && gauge.golden_value.is_none() {
+                format!(
+                    "gauge {name:?} finds nothing to measure in golden: move its feature, or write its limits and leave golden and master out"
+                )
+            } else {
+                continue;
+            };
+            let of = Some((Part::Gauge, gauge.name.clone()));
+            return Err(Unsettled { words, of });
         }
         Ok(())
     }

@@ -112,7 +112,8 @@ fn is_round(
     };
     let found = Recipe::fit(&alone, arrays.clone())
         .and_then(|recipe| Plan::golden(recipe, head).map_err(|error| error.to_string()));
-    let Ok(found) = found else { return false };
+    let Ok(golden) = found else { return false };
+    let found = golden.findings;
     let seen = |feature: &&FoundFeature| feature.found >= GOLDEN_FOUND;
     let rim = found.features.iter().filter(seen).find_map(|of| of.rim);
     let (Some(reading), Some(SeenRim { pixel_mm, .. })) = (found.readings[0], rim) else {

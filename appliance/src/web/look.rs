@@ -1,16 +1,19 @@
 //! Answers that change nothing: snapshot, pictures, registers, log, record of changes, health and
 //! readiness.
 
-use axum::extract::Path;
+use axum::extract::{Path, Query};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
+use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::map::{Drawn, Map, map};
+use super::map::{Drawn, Map, Plane, map, surface, usual_stride};
 use super::problem::{Problem, Result};
 use super::site::Site;
 use super::view;
 use crate::recipe::plan::{Layers, Shown};
+use crate::recipe::{RecipeId, Seen};
+use crate::station::Verdict;
 use crate::station::snapshot::status;
 
 /// The description of this API.
@@ -45,19 +48,80 @@ pub(super) async fn readiness(site: Site) -> Response {
 }
 
 /// The pictures of a measured part.
-const LAYERS: [&str; 3] = ["height", "deviation", "modulation"];
+const LAYERS: [&str; 4] = ["height", "deviation", "modulation", SURFACE];
+/// The picture that has points.
+pub(super) const SURFACE: &str = "surface";
+/// The coarsest level of a surface.
+const MAX_LEVEL: u32 = 5;
 /// The direction in which deviations are measured.
 const DIRECTION: &str = "along the normal";
 
-pub(super) async fn picture(site: Site, Path(layer): Path<String>) -> Result<Response> {
+/// How fine a surface is: every 2^level-th pixel, as fine as other maps if left out.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Level {
+    level: Option<u32>,
+}
+
+impl Level {
+    /// Pixels from one to the next that is sent of frames of `width` columns.
+    ///
+    /// # Errors
+    /// There is no such level.
+    pub(super) fn stride(self, width: usize) -> Result<usize> {
+        match self.level {
+            None => Ok(usual_stride(width)),
+            Some(level) if level <= MAX_LEVEL => Ok(1 << level),
+            Some(level) => Err(Problem::unfit(format!(
+                "level {level}: write 0 to {MAX_LEVEL}"
+            ))),
+        }
+    }
+}
+
+/// What was found on a part.
+pub(super) fn found(
+    (seq, verdict): (u32, Verdict),
+    (id, features): (&RecipeId, &[Seen<'_>]),
+) -> Value {
+    json!({
+        "seq": seq, "recipe": id.number, "fingerprint": id.fingerprint, "verdict": verdict.word(),
+        "features": features,
+    })
+}
+
+pub(super) async fn features(site: Site) -> Result<Response> {
+    site.aside(|site| {
+        let asked = site.last_cycle.ask(|part| {
+            let (_, features) = part.plan.look(part.sequence, &part.frames);
+            found(
+                (part.record.seq, part.record.verdict),
+                (part.plan.id(), &features),
+            )
+        });
+        let answer = asked.map(|found| Json(found).into_response());
+        Ok(answer.unwrap_or_else(none))
+    })
+    .await
+}
+
+/// Not an error: the page asks for what belongs to every result.
+fn none() -> Response {
+    let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
+    (StatusCode::NO_CONTENT, [("x-none", words)]).into_response()
+}
+
+pub(super) async fn picture(
+    site: Site,
+    Path(layer): Path<String>,
+    Query(level): Query<Level>,
+) -> Result<Response> {
     site.aside(move |site| {
         let at = place_of(&layer)?;
-        // Not an error: the page asks for a picture of every result.
         let Some((seq, layers)) = site.last_cycle.layers(site.last_seq()) else {
-            let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
-            return Ok((StatusCode::NO_CONTENT, [("x-none", words)]).into_response());
+            return Ok(none());
         };
-        Ok(map_of(&layers, at, seq).into_response())
+        Ok(map_of(&layers, at, seq, level)?.into_response())
     })
     .await
 }
@@ -68,18 +132,36 @@ pub(super) async fn picture(site: Site, Path(layer): Path<String>) -> Result<Res
 /// If there is no such picture.
 pub(super) fn place_of(layer: &str) -> Result<usize> {
     let at = LAYERS.iter().position(|known| *known == layer);
-    at.ok_or_else(|| Problem::missing("there are height, deviation and modulation"))
+    at.ok_or_else(|| Problem::missing("there are height, deviation, modulation and surface"))
 }
 
 /// One of the maps of a part, by its place in [`LAYERS`].
-pub(super) fn map_of(layers: &Layers, at: usize, seq: u32) -> Map {
+///
+/// # Errors
+/// There is no such level.
+pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Result<Map> {
     let limit = layers.shown.gauge.as_ref().and_then(|gauge| {
         let limits = [gauge.low, gauge.high].into_iter().flatten();
         limits.map(f64::abs).max_by(f64::total_cmp)
     });
+    let deviation = Drawn::Deviation { limit };
+    if LAYERS[at] == SURFACE {
+        let of = (layers.width, level.stride(layers.width)?);
+        let mut planes = Plane::points(layers.points(of.1));
+        planes.extend([
+            Plane::of("deviation", "mm", (&layers.deviation_mm, of), deviation),
+            Plane::of(
+                "modulation",
+                "counts",
+                (&layers.modulation, of),
+                Drawn::Plain,
+            ),
+        ]);
+        return Ok(surface(&planes, of, Some(seq)));
+    }
     let (values, unit, drawn) = [
         (&layers.height_mm, "mm", Drawn::Plain),
-        (&layers.deviation_mm, "mm", Drawn::Deviation { limit }),
+        (&layers.deviation_mm, "mm", deviation),
         (&layers.modulation, "counts", Drawn::Plain),
     ][at];
     let mut map = map(values, layers.width, unit, drawn, Some(seq));
@@ -92,7 +174,7 @@ pub(super) fn map_of(layers: &Layers, at: usize, seq: u32) -> Map {
     if LAYERS[at] == "deviation" {
         map.description["shown"] = described(&layers.shown);
     }
-    map
+    Ok(map)
 }
 
 /// What a map of deviations shows, for people.

@@ -41,11 +41,86 @@ pub struct Map {
     pub description: serde_json::Value,
 }
 
+/// Pixels from one to the next that is sent of `width` columns, unless a request says otherwise.
+pub fn usual_stride(width: usize) -> usize {
+    width.div_ceil(MAX_WIDTH).max(1)
+}
+
 /// Makes a map of `width` columns.
 pub fn map(values: &[f32], width: usize, unit: &str, drawn: Drawn, seq: Option<u32>) -> Map {
-    let stride = width.div_ceil(MAX_WIDTH).max(1);
+    let stride = usual_stride(width);
     let thin = thinned(values, (width, stride), drawn);
     let columns = width.div_ceil(stride).max(1);
+    let (words, mut description) = encoded(&thin, unit, drawn);
+    for (key, value) in [
+        ("width", json!(columns)),
+        ("height", json!(thin.len() / columns)),
+        ("stride", json!(stride)),
+        ("seq", json!(seq)),
+    ] {
+        description[key] = value;
+    }
+    Map { words, description }
+}
+
+/// A plane of a surface.
+#[derive(Clone, Debug)]
+pub struct Plane {
+    name: &'static str,
+    unit: &'static str,
+    thin: Vec<f32>,
+    drawn: Drawn,
+}
+
+impl Plane {
+    /// Of values of so many columns, from one pixel to the next that is sent.
+    pub fn of(
+        name: &'static str,
+        unit: &'static str,
+        (values, size): (&[f32], (usize, usize)),
+        drawn: Drawn,
+    ) -> Self {
+        Self {
+            name,
+            unit,
+            thin: thinned(values, size, drawn),
+            drawn,
+        }
+    }
+
+    /// x, y and z of the pixels that are sent, mm.
+    pub fn points(points: [Vec<f32>; 3]) -> Vec<Self> {
+        let planes = ["x", "y", "z"].into_iter().zip(points);
+        planes
+            .map(|(name, thin)| Self {
+                name,
+                unit: "mm",
+                thin,
+                drawn: Drawn::Plain,
+            })
+            .collect()
+    }
+}
+
+/// Makes a surface of planes of so many columns, with one pixel in `stride` along each.
+pub fn surface(planes: &[Plane], (width, stride): (usize, usize), seq: Option<u32>) -> Map {
+    let columns = width.div_ceil(stride).max(1);
+    let rows = planes.first().map_or(0, |plane| plane.thin.len() / columns);
+    let (mut words, mut described) = (Vec::new(), Vec::new());
+    for plane in planes {
+        let (own, mut description) = encoded(&plane.thin, plane.unit, plane.drawn);
+        words.extend(own);
+        description["name"] = plane.name.into();
+        described.push(description);
+    }
+    let description = json!({
+        "width": columns, "height": rows, "stride": stride, "seq": seq, "planes": described,
+    });
+    Map { words, description }
+}
+
+/// The words of values, and what turns them back.
+fn encoded(thin: &[f32], unit: &str, drawn: Drawn) -> (Vec<u8>, serde_json::Value) {
     let mut known: Vec<f32> = thin
         .iter()
         .copied()
@@ -85,11 +160,10 @@ pub fn map(values: &[f32], width: usize, unit: &str, drawn: Drawn, seq: Option<u
             [-far, far]
         }
     };
-    let description = json!({
-        "width": columns, "height": thin.len() / columns, "stride": stride, "low": low, "step": step, "unit": unit,
-        "scale": scale, "seq": seq,
-    });
-    Map { words, description }
+    (
+        words,
+        json!({ "low": low, "step": step, "unit": unit, "scale": scale }),
+    )
 }
 
 /// One value for each square of `stride` pixels, of those that lie in the frame.

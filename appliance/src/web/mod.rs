@@ -21,6 +21,7 @@ pub mod server;
 pub mod simulation;
 mod site;
 pub mod slots;
+mod tries;
 pub mod view;
 
 mod downloads;

@@ -2,7 +2,7 @@
 
 use axum::http::{HeaderValue, StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Display;
 use std::io::{self, ErrorKind};
 
@@ -16,8 +16,8 @@ pub struct Problem {
     pub status: StatusCode,
     /// What was attempted, and the remedy.
     pub words: String,
-    /// The number of the recipe that must be replaced for it.
-    pub taken: Option<u16>,
+    /// What programs need beside the words, by its key.
+    pub more: Vec<(&'static str, Value)>,
 }
 
 impl Problem {
@@ -26,8 +26,15 @@ impl Problem {
         Self {
             status,
             words: words.to_string(),
-            taken: None,
+            more: Vec::new(),
         }
+    }
+
+    /// The same with something that programs need.
+    #[must_use]
+    pub fn with(mut self, key: &'static str, value: impl Into<Value>) -> Self {
+        self.more.push((key, value.into()));
+        self
     }
 
     /// A file could not be written: 507 if there is no room, else 500.
@@ -69,8 +76,8 @@ problems! {
 impl IntoResponse for Problem {
     fn into_response(self) -> Response {
         let mut body = json!({ "error": self.words });
-        if let Some(number) = self.taken {
-            body["taken"] = number.into();
+        for (key, value) in self.more {
+            body[key] = value;
         }
         let mut response = (self.status, Json(body)).into_response();
         if self.status == StatusCode::SERVICE_UNAVAILABLE {

@@ -10,13 +10,14 @@ use serde_json::{Value, json};
 use super::body;
 use super::downloads::{Content, send};
 use super::gate::Changed;
-use super::map::{Drawn, Map, map};
+use super::look::{Level, SURFACE};
+use super::map::{Drawn, Map, Plane, map, surface};
 use super::orders::{self, Reload};
 use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, Edited};
 use crate::recipe::exchange::Destination;
-use crate::recipe::plan::{Plan, PlanError};
+use crate::recipe::plan::{GoldenView, Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
 use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, Store};
 use crate::station::control::MAX_RECIPE;
@@ -36,11 +37,8 @@ impl From<ChangeError> for Problem {
         match error {
             ChangeError::Load(error) => error.into(),
             ChangeError::Nothing(_) | ChangeError::Missing { .. } => Self::missing(words),
-            ChangeError::Outdated(_) => Self::busy(words),
-            ChangeError::Taken { number, .. } => Self {
-                taken: Some(number),
-                ..Self::busy(words)
-            },
+            ChangeError::Outdated(_) => Self::busy(words).with("why", "outdated"),
+            ChangeError::Taken { number, .. } => Self::busy(words).with("taken", number),
             ChangeError::Unfit(_) => Self::unfit(words),
             ChangeError::Store(error) | ChangeError::Write { source: error, .. } => {
                 Self::unstored(words, &error)
@@ -101,27 +99,35 @@ pub(super) async fn export(site: Site, Path(number): Path<u16>) -> Result<Respon
     .await
 }
 
-pub(super) async fn picture(site: Site, Path((number, layer)): Path<(u16, String)>) -> Result<Map> {
+pub(super) async fn picture(
+    site: Site,
+    Path((number, layer)): Path<(u16, String)>,
+    Query(level): Query<Level>,
+) -> Result<Map> {
     site.aside(move |site| {
-        let LoadedRecipe { recipe, .. } = site.recipes.load_to_edit(number)?;
+        let LoadedRecipe { file, recipe, .. } = site.recipes.load_to_edit(number)?;
+        let head = file.head().map_err(Problem::unfit)?;
+        let view = GoldenView::new(&recipe, &head).map_err(Problem::unfit)?;
         let width = recipe.conditions.camera.0 as usize;
-        match layer.as_str() {
-            "height" => Ok(map(
-                &recipe.arrays.golden_height,
-                width,
-                "mm",
-                Drawn::Plain,
-                None,
-            )),
-            "modulation" => Ok(map(
-                &recipe.arrays.modulation,
-                width,
-                "counts",
-                Drawn::Plain,
-                None,
-            )),
-            _ => Err(Problem::missing("a recipe has height and modulation")),
-        }
+        let arrays = &recipe.arrays;
+        let plain = |values, unit| map(values, width, unit, Drawn::Plain, None);
+        let mut picture = match layer.as_str() {
+            "height" => plain(&arrays.golden_height, "mm"),
+            "modulation" => plain(&arrays.modulation, "counts"),
+            SURFACE => {
+                let of = (width, level.stride(width)?);
+                let mut planes = Plane::points(view.points(&recipe, of.1));
+                let light = (&arrays.modulation[..], of);
+                planes.push(Plane::of("modulation", "counts", light, Drawn::Plain));
+                surface(&planes, of, None)
+            }
+            _ => {
+                let words = "a recipe has height, modulation and surface";
+                return Err(Problem::missing(words));
+            }
+        };
+        picture.description["pixel_mm"] = view.pixel_mm().into();
+        Ok(picture)
     })
     .await
 }

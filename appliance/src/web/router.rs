@@ -13,7 +13,7 @@ use super::problem::Problem;
 use super::site::Site;
 use super::{
     assets, board, downloads, events, head, history, host, kept, look, metrics, orders, recipes,
-    sessions, simulation,
+    sessions, simulation, tries,
 };
 
 /// Only files of this device, nothing inline, not inside a frame of another page.
@@ -81,10 +81,12 @@ pub fn routes() -> Vec<Route> {
         look("/api/last/cloud.ply", downloads::cloud),
         look("/api/last/recording.zip", downloads::recording),
         look("/api/last/gauges.csv", downloads::gauges),
+        look("/api/last/features", look::features),
         look("/api/history", history::list),
         look("/api/history.csv", history::csv),
         look("/api/history/{seq}", kept::one),
         look("/api/history/{seq}/picture/{layer}", kept::picture),
+        look("/api/history/{seq}/features", kept::features),
         look("/api/history/{seq}/recording.zip", history::recording),
         look("/api/diagnostics.zip", downloads::diagnostics),
         look("/api/kinds", recipes::kinds),
@@ -94,6 +96,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/recipes/{number}/picture/{layer}", recipes::picture),
         change(POST, "/api/recipes", "import recipe", recipes::import),
         change(PUT, "/api/recipes/{number}", "edit recipe", recipes::edit),
+        route(POST, "/api/recipes/{number}/try", None, tries::attempt),
         change(
             DELETE,
             "/api/recipes/{number}",

@@ -10,9 +10,9 @@ use ipnet::IpNet;
 use serde_json::Value;
 use tokio::sync::{Mutex, Semaphore, oneshot};
 
-use super::map::Map;
 use super::problem::{Problem, Result};
 use super::slots::Slots;
+use super::tries::Tries;
 use crate::head::calibration::Current;
 use crate::history::Reader;
 use crate::production::commissioning::Commission;
@@ -20,6 +20,8 @@ use crate::production::commissioning::live::Live;
 use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
+use crate::recipe::plan::Layers;
+use crate::recipe::trying::Opened;
 use crate::station::{Snapshot, StationHandle};
 use crate::system::logbook::Logbook;
 use crate::system::socket;
@@ -40,9 +42,8 @@ const MAX_ARRIVING: usize = 2;
 /// The most files that are sent at a time: each is in memory until its client has received it.
 const MAX_FILES: usize = 4;
 
-/// The pictures that were computed last, height, deviation, modulation, and the SEQ of their
-/// result.
-pub(super) type LastKept = Option<(u32, [Map; 3])>;
+/// The maps that were computed last, and the SEQ of their result.
+pub(super) type LastKept = Option<(u32, Arc<Layers>)>;
 
 /// What the daemon hands to the page.
 pub struct Parts {
@@ -89,8 +90,13 @@ pub struct Site {
     pub(super) arriving: Arc<Semaphore>,
     /// Permits to send a file.
     pub(super) files: Arc<Semaphore>,
-    /// The pictures of a kept part that were computed last; locked while others are computed.
+    /// The maps of a kept part that were computed last; locked while something else is computed of
+    /// one.
     pub(super) kept: Arc<Mutex<LastKept>>,
+    /// The recipe of which an edit was tried last; locked while one is tried.
+    pub(super) opened: Arc<Mutex<Option<Opened>>>,
+    /// The tries that are being answered.
+    pub(super) tries: Tries,
     looking: Arc<Semaphore>,
     changing: Arc<Semaphore>,
 }
@@ -120,6 +126,8 @@ impl Site {
             arriving: Arc::new(Semaphore::new(MAX_ARRIVING)),
             files: Arc::new(Semaphore::new(MAX_FILES)),
             kept: Arc::default(),
+            opened: Arc::default(),
+            tries: Tries::default(),
             looking: Arc::new(Semaphore::new(MAX_ASIDE)),
             changing: Arc::new(Semaphore::new(MAX_CHANGES)),
         }

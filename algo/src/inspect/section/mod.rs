@@ -44,7 +44,7 @@ mod view;
 
 pub use edge::Edge;
 pub use find::Section;
-pub use geometry::{Geometry, Round, flush, gap, radius};
+pub use geometry::{Geometry, Pair, Round, flush, gap, radius};
 pub use inputs::{Input, Knowledge, Source, Value};
 pub use reason::{Side, Unseen, Why};
 pub use request::{Optics, Point, Request};

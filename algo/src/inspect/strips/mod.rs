@@ -45,6 +45,7 @@ mod coverage;
 mod decode;
 mod deviation;
 mod displaced;
+mod drawn;
 mod findings;
 mod fits;
 mod gauges;
@@ -69,6 +70,7 @@ mod uncertainty;
 
 pub use contours::{FoundFeature, GoldenSignal, Levels, Lost, SeenRim, Signal};
 pub use decode::Input;
+pub use drawn::{Drawing, Drawn, Place, Profile};
 pub use findings::{Findings, Missing, Skipped};
 pub use gauges::{Gauge, MAX_FEATURES, MAX_GAUGES, Unmeasurable};
 pub use maps::Maps;

@@ -230,6 +230,11 @@ impl Production {
         &self.golden.triangulator
     }
 
+    /// The same, to be kept.
+    pub fn shared_triangulator(&self) -> Arc<Triangulator> {
+        Arc::clone(&self.golden.triangulator)
+    }
+
     /// The map that phases are unwrapped about, row-major.
     pub fn map(&self) -> &[AbsolutePhase] {
         self.golden.map()

@@ -3,11 +3,12 @@
 use crate::recipe::Demands;
 use crate::recipe::demands::GaugeLimits as Limits;
 use crate::recipe::light::{Cause, Light};
+use crate::recipe::lost::{MIN_SHARE, why_lost};
 use crate::station::error_code::{BLURRED, GUARD_BAND, NOT_MEASURED, NOT_THE_PART, OUT_OF_PLACE};
 use crate::station::{
     COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Unit, Verdict,
 };
-use algo::inspect::{Findings, FoundFeature, Lost, MAX_PLACES, Missing, Placed, State};
+use algo::inspect::{Findings, FoundFeature, MAX_PLACES, Missing, Placed, State};
 use hal::bounds::clipped;
 use std::sync::Arc;
 
@@ -36,9 +37,6 @@ pub(super) const ALIKE: f64 = 0.8;
 /// Why a gauge has no value.
 const NOTHING: &str = "found nothing to measure";
 
-/// Less than this share of a feature is not measured.
-const MIN_SHARE: f64 = 0.5;
-
 impl Demands {
     /// What is known of a gauge without a value.
     fn without_value(&self, limits: &Limits, missing: Option<Missing>, of: &Findings) -> Measured {
@@ -66,32 +64,10 @@ impl Demands {
     /// Whether a feature that was not found is absent, and why it was not found.
     fn lost(&self, found: &FoundFeature) -> (bool, String) {
         let name = self.features.get(found.feature);
-        let feature = format!("feature {:?}", clipped(name.map_or("", |name| name)));
-        let percent = found.found * 100.0;
-        match (found.state, found.lost) {
-            (State::Absent, _) => (
-                true,
-                format!("{feature}: the material goes on where its rim should be"),
-            ),
-            (_, Some(Lost::NoPlane)) => (false, format!("{feature}: its plane was not found")),
-            (_, Some(Lost::Face(above))) => (
-                false,
-                format!("{feature}: the face next to its rim lies {above:+.2} mm off the plane"),
-            ),
-            (_, Some(Lost::Section(unseen))) => (false, format!("{feature}: {unseen}")),
-            (_, Some(Lost::Rim)) => (
-                false,
-                format!("{feature}: {percent:.0} % of its rim is seen"),
-            ),
-            (_, None) if found.found < MIN_SHARE => (
-                false,
-                format!("{feature}: {percent:.0} % of it was measured"),
-            ),
-            (_, None) => (
-                false,
-                format!("{feature}: too few cells were measured, or they lie on a line"),
-            ),
-        }
+        let name = clipped(name.map_or("", |name| name));
+        let (reason, _) = why_lost(found);
+        let absent = found.state == State::Absent;
+        (absent, format!("feature {name:?}: {reason}"))
     }
 }
 

@@ -1,10 +1,14 @@
 //! Maps of a measured part for the page (height, deviation from golden, modulation), and its point
 //! cloud.
 
+use super::window::pitch;
 use super::{Laps, Plan};
+use crate::head::calibration::Calibration;
 use crate::head::seam;
 use crate::output::cloud::{Axes, ply};
+use crate::recipe::Recipe;
 use crate::station::Square;
+use algo::geometry::{HeightRange, Triangulator};
 use algo::inspect::{Findings, Maps};
 use algo::pipeline;
 use algo::units::{Height, Modulation};
@@ -13,7 +17,7 @@ use std::sync::{Arc, PoisonError};
 use std::time::Instant;
 
 /// Maps of one part, row-major.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Layers {
     /// Pixels per row.
     pub width: usize,
@@ -25,6 +29,62 @@ pub struct Layers {
     pub shown: Shown,
     /// Modulation of the finest level in counts.
     pub modulation: Vec<f32>,
+    triangulator: Arc<Triangulator>,
+}
+
+impl Layers {
+    /// x, y and z in mm of every `stride`-th pixel, NaN where not resolved.
+    pub fn points(&self, stride: usize) -> [Vec<f32>; 3] {
+        points(&self.triangulator, (&self.height_mm, self.width), stride)
+    }
+}
+
+/// x, y and z in mm of every `stride`-th pixel of heights of `width` columns, NaN where not known.
+fn points(
+    triangulator: &Triangulator,
+    (height_mm, width): (&[f32], usize),
+    stride: usize,
+) -> [Vec<f32>; 3] {
+    let mut all = [const { Vec::new() }; 3];
+    for (v, row) in height_mm.chunks(width.max(1)).enumerate().step_by(stride) {
+        for (u, &mm) in row.iter().enumerate().step_by(stride) {
+            let height = Height::from_mm(f64::from(mm));
+            let point = triangulator.point(u, v, height);
+            let point = point.map_or([f32::NAN; 3], |at| [at.x, at.y, at.z].map(|mm| mm as f32));
+            for (plane, mm) in all.iter_mut().zip(point) {
+                plane.push(mm);
+            }
+        }
+    }
+    all
+}
+
+/// Golden as it is looked at.
+#[derive(Debug)]
+pub struct GoldenView(Triangulator);
+
+impl GoldenView {
+    /// Of a recipe, with the models that it was taught with.
+    ///
+    /// # Errors
+    /// In words: they are none.
+    pub fn new(recipe: &Recipe, head: &Calibration) -> Result<Self, String> {
+        let [low, high] = recipe.conditions.range_mm;
+        let range = Some(HeightRange { low, high });
+        let triangulator = head.triangulator(recipe.function.clone(), range);
+        triangulator.map(Self).map_err(|error| error.to_string())
+    }
+
+    /// x, y and z in mm of every `stride`-th pixel of its heights, NaN where not known.
+    pub fn points(&self, recipe: &Recipe, stride: usize) -> [Vec<f32>; 3] {
+        let width = recipe.conditions.camera.0 as usize;
+        points(&self.0, (&recipe.arrays.golden_height, width), stride)
+    }
+
+    /// What a pixel in the middle of the frame sees of a surface that faces the camera, mm.
+    pub fn pixel_mm(&self) -> Option<f64> {
+        pitch(&self.0)
+    }
 }
 
 /// What a map of deviations shows: what a gauge of the recipe was judged by.
@@ -87,6 +147,7 @@ impl Plan {
             height_mm,
             deviation_mm,
             shown,
+            triangulator: production.shared_triangulator(),
             modulation: counts.map(|b| b.counts(full_scale) as f32).collect(),
         })
     }

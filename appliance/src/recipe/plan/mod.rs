@@ -5,6 +5,7 @@ mod arriving;
 mod golden;
 mod judge;
 mod layers;
+mod look;
 mod patterns;
 mod refused;
 mod rendered;
@@ -13,14 +14,15 @@ mod trial;
 mod window;
 
 pub use arriving::Arriving;
-pub use layers::{Layers, Shown, ShownGauge};
+pub use layers::{GoldenView, Layers, Shown, ShownGauge};
 pub use refused::PlanError;
+pub use trial::Golden;
 
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::head::seam;
 use crate::recipe::light::{GoldenLight, Light};
-use crate::recipe::{Conditions, Demands, Recipe, RecipeId, SequenceKind};
+use crate::recipe::{Conditions, Demands, Outline, Recipe, RecipeId, SequenceKind};
 use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{
     FULL_SEQUENCE, JUDGES_NOTHING, SIMULATED, SINGLE_LEVEL, TWO_LEVELS,
@@ -33,6 +35,7 @@ use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
 use hal::frame::Frame;
+use refused::Refusal;
 use run::{Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -45,6 +48,8 @@ pub struct Plan {
     conditions: Conditions,
     /// What it demands of a part.
     demands: Demands,
+    /// What its gauges and features are called.
+    outline: Outline,
     /// The light of its patterns.
     illumination: Illumination,
     /// What the rasters show, each once; those of the first run come first.
@@ -108,24 +113,41 @@ impl Plan {
         calibration: &Calibration,
         simulated: bool,
     ) -> Result<Self, PlanError> {
+        Self::join(recipe, calibration, (simulated, None))
+    }
+
+    /// Joins them; of several sequences with `only` that one.
+    fn join(
+        recipe: Recipe,
+        calibration: &Calibration,
+        (simulated, only): (bool, Option<usize>),
+    ) -> Result<Self, PlanError> {
         let number = recipe.id.number;
         refused::same_devices(&recipe.conditions, calibration)
             .map_err(|reason| PlanError::OtherHead { number, reason })?;
-        Self::join(recipe, calibration, simulated)
-            .map_err(|reason| PlanError::Unfit { number, reason })
+        let unfit = |Refusal { words, feature }| PlanError::Unfit {
+            number,
+            reason: words,
+            feature,
+        };
+        Self::joined(recipe, calibration, (simulated, only)).map_err(unfit)
     }
 
-    fn join(recipe: Recipe, calibration: &Calibration, simulated: bool) -> Result<Self, String> {
+    fn joined(
+        recipe: Recipe,
+        calibration: &Calibration,
+        (simulated, only): (bool, Option<usize>),
+    ) -> Result<Self, Refusal> {
         let Recipe {
             id,
             conditions,
             demands,
+            outline,
             function,
             sequences,
             mut features,
             gauges,
             mut arrays,
-            ..
         } = recipe;
         // Large arrays that production does not read.
         arrays.phase_function = Vec::new();
@@ -186,9 +208,12 @@ impl Plan {
             names: &demands.features,
             signal,
         };
+        let wanted = |(at, _): &(usize, _)| only.is_none_or(|only| only == *at);
         let runs = prepared
             .into_iter()
-            .map(|sequence| sequence.join(&shared))
+            .enumerate()
+            .filter(wanted)
+            .map(|(_, sequence)| sequence.join(&shared))
             .collect::<Result<Vec<_>, _>>()?;
         let first = runs.first().ok_or("it has no sequence")?;
         let strips = first.production.strips(size.1.div_ceil(STRIPS));
@@ -197,6 +222,7 @@ impl Plan {
             id,
             conditions,
             demands,
+            outline,
             illumination,
             shots,
             runs,

@@ -48,7 +48,31 @@ pub enum PlanError {
         number: u16,
         /// In words, with the remedy.
         reason: String,
+        /// Which of its features is why, if one is.
+        feature: Option<usize>,
     },
+}
+
+/// Why a recipe and a head cannot be joined.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Refusal {
+    /// In words, with the remedy.
+    pub words: String,
+    /// Which feature is why, if one is.
+    pub feature: Option<usize>,
+}
+
+impl From<String> for Refusal {
+    fn from(words: String) -> Self {
+        let feature = None;
+        Self { words, feature }
+    }
+}
+
+impl From<&str> for Refusal {
+    fn from(words: &str) -> Self {
+        String::from(words).into()
+    }
 }
 
 /// Checks that camera and projector have the size that the recipe was made for.

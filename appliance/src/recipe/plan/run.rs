@@ -1,6 +1,7 @@
 //! One sequence of a recipe, ready to judge parts.
 
 use super::golden;
+use super::refused::Refusal;
 use crate::recipe::archive::Arrays;
 use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
@@ -210,7 +211,7 @@ impl Prepared {
     }
 
     /// Joins it with what all sequences share.
-    pub fn join(self, shared: &Shared<'_>) -> Result<Run, String> {
+    pub fn join(self, shared: &Shared<'_>) -> Result<Run, Refusal> {
         let golden_noise = self.noise_of_golden(&shared.golden);
         let over_full = golden_noise * self.phase_noise() / shared.golden.full;
         let largest = shared.golden.largest.iter();
@@ -267,17 +268,9 @@ impl Prepared {
 }
 
 /// Why gauges cannot be measured, with the name of a feature that is why.
-fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> String {
-    let feature = match error {
-        Unmeasurable::NoContour { feature } => feature,
-        Unmeasurable::NoSection { feature } => {
-            let name = shared.names.get(feature).map_or("", |name| name);
-            let name = clipped(name);
-            return format!(
-                "feature {name:?}: golden sees nothing where it begins or ends: move it"
-            );
-        }
-        _ => return error.to_string(),
+fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> Refusal {
+    let (Unmeasurable::NoContour { feature } | Unmeasurable::NoSection { feature }) = error else {
+        return error.to_string().into();
     };
     let kind = shared
         .features
@@ -285,12 +278,18 @@ fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> String {
         .map_or("contour", |of| of.kind.name());
     let name = shared.names.get(feature).map_or("", |name| name);
     let name = clipped(name);
-    match shared.signal {
+    let is_section = matches!(error, Unmeasurable::NoSection { .. });
+    let words = match shared.signal {
+        _ if is_section => {
+            format!("feature {name:?}: golden sees nothing where it begins or ends: move it")
+        }
         None => format!(
             "feature {name:?} is a {kind}, and the recipe has no golden_signal, in which it is found: teach again, gauges can be kept"
         ),
         Some(_) => format!(
             "feature {name:?}: golden has no {kind} in its region, or too little of its rim is seen: draw the region around it, with 1.5 mm or more on both sides"
         ),
-    }
+    };
+    let feature = Some(feature);
+    Refusal { words, feature }
 }

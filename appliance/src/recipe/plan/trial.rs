@@ -3,9 +3,9 @@
 
 use super::{Laps, Plan, PlanError};
 use crate::head::calibration::Calibration;
-use crate::recipe::Recipe;
+use crate::recipe::{Demands, Recipe, Seen};
 use crate::station::Inspection;
-use algo::inspect::{Findings, Input, Maps, Signal};
+use algo::inspect::{Drawing, Findings, Input, Maps, Signal};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use algo::units::Modulation;
@@ -33,22 +33,34 @@ impl Plan {
     ///
     /// # Errors
     /// As [`Plan::again`].
-    pub fn golden(recipe: Recipe, head: &Calibration) -> Result<Findings, PlanError> {
-        alone(recipe, |recipe| {
-            golden(recipe, head).map(|(_, found)| found)
-        })
+    pub fn golden(recipe: Recipe, head: &Calibration) -> Result<Golden, PlanError> {
+        alone(recipe, |recipe| golden(recipe, head))
     }
+}
 
-    /// As [`Plan::golden`], judged as a part is.
-    ///
-    /// # Errors
-    /// As [`Plan::again`].
-    pub fn judge_golden(recipe: Recipe, head: &Calibration) -> Result<Inspection, PlanError> {
-        alone(recipe, |recipe| {
-            let (plan, found) = golden(recipe, head)?;
-            let mut laps = Laps::since(Instant::now());
-            Ok(plan.judged((0, &[]), Ok((found, None)), &mut laps))
-        })
+/// Golden, measured like a part.
+#[derive(Debug)]
+pub struct Golden {
+    /// With the sequence that it was measured by, alone.
+    plan: Plan,
+    /// What was found.
+    pub findings: Findings,
+}
+
+impl Golden {
+    /// Golden judged as a part is, by a recipe that has other limits at most, and what became of
+    /// the features that its gauges need.
+    pub fn judged(&mut self, demands: Demands) -> (Inspection, Vec<Seen<'_>>) {
+        self.plan.demands = demands;
+        let plan = &self.plan;
+        let mut laps = Laps::since(Instant::now());
+        let found = Ok((self.findings.clone(), None));
+        let inspection = plan.judged((0, &[]), found, &mut laps);
+        let strips = plan.strips();
+        let drawing = Drawing::new(plan.production(), &strips);
+        let seen = plan.outline.features(&inspection, &drawing);
+        drop(strips);
+        (inspection, seen)
     }
 }
 
@@ -63,20 +75,24 @@ fn alone<T: Send>(
     let thread = thread.map_err(|error| PlanError::Unfit {
         number,
         reason: format!("it cannot be tried out: {error}: end other programs"),
+        feature: None,
     })?;
     thread.install(|| work(recipe))
 }
 
-/// A plan, and what it finds of golden.
-fn golden(recipe: Recipe, head: &Calibration) -> Result<(Plan, Findings), PlanError> {
+fn golden(recipe: Recipe, head: &Calibration) -> Result<Golden, PlanError> {
     let number = recipe.id.number;
-    let unfit = |reason: String| PlanError::Unfit { number, reason };
+    let unfit = |reason: String| PlanError::Unfit {
+        number,
+        reason,
+        feature: None,
+    };
     // Two frames compare pictures, and golden's is by the sequence behind them.
     let planned = recipe.sequences.iter().position(|of| !of.is_pair());
     let sequence = planned.ok_or_else(|| unfit("it has no sequence".into()))?;
     let light = recipe.light(sequence);
-    let plan = Plan::again(recipe, head, false)?;
-    let production = &plan.runs[sequence].production;
+    let plan = Plan::join(recipe, head, (false, Some(sequence)))?;
+    let production = plan.production();
     let (map, decoder) = (production.map(), production.decoder());
     let surface = production.cubics().surface();
     let mut phases = PhaseMap::new(surface.width, map.len() / surface.width.max(1));
@@ -102,5 +118,8 @@ fn golden(recipe: Recipe, head: &Calibration) -> Result<(Plan, Findings), PlanEr
         })
         .map_err(|error| unfit(error.to_string()))?;
     drop(strips);
-    Ok((plan, found))
+    Ok(Golden {
+        plan,
+        findings: found,
+    })
 }

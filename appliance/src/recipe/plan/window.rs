@@ -1,9 +1,10 @@
 //! The part of the frame that the gauges need.
 
+use super::refused::Refusal;
 use crate::recipe::Demands;
 use crate::recipe::archive::Arrays;
 use algo::geometry::Triangulator;
-use algo::inspect::{Cut, Feature, Gauge, Region};
+use algo::inspect::{Cut, Feature, Gauge, Region, RegionError};
 use algo::units::Height;
 use std::ops::Range;
 
@@ -60,9 +61,9 @@ pub(super) fn of_sections(
     features: &mut [Feature],
     (width, height): (usize, usize),
     triangulator: &Triangulator,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     let pitch = pitch(triangulator).ok_or("the camera sees no plane in its middle")?;
-    for feature in features {
+    for (at, feature) in features.iter_mut().enumerate() {
         let Some(Cut {
             from: [u0, v0],
             to: [u1, v1],
@@ -82,7 +83,11 @@ pub(super) fn of_sections(
             (u1 + down, v1 - along),
             (u0 + down, v0 - along),
         ];
-        feature.region = Region::polygon(&corners, width, height).map_err(|e| e.to_string())?;
+        let refused = |error: RegionError| Refusal {
+            words: error.to_string(),
+            feature: Some(at),
+        };
+        feature.region = Region::polygon(&corners, width, height).map_err(refused)?;
     }
     Ok(())
 }

@@ -2,17 +2,18 @@
 
 use super::face::Face;
 use super::light::Signal;
-use super::shape::Associated;
+use super::shape::{Associated, Outline};
 use super::taught::{Contours, Expected, REACH_MM};
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed};
-use crate::inspect::contour::State;
+use crate::inspect::contour::{Outcome, Point, State};
 use crate::inspect::feature::{Geometry, PlaneFrame, Rim};
 use crate::inspect::gauge::Sensitive;
 use crate::inspect::section::Unseen;
 use crate::inspect::strips::fits::Fit;
 use crate::inspect::strips::golden::Golden;
 use crate::inspect::strips::near::Near;
+use alloc::vec::Vec;
 
 /// The face does not reach the rim if the phase next to it is off the plane's by more than this
 /// many σ and this many mm.
@@ -68,8 +69,44 @@ pub struct ContourFit {
     pub of: Option<FoundFeature>,
     /// `None` if it is not found.
     pub rim: Option<Rim>,
+    /// Its pieces; `None` if it was not looked for, because its plane was not found.
+    pub pieces: Option<Pieces>,
     /// Which of the planes it lies in.
     plane: usize,
+}
+
+/// The pieces that a contour was looked for in.
+#[derive(Clone, Debug)]
+pub struct Pieces {
+    /// The frame of its plane, in the frame as taught.
+    frame: PlaneFrame,
+    outline: Outline,
+    outcomes: Vec<Outcome>,
+    points: Vec<Point>,
+}
+
+impl Pieces {
+    /// Places along the contour, in the frame as taught.
+    pub fn outline(&self) -> impl Iterator<Item = Vector> {
+        let places = self.outline.places();
+        places.map(|(x, y)| self.frame.point(x, y))
+    }
+
+    /// Where each piece is, in the frame as taught, and what became of it: at its edge if it has
+    /// one, else on the contour.
+    pub fn all(&self) -> impl Iterator<Item = (Vector, Outcome)> {
+        let (count, mut points) = (self.outcomes.len() as f64, self.points.iter());
+        let pieces = self.outcomes.iter().enumerate();
+        pieces.map(move |(at, &outcome)| {
+            let edge = match outcome {
+                Outcome::Accepted | Outcome::Outlier => points.next(),
+                _ => None,
+            };
+            let middle = || self.outline.at((at as f64 + 0.5) / count);
+            let (x, y) = edge.map_or_else(middle, |point| (point.x, point.y));
+            (self.frame.point(x, y), outcome)
+        })
+    }
 }
 
 impl ContourFit {
@@ -111,6 +148,7 @@ impl ContourFit {
             geometry: None,
         };
         self.rim = None;
+        self.pieces = None;
         self.plane = expected.plane;
         if let Some(taught) = contours.frame(expected, plane) {
             let motion = placed.map(|placed| &placed.motion);
@@ -128,7 +166,13 @@ impl ContourFit {
             }
             let setup = contours.setup(expected, &face);
             if let Some(setup) = setup {
-                let found = expected.outline.find(&face, &setup, expected.rim);
+                let mut found = expected.outline.find(&face, &setup, expected.rim);
+                self.pieces = Some(Pieces {
+                    frame: taught,
+                    outline: expected.outline.with(&found.contour.parameters),
+                    outcomes: core::mem::take(&mut found.contour.outcomes),
+                    points: core::mem::take(&mut found.contour.points),
+                });
                 of.state = found.contour.state;
                 of.found = found.contour.found;
                 of.lost = (of.state == State::Unseen).then_some(Lost::Rim);

@@ -60,14 +60,16 @@ impl Outline {
     /// Places along it.
     pub fn places(&self) -> impl Iterator<Item = (f64, f64)> {
         const COUNT: u32 = 32;
-        (0..=COUNT).map(|at| {
-            let share = f64::from(at) / f64::from(COUNT);
-            match self {
-                Self::Circle(p) => place(&Circle, p, share),
-                Self::Slot(p) => place(&Slot, p, share),
-                Self::Line(line, p) => place(line, p, share),
-            }
-        })
+        (0..=COUNT).map(|at| self.at(f64::from(at) / f64::from(COUNT)))
+    }
+
+    /// The place at a share of its length.
+    pub fn at(&self, share: f64) -> (f64, f64) {
+        match self {
+            Self::Circle(p) => place(&Circle, p, share),
+            Self::Slot(p) => place(&Slot, p, share),
+            Self::Line(line, p) => place(line, p, share),
+        }
     }
 
     /// Finds it near where it is.

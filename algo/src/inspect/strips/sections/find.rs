@@ -3,7 +3,7 @@
 use super::expected::Expected;
 use crate::inspect::contour::State;
 use crate::inspect::gauge::{Kind, Reading};
-use crate::inspect::section::{Input, Knowledge, Point, Section};
+use crate::inspect::section::{Geometry, Input, Knowledge, Point, Section};
 use crate::inspect::strips::contours::{FoundFeature, Lost};
 use crate::inspect::strips::uncertainty::ErrorBudget;
 use alloc::vec::Vec;
@@ -61,6 +61,17 @@ impl SectionFit {
             lost: lost.map(Lost::Section),
             geometry: None,
         });
+    }
+
+    /// The points that it was looked for in.
+    pub fn points(&self) -> &[Point] {
+        &self.points
+    }
+
+    /// Its geometry; `None` if it is not found.
+    pub fn geometry(&self) -> Option<Geometry> {
+        let (section, _) = self.section.as_ref()?;
+        Some(section.geometry(&section.parameters()))
     }
 
     /// The reading of a kind; `golden` is the variance of golden's heights over that of the part's.

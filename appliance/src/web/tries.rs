@@ -1,0 +1,303 @@
+//! Tries an edit of a recipe before it is stored: on golden, on the last part, on kept ones.
+//!
+//! Of each session one try is answered at a time, and the newest wins: an older one is answered at
+//! once and given up at its next step. One is worked out at a time, on a thread with a lower priority
+//! than the measuring task. What does not change between tries, the recipe as it is stored, is kept
+//! for the one that was tried last.
+
+use std::collections::HashMap;
+use std::collections::hash_map::DefaultHasher;
+use std::hash::{Hash as _, Hasher as _};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use axum::body::Body;
+use axum::extract::{Path, Request};
+use axum::http::HeaderMap;
+use axum::response::Json;
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer};
+use serde_json::value::RawValue;
+use serde_json::{Value, json};
+use tokio::sync::watch;
+
+use super::body;
+use super::gate::{signed_in, token};
+use super::kept::{broken, recording};
+use super::problem::{Problem, Result};
+use super::site::{Site, alone};
+use crate::history::kept::Kept;
+use crate::recipe::ChangeError;
+use crate::recipe::edit::Edit;
+use crate::recipe::plan::Plan;
+use crate::recipe::trying::{Opened, Over, Tried};
+use crate::station::result::flag::SIMULATED;
+use crate::system::priority;
+
+/// Most kept parts of one try.
+const MAX_PARTS: usize = 20;
+/// Largest recipe that is kept between tries, bytes.
+const MAX_OPEN: usize = 64 << 20;
+
+/// On which parts an edit is tried, beside golden.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "on: write \"golden\", \"last\" or a list of RESULT_SEQ"
+)]
+enum On {
+    #[default]
+    #[serde(skip)]
+    Golden,
+    Named(Named),
+    Kept(Vec<u32>),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+enum Named {
+    Golden,
+    Last,
+}
+
+impl On {
+    fn json(&self) -> Value {
+        match self {
+            Self::Golden | Self::Named(Named::Golden) => "golden".into(),
+            Self::Named(Named::Last) => "last".into(),
+            Self::Kept(seqs) => json!(seqs),
+        }
+    }
+}
+
+/// An edit, and what it is tried on.
+#[derive(Debug)]
+struct Asked {
+    edit: Edit,
+    on: On,
+}
+
+impl<'de> Deserialize<'de> for Asked {
+    fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
+        let mut keys: HashMap<String, Box<RawValue>> = HashMap::deserialize(from)?;
+        let on = keys.remove("on");
+        let on = on.map(|on| serde_json::from_str(on.get())).transpose();
+        let edit = serde_json::to_string(&keys).and_then(|edit| serde_json::from_str(&edit));
+        Ok(Self {
+            edit: edit.map_err(D::Error::custom)?,
+            on: on.map_err(D::Error::custom)?.unwrap_or_default(),
+        })
+    }
+}
+
+/// The tries that are being answered, by session.
+#[derive(Clone, Default)]
+pub(super) struct Tries(Arc<Mutex<Inside>>);
+
+#[derive(Default)]
+struct Inside {
+    number: u64,
+    running: HashMap<u64, (u64, watch::Sender<()>)>,
+}
+
+/// A try that is being answered; dropped, it is over.
+struct Turn {
+    tries: Tries,
+    session: u64,
+    number: u64,
+    /// Closed when it is over.
+    open: watch::Receiver<()>,
+}
+
+impl Tries {
+    fn inside(&self) -> MutexGuard<'_, Inside> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins a try of a session; the one before is over.
+    fn begin(&self, token: &str) -> Turn {
+        let mut hash = DefaultHasher::new();
+        token.hash(&mut hash);
+        let session = hash.finish();
+        let (sender, open) = watch::channel(());
+        let mut inside = self.inside();
+        inside.number += 1;
+        let number = inside.number;
+        inside.running.insert(session, (number, sender));
+        drop(inside);
+        Turn {
+            tries: self.clone(),
+            session,
+            number,
+            open,
+        }
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        let mut inside = self.tries.inside();
+        let own = inside.running.get(&self.session);
+        if own.is_some_and(|(number, _)| *number == self.number) {
+            inside.running.remove(&self.session);
+        }
+    }
+}
+
+fn superseded() -> Problem {
+    let words = "try an edit: this session has asked for a newer one";
+    Problem::busy(words).with("why", "superseded")
+}
+
+pub(super) async fn attempt(
+    site: Site,
+    Path(number): Path<u16>,
+    headers: HeaderMap,
+    request: Request<Body>,
+) -> Result<Json<Value>> {
+    signed_in(&site, &headers)?;
+    let asked: Asked = body::edit(request.into_body()).await?;
+    if let On::Kept(seqs) = &asked.on
+        && seqs.len() > MAX_PARTS
+    {
+        let words = format!("try an edit on {} parts: at most {MAX_PARTS}", seqs.len());
+        return Err(Problem::unfit(words));
+    }
+    let mut turn = site.tries.begin(token(&headers).unwrap_or_default());
+    let open = turn.open.clone();
+    let worked = async {
+        // Waiting here takes no thread from other requests.
+        let mut opened = site.opened.clone().lock_owned().await;
+        let site = site.clone();
+        let failed = "trying the edit failed; see the log";
+        let work = move || {
+            priority::give_way();
+            let is_over = || open.has_changed().is_err();
+            tried(&site, number, asked, (&mut opened, &is_over))
+        };
+        alone("trying", failed, work).await?
+    };
+    tokio::select! {
+        answer = worked => answer.map(Json),
+        _ = turn.open.changed() => Err(superseded()),
+    }
+}
+
+/// Tries an edit, with the recipe that was tried last.
+fn tried(
+    site: &Site,
+    number: u16,
+    Asked { edit, on }: Asked,
+    (opened, is_over): (&mut Option<Opened>, &dyn Fn() -> bool),
+) -> Result<Value> {
+    let begun = Instant::now();
+    if is_over() {
+        return Err(superseded());
+    }
+    let stored = site.recipes.manifest(number).map_err(Problem::missing)?;
+    let same = |opened: &Opened| opened.id() == (number, &*stored.fingerprint);
+    let open = match opened.take().filter(same) {
+        Some(open) => open,
+        None => site.recipes.load_to_edit(number)?.into(),
+    };
+    let fingerprint = open.id().1.to_owned();
+    if edit.fingerprint != fingerprint {
+        let outdated = Problem::from(ChangeError::Outdated(number));
+        return Err(outdated.with("fingerprint", fingerprint));
+    }
+    let shared = edit.part_number.as_ref();
+    let shared = shared.map_or(Ok(()), |of| site.recipes.refuse_shared(number, of));
+    let mut tried = open.attempt(edit, is_over).map_err(|Over| superseded())?;
+    if let Err(words) = shared {
+        let problem = json!({ "words": words, "refused": true });
+        tried.problems.insert(0, problem);
+    }
+    let parts = parts(site, (&open, &tried), &on, is_over)?;
+    if open.bytes() <= MAX_OPEN {
+        *opened = Some(open);
+    }
+    Ok(json!({
+        "fingerprint": fingerprint, "on": on.json(), "features": tried.features, "gauges": tried.gauges,
+        "problems": tried.problems, "parts": parts, "ms": begun.elapsed().as_millis() as u64,
+    }))
+}
+
+/// What a tried list measures of parts.
+fn parts(
+    site: &Site,
+    of: (&Opened, &Tried),
+    on: &On,
+    is_over: &dyn Fn() -> bool,
+) -> Result<Vec<Value>> {
+    let part = |seq: Option<u32>, measured: Result<(Value, Value), String>| {
+        let mut part = match measured {
+            Ok((mut part, before)) => {
+                part["before"] = before;
+                part["error"] = Value::Null;
+                part
+            }
+            Err(words) => json!({ "error": words }),
+        };
+        part["seq"] = seq.into();
+        part
+    };
+    match on {
+        On::Golden | On::Named(Named::Golden) => Ok(Vec::new()),
+        On::Named(Named::Last) => {
+            let last = last(site, of);
+            Ok(vec![part(last.0, last.1)])
+        }
+        On::Kept(seqs) => seqs
+            .iter()
+            .map(|&seq| match is_over() {
+                true => Err(superseded()),
+                false => Ok(part(Some(seq), kept(site, of, seq))),
+            })
+            .collect(),
+    }
+}
+
+/// What it measures of the last part, and the verdict that this had.
+fn last(
+    site: &Site,
+    (open, tried): (&Opened, &Tried),
+) -> (Option<u32>, Result<(Value, Value), String>) {
+    let Some(part) = site.last_cycle.ask(|part| part.clone()) else {
+        let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
+        return (None, Err(words.into()));
+    };
+    let measured = || {
+        let recipe = open.recipe(tried)?;
+        let shots: Vec<_> = part.plan.shots(part.sequence).map(Some).collect();
+        let plan = Plan::new(
+            recipe,
+            &part.calibration,
+            part.record.flags() & SIMULATED != 0,
+        );
+        let plan = plan.map_err(|error| error.to_string())?;
+        let sequence = plan.sequence_among(&shots);
+        let (sequence, at) = sequence.ok_or("the recipe has no sequence with its frames")?;
+        let frames: Vec<_> = at.iter().map(|&at| part.frames[at].clone()).collect();
+        Ok((
+            tried.part(&plan, sequence, &frames),
+            part.record.verdict.word().into(),
+        ))
+    };
+    (Some(part.record.seq), measured())
+}
+
+/// What it measures of a kept part, and the verdict that this had.
+fn kept(site: &Site, (open, tried): (&Opened, &Tried), seq: u32) -> Result<(Value, Value), String> {
+    let words = |problem: Problem| problem.words;
+    let (entry, folder) = recording(site, seq).map_err(words)?;
+    let recipe = open.recipe(tried)?;
+    let kept = Kept::judged_by(&folder, &recipe).map_err(|failure| words(broken(failure)))?;
+    let plan = kept.plan(recipe, entry.flags & SIMULATED != 0);
+    let plan = plan.map_err(|error| error.to_string())?;
+    let sequence = kept.sequence(&plan);
+    let (sequence, frames) = sequence.ok_or("the recipe has no sequence with its frames")?;
+    Ok((
+        tried.part(&plan, sequence, &frames),
+        entry.verdict.word().into(),
+    ))
+}
