@@ -1,7 +1,7 @@
 // The triangles of a part's heights, and lines that lie on them.
 import { draw } from "./element.js";
 
-// A triangle lies across a jump if its z differ by more than this many distances of neighbours.
+// A triangle lies across a jump if its z differ by more than so many distances of neighbours.
 const JUMP = 3;
 // The word for "no value".
 const NONE = 65535;

@@ -15,7 +15,7 @@ void main() {
   at = vec2(gl_VertexID % int(columns), gl_VertexID / int(columns)) * texel.xy + texel.zw;
   gl_Position = vec4(place.xy * fit.xy + fit.zw, -place.z * near, 1);
 }`;
-// Each triangle has its own normal; the light comes from above on the left.
+// Each triangle has its own normal; light comes from above on the left.
 const SHADE = `#version 300 es
 precision highp float;
 uniform sampler2D picture;
@@ -139,7 +139,7 @@ export function surface(canvas, antialias) {
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, strokes);
       gl.depthMask(true);
     },
-    // Gives all of its memory back.
+    // Gives its memory back.
     free() {
       const held = gl.getExtension("WEBGL_lose_context");
       if (held) held.loseContext();

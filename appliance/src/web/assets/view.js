@@ -7,14 +7,14 @@ import { surface } from "./surface.js";
 // A phone or a tablet draws fewer triangles, and its pixels are so fine that edges need no smoothing.
 const FINGERS = matchMedia("(pointer: coarse)").matches;
 const TRIANGLES = FINGERS ? 100000 : 200000, LEVELS = 5;
-// The view at first, turned about z and from above (radians), of no part yet; and how far a key or a button goes.
+// The view at first, turned about z and from above (radians); and how far a key or a button goes.
 const FIRST = { yaw: -0.35, tilt: 0.85, zoom: 1, pan: [0, 0], middle: [Infinity, 0, 0], radius: 1 };
 const TURN = Math.PI / 18, MOVE = 0.15, ZOOM = 1.25, ZOOMS = [0.5, 60];
 const WAYS = { Left: [-1, 0], Right: [1, 0], Up: [0, 1], Down: [0, -1] };
-const KEYS = "Arrow keys turn, with Shift they move; + and \u2212 zoom, 0 resets.";
+const KEYS = "Arrow keys turn, with Shift move; + and \u2212 zoom, 0 resets.";
 const HELP = FINGERS ? "One finger turns, two move and zoom." : `Drag to turn, with Shift to move; the wheel zooms. ${KEYS}`;
-const NO_WEBGL = "No 3-D view: this browser has no WebGL 2. The picture shows the same part.";
-const LOST = "The 3-D view is interrupted; the picture shows the same part.";
+const NO_WEBGL = "No 3-D view: this browser has no WebGL 2. The picture shows the same.";
+const LOST = "The 3-D view is interrupted; the picture shows the same.";
 
 function within(value, [least, most]) { return Math.min(most, Math.max(least, value)); }
 
@@ -29,11 +29,11 @@ function part(name, kind, attributes, ...children) {
 export function viewOf(picture) {
   const frame = picture.parentElement, plate = frame.parentElement, pointers = new Map();
   const seen = Object.assign({}, FIRST);
-  // `wanted`: what the picture shows; `held`: what was loaded of it; `draws`: draws it on the canvas, unless its context is lost.
+  // `wanted`: what the picture shows; `held`: what was loaded of it; `draws`: draws on the canvas, unless its context is lost.
   let open = false, near = false, moving = false, loading = false, due = 0, wanted = null, held = null, draws = null, canvas = null;
   const place = part("div", "space", { tabindex: 0, role: "application", "aria-label": `the part in 3-D. ${KEYS}` });
   const help = part("p", "quiet", { role: "status" });
-  const toggle = button("3-D", "", () => { open = !open; wake(); });
+  const toggle = button("3-D", "in-space", () => { open = !open; wake(); });
   const mover = button("Move", "", () => { moving = !moving; tell(); });
   const keys = Object.keys(WAYS).concat("+", "\u2212").map((key) => button(key, "", () => { act(key, moving); }));
   const pad = part("div", "pad", { role: "group", "aria-label": "3-D view" }, ...keys, mover, button("Reset", "", () => { act("0"); }));
@@ -193,7 +193,7 @@ export function viewOf(picture) {
   tell();
 
   return {
-    // What the picture shows, after each change of it: the path of the part's surface with its SEQ, and its number of points; or null.
+    // What the picture shows, after each change: the path of the part's surface with its SEQ, and its number of points; or null.
     show(shown) { wanted = shown; load(); },
   };
 }
