@@ -10,7 +10,10 @@ import { decided, named, tag, uncertainty } from "./verdict.js";
 import { viewOf } from "./view.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
-const state = { seq: 0, layer: "height", asked: 0, failed: [], points: 0, view: null };
+const state = { seq: 0, layer: "height", asked: 0, failed: [] };
+
+// The view in 3-D, and the number of points of the part.
+let view = null, points = 0;
 
 function gauge(entry) {
   const decision = decided(entry);
@@ -57,7 +60,7 @@ function empty(words) {
   text("kept-shown", "");
   text("kept-words", words);
   show("kept-words", true);
-  state.view.show(null);
+  view.show(null);
 }
 
 async function picture() {
@@ -74,7 +77,7 @@ async function picture() {
   over($("kept-ring"), loaded.about, ...rings(loaded.about, state.failed));
   text("kept-shown", loaded.about.words);
   show("kept-words", false);
-  state.view.show({ path: `/api/history/${state.seq}/picture/surface?seq=${state.seq}`, seq: state.seq, points: state.points });
+  view.show({ path: `/api/history/${state.seq}/picture/surface?seq=${state.seq}`, seq: state.seq, points });
 }
 
 // Shows the result of a SEQ.
@@ -89,7 +92,7 @@ export async function openKept(seq, boot) {
   if (state.seq !== seq) return;
   const { result, no_frames } = found;
   state.failed = result.gauges.filter((one) => one.square && !decided(one).pass).map((one) => one.square);
-  state.points = result.valid_points;
+  points = result.valid_points;
   text("kept-number", `no. ${seq}`);
   $("kept-verdict").className = `tag ${result.verdict.toLowerCase()}`;
   text("kept-verdict", result.verdict);
@@ -106,7 +109,7 @@ export async function openKept(seq, boot) {
 }
 
 export function start() {
-  state.view = viewOf($("kept-map"));
+  view = viewOf($("kept-map"));
   $("kept-close").addEventListener("click", () => { state.asked += 1; state.seq = 0; show("kept", false); });
   for (const choice of document.querySelectorAll("[data-kept]")) {
     choice.addEventListener("click", () => {

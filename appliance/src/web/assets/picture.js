@@ -8,7 +8,9 @@ import { signed } from "./number.js";
 import { viewOf } from "./view.js";
 
 const UNITS = { mm: 3, counts: 1 };
-const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, kinds: null, recipeKey: "", asked: 0, at: [0, 0], view: null };
+const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, kinds: null, recipeKey: "", asked: 0, at: [0, 0] };
+
+let view = null;
 
 // The recipe's gauges that failed or could not be measured in the result.
 function failing() {
@@ -130,7 +132,7 @@ async function load() {
   text("shown", loaded.about.words);
   drawScale($("scale"), state.map.about, state.layer);
   drawOutlines();
-  state.view.show({ path: `/api/picture/surface?seq=${result.seq}`, seq: result.seq, points: result.valid_points });
+  view.show({ path: `/api/picture/surface?seq=${result.seq}`, seq: result.seq, points: result.valid_points });
 }
 
 function empty(words) {
@@ -143,7 +145,7 @@ function empty(words) {
   show("no-picture", true);
   text("cursor", "point at the picture to read a value");
   drawOutlines();
-  state.view.show(null);
+  view.show(null);
 }
 
 // Loads the recipe of a result; none if it was changed since, because its regions need not be those of the result.
@@ -186,7 +188,7 @@ export function start() {
     });
   }
   const canvas = $("map");
-  state.view = viewOf(canvas);
+  view = viewOf(canvas);
   canvas.addEventListener("pointermove", point);
   canvas.addEventListener("pointerdown", point);
   canvas.addEventListener("keydown", move);
