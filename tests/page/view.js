@@ -135,10 +135,15 @@ async function byFingers({ page }) {
   const middle = { x: box.x + box.width / 2, y: box.y + box.height / 2 };
   const session = await page.context().newCDPSession(page);
   const touch = (type, points) => session.send("Input.dispatchTouchEvent", { type, touchPoints: points.map(([x, y], id) => ({ x: middle.x + x, y: middle.y + y, id })) });
+  const drag = async (ends) => {
+    await touch("touchStart", ends.map(([from]) => from));
+    for (const share of [0.2, 0.4, 0.6, 0.8, 1]) await touch("touchMove", ends.map(([from, to]) => from.map((was, axis) => was + share * (to[axis] - was))));
+    await touch("touchEnd", []);
+  };
   const { changes } = await watch(page);
   const scrolled = await page.evaluate(() => window.scrollY);
-  await changes("one finger", async () => { await touch("touchStart", [[0, 0]]); await touch("touchMove", [[30, 40]]); await touch("touchEnd", []); });
-  await changes("two fingers", async () => { await touch("touchStart", [[-20, 0], [20, 0]]); await touch("touchMove", [[-60, 0], [60, 0]]); await touch("touchEnd", []); });
+  await changes("one finger", () => drag([[[0, 60], [30, -60]]]));
+  await changes("two fingers", () => drag([[[-20, 0], [-60, 10]], [[20, 0], [60, 10]]]));
   assert.equal(await page.evaluate(() => window.scrollY), scrolled, "fingers on the view scroll the page");
 }
 

@@ -104,7 +104,6 @@ export function viewOf(picture) {
 
   function begin() {
     draws = surface(canvas, !FINGERS);
-    held = null;
     if (!draws) { canvas.remove(); canvas = null; open = false; }
     tell(draws ? "" : NO_WEBGL);
     load();
