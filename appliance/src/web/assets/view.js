@@ -35,8 +35,8 @@ export function viewOf(picture) {
   const help = part("p", "quiet", { role: "status" });
   const toggle = button("3-D", "in-space", () => { open = !open; wake(); });
   const mover = button("Move", "", () => { moving = !moving; tell(); });
-  const keys = Object.keys(WAYS).concat("+", "\u2212").map((key) => button(key, "", () => { act(key, moving); }));
-  const pad = part("div", "pad", { role: "group", "aria-label": "3-D view" }, ...keys, mover, button("Reset", "", () => { act("0"); }));
+  const key = (name) => button(name, "", () => { act(name, moving); });
+  const pad = part("div", "pad", { role: "group", "aria-label": "3-D view" }, ...Object.keys(WAYS).map(key), mover, ...["+", "\u2212", "Reset"].map(key));
 
   function tell(problem) {
     toggle.setAttribute("aria-pressed", open);
@@ -147,7 +147,7 @@ export function viewOf(picture) {
     else if (way) turn(TURN * way[0], TURN * way[1]);
     else if (key === "+") zoom(ZOOM);
     else if (key === "-" || key === "\u2212") zoom(1 / ZOOM);
-    else if (key === "0") { Object.assign(seen, FIRST); if (held) put(); } else return false;
+    else if (key === "0" || key === "Reset") { Object.assign(seen, FIRST); if (held) put(); } else return false;
     redraw();
     return true;
   }
