@@ -17,7 +17,7 @@ const SIDE = 224;
 const ALL = 2 * (SIDE - 1) * (SIDE - 1);
 
 // Waves as the sensor would send them; `change` may edit the word of z at a row and column.
-function surface(change = (word) => word) {
+function surface(change) {
   const words = new Uint16Array(3 * SIDE * SIDE);
   for (let at = 0; at < SIDE * SIDE; at += 1) {
     const u = at % SIDE, v = Math.floor(at / SIDE);
@@ -149,9 +149,10 @@ async function byFingers({ page }) {
 
 // The triangles of surfaces that are known.
 async function triangles({ page }) {
-  let change;
+  let change = (word) => word;
   await page.route("**/picture/surface*", async (route) => {
     const seq = Number(new URL(route.request().url()).searchParams.get("seq"));
+    if (!change) { await route.fulfill({ status: 500, json: { error: "no surface today" } }); return; }
     const planes = ["x", "y", "z"].map((name) => ({ name, unit: "mm", low: -10, step: 0.001 }));
     await route.fulfill({ headers: { "x-map": JSON.stringify({ width: SIDE, height: SIDE, stride: 1, seq, planes }) }, body: surface(change) });
   });
@@ -171,7 +172,11 @@ async function triangles({ page }) {
   assert.equal(await count(), ALL - 2 * (SIDE - 1), "triangles across a jump");
   change = (word, u) => word + 100 * u;
   assert.equal(await count(), ALL, "a slope is no jump");
-  change = undefined;
+  change = null;
+  await page.click(TOGGLE);
+  await page.waitForFunction(() => document.querySelector("#picture").textContent.includes("no surface today"));
+  await page.click(TOGGLE);
+  change = (word) => word;
 }
 
 // Frames per second while it is turned.

@@ -1,4 +1,4 @@
-// The triangles of a part's heights, and lines that lie on them.
+// Triangles of a part's heights, and lines on them.
 import { draw } from "./element.js";
 
 // A triangle lies across a jump if its z differ by more than so many distances of neighbours.
@@ -8,7 +8,7 @@ const NONE = 65535;
 // How far around a line heights are looked for, in their own distances.
 const FAR = [1.5, 5, 12];
 
-// The heights of an answer: three planes of words, x, y and z, and what they are in mm.
+// The heights of an answer: words for x, y and z, and what they are in mm.
 export function heightsOf({ about: { width, height, stride, planes }, buffer }) {
   const [low, mm] = ["low", "step"].map((key) => planes.slice(0, 3).map((plane) => plane[key]));
   return { width, height, stride, low, mm, words: new Uint16Array(buffer, 0, 3 * width * height) };
@@ -18,7 +18,7 @@ function placeOf({ words, low, mm, width, height }, at) {
   return low.map((least, axis) => least + mm[axis] * words[axis * width * height + at]);
 }
 
-// From a point to the one that is `by` words further, in mm in the plane: medians.
+// From a point to the one `by` words further, in mm in the plane: medians.
 function neighbour(heights, by) {
   const { words, width, height } = heights, size = width * height, found = [];
   for (let at = 0; at + by < size; at += Math.ceil(size / 5000)) {

@@ -1,10 +1,10 @@
-// The part of a picture in 3-D: its heights as a surface, on which lies all that the picture shows.
+// The part of a picture in 3-D: heights as a surface, on which lies all that the picture shows.
 import { button, make } from "./element.js";
 import { words } from "./api.js";
 import { heightsOf, linesOn, meshOf } from "./mesh.js";
 import { surface } from "./surface.js";
 
-// A phone or a tablet draws fewer triangles, and its pixels are so fine that edges need no smoothing.
+// A phone or a tablet draws fewer triangles; its pixels are so fine that edges need no smoothing.
 const FINGERS = matchMedia("(pointer: coarse)").matches;
 const TRIANGLES = FINGERS ? 100000 : 200000, LEVELS = 5;
 // The view at first, turned about z and from above (radians); and how far a key or a button goes.
@@ -73,7 +73,7 @@ export function viewOf(picture) {
   function put() {
     const { heights, mesh: { triangles, middle, radius } } = held;
     draws.put(heights, triangles, picture);
-    // The next part lies about where the last one lay: the view stays.
+    // The view stays while parts lie about where they lay.
     const off = middle.map((mm, axis) => mm - seen.middle[axis]);
     if (Math.hypot(radius - seen.radius, ...off) > radius / 4) Object.assign(seen, { middle, radius });
     line();
@@ -97,7 +97,12 @@ export function viewOf(picture) {
         held = { path, heights, mesh: meshOf(heights) };
         put();
       }
-    } catch (error) { problem = error.message; }
+    } catch (error) {
+      // An older part is not shown as this one.
+      problem = error.message;
+      held = null;
+      redraw();
+    }
     loading = false;
     if (others()) load(); else tell(problem);
   }
@@ -109,7 +114,7 @@ export function viewOf(picture) {
     load();
   }
 
-  // Begins or ends, as the view is asked for and is on the screen.
+  // Begins or ends, as the view is open and on the screen.
   function wake() {
     if (open && near && !canvas) {
       const own = canvas = make("canvas");
@@ -192,7 +197,7 @@ export function viewOf(picture) {
   tell();
 
   return {
-    // What the picture shows, after each change: the path of the part's surface with its SEQ, and its number of points; or null.
+    // What the picture shows, after each change: the path of its part's surface with SEQ, and the number of points; or null.
     show(shown) { wanted = shown; load(); },
   };
 }
