@@ -8,6 +8,7 @@ import { editor } from "./editor.js";
 import { forms } from "./forms.js";
 import { pictures } from "./pictures.js";
 import { recipes } from "./recipes.js";
+import { view } from "./view.js";
 import { wizard } from "./wizard.js";
 
 const [program, browserPath, folder] = process.argv.slice(2);
@@ -139,6 +140,8 @@ try {
     const jumped = await page.evaluate(() => window.jumped);
     assert.ok(jumped < JUMPS, `the page jumped by ${jumped}`);
   });
+
+  await view({ browserPath, page, url: daemon.url, step, folder });
 
   await step("a limit that is edited on the page changes the verdict", async () => {
     await page.click("nav a[href='#recipes']");

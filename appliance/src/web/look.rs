@@ -56,9 +56,9 @@ const MAX_LEVEL: u32 = 5;
 /// The direction in which deviations are measured.
 const DIRECTION: &str = "along the normal";
 
-/// How fine a surface is: every 2^level-th pixel, as fine as other maps if left out.
+/// How fine a surface is: every 2^level-th pixel, as fine as other maps if left out. Other keys, such
+/// as the page's `seq`, by which no browser takes one part's answer for another's, have no meaning.
 #[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub(super) struct Level {
     level: Option<u32>,
 }

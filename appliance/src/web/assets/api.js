@@ -42,13 +42,18 @@ export async function picture(path) {
   return createImageBitmap(await response.blob());
 }
 
-// A map: its description and its values, NaN where there is none. Where there is no map, the error says why.
-export async function map(path) {
+// The words of a map, and their description. Where there is no map, the error says why.
+export async function words(path) {
   const response = await fetch(path, { credentials: "same-origin" });
   if (!response.ok) throw await failure(response);
   if (response.status === 204) throw new Error(response.headers.get("x-none"));
-  const about = JSON.parse(response.headers.get("x-map"));
-  const view = new DataView(await response.arrayBuffer());
+  return { about: JSON.parse(response.headers.get("x-map")), buffer: await response.arrayBuffer() };
+}
+
+// A map: its description and its values, NaN where there is none.
+export async function map(path) {
+  const { about, buffer } = await words(path);
+  const view = new DataView(buffer);
   const values = new Float32Array(view.byteLength / 2);
   for (let at = 0; at < values.length; at += 1) {
     const word = view.getUint16(2 * at, true);

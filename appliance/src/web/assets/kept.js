@@ -8,9 +8,13 @@ import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
 import { nameOf } from "./times.js";
 import { decided, named, tag, uncertainty } from "./verdict.js";
+import { viewOf } from "./view.js";
 
 const COMPONENTS = ["x", "y", "z", "about x", "about y", "about z"];
 const state = { seq: 0, layer: "height", asked: 0, failed: [], found: null };
+
+// The view in 3-D, and the number of points of the part.
+let view = null, points = 0;
 
 function gauge(entry) {
   const decision = decided(entry);
@@ -57,6 +61,7 @@ function empty(words) {
   text("kept-shown", "");
   text("kept-words", words);
   show("kept-words", true);
+  view.show(null);
 }
 
 async function picture() {
@@ -78,6 +83,7 @@ async function picture() {
   over($("kept-ring"), loaded.about, ...marks(found, loaded.about.width * loaded.about.stride / 200), ...rings(loaded.about, state.failed));
   text("kept-shown", loaded.about.words);
   show("kept-words", false);
+  view.show({ path: `/api/history/${state.seq}/picture/surface?seq=${state.seq}`, seq: state.seq, points });
 }
 
 // Shows the result of a SEQ.
@@ -93,6 +99,7 @@ export async function openKept(seq, boot) {
   if (state.seq !== seq) return;
   const { result, no_frames } = found;
   state.failed = result.gauges.filter((one) => one.square && !decided(one).pass).map((one) => one.square);
+  points = result.valid_points;
   text("kept-number", `no. ${seq}`);
   $("kept-verdict").className = `tag ${result.verdict.toLowerCase()}`;
   text("kept-verdict", result.verdict);
@@ -109,6 +116,7 @@ export async function openKept(seq, boot) {
 }
 
 export function start() {
+  view = viewOf($("kept-map"));
   $("kept-close").addEventListener("click", () => { state.asked += 1; state.seq = 0; show("kept", false); });
   for (const choice of document.querySelectorAll("[data-kept]")) {
     choice.addEventListener("click", () => {

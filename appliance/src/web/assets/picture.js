@@ -7,9 +7,12 @@ import { over, rings } from "./ring.js";
 import { inside } from "./editor-shapes.js";
 import { drawScale } from "./scale.js";
 import { signed } from "./number.js";
+import { viewOf } from "./view.js";
 
 const UNITS = { mm: 3, counts: 1 };
 const state = { layer: "height", map: null, deviation: null, result: null, key: "", recipe: null, kinds: null, recipeKey: "", found: [], asked: 0, at: [0, 0] };
+
+let view = null;
 
 // The recipe's gauges that failed or could not be measured in the result.
 function failing() {
@@ -124,6 +127,7 @@ async function load() {
   text("shown", loaded.about.words);
   drawScale($("scale"), state.map.about, state.layer);
   drawOutlines();
+  view.show({ path: `/api/picture/surface?seq=${result.seq}`, seq: result.seq, points: result.valid_points });
 }
 
 // What was found of the contours of a result's recipe; nothing if it has none, or its frames are gone.
@@ -146,6 +150,7 @@ function empty(words) {
   show("no-picture", true);
   text("cursor", "point at the picture to read a value");
   drawOutlines();
+  view.show(null);
 }
 
 // Loads the recipe of a result; none if it was changed since, because its regions need not be those of the result.
@@ -188,6 +193,7 @@ export function start() {
     });
   }
   const canvas = $("map");
+  view = viewOf(canvas);
   canvas.addEventListener("pointermove", point);
   canvas.addEventListener("pointerdown", point);
   canvas.addEventListener("keydown", move);
