@@ -148,10 +148,10 @@ class ClickHouse(Process):
     def serves(self):
         wait_for(f"{self.name} serves", 30, lambda: get(self.url, 2))
 
-    def sql(self, query, timeout=60):
+    def sql(self, query, timeout=60, database="default"):
         """The rows of the answer; the values are those of JSON."""
         request = urllib.request.Request(
-            f"{self.url}/?database=default&output_format_json_quote_64bit_integers=0", f"{query} FORMAT JSONCompact".encode()
+            f"{self.url}/?database={database}&output_format_json_quote_64bit_integers=0", f"{query} FORMAT JSONCompact".encode()
         )
         try:
             with urllib.request.urlopen(request, timeout=timeout) as answer:
@@ -159,9 +159,9 @@ class ClickHouse(Process):
         except urllib.error.HTTPError as error:
             raise SystemExit(f"{self.name}: {query}\n{error.read().decode(errors='replace')}") from error
 
-    def run(self, statement, timeout=60):
+    def run(self, statement, timeout=60, database="default"):
         """A statement without an answer."""
-        request = urllib.request.Request(f"{self.url}/?database=default", statement.encode())
+        request = urllib.request.Request(f"{self.url}/?database={database}", statement.encode())
         try:
             with urllib.request.urlopen(request, timeout=timeout) as answer:
                 answer.read()
@@ -197,7 +197,8 @@ class Plant(Process):
 
 
 class Collector(Process):
-    """`fringed-fleet collect` of all heads of a plant."""
+    """`fringed-fleet collect` of all heads of a plant, or of those of a configuration."""
 
-    def __init__(self, folder, fleet, plant, store, name="collector", more=()):
-        super().__init__(folder, name, [fleet, "collect", "--heads", plant.heads, "--store", store, *more])
+    def __init__(self, folder, fleet, plant=None, store=None, name="collector", more=(), config=None):
+        words = ["--config", config] if config else ["--heads", plant.heads, "--store", store]
+        super().__init__(folder, name, [fleet, "collect", *words, *more])

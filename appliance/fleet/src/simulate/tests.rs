@@ -7,6 +7,7 @@ use super::head::{Head, Plant};
 use super::now_ms;
 use hyper::body::Body as _;
 use serde_json::Value;
+use std::collections::BTreeSet;
 use std::future::poll_fn;
 use std::pin::pin;
 use std::sync::Arc;
@@ -252,4 +253,41 @@ fn metrics_count_every_result_once() {
     }
     let (status, _, _) = get(&plant, &format!("{:04}/metrics", HEADS + 1));
     assert_eq!(status, 404);
+}
+
+/// What begins with `fringed_` in a text.
+fn metrics_in(text: &str) -> BTreeSet<&str> {
+    let at = text.match_indices("fringed_").map(|(at, _)| &text[at..]);
+    at.map(|rest| {
+        rest.split(|c: char| !c.is_ascii_lowercase() && c != '_')
+            .next()
+            .unwrap()
+    })
+    .collect()
+}
+
+#[test]
+fn every_metric_that_a_plant_looks_at_is_one_of_the_daemons() {
+    let daemons = include_str!("../../../src/web/metrics.rs");
+    // A counter is written with the name of its family; its samples end with _total.
+    let quoted = |name: &str| daemons.contains(&format!("\"{name}\""));
+    let known = |name: &str| quoted(name) || name.strip_suffix("_total").is_some_and(quoted);
+    let plant = plant(10, &[]);
+    let (_, simulated, _) = get(&plant, "0003/metrics");
+    let texts = [
+        &*simulated,
+        include_str!("../../../../docs/fleet/health.json"),
+        include_str!("../../../../docs/fleet/alerts.yml"),
+    ];
+    for text in texts {
+        let names = metrics_in(text);
+        assert!(names.len() > 5);
+        let unknown: Vec<_> = names.iter().filter(|name| !known(name)).collect();
+        assert!(unknown.is_empty(), "{unknown:?} of {names:?}");
+    }
+    // What dashboards and alerts ask for has a simulated head, too, but for what only devices have.
+    let asked = texts[1..].iter().flat_map(|text| metrics_in(text));
+    let simulated = metrics_in(&simulated);
+    let missing: BTreeSet<_> = asked.filter(|name| !simulated.contains(name)).collect();
+    assert_eq!(missing, BTreeSet::from(["fringed_power"]));
 }
