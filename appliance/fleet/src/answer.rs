@@ -131,6 +131,9 @@ pub enum Wrong {
         /// The one behind it.
         to: u32,
     },
+    /// A result that is newer than the newest.
+    #[error("it sends result {0}, behind the last of its header, {1:?}")]
+    Behind(u32, Option<u32>),
     /// More than was asked for.
     #[error("it sends more than the {0} results that were asked for")]
     More(u32),
@@ -187,6 +190,9 @@ impl Row {
                 from: before,
                 to: row.seq,
             });
+        }
+        if header.last.is_none_or(|last| row.seq > last) {
+            return Err(Wrong::Behind(row.seq, header.last));
         }
         match row.impossible(header) {
             Some(what) => Err(Wrong::Value(what, row.seq)),
@@ -251,6 +257,8 @@ mod tests {
 
     #[test]
     fn what_no_head_sends_is_refused_by_name() {
+        let newer = LINE.replace("\"seq\":7", "\"seq\":10");
+        assert!(complaint(&newer, 6).contains("result 10, behind the last"));
         assert!(complaint(LINE, 7).contains("SEQ falls from 7 to 7"));
         for (from, to, named) in [
             ("\"S\"", "\"T\"", "wrong serial: \"T\""),

@@ -22,7 +22,8 @@ pub struct After {
     seq: u32,
     /// Results that may still be read.
     left: usize,
-    begun: bool,
+    /// The newest SEQ when the walk began, at which it ends; none before its first page.
+    last: Option<u32>,
 }
 
 /// Some results, oldest first.
@@ -52,7 +53,7 @@ impl Reader {
             path: self.path().to_path_buf(),
             seq,
             left: limit,
-            begun: false,
+            last: None,
         })
     }
 }
@@ -63,7 +64,7 @@ impl After {
         &self.id
     }
 
-    /// The next page. Where results that are next were deleted meanwhile, the walk ends early, so
+    /// The next page; the first says where the walk ends. Where results that are next were deleted meanwhile, the walk ends early, so
     /// that the first page of another one shows what is missing.
     ///
     /// # Errors
@@ -77,13 +78,14 @@ impl After {
             let gone = page
                 .first
                 .is_some_and(|first| first > self.seq.saturating_add(1));
-            if !(self.begun && gone) {
-                page.results = behind(&transaction, self.seq, most)?;
+            if self.last.is_none() || !gone {
+                let last = self.last.or(page.last).unwrap_or(0);
+                page.results = behind(&transaction, self.seq, last, most)?;
             }
             Ok(page)
         });
         let page = page.map_err(|error| HistoryError::of(&self.path, &error))?;
-        self.begun = true;
+        self.last = self.last.or(page.last);
         self.left -= page.results.len();
         self.seq = page.results.last().map_or(self.seq, |entry| entry.seq);
         Ok(page)
@@ -101,7 +103,13 @@ fn bounds(transaction: &Transaction<'_>) -> rusqlite::Result<Page> {
     })
 }
 
-fn behind(connection: &Connection, seq: u32, most: usize) -> rusqlite::Result<Vec<Entry>> {
-    let query = "SELECT * FROM dated WHERE seq > ?1 ORDER BY seq LIMIT ?2";
-    rows(connection, query, (seq, most), |row| read(connection, row))
+fn behind(
+    connection: &Connection,
+    seq: u32,
+    last: u32,
+    most: usize,
+) -> rusqlite::Result<Vec<Entry>> {
+    let query = "SELECT * FROM dated WHERE seq > ?1 AND seq <= ?2 ORDER BY seq LIMIT ?3";
+    let bounds = (seq, last, most);
+    rows(connection, query, bounds, |row| read(connection, row))
 }

@@ -217,9 +217,10 @@ impl Poll {
         })
     }
 
-    /// Hands on the results of an answer; those before a wrong line, too.
+    /// Hands on the results of an answer. One with a wrong line is asked for again from its
+    /// beginning: what was skipped before that line may be there.
     async fn rows(&mut self, lines: &mut Lines, header: &Header) -> Result<u32, Trouble> {
-        let mut count = 0;
+        let (mut count, after) = (0, self.state.seq);
         let mut rows = Vec::new();
         loop {
             if rows.len() == PIECE || (!rows.is_empty() && !lines.has_next()) {
@@ -241,6 +242,10 @@ impl Poll {
                     row,
                     at_unix_ms: now_ms(),
                 }),
+                Err(Trouble::Wrong(wrong)) => {
+                    self.state.seq = after;
+                    return Err(wrong.into());
+                }
                 Err(trouble) => {
                     self.take(&mut rows).await;
                     return Err(trouble);
