@@ -13,11 +13,16 @@ macro_rules! say {
     }};
 }
 
+pub mod answer;
 pub mod backup;
 pub mod cli;
 pub mod collect;
+pub mod config;
 pub mod error;
+pub mod http;
 pub mod log;
+pub mod part;
 pub mod schema;
 pub mod simulate;
 pub mod status;
+pub mod store;

@@ -1,17 +1,23 @@
-//! `fringed-fleet schema`: print the tables and views of a store.
+//! `fringed-fleet schema`: the tables and views of a store, for whoever makes them by hand.
 
-use crate::error::{Exit, Result};
+use crate::error::Result;
+use crate::store::{Kind, schema};
 
 /// Print the tables and views of a store.
 #[derive(Debug, clap::Args)]
-pub struct Schema {}
+pub struct Schema {
+    /// What the store is made of.
+    #[arg(long, value_enum)]
+    store: Kind,
+}
 
 impl Schema {
-    /// Runs the command.
+    /// Prints SQL.
     ///
     /// # Errors
-    /// Always: it is not there yet.
+    /// None.
     pub fn run(&self) -> Result<()> {
-        Exit::Software.fail("not there yet")
+        say!("{}", schema(self.store).trim_end());
+        Ok(())
     }
 }

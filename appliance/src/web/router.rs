@@ -13,7 +13,7 @@ use super::problem::Problem;
 use super::site::Site;
 use super::{
     assets, board, downloads, events, head, history, host, kept, look, metrics, orders, recipes,
-    sessions, simulation,
+    results, sessions, simulation,
 };
 
 /// Only files of this device, nothing inline, not inside a frame of another page.
@@ -86,6 +86,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/history/{seq}", kept::one),
         look("/api/history/{seq}/picture/{layer}", kept::picture),
         look("/api/history/{seq}/recording.zip", history::recording),
+        look("/api/results", results::after),
         look("/api/diagnostics.zip", downloads::diagnostics),
         look("/api/kinds", recipes::kinds),
         look("/api/recipes", recipes::list),

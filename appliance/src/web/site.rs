@@ -39,6 +39,8 @@ const MAX_CHANGES: usize = 2;
 const MAX_ARRIVING: usize = 2;
 /// The most files that are sent at a time: each is in memory until its client has received it.
 const MAX_FILES: usize = 4;
+/// The most programs that collect results at a time, beside the files of people.
+const MAX_COLLECTING: usize = 4;
 
 /// The pictures that were computed last, height, deviation, modulation, and the SEQ of their
 /// result.
@@ -89,6 +91,8 @@ pub struct Site {
     pub(super) arriving: Arc<Semaphore>,
     /// Permits to send a file.
     pub(super) files: Arc<Semaphore>,
+    /// Permits to collect results.
+    pub(super) collecting: Arc<Semaphore>,
     /// The pictures of a kept part that were computed last; locked while others are computed.
     pub(super) kept: Arc<Mutex<LastKept>>,
     looking: Arc<Semaphore>,
@@ -119,6 +123,7 @@ impl Site {
             followers: Slots::new(MAX_FOLLOWERS, MAX_FOLLOWERS_EACH),
             arriving: Arc::new(Semaphore::new(MAX_ARRIVING)),
             files: Arc::new(Semaphore::new(MAX_FILES)),
+            collecting: Arc::new(Semaphore::new(MAX_COLLECTING)),
             kept: Arc::default(),
             looking: Arc::new(Semaphore::new(MAX_ASIDE)),
             changing: Arc::new(Semaphore::new(MAX_CHANGES)),

@@ -5,6 +5,7 @@ mod boundaries;
 mod connections;
 mod gate;
 mod page;
+mod results;
 
 use std::net::SocketAddr;
 use std::sync::{Arc, mpsc};
