@@ -5,8 +5,8 @@
 
 A station with simulated light and a history of 100 000 results is triggered over Modbus, in blocks with and without readers by turns; the
 readers run where a core has nothing else to do, because real ones run elsewhere. The median of TOTAL_TIME (trigger to result) with each
-reader is compared with that of the blocks around it, and the memory with that before. Small: 8 blocks of 10 cycles per reader. Large: 30
-blocks of 20.
+reader is compared with that of the blocks around it, and the memory with that before. Small: a head of few pixels, 8 blocks of 15 cycles
+per reader. Large: the usual head, 30 blocks of 20.
 """
 
 import contextlib
@@ -25,6 +25,9 @@ from servers import Folder, Process, broken, wait_for
 
 RESULTS = 100_000
 MOST_LATER, MOST_MIB = 0.01, 8
+# Bit of register 100.
+READY = 1 << 1
+FEW_PIXELS = "sub_rays = 2\n\n[rig.camera]\nwidth = 160\nheight = 160\n"
 # What the medians of a small run may differ by on a machine that does other things, too.
 SLACK = 0.04
 
@@ -76,7 +79,7 @@ class Reader:
     """A reader of results in a thread of its own, of which the machine takes no notice."""
 
     def __init__(self, port, what):
-        self.port, self.what, self.stopped, self.bytes = port, what, False, 0
+        self.port, self.what, self.stopped, self.bytes, self.failed = port, what, False, 0, None
         self.thread = threading.Thread(target=self.run, daemon=True)
 
     def __enter__(self):
@@ -96,7 +99,10 @@ class Reader:
     def asks(self, after, limit):
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=30)
         connection.request("GET", f"/api/results?after={after}&limit={limit}")
-        return connection, connection.getresponse()
+        answer = connection.getresponse()
+        if answer.status != 200:
+            self.failed = f"{answer.status} {answer.read(200)}"
+        return connection, answer
 
     def all_the_time(self):
         connection, answer = self.asks(RESULTS - 5, 100)
@@ -125,9 +131,12 @@ class Reader:
 class Station(Process):
     """`fringed serve` with simulated light."""
 
-    def __init__(self, folder, fringed, name):
-        state = folder.path / "state"
-        super().__init__(folder, name, [fringed, "serve", "--state", state, "--modbus", "127.0.0.1:0", "--http", "127.0.0.1:0"])
+    def __init__(self, folder, fringed, name, scenario):
+        state, config = folder.path / "state", folder.path / "fringed.toml"
+        (folder.path / "scenario.toml").write_text(scenario)
+        config.write_text(f'[head]\nscenario = "{folder.path}/scenario.toml"\n')
+        ports = ["--modbus", "127.0.0.1:0", "--http", "127.0.0.1:0"]
+        super().__init__(folder, name, [fringed, "serve", "--state", state, "--config", config, *ports])
         port = lambda words: wait_for(f"the station says {words}", 120, lambda: re.search(words + r" on (?:http://)?127\.0\.0\.1:(\d+)", self.log.read_text()))
         self.modbus, self.http = int(port("Modbus TCP")[1]), int(port("page")[1])
 
@@ -151,18 +160,18 @@ def fill(file):
         return database.execute("SELECT count(*), max(seq) FROM result").fetchone()
 
 
-def main(fringed, blocks, cycles, slack):
+def main(fringed, blocks, cycles, slack, scenario):
     with Folder() as folder:
-        station = Station(folder, fringed, "teaching")
+        station = Station(folder, fringed, "teaching", scenario)
         plc = Plc(station.modbus)
-        wait_for("the station is ready", 180, lambda: plc.read(100, 1)[0] & 1)
+        wait_for("the station is ready", 180, lambda: plc.read(100, 1)[0] & READY)
         for _ in range(3):
             plc.cycle()
         station.stop()
-        count, last = fill(next((folder.path / "state").glob("history*.sqlite*")))
-        station = Station(folder, fringed, "station")
+        count, last = fill(folder.path / "state" / "history.db")
+        station = Station(folder, fringed, "station", scenario)
         plc = Plc(station.modbus)
-        wait_for("the station is ready", 180, lambda: plc.read(100, 1)[0] & 1)
+        wait_for("the station is ready", 180, lambda: plc.read(100, 1)[0] & READY)
         for _ in range(3 * cycles):
             plc.cycle()
         failed = []
@@ -179,6 +188,8 @@ def main(fringed, blocks, cycles, slack):
                         peak = max(peak, station.resident())
                     read = statistics.median(times)
                 sent += reader.bytes
+                if reader.failed:
+                    broken(f"{what}: {reader.failed}")
                 after = statistics.median(plc.cycle() for _ in range(cycles))
                 ratios.append(2 * read / (quiet + after))
                 alone.append(quiet)
@@ -201,4 +212,4 @@ def main(fringed, blocks, cycles, slack):
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], *((30, 20, 0) if sys.argv[2:] == ["large"] else (8, 10, SLACK)))
+    main(sys.argv[1], *((30, 20, 0, "") if sys.argv[2:] == ["large"] else (8, 15, SLACK, FEW_PIXELS)))

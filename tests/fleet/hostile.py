@@ -52,7 +52,9 @@ def main(fleet, heads, seconds):
         time.sleep(1)
         every = {serial: sorted(seqs) for serial, seqs in store.sql("SELECT serial, groupArray(seq) FROM plant.result_once GROUP BY serial")}
         for head in said:
-            if every.pop(head.serial, None) != list(range(1, seconds + 1)):
+            # Nobody can know that results do not exist which are of the right form: those that do must be there.
+            seqs = [seq for seq in every.pop(head.serial, []) if head.fault != "endless" or seq <= seconds]
+            if seqs != list(range(1, seconds + 1)):
                 broken(f"{head.serial}, {head.fault}: not each of its results is there once")
         if every:
             broken(f"results of nobody: {list(every)[:9]}")
