@@ -56,3 +56,16 @@ fn a_wrong_configuration_is_refused_by_its_key() {
         assert!(failure.message.contains(named), "{failure}");
     }
 }
+
+#[test]
+fn the_document_has_the_table() {
+    let document = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/fleet.md");
+    assert!(fs::read_to_string(document).unwrap().contains(KEYS));
+}
+
+#[test]
+fn the_example_is_a_configuration() {
+    let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/fleet/fleet.toml");
+    let config = read(&fs::read_to_string(example).unwrap()).unwrap();
+    assert!(config.heads.len() > 5 && config.store.is_some());
+}
