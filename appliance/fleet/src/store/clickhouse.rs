@@ -222,8 +222,8 @@ mod tests {
                     line.len() - line.trim_start().len(),
                     line.trim().split(' ').next()?,
                 );
-                let column =
-                    name.chars().all(|c| c.is_ascii_lowercase() || c == '_') && !name.is_empty();
+                let letters = |c: char| c.is_ascii_lowercase() || c == '_';
+                let column = !name.is_empty() && name != "gauges" && name.chars().all(letters);
                 column.then(|| {
                     if indent > 4 {
                         format!("gauges.{name}")
