@@ -1,8 +1,9 @@
-//! `fringed-fleet backup`: recipes and configuration of each head, as files.
+//! `fringed-fleet backup`: recipes, calibration and configuration of each head, as files.
 //!
 //! A recipe that many heads have is one file, named by its fingerprint: `recipes/FINGERPRINT.recipe`.
-//! Configurations are named by the SHA-256 of their text. `heads/SERIAL.json` says which of them a
-//! head has. What is there already is neither fetched nor written again.
+//! Calibrations and configurations are named by the SHA-256 of their text. `heads/SERIAL.json` says
+//! which of them a head has. What is there already is neither fetched nor written again. A head does
+//! not send the phase maps of a measured plate: copy `calibration/` of its state folder.
 
 use crate::config::{Fleet, HeadConfig};
 use crate::error::{Exit, Failure, Result};
@@ -10,13 +11,15 @@ use crate::http::{Client, HttpError, trusting};
 use crate::log::{self, Severity};
 use rustls::ClientConfig;
 use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::json;
 use sha2::{Digest as _, Sha256};
 use std::fs;
 use std::io::{Cursor, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use tokio::task::JoinSet;
+use zip::ZipArchive;
+use zip::result::ZipError;
 
 /// The most bytes of a recipe's file, as of one that a head takes.
 const MOST_RECIPE: usize = 256 << 20;
@@ -25,7 +28,7 @@ const MOST_ANSWER: usize = 32 << 20;
 /// Heads that are asked at a time.
 const AT_A_TIME: usize = 8;
 
-/// Write recipes and configuration of each head as files.
+/// Write recipes, calibration and configuration of each head as files.
 #[derive(Debug, clap::Args)]
 pub struct Backup {
     /// Folder of the files; made if it does not exist.
@@ -70,7 +73,7 @@ impl Backup {
         let config = self.fleet.read()?;
         let heads = config.heads()?.to_vec();
         let tls = config.ca.as_deref().map(trusting).transpose()?;
-        for part in ["recipes", "configurations", "heads"] {
+        for part in ["recipes", "calibrations", "configurations", "heads"] {
             let folder = self.folder.join(part);
             let failed = Exit::CannotCreate.because(format!("create {}", folder.display()));
             fs::create_dir_all(&folder).map_err(failed)?;
@@ -164,16 +167,23 @@ async fn one(folder: PathBuf, mut client: Client) -> Result<usize> {
     let path = "/api/diagnostics.zip";
     let packed = client.get_whole(path, MOST_ANSWER).await;
     let packed = packed.map_err(unavailable(&url, path))?;
-    let configuration =
-        member(&packed, "fringed.toml").map_err(Exit::Content.because(format!("{url}{path}")))?;
-    let digest: String = Sha256::digest(&configuration)
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect();
-    let file = folder.join("configurations").join(format!("{digest}.toml"));
-    written += store(&file, &configuration)?;
-    let head: Value =
-        json!({ "serial": serial, "url": url, "configuration": digest, "recipes": rows });
+    let mut kept = |part: &str, name: &str, extension: &str| -> Result<Option<String>> {
+        let wrong = Exit::Content.because(format!("{url}{path}"));
+        let Some(content) = member(&packed, name).map_err(wrong)? else {
+            return Ok(None);
+        };
+        let digest = Sha256::digest(&content);
+        let digest: String = digest.iter().map(|byte| format!("{byte:02x}")).collect();
+        let file = folder.join(part).join(format!("{digest}.{extension}"));
+        written += store(&file, &content)?;
+        Ok(Some(digest))
+    };
+    let configuration = kept("configurations", "fringed.toml", "toml")?;
+    // A head without a calibration has none.
+    let calibration = kept("calibrations", "calibration.json", "json")?;
+    let head = json!({
+        "serial": serial, "url": url, "configuration": configuration, "calibration": calibration, "recipes": rows,
+    });
     let file = folder.join("heads").join(format!("{serial}.json"));
     Ok(written + store(&file, format!("{head:#}\n").as_bytes())?)
 }
@@ -189,16 +199,16 @@ fn unavailable(url: &str, path: &str) -> impl Fn(HttpError) -> Failure {
     Exit::Unavailable.because(format!("{url}{path}"))
 }
 
-/// A file of a ZIP.
-fn member(packed: &[u8], name: &str) -> Result<Vec<u8>, String> {
-    let mut zip = zip::ZipArchive::new(Cursor::new(packed)).map_err(|error| error.to_string())?;
-    let file = zip
-        .by_name(name)
-        .map_err(|error| format!("{name}: {error}"))?;
+/// A file of a ZIP, if it is there.
+fn member(packed: &[u8], name: &str) -> Result<Option<Vec<u8>>, ZipError> {
+    let mut zip = ZipArchive::new(Cursor::new(packed))?;
+    let file = match zip.by_name(name) {
+        Err(ZipError::FileNotFound) => return Ok(None),
+        file => file?,
+    };
     let mut content = Vec::new();
-    let read = file.take(MOST_ANSWER as u64).read_to_end(&mut content);
-    read.map_err(|error| format!("{name}: {error}"))?;
-    Ok(content)
+    file.take(MOST_ANSWER as u64).read_to_end(&mut content)?;
+    Ok(Some(content))
 }
 
 /// Writes a file that is whole whatever happens: 1, or 0 if it has this content already.

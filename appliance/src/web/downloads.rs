@@ -287,5 +287,12 @@ fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {
         ("metrics.txt", metrics::text(site)),
         ("fringed.toml", site.configuration.clone()),
     ];
-    packed(members)
+    // Its maps are large, and beside it on the device.
+    let calibration = site.calibration_file.as_deref();
+    let calibration = calibration.and_then(|file| std::fs::read_to_string(file).ok());
+    packed(
+        members
+            .into_iter()
+            .chain(calibration.map(|text| ("calibration.json", text))),
+    )
 }

@@ -2,6 +2,7 @@
 
 use std::convert::Infallible;
 use std::net::IpAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use axum::extract::FromRequestParts;
@@ -75,6 +76,8 @@ pub struct Parts {
     pub registers: fn(&Snapshot) -> Value,
     /// The configuration as TOML, for the diagnostic bundle.
     pub configuration: String,
+    /// The file of the calibration, for the same.
+    pub calibration_file: Option<PathBuf>,
     /// Host names of the page, besides IP addresses and `localhost`.
     pub hosts: Vec<String>,
     /// Networks of proxies: one such address stands for many clients.

@@ -200,16 +200,18 @@ pub(super) fn file(head: &Head<'_>, number: u16) -> Result<Vec<u8>> {
     ])
 }
 
-/// `GET /api/diagnostics.zip`: the configuration, and what a person asks for.
+/// `GET /api/diagnostics.zip`: configuration and calibration, and what a person asks for.
 ///
 /// # Errors
 /// If the archive cannot be made.
 pub(super) fn diagnostics(head: &Head<'_>, now_ms: u64) -> Result<Vec<u8>> {
     let snapshot = format!("{:#}\n", snapshot(head, now_ms));
     let configuration = configuration(head);
+    let calibration = json!({ "format": "fringed calibration", "made_by": head.serial() });
     archive(&[
         ("snapshot.json", snapshot.as_bytes()),
         ("fringed.toml", configuration.as_bytes()),
+        ("calibration.json", calibration.to_string().as_bytes()),
     ])
 }
 
