@@ -11,6 +11,7 @@ import subprocess
 import sys
 import time
 
+from panels import panels_of, sql_of
 from plant import Head
 from servers import ClickHouse, Collector, Folder, Plant, ZooKeeper, broken, ports, wait_for
 
@@ -81,6 +82,11 @@ def main(fleet, heads, seconds, gone):
         shares = [servers[at].sql("SELECT uniqExact(serial) FROM plant.result_local")[0][0] for at in (0, 2)]
         if sum(shares) != heads or min(shares) == 0:
             broken(f"the shards have {shares} of {heads} heads")
+        end = int(time.time())
+        for title, sql in panels_of("results.json"):
+            shown = other.sql(sql_of(sql, end - seconds - 60, end, [""], gauge="deviation"), database="plant")
+            if not shown and title not in ("Heads that are silent", "Cpk of one gauge per hour"):
+                broken(f"{title}: nothing is shown of a cluster")
         for collector in collectors:
             if not collector.is_alive():
                 broken(f"{collector.name} ended")

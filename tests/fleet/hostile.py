@@ -4,7 +4,7 @@
     tests/fleet/hostile.py target/release/fringed-fleet [large]
 
 Lines without end, 1 GB in a line, the results of another head, SEQ that falls, NaN, a redirect, silence, half answers, each for 6 s in
-30; a certificate of another host. The log must name each of these heads with what is wrong, the results of the others must come in time,
+47; a certificate of another host. The log must name each of these heads with what is wrong, the results of the others must come in time,
 and in the end those of all heads must be there, each once. Small: 40 heads for 40 s. Large: 200 heads for 120 s.
 """
 

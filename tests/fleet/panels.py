@@ -38,12 +38,20 @@ def lines_of(number):
 
 
 def same(left, right):
+    # stddevSamp loses digits to squares, where a value is large to its spread.
     if isinstance(left, float) or isinstance(right, float):
-        return left is not None and right is not None and math.isclose(left, right, rel_tol=1e-9, abs_tol=1e-12)
+        return left is not None and right is not None and math.isclose(left, right, rel_tol=1e-7, abs_tol=1e-12)
     return left == right
 
 
-def sql_of(target, begin, end, chosen):
+def panels_of(name):
+    """Title and query of each panel."""
+    for panel in json.loads((DOCS / name).read_text())["panels"]:
+        for target in panel["targets"]:
+            yield panel["title"], target.get("rawSql") or target["expr"]
+
+
+def sql_of(target, begin, end, chosen, gauge=GAUGE):
     """The panel's SQL with the macros of Grafana's data source replaced."""
     quoted = lambda text: "'" + text.replace("'", "\\'") + "'"
     sql = re.sub(r"\$__timeFilter\((\w+)\)", rf"(\1 >= toDateTime({begin}) AND \1 <= toDateTime({end}))", target)
@@ -52,7 +60,7 @@ def sql_of(target, begin, end, chosen):
         "$__fromTime": f"toDateTime({begin})",
         "$__toTime": f"toDateTime({end})",
         "${line:sqlstring}": ", ".join(map(quoted, chosen)),
-        "${gauge:sqlstring}": quoted(GAUGE),
+        "${gauge:sqlstring}": quoted(gauge),
     }.items():
         sql = sql.replace(macro, value)
     if "$" in sql:
@@ -76,6 +84,8 @@ def results_board(folder, fleet):
     wait_for("tables", 20, lambda: store.sql(exists)[0][0])
     counted = "SELECT count() FROM plant.result WHERE serial <= 'SIM00012'"
     wait_for("results", 60, lambda: store.sql(counted)[0][0] >= 12 * KEPT)
+    # As a collector does that was killed before it knew what it had written.
+    store.run("INSERT INTO plant.result SELECT * FROM plant.result WHERE serial < 'SIM00004'")
     states = "SELECT count() FROM plant.head_once WHERE state != '' OR error != ''"
     wait_for("states", 30, lambda: store.sql(states)[0][0] == len(heads) + 3)
     every = []
@@ -90,24 +100,23 @@ def results_board(folder, fleet):
     begin, end = start + 300, start + 5400
     asked = Asked(every, [*heads, *going_on, gone], begin, end, INTERVAL, GAUGE, CHOSEN)
     board = json.loads((DOCS / "results.json").read_text())
-    titles = [panel["title"] for panel in board["panels"]]
+    titles = [title for title, _ in panels_of("results.json")]
     if titles != list(PANELS):
         broken(f"panels {titles}, of which {list(PANELS)} are checked")
     for variable in board["templating"]["list"][1:]:
         if not store.sql(sql_of(variable["query"], begin, end, CHOSEN), database="plant"):
             broken(f"the variable {variable['name']} has no values")
-    for panel in board["panels"]:
-        (target,) = panel["targets"]
-        if panel["title"] == "Heads that are silent":
-            check_silent(store, target["rawSql"], begin, end, heads, gone, every)
+    for title, sql in panels_of("results.json"):
+        if title == "Heads that are silent":
+            check_silent(store, sql, begin, end, heads, gone, every)
             continue
-        rows = store.sql(sql_of(target["rawSql"], begin, end, CHOSEN), database="plant")
-        expected = [list(row) for row in PANELS[panel["title"]](asked)]
+        rows = store.sql(sql_of(sql, begin, end, CHOSEN), database="plant")
+        expected = [list(row) for row in PANELS[title](asked)]
         if not expected or len(rows) != len(expected):
-            broken(f"{panel['title']}: {len(rows)} rows, of {len(expected)}")
+            broken(f"{title}: {len(rows)} rows, of {len(expected)}")
         for row, other in zip(rows, expected):
             if len(row) != len(other) or not all(map(same, row, other)):
-                broken(f"{panel['title']}: {row}, by the CSV {other}")
+                broken(f"{title}: {row}, by the CSV {other}")
     print(f"{len(titles)} panels of results.json show what the CSV of {len(heads)} heads says")
 
 
@@ -149,20 +158,20 @@ def health_board(folder, fleet):
         return answer["data"]["result"]
 
     wait_for("Prometheus scrapes", 30, lambda: len(query("rate(fringed_results_total[10s]) >= 0")) >= 36)
-    board = json.loads((DOCS / "health.json").read_text())
-    for panel in board["panels"]:
-        for target in panel["targets"]:
-            # Heads that are well have none of these.
-            found, none = query(target["expr"]), panel["title"] in ("Heads that are silent", "Rejected triggers")
-            if bool(found) == none:
-                broken(f"{panel['title']}: {len(found)} series")
+    titles = set()
+    for title, expression in panels_of("health.json"):
+        titles.add(title)
+        # Heads that are well have none of these.
+        found, none = query(expression), title in ("Heads that are silent", "Rejected triggers")
+        if bool(found) == none:
+            broken(f"{title}: {len(found)} series")
     alerts = {alert["labels"]["alertname"] for alert in json.loads(get(f"{url}/alerts"))["data"]["alerts"]}
     if alerts != {"HeadDrifts"}:
         broken(f"alerts {alerts}, and heads that drift are all that is wrong")
     drifting = {series["metric"]["instance"] for series in query("fringed_drift_pixels > 0.5")}
     if drifting != {"SIM00003", "SIM00011"}:
         broken(f"{drifting} drift")
-    print(f"{len(board['panels'])} panels of health.json have series, and the alerts are those of heads that drift")
+    print(f"{len(titles)} panels of health.json have series, and the alerts are those of heads that drift")
 
 
 if __name__ == "__main__":

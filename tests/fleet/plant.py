@@ -6,7 +6,7 @@ A result is a function of (seed, head, history, seq); values are whole millionth
 WORD = (1 << 64) - 1
 SPREAD = 37_837
 DRIFT = 3600
-PERIOD_MS, LENGTH_MS, SHARE = 30_000, 6_000, 20
+PERIOD_MS, LENGTH_MS, FIRST_MS, SHARE = 47_000, 6_000, 24_000, 20
 
 # Name, unit, centre, spread, lower and upper limit, in millionths.
 GAUGES = [
@@ -39,7 +39,7 @@ class Head:
         self.seed, self.rate, self.start_ms = said["seed"], said["rate"], said["start_unix_ms"]
         self.number, self.gauges = number, said["gauges"]
         self.key = mixed(mixed(self.seed) ^ number)
-        self.phase_ms = self.key % (PERIOD_MS - LENGTH_MS)
+        self.phase_ms = self.key % FIRST_MS
         place = (number - 1) % SHARE
         self.fault = faults[place] if place < len(faults) else None
         self.serial = f"SIM{number:05}"

@@ -1,4 +1,4 @@
-//! What goes wrong on a head, and when: for 6 s in every 30 s, from a seeded time on.
+//! What goes wrong on a head, and when: for 6 s in every 47 s, from a seeded time in the first 24 s on.
 
 /// A fault of one head in twenty.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -29,8 +29,11 @@ pub(super) enum Fault {
 
 /// Of so many heads one has a certain fault.
 const SHARE: u32 = 20;
-/// Time between the beginnings of a fault, ms.
-pub(super) const PERIOD_MS: u64 = 30_000;
+/// Time between the beginnings of a fault, ms: no multiple of the time after which a collector asks
+/// again, so that it does not ask in the next one.
+pub(super) const PERIOD_MS: u64 = 47_000;
+/// A fault begins for the first time before this, ms.
+pub(super) const FIRST_MS: u64 = 24_000;
 /// How long it lasts, ms.
 pub(super) const LENGTH_MS: u64 = 6_000;
 

@@ -1,6 +1,6 @@
 //! One head at one time: its history, which results it holds, and when each was made.
 
-use super::fault::{Fault, LENGTH_MS, PERIOD_MS, begun};
+use super::fault::{FIRST_MS, Fault, PERIOD_MS, begun};
 use super::figures::mixed;
 use super::gauge::{Character, Gauge};
 use std::collections::HashMap;
@@ -65,7 +65,7 @@ impl Plant {
         }
         let key = mixed(mixed(self.seed) ^ u64::from(number));
         let fault = Fault::of(&self.faults, number);
-        let phase_ms = key % (PERIOD_MS - LENGTH_MS);
+        let phase_ms = key % FIRST_MS;
         let (times, lasts) = begun(phase_ms, now_ms.saturating_sub(self.start_ms));
         // Each time that the fault begins a new history does, too.
         let (history, begun_ms) = match (fault, times) {

@@ -216,7 +216,7 @@ pub(super) fn diagnostics(head: &Head<'_>, now_ms: u64) -> Result<Vec<u8>> {
 }
 
 /// The configuration file of a head.
-pub(super) fn configuration(head: &Head<'_>) -> String {
+fn configuration(head: &Head<'_>) -> String {
     format!("# Head {}\n[http]\nlisten = \"0.0.0.0:80\"\n", head.number)
 }
 

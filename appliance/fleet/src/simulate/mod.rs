@@ -4,7 +4,7 @@
 //! the start of its history + seq / rate, so an independent program can work out which rows a store
 //! must have (`tests/fleet/plant.py`). Head N answers below `/h/N/`, N with four digits:
 //! `api/results`, `api/history.csv`, `api/snapshot`, `api/recipes`, `api/recipes/R/file`,
-//! `api/calibration`, `api/config`, `metrics`, `healthz`.
+//! `api/diagnostics.zip`, `metrics`, `healthz`.
 
 mod answer;
 mod body;
