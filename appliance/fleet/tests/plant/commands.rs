@@ -9,7 +9,7 @@ use std::path::Path;
 /// Every file below a folder, with its content.
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut all = BTreeMap::new();
-    for part in ["recipes", "configurations", "heads"] {
+    for part in ["recipes", "calibrations", "configurations", "heads"] {
         for entry in fs::read_dir(folder.join(part)).unwrap() {
             let entry = entry.unwrap();
             let name = format!("{part}/{}", entry.file_name().to_string_lossy());
@@ -78,11 +78,9 @@ fn a_backup_has_each_file_once_and_a_second_run_writes_none() {
     let written = files(folder.path());
     assert_eq!(first["files_written"], written.len());
     let of = |part: &str| written.keys().filter(|name| name.starts_with(part)).count();
-    // The same two recipes are on all heads that have them, and each head has a configuration.
-    assert_eq!(
-        (of("recipes"), of("configurations"), of("heads")),
-        (2, 5, 5)
-    );
+    // The same two recipes are on all heads that have them; the other files are each head's own.
+    assert_eq!((of("recipes"), of("heads")), (2, 5));
+    assert_eq!((of("calibrations"), of("configurations")), (5, 5));
     let head: Value = serde_json::from_slice(&written["heads/SIM00004.json"]).unwrap();
     for recipe in head["recipes"].as_array().unwrap() {
         let name = format!("recipes/{}.recipe", recipe["fingerprint"].as_str().unwrap());
