@@ -10,7 +10,7 @@ mkdir -p "${2:?$usage}"
 out=$(cd "$2" && pwd)
 cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 
-"$dir/bin/cargo-rpi" build --profile dist -p appliance -p fringed-lab --features appliance/rpi
+"$dir/bin/cargo-rpi" build --profile dist -p appliance -p fringed-lab -p fringed-fleet --features appliance/rpi
 package=$(PATH=$PATH:$dir/root/usr/bin LD_LIBRARY_PATH=$dir/root/usr/lib/x86_64-linux-gnu \
     debian/make "$dir/build/aarch64-unknown-linux-gnu/dist/fringed" "$out" "$dir/bin/qemu-rpi")
 tests/package/check.sh "$package"

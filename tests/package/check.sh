@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Checks the content of the packages fringed and fringed-lab: the size of the binary, the places of the files, the user's configuration,
+# Checks the content of the packages fringed, fringed-lab and fringed-fleet: the size of the binary, the places of the files, the user's configuration,
 # and the dependencies.
 #
 #     tests/package/check.sh PACKAGE.deb            built with the profile dist
@@ -11,7 +11,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 largest=$((12 << 20)) # bytes of the stripped binary, without libcamera's own
 
 work=$(mktemp -d)
-trap 'rm -rf "$work" "$work-lab"' EXIT
+trap 'rm -rf "$work" "$work-lab" "$work-fleet"' EXIT
 failed=0
 broken() {
     echo "FAILED: $*" >&2
@@ -21,6 +21,8 @@ broken() {
 lab=${package/fringed_/fringed-lab_}
 dpkg-deb --raw-extract "$package" "$work"
 dpkg-deb --raw-extract "$lab" "$work-lab"
+fleet=${package/fringed_/fringed-fleet_}
+dpkg-deb --raw-extract "$fleet" "$work-fleet"
 for file in usr/bin/fringed usr/lib/systemd/system/fringed.service usr/lib/sysusers.d/fringed.conf usr/lib/tmpfiles.d/fringed.conf \
     usr/lib/udev/rules.d/60-fringed.rules etc/security/limits.d/fringed.conf usr/share/{bash-completion/completions/fringed,zsh/vendor-completions/_fringed,fish/vendor_completions.d/fringed.fish} \
     usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/fringed.toml}; do
@@ -67,14 +69,26 @@ for file in licences.txt copyright; do
 done
 grep -q -- --frames "$work-lab/usr/share/bash-completion/completions/fringed-lab" || broken "the completion of fringed-lab does not know --frames"
 
+# fringed-fleet has a program, its unit and its documentation; the unit is there and waits for a configuration.
+stray=$(cd "$work-fleet" && find . -type f -not -path './DEBIAN/*' -not -path './usr/share/doc/fringed-fleet/*' | sort | tr '\n' ' ')
+[[ $stray == './usr/bin/fringed-fleet ./usr/lib/systemd/system/fringed-fleet-collect.service ./usr/share/man/man1/fringed-fleet.1.gz ' ]] ||
+    broken "fringed-fleet has $stray"
+for file in fleet.md licences.txt copyright examples/{fleet.toml,prometheus.yml,alerts.yml,results.json,health.json}; do
+    [[ -s $work-fleet/usr/share/doc/fringed-fleet/$file ]] || broken "fringed-fleet has no $file"
+done
+[[ -d $work-fleet/etc/fringed-fleet ]] || broken "fringed-fleet has no folder for a configuration"
+grep -q 'deb-systemd-helper enable' "$work-fleet/DEBIAN/postinst" || broken "the collector is not enabled"
+grep -q '^ConditionPathExists=/etc/fringed-fleet/fleet.toml$' "$work-fleet/usr/lib/systemd/system/fringed-fleet-collect.service" ||
+    broken "the collector starts without a configuration"
+
 binary=$work/usr/bin/fringed
 size=$(stat --format %s "$binary")
 [[ ${2:-} == quick ]] || ((size <= largest)) || broken "the binary has $size bytes, more than $largest"
-for one in "$binary" "$work-lab/usr/bin/fringed-lab"; do
+for one in "$binary" "$work-lab/usr/bin/fringed-lab" "$work-fleet/usr/bin/fringed-fleet"; do
     sections=$(readelf --section-headers --wide "$one")
     [[ $sections != *.symtab* && $sections != *.debug_info* ]] || broken "$one is not stripped"
 done
-for one in "$lab" "$package"; do
+for one in "$lab" "$fleet" "$package"; do
     depends=$(dpkg-deb --field "$one" Depends)
     [[ $depends == *'libc6 (>= 2.'* ]] || broken "$one depends on $depends, on no C library"
 done

@@ -1,7 +1,7 @@
 //! The operations guide has every error code, and only log lines that the program writes; the
 //! manual page is complete.
 
-use crate::written::{laboratory, program};
+use crate::written::{collector, laboratory, program};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -151,19 +151,24 @@ fn the_manual_page_has_exactly_the_commands_options_and_exit_codes_that_there_ar
 }
 
 #[test]
-fn the_laboratorys_manual_page_has_exactly_the_commands_and_options_that_there_are() {
-    let page = Page::of("fringed-lab");
-    let help = laboratory().run(&["--help"]).stdout;
-    let mut told = page.items(".It Cm ");
-    assert!(told.insert("help".to_owned()));
-    assert_eq!(told, commands(&help));
-    let names = told.iter().filter(|name| *name != "help");
-    let help: Vec<_> = names
-        .map(|name| laboratory().run(&[name.as_str(), "--help"]).stdout)
-        .collect();
-    assert_eq!(
-        page.items(".It Fl "),
-        help.iter().flat_map(|help| options(help)).collect()
-    );
-    assert!(page.exit_codes().is_subset(&exit_codes()));
+fn the_other_manual_pages_have_exactly_the_commands_and_options_that_there_are() {
+    for (name, program) in [
+        ("fringed-lab", laboratory()),
+        ("fringed-fleet", collector()),
+    ] {
+        let page = Page::of(name);
+        let help = program.run(&["--help"]).stdout;
+        let mut told = page.items(".It Cm ");
+        assert!(told.insert("help".to_owned()));
+        assert_eq!(told, commands(&help));
+        let names = told.iter().filter(|name| *name != "help");
+        let help: Vec<_> = names
+            .map(|name| program.run(&[name.as_str(), "--help"]).stdout)
+            .collect();
+        assert_eq!(
+            page.items(".It Fl "),
+            help.iter().flat_map(|help| options(help)).collect()
+        );
+        assert!(page.exit_codes().is_subset(&exit_codes()));
+    }
 }

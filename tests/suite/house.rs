@@ -166,6 +166,23 @@ fn the_oracle_shares_no_code_with_what_it_judges() {
 }
 
 #[test]
+fn the_collector_of_a_plant_knows_formats_of_the_daemon_and_none_of_its_types() {
+    let rule = "fringed-fleet reads what heads answer, as any other program would: it shares no type with \
+                what measures, so that a plant's programs and its heads change at different times.";
+    let measuring = ["appliance", "algo", "hal", "sim", "tests"];
+    forbid(
+        rule,
+        "appliance/fleet/src",
+        &measuring
+            .map(|name| [name, "::"].concat())
+            .each_ref()
+            .map(String::as_str),
+    );
+    forbid_dependency(rule, "appliance/fleet", &measuring);
+    forbid_dependency(rule, "appliance", &["fringed-fleet"]);
+}
+
+#[test]
 fn modbus_and_web_see_only_the_snapshot() {
     let rule = "modbus and web see only Snapshot, never each other, never algo, hal or sim.";
     let ours = ["algo::", "hal::", "sim::"];
@@ -239,6 +256,7 @@ fn no_files_name_each_other_in_a_circle() {
         "hal/src",
         "hal/sim/src",
         "appliance/src",
+        "appliance/fleet/src",
         "appliance/lab/src",
         "tests/src",
     ] {
@@ -304,6 +322,7 @@ fn files_hold_one_concept_each_and_say_which() {
         "hal/src",
         "hal/sim/src",
         "appliance/src",
+        "appliance/fleet/src",
         "appliance/lab/src",
         "tests/src",
         "tests/suite",
@@ -392,7 +411,13 @@ fn every_file_that_the_architecture_names_is_there() {
     for file in named {
         // A file in the folder of the previous one needs only its name.
         let by_name = || {
-            let all = ["algo/src", "hal/src", "appliance/src", "appliance/lab/src"];
+            let all = [
+                "algo/src",
+                "hal/src",
+                "appliance/src",
+                "appliance/fleet/src",
+                "appliance/lab/src",
+            ];
             all.iter().flat_map(|folder| sources(folder)).any(|source| {
                 Path::new(&source.name)
                     .file_name()

@@ -64,6 +64,7 @@ mod recovery;
 mod repeatability;
 mod replacing;
 mod replayed;
+mod results;
 mod rooms;
 mod sequences;
 mod service;

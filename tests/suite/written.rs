@@ -24,6 +24,11 @@ pub fn laboratory() -> Program {
     Program::at(FRINGED_LAB)
 }
 
+/// The program `fringed-fleet` of the same build as this suite.
+pub fn collector() -> Program {
+    Program::at(env!("CARGO_BIN_EXE_fringed-fleet-under-test"))
+}
+
 /// A geometric recording of three levels of four shifts.
 pub fn geometric() -> Scene {
     Scene::new(49.0, levels(&[0.0192, 0.138, 1.0], 4))

@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Checks the files in systemd/ without starting anything: systemd's tools read them, and rate the exposure of the service.
+# Checks the files in systemd/, and the collector's unit in docs/fleet, without starting anything: systemd's tools read them, and rate the
+# exposure of the services.
 #
 #     tests/systemd/check.sh
 #
@@ -10,6 +11,8 @@ cd "$(dirname "${BASH_SOURCE[0]}")/../.."
 # The largest exposure level, in tenths. 2.2 is the best that a program can have which uses devices, a privileged port and a real-time
 # priority.
 most=22
+# That of the collector, which needs none of these.
+most_collector=10
 
 for program in systemd-analyze systemd-sysusers systemd-tmpfiles; do
     command -v "$program" >/dev/null || {
@@ -25,10 +28,11 @@ mkdir -p "$root"/{etc,var/lib,usr/bin,usr/lib/{systemd/system,sysusers.d,tmpfile
 units=/usr/lib/systemd/system
 [[ -e $units/sysinit.target ]] || units=/lib/systemd/system
 cp -r "$units/." "$root/usr/lib/systemd/system"
-cp systemd/fringed.service "$root/usr/lib/systemd/system"
+cp systemd/fringed.service docs/fleet/fringed-fleet-collect.service "$root/usr/lib/systemd/system"
 cp systemd/fringed.sysusers "$root/usr/lib/sysusers.d/fringed.conf"
 cp systemd/fringed.tmpfiles "$root/usr/lib/tmpfiles.d/fringed.conf"
 install -m 755 /dev/null "$root/usr/bin/fringed"
+install -m 755 /dev/null "$root/usr/bin/fringed-fleet"
 
 failed=0
 complain() {
@@ -37,11 +41,14 @@ complain() {
 }
 
 # Its output counts, not only its exit code: an unknown key is only a warning.
-said=$(systemd-analyze verify --man=no --root="$root" fringed.service 2>&1) || complain "systemd does not take the unit"
+said=$(systemd-analyze verify --man=no --root="$root" fringed.service fringed-fleet-collect.service 2>&1) || complain "systemd does not take the units"
 [[ -z $said ]] || complain "systemd-analyze verify: $said"
 
 rated=$(systemd-analyze security --no-pager --offline=true --threshold=$most systemd/fringed.service) ||
     complain "the service may do more than $((most / 10)).$((most % 10)) allows: systemd-analyze security --offline=true systemd/fringed.service"
+tail -n 1 <<<"$rated"
+rated=$(systemd-analyze security --no-pager --offline=true --threshold=$most_collector docs/fleet/fringed-fleet-collect.service) ||
+    complain "the collector may do more than $((most_collector / 10)).$((most_collector % 10)) allows"
 tail -n 1 <<<"$rated"
 
 # The user, its groups and its folders, created in that root folder.

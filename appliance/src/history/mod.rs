@@ -18,6 +18,7 @@
 //! lacks: kill -9 costs at most the result in flight, however busy the card was. A loss of power
 //! costs what was not synced yet: what came in the time that the card takes for one sync.
 
+pub mod after;
 mod columns;
 pub mod csv;
 pub mod entry;

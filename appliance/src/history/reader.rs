@@ -293,7 +293,7 @@ impl Reader {
 }
 
 /// The result of a row of the view `dated`, with its gauges.
-fn read(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry> {
+pub(super) fn read(connection: &Connection, row: &Row<'_>) -> rusqlite::Result<Entry> {
     let id: i64 = row.get("id")?;
     let of_result = "SELECT * FROM gauge WHERE result = ?1 ORDER BY place";
     Ok(Entry {

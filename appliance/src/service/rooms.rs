@@ -98,6 +98,7 @@ impl Rooms<'_> {
             log: self.progress.logbook().clone(),
             registers: modbus::live,
             configuration: toml::to_string(&config).unwrap_or_default(),
+            calibration_file: config.head.calibration.clone(),
             hosts: config.http.hosts.clone(),
             proxies: config.http.proxies.clone(),
         });

@@ -40,6 +40,25 @@ pub fn give_way() {
 #[cfg(not(target_os = "linux"))]
 pub fn give_way() {}
 
+/// Lets the calling thread run only where a core has nothing else to do: beside busy ones it gets
+/// 0.3 % of a core (`SCHED_IDLE`, sched(7)).
+#[cfg(target_os = "linux")]
+#[expect(
+    unsafe_code,
+    reason = "the call that gives up a thread's priority has no safe wrapper that is kept"
+)]
+pub fn stand_back() {
+    let ordinary = libc::sched_param { sched_priority: 0 };
+    // SAFETY: the call only reads its arguments, and 0 names the calling thread.
+    unsafe {
+        libc::sched_setscheduler(0, libc::SCHED_IDLE, &raw const ordinary);
+    }
+}
+
+/// Elsewhere all threads have the same priority.
+#[cfg(not(target_os = "linux"))]
+pub fn stand_back() {}
+
 /// Gives the calling thread a real-time priority, and `core` if there is one that the kernel keeps
 /// free of other work, as far as the system permits: `LimitRTPRIO=` of the service. Otherwise the
 /// thread goes on as it is.

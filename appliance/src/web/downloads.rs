@@ -70,16 +70,12 @@ pub(super) async fn send(
     let (name, content) = site.aside(work).await?;
     let length = content.length();
     let length = length.map_err(|error| Problem::broken(format!("read {name}: {error}")))?;
-    let (sender, receiver) = mpsc::channel(1);
+    let (mut to, body) = ToClient::new();
     tokio::task::spawn_blocking(move || {
         // Held until the client has received the file or is gone.
         let _permit = permit;
-        let chunk = Vec::with_capacity(CHUNK);
-        let mut to = ToClient { sender, chunk };
-        if let Err(error) = content.write(&mut to).and_then(|()| to.flush()) {
-            // The answer breaks off, so the client knows that it is not whole.
-            let _ = to.sender.blocking_send(Err(error));
-        }
+        let written = content.write(&mut to);
+        to.end(written);
     });
     let headers = [
         (header::CONTENT_TYPE, kind.to_owned()),
@@ -89,7 +85,6 @@ pub(super) async fn send(
         ),
     ];
     let length = length.map(|bytes| [(header::CONTENT_LENGTH, bytes.to_string())]);
-    let body = Body::from_stream(ReceiverStream::new(receiver));
     Ok((headers, length, body).into_response())
 }
 
@@ -136,9 +131,27 @@ impl Packed {
 }
 
 /// Sends bytes to a client, no faster than it receives them.
-struct ToClient {
+pub(super) struct ToClient {
     sender: mpsc::Sender<Result<Bytes, io::Error>>,
     chunk: Vec<u8>,
+}
+
+impl ToClient {
+    /// It, and the body of the answer that sends what is written to it.
+    pub(super) fn new() -> (Self, Body) {
+        let (sender, receiver) = mpsc::channel(1);
+        let chunk = Vec::new();
+        let body = Body::from_stream(ReceiverStream::new(receiver));
+        (Self { sender, chunk }, body)
+    }
+
+    /// Ends the answer. Where writing failed it breaks off, so the client knows that it is not
+    /// whole.
+    pub(super) fn end(mut self, written: io::Result<()>) {
+        if let Err(error) = written.and_then(|()| self.flush()) {
+            let _ = self.sender.blocking_send(Err(error));
+        }
+    }
 }
 
 impl io::Write for ToClient {
@@ -274,5 +287,12 @@ fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {
         ("metrics.txt", metrics::text(site)),
         ("fringed.toml", site.configuration.clone()),
     ];
-    packed(members)
+    // Its maps are large, and beside it on the device.
+    let calibration = site.calibration_file.as_deref();
+    let calibration = calibration.and_then(|file| std::fs::read_to_string(file).ok());
+    packed(
+        members
+            .into_iter()
+            .chain(calibration.map(|text| ("calibration.json", text))),
+    )
 }

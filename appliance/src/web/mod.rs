@@ -32,6 +32,7 @@ mod kept;
 mod metrics;
 mod orders;
 mod recipes;
+mod results;
 mod sessions;
 
 #[cfg(test)]

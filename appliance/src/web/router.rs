@@ -13,7 +13,7 @@ use super::problem::Problem;
 use super::site::Site;
 use super::{
     assets, board, downloads, events, head, history, host, kept, look, metrics, orders, recipes,
-    sessions, simulation, tries,
+    results, sessions, simulation, tries,
 };
 
 /// Only files of this device, nothing inline, not inside a frame of another page.
@@ -88,6 +88,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/history/{seq}/picture/{layer}", kept::picture),
         look("/api/history/{seq}/features", kept::features),
         look("/api/history/{seq}/recording.zip", history::recording),
+        look("/api/results", results::after),
         look("/api/diagnostics.zip", downloads::diagnostics),
         look("/api/kinds", recipes::kinds),
         look("/api/recipes", recipes::list),

@@ -2,6 +2,7 @@
 
 use std::convert::Infallible;
 use std::net::IpAddr;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use axum::extract::FromRequestParts;
@@ -41,6 +42,8 @@ const MAX_CHANGES: usize = 2;
 const MAX_ARRIVING: usize = 2;
 /// The most files that are sent at a time: each is in memory until its client has received it.
 const MAX_FILES: usize = 4;
+/// The most programs that collect results at a time, beside the files of people.
+const MAX_COLLECTING: usize = 4;
 
 /// The maps that were computed last, and the SEQ of their result.
 pub(super) type LastKept = Option<(u32, Arc<Layers>)>;
@@ -74,6 +77,8 @@ pub struct Parts {
     pub registers: fn(&Snapshot) -> Value,
     /// The configuration as TOML, for the diagnostic bundle.
     pub configuration: String,
+    /// The file of the calibration, for the same.
+    pub calibration_file: Option<PathBuf>,
     /// Host names of the page, besides IP addresses and `localhost`.
     pub hosts: Vec<String>,
     /// Networks of proxies: one such address stands for many clients.
@@ -90,6 +95,8 @@ pub struct Site {
     pub(super) arriving: Arc<Semaphore>,
     /// Permits to send a file.
     pub(super) files: Arc<Semaphore>,
+    /// Permits to collect results.
+    pub(super) collecting: Arc<Semaphore>,
     /// The maps of a kept part that were computed last; locked while something else is computed of
     /// one.
     pub(super) kept: Arc<Mutex<LastKept>>,
@@ -125,6 +132,7 @@ impl Site {
             followers: Slots::new(MAX_FOLLOWERS, MAX_FOLLOWERS_EACH),
             arriving: Arc::new(Semaphore::new(MAX_ARRIVING)),
             files: Arc::new(Semaphore::new(MAX_FILES)),
+            collecting: Arc::new(Semaphore::new(MAX_COLLECTING)),
             kept: Arc::default(),
             opened: Arc::default(),
             tries: Tries::default(),

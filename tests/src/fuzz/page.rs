@@ -74,6 +74,7 @@ impl Page {
             log: Default::default(),
             registers: |_| serde_json::json!({ "registers": [] }),
             configuration: "threads = 0\n".into(),
+            calibration_file: None,
             hosts: vec!["sensor.local".into()],
             proxies: Vec::new(),
         });

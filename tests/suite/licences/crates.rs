@@ -20,7 +20,7 @@ pub struct Crate {
     pub authors: Vec<String>,
     /// Its folder on this machine.
     pub folder: PathBuf,
-    /// Whether its code is in `fringed` or `fringed-lab`; the others are only for building and
+    /// Whether its code is in `fringed`, `fringed-fleet` or `fringed-lab`; the others are only for building and
     /// testing.
     pub shipped: bool,
 }

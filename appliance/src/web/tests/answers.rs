@@ -198,6 +198,7 @@ async fn a_recipe_that_is_none_is_refused_and_not_stored() {
 async fn the_diagnostic_bundle_holds_no_secret() {
     let served = served().await;
     let cookie = served.sign_in().await;
+    std::fs::write(served._folder.path().join("calibration.json"), "{}").unwrap();
     let bundle = served.get("/api/diagnostics.zip").await;
     assert_eq!(bundle.status, 200);
     for name in [
@@ -205,6 +206,7 @@ async fn the_diagnostic_bundle_holds_no_secret() {
         "log.json",
         "recipes.json",
         "fringed.toml",
+        "calibration.json",
         "metrics.txt",
     ] {
         assert!(bundle.body.contains(name), "{name}");

@@ -5,6 +5,7 @@ mod boundaries;
 mod connections;
 mod gate;
 mod page;
+mod results;
 mod tries;
 
 use std::net::SocketAddr;
@@ -70,6 +71,7 @@ async fn served() -> Served {
         log: Default::default(),
         registers: |_| serde_json::json!({ "registers": [] }),
         configuration: "threads = 0\n".into(),
+        calibration_file: Some(folder.path().join("calibration.json")),
         hosts: vec!["sensor.local".into()],
         proxies: vec!["127.9.9.9/32".parse().unwrap()],
     });

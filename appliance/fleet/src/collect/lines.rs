@@ -1,0 +1,64 @@
+//! The lines of an answer, each of which is bounded in length and time.
+
+use super::poll::Trouble;
+use crate::answer::{MOST_LINE, Wrong};
+use crate::http::{ANSWERING, HttpError, next};
+use hyper::body::Incoming;
+use tokio::time::timeout;
+
+/// Reads a body line by line.
+pub(super) struct Lines {
+    body: Incoming,
+    buffer: Vec<u8>,
+    /// Where the next line begins.
+    from: usize,
+}
+
+impl Lines {
+    pub(super) fn of(body: Incoming) -> Self {
+        Self {
+            body,
+            buffer: Vec::new(),
+            from: 0,
+        }
+    }
+
+    /// Whether the next line has arrived already.
+    pub(super) fn has_next(&self) -> bool {
+        self.buffer[self.from..].contains(&b'\n')
+    }
+
+    /// The next line, without its end; none at the end of the answer.
+    ///
+    /// # Errors
+    /// [`Trouble`]
+    pub(super) async fn next(&mut self) -> Result<Option<&[u8]>, Trouble> {
+        let read = timeout(ANSWERING, self.end_of_line()).await;
+        let end = read.map_err(|_| HttpError::Silent(ANSWERING))??;
+        let from = std::mem::replace(&mut self.from, end.map_or(0, |end| end + 1));
+        Ok(end.map(|end| &self.buffer[from..end]))
+    }
+
+    /// Where the next line ends.
+    async fn end_of_line(&mut self) -> Result<Option<usize>, Trouble> {
+        let mut looked = self.from;
+        loop {
+            let found = self.buffer[looked..].iter().position(|&byte| byte == b'\n');
+            let end = found.map_or(self.buffer.len(), |at| looked + at);
+            if end - self.from > MOST_LINE {
+                return Err(Wrong::Long.into());
+            }
+            if found.is_some() {
+                return Ok(Some(end));
+            }
+            self.buffer.drain(..self.from);
+            self.from = 0;
+            looked = self.buffer.len();
+            match next(&mut self.body).await? {
+                Some(piece) => self.buffer.extend_from_slice(&piece),
+                None if self.buffer.is_empty() => return Ok(None),
+                None => return Err(Trouble::Cut),
+            }
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! `fleet.toml`: which heads there are, and where their results go.
+
+mod range;
+
+use crate::error::{Exit, Result};
+use crate::http::Url;
+use serde::Deserialize;
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Every key with its unit, range, default and meaning, as a table in Markdown; docs/fleet.md has
+/// the same.
+pub const KEYS: &str = include_str!("keys.md");
+
+/// The file that is read if it is there and no other is named.
+const FILE: &str = "fleet.toml";
+/// The most heads.
+const MOST_HEADS: usize = 100_000;
+
+/// The file.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Written {
+    store: Option<String>,
+    poll_s: f64,
+    state_s: f64,
+    ca: Option<PathBuf>,
+    heads: Vec<WrittenHeads>,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct WrittenHeads {
+    url: String,
+    #[serde(default)]
+    line: String,
+    serial: Option<String>,
+}
+
+impl Default for Written {
+    fn default() -> Self {
+        Self {
+            store: None,
+            poll_s: 1.0,
+            state_s: 10.0,
+            ca: None,
+            heads: Vec::new(),
+        }
+    }
+}
+
+/// A head that is asked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct HeadConfig {
+    /// Where it answers.
+    pub url: Url,
+    /// The production line.
+    pub line: String,
+    /// The serial that it must have.
+    pub serial: Option<String>,
+}
+
+/// What is checked.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// URL of the store, if one is named.
+    pub store: Option<String>,
+    /// Pause between two questions for results.
+    pub poll: Duration,
+    /// Pause between two questions for the state.
+    pub state: Duration,
+    /// Authorities that certificates are signed by.
+    pub ca: Option<PathBuf>,
+    /// The heads, each address once.
+    pub heads: Vec<HeadConfig>,
+}
+
+/// Where the configuration comes from: options of several commands.
+#[derive(Clone, Debug, Default, clap::Args)]
+pub struct Fleet {
+    /// Configuration; without it and without --heads, fleet.toml if it is there.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Address of a head, or of several: http://10.0.0.{1..30}:8080 (repeatable). Instead of those
+    /// of the configuration.
+    #[arg(long, value_name = "URL")]
+    heads: Vec<String>,
+    /// Where results are: sqlite:FILE or http://HOST:PORT/DATABASE. Takes precedence.
+    #[arg(long, value_name = "URL")]
+    store: Option<String>,
+}
+
+impl Fleet {
+    /// Reads and checks the configuration.
+    ///
+    /// # Errors
+    /// If the file is missing or wrong, or an option is.
+    pub fn read(&self) -> Result<Config> {
+        let file = self.config.as_deref();
+        let usual = Some(Path::new(FILE)).filter(|file| self.heads.is_empty() && file.exists());
+        let mut written = match file.or(usual) {
+            Some(file) => {
+                let missing = Exit::Missing.because(format!("read {}", file.display()));
+                let text = fs::read_to_string(file).map_err(missing)?;
+                let wrong = Exit::Configuration.because(file.display());
+                toml::from_str(&text).map_err(wrong)?
+            }
+            None => Written::default(),
+        };
+        if !self.heads.is_empty() {
+            let asked = self.heads.iter().map(|url| WrittenHeads {
+                url: url.clone(),
+                ..WrittenHeads::default()
+            });
+            written.heads = asked.collect();
+        }
+        let store = self.store.clone().or(written.store.take());
+        checked(written, store)
+    }
+}
+
+fn checked(written: Written, store: Option<String>) -> Result<Config> {
+    let seconds = |key: &str, value: f64, least: f64| match (least..=3600.0).contains(&value) {
+        true => Ok(Duration::from_secs_f64(value)),
+        false => Exit::Configuration.fail(format!("{key} = {value}: write {least} to 3600")),
+    };
+    let poll = seconds("poll_s", written.poll_s, 0.1)?;
+    let state = seconds("state_s", written.state_s, 1.0)?;
+    let mut heads = Vec::new();
+    let mut known = BTreeSet::new();
+    for row in written.heads {
+        let wrong = Exit::Configuration.because(format!("heads.url = {:?}", row.url));
+        let urls = range::expanded(&row.url, MOST_HEADS).map_err(&wrong)?;
+        if row.serial.is_some() && urls.len() > 1 {
+            let words = format!("{}: a serial is of one head: give each a table", row.url);
+            return Exit::Configuration.fail(words);
+        }
+        for text in urls {
+            let url: Url = text.parse().map_err(&wrong)?;
+            if !known.insert(text) {
+                return Exit::Configuration.fail(format!("{url} is there twice: delete one"));
+            }
+            heads.push(HeadConfig {
+                url,
+                line: row.line.clone(),
+                serial: row.serial.clone(),
+            });
+        }
+    }
+    if heads.len() > MOST_HEADS {
+        let words = format!("{} heads: one collector takes {MOST_HEADS}", heads.len());
+        return Exit::Configuration.fail(words);
+    }
+    Ok(Config {
+        store,
+        poll,
+        state,
+        ca: written.ca,
+        heads,
+    })
+}
+
+impl Config {
+    /// The URL of the store.
+    ///
+    /// # Errors
+    /// If none is named.
+    pub fn store(&self) -> Result<&str> {
+        match &self.store {
+            Some(store) => Ok(store),
+            None => Exit::Usage.fail("no store is named: add --store sqlite:plant.db"),
+        }
+    }
+
+    /// The heads, of which there is at least one.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn heads(&self) -> Result<&[HeadConfig]> {
+        if self.heads.is_empty() {
+            let words = "no heads are named: add --heads URL, or write fleet.toml";
+            return Exit::Usage.fail(words);
+        }
+        Ok(&self.heads)
+    }
+}
+
+#[cfg(test)]
+mod tests;

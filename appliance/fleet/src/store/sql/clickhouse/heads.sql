@@ -1,0 +1,1 @@
+SELECT * FROM head_once ORDER BY url

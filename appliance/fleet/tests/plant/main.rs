@@ -1,0 +1,11 @@
+//! The program on simulated heads: nothing is missing and nothing there twice, whatever is killed;
+//! heads that answer what no head answers are named, and harm no other.
+
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+mod clickhouse;
+mod commands;
+mod embedded;
+mod hostile;
+mod impostor;
+mod program;

@@ -1,0 +1,176 @@
+//! Results for a program that collects those of many stations: a line of JSON each.
+//!
+//! Cycles must not pay for it. Database and JSON are the work of a thread of its own that runs only
+//! where a core has nothing else to do; a client that does not receive holds one page of results
+//! until its connection is closed, and no more than a few may ask at a time.
+
+use std::io::{self, Write};
+
+use axum::extract::Query;
+use axum::http::header;
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use tokio::sync::oneshot;
+
+use super::downloads::ToClient;
+use super::problem::{Problem, Result};
+use super::site::Site;
+use crate::history::after::{After, Page};
+use crate::history::{Entry, GaugeEntry};
+use crate::station::Verdict;
+use crate::station::gauge::decision;
+use crate::system::priority;
+
+/// The most results of one answer, and how many it has unless it asks for fewer.
+const MOST: usize = 10_000;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Wanted {
+    #[serde(default)]
+    after: u32,
+    limit: Option<usize>,
+}
+
+/// The first line.
+#[derive(Serialize)]
+struct Header<'a> {
+    serial: &'a str,
+    history: &'a str,
+    first: Option<u32>,
+    last: Option<u32>,
+}
+
+/// Any other line. Lengths in mm, angles in °, volumes in mm³, shares 0…1.
+#[derive(Serialize)]
+struct Line<'a> {
+    serial: &'a str,
+    history: &'a str,
+    seq: u32,
+    at_unix_ms: Option<u64>,
+    clock: &'static str,
+    recipe: u16,
+    fingerprint: &'a str,
+    part_id: u32,
+    press_stroke: u32,
+    verdict: Verdict,
+    error_code: u16,
+    flags: u16,
+    exposure_us: u32,
+    processing_us: u32,
+    coverage: f64,
+    placement: Option<[Option<f64>; 6]>,
+    gauges: Vec<Gauge<'a>>,
+}
+
+#[derive(Serialize)]
+struct Gauge<'a> {
+    slot: u16,
+    name: &'a str,
+    unit: &'a str,
+    value: Option<f64>,
+    sigma: Option<f64>,
+    u: Option<f64>,
+    low: Option<f64>,
+    high: Option<f64>,
+    decision: u16,
+    reason: Option<&'a str>,
+}
+
+pub(super) async fn after(site: Site, Query(wanted): Query<Wanted>) -> Result<Response> {
+    let permit = site.collecting.clone().try_acquire_owned();
+    let crowded = "too many programs collect results: wait until one is done";
+    let permit = permit.map_err(|_| Problem::crowded(crowded))?;
+    let (mut to, body) = ToClient::new();
+    let (begun, beginning) = oneshot::channel::<Result<()>>();
+    let work = move || {
+        // Held until the client has received everything or is gone.
+        let _permit = permit;
+        priority::stand_back();
+        let serial = &*site.station.snapshot().identity.serial;
+        let limit = wanted.limit.unwrap_or(MOST).min(MOST);
+        let walk = site.history.after(wanted.after, limit);
+        match walk.and_then(|mut walk| walk.page().map(|page| (walk, page))) {
+            Err(error) => drop(begun.send(Err(error.into()))),
+            Ok((walk, page)) => {
+                if begun.send(Ok(())).is_ok() {
+                    let written = write(&mut to, serial, walk, page);
+                    to.end(written);
+                }
+            }
+        }
+    };
+    let failed = "reading the history failed; see the log";
+    let thread = std::thread::Builder::new().name("collecting".into());
+    thread.spawn(work).map_err(|_| Problem::broken(failed))?;
+    beginning.await.map_err(|_| Problem::broken(failed))??;
+    Ok(([(header::CONTENT_TYPE, "application/x-ndjson")], body).into_response())
+}
+
+fn write(to: &mut ToClient, serial: &str, mut walk: After, mut page: Page) -> io::Result<()> {
+    let history = walk.id().to_owned();
+    let header = Header {
+        serial,
+        history: &history,
+        first: page.first,
+        last: page.last,
+    };
+    line(to, &header)?;
+    while !page.results.is_empty() {
+        for entry in &page.results {
+            line(to, &of(serial, &history, entry))?;
+        }
+        page = walk.page().map_err(io::Error::other)?;
+    }
+    Ok(())
+}
+
+fn line(to: &mut ToClient, line: &impl Serialize) -> io::Result<()> {
+    serde_json::to_writer(&mut *to, line)?;
+    to.write_all(b"\n")
+}
+
+fn of<'a>(serial: &'a str, history: &'a str, entry: &'a Entry) -> Line<'a> {
+    let (us, clock) = match (entry.time_utc_us, entry.browser_utc_us) {
+        (Some(us), _) => (Some(us), "synchronised"),
+        (None, Some(us)) => (Some(us), "browser"),
+        (None, None) => (None, "none"),
+    };
+    Line {
+        serial,
+        history,
+        seq: entry.seq,
+        at_unix_ms: us.map(|us| us / 1000),
+        clock,
+        recipe: entry.recipe,
+        fingerprint: &entry.fingerprint,
+        part_id: entry.part_id,
+        press_stroke: entry.press_stroke,
+        verdict: entry.verdict,
+        error_code: entry.error_code,
+        flags: entry.flags,
+        exposure_us: entry.exposure_us,
+        processing_us: entry.total_us.saturating_sub(entry.exposure_us),
+        coverage: f64::from(entry.coverage_permille) / 1e3,
+        placement: entry.placement.map(|placement| placement.values),
+        gauges: entry.gauges.iter().map(gauge).collect(),
+    }
+}
+
+fn gauge(gauge: &GaugeEntry) -> Gauge<'_> {
+    Gauge {
+        slot: gauge.slot,
+        name: &gauge.name,
+        unit: &gauge.unit,
+        // What is not valid is no number, whatever was found.
+        value: gauge
+            .value
+            .filter(|_| gauge.decision & decision::VALID != 0),
+        sigma: gauge.sigma,
+        u: gauge.uncertainty,
+        low: gauge.low,
+        high: gauge.high,
+        decision: gauge.decision,
+        reason: gauge.reason.as_deref(),
+    }
+}
