@@ -66,7 +66,7 @@ impl RecipeFile {
             return Ok((choice, None));
         }
         for _ in 0..TURNS {
-            let golden = self.golden(arrays)?;
+            let golden = self.golden(arrays, false)?;
             self.follow(&golden.findings)?;
             choice = choose(self);
             if choice.production == self.production {
@@ -77,17 +77,21 @@ impl RecipeFile {
         Ok((choice, None))
     }
 
-    /// Golden as the recipe measures it.
+    /// Golden as the recipe measures it; leniently also where golden shows too little of a contour.
     ///
     /// # Errors
     /// In words: manifest and arrays do not fit each other, or golden does not have a feature.
-    pub(super) fn golden(&self, arrays: &Arrays) -> Result<Golden, Unsettled> {
+    pub(super) fn golden(&self, arrays: &Arrays, lenient: bool) -> Result<Golden, Unsettled> {
         let recipe = Recipe::fit(self, arrays.clone())?;
         let name = |at: usize| {
             let feature = self.features.get(at)?;
             Some((Part::Feature, feature.name.clone()))
         };
-        Plan::golden(recipe, &self.head()?).map_err(|error| Unsettled {
+        let measure = match lenient {
+            true => Plan::golden_leniently,
+            false => Plan::golden,
+        };
+        measure(recipe, &self.head()?).map_err(|error| Unsettled {
             words: error.to_string(),
             of: match error {
                 PlanError::Unfit { feature, .. } => feature.and_then(name),

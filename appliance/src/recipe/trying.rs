@@ -12,7 +12,7 @@ use super::outline::{Outline, Seen};
 use super::plan::{Golden, Plan};
 use super::regauge::Unsettled;
 use super::store::LoadedRecipe;
-use super::{GaugeFile, Part, Recipe, RecipeFile, Wrong};
+use super::{FeatureFile, GaugeFile, Part, Recipe, RecipeFile, Wrong};
 use crate::station::{GaugeValue, Inspection, MAX_GAUGES};
 use algo::inspect::{FeatureKind, Measure, kinds};
 use hal::bounds::clipped;
@@ -83,6 +83,7 @@ impl Opened {
             arrays: &self.arrays,
             is_over,
             features: Vec::new(),
+            missed: Vec::new(),
         };
         let (file, golden) = trial.settled()?;
         let outline = Outline::from(&file);
@@ -94,6 +95,7 @@ impl Opened {
             trial.take(&seen);
         }
         trial.probe(&file)?;
+        trial.look_closer(&file)?;
         trial.features.sort_by_key(|(at, _)| *at);
         let features = trial.features.into_iter().map(|(_, seen)| seen);
         Ok(Tried {
@@ -134,6 +136,8 @@ struct Trial<'a> {
     wrong: Vec<Wrong>,
     /// What golden has of features, with their places in the list.
     features: Vec<(usize, Value)>,
+    /// The places of features that golden does not have.
+    missed: Vec<usize>,
 }
 
 impl Trial<'_> {
@@ -149,7 +153,7 @@ impl Trial<'_> {
             let settled = file.settle(self.arrays);
             let golden = settled.and_then(|(_, golden)| match golden {
                 Some(golden) => Ok(golden),
-                None => file.golden(self.arrays),
+                None => file.golden(self.arrays, false),
             });
             match golden {
                 Ok(golden) => return Ok((file, Some(golden))),
@@ -176,6 +180,9 @@ impl Trial<'_> {
         let place =
             |(part, name): (Part, String)| Some((part, self.sent.place(part, &name)?, name));
         let of = of.and_then(place);
+        if let Some((Part::Feature, at, _)) = &of {
+            self.missed.push(*at);
+        }
         let is_new = !self.wrong.iter().any(|wrong| wrong.words == words);
         let is_known = of.is_some();
         if is_new {
@@ -233,29 +240,21 @@ impl Trial<'_> {
     /// Measures the features that no gauge is of.
     fn probe(&mut self, file: &RecipeFile) -> Result<(), Over> {
         loop {
-            let left = file.features.iter().filter(|feature| {
-                let place = self.sent.place(Part::Feature, &feature.name);
-                let known = |at| {
-                    let is_wrong = |wrong: &Wrong| matches!(wrong.of, Some((Part::Feature, of, _)) if of == at);
-                    self.features.iter().any(|(of, _)| *of == at) || self.wrong.iter().any(is_wrong)
-                };
-                !place.is_some_and(known)
-            });
-            let gauges = left.take(MAX_GAUGES).enumerate().map(|(at, feature)| {
-                let of = [feature.name.as_str()];
-                GaugeFile::new(at as u16 + 1, &feature.name, probe(feature.kind), &of)
-            });
-            let probing = RecipeFile {
-                gauges: gauges.collect(),
-                datums: Vec::new(),
-                two_frames: false,
-                ..file.clone()
-            };
+            let place = |feature: &FeatureFile| self.sent.place(Part::Feature, &feature.name);
+            let is_wrong = |at| self.wrong.iter().any(|wrong| wrong.is(Part::Feature, at));
+            let is_left =
+                |of: &&FeatureFile| place(of).is_some_and(|at| !self.is_known(at) && !is_wrong(at));
+            let left = file.features.iter().filter(is_left).take(MAX_GAUGES);
+            let mut probing = probing(file, left);
+            // A section outside of the frame is refused even if no gauge is of it.
+            probing
+                .features
+                .retain(|of| of.kind != FeatureKind::Section || !place(of).is_some_and(is_wrong));
             if probing.gauges.is_empty() {
                 return Ok(());
             }
             self.goes_on()?;
-            match probing.golden(self.arrays) {
+            match probing.golden(self.arrays, false) {
                 Ok(mut golden) => {
                     let (_, seen) = golden.judged((&probing).into());
                     self.miss(&seen);
@@ -269,6 +268,43 @@ impl Trial<'_> {
                 }
             }
         }
+    }
+
+    /// Shows what is seen of the features that golden does not have.
+    fn look_closer(&mut self, file: &RecipeFile) -> Result<(), Over> {
+        for at in std::mem::take(&mut self.missed) {
+            let Some(feature) = self.sent.features.get(at).filter(|_| !self.is_known(at)) else {
+                continue;
+            };
+            self.goes_on()?;
+            let mut probing = probing(file, std::iter::once(feature));
+            probing.features.retain(|of| of.name != feature.name);
+            probing.features.push(feature.clone());
+            if let Ok(mut golden) = probing.golden(self.arrays, true) {
+                let (_, seen) = golden.judged((&probing).into());
+                self.take(&seen);
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether what golden has of a feature is known.
+    fn is_known(&self, at: usize) -> bool {
+        self.features.iter().any(|(of, _)| *of == at)
+    }
+}
+
+/// A recipe with a gauge of each of these features and no other.
+fn probing<'a>(file: &RecipeFile, of: impl Iterator<Item = &'a FeatureFile>) -> RecipeFile {
+    let gauges = of.enumerate().map(|(at, feature)| {
+        let of = [feature.name.as_str()];
+        GaugeFile::new(at as u16 + 1, &feature.name, probe(feature.kind), &of)
+    });
+    RecipeFile {
+        gauges: gauges.collect(),
+        datums: Vec::new(),
+        two_frames: false,
+        ..file.clone()
     }
 }
 

@@ -50,7 +50,8 @@ impl Wrong {
         all
     }
 
-    fn is(&self, part: Part, at: usize) -> bool {
+    /// Whether it is with this element of a list.
+    pub(super) fn is(&self, part: Part, at: usize) -> bool {
         let of = self.of.as_ref();
         of.is_some_and(|(own, place, _)| (*own, *place) == (part, at))
     }

@@ -91,6 +91,7 @@ pub(super) fn signal(
     arrays: &mut Arrays,
     sequences: &[RecipeSequence],
     (features, gauges): (&[Feature], &[Gauge]),
+    lenient: bool,
 ) -> Option<GoldenSignal> {
     let values = std::mem::take(&mut arrays.golden_signal);
     let is_contour = |at: usize| features[at].kind.is_contour();
@@ -103,6 +104,7 @@ pub(super) fn signal(
         ratio: finest.ratio,
         shifts: finest.shifts(),
         brighter: 1.0,
+        lenient,
     })
 }
 

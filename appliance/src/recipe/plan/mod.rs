@@ -39,6 +39,7 @@ use refused::Refusal;
 use run::{Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
+use trial::OfGolden;
 
 /// A recipe joined with the head's calibration. Of the recipe's arrays only what production reads
 /// is kept.
@@ -116,11 +117,11 @@ impl Plan {
         Self::join(recipe, calibration, (simulated, None))
     }
 
-    /// Joins them; of several sequences with `only` that one.
+    /// Joins them, for parts or as `golden` says.
     fn join(
         recipe: Recipe,
         calibration: &Calibration,
-        (simulated, only): (bool, Option<usize>),
+        (simulated, golden): (bool, Option<OfGolden>),
     ) -> Result<Self, PlanError> {
         let number = recipe.id.number;
         refused::same_devices(&recipe.conditions, calibration)
@@ -130,13 +131,13 @@ impl Plan {
             reason: words,
             feature,
         };
-        Self::joined(recipe, calibration, (simulated, only)).map_err(unfit)
+        Self::joined(recipe, calibration, (simulated, golden)).map_err(unfit)
     }
 
     fn joined(
         recipe: Recipe,
         calibration: &Calibration,
-        (simulated, only): (bool, Option<usize>),
+        (simulated, of_golden): (bool, Option<OfGolden>),
     ) -> Result<Self, Refusal> {
         let Recipe {
             id,
@@ -171,7 +172,8 @@ impl Plan {
         let surface = golden::surface(size.0, &arrays, golden::offset(&arrays, base));
         let shares = normal_shares(&triangulator, &surface);
         let range = triangulator.function().range();
-        let signal = golden::signal(&mut arrays, &sequences, (&features, &gauges));
+        let lenient = of_golden.is_some_and(|of| of.lenient);
+        let signal = golden::signal(&mut arrays, &sequences, (&features, &gauges), lenient);
         let golden = (&arrays, &shares[..], base);
         let (prepared, shots) = Prepared::all(sequences, &conditions, golden, range)?;
         drop(shares);
@@ -208,7 +210,7 @@ impl Plan {
             names: &demands.features,
             signal,
         };
-        let wanted = |(at, _): &(usize, _)| only.is_none_or(|only| only == *at);
+        let wanted = |(at, _): &(usize, _)| of_golden.is_none_or(|of| of.sequence == *at);
         let runs = prepared
             .into_iter()
             .enumerate()

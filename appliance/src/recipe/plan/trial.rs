@@ -34,8 +34,25 @@ impl Plan {
     /// # Errors
     /// As [`Plan::again`].
     pub fn golden(recipe: Recipe, head: &Calibration) -> Result<Golden, PlanError> {
-        alone(recipe, |recipe| golden(recipe, head))
+        alone(recipe, |recipe| golden(recipe, head, false))
     }
+
+    /// As [`Plan::golden`], also where golden shows too little of a contour.
+    ///
+    /// # Errors
+    /// As [`Plan::again`].
+    pub fn golden_leniently(recipe: Recipe, head: &Calibration) -> Result<Golden, PlanError> {
+        alone(recipe, |recipe| golden(recipe, head, true))
+    }
+}
+
+/// How golden is planned, by one of the sequences alone.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OfGolden {
+    /// By which.
+    pub sequence: usize,
+    /// Whether contours are looked for of which golden shows too little.
+    pub lenient: bool,
 }
 
 /// Golden, measured like a part.
@@ -80,7 +97,7 @@ fn alone<T: Send>(
     thread.install(|| work(recipe))
 }
 
-fn golden(recipe: Recipe, head: &Calibration) -> Result<Golden, PlanError> {
+fn golden(recipe: Recipe, head: &Calibration, lenient: bool) -> Result<Golden, PlanError> {
     let number = recipe.id.number;
     let unfit = |reason: String| PlanError::Unfit {
         number,
@@ -91,7 +108,8 @@ fn golden(recipe: Recipe, head: &Calibration) -> Result<Golden, PlanError> {
     let planned = recipe.sequences.iter().position(|of| !of.is_pair());
     let sequence = planned.ok_or_else(|| unfit("it has no sequence".into()))?;
     let light = recipe.light(sequence);
-    let plan = Plan::join(recipe, head, (false, Some(sequence)))?;
+    let only = OfGolden { sequence, lenient };
+    let plan = Plan::join(recipe, head, (false, Some(only)))?;
     let production = plan.production();
     let (map, decoder) = (production.map(), production.decoder());
     let surface = production.cubics().surface();

@@ -230,10 +230,8 @@ async fn parts_that_are_not_there_have_an_error_each_and_too_many_are_refused() 
     for (at, seq) in [7, 8].into_iter().enumerate() {
         let part = &tried["parts"][at];
         assert_eq!(part["seq"], seq);
-        assert!(
-            part["error"].as_str().unwrap().contains(&seq.to_string()),
-            "{part}"
-        );
+        let error = part["error"].as_str().unwrap();
+        assert!(error.contains("history"), "{part}");
     }
     for (on, status) in [
         (json!(vec![1; 21]), 422),

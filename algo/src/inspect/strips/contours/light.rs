@@ -34,6 +34,9 @@ pub struct GoldenSignal {
     pub shifts: usize,
     /// The modulation by this sequence over that of the signal.
     pub brighter: f64,
+    /// Whether a contour is looked for of which golden shows too little: an editor shows what is
+    /// seen of it.
+    pub lenient: bool,
 }
 
 impl GoldenSignal {
