@@ -20,7 +20,7 @@ export function usualLimits(kind) {
 // "✓ pass 10.012 mm ± 0.004 mm": the decision about golden by words as well as a colour, value and U that a try has found.
 export function gaugeWords(gauge) {
   const of = foundOf("gauges", gauge), unit = unitOf(state.kinds, gauge).unit;
-  if (!of) return [limits(gauge.low, gauge.high, unit), ""];
+  if (!of) return [wayOf(gauge, state.kinds) === "limits" ? limits(gauge.low, gauge.high, unit) : "", ""];
   if (of.value === null) return [`✗ ${of.reason || "no value"}`, "bad"];
   const decision = decided(of);
   return [`${tag(decision).textContent} ${quantity(of.value, unit)}${of.u ? ` ± ${quantity(of.u, unit, 1)}` : ""} · ${limits(of.low, of.high, unit)}${of.too_fine ? " · too fine for this head" : ""}`, decision.pass && !of.too_fine ? "" : "bad"];

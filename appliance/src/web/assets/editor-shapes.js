@@ -7,8 +7,8 @@ const WIDTH_MM = 5;
 // Corners of a circle, and how much their distances from the centre may differ, as a share.
 const ROUND = 16;
 const UNEVEN = 0.06;
-// Share of a section's length that is flat at both ends.
-const FLAT = 0.35;
+// Share of a section's length that is taken to be flat at both ends: its joint need not be in the middle.
+const FLAT = 0.25;
 
 const far = ([u0, v0], [u1, v1]) => Math.hypot(u1 - u0, v1 - v0);
 const tenth = (value) => Math.round(10 * value) / 10;
