@@ -123,6 +123,14 @@ pub enum Wrong {
         /// Who should.
         known: String,
     },
+    /// Two heads say that they are the same one.
+    #[error("serial {serial:?} is that of {url}: give each head a serial of its own")]
+    Taken {
+        /// What both say.
+        serial: String,
+        /// Where the other one answers.
+        url: String,
+    },
     /// Numbers go back.
     #[error("SEQ falls from {from} to {to}")]
     Falls {

@@ -19,7 +19,7 @@ use crate::part::Part;
 use crate::store::{HeadState, Store};
 use poll::{Plant, Poll};
 use std::collections::HashMap;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tally::Tally;
 use tokio::signal::unix::{SignalKind, signal};
@@ -67,6 +67,7 @@ impl Collect {
             poll: config.poll,
             state: config.state,
             ends: HashMap::new(),
+            places: Mutex::default(),
             tally: Tally::default(),
         };
         runtime.block_on(self.collect(config, plant, store))

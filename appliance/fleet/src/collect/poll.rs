@@ -12,8 +12,8 @@ use crate::store::{Batch, Gap, HeadState, Received};
 use rustls::ClientConfig;
 use serde::Deserialize;
 use std::collections::HashMap;
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::mpsc::Sender;
 use tokio::time::{Instant, sleep};
@@ -35,6 +35,8 @@ pub(super) struct Plant {
     pub(super) state: Duration,
     /// How far each history was fetched when the collector began, by serial and history.
     pub(super) ends: HashMap<(String, String), u32>,
+    /// Where each serial answers.
+    pub(super) places: Mutex<HashMap<String, String>>,
     pub(super) tally: Tally,
 }
 
@@ -116,6 +118,10 @@ impl Poll {
             state.history.clear();
         }
         state.seq = plant.end(&state.serial, &state.history);
+        if !state.serial.is_empty() && plant.place(&state.serial, &state.url).is_err() {
+            // Two heads have it: this one is named when it answers.
+            state.serial.clear();
+        }
         Self {
             client: Client::new(config.url.clone(), plant.tls.clone()),
             config,
@@ -170,6 +176,7 @@ impl Poll {
             if !self.plant.part.has(&header.serial) {
                 return Ok(Asked::Foreign);
             }
+            self.plant.place(&header.serial, &self.state.url)?;
             self.state.serial.clone_from(&header.serial);
         } else if self.state.serial != header.serial {
             let (found, known) = (header.serial, self.state.serial.clone());
@@ -360,6 +367,21 @@ impl Poll {
 }
 
 impl Plant {
+    /// Notes where a serial answers.
+    fn place(&self, serial: &str, url: &str) -> Result<(), Wrong> {
+        let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);
+        let place = places
+            .entry(serial.to_owned())
+            .or_insert_with(|| url.to_owned());
+        match place == url {
+            true => Ok(()),
+            false => Err(Wrong::Taken {
+                serial: serial.to_owned(),
+                url: place.clone(),
+            }),
+        }
+    }
+
     /// The last SEQ that was fetched of a history when the collector began.
     fn end(&self, serial: &str, history: &str) -> u32 {
         let key = (serial.to_owned(), history.to_owned());

@@ -23,11 +23,12 @@ fn text(words: &str) -> Pieces {
 }
 
 /// What is sent for each path, and what the log must say about it.
-const KINDS: [(&str, &str); 11] = [
+const KINDS: [(&str, &str); 12] = [
     ("/line", "a line is longer than 65536 bytes"),
     ("/endless", "it sends result 10, behind the last"),
     ("/many", "it sends more than the 10000 results"),
     ("/row", "wrong serial: \"GOOD\" answers"),
+    ("/same", "serial \"SIM00001\" is that of"),
     ("/changes", "wrong serial: \"SECOND\" answers"),
     ("/falls", "SEQ falls from 5 to 4"),
     ("/nan", "a line is no result"),
@@ -66,6 +67,7 @@ fn answers(path: &str, before: usize) -> Pieces {
             Box::new([begin.into_bytes()].into_iter().chain(rows))
         }
         "/row" => below(HEADER, &line("GOOD", 1, "1")),
+        "/same" => below(&HEADER.replace("EVIL", "SIM00001"), ""),
         "/changes" if before.is_multiple_of(2) => below(&HEADER.replace("EVIL", "FIRST"), ""),
         "/changes" => below(&HEADER.replace("EVIL", "SECOND"), ""),
         "/falls" => below(HEADER, &(line("EVIL", 5, "1") + &line("EVIL", 4, "1"))),
@@ -86,7 +88,8 @@ fn a_hostile_head_is_named_and_the_others_are_collected_on() {
     for (kind, words) in KINDS {
         let impostor = Impostor::new(answers, false);
         let url = format!("http://localhost:{}{kind}", impostor.port);
-        let place = Place::new(&[&url, &plant.heads()], "");
+        // The others are asked first.
+        let place = Place::new(&[&plant.heads(), &url], "");
         let collector = place.collect(&place.store(), &[]);
         wait(kind, || {
             let log = place.log();
