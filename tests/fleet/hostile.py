@@ -16,7 +16,7 @@ import sys
 import threading
 import time
 
-from plant import Head
+from plant import Head, are_the_heads
 from servers import ClickHouse, Collector, Folder, Plant, broken, wait_for
 
 SEED = 3
@@ -62,7 +62,7 @@ def main(fleet, heads, seconds):
             query = f"SELECT seq, verdict, gauges.value FROM plant.result_once WHERE serial = '{head.serial}'"
             for seq, verdict, values in store.sql(query):
                 expected, numbers = head.result(seq)
-                if (verdict, values) != (expected, [None if number is None else number / 1e6 for number in numbers]):
+                if verdict != expected or not are_the_heads(values, numbers):
                     broken(f"{head.serial}, {head.fault}, {seq}: {verdict} {values}")
         log = collector.log.read_text()
         unnamed = [

@@ -118,9 +118,9 @@ impl Poll {
             state.history.clear();
         }
         state.seq = plant.end(&state.serial, &state.history);
-        if !state.serial.is_empty() {
-            // Where two have it, the second is named when it answers.
-            let _ = plant.place(&state.serial, &state.url);
+        if !state.serial.is_empty() && plant.place(&state.serial, &state.url).is_err() {
+            // Two heads have it: this one is named when it answers.
+            state.serial.clear();
         }
         Self {
             client: Client::new(config.url.clone(), plant.tls.clone()),

@@ -28,8 +28,8 @@ use tokio_rustls::TlsConnector;
 
 /// Longest wait for a connection.
 const CONNECTING: Duration = Duration::from_secs(5);
-/// Longest wait for the head of an answer, and for each next piece of its body.
-pub const ANSWERING: Duration = Duration::from_secs(30);
+/// Longest wait for the beginning of a head's answer, and for each next piece or line of it.
+pub const ANSWERING: Duration = Duration::from_secs(10);
 /// The most bytes of header lines.
 const HEADER: usize = 64 << 10;
 /// The most bytes of a message about an error that are kept.
@@ -63,6 +63,7 @@ pub struct Client {
     url: Url,
     tls: Option<Arc<ClientConfig>>,
     headers: Vec<(&'static str, String)>,
+    patience: Duration,
     open: Option<SendRequest<Full<Bytes>>>,
 }
 
@@ -73,6 +74,7 @@ impl Client {
             url,
             tls,
             headers: Vec::new(),
+            patience: ANSWERING,
             open: None,
         }
     }
@@ -80,6 +82,12 @@ impl Client {
     /// Adds a header to every request.
     pub fn with_header(mut self, name: &'static str, value: String) -> Self {
         self.headers.push((name, value));
+        self
+    }
+
+    /// Waits longer than for a head.
+    pub fn with_patience(mut self, patience: Duration) -> Self {
+        self.patience = patience;
         self
     }
 
@@ -126,14 +134,16 @@ impl Client {
 
     async fn whole(&mut self, mut body: Incoming, most: usize) -> Result<Vec<u8>, HttpError> {
         let mut all = Vec::new();
-        while let Some(piece) = next(&mut body).await? {
+        loop {
+            let piece = timeout(self.patience, next(&mut body)).await;
+            let piece = piece.map_err(|_| HttpError::Silent(self.patience))??;
+            let Some(piece) = piece else { return Ok(all) };
             if all.len() + piece.len() > most {
                 self.close();
                 return Err(HttpError::Long(most));
             }
             all.extend_from_slice(&piece);
         }
-        Ok(all)
     }
 
     async fn ask(
@@ -197,8 +207,8 @@ impl Client {
             open.ready().await?;
             open.send_request(request).await
         };
-        let answer = timeout(ANSWERING, asked).await;
-        let answer = answer.map_err(|_| HttpError::Silent(ANSWERING))??;
+        let answer = timeout(self.patience, asked).await;
+        let answer = answer.map_err(|_| HttpError::Silent(self.patience))??;
         self.open = Some(open);
         Ok(answer)
     }
@@ -238,8 +248,7 @@ async fn speak(
 /// [`HttpError`]
 pub async fn next(body: &mut Incoming) -> Result<Option<Bytes>, HttpError> {
     loop {
-        let frame = timeout(ANSWERING, body.frame()).await;
-        match frame.map_err(|_| HttpError::Silent(ANSWERING))? {
+        match body.frame().await {
             None => return Ok(None),
             Some(frame) => {
                 // What is not data are trailers.

@@ -12,9 +12,12 @@ use hyper::body::Bytes;
 use rustls::ClientConfig;
 use serde::ser::{Serialize, SerializeMap as _, Serializer};
 use std::sync::Arc;
+use std::time::Duration;
 
 /// The most bytes of an answer: a line for each of 100,000 heads, or each of their gauges.
 const MOST: usize = 512 << 20;
+/// Longest wait for an answer: a question about billions of rows takes a while.
+const ANSWERING: Duration = Duration::from_secs(60);
 /// An insertion into a cluster is done when the rows are where they belong, not when they are
 /// spooled on the server that was asked.
 const SETTINGS: &str = "&insert_distributed_sync=1&output_format_json_quote_64bit_integers=0";
@@ -42,7 +45,8 @@ impl ClickHouse {
             return Err("name the database: http://HOST:8123/plant".into());
         }
         let client = |host: &str| {
-            let client = Client::new(format!("{scheme}://{host}").parse::<Url>()?, tls.clone());
+            let url: Url = format!("{scheme}://{host}").parse()?;
+            let client = Client::new(url, tls.clone()).with_patience(ANSWERING);
             Ok(match login {
                 Some((user, key)) => client
                     .with_header("X-ClickHouse-User", user.into())

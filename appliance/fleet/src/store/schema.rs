@@ -23,7 +23,8 @@ const TABLES: [(&str, &str, &str); 3] = [
 ];
 
 /// Statements that make tables and views, where they are not there yet; each ends with `;` at the
-/// end of a line.
+/// end of a line. Those of a cluster are of the database `plant`: ClickHouse 18.16 works
+/// `currentDatabase()` out again when it starts, and then there is none.
 pub fn schema(kind: Kind) -> String {
     let (tables, views) = match kind {
         Kind::Sqlite => (
@@ -67,7 +68,7 @@ fn of_servers(cluster: bool) -> String {
         if cluster {
             tables += &format!(
                 "\nCREATE TABLE IF NOT EXISTS {name} AS {name}_local\n    \
-                 ENGINE = Distributed(plant, currentDatabase(), {name}_local, cityHash64({key}));\n"
+                 ENGINE = Distributed(plant, plant, {name}_local, cityHash64({key}));\n"
             );
         }
     }
