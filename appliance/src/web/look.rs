@@ -58,7 +58,6 @@ const DIRECTION: &str = "along the normal";
 
 /// How fine a surface is: every 2^level-th pixel, as fine as other maps if left out.
 #[derive(Clone, Copy, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub(super) struct Level {
     level: Option<u32>,
 }
