@@ -389,6 +389,12 @@ export async function editor({ browser, program, step, folder, running = null })
       await page.click("#question-choices button.strong");
       await saved(page);
       assert.equal((await recipe(page)).name, "mine");
+      // What was stored is edited as it was: limits that come from golden still do.
+      await edit(page);
+      const { gauges } = JSON.parse(await list(page)), own = gauges.filter(({ golden }) => golden);
+      assert.ok(own.length && own.every(({ low, plus }) => low === undefined && plus > 0), JSON.stringify(own));
+      assert.deepEqual((await found(page)).problems.filter(({ refused }) => refused), []);
+      await leave(page);
     });
 
     assert.deepEqual(complaints, [], "the browser complains");
