@@ -22,6 +22,7 @@ pub mod simulation;
 mod site;
 pub mod slots;
 mod tries;
+mod turns;
 pub mod view;
 
 mod downloads;

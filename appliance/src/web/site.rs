@@ -12,7 +12,7 @@ use tokio::sync::{Mutex, Semaphore, oneshot};
 
 use super::problem::{Problem, Result};
 use super::slots::Slots;
-use super::tries::Tries;
+use super::turns::Tries;
 use crate::head::calibration::Current;
 use crate::history::Reader;
 use crate::production::commissioning::Commission;

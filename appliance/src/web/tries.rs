@@ -6,9 +6,6 @@
 //! for the one that was tried last.
 
 use std::collections::HashMap;
-use std::collections::hash_map::DefaultHasher;
-use std::hash::{Hash as _, Hasher as _};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use axum::body::Body;
@@ -19,7 +16,6 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
-use tokio::sync::watch;
 
 use super::body;
 use super::gate::{signed_in, token};
@@ -90,60 +86,6 @@ impl<'de> Deserialize<'de> for Asked {
     }
 }
 
-/// The tries that are being answered, by session.
-#[derive(Clone, Default)]
-pub(super) struct Tries(Arc<Mutex<Inside>>);
-
-#[derive(Default)]
-struct Inside {
-    number: u64,
-    running: HashMap<u64, (u64, watch::Sender<()>)>,
-}
-
-/// A try that is being answered; dropped, it is over.
-struct Turn {
-    tries: Tries,
-    session: u64,
-    number: u64,
-    /// Closed when it is over.
-    open: watch::Receiver<()>,
-}
-
-impl Tries {
-    fn inside(&self) -> MutexGuard<'_, Inside> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Begins a try of a session; the one before is over.
-    fn begin(&self, token: &str) -> Turn {
-        let mut hash = DefaultHasher::new();
-        token.hash(&mut hash);
-        let session = hash.finish();
-        let (sender, open) = watch::channel(());
-        let mut inside = self.inside();
-        inside.number += 1;
-        let number = inside.number;
-        inside.running.insert(session, (number, sender));
-        drop(inside);
-        Turn {
-            tries: self.clone(),
-            session,
-            number,
-            open,
-        }
-    }
-}
-
-impl Drop for Turn {
-    fn drop(&mut self) {
-        let mut inside = self.tries.inside();
-        let own = inside.running.get(&self.session);
-        if own.is_some_and(|(number, _)| *number == self.number) {
-            inside.running.remove(&self.session);
-        }
-    }
-}
-
 fn superseded() -> Problem {
     let words = "try an edit: this session has asked for a newer one";
     Problem::busy(words).with("why", "superseded")
@@ -164,7 +106,7 @@ pub(super) async fn attempt(
         return Err(Problem::unfit(words));
     }
     let mut turn = site.tries.begin(token(&headers).unwrap_or_default());
-    let open = turn.open.clone();
+    let watched = turn.watched();
     let worked = async {
         // Waiting here takes no thread from other requests.
         let mut opened = site.opened.clone().lock_owned().await;
@@ -172,14 +114,14 @@ pub(super) async fn attempt(
         let failed = "trying the edit failed; see the log";
         let work = move || {
             priority::give_way();
-            let is_over = || open.has_changed().is_err();
+            let is_over = || watched.is_over();
             tried(&site, number, asked, (&mut opened, &is_over))
         };
         alone("trying", failed, work).await?
     };
     tokio::select! {
         answer = worked => answer.map(Json),
-        _ = turn.open.changed() => Err(superseded()),
+        () = turn.over() => Err(superseded()),
     }
 }
 
@@ -305,21 +247,6 @@ fn kept(site: &Site, (open, tried): (&Opened, &Tried), seq: u32) -> Result<(Valu
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn of_one_session_the_newest_try_is_open_and_other_sessions_do_not_matter() {
-        let tries = Tries::default();
-        let is_over = |turn: &Turn| turn.open.has_changed().is_err();
-        let (first, other) = (tries.begin("a"), tries.begin("b"));
-        assert!(!is_over(&first) && !is_over(&other));
-        let second = tries.begin("a");
-        assert!(is_over(&first) && !is_over(&second) && !is_over(&other));
-        // One that was given up does not end the newer one.
-        drop(first);
-        assert!(!is_over(&second));
-        drop((second, other));
-        assert!(tries.inside().running.is_empty());
-    }
 
     #[test]
     fn an_edit_keeps_the_refusals_of_its_own_keys_beside_what_it_is_tried_on() {
