@@ -190,7 +190,7 @@ try {
     const label = await handle.getAttribute("aria-label");
     await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
     await page.mouse.down();
-    await page.mouse.move(box.x - 40, box.y - 30, { steps: 4 });
+    await page.mouse.move(box.x + 40, box.y + 30, { steps: 4 });
     await page.mouse.up();
     const moved = await page.locator("#editor-regions .handle").first().getAttribute("aria-label");
     assert.notEqual(moved, label);

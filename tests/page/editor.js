@@ -334,9 +334,10 @@ export async function editor({ browser, program, step, folder, running = null })
       const [moved, times] = await other.evaluate(() => [document.querySelector("#editor-regions .region.chosen").getBoundingClientRect().y, window.pictures]);
       await other.mouse.up();
       assert.ok(Math.abs(moved - box.y) > 10, "nothing was dragged");
-      const gaps = times.slice(1).map((at, place) => at - times[place]).sort((one, more) => one - more), median = gaps[Math.floor(gaps.length / 2)];
-      console.log(`  a picture each ${median.toFixed(1)} ms, 90 % within ${gaps[Math.floor(0.9 * gaps.length)].toFixed(1)} ms`);
-      assert.ok(median <= FRAME_MS, `${median} ms`);
+      // Most pictures are in time even if those in which something moves are late.
+      const gaps = times.slice(1).map((at, place) => at - times[place]).sort((one, more) => one - more), slow = gaps[Math.floor(0.9 * gaps.length)];
+      console.log(`  nine of ten pictures within ${slow.toFixed(1)} ms`);
+      assert.ok(slow <= FRAME_MS, `${slow} ms`);
       await leave(other);
       await other.context().close();
     });
@@ -388,6 +389,12 @@ export async function editor({ browser, program, step, folder, running = null })
       await page.click("#question-choices button.strong");
       await saved(page);
       assert.equal((await recipe(page)).name, "mine");
+      // What was stored is edited as it was: limits that come from golden still do.
+      await edit(page);
+      const { gauges } = JSON.parse(await list(page)), own = gauges.filter(({ golden }) => golden);
+      assert.ok(own.length && own.every(({ low, plus }) => low === undefined && plus > 0), JSON.stringify(own));
+      assert.deepEqual((await found(page)).problems.filter(({ refused }) => refused), []);
+      await leave(page);
     });
 
     assert.deepEqual(complaints, [], "the browser complains");

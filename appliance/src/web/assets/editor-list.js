@@ -47,7 +47,8 @@ export function waysOf(gauge, kinds) {
   return own.reduce((ways, { of: [way] }) => (ways.includes(way) ? ways : ways.concat(way)), []);
 }
 export function wayOf(gauge, kinds) {
-  return waysOf(gauge, kinds).find((way) => kinds.limits.some(({ name, of }) => of.length === 1 && of[0] === way && gauge[name] !== undefined)) || "limits";
+  // A stored gauge also has the limits that were worked out.
+  return waysOf(gauge, kinds).reverse().find((way) => kinds.limits.some(({ name, of }) => of.length === 1 && of[0] === way && gauge[name] !== undefined)) || "limits";
 }
 
 // Makes a step of what has changed since the list was `before`.
