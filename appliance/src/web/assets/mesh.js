@@ -5,7 +5,7 @@ import { draw } from "./element.js";
 const JUMP = 3;
 // The word for "no value".
 const NONE = 65535;
-// How far around a line heights are looked for, in their own distances.
+// How far around a line heights are sought, in their distances.
 const FAR = [1.5, 5, 12];
 
 // The heights of an answer: words for x, y and z, and what they are in mm.

@@ -54,7 +54,7 @@ flat in vec4 ink;
 out vec4 colour;
 void main() { colour = ink; }`;
 
-// Numbers of a piece of a line: both ends, colour with opacity, width.
+// Of a piece of a line: both ends, colour with opacity, width.
 const PIECE = [3, 3, 4, 1], SIZE = 11;
 
 function program(gl, vertex, fragment) {
@@ -139,7 +139,7 @@ export function surface(canvas, antialias) {
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, strokes);
       gl.depthMask(true);
     },
-    // Gives memory back.
+    // Frees memory.
     free() {
       const held = gl.getExtension("WEBGL_lose_context");
       if (held) held.loseContext();

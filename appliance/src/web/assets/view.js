@@ -98,7 +98,7 @@ export function viewOf(picture) {
         put();
       }
     } catch (error) {
-      // An older part is not shown as this one.
+      // No older part is shown as this one.
       problem = error.message;
       held = null;
       redraw();
