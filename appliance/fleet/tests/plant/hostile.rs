@@ -42,7 +42,12 @@ const KINDS: [(&str, &str); 12] = [
 ];
 
 fn answers(path: &str, before: usize) -> Pieces {
-    let below = |header: &str, rows: &str| text(&format!("{HEAD}{header}\n{rows}"));
+    let below = |header: &str, rows: &str| {
+        let body = format!("{header}\n{rows}");
+        let length = body.len();
+        let head = HEAD.replace("\r\n\r\n", &format!("\r\nContent-Length: {length}\r\n\r\n"));
+        text(&(head + &body))
+    };
     let kind = path.split("/api/").next().unwrap();
     match kind {
         "/line" => {
