@@ -21,7 +21,7 @@ class Result:
 
     def __init__(self, serial, line, cells):
         self.serial, self.line = serial, line
-        self.seq, self.verdict = int(cells["seq"]), cells["verdict"]
+        self.recipe, self.verdict = cells["recipe"], cells["verdict"]
         time = datetime.fromisoformat(cells["time_utc"].replace("Z", "+00:00"))
         self.at = math.floor(time.timestamp())
         names = [name.removesuffix(" decision") for name in cells if name.endswith(" decision")]
@@ -130,10 +130,11 @@ def least_capable(asked):
 
 
 def hourly(asked):
+    """The view has a row per head, recipe and gauge."""
     hours = grouped(asked.every, lambda one: one.at // HOUR * HOUR)
     for hour, found in hours.items():
         if asked.begin <= hour <= asked.end:
-            heads = grouped(found, lambda one: one.serial).values()
+            heads = grouped(found, lambda one: (one.serial, one.recipe)).values()
             yield [text(hour), min(cpk([one for one in head if one.gauges.get(asked.gauge, [None])[0] is not None], asked.gauge) for head in heads)]
 
 

@@ -82,9 +82,9 @@ def main(fleet, heads, seconds, gone):
         shares = [servers[at].sql("SELECT uniqExact(serial) FROM plant.result_local")[0][0] for at in (0, 2)]
         if sum(shares) != heads or min(shares) == 0:
             broken(f"the shards have {shares} of {heads} heads")
-        end = int(time.time())
+        begin = plant.said["start_unix_ms"] // 1000
         for title, sql in panels_of("results.json"):
-            shown = other.sql(sql_of(sql, end - seconds - 60, end, [""], gauge="deviation"), database="plant")
+            shown = other.sql(sql_of(sql, begin, begin + seconds, [""], gauge="deviation"), database="plant")
             if not shown and title not in ("Heads that are silent", "Cpk of one gauge per hour"):
                 broken(f"{title}: nothing is shown of a cluster")
         for collector in collectors:

@@ -20,6 +20,7 @@ CONFIG = """<yandex>
 <path>{folder}/data/</path><tmp_path>{folder}/tmp/</tmp_path><format_schema_path>{folder}/formats/</format_schema_path>
 <users_config>{folder}/users.xml</users_config><default_profile>default</default_profile><default_database>default</default_database>
 <mark_cache_size>67108864</mark_cache_size><timezone>UTC</timezone>
+<merge_tree><old_parts_lifetime>5</old_parts_lifetime></merge_tree>
 {cluster}
 </yandex>
 """

@@ -42,7 +42,12 @@ const KINDS: [(&str, &str); 12] = [
 ];
 
 fn answers(path: &str, before: usize) -> Pieces {
-    let below = |header: &str, rows: &str| text(&format!("{HEAD}{header}\n{rows}"));
+    let below = |header: &str, rows: &str| {
+        let body = format!("{header}\n{rows}");
+        let length = body.len();
+        let head = HEAD.replace("\r\n\r\n", &format!("\r\nContent-Length: {length}\r\n\r\n"));
+        text(&(head + &body))
+    };
     let kind = path.split("/api/").next().unwrap();
     match kind {
         "/line" => {
@@ -78,6 +83,7 @@ fn answers(path: &str, before: usize) -> Pieces {
         "/cut" => below(HEADER, &line("EVIL", 1, "1")[..50]),
         "/status" => text("HTTP/1.1 500 Wrong\r\nContent-Length: 12\r\n\r\nout of order"),
         "/garbage" => text("SSH-2.0-OpenSSH\r\n\r\n"),
+        _ if !path.contains("after=0&") => below(HEADER, ""),
         _ => below(HEADER, &line("EVIL", 1, "1")),
     }
 }

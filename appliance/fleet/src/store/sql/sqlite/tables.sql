@@ -22,8 +22,9 @@ CREATE TABLE IF NOT EXISTS result (
     placement TEXT,
     -- As the head sent them, as JSON: read gauge_once.
     gauges TEXT NOT NULL,
+    -- With row numbers of its own: without them each row, longer than a quarter of a page, takes a page more.
     PRIMARY KEY (serial, history, seq)
-) WITHOUT ROWID;
+);
 CREATE INDEX IF NOT EXISTS result_at ON result (at);
 
 -- Results that a head deleted before anybody fetched them: first to last SEQ.
