@@ -364,7 +364,8 @@ export async function editor({ browser, program, step, folder, running = null })
 
     await step("unsaved changes are not lost unasked, and two people do not undo each other", async () => {
       if (await page.isHidden("#editor")) await edit(page);
-      await page.fill("#editor-name", "draft");
+      await page.click("#row-features-0");
+      await page.click("#gauge-kinds button >> text=/^mean height$/");
       await page.click("#editor-close");
       await page.waitForSelector("#question:not([hidden])");
       await page.keyboard.press("Escape");
