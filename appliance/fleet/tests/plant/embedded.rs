@@ -1,6 +1,7 @@
 //! The embedded store.
 
 use super::program::*;
+use fringed_fleet::answer::{Gauge, Row};
 use std::time::Duration;
 
 /// Results that each head makes, and how many a second.
@@ -32,12 +33,12 @@ fn a_collector_that_is_killed_again_and_again_leaves_nothing_out() {
     assert_eq!(collector.terminate(), Some(0));
     // What is stored is what the head says.
     let said = answer(&plant, "/h/0007/api/results?after=16&limit=1");
-    let said: serde_json::Value = serde_json::from_str(said.lines().nth(1).unwrap()).unwrap();
+    let said: Row = serde_json::from_str(said.lines().nth(1).unwrap()).unwrap();
     let query = "SELECT gauges, at FROM result WHERE serial = 'SIM00007' AND seq = 17";
     let (gauges, at) = numbers(&place, query).remove(0);
-    let gauges: serde_json::Value = serde_json::from_str(&gauges).unwrap();
-    assert_eq!(gauges, said["gauges"]);
-    assert_eq!(at as u64, said["at_unix_ms"].as_u64().unwrap() / 1000);
+    let gauges: Vec<Gauge> = serde_json::from_str(&gauges).unwrap();
+    assert_eq!(gauges, said.gauges);
+    assert_eq!(at as u64, said.at_unix_ms.unwrap() / 1000);
 }
 
 #[test]
@@ -81,9 +82,12 @@ fn what_a_head_deleted_before_it_was_asked_is_a_gap() {
     ];
     let plant = Plant::of(2, &options);
     let place = Place::new(&[&plant.heads()], "");
-    for _ in 0..2 {
+    for times in 1..=2 {
         // A second collector finds the same.
         let collector = place.collect(&place.store(), &[]);
+        wait("a collector", || {
+            place.log().matches("2 heads are asked").count() == times
+        });
         wait("what is kept", || {
             counted(&place).iter().map(|(_, count)| count).sum::<i64>() == 40
         });

@@ -83,6 +83,7 @@ fn answers(path: &str, before: usize) -> Pieces {
         "/cut" => below(HEADER, &line("EVIL", 1, "1")[..50]),
         "/status" => text("HTTP/1.1 500 Wrong\r\nContent-Length: 12\r\n\r\nout of order"),
         "/garbage" => text("SSH-2.0-OpenSSH\r\n\r\n"),
+        _ if !path.contains("after=0&") => below(HEADER, ""),
         _ => below(HEADER, &line("EVIL", 1, "1")),
     }
 }
