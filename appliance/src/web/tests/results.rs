@@ -19,7 +19,7 @@ fn entry(seq: u32) -> Entry {
     };
     Entry {
         seq,
-        time_utc_us: Some(1_000_000 * u64::from(seq) + 999).filter(|_| seq % 2 == 0),
+        time_utc_us: Some(1_000_000 * u64::from(seq) + 999).filter(|_| seq.is_multiple_of(2)),
         boot_id: "0000000a".into(),
         uptime_s: seq,
         fingerprint: "00c0ffee".into(),
@@ -53,7 +53,7 @@ fn whole(body: &str) -> String {
     while let Some((length, chunk)) = rest.split_once("\r\n") {
         let length = usize::from_str_radix(length, 16).unwrap();
         all += &chunk[..length];
-        rest = &chunk[length..].trim_start_matches("\r\n");
+        rest = chunk[length..].trim_start_matches("\r\n");
     }
     all
 }
