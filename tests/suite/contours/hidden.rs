@@ -8,7 +8,7 @@ use crate::placement::bed;
 use crate::two_frames::{samples, with_left};
 use algo::inspect::State;
 use appliance::station::{Inspection, Verdict};
-use sim::parts::{Hole, Joggle, Plate};
+use sim::parts::Plate;
 use sim::{Part, Placement};
 use std::time::Instant;
 
@@ -30,11 +30,6 @@ fn unseen(line: &Line, found: &Inspection) -> Vec<String> {
         of.state == State::Unseen
     });
     unseen.map(|of| line.features[of.feature].clone()).collect()
-}
-
-fn names_one(found: &Inspection, names: &[String]) -> bool {
-    let reason = found.reason.clone().unwrap_or_default();
-    names.iter().any(|name| reason.contains(name.as_str()))
 }
 
 #[test]
@@ -78,55 +73,17 @@ fn holes_under_a_hand_are_unseen() {
 }
 
 #[test]
-fn a_hole_that_lies_outside_of_the_frame_is_unseen() {
+fn holes_of_a_plate_that_lies_partly_beside_the_frame_are_unseen() {
     let mut line = Line::new(&Setting::default());
-    // Half of hole 1 lies beyond the frame's border then.
-    for shift in [20.0, 28.0, 36.0, 44.0] {
+    for shift in [28.0, 44.0, 60.0] {
         let lies = Placement {
             shift_mm: [-shift, 0.0, 0.0],
             ..Placement::default()
         };
         let found = line.inspect(line.setting.plate.clone(), &lies);
         let unseen = unseen(&line, &found);
-        println!("{shift}: {:?} {unseen:?}", found.reason);
-        if !unseen.is_empty() {
-            assert_eq!(found.verdict(), Verdict::Invalid);
-            assert!(found.reason.is_some());
-        }
-    }
-}
-
-#[test]
-fn a_hole_in_the_shadow_of_a_step_is_unseen_or_as_true_as_it_says() {
-    let mut plate = Setting::default().plate;
-    plate.joggle = Some(Joggle {
-        x: 40.0,
-        drop: 3.0,
-        run: 3.0,
-    });
-    plate.holes[1] = Hole {
-        x: 60.0,
-        y: 41.0,
-        radius: 5.0,
-    };
-    let setting = Setting {
-        plate,
-        ..Setting::default()
-    };
-    let mut line = Line::new(&setting);
-    let _ = &mut line;
-    for x in [45.0, 50.0, 55.0] {
-        let mut deeper = setting.plate.clone();
-        deeper.joggle = Some(Joggle {
-            x,
-            drop: 3.0,
-            run: 0.0,
-        });
-        let found = line.inspect(deeper, &Placement::default());
-        println!("{x}: {:?}", found.reason);
-        let unseen = unseen(&line, &found);
-        if !unseen.is_empty() {
-            assert!(names_one(&found, &unseen), "{:?} {unseen:?}", found.reason);
-        }
+        assert!(!unseen.is_empty(), "{shift}: {:?}", found.reason);
+        assert_eq!(found.verdict(), Verdict::Invalid);
+        assert!(found.reason.is_some());
     }
 }

@@ -1,6 +1,6 @@
 //! The lines of an answer, each of which is bounded in length and time.
 
-use super::poll::Trouble;
+use super::trouble::Trouble;
 use crate::answer::{MOST_LINE, Wrong};
 use crate::http::{ANSWERING, HttpError, next};
 use hyper::body::Incoming;

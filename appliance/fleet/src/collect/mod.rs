@@ -9,6 +9,7 @@
 mod lines;
 mod poll;
 mod tally;
+mod trouble;
 mod writer;
 
 use crate::config::{Config, Fleet};

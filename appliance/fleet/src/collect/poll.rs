@@ -3,9 +3,10 @@
 use super::lines::Lines;
 use super::now_ms;
 use super::tally::Tally;
+use super::trouble::Trouble;
 use crate::answer::{Header, Row, Wrong};
 use crate::config::HeadConfig;
-use crate::http::{Client, HttpError, shortened};
+use crate::http::{Client, shortened};
 use crate::log::{self, Severity};
 use crate::part::Part;
 use crate::store::{Batch, Gap, HeadState, Received};
@@ -38,20 +39,6 @@ pub(super) struct Plant {
     /// Where each serial answers.
     pub(super) places: Mutex<HashMap<String, String>>,
     pub(super) tally: Tally,
-}
-
-/// Why a question failed.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum Trouble {
-    /// No answer, or none that says 200.
-    #[error(transparent)]
-    Http(#[from] HttpError),
-    /// An answer that no head gives.
-    #[error(transparent)]
-    Wrong(#[from] Wrong),
-    /// An answer without its end.
-    #[error("the answer ends in the middle of a line")]
-    Cut,
 }
 
 /// What a question came to.
