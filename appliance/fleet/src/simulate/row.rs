@@ -56,8 +56,9 @@ impl Found {
         self.coverage = 900 + (luck >> 24) as u16 % 100;
         let part = |shift: u32| (luck >> shift) as i64 % 256 - 128;
         self.placement = (luck % 64 != 2).then(|| [16, 24, 32, 40, 48].map(part));
-        let unseen =
-            (luck % UNSEEN == 0).then_some((luck >> 40) as usize % head.plant.gauges.len());
+        let unseen = luck
+            .is_multiple_of(UNSEEN)
+            .then_some((luck >> 40) as usize % head.plant.gauges.len());
         let (mut failed, mut doubtful) = (false, false);
         for (place, gauge) in head.plant.gauges.iter().enumerate() {
             if unseen == Some(place) {
