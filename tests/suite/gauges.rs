@@ -10,7 +10,7 @@ use algo::inspect::{FeatureKind, Findings, Measure, Production};
 use algo::simd::Backend;
 use appliance::head::seam;
 use appliance::recipe::archive::{Arrays, pack};
-use appliance::recipe::plan::Plan;
+use appliance::recipe::plan::{Plan, PlanError};
 use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile};
 use appliance::station::{Inspection, Unit, Verdict};
 use hal::frame::Frame;
@@ -81,6 +81,10 @@ pub(crate) fn features(plate: [[f64; 2]; 4], bead: [[f64; 2]; 4]) -> Vec<Feature
 }
 
 pub(crate) fn plan(bed: &Bed, file: &RecipeFile, arrays: &Arrays) -> Plan {
+    planned(bed, file, arrays).unwrap()
+}
+
+pub(crate) fn planned(bed: &Bed, file: &RecipeFile, arrays: &Arrays) -> Result<Plan, PlanError> {
     let limited = |gauge: &GaugeFile| gauge.low.is_some() || gauge.high.is_some();
     let mut file = RecipeFile {
         judges_nothing: !file.gauges.iter().any(limited),
@@ -90,7 +94,7 @@ pub(crate) fn plan(bed: &Bed, file: &RecipeFile, arrays: &Arrays) -> Plan {
         gauge.slot = slot;
     }
     let (bytes, _) = pack(&file, arrays).unwrap();
-    Plan::new(Recipe::from_bytes(&bytes).unwrap(), &bed.calibration, true).unwrap()
+    Plan::new(Recipe::from_bytes(&bytes).unwrap(), &bed.calibration, true)
 }
 
 /// Frames of a sequence of a plan whose patterns are loaded.

@@ -1,10 +1,10 @@
 //! A taught plate in front of a head, and sums over what is measured of many.
 
 use super::plates::{Setting, gauging};
-use crate::gauges::{frames, plan};
+use crate::gauges::{frames, planned};
 use crate::placement::{Bed, bed, taught_within};
 use algo::inspect::State;
-use appliance::recipe::plan::Plan;
+use appliance::recipe::plan::{Plan, PlanError};
 use appliance::recipe::{GaugeFile, RecipeFile};
 use appliance::station::{GaugeValue, Inspection};
 use sim::parts::Plate;
@@ -46,7 +46,25 @@ impl Line {
         file.features.extend(features);
         file.datums = datums;
         file.gauges = gauges.iter().map(|(gauge, _)| gauge.clone()).collect();
-        let plan = plan(&bed, &file, &taught.recipe.arrays);
+        let plan = loop {
+            let refused = match planned(&bed, &file, &taught.recipe.arrays) {
+                Ok(plan) => break plan,
+                Err(PlanError::Unfit {
+                    feature: Some(at), ..
+                }) if setting.some => at,
+                Err(error) => panic!("{error}"),
+            };
+            // What golden does not show is not measured, nor what refers to it.
+            let name = file.features.remove(refused).name;
+            println!("golden does not show {name}");
+            file.datums.retain(|datum| !datum.of.contains(&name));
+            let systems: Vec<String> = file.datums.iter().map(|of| of.name.clone()).collect();
+            gauges.retain(|(gauge, _)| {
+                let datum = gauge.datum.as_ref().is_none_or(|of| systems.contains(of));
+                datum && !gauge.of.contains(&name)
+            });
+            file.gauges = gauges.iter().map(|(gauge, _)| gauge.clone()).collect();
+        };
         bed.head
             .load(plan.rasters(&bed.calibration).unwrap())
             .unwrap();

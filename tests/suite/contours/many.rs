@@ -117,6 +117,7 @@ fn a_floor_a_whole_number_of_fringes_lower_is_never_taken_for_the_sheet() {
         };
         let setting = Setting {
             plate,
+            some: true,
             ..Setting::default()
         };
         let mut judged = Judged::default();

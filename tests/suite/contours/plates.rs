@@ -206,6 +206,8 @@ pub(super) struct Setting {
     /// Of the part as taught about y, degrees.
     pub(super) tilt_deg: f64,
     pub(super) thickness_mm: Option<f64>,
+    /// Whether what golden does not show is left out.
+    pub(super) some: bool,
     /// Counts; `None` for a quiet camera.
     pub(super) noise: Option<f64>,
 }
@@ -219,6 +221,7 @@ impl Default for Setting {
             ambient: 0.04,
             tilt_deg: 0.0,
             thickness_mm: Some(0.0),
+            some: false,
             noise: Some(Noise::PAPER),
         }
     }
