@@ -92,7 +92,9 @@ export function linesOn(heights, mesh, frame) {
     if (blue === undefined) continue;
     const lines = shape.tagName === "path" ? shape.getAttribute("d").split(/(?=M)/).map((d) => draw("path", { d })) : [shape];
     for (const line of lines) {
-      const length = line.getTotalLength(), steps = Math.ceil(length / most) || 1;
+      const length = line.getTotalLength(), steps = Math.ceil(length / most);
+      // A path without a place has no point, either.
+      if (!length) continue;
       let last = null, from = null;
       for (let step = 0; step <= steps; step += 1) {
         const at = line.getPointAtLength(length * step / steps), place = onto(heights, mesh, at.x - 0.5, at.y - 0.5);
