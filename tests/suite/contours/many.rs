@@ -109,6 +109,7 @@ fn depth_of(line: &Line, count: f64) -> f64 {
 #[ignore = "takes minutes: `.ci/run full`"]
 fn a_floor_a_whole_number_of_fringes_lower_is_never_taken_for_the_sheet() {
     let dark = Line::new(&Setting::default());
+    let mut wrong = Vec::new();
     for count in 1..=8 {
         let depth = depth_of(&dark, f64::from(count));
         let plate = Plate {
@@ -124,8 +125,11 @@ fn a_floor_a_whole_number_of_fringes_lower_is_never_taken_for_the_sheet() {
         let name = format!("{count} fringes, {depth:.1} mm");
         Line::new(&setting).judge(&name, 4, &mut judged);
         let [_, within, _] = judged.figures();
-        assert!(within >= 0.9 || judged.errors == 0.0, "{name}: {within}");
+        if within < 0.93 && judged.errors > 0.0 {
+            wrong.push((name, within));
+        }
     }
+    assert!(wrong.is_empty(), "{wrong:?}");
 }
 
 #[test]

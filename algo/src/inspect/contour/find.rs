@@ -57,6 +57,9 @@ pub struct Contour<const N: usize> {
     pub covariance: [[f64; N]; N],
     /// σ of the camera's blur at its rim, px.
     pub blur: f64,
+    /// By how much more than above a dark background light that is off the model moves an edge: the
+    /// material's light over what the background's differs from it, at least 1.
+    pub faint: f64,
     /// mm per px.
     pub pixel: f64,
     /// Points of its rim.
@@ -87,6 +90,7 @@ pub fn find<const N: usize>(
         parameters: *expected,
         covariance: [[0.0; N]; N],
         blur: FIRST_BLUR,
+        faint: 1.0,
         pixel: 0.0,
         points: Vec::new(),
         outcomes: Vec::new(),
@@ -228,6 +232,7 @@ impl<S, V: View> Search<'_, S, V> {
         contour.points.clear();
         contour.outcomes.clear();
         let (mut sharpness, mut face) = (Sharpness::default(), [0.0; 2]);
+        let mut faint = 0.0;
         let Room {
             pieces,
             seen,
@@ -252,11 +257,14 @@ impl<S, V: View> Search<'_, S, V> {
             contour.outcomes.push(outcome);
             if let Some(fit) = fit.filter(|_| outcome == Outcome::Accepted) {
                 sharpness.add(&fit);
+                faint += 1.0 / (fit.contrast * fit.contrast);
                 contour.points.push(point(&problem, &fit));
                 add_face(&problem, &fit, &mut face);
             }
         }
         contour.blur = sharpness.adapted(contour.blur);
+        let count = contour.points.len().max(1) as f64;
+        contour.faint = libm::sqrt(faint / count).max(1.0);
         contour.face = (face[0] / face[1], 1.0 / libm::sqrt(face[1]));
     }
 

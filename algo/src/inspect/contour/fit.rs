@@ -78,6 +78,8 @@ pub struct Fit {
     pub material: f64,
     /// The brightness of the background over the material's.
     pub background: f64,
+    /// By how much background and material differ, over the material.
+    pub contrast: f64,
     /// What the cost would be if all of the material's light were left.
     pub strength: f64,
     /// The angle of b, turns.
@@ -222,6 +224,7 @@ impl<V: View> Problem<'_, V> {
             right: [weight * sums[3], weight * sums[4]],
             material: b.re,
             background: a.length() / b.length(),
+            contrast: (b - a).length() / b.length(),
             strength: weight * b.square() * count,
             off: libm::fabs(b.turns()),
         })

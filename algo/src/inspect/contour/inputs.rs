@@ -66,7 +66,9 @@ pub fn inputs<const N: usize>(
         off: contour.response(shape, shift),
     };
     let mut inputs = Vec::new();
-    inputs.push(of(Source::Edge, &|_| EDGE_PX * contour.pixel));
+    // Both are of the light of the material: beside a floor nearly in phase it moves an edge farther.
+    let pixel = contour.pixel * contour.faint;
+    inputs.push(of(Source::Edge, &|_| EDGE_PX * pixel));
     inputs.push(of(Source::Rim, &|point| {
         // α is how far the line of sight leans over the material.
         let lean = dot(lean(point), into(point)).max(0.0);
@@ -77,7 +79,7 @@ pub fn inputs<const N: usize>(
         let rate = |point: &Point| shape.derivative(p, point.x, point.y)[i];
         let squares = contour.points.iter().map(|point| rate(point) * rate(point));
         let mut off = [0.0; N];
-        off[i] = PIECE_PX * contour.pixel / libm::sqrt(squares.sum::<f64>());
+        off[i] = PIECE_PX * pixel / libm::sqrt(squares.sum::<f64>());
         inputs.push(Input {
             source: Source::Pixels,
             off,
