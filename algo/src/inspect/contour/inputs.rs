@@ -75,6 +75,11 @@ pub fn inputs<const N: usize>(
         let near = 1.0 + lean - libm::sqrt(1.0 + lean * lean);
         rim * near.max(FAR_SIDE) / libm::sqrt(3.0)
     }));
+    if rim > 0.0 {
+        // The side that leans towards the camera is seen farther around than the other.
+        let aside = |point: &Point| rim * dot(lean(point), into(point)) / libm::sqrt(3.0);
+        inputs.push(of(Source::Rim, &aside));
+    }
     for i in 0..N {
         let rate = |point: &Point| shape.derivative(p, point.x, point.y)[i];
         let squares = contour.points.iter().map(|point| rate(point) * rate(point));
