@@ -64,8 +64,8 @@ impl After {
         &self.id
     }
 
-    /// The next page; the first says where the walk ends. Where results that are next were deleted meanwhile, the walk ends early, so
-    /// that the first page of another one shows what is missing.
+    /// The next page; the first says where the walk ends. Where results that are next were deleted
+    /// meanwhile, the walk ends early, so that the first page of another one shows what is missing.
     ///
     /// # Errors
     /// As [`Reader::results`].

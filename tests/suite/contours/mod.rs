@@ -132,8 +132,14 @@ fn holes_slots_and_edges_are_true_and_as_uncertain_as_they_say() {
 #[test]
 #[ignore = "minutes"]
 fn contours_are_true_with_thick_sheets_bright_floors_real_optics_and_tilts() {
+    judge(settings());
+}
+
+/// Fails if plates in one of these settings are measured with a larger bias than it names, in µm, or
+/// with other scatter or errors than they state.
+fn judge(settings: Vec<(&'static str, Setting, f64)>) {
     let mut wrong = Vec::new();
-    for (name, setting, most) in settings() {
+    for (name, setting, most) in settings {
         let mut judged = Judged::default();
         Line::new(&setting).judge(name, PLACEMENTS, &mut judged);
         let [scatter, within, _] = judged.figures();

@@ -20,8 +20,8 @@ pub struct Crate {
     pub authors: Vec<String>,
     /// Its folder on this machine.
     pub folder: PathBuf,
-    /// Whether its code is in `fringed`, `fringed-fleet` or `fringed-lab`; the others are only for building and
-    /// testing.
+    /// Whether its code is in `fringed`, `fringed-fleet` or `fringed-lab`; the others are only for
+    /// building and testing.
     pub shipped: bool,
 }
 

@@ -16,9 +16,9 @@
 //! `start` finds the contour to a tenth of a pixel on some of its normals. `piece` divides it and
 //! gathers the pixels of each piece, whose levels `sample` demodulates and adds. `fit` finds the
 //! edge of each piece by the profile of `edge` and what `beyond` knows of walls and floors,
-//! [`associate`](crate::math::associate) the shape through the edges, `find` does this until nothing
-//! moves, and `verdict` says whether the contour is found, absent or unseen. `inputs` states what
-//! else is uncertain.
+//! [`associate`](crate::math::associate) the shape through the edges, `find` does this with some of
+//! the pieces until nothing moves and with all of them in the end, and `verdict` says whether the
+//! contour is found, absent or unseen. `inputs` states what else is uncertain.
 //!
 //! # Units
 //! mm in the plane's frame, px in the picture, turns, counts.
