@@ -13,7 +13,7 @@ const MOST_GAUGES: usize = 64;
 const MOST_ID: usize = 64;
 
 /// The first line of an answer.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Header {
     /// The head's serial.
     pub serial: String,
@@ -26,7 +26,7 @@ pub struct Header {
 }
 
 /// A result. Lengths in mm, angles in °, volumes in mm³, shares 0…1.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Row {
     /// The head's serial.
     pub serial: String,
@@ -98,47 +98,24 @@ pub enum Wrong {
     /// It is not what the format says.
     #[error("a line is no {0}: {1}")]
     Json(&'static str, serde_json::Error),
-    /// It is JSON of the right form, with values that no head has.
+    /// It is JSON of the right form, with a value of this key that no head has.
     #[error("{0} of result {1} cannot be")]
     Value(&'static str, u32),
-    /// The header contradicts itself or what was asked for.
+    /// The first and the last of the header contradict each other or the question for results behind
+    /// the third.
+    #[error("its header cannot be: first {0:?}, last {1:?}, asked for results behind {2}")]
+    Header(Option<u32>, Option<u32>, u32),
+    /// A head with this serial answers in place of the one with the second.
     #[error(
-        "its header cannot be: first {first:?}, last {last:?}, asked for results behind {after}"
+        "wrong serial: {0:?} answers, {1:?} did before: if the head was replaced, write serial = {0:?} for it in fleet.toml"
     )]
-    Header {
-        /// The oldest.
-        first: Option<u32>,
-        /// The newest.
-        last: Option<u32>,
-        /// What was asked for.
-        after: u32,
-    },
-    /// Another head answers.
-    #[error(
-        "wrong serial: {found:?} answers, {known:?} did before: if the head was replaced, write serial = {found:?} for it in fleet.toml"
-    )]
-    Serial {
-        /// Who answers.
-        found: String,
-        /// Who should.
-        known: String,
-    },
-    /// Two heads say that they are the same one.
-    #[error("serial {serial:?} is that of {url}: give each head a serial of its own")]
-    Taken {
-        /// What both say.
-        serial: String,
-        /// Where the other one answers.
-        url: String,
-    },
-    /// Numbers go back.
-    #[error("SEQ falls from {from} to {to}")]
-    Falls {
-        /// The larger.
-        from: u32,
-        /// The one behind it.
-        to: u32,
-    },
+    Serial(String, String),
+    /// Another head, at the second address, says that it has the same serial.
+    #[error("serial {0:?} is that of {1}: give each head a serial of its own")]
+    Taken(String, String),
+    /// Numbers go back from the first to the second.
+    #[error("SEQ falls from {0} to {1}")]
+    Falls(u32, u32),
     /// A result that is newer than the newest.
     #[error("it sends result {0}, behind the last of its header, {1:?}")]
     Behind(u32, Option<u32>),
@@ -158,24 +135,12 @@ impl Header {
         let id = |id: &str| {
             (1..=MOST_ID).contains(&id.len()) && id.bytes().all(|b| b.is_ascii_graphic())
         };
-        let ordered = match (header.first, header.last) {
-            (Some(first), Some(last)) => first <= last,
-            (None, None) => true,
-            _ => false,
-        };
+        let (first, last) = (header.first, header.last);
+        let ordered = first.is_some() == last.is_some() && first <= last;
         if !id(&header.serial) || !id(&header.history) || !ordered {
-            return Err(header.impossible(0));
+            return Err(Wrong::Header(first, last, 0));
         }
         Ok(header)
-    }
-
-    /// That it cannot be the answer to a question for what is behind `after`.
-    pub fn impossible(&self, after: u32) -> Wrong {
-        Wrong::Header {
-            first: self.first,
-            last: self.last,
-            after,
-        }
     }
 }
 
@@ -188,16 +153,10 @@ impl Row {
         let row: Self =
             serde_json::from_slice(line).map_err(|error| Wrong::Json("result", error))?;
         if row.serial != header.serial {
-            return Err(Wrong::Serial {
-                found: row.serial,
-                known: header.serial.clone(),
-            });
+            return Err(Wrong::Serial(row.serial, header.serial.clone()));
         }
         if row.seq <= before {
-            return Err(Wrong::Falls {
-                from: before,
-                to: row.seq,
-            });
+            return Err(Wrong::Falls(before, row.seq));
         }
         if header.last.is_none_or(|last| row.seq > last) {
             return Err(Wrong::Behind(row.seq, header.last));
@@ -210,24 +169,18 @@ impl Row {
 
     /// The first key whose value cannot be.
     fn impossible(&self, header: &Header) -> Option<&'static str> {
-        let word = |word: &str, known: &[&str]| known.contains(&word);
+        let clocks = ["synchronised", "browser", "none"];
+        // The store has seconds in 32 bits.
+        let at_s = self.at_unix_ms.unwrap_or(0) / 1000;
+        let is_timed = self.at_unix_ms.is_some() != (self.clock == "none");
         [
             ("history", self.history == header.history),
-            ("verdict", word(&self.verdict, &["PASS", "FAIL", "INVALID"])),
             (
-                "clock",
-                word(&self.clock, &["synchronised", "browser", "none"]),
+                "verdict",
+                ["PASS", "FAIL", "INVALID"].contains(&&*self.verdict),
             ),
-            (
-                "at_unix_ms",
-                self.at_unix_ms.is_none() == (self.clock == "none"),
-            ),
-            // The store has seconds in 32 bits.
-            (
-                "at_unix_ms",
-                self.at_unix_ms
-                    .is_none_or(|ms| ms / 1000 <= u64::from(u32::MAX)),
-            ),
+            ("clock", clocks.contains(&&*self.clock)),
+            ("at_unix_ms", is_timed && at_s <= u64::from(u32::MAX)),
             ("coverage", (0.0..=1.0).contains(&self.coverage)),
             ("gauges", self.gauges.len() <= MOST_GAUGES),
         ]
@@ -261,6 +214,12 @@ mod tests {
         assert_eq!((row.seq, &*row.gauges[0].name), (7, "a\"b"));
         assert_eq!(row.gauges[0].value, None);
         assert_eq!(row.placement.unwrap()[..2], [Some(0.1), None]);
+        // Each key is read, under the name that it is written with.
+        let read = |text: &[u8]| serde_json::from_slice::<serde_json::Value>(text).unwrap();
+        let written = serde_json::to_vec(&row).unwrap();
+        let whole = LINE.replace("[0.1,null,0,0,0,0]", "[0.1,null,0.0,0.0,0.0,0.0]");
+        let whole = whole.replace("\"low\":-1,", "\"low\":-1.0,");
+        assert_eq!(read(&written), read(whole.as_bytes()));
     }
 
     #[test]

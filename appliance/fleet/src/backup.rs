@@ -5,18 +5,16 @@
 //! which of them a head has. What is there already is neither fetched nor written again. A head does
 //! not send the phase maps of a measured plate: copy `calibration/` of its state folder.
 
-use crate::config::{Fleet, HeadConfig};
-use crate::error::{Exit, Failure, Result};
-use crate::http::{Client, HttpError, trusting};
+use crate::config::Fleet;
+use crate::error::{Exit, Result};
+use crate::http::Client;
 use crate::log::{self, Severity};
-use rustls::ClientConfig;
-use serde::Deserialize;
-use serde_json::json;
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use sha2::{Digest as _, Sha256};
 use std::fs;
 use std::io::{Cursor, Read as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use tokio::task::JoinSet;
 use zip::ZipArchive;
 use zip::result::ZipError;
@@ -41,27 +39,12 @@ pub struct Backup {
     json: bool,
 }
 
-/// What of `GET /api/recipes` is read.
-#[derive(Deserialize)]
-struct Recipes {
-    recipes: Vec<Recipe>,
-}
-
-#[derive(Deserialize)]
+/// What of a recipe in `GET /api/recipes` is read.
+#[derive(Deserialize, Serialize)]
 struct Recipe {
     number: u16,
     name: String,
     fingerprint: String,
-}
-
-#[derive(Deserialize)]
-struct Snapshot {
-    identity: Identity,
-}
-
-#[derive(Deserialize)]
-struct Identity {
-    serial: String,
 }
 
 impl Backup {
@@ -69,21 +52,37 @@ impl Backup {
     ///
     /// # Errors
     /// If the folder cannot be written; if a head could not be asked, after the others were.
-    pub fn run(&self) -> Result<()> {
+    pub async fn run(&self) -> Result<()> {
         let config = self.fleet.read()?;
-        let heads = config.heads()?.to_vec();
-        let tls = config.ca.as_deref().map(trusting).transpose()?;
+        let count = config.heads()?.len();
         for part in ["recipes", "calibrations", "configurations", "heads"] {
             let folder = self.folder.join(part);
             let failed = Exit::CannotCreate.because(format!("create {}", folder.display()));
             fs::create_dir_all(&folder).map_err(failed)?;
         }
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build();
-        let runtime = runtime.map_err(Exit::Software.because("start"))?;
-        let count = heads.len();
-        let (written, failed) = runtime.block_on(all(&self.folder, heads, tls))?;
+        let (mut written, mut failed) = (0, 0);
+        let mut asking = JoinSet::new();
+        let mut heads = config.heads.into_iter();
+        loop {
+            while asking.len() < AT_A_TIME
+                && let Some(head) = heads.next()
+            {
+                let client = Client::new(head.url, config.tls.clone());
+                asking.spawn(one(self.folder.clone(), client));
+            }
+            match asking.join_next().await {
+                None => break,
+                Some(Ok(Ok(count))) => written += count,
+                Some(Ok(Err(failure))) if failure.exit == Exit::CannotCreate => {
+                    return Err(failure);
+                }
+                Some(Ok(Err(failure))) => {
+                    log::write(Severity::Warning, failure);
+                    failed += 1;
+                }
+                Some(Err(error)) => return Exit::Software.fail(error),
+            }
+        }
         match self.json {
             true => say!(
                 "{}",
@@ -98,75 +97,39 @@ impl Backup {
     }
 }
 
-/// Files that were written, and heads that could not be asked.
-async fn all(
-    folder: &Path,
-    heads: Vec<HeadConfig>,
-    tls: Option<Arc<ClientConfig>>,
-) -> Result<(usize, usize)> {
-    let (mut written, mut failed) = (0, 0);
-    let mut asking = JoinSet::new();
-    let mut heads = heads.into_iter();
-    loop {
-        while asking.len() < AT_A_TIME
-            && let Some(head) = heads.next()
-        {
-            let client = Client::new(head.url, tls.clone());
-            asking.spawn(one(folder.to_path_buf(), client));
-        }
-        match asking.join_next().await {
-            None => return Ok((written, failed)),
-            Some(Ok(Ok(count))) => written += count,
-            Some(Ok(Err(failure))) if failure.exit == Exit::CannotCreate => return Err(failure),
-            Some(Ok(Err(failure))) => {
-                log::write(Severity::Warning, &failure.to_string());
-                failed += 1;
-            }
-            Some(Err(error)) => return Exit::Software.fail(error),
-        }
-    }
-}
-
 /// Files that were written of one head.
 async fn one(folder: PathBuf, mut client: Client) -> Result<usize> {
     let url = client.url().to_string();
-    let snapshot: Snapshot = asked(&mut client, "/api/snapshot").await?;
-    let serial = snapshot.identity.serial;
-    let safe = |name: &str| {
-        !name.is_empty()
-            && name.len() <= 64
-            && name
-                .chars()
-                .all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_')
-    };
-    if !safe(&serial) {
-        return Exit::Content.fail(format!("{url}: the serial {serial:?} is no name of a file"));
+    let wrong = |words: String| Exit::Content.fail(format!("{url}: {words}"));
+    let snapshot: Value = asked(&mut client, "/api/snapshot").await?;
+    let serial = snapshot["identity"]["serial"].as_str().unwrap_or_default();
+    if !is_name(serial) {
+        return wrong(format!("the serial {serial:?} is no name of a file"));
     }
-    let known: Recipes = asked(&mut client, "/api/recipes").await?;
+    let mut known: Value = asked(&mut client, "/api/recipes").await?;
+    let malformed = Exit::Content.because(format!("{url}/api/recipes"));
+    let recipes: Vec<Recipe> =
+        serde_json::from_value(known["recipes"].take()).map_err(malformed)?;
     let mut written = 0;
-    let mut rows = Vec::new();
-    for recipe in known.recipes {
-        let Recipe {
-            number,
-            name,
-            fingerprint,
-        } = recipe;
-        if !safe(&fingerprint) {
-            let words =
-                format!("{url}: the fingerprint {fingerprint:?} of recipe {number} is none");
-            return Exit::Content.fail(words);
+    for Recipe {
+        number,
+        fingerprint,
+        ..
+    } in &recipes
+    {
+        if !is_name(fingerprint) {
+            return wrong(format!(
+                "the fingerprint {fingerprint:?} of recipe {number} is none"
+            ));
         }
         let file = folder.join("recipes").join(format!("{fingerprint}.recipe"));
         if !file.exists() {
             let path = format!("/api/recipes/{number}/file");
-            let content = client.get_whole(&path, MOST_RECIPE).await;
-            written += store(&file, &content.map_err(unavailable(&url, &path))?)?;
+            written += store(&file, &fetched(&mut client, &path, MOST_RECIPE).await?)?;
         }
-        rows.push(json!({ "number": number, "name": name, "fingerprint": fingerprint }));
     }
     let path = "/api/diagnostics.zip";
-    let packed = client.get_whole(path, MOST_ANSWER).await;
-    let packed = packed.map_err(unavailable(&url, path))?;
+    let packed = fetched(&mut client, path, MOST_ANSWER).await?;
     let mut kept = |part: &str, name: &str, extension: &str| -> Result<Option<String>> {
         let wrong = Exit::Content.because(format!("{url}{path}"));
         let Some(content) = member(&packed, name).map_err(wrong)? else {
@@ -182,21 +145,27 @@ async fn one(folder: PathBuf, mut client: Client) -> Result<usize> {
     // A head without a calibration has none.
     let calibration = kept("calibrations", "calibration.json", "json")?;
     let head = json!({
-        "serial": serial, "url": url, "configuration": configuration, "calibration": calibration, "recipes": rows,
+        "serial": serial, "url": url, "configuration": configuration, "calibration": calibration, "recipes": recipes,
     });
     let file = folder.join("heads").join(format!("{serial}.json"));
     Ok(written + store(&file, format!("{head:#}\n").as_bytes())?)
 }
 
-async fn asked<T: for<'a> Deserialize<'a>>(client: &mut Client, path: &str) -> Result<T> {
-    let url = client.url().to_string();
-    let answer = client.get_whole(path, MOST_ANSWER).await;
-    let answer = answer.map_err(unavailable(&url, path))?;
-    serde_json::from_slice(&answer).map_err(Exit::Content.because(format!("{url}{path}")))
+/// Whether a head may name a file so.
+fn is_name(text: &str) -> bool {
+    let allowed = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+    (1..=64).contains(&text.len()) && text.chars().all(allowed)
 }
 
-fn unavailable(url: &str, path: &str) -> impl Fn(HttpError) -> Failure {
-    Exit::Unavailable.because(format!("{url}{path}"))
+async fn asked(client: &mut Client, path: &str) -> Result<Value> {
+    let answer = fetched(client, path, MOST_ANSWER).await?;
+    let wrong = Exit::Content.because(format!("{}{path}", client.url()));
+    serde_json::from_slice(&answer).map_err(wrong)
+}
+
+async fn fetched(client: &mut Client, path: &str, most: usize) -> Result<Vec<u8>> {
+    let failed = Exit::Unavailable.because(format!("{}{path}", client.url()));
+    client.whole(path, None, most).await.map_err(failed)
 }
 
 /// A file of a ZIP, if it is there.

@@ -4,9 +4,9 @@ use crate::backup::Backup;
 use crate::collect::Collect;
 use crate::error::{Exit, Result};
 use crate::log::{self, Severity};
-use crate::schema::Schema;
 use crate::simulate::Simulate;
 use crate::status::Status;
+use crate::store::{Kind, schema};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -30,7 +30,11 @@ enum Command {
     /// Answer as many heads would, without light.
     Simulate(Simulate),
     /// Print the tables and views of a store.
-    Schema(Schema),
+    Schema {
+        /// What the store is made of.
+        #[arg(long, value_enum)]
+        store: Kind,
+    },
 }
 
 /// Runs the program `fringed-fleet`: parses the arguments of this process, runs the command and
@@ -41,29 +45,34 @@ pub fn main() -> ExitCode {
         Err(error) => {
             // If stdout or stderr is closed, there is nothing to do about it.
             let _ = error.print();
-            let wrong = error.use_stderr();
-            return if wrong {
-                Exit::Usage.into()
-            } else {
-                ExitCode::SUCCESS
+            return match error.use_stderr() {
+                true => Exit::Usage.into(),
+                false => ExitCode::SUCCESS,
             };
         }
     };
-    match run(arguments.command) {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build();
+    let runtime = runtime.map_err(Exit::Software.because("start"));
+    match runtime.and_then(|runtime| runtime.block_on(run(arguments.command))) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            log::write(Severity::Error, &failure.to_string());
+            log::write(Severity::Error, &failure);
             failure.exit.into()
         }
     }
 }
 
-fn run(command: Command) -> Result<()> {
+async fn run(command: Command) -> Result<()> {
     match command {
-        Command::Collect(command) => command.run(),
-        Command::Status(command) => command.run(),
-        Command::Backup(command) => command.run(),
-        Command::Simulate(command) => command.run(),
-        Command::Schema(command) => command.run(),
+        Command::Collect(command) => command.run().await,
+        Command::Status(command) => command.run().await,
+        Command::Backup(command) => command.run().await,
+        Command::Simulate(command) => command.run().await,
+        Command::Schema { store } => {
+            say!("{}", schema(store).trim_end());
+            Ok(())
+        }
     }
 }

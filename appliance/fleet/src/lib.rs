@@ -13,6 +13,12 @@ macro_rules! say {
     }};
 }
 
+/// ms since 1970 UTC; 0 if the clock is before that.
+fn now_ms() -> u64 {
+    let since = std::time::UNIX_EPOCH.elapsed();
+    since.map_or(0, |since| since.as_millis() as u64)
+}
+
 pub mod answer;
 pub mod backup;
 pub mod cli;
@@ -22,7 +28,6 @@ pub mod error;
 pub mod http;
 pub mod log;
 pub mod part;
-pub mod schema;
 pub mod simulate;
 pub mod status;
 pub mod store;

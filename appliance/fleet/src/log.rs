@@ -1,5 +1,6 @@
 //! Lines for people on stderr, which under systemd is the journal.
 
+use std::fmt::Display;
 use std::io::Write as _;
 
 /// How grave a line is.
@@ -15,11 +16,8 @@ pub enum Severity {
 
 /// Writes one line: the program's name, and below systemd the priority before it. Control
 /// characters of `words`, which may come from a head, are replaced.
-pub fn write(severity: Severity, words: &str) {
-    let clean: String = words
-        .chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .collect();
+pub fn write(severity: Severity, words: impl Display) {
+    let clean = words.to_string().replace(char::is_control, " ");
     let prefix = match std::env::var_os("JOURNAL_STREAM") {
         Some(_) => format!("<{}>", severity as u8),
         None => String::new(),

@@ -1,6 +1,8 @@
 //! Which of several collectors a head belongs to: rendezvous hashing (Thaler and Ravishankar,
 //! 1998). Where a collector is added or taken away, only the heads that it gets or had move.
 
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
 use std::str::FromStr;
 
 /// Collector `number` of `count`, from 1.
@@ -31,29 +33,16 @@ impl FromStr for Part {
 }
 
 impl Part {
-    /// All heads.
-    pub const WHOLE: Self = Self {
-        number: 1,
-        count: 1,
-    };
-
     /// Whether it is this collector's to ask the head with this serial, or this address while the
-    /// serial is not known.
+    /// serial is not known. Weights are numbers of a generator with the FNV-1a hash of the key as seed.
     pub fn has(self, key: &str) -> bool {
-        let best = (1..=self.count).max_by_key(|&number| weight(key, number));
+        let hash = key.bytes().fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| {
+            (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
+        });
+        let mut weights = SplitMix64::seed_from_u64(hash);
+        let best = (1..=self.count).max_by_key(|_| weights.next_u64());
         best == Some(self.number)
     }
-}
-
-/// FNV-1a of the key, mixed with the collector's number (finaliser of SplitMix64, Steele 2014).
-fn weight(key: &str, number: u32) -> u64 {
-    let hash = key.bytes().fold(0xCBF2_9CE4_8422_2325, |hash: u64, byte| {
-        (hash ^ u64::from(byte)).wrapping_mul(0x0100_0000_01B3)
-    });
-    let mixed = hash.wrapping_add(u64::from(number).wrapping_mul(0x9E37_79B9_7F4A_7C15));
-    let mixed = (mixed ^ (mixed >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-    let mixed = (mixed ^ (mixed >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-    mixed ^ (mixed >> 31)
 }
 
 #[cfg(test)]

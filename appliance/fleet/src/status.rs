@@ -2,11 +2,10 @@
 
 use crate::config::Fleet;
 use crate::error::{Exit, Result};
-use crate::http::trusting;
-use crate::store::{Count, HeadState, Spread, Store};
+use crate::store::{Complaint, Count, HeadState, Spread, Store};
 use serde::Serialize;
 use std::collections::HashMap;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::iter::once;
 
 /// s of a day.
 const DAY_S: u64 = 86_400;
@@ -56,40 +55,32 @@ impl Status {
     ///
     /// # Errors
     /// If the store cannot be read, or no collector ever wrote to it.
-    pub fn run(&self) -> Result<()> {
+    pub async fn run(&self) -> Result<()> {
         let config = self.fleet.read()?;
-        let tls = config.ca.as_deref().map(trusting).transpose()?;
         let url = config.store()?;
-        let mut store = Store::of(url, tls)?;
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build();
-        let runtime = runtime.map_err(Exit::Software.because("start"))?;
-        let now_s = SystemTime::now().duration_since(UNIX_EPOCH);
-        let now_s = now_s.map_or(0, |now| now.as_secs());
+        let mut store = Store::of(url, config.tls.clone())?;
+        let now_s = crate::now_ms() / 1000;
         let today = now_s - now_s % DAY_S;
-        let read = runtime.block_on(async {
+        let read = async {
             let heads = store.heads().await?;
             Ok((
                 heads,
                 store.counts(today).await?,
                 store.spreads(today).await?,
             ))
-        });
-        let unread = Exit::Unavailable.because::<String>(format!("read {url}"));
-        let (heads, counts, spreads) = read.map_err(unread)?;
+        };
+        let unread = Exit::Unavailable.because::<Complaint>(format!("read {url}"));
+        let (heads, counts, spreads) = read.await.map_err(unread)?;
         if heads.is_empty() {
             let words = format!("{url} has no heads: run fringed-fleet collect with this store");
             return Exit::Missing.fail(words);
         }
         let lines = lines(heads, &counts, &spreads, now_s);
-        match self.json {
-            true => say!(
-                "{}",
-                serde_json::to_string_pretty(&lines).unwrap_or_default()
-            ),
-            false => say!("{}", table(&lines)),
-        }
+        let text = match self.json {
+            true => serde_json::to_string_pretty(&lines).unwrap_or_default(),
+            false => table(&lines),
+        };
+        say!("{text}");
         Ok(())
     }
 }
@@ -142,66 +133,54 @@ fn cpk(spread: &Spread) -> Option<f64> {
     (spread.n >= ENOUGH).then_some(nearer / (3.0 * s))
 }
 
-const TITLES: [&str; 9] = [
-    "head",
-    "reachable",
-    "state",
-    "recipe",
-    "today",
-    "yield",
-    "worst gauge (Cpk)",
-    "drift",
-    "last",
-];
+const TITLES: &str = "head|reachable|state|recipe|today|yield|worst gauge (Cpk)|drift|last";
 
 /// The lines in columns.
 fn table(lines: &[Line]) -> String {
-    let mut rows = vec![TITLES.map(str::to_owned)];
-    rows.extend(lines.iter().map(cells));
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max();
-    let widths: Vec<_> = (0..TITLES.len())
-        .map(|column| width(column).unwrap_or(0))
-        .collect();
-    let padded = |row: &[String; TITLES.len()]| {
+    let titles = TITLES.split('|').map(str::to_owned).collect();
+    let rows: Vec<Vec<String>> = once(titles).chain(lines.iter().map(cells)).collect();
+    let mut widths = vec![0; rows[0].len()];
+    for row in &rows {
+        for (width, cell) in widths.iter_mut().zip(row) {
+            *width = cell.chars().count().max(*width);
+        }
+    }
+    let padded = |row: &Vec<String>| {
         let cells = row.iter().zip(&widths);
-        let cells: Vec<_> = cells
-            .map(|(cell, &width)| format!("{cell:width$}"))
+        let line: String = cells
+            .map(|(cell, &width)| format!("{cell:width$}  "))
             .collect();
-        cells.join("  ").trim_end().to_owned()
+        line.trim_end().to_owned()
     };
     rows.iter().map(padded).collect::<Vec<_>>().join("\n")
 }
 
-fn cells(line: &Line) -> [String; TITLES.len()] {
+fn cells(line: &Line) -> Vec<String> {
     let or_dash = |text: Option<String>| text.unwrap_or_else(|| "–".into());
-    let named = Some(line.serial.clone()).filter(|serial| !serial.is_empty());
+    let some = |text: &String| Some(text.clone()).filter(|text| !text.is_empty());
     let recipe = line
         .recipe
         .map(|number| format!("{number} {}", line.recipe_name));
-    let worst = line
-        .worst_gauge
-        .as_ref()
-        .map(|worst| format!("{} ({:.2})", worst.name, worst.cpk));
-    let reachable = match (&line.error, line.reachable) {
-        (_, true) => "yes".to_owned(),
-        (error, false) => format!(
-            "no: {}",
-            error
-                .as_deref()
-                .unwrap_or("silent")
-                .chars()
-                .take(40)
-                .collect::<String>()
-        ),
-    };
-    [
-        named.unwrap_or_else(|| line.url.clone()),
-        reachable,
-        or_dash(Some(line.state.clone()).filter(|state| !state.is_empty())),
+    let worst = line.worst_gauge.as_ref();
+    let error: String = line
+        .error
+        .as_deref()
+        .unwrap_or("silent")
+        .chars()
+        .take(40)
+        .collect();
+    vec![
+        some(&line.serial).unwrap_or_else(|| line.url.clone()),
+        if line.reachable {
+            "yes".into()
+        } else {
+            format!("no: {error}")
+        },
+        or_dash(some(&line.state)),
         or_dash(recipe),
         line.results_today.to_string(),
         or_dash(line.share.map(|share| format!("{:.1} %", 100.0 * share))),
-        or_dash(worst),
+        or_dash(worst.map(|worst| format!("{} ({:.2})", worst.name, worst.cpk))),
         or_dash(line.drift_px.map(|px| format!("{px:.2} px"))),
         or_dash(line.seconds_since_result.map(|s| format!("{s} s"))),
     ]

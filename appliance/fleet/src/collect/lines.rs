@@ -2,9 +2,8 @@
 
 use super::trouble::Trouble;
 use crate::answer::{MOST_LINE, Wrong};
-use crate::http::{ANSWERING, HttpError, next};
+use crate::http::{ANSWERING, next, within};
 use hyper::body::Incoming;
-use tokio::time::timeout;
 
 /// Reads a body line by line.
 pub(super) struct Lines {
@@ -33,8 +32,7 @@ impl Lines {
     /// # Errors
     /// [`Trouble`]
     pub(super) async fn next(&mut self) -> Result<Option<&[u8]>, Trouble> {
-        let read = timeout(ANSWERING, self.end_of_line()).await;
-        let end = read.map_err(|_| HttpError::Silent(ANSWERING))??;
+        let end = within(ANSWERING, self.end_of_line()).await?;
         let from = std::mem::replace(&mut self.from, end.map_or(0, |end| end + 1));
         Ok(end.map(|end| &self.buffer[from..end]))
     }

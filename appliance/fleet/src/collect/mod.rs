@@ -12,28 +12,26 @@ mod tally;
 mod trouble;
 mod writer;
 
-use crate::config::{Config, Fleet};
+use crate::config::Fleet;
 use crate::error::{Exit, Result};
-use crate::http::trusting;
 use crate::log::{self, Severity};
 use crate::part::Part;
-use crate::store::{HeadState, Store};
+use crate::store::Store;
 use poll::{Plant, Poll};
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 use tally::Tally;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
-use tokio::time::{sleep, timeout};
+use tokio::time::timeout;
+use writer::until_it_works;
 
 /// Pieces that wait for the writer.
 const WAITING: usize = 32;
 /// Longest time for the last batch after a stop.
 const STOPPING: Duration = Duration::from_secs(5);
-/// Longest pause before a store that does not work is tried again.
-const LONGEST: Duration = Duration::from_secs(10);
 
 /// Fetch the results of every head and write them to the store, until it is stopped.
 #[derive(Debug, clap::Args)]
@@ -41,8 +39,8 @@ pub struct Collect {
     #[command(flatten)]
     fleet: Fleet,
     /// Which collector this is of how many, as 2/3: each head is asked by one of them.
-    #[arg(long, value_name = "PART")]
-    part: Option<Part>,
+    #[arg(long, value_name = "PART", default_value = "1/1")]
+    part: Part,
     /// Print how it goes as a line of JSON every 10 s.
     #[arg(long)]
     json: bool,
@@ -53,28 +51,10 @@ impl Collect {
     ///
     /// # Errors
     /// If the configuration is wrong, or the store cannot be what it says.
-    pub fn run(&self) -> Result<()> {
+    pub async fn run(&self) -> Result<()> {
         let config = self.fleet.read()?;
-        config.heads()?;
-        let tls = config.ca.as_deref().map(trusting).transpose()?;
-        let store = Store::of(config.store()?, tls.clone())?;
-        let runtime = tokio::runtime::Builder::new_current_thread()
-            .enable_all()
-            .build();
-        let runtime = runtime.map_err(Exit::Software.because("start"))?;
-        let plant = Plant {
-            tls,
-            part: self.part.unwrap_or(Part::WHOLE),
-            poll: config.poll,
-            state: config.state,
-            ends: HashMap::new(),
-            places: Mutex::default(),
-            tally: Tally::default(),
-        };
-        runtime.block_on(self.collect(config, plant, store))
-    }
-
-    async fn collect(&self, config: Config, mut plant: Plant, mut store: Store) -> Result<()> {
+        let heads = config.heads()?.to_vec();
+        let mut store = Store::of(config.store()?, config.tls.clone())?;
         let failed = || Exit::Software.because("wait for signals");
         let mut terminated = signal(SignalKind::terminate()).map_err(failed())?;
         let mut interrupted = signal(SignalKind::interrupt()).map_err(failed())?;
@@ -85,23 +65,39 @@ impl Collect {
             }
         };
         tokio::pin!(stop);
-        let known = tokio::select! {
-            known = begin(&mut store, &mut plant) => known,
+        // The store may start later than its collectors.
+        let opening = until_it_works("open the store", async || {
+            store.prepare().await?;
+            Ok((store.ends().await?, store.heads().await?))
+        });
+        let (ends, known) = tokio::select! {
+            read = opening => read,
             () = &mut stop => return Ok(()),
         };
-        let count = config.heads.len();
+        let ends = ends
+            .into_iter()
+            .map(|end| ((end.serial, end.history), end.seq));
+        let known = known.into_iter().map(|head| (head.url.clone(), head));
+        let mut known: HashMap<_, _> = known.collect();
+        let count = heads.len();
         log::write(
             Severity::Info,
-            &format!("{count} heads are asked for results"),
+            format_args!("{count} heads are asked for results"),
         );
-        let plant = Arc::new(plant);
+        let plant = Arc::new(Plant {
+            config,
+            part: self.part,
+            ends: ends.collect(),
+            places: Mutex::default(),
+            tally: Tally::default(),
+        });
         let (out, incoming) = mpsc::channel(WAITING);
         let mut asking = JoinSet::new();
-        for (at, head) in config.heads.into_iter().enumerate() {
+        for (at, head) in heads.into_iter().enumerate() {
             // Questions are spread over the pause between two.
-            let offset = config.poll.mul_f64(at as f64 / count as f64);
-            let state = known.get(&head.url.to_string()).cloned();
-            let poll = Poll::new(head, state.unwrap_or_default(), plant.clone(), out.clone());
+            let offset = plant.config.poll.mul_f64(at as f64 / count as f64);
+            let state = known.remove(&head.url.to_string()).unwrap_or_default();
+            let poll = Poll::new(head, state, plant.clone(), out.clone());
             asking.spawn(poll.run(offset));
         }
         drop(out);
@@ -120,40 +116,4 @@ impl Collect {
         }
         Ok(())
     }
-}
-
-/// Opens the store and reads how far each history was fetched, and the heads as they were; tries
-/// again until it works, because the store may start later than its collectors.
-async fn begin(store: &mut Store, plant: &mut Plant) -> HashMap<String, HeadState> {
-    let mut pause = Duration::from_millis(500);
-    loop {
-        let read = async {
-            store.prepare().await?;
-            Ok::<_, String>((store.ends().await?, store.heads().await?))
-        };
-        match read.await {
-            Ok((ends, heads)) => {
-                let ends = ends
-                    .into_iter()
-                    .map(|end| ((end.serial, end.history), end.seq));
-                plant.ends = ends.collect();
-                return heads
-                    .into_iter()
-                    .map(|head| (head.url.clone(), head))
-                    .collect();
-            }
-            Err(words) => {
-                let words = format!("open the store: {words}: it is tried again in {pause:?}");
-                log::write(Severity::Warning, &words);
-            }
-        }
-        sleep(pause).await;
-        pause = (2 * pause).min(LONGEST);
-    }
-}
-
-/// ms since 1970 UTC.
-fn now_ms() -> u64 {
-    let now = SystemTime::now().duration_since(UNIX_EPOCH);
-    now.map_or(0, |now| now.as_millis() as u64)
 }

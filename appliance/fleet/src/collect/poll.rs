@@ -1,23 +1,22 @@
 //! Asks one head for its results and its state, again and again.
 
 use super::lines::Lines;
-use super::now_ms;
 use super::tally::Tally;
 use super::trouble::Trouble;
 use crate::answer::{Header, Row, Wrong};
-use crate::config::HeadConfig;
+use crate::config::{Config, HeadConfig};
 use crate::http::{Client, shortened};
 use crate::log::{self, Severity};
+use crate::now_ms;
 use crate::part::Part;
 use crate::store::{Batch, Gap, HeadState, Received};
-use rustls::ClientConfig;
-use serde::Deserialize;
+use serde_json::Value;
 use std::collections::HashMap;
-use std::sync::atomic::Ordering::Relaxed;
+use std::fmt::Display;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use tokio::sync::mpsc::Sender;
-use tokio::time::{Instant, sleep};
+use tokio::time::{Instant, sleep, sleep_until};
 
 /// The most results that are handed to the writer at a time.
 pub(super) const PIECE: usize = 500;
@@ -30,10 +29,8 @@ const MOST_SNAPSHOT: usize = 256 << 10;
 
 /// What the tasks of all heads share.
 pub(super) struct Plant {
-    pub(super) tls: Option<Arc<ClientConfig>>,
+    pub(super) config: Config,
     pub(super) part: Part,
-    pub(super) poll: Duration,
-    pub(super) state: Duration,
     /// How far each history was fetched when the collector began, by serial and history.
     pub(super) ends: HashMap<(String, String), u32>,
     /// Where each serial answers.
@@ -51,57 +48,31 @@ enum Asked {
     Foreign,
 }
 
-/// The part of `GET /api/snapshot` that is read.
-#[derive(Deserialize)]
-struct Snapshot {
-    state: String,
-    recipe: Option<Recipe>,
-    #[serde(default)]
-    health: Health,
-}
-
-#[derive(Deserialize)]
-struct Recipe {
-    number: u16,
-    name: String,
-}
-
-#[derive(Default, Deserialize)]
-struct Health {
-    drift_px: Option<f64>,
-}
-
 /// The task of one head.
 pub(super) struct Poll {
-    config: HeadConfig,
     client: Client,
     plant: Arc<Plant>,
     out: Sender<Batch>,
+    /// What was not handed on yet.
+    batch: Batch,
     state: HeadState,
-    /// Whether it answered the last question; none before the first.
-    answers: Option<bool>,
     state_asked: Option<Instant>,
 }
 
 impl Poll {
-    /// A task that goes on where `before` ended.
+    /// A task that goes on where `state` ended.
     pub(super) fn new(
         config: HeadConfig,
-        before: HeadState,
+        mut state: HeadState,
         plant: Arc<Plant>,
         out: Sender<Batch>,
     ) -> Self {
-        let mut state = HeadState {
-            url: config.url.to_string(),
-            line: config.line.clone(),
-            ..before
-        };
-        if let Some(serial) = config
-            .serial
-            .as_ref()
-            .filter(|serial| **serial != state.serial)
+        state.url = config.url.to_string();
+        state.line = config.line;
+        if let Some(serial) = config.serial
+            && serial != state.serial
         {
-            state.serial.clone_from(serial);
+            state.serial = serial;
             state.history.clear();
         }
         state.seq = plant.end(&state.serial, &state.history);
@@ -110,12 +81,11 @@ impl Poll {
             state.serial.clear();
         }
         Self {
-            client: Client::new(config.url.clone(), plant.tls.clone()),
-            config,
+            client: Client::new(config.url, plant.config.tls.clone()),
             plant,
             out,
+            batch: Batch::default(),
             state,
-            answers: None,
             state_asked: None,
         }
     }
@@ -128,10 +98,10 @@ impl Poll {
         let mut next = Instant::now() + offset;
         let mut pause = PAUSES[0];
         loop {
-            tokio::time::sleep_until(next).await;
+            sleep_until(next).await;
             match self.ask().await {
                 Ok(Asked::Foreign) => {
-                    self.note(None);
+                    self.plant.tally.note(&self.state.url, None);
                     return;
                 }
                 Ok(asked) => {
@@ -139,7 +109,7 @@ impl Poll {
                     self.answered().await;
                     if matches!(asked, Asked::All) {
                         // Late questions are not made up for.
-                        next = (next + self.plant.poll).max(Instant::now());
+                        next = (next + self.plant.config.poll).max(Instant::now());
                     }
                 }
                 Err(trouble) => {
@@ -166,8 +136,7 @@ impl Poll {
             self.plant.place(&header.serial, &self.state.url)?;
             self.state.serial.clone_from(&header.serial);
         } else if self.state.serial != header.serial {
-            let (found, known) = (header.serial, self.state.serial.clone());
-            return Err(Wrong::Serial { found, known }.into());
+            return Err(Wrong::Serial(header.serial, self.state.serial.clone()).into());
         }
         if self.state.history != header.history {
             self.state.history.clone_from(&header.history);
@@ -179,126 +148,107 @@ impl Poll {
             }
         }
         if header.last.is_some_and(|last| last < after) {
-            return Err(header.impossible(after).into());
+            return Err(Wrong::Header(header.first, header.last, after).into());
         }
-        if let Some(first) = header
-            .first
-            .filter(|&first| first > after.saturating_add(1))
+        if let Some(first) = header.first
+            && first > after.saturating_add(1)
         {
-            let gap = Gap {
-                serial: header.serial.clone(),
-                history: header.history.clone(),
-                first: after + 1,
-                last: first - 1,
-            };
-            let words = format!(
-                "results {} to {} were deleted before they were fetched",
-                gap.first, gap.last
+            let (serial, history) = (header.serial.clone(), header.history.clone());
+            let (first, last) = (after + 1, first - 1);
+            self.say(
+                Severity::Warning,
+                format_args!("results {first} to {last} were deleted before they were fetched"),
             );
-            self.say(Severity::Warning, &words);
-            self.hand_on(Batch {
-                gaps: vec![gap],
-                ..Batch::default()
-            })
-            .await;
-            self.state.seq = first - 1;
+            self.batch.gaps.push(Gap {
+                serial,
+                history,
+                first,
+                last,
+            });
+            self.state.seq = last;
         }
-        let received = self.rows(&mut lines, &header).await?;
-        Ok(if received < LIMIT {
-            Asked::All
-        } else {
-            Asked::More
+        let before = self.state.clone();
+        let received = self.rows(&mut lines, &header).await;
+        if matches!(received, Err(Trouble::Wrong(_))) {
+            // It is asked for again from the beginning: what was skipped may be there.
+            self.batch.rows.clear();
+            self.state = before;
+        }
+        self.hand_on().await;
+        Ok(match received? < LIMIT {
+            true => Asked::All,
+            false => Asked::More,
         })
     }
 
-    /// Hands on the results of an answer. One with a wrong line is asked for again from its
-    /// beginning: what was skipped before that line may be there.
+    /// Takes the results of an answer.
     async fn rows(&mut self, lines: &mut Lines, header: &Header) -> Result<u32, Trouble> {
-        let (mut count, after) = (0, self.state.seq);
-        let mut rows = Vec::new();
-        loop {
-            if rows.len() == PIECE || (!rows.is_empty() && !lines.has_next()) {
-                self.take(&mut rows).await;
+        let mut count = 0;
+        while let Some(line) = lines.next().await? {
+            if count == LIMIT {
+                return Err(Wrong::More(LIMIT).into());
             }
-            let read = match lines.next().await {
-                Ok(None) => return Ok(count),
-                Ok(Some(_)) if count == LIMIT => Err(Wrong::More(LIMIT).into()),
-                Ok(Some(line)) => {
-                    let before = rows
-                        .last()
-                        .map_or(self.state.seq, |row: &Received| row.row.seq);
-                    Row::read(line, header, before).map_err(Trouble::from)
-                }
-                Err(trouble) => Err(trouble),
-            };
-            match read {
-                Ok(row) => rows.push(Received {
-                    row,
-                    at_unix_ms: now_ms(),
-                }),
-                Err(Trouble::Wrong(wrong)) => {
-                    self.state.seq = after;
-                    return Err(wrong.into());
-                }
-                Err(trouble) => {
-                    self.take(&mut rows).await;
-                    return Err(trouble);
-                }
-            }
+            let row = Row::read(line, header, self.state.seq)?;
+            let at_unix_ms = now_ms();
+            self.state.seq = row.seq;
+            self.state.last_result_unix_ms = row.at_unix_ms.or(Some(at_unix_ms));
+            self.batch.rows.push(Received { row, at_unix_ms });
             count += 1;
+            if self.batch.rows.len() == PIECE || !lines.has_next() {
+                self.hand_on().await;
+            }
         }
+        Ok(count)
     }
 
-    /// Hands rows on, and remembers the last.
-    async fn take(&mut self, rows: &mut Vec<Received>) {
-        let Some(last) = rows.last() else { return };
-        self.state.seq = last.row.seq;
-        self.state.last_result_unix_ms = last.row.at_unix_ms.or(Some(last.at_unix_ms));
-        let rows = std::mem::take(rows);
-        self.hand_on(Batch {
-            rows,
-            ..Batch::default()
-        })
-        .await;
+    async fn hand_on(&mut self) {
+        if !self.batch.is_empty() {
+            // Without a writer the program is about to end.
+            let _ = self.out.send(std::mem::take(&mut self.batch)).await;
+        }
     }
 
     /// Notes that the head answers, and now and then asks for its state.
     async fn answered(&mut self) {
-        let changed = self.note(Some(true));
+        let changed = self.plant.tally.note(&self.state.url, Some(true));
         if changed && !self.state.error.is_empty() {
             self.say(Severity::Info, "it answers again");
         }
+        let pause = self.plant.config.state;
         let due = self
             .state_asked
-            .is_none_or(|asked| asked.elapsed() >= self.plant.state);
+            .is_none_or(|asked| asked.elapsed() >= pause);
         if !due && !changed {
             return;
         }
         self.state_asked = Some(Instant::now());
-        let answer = self.client.get_whole("/api/snapshot", MOST_SNAPSHOT).await;
-        let answer = answer
-            .ok()
-            .and_then(|answer| serde_json::from_slice(&answer).ok());
-        let answer: Option<Snapshot> = answer;
-        let known = answer.is_some();
-        let recipe = answer.as_ref().and_then(|answer| answer.recipe.as_ref());
-        self.state.recipe = recipe.map(|recipe| recipe.number);
-        self.state.recipe_name = recipe.map_or_else(String::new, |recipe| shortened(&recipe.name));
-        self.state.drift_px = answer.as_ref().and_then(|answer| answer.health.drift_px);
-        self.state.state = answer.map_or_else(String::new, |answer| shortened(&answer.state));
-        if !known {
+        let answer = self
+            .client
+            .whole("/api/snapshot", None, MOST_SNAPSHOT)
+            .await;
+        let answer: Value = serde_json::from_slice(&answer.unwrap_or_default()).unwrap_or_default();
+        if answer.is_null() {
             self.client.close();
         }
+        let text = |value: &Value| shortened(value.as_str().unwrap_or_default());
+        let recipe = &answer["recipe"];
+        self.state.recipe = recipe["number"]
+            .as_u64()
+            .and_then(|number| number.try_into().ok());
+        self.state.recipe_name = text(&recipe["name"]);
+        self.state.drift_px = answer["health"]["drift_px"].as_f64();
+        self.state.state = text(&answer["state"]);
         self.write_state(String::new()).await;
     }
 
     async fn failed(&mut self, trouble: &Trouble, pause: Duration) {
-        self.note(Some(false));
+        self.plant.tally.note(&self.state.url, Some(false));
         let words = trouble.to_string();
         if self.state.error != words {
+            let pause_s = pause.as_secs();
             self.say(
                 Severity::Warning,
-                &format!("{words}; it is asked again in {} s", pause.as_secs()),
+                format_args!("{words}; it is asked again in {pause_s} s"),
             );
         }
         self.write_state(words).await;
@@ -310,46 +260,20 @@ impl Poll {
         self.state.updated_unix_ms = now_ms();
         // Of a head that never answered one collector writes that it does not.
         if !self.state.serial.is_empty() || self.plant.part.has(&self.state.url) {
-            let heads = vec![self.state.clone()];
-            self.hand_on(Batch {
-                heads,
-                ..Batch::default()
-            })
-            .await;
+            self.batch.heads.push(self.state.clone());
         }
+        self.hand_on().await;
     }
 
-    async fn hand_on(&self, batch: Batch) {
-        // Without a writer the program is about to end.
-        let _ = self.out.send(batch).await;
-    }
-
-    /// Counts the head among those that answer, those that do not, or neither; answers whether that
-    /// is new.
-    fn note(&mut self, now: Option<bool>) -> bool {
-        let tally = &self.plant.tally;
-        let count = |answers| {
-            if answers {
-                &tally.answering
-            } else {
-                &tally.failing
-            }
-        };
-        let before = std::mem::replace(&mut self.answers, now);
-        if before == now {
-            return false;
-        }
-        before.map(|answers| count(answers).fetch_sub(1, Relaxed));
-        now.map(|answers| count(answers).fetch_add(1, Relaxed));
-        true
-    }
-
-    fn say(&self, severity: Severity, words: &str) {
+    fn say(&self, severity: Severity, words: impl Display) {
         let serial = match &*self.state.serial {
             "" => String::new(),
             serial => format!(" ({serial})"),
         };
-        log::write(severity, &format!("{}{serial}: {words}", self.config.url));
+        log::write(
+            severity,
+            format_args!("{}{serial}: {words}", self.state.url),
+        );
     }
 }
 
@@ -362,10 +286,7 @@ impl Plant {
             .or_insert_with(|| url.to_owned());
         match place == url {
             true => Ok(()),
-            false => Err(Wrong::Taken {
-                serial: serial.to_owned(),
-                url: place.clone(),
-            }),
+            false => Err(Wrong::Taken(serial.to_owned(), place.clone())),
         }
     }
 

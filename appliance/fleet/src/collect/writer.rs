@@ -1,9 +1,9 @@
 //! Puts what the heads bring into batches, and writes each until it is written.
 
+use super::poll::PIECE;
 use super::tally::Tally;
-use super::{LONGEST, poll};
 use crate::log::{self, Severity};
-use crate::store::{Batch, Store};
+use crate::store::{Batch, Complaint, Store};
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 use tokio::sync::mpsc::Receiver;
@@ -14,35 +14,48 @@ const MOST: usize = 10_000;
 /// Longest time that a result waits for others: with the pause between two questions, and the
 /// writing, a result is in the store within two seconds.
 const GATHERING: Duration = Duration::from_millis(500);
+/// Pause before a store that does not work is tried again, at first and at most.
+const PAUSES: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(10)];
 
 /// Writes until all tasks that fetch have ended and everything is written.
 pub(super) async fn write(store: &mut Store, mut incoming: Receiver<Batch>, tally: &Tally) {
     while let Some(mut batch) = incoming.recv().await {
         let until = Instant::now() + GATHERING;
-        while batch.rows.len() + poll::PIECE <= MOST {
-            match timeout_at(until, incoming.recv()).await {
-                Ok(Some(more)) => {
-                    batch.rows.extend(more.rows);
-                    batch.gaps.extend(more.gaps);
-                    batch.heads.extend(more.heads);
-                }
-                Ok(None) | Err(_) => break,
-            }
+        while batch.rows.len() + PIECE <= MOST
+            && let Ok(Some(more)) = timeout_at(until, incoming.recv()).await
+        {
+            batch.rows.extend(more.rows);
+            batch.gaps.extend(more.gaps);
+            batch.heads.extend(more.heads);
         }
-        let mut pause = Duration::from_millis(500);
-        let mut complained = false;
-        while let Err(words) = store.write(&batch).await {
-            if !complained {
-                let words = format!("write results: {words}: it is tried again until it works");
-                log::write(Severity::Warning, &words);
-            }
-            complained = true;
-            sleep(pause).await;
-            pause = (2 * pause).min(LONGEST);
-        }
-        if complained {
-            log::write(Severity::Info, "results are written again");
-        }
+        until_it_works("write results", async || store.write(&batch).await).await;
         tally.rows.fetch_add(batch.rows.len() as u64, Relaxed);
+    }
+}
+
+/// Tries again and again what a store may not do at first.
+pub(super) async fn until_it_works<T>(
+    what: &str,
+    mut attempt: impl AsyncFnMut() -> Result<T, Complaint>,
+) -> T {
+    let mut pause = PAUSES[0];
+    let mut complained = false;
+    loop {
+        match attempt().await {
+            Ok(done) => {
+                if complained {
+                    log::write(Severity::Info, format_args!("{what}: it works again"));
+                }
+                return done;
+            }
+            Err(words) if !complained => log::write(
+                Severity::Warning,
+                format_args!("{what}: {words}: it is tried again until it works"),
+            ),
+            Err(_) => {}
+        }
+        complained = true;
+        sleep(pause).await;
+        pause = (2 * pause).min(PAUSES[1]);
     }
 }

@@ -3,11 +3,13 @@
 mod range;
 
 use crate::error::{Exit, Result};
-use crate::http::Url;
+use crate::http::{Url, trusting};
+use rustls::ClientConfig;
 use serde::Deserialize;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Every key with its unit, range, default and meaning, as a table in Markdown; docs/fleet.md has
@@ -20,13 +22,14 @@ const FILE: &str = "fleet.toml";
 const MOST_HEADS: usize = 100_000;
 
 /// The file.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields, default)]
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
 struct Written {
     store: Option<String>,
-    poll_s: f64,
-    state_s: f64,
+    poll_s: Option<f64>,
+    state_s: Option<f64>,
     ca: Option<PathBuf>,
+    #[serde(default)]
     heads: Vec<WrittenHeads>,
 }
 
@@ -37,18 +40,6 @@ struct WrittenHeads {
     #[serde(default)]
     line: String,
     serial: Option<String>,
-}
-
-impl Default for Written {
-    fn default() -> Self {
-        Self {
-            store: None,
-            poll_s: 1.0,
-            state_s: 10.0,
-            ca: None,
-            heads: Vec::new(),
-        }
-    }
 }
 
 /// A head that is asked.
@@ -71,8 +62,8 @@ pub struct Config {
     pub poll: Duration,
     /// Pause between two questions for the state.
     pub state: Duration,
-    /// Authorities that certificates are signed by.
-    pub ca: Option<PathBuf>,
+    /// Whom connections trust, with https.
+    pub tls: Option<Arc<ClientConfig>>,
     /// The heads, each address once.
     pub heads: Vec<HeadConfig>,
 }
@@ -126,8 +117,8 @@ fn checked(written: Written, store: Option<String>) -> Result<Config> {
         true => Ok(Duration::from_secs_f64(value)),
         false => Exit::Configuration.fail(format!("{key} = {value}: write {least} to 3600")),
     };
-    let poll = seconds("poll_s", written.poll_s, 0.1)?;
-    let state = seconds("state_s", written.state_s, 1.0)?;
+    let poll = seconds("poll_s", written.poll_s.unwrap_or(1.0), 0.1)?;
+    let state = seconds("state_s", written.state_s.unwrap_or(10.0), 1.0)?;
     let mut heads = Vec::new();
     let mut known = BTreeSet::new();
     for row in written.heads {
@@ -157,7 +148,7 @@ fn checked(written: Written, store: Option<String>) -> Result<Config> {
         store,
         poll,
         state,
-        ca: written.ca,
+        tls: written.ca.as_deref().map(trusting).transpose()?,
         heads,
     })
 }

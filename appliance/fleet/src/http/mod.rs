@@ -19,6 +19,7 @@ use hyper::{Method, Request, Response, header};
 use hyper_util::rt::TokioIo;
 use rustls::ClientConfig;
 use rustls::pki_types::ServerName;
+use std::io;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -62,8 +63,10 @@ pub enum HttpError {
 pub struct Client {
     url: Url,
     tls: Option<Arc<ClientConfig>>,
-    headers: Vec<(&'static str, String)>,
-    patience: Duration,
+    /// Of every request.
+    pub headers: Vec<(&'static str, String)>,
+    /// Longest wait for the beginning of an answer, and for each next piece of it.
+    pub patience: Duration,
     open: Option<SendRequest<Full<Bytes>>>,
 }
 
@@ -77,18 +80,6 @@ impl Client {
             patience: ANSWERING,
             open: None,
         }
-    }
-
-    /// Adds a header to every request.
-    pub fn with_header(mut self, name: &'static str, value: String) -> Self {
-        self.headers.push((name, value));
-        self
-    }
-
-    /// Waits longer than for a head.
-    pub fn with_patience(mut self, patience: Duration) -> Self {
-        self.patience = patience;
-        self
     }
 
     /// The address.
@@ -106,57 +97,42 @@ impl Client {
     /// # Errors
     /// [`HttpError`]
     pub async fn get(&mut self, path: &str) -> Result<Incoming, HttpError> {
-        self.ask(Method::GET, path, Bytes::new()).await
+        self.ask(path, None).await
     }
 
-    /// Sends a body, and answers with the whole answer of at most `most` bytes.
+    /// Asks for a path, or sends a body to it, and answers with the whole answer of at most `most`
+    /// bytes.
     ///
     /// # Errors
     /// [`HttpError`]
-    pub async fn post(
+    pub async fn whole(
         &mut self,
         path: &str,
-        body: Bytes,
+        body: Option<Bytes>,
         most: usize,
     ) -> Result<Vec<u8>, HttpError> {
-        let answer = self.ask(Method::POST, path, body).await?;
-        self.whole(answer, most).await
+        let answer = self.ask(path, body).await?;
+        self.read(answer, most).await
     }
 
-    /// The whole answer to a question, of at most `most` bytes.
-    ///
-    /// # Errors
-    /// [`HttpError`]
-    pub async fn get_whole(&mut self, path: &str, most: usize) -> Result<Vec<u8>, HttpError> {
-        let answer = self.get(path).await?;
-        self.whole(answer, most).await
-    }
-
-    async fn whole(&mut self, mut body: Incoming, most: usize) -> Result<Vec<u8>, HttpError> {
+    async fn read(&mut self, mut body: Incoming, most: usize) -> Result<Vec<u8>, HttpError> {
         let mut all = Vec::new();
-        loop {
-            let piece = timeout(self.patience, next(&mut body)).await;
-            let piece = piece.map_err(|_| HttpError::Silent(self.patience))??;
-            let Some(piece) = piece else { return Ok(all) };
+        while let Some(piece) = within(self.patience, next(&mut body)).await? {
             if all.len() + piece.len() > most {
                 self.close();
                 return Err(HttpError::Long(most));
             }
             all.extend_from_slice(&piece);
         }
+        Ok(all)
     }
 
-    async fn ask(
-        &mut self,
-        method: Method,
-        path: &str,
-        body: Bytes,
-    ) -> Result<Incoming, HttpError> {
+    async fn ask(&mut self, path: &str, body: Option<Bytes>) -> Result<Incoming, HttpError> {
         let reused = self.open.is_some();
-        let answer = match self.once(method.clone(), path, body.clone()).await {
+        let answer = match self.once(path, body.clone()).await {
             // The server may have closed a connection that was idle. Every question may be asked
             // twice: writing a row again changes nothing.
-            Err(HttpError::Broken(_)) if reused => self.once(method, path, body).await?,
+            Err(HttpError::Broken(_)) if reused => self.once(path, body).await?,
             answer => answer?,
         };
         let status = answer.status();
@@ -167,10 +143,8 @@ impl Client {
             return Err(HttpError::Redirect(shortened(&place)));
         }
         if status != 200 {
-            let words = self
-                .whole(answer.into_body(), HEADER)
-                .await
-                .unwrap_or_default();
+            let words = self.read(answer.into_body(), HEADER).await;
+            let words = words.unwrap_or_default();
             let words = String::from_utf8_lossy(&words);
             let words = match words.trim() {
                 "" => String::new(),
@@ -183,16 +157,18 @@ impl Client {
 
     async fn once(
         &mut self,
-        method: Method,
         path: &str,
-        body: Bytes,
+        body: Option<Bytes>,
     ) -> Result<Response<Incoming>, HttpError> {
         // Taken, so that a question that is given up leaves no connection in the middle of it.
         let mut open = match self.open.take() {
             Some(open) if !open.is_closed() => open,
-            _ => timeout(CONNECTING, self.connect())
-                .await
-                .map_err(|_| HttpError::Silent(CONNECTING))??,
+            _ => within(CONNECTING, self.connect()).await?,
+        };
+        let method = if body.is_some() {
+            Method::POST
+        } else {
+            Method::GET
         };
         let mut request = Request::builder()
             .method(method)
@@ -201,32 +177,35 @@ impl Client {
         for (name, value) in &self.headers {
             request = request.header(*name, value);
         }
-        let request = request.body(Full::new(body));
+        let request = request.body(Full::new(body.unwrap_or_default()));
         let request = request.map_err(|error| HttpError::Connect(error.to_string()))?;
         let asked = async {
             open.ready().await?;
-            open.send_request(request).await
+            Ok::<_, HttpError>(open.send_request(request).await?)
         };
-        let answer = timeout(self.patience, asked).await;
-        let answer = answer.map_err(|_| HttpError::Silent(self.patience))??;
+        let answer = within(self.patience, asked).await?;
         self.open = Some(open);
         Ok(answer)
     }
 
     async fn connect(&self) -> Result<SendRequest<Full<Bytes>>, HttpError> {
-        let failed = |error: &dyn std::fmt::Display| HttpError::Connect(error.to_string());
+        let failed = |error: io::Error| HttpError::Connect(error.to_string());
         let stream = TcpStream::connect((&*self.url.host, self.url.port)).await;
-        let stream = stream.map_err(|error| failed(&error))?;
+        let stream = stream.map_err(failed)?;
         // A small question must not wait for more to send.
-        stream.set_nodelay(true).map_err(|error| failed(&error))?;
+        stream.set_nodelay(true).map_err(failed)?;
         if !self.url.tls {
             return speak(stream).await;
         }
-        let missing = &"https needs `ca`, the file of the authority that signed the certificate";
-        let tls = self.tls.clone().ok_or_else(|| failed(missing))?;
-        let name = ServerName::try_from(self.url.host.clone()).map_err(|error| failed(&error))?;
+        let missing = "https needs `ca`, the file of the authority that signed the certificate";
+        let tls = self
+            .tls
+            .clone()
+            .ok_or_else(|| failed(io::Error::other(missing)))?;
+        let name = ServerName::try_from(self.url.host.clone());
+        let name = name.map_err(|error| failed(io::Error::other(error)))?;
         let stream = TlsConnector::from(tls).connect(name, stream).await;
-        speak(stream.map_err(|error| failed(&error))?).await
+        speak(stream.map_err(failed)?).await
     }
 }
 
@@ -242,22 +221,30 @@ async fn speak(
     Ok(sender)
 }
 
+/// What comes within a time, or that nothing does.
+///
+/// # Errors
+/// [`HttpError::Silent`], or that of `what`.
+pub async fn within<T, E: From<HttpError>>(
+    time: Duration,
+    what: impl Future<Output = Result<T, E>>,
+) -> Result<T, E> {
+    let silent = |_| HttpError::Silent(time);
+    timeout(time, what).await.map_err(silent)?
+}
+
 /// The next piece of a body; none at its end.
 ///
 /// # Errors
 /// [`HttpError`]
 pub async fn next(body: &mut Incoming) -> Result<Option<Bytes>, HttpError> {
-    loop {
-        match body.frame().await {
-            None => return Ok(None),
-            Some(frame) => {
-                // What is not data are trailers.
-                if let Ok(piece) = frame?.into_data() {
-                    return Ok(Some(piece));
-                }
-            }
+    while let Some(frame) = body.frame().await {
+        // What is not data are trailers.
+        if let Ok(piece) = frame?.into_data() {
+            return Ok(Some(piece));
         }
     }
+    Ok(None)
 }
 
 /// The beginning of a text from elsewhere.

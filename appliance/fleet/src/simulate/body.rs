@@ -1,123 +1,60 @@
 //! A body that is made while it is sent, never held as a whole, and may be slow or end too early.
 
-use hyper::body::{Body, Bytes, Frame};
-use std::future::Future as _;
+use super::fault::Fault;
+use http_body_util::channel::Channel;
+use hyper::body::Bytes;
 use std::io;
-use std::pin::Pin;
-use std::task::{Context, Poll};
 use std::time::Duration;
-use tokio::time::{Sleep, sleep};
+use tokio::time::sleep;
 
-/// Bytes of a piece, unless it is a slow body's.
+/// Bytes of a piece.
 pub(super) const PIECE: usize = 64 << 10;
+/// A slow head sends so many bytes, then pauses: 10 kB/s.
+const SLOW: usize = 1000;
+const PAUSE: Duration = Duration::from_millis(100);
+/// A head that breaks off has sent so many bytes: the header and some of a result.
+const CUT: usize = 700;
 
-/// What follows the piece that was made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Then {
-    /// Another piece.
-    More,
-    /// The end.
-    End,
-}
+/// What is sent.
+pub(super) type Body = Channel<Bytes, io::Error>;
 
-type Make = Box<dyn FnMut(&mut Vec<u8>) -> Then + Send>;
-
-/// A body of pieces.
-pub(super) struct Pieces {
-    make: Option<Make>,
-    /// Bytes that are made and not sent.
-    left: Bytes,
-    slow: Option<Slow>,
-    /// Bytes after which the connection breaks off.
-    cut: Option<usize>,
-}
-
-struct Slow {
-    bytes: usize,
-    pause: Duration,
-    sleep: Pin<Box<Sleep>>,
-}
-
-impl Pieces {
-    /// A body of what `make` appends, until it says that this was the end.
-    pub(super) fn new(make: impl FnMut(&mut Vec<u8>) -> Then + Send + 'static) -> Self {
-        Self {
-            make: Some(Box::new(make)),
-            left: Bytes::new(),
-            slow: None,
-            cut: None,
-        }
-    }
-
-    /// A body that is known.
-    pub(super) fn whole(bytes: impl Into<Bytes>) -> Self {
-        Self {
-            make: None,
-            left: bytes.into(),
-            slow: None,
-            cut: None,
-        }
-    }
-
-    /// The same, so many bytes at a time with a pause before each.
-    pub(super) fn slowly(mut self, bytes: usize, pause: Duration) -> Self {
-        let sleep = Box::pin(sleep(pause));
-        self.slow = Some(Slow {
-            bytes,
-            pause,
-            sleep,
-        });
-        self
-    }
-
-    /// The same until so many bytes; then the connection breaks off.
-    pub(super) fn cut_after(mut self, bytes: usize) -> Self {
-        self.cut = Some(bytes);
-        self
-    }
-
-    fn refill(&mut self) {
-        while self.left.is_empty()
-            && let Some(make) = &mut self.make
-        {
-            let mut piece = Vec::with_capacity(PIECE + PIECE / 4);
-            if make(&mut piece) == Then::End {
-                self.make = None;
+/// A body of lines, on a head with a fault or without one.
+pub(super) fn body(
+    mut lines: impl Iterator<Item = Vec<u8>> + Send + 'static,
+    fault: Option<Fault>,
+) -> Body {
+    let (mut sender, body) = Channel::new(1);
+    let (most, mut left) = match fault {
+        Some(Fault::Slow) => (SLOW, usize::MAX),
+        Some(Fault::Cut) => (usize::MAX, CUT),
+        _ => (usize::MAX, usize::MAX),
+    };
+    tokio::spawn(async move {
+        while let Some(piece) = piece(&mut lines) {
+            for part in piece.chunks(most) {
+                if fault == Some(Fault::Slow) {
+                    sleep(PAUSE).await;
+                }
+                let part = Bytes::copy_from_slice(&part[..part.len().min(left)]);
+                left -= part.len();
+                if sender.send_data(part).await.is_err() {
+                    return;
+                }
+                if left == 0 {
+                    return sender.abort(io::ErrorKind::ConnectionAborted.into());
+                }
             }
-            self.left = piece.into();
         }
-    }
+    });
+    body
 }
 
-impl Body for Pieces {
-    type Data = Bytes;
-    type Error = io::Error;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, io::Error>>> {
-        let mut most = usize::MAX;
-        if let Some(slow) = &mut self.slow {
-            if slow.sleep.as_mut().poll(context).is_pending() {
-                return Poll::Pending;
-            }
-            slow.sleep = Box::pin(sleep(slow.pause));
-            most = slow.bytes;
-        }
-        if self.cut == Some(0) {
-            return Poll::Ready(Some(Err(io::ErrorKind::ConnectionAborted.into())));
-        }
-        self.refill();
-        if self.left.is_empty() {
-            return Poll::Ready(None);
-        }
-        let most = most
-            .min(self.left.len())
-            .min(self.cut.unwrap_or(usize::MAX));
-        if let Some(cut) = &mut self.cut {
-            *cut -= most;
-        }
-        Poll::Ready(Some(Ok(Frame::data(self.left.split_to(most)))))
+fn piece(lines: &mut impl Iterator<Item = Vec<u8>>) -> Option<Vec<u8>> {
+    let mut piece = lines.next()?;
+    while piece.len() < PIECE
+        && let Some(line) = lines.next()
+    {
+        piece.extend(line);
     }
+    Some(piece)
 }

@@ -1,10 +1,8 @@
 //! The history of a head as CSV, in the format of the daemon's `GET /api/history.csv`.
 
-use super::figures::millionths;
-use super::gauge::Gauge;
-use super::head::{Clock, Head};
-use super::row::{Found, fingerprint};
-use std::borrow::Cow;
+use super::head::Head;
+use super::row::row;
+use crate::answer::{Gauge, Row};
 use std::fmt::Write as _;
 
 /// The most results of one answer.
@@ -13,62 +11,77 @@ pub(super) const MOST: u32 = 20_000;
 const COLUMNS: &str = "seq,time_utc,recipe,fingerprint,part_id,press_stroke,token,verdict,error_code,reason,flags,\
     valid_points,coverage_permille,temperature_c,height_noise_mm,fitness_permille,exposure_us,total_us,stages_us,recording,time_source";
 
-/// The names of the columns.
-pub(super) fn header(gauges: &[Gauge]) -> String {
-    let mut line = COLUMNS.to_owned();
-    for gauge in gauges {
-        let unit = match gauge.unit {
-            "" => String::new(),
-            unit => format!(" [{unit}]"),
-        };
-        for column in [
-            &unit,
-            " sigma",
-            " low",
-            " high",
-            " decision",
-            " U",
-            " expected",
-        ] {
-            let _ = write!(line, ",{}", quoted(&format!("{}{column}", gauge.name)));
-        }
-    }
-    line + "\r\n"
+/// The newest results before SEQ `before`.
+pub(super) fn history(head: &Head, before: u32, limit: u32) -> String {
+    let shapes = head.plant.gauges.iter().map(|gauge| &gauge.shape);
+    let titles: String = shapes.map(titles).collect();
+    let found = head.newest().filter(|&seq| seq < before);
+    let found = found.take(limit.min(MOST) as usize);
+    let lines = found.map(|seq| line(&row(head, seq), head.plant.gauges.len()));
+    format!("{COLUMNS}{titles}\r\n{}", lines.collect::<String>())
 }
 
-/// One result.
-pub(super) fn line(head: &Head<'_>, found: &Found) -> String {
-    let (time, source) = match head.clock() {
-        Clock::None => (String::new(), ""),
-        Clock::Browser => (utc(head.at_ms(found.seq)), "browser"),
-        Clock::Synchronised => (utc(head.at_ms(found.seq)), "clock"),
+/// The names of the columns of a gauge.
+fn titles(gauge: &Gauge) -> String {
+    let unit = match &*gauge.unit {
+        "" => String::new(),
+        unit => format!(" [{unit}]"),
     };
-    let points = u32::from(found.coverage) * 100;
-    let mut line = format!(
-        "{},{time},{},{},{},{},0,{},{},,{},{points},{},,0.004,1000,{},{},,,{source}",
-        found.seq,
-        found.recipe,
-        fingerprint(head, found.recipe),
-        found.part_id,
-        found.seq,
-        found.verdict,
-        found.error_code,
-        found.flags,
-        found.coverage,
-        found.exposure_us,
-        found.exposure_us + found.processing_us,
-    );
-    for (place, gauge) in head.plant.gauges.iter().enumerate() {
-        let Some(&(value, bits)) = found.gauges.get(place) else {
-            line.push_str(",,,,,,,");
-            continue;
-        };
-        for number in [value, Some(gauge.sigma()), gauge.low, gauge.high] {
-            let _ = write!(line, ",{}", number.map_or(String::new(), millionths));
+    let columns = [
+        &*unit,
+        " sigma",
+        " low",
+        " high",
+        " decision",
+        " U",
+        " expected",
+    ];
+    let quoted = |column| {
+        let title = format!("{}{column}", gauge.name);
+        match title.contains([',', '"']) {
+            true => format!(",\"{}\"", title.replace('"', "\"\"")),
+            false => format!(",{title}"),
         }
-        let _ = write!(line, ",{bits},{},", millionths(gauge.u()));
+    };
+    columns.map(quoted).concat()
+}
+
+/// One result, with the columns of so many gauges.
+fn line(row: &Row, gauges: usize) -> String {
+    let time = row.at_unix_ms.map_or(String::new(), utc);
+    let source = match &*row.clock {
+        "synchronised" => "clock",
+        "none" => "",
+        other => other,
+    };
+    let permille = (row.coverage * 1e3).round();
+    let mut line = format!(
+        "{},{time},{},{},{},{},0,{},{},,{},{},{permille},,0.004,1000,{},{},,,{source}",
+        row.seq,
+        row.recipe,
+        row.fingerprint,
+        row.part_id,
+        row.press_stroke,
+        row.verdict,
+        row.error_code,
+        row.flags,
+        permille * 100.0,
+        row.exposure_us,
+        row.exposure_us + row.processing_us,
+    );
+    let number = |number: Option<f64>| number.map_or(String::new(), |number| number.to_string());
+    for gauge in &row.gauges {
+        let [value, sigma, low, high] =
+            [gauge.value, gauge.sigma, gauge.low, gauge.high].map(number);
+        // Writing to a string cannot fail.
+        let _ = write!(
+            line,
+            ",{value},{sigma},{low},{high},{},{},",
+            gauge.decision,
+            number(gauge.u)
+        );
     }
-    line + "\r\n"
+    line + &",".repeat(7 * (gauges - row.gauges.len())) + "\r\n"
 }
 
 /// A time in ms since 1970 UTC as text. Civil date of a day after H. Hinnant, "chrono-compatible
@@ -79,29 +92,12 @@ fn utc(ms: u64) -> String {
     let (era, day) = (shifted / 146_097, shifted % 146_097);
     let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
     let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let of_month = day - (153 * month + 2) / 5 + 1;
-    let (month, carry) = if month < 10 {
-        (month + 3, 0)
-    } else {
-        (month - 9, 1)
-    };
+    let march = (5 * day + 2) / 153;
+    let of_month = day - (153 * march + 2) / 5 + 1;
+    let (month, year) = ((march + 2) % 12 + 1, era * 400 + year + march / 10);
     let (seconds, ms) = (rest / 1000, rest % 1000);
-    format!(
-        "{:04}-{month:02}-{of_month:02}T{:02}:{:02}:{:02}.{ms:03}000Z",
-        era * 400 + year + carry,
-        seconds / 3600,
-        seconds / 60 % 60,
-        seconds % 60
-    )
-}
-
-fn quoted(text: &str) -> Cow<'_, str> {
-    if text.contains([',', '"']) {
-        format!("\"{}\"", text.replace('"', "\"\"")).into()
-    } else {
-        text.into()
-    }
+    let (hour, minute, second) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    format!("{year:04}-{month:02}-{of_month:02}T{hour:02}:{minute:02}:{second:02}.{ms:03}000Z")
 }
 
 #[cfg(test)]

@@ -27,8 +27,8 @@ pub(super) enum Fault {
     Redirect,
 }
 
-/// Of so many heads one has a certain fault.
-const SHARE: u32 = 20;
+/// Of so many heads one has a certain fault: the first the first of a list, and so on.
+pub(super) const SHARE: u32 = 20;
 /// Time between the beginnings of a fault, ms: no multiple of the time after which a collector asks
 /// again, so that it does not ask in the next one.
 pub(super) const PERIOD_MS: u64 = 47_000;
@@ -36,13 +36,6 @@ pub(super) const PERIOD_MS: u64 = 47_000;
 pub(super) const FIRST_MS: u64 = 24_000;
 /// How long it lasts, ms.
 pub(super) const LENGTH_MS: u64 = 6_000;
-
-impl Fault {
-    /// The fault of a head, if it has one: each of `faults` is on every twentieth head.
-    pub(super) fn of(faults: &[Self], head: u32) -> Option<Self> {
-        faults.get(((head - 1) % SHARE) as usize).copied()
-    }
-}
 
 /// How often the fault of a head has begun `since_ms` after the start, and whether it lasts.
 pub(super) fn begun(phase_ms: u64, since_ms: u64) -> (u64, bool) {

@@ -10,7 +10,6 @@ mod answer;
 mod body;
 mod csv;
 mod fault;
-mod figures;
 mod gauge;
 mod head;
 mod health;
@@ -23,9 +22,10 @@ mod tests;
 
 use crate::error::{Exit, Result};
 use fault::Fault;
+use gauge::Gauge;
 use head::Plant;
-use std::sync::Mutex;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::sync::{Arc, Mutex};
+use tokio::net::TcpListener;
 
 /// The most heads: their numbers have four digits.
 const MOST_HEADS: u32 = 9999;
@@ -33,7 +33,7 @@ const MOST_HEADS: u32 = 9999;
 const MOST_GAUGES: u16 = 64;
 
 /// Answer as many heads would, without light.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Simulate {
     /// Heads, below /h/0001/, /h/0002/ and so on.
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_HEADS)))]
@@ -71,38 +71,28 @@ impl Simulate {
     ///
     /// # Errors
     /// If the rate is not above 0, or the address cannot be listened at.
-    pub fn run(&self) -> Result<()> {
+    pub async fn run(self) -> Result<()> {
         if !(self.rate > 0.0 && self.rate <= 1e4) {
             return Exit::Usage.fail("--rate: write results per second, above 0, at most 10000");
         }
+        let failed = || Exit::Unavailable.because(format!("listen at {}", self.listen));
+        let listener = TcpListener::bind(&self.listen).await.map_err(failed())?;
+        let address = listener.local_addr().map_err(failed())?;
         let backlog_ms = f64::from(self.backlog) * 1000.0 / self.rate;
-        serve::serve(&self.listen, |address| {
-            let plant = Plant {
-                seed: self.seed,
-                heads: self.heads,
-                rate: self.rate,
-                start_ms: now_ms().saturating_sub(backlog_ms as u64),
-                results: self.results,
-                kept: self.kept,
-                faults: self.faults.clone(),
-                gauges: gauge::Gauge::table(self.gauges),
-                counted: Mutex::default(),
-            };
-            say!(
-                r#"{{"listen":"{address}","start_unix_ms":{},"seed":{},"heads":{},"rate":{},"gauges":{}}}"#,
-                plant.start_ms,
-                plant.seed,
-                plant.heads,
-                plant.rate,
-                self.gauges
-            );
-            plant
-        })
+        let start_ms = crate::now_ms().saturating_sub(backlog_ms as u64);
+        say!(
+            r#"{{"listen":"{address}","start_unix_ms":{start_ms},"seed":{},"heads":{},"rate":{},"gauges":{}}}"#,
+            self.seed,
+            self.heads,
+            self.rate,
+            self.gauges
+        );
+        let plant = Plant {
+            start_ms,
+            gauges: Gauge::table(self.gauges),
+            counted: Mutex::default(),
+            options: self,
+        };
+        serve::serve(listener, Arc::new(plant)).await
     }
-}
-
-/// ms since 1970 UTC; 0 if the clock is before that.
-fn now_ms() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |since| since.as_millis() as u64)
 }

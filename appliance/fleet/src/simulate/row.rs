@@ -1,8 +1,9 @@
-//! A result, and its line as JSON.
+//! A result of a head.
 
-use super::figures::{mixed, push_millionths, push_whole};
-use super::gauge::{REASON, decision};
-use super::head::{Clock, Head};
+use super::gauge::{DOUBTFUL, HIGH, LOW, mixed};
+use super::head::Head;
+use crate::answer::Row;
+use serde::Serialize;
 
 /// Of so many results one has a gauge without a value, or cannot be judged at all.
 const UNSEEN: u64 = 500;
@@ -13,171 +14,79 @@ const CHANGEOVER: u32 = 500;
 const NO_MEASUREMENT: u16 = 302;
 /// RESULT flags: the full sequence, a simulated head, a doubtful decision.
 const FLAGS: u16 = 1 << 3 | 1 << 5;
-const DOUBTFUL: u16 = 1 << 7;
+const IS_DOUBTFUL: u16 = 1 << 7;
 
-/// A result of a head.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Found {
-    pub seq: u32,
-    pub recipe: u16,
-    pub part_id: u32,
-    pub verdict: &'static str,
-    pub error_code: u16,
-    pub flags: u16,
-    pub exposure_us: u32,
-    pub processing_us: u32,
-    /// Share of the regions that was resolved, ‰.
-    pub coverage: u16,
-    /// Shifts in µm, turns in thousandths of a degree; `None` where the part was not aligned.
-    pub placement: Option<[i64; 5]>,
-    /// Values in millionths and bits of the decision, in the order of the slots; empty where nothing
-    /// was measured.
-    pub gauges: Vec<(Option<i64>, u16)>,
-}
-
-impl Found {
-    /// Works out result `seq` of a head, into memory that is used again.
-    pub(super) fn of(&mut self, head: &Head<'_>, seq: u32) {
-        let character = head.character();
-        let luck = mixed(mixed(character.key) ^ u64::from(seq));
-        self.seq = seq;
-        self.recipe = recipe(head.number, seq);
-        self.part_id = head.number.wrapping_mul(1_000_000).wrapping_add(seq);
-        self.exposure_us = 87_000 + (luck % 8_000) as u32;
-        self.processing_us = 5_000 + (luck >> 16) as u32 % 3_000;
-        self.gauges.clear();
-        self.flags = FLAGS;
-        if luck % FAILED == 1 {
-            (self.verdict, self.error_code) = ("INVALID", NO_MEASUREMENT);
-            (self.coverage, self.placement) = (0, None);
-            return;
-        }
-        self.error_code = 0;
-        self.coverage = 900 + (luck >> 24) as u16 % 100;
-        let part = |shift: u32| (luck >> shift) as i64 % 256 - 128;
-        self.placement = (luck % 64 != 2).then(|| [16, 24, 32, 40, 48].map(part));
-        let unseen = luck
-            .is_multiple_of(UNSEEN)
-            .then_some((luck >> 40) as usize % head.plant.gauges.len());
-        let (mut failed, mut doubtful) = (false, false);
-        for (place, gauge) in head.plant.gauges.iter().enumerate() {
-            if unseen == Some(place) {
-                self.gauges.push((None, 0));
-                continue;
-            }
-            let value = gauge.value(character, seq);
-            let bits = gauge.decision(value);
-            failed |= bits & (decision::LOW | decision::HIGH) != 0;
-            doubtful |= bits & decision::DOUBTFUL != 0;
-            self.gauges.push((Some(value), bits));
-        }
-        self.flags |= if doubtful { DOUBTFUL } else { 0 };
-        self.verdict = match (unseen, failed) {
-            (Some(_), _) => "INVALID",
-            (None, true) => "FAIL",
-            (None, false) => "PASS",
+/// Result `seq` of a head.
+pub(super) fn row(head: &Head, seq: u32) -> Row {
+    let luck = mixed(mixed(head.character.key) ^ u64::from(seq));
+    let recipe = recipe(head, seq);
+    let clock = head.clock();
+    let row = Row {
+        serial: head.serial(),
+        history: head.history(),
+        seq,
+        at_unix_ms: (clock != "none").then(|| head.at_ms(seq)),
+        clock: clock.into(),
+        recipe,
+        fingerprint: fingerprint(head, recipe),
+        part_id: head.number.wrapping_mul(1_000_000).wrapping_add(seq),
+        press_stroke: seq,
+        flags: FLAGS,
+        exposure_us: 87_000 + (luck % 8_000) as u32,
+        processing_us: 5_000 + (luck >> 16) as u32 % 3_000,
+        ..Row::default()
+    };
+    if luck % FAILED == 1 {
+        return Row {
+            verdict: "INVALID".into(),
+            error_code: NO_MEASUREMENT,
+            ..row
         };
     }
-
-    /// Appends its line for `GET /api/results`.
-    pub(super) fn line(&self, out: &mut Vec<u8>, head: &Head<'_>, start: &Start) {
-        out.extend_from_slice(&start.0);
-        push_whole(out, u64::from(self.seq));
-        out.extend_from_slice(br#","at_unix_ms":"#);
-        match head.clock() {
-            Clock::None => out.extend_from_slice(b"null"),
-            _ => push_whole(out, head.at_ms(self.seq)),
-        }
-        let mut text = |text: &str| out.extend_from_slice(text.as_bytes());
-        text(r#","clock":""#);
-        text(head.clock().word());
-        text(r#"","recipe":"#);
-        whole(out, self.recipe, r#","fingerprint":""#);
-        out.extend_from_slice(start.fingerprint(self.recipe));
-        out.extend_from_slice(br#"","part_id":"#);
-        whole(out, self.part_id, r#","press_stroke":"#);
-        whole(out, self.seq, r#","verdict":""#);
-        out.extend_from_slice(self.verdict.as_bytes());
-        out.extend_from_slice(br#"","error_code":"#);
-        whole(out, self.error_code, r#","flags":"#);
-        whole(out, self.flags, r#","exposure_us":"#);
-        whole(out, self.exposure_us, r#","processing_us":"#);
-        whole(out, self.processing_us, r#","coverage":"#);
-        push_millionths(out, i64::from(self.coverage) * 1000);
-        out.extend_from_slice(br#","placement":"#);
-        match self.placement {
-            Some(parts) => {
-                for (place, part) in parts.into_iter().enumerate() {
-                    out.push(if place == 0 { b'[' } else { b',' });
-                    push_millionths(out, part * 1000);
-                }
-                // The turn about z of a round part is not determined.
-                out.extend_from_slice(b",null]");
-            }
-            None => out.extend_from_slice(b"null"),
-        }
-        out.extend_from_slice(br#","gauges":["#);
-        for (place, (gauge, (value, bits))) in
-            head.plant.gauges.iter().zip(&self.gauges).enumerate()
-        {
-            if place > 0 {
-                out.push(b',');
-            }
-            out.extend_from_slice(&gauge.before);
-            match value {
-                Some(value) => push_millionths(out, *value),
-                None => out.extend_from_slice(b"null"),
-            }
-            out.extend_from_slice(&gauge.behind);
-            push_whole(out, u64::from(*bits));
-            match value {
-                Some(_) => out.extend_from_slice(br#","reason":null}"#),
-                None => {
-                    out.extend_from_slice(br#","reason":""#);
-                    out.extend_from_slice(REASON.as_bytes());
-                    out.extend_from_slice(br#""}"#);
-                }
-            }
-        }
-        out.extend_from_slice(b"]}\n");
+    let gauges = &head.plant.gauges;
+    let unseen = luck.is_multiple_of(UNSEEN);
+    let unseen = unseen.then_some((luck >> 40) as usize % gauges.len());
+    let gauges = gauges.iter().enumerate().map(|(place, gauge)| {
+        let seen = unseen != Some(place);
+        gauge.measured(seen.then(|| gauge.value(head.character, seq)))
+    });
+    let gauges: Vec<_> = gauges.collect();
+    let bits = gauges.iter().fold(0, |bits, gauge| bits | gauge.decision);
+    let verdict = match unseen {
+        Some(_) => "INVALID",
+        None if bits & (LOW | HIGH) != 0 => "FAIL",
+        None => "PASS",
+    };
+    let doubtful = if bits & DOUBTFUL != 0 { IS_DOUBTFUL } else { 0 };
+    // Thousandths of a mm and of a degree; the turn about z of a round part is not determined.
+    let shift = |at: u32| Some(((luck >> at) as i64 % 256 - 128) as f64 / 1e3);
+    let [x, y, z, a, b] = [16, 24, 32, 40, 48].map(shift);
+    Row {
+        verdict: verdict.into(),
+        flags: FLAGS | doubtful,
+        coverage: f64::from(900 + (luck >> 24) as u16 % 100) / 1e3,
+        placement: (luck % 64 != 2).then_some([x, y, z, a, b, None]),
+        gauges,
+        ..row
     }
 }
 
-fn whole(out: &mut Vec<u8>, number: impl Into<u64>, then: &str) {
-    push_whole(out, number.into());
-    out.extend_from_slice(then.as_bytes());
-}
-
-/// What all lines of an answer begin with, and the fingerprints of the recipes.
-pub(super) struct Start(Vec<u8>, [[u8; 8]; 2]);
-
-impl Start {
-    /// Of a head, with its serial number and the id of its history.
-    pub(super) fn of(head: &Head<'_>) -> Self {
-        let (serial, history) = (head.serial(), head.history());
-        let mut fingerprints = [[b'0'; 8]; 2];
-        for (recipe, bytes) in (1..).zip(&mut fingerprints) {
-            bytes.copy_from_slice(fingerprint(head, recipe).as_bytes());
-        }
-        let words = format!(r#"{{"serial":"{serial}","history":"{history}","seq":"#);
-        Self(words.into_bytes(), fingerprints)
-    }
-
-    fn fingerprint(&self, recipe: u16) -> &[u8] {
-        &self.1[usize::from(recipe == 2)]
-    }
+/// A line of an answer.
+pub(super) fn line(of: &impl Serialize) -> Vec<u8> {
+    // What has names for keys can be written.
+    let mut line = serde_json::to_vec(of).unwrap_or_default();
+    line.push(b'\n');
+    line
 }
 
 /// The recipe of result `seq`: one head in four makes two parts in turns.
-pub(super) fn recipe(head: u32, seq: u32) -> u16 {
-    let second = head.is_multiple_of(4) && (seq / CHANGEOVER) % 2 == 1;
-    if second { 2 } else { 1 }
+pub(super) fn recipe(head: &Head, seq: u32) -> u16 {
+    let second = head.number.is_multiple_of(4) && (seq / CHANGEOVER) % 2 == 1;
+    1 + u16::from(second)
 }
 
 /// The first 8 hexadecimal digits of a recipe's fingerprint: the same recipe on all heads.
-pub(super) fn fingerprint(head: &Head<'_>, recipe: u16) -> String {
-    format!(
-        "{:08x}",
-        mixed(mixed(head.plant.seed) ^ u64::from(recipe)) as u32
-    )
+pub(super) fn fingerprint(head: &Head, recipe: u16) -> String {
+    let seed = mixed(head.plant.options.seed);
+    format!("{:08x}", mixed(seed ^ u64::from(recipe)) as u32)
 }

@@ -1,10 +1,11 @@
 //! The simulated heads as a collector sees them.
 
+use super::Simulate;
 use super::answer::answer;
 use super::fault::{Fault, PERIOD_MS};
 use super::gauge::Gauge;
-use super::head::{Head, Plant};
-use super::now_ms;
+use super::head::Plant;
+use crate::now_ms;
 use hyper::body::Body as _;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -16,16 +17,22 @@ const HEADS: u32 = 40;
 
 /// A plant whose heads have made `results` each.
 fn plant(results: u32, faults: &[Fault]) -> Arc<Plant> {
-    Arc::new(Plant {
-        seed: 7,
+    let options = Simulate {
         heads: HEADS,
         rate: 10.0,
-        start_ms: now_ms() - u64::from(results) * 100,
+        listen: String::new(),
+        seed: 7,
+        faults: faults.to_vec(),
+        gauges: 8,
+        backlog: 0,
         results,
         kept: u32::MAX,
-        faults: faults.to_vec(),
-        gauges: Gauge::table(8),
+    };
+    Arc::new(Plant {
+        start_ms: now_ms() - u64::from(results) * 100,
+        gauges: Gauge::table(options.gauges),
         counted: Default::default(),
+        options,
     })
 }
 
@@ -68,11 +75,6 @@ fn seqs(rows: &[Value]) -> Vec<u64> {
     rows.iter()
         .map(|row| row["seq"].as_u64().unwrap())
         .collect()
-}
-
-fn failing_at(plant: &Plant, fault: Fault) -> Head<'_> {
-    let number = 1 + plant.faults.iter().position(|&one| one == fault).unwrap() as u32;
-    plant.head(number, now_ms()).unwrap()
 }
 
 #[test]
@@ -191,7 +193,7 @@ fn a_history_that_is_made_anew_has_another_id_and_counts_from_1() {
 #[test]
 fn a_history_that_keeps_few_results_says_which_is_the_oldest() {
     let mut plant = Arc::into_inner(plant(1_000, &[])).unwrap();
-    plant.kept = 50;
+    plant.options.kept = 50;
     let (header, rows) = results(&Arc::new(plant), 9, "after=10");
     assert_eq!(header["first"], 951);
     assert_eq!(seqs(&rows), (951..=1_000).collect::<Vec<_>>());
@@ -210,18 +212,17 @@ fn what_is_hostile_is_hostile_while_the_fault_lasts() {
     ];
     // The start is chosen so that every fault has begun at least once.
     for fault in kinds {
-        let mut plant = Arc::into_inner(plant(1_000, &[fault])).unwrap();
+        let mut plant = plant(1_000, &[fault]);
         // The time at which the first head begins to fail is found by moving the start.
         let now = now_ms();
         let failing = |since: &u64| {
             let probe = plant.head(1, plant.start_ms + since);
-            probe.is_some_and(|head| head.ails().is_some())
+            probe.is_some_and(|head| head.ails.is_some())
         };
         let since = (0..2 * PERIOD_MS).step_by(1_000).find(failing).unwrap() + 1_000;
-        plant.start_ms = now - since;
-        let plant = Arc::new(plant);
-        let head = failing_at(&plant, fault);
-        assert_eq!(head.ails(), Some(fault));
+        Arc::get_mut(&mut plant).unwrap().start_ms = now - since;
+        let head = plant.head(1, now_ms()).unwrap();
+        assert_eq!(head.ails, Some(fault));
         let (status, text, whole) = get(&plant, "0001/api/results?after=5");
         let lines: Vec<_> = text.lines().collect();
         match fault {

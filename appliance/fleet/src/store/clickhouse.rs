@@ -46,19 +46,17 @@ impl ClickHouse {
         }
         let client = |host: &str| {
             let url: Url = format!("{scheme}://{host}").parse()?;
-            let client = Client::new(url, tls.clone()).with_patience(ANSWERING);
-            Ok(match login {
-                Some((user, key)) => client
-                    .with_header("X-ClickHouse-User", user.into())
-                    .with_header("X-ClickHouse-Key", key.into()),
-                None => client,
-            })
+            let mut client = Client::new(url, tls.clone());
+            client.patience = ANSWERING;
+            if let Some((user, key)) = login {
+                let login = [("X-ClickHouse-User", user), ("X-ClickHouse-Key", key)];
+                client.headers = login.map(|(name, value)| (name, value.to_owned())).into();
+            }
+            Ok(client)
         };
+        let clients = hosts.split(',').map(client);
         Ok(Self {
-            clients: hosts
-                .split(',')
-                .map(client)
-                .collect::<Result<_, Complaint>>()?,
+            clients: clients.collect::<Result<_, Complaint>>()?,
             at: 0,
             database: database.to_owned(),
         })
@@ -76,9 +74,10 @@ impl ClickHouse {
     }
 
     pub(super) async fn write(&mut self, batch: &Batch) -> Result<(), Complaint> {
+        // What is behind a gap must not be known before the gap is.
+        self.insert("gap", batch.gaps.iter()).await?;
         self.insert("result", batch.rows.iter().map(Columns))
             .await?;
-        self.insert("gap", batch.gaps.iter()).await?;
         self.insert("head", batch.heads.iter()).await
     }
 
@@ -102,10 +101,8 @@ impl ClickHouse {
         if lines.is_empty() {
             return Ok(());
         }
-        let path = format!(
-            "{}&query=INSERT%20INTO%20{table}%20FORMAT%20JSONEachRow",
-            self.of_database()
-        );
+        let path = self.of_database();
+        let path = format!("{path}&query=INSERT%20INTO%20{table}%20FORMAT%20JSONEachRow");
         self.post(path, lines.into()).await.map(drop)
     }
 
@@ -118,7 +115,7 @@ impl ClickHouse {
         let mut tried = 0;
         loop {
             let client = &mut self.clients[self.at];
-            let error = match client.post(&path, body.clone(), MOST).await {
+            let error = match client.whole(&path, Some(body.clone()), MOST).await {
                 Ok(answer) => return Ok(answer),
                 Err(error) => error,
             };
@@ -159,11 +156,10 @@ impl Serialize for Columns<'_> {
         }
         map.serialize_entry("at", &self.0.at())?;
         map.serialize_entry("received_unix_ms", &self.0.at_unix_ms)?;
-        let placement = row
-            .placement
-            .as_ref()
-            .map_or(&[][..], |placement| placement);
-        map.serialize_entry("placement", placement)?;
+        map.serialize_entry(
+            "placement",
+            row.placement.as_ref().map_or(&[][..], |all| all),
+        )?;
         nested! { slot name unit value sigma u low high decision reason }
         map.end()
     }

@@ -11,7 +11,6 @@ use crate::answer::Row;
 use crate::error::{Exit, Failure, Result};
 use clickhouse::ClickHouse;
 use rustls::ClientConfig;
-use schema::Query;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use sqlite::Sqlite;
@@ -138,6 +137,16 @@ pub struct Spread {
     pub variance: Option<f64>,
 }
 
+/// The SQL of a file for SQLite and for ClickHouse, each of whose answers is a line of JSON per row.
+macro_rules! both {
+    ($file:literal) => {
+        [
+            include_str!(concat!("sql/sqlite/", $file)),
+            include_str!(concat!("sql/clickhouse/", $file)),
+        ]
+    };
+}
+
 /// Why a store does not do what it should, for people.
 pub type Complaint = String;
 
@@ -159,9 +168,8 @@ impl Store {
             return Ok(Self::Sqlite(Sqlite::of(file)));
         }
         let wrong = |words| Failure::new(Exit::Usage, format!("--store {url}: {words}"));
-        ClickHouse::of(url, tls)
-            .map(Self::ClickHouse)
-            .map_err(wrong)
+        let store = ClickHouse::of(url, tls).map_err(wrong)?;
+        Ok(Self::ClickHouse(store))
     }
 
     /// Opens it and makes its tables and views where they are missing.
@@ -191,7 +199,7 @@ impl Store {
     /// # Errors
     /// In words.
     pub async fn ends(&mut self) -> Result<Vec<End>, Complaint> {
-        self.select(Query::Ends, 0).await
+        self.select(both!("ends.sql"), 0).await
     }
 
     /// The heads as they were written last, by their addresses.
@@ -199,7 +207,7 @@ impl Store {
     /// # Errors
     /// In words.
     pub async fn heads(&mut self) -> Result<Vec<HeadState>, Complaint> {
-        self.select(Query::Heads, 0).await
+        self.select(both!("heads.sql"), 0).await
     }
 
     /// Results of each head since a time, s since 1970 UTC.
@@ -207,7 +215,7 @@ impl Store {
     /// # Errors
     /// In words.
     pub async fn counts(&mut self, since: u64) -> Result<Vec<Count>, Complaint> {
-        self.select(Query::Counts, since).await
+        self.select(both!("counts.sql"), since).await
     }
 
     /// Values of each gauge since a time, s since 1970 UTC.
@@ -215,17 +223,19 @@ impl Store {
     /// # Errors
     /// In words.
     pub async fn spreads(&mut self, since: u64) -> Result<Vec<Spread>, Complaint> {
-        self.select(Query::Spreads, since).await
+        self.select(both!("spreads.sql"), since).await
     }
 
+    /// The rows of a query, which is written for both kinds of store.
     async fn select<T: DeserializeOwned>(
         &mut self,
-        query: Query,
+        [sqlite, clickhouse]: [&str; 2],
         since: u64,
     ) -> Result<Vec<T>, Complaint> {
+        let of = |sql: &str| sql.replace("$since", &since.to_string());
         let lines = match self {
-            Self::Sqlite(store) => store.lines(&query.sql(Kind::Sqlite, since)),
-            Self::ClickHouse(store) => store.lines(&query.sql(Kind::ClickHouse, since)).await,
+            Self::Sqlite(store) => store.lines(&of(sqlite)),
+            Self::ClickHouse(store) => store.lines(&of(clickhouse)).await,
         }?;
         let read = |line: &str| serde_json::from_str(line);
         let rows = lines.lines().map(read).collect::<Result<_, _>>();

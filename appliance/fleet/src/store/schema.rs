@@ -1,4 +1,4 @@
-//! All SQL, which lies in files.
+//! The tables and views of each kind of store, whose SQL lies in files.
 
 use clap::ValueEnum;
 
@@ -26,30 +26,26 @@ const TABLES: [(&str, &str, &str); 3] = [
 /// end of a line. Those of a cluster are of the database `plant`: ClickHouse 18.16 works
 /// `currentDatabase()` out again when it starts, and then there is none.
 pub fn schema(kind: Kind) -> String {
-    let (tables, views) = match kind {
+    let (mut all, views, starts) = match kind {
         Kind::Sqlite => (
             include_str!("sql/sqlite/tables.sql").to_owned(),
             include_str!("sql/sqlite/views.sql"),
+            ["at - at % 3600", "at - at % 86400"],
         ),
         _ => (
             of_servers(kind == Kind::Cluster),
             include_str!("sql/clickhouse/views.sql"),
+            ["toStartOfHour(at)", "toDate(at)"],
         ),
     };
-    let starts = match kind {
-        Kind::Sqlite => ["at - at % 3600", "at - at % 86400"],
-        _ => ["toStartOfHour(at)", "toDate(at)"],
-    };
-    let mut all = tables;
     for statement in views.split_inclusive(";\n") {
         if !statement.contains("$period") {
             all += statement;
             continue;
         }
         for (period, start) in ["hour", "day"].into_iter().zip(starts) {
-            all += &statement
-                .replace("$period", period)
-                .replace("$start", start);
+            let statement = statement.replace("$period", period);
+            all += &statement.replace("$start", start);
         }
     }
     all
@@ -76,49 +72,14 @@ fn of_servers(cluster: bool) -> String {
 }
 
 /// The statements of a schema, without comments.
-pub(super) fn statements(schema: &str) -> impl Iterator<Item = String> {
+pub(super) fn statements(schema: &str) -> Vec<String> {
     let lines = schema.lines();
     let code = lines.filter(|line| !line.trim_start().starts_with("--"));
-    let code: Vec<_> = code.collect();
-    let code = code.join("\n");
-    let statements: Vec<_> = code
-        .split(";\n")
-        .map(|s| s.trim().trim_end_matches(';').to_owned())
-        .collect();
+    let code = code.collect::<Vec<_>>().join("\n") + "\n";
+    let statements = code.split_terminator(";\n");
     statements
-        .into_iter()
-        .filter(|statement| !statement.is_empty())
-}
-
-/// A question to a store, whose answer is a line of JSON per row.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Query {
-    Ends,
-    Heads,
-    Counts,
-    Spreads,
-}
-
-macro_rules! of_kind {
-    ($kind:expr, $file:literal) => {
-        match $kind {
-            Kind::Sqlite => include_str!(concat!("sql/sqlite/", $file)),
-            _ => include_str!(concat!("sql/clickhouse/", $file)),
-        }
-    };
-}
-
-impl Query {
-    /// Its SQL, about results since a time (s since 1970 UTC) where it is about results.
-    pub(super) fn sql(self, kind: Kind, since: u64) -> String {
-        let sql = match self {
-            Self::Ends => of_kind!(kind, "ends.sql"),
-            Self::Heads => of_kind!(kind, "heads.sql"),
-            Self::Counts => of_kind!(kind, "counts.sql"),
-            Self::Spreads => of_kind!(kind, "spreads.sql"),
-        };
-        sql.replace("$since", &since.to_string())
-    }
+        .map(|statement| statement.trim().to_owned())
+        .collect()
 }
 
 #[cfg(test)]
@@ -128,7 +89,7 @@ mod tests {
     #[test]
     fn no_mark_is_left_in_a_schema_and_every_kind_has_the_same_views() {
         let views = |kind| {
-            let statements: Vec<_> = statements(&schema(kind)).collect();
+            let statements = statements(&schema(kind));
             let views = statements
                 .iter()
                 .filter_map(|s| s.strip_prefix("CREATE VIEW IF NOT EXISTS "));

@@ -6,8 +6,9 @@
 
 use super::schema::{Kind, schema};
 use super::{Batch, Complaint};
-use rusqlite::{Connection, Transaction, params};
-use serde_json::json;
+use rusqlite::types::Value as Sql;
+use rusqlite::{Connection, Transaction, params_from_iter};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -76,58 +77,50 @@ impl Sqlite {
 }
 
 fn write(transaction: &Transaction<'_>, batch: &Batch) -> rusqlite::Result<()> {
-    let mut insert = transaction.prepare_cached(
-        "INSERT OR IGNORE INTO result VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )?;
     for received in &batch.rows {
-        let row = &received.row;
-        insert.execute(params![
-            row.serial,
-            row.history,
-            row.seq,
-            received.at(),
-            row.at_unix_ms,
-            row.clock,
-            received.at_unix_ms,
-            row.recipe,
-            row.fingerprint,
-            row.part_id,
-            row.press_stroke,
-            row.verdict,
-            row.error_code,
-            row.flags,
-            row.exposure_us,
-            row.processing_us,
-            row.coverage,
-            row.placement.map(|placement| json!(placement).to_string()),
-            json!(row.gauges).to_string(),
-        ])?;
+        let mut row = json!(received.row);
+        row["at"] = json!(received.at());
+        row["received_unix_ms"] = json!(received.at_unix_ms);
+        insert(transaction, "OR IGNORE INTO result", "", &row)?;
     }
-    let mut insert = transaction.prepare_cached(
-        "INSERT INTO gap VALUES (?, ?, ?, ?) ON CONFLICT DO UPDATE SET last = max(last, excluded.last)",
-    )?;
     for gap in &batch.gaps {
-        insert.execute(params![gap.serial, gap.history, gap.first, gap.last])?;
+        let newer = "ON CONFLICT DO UPDATE SET last = max(last, excluded.last)";
+        insert(transaction, "INTO gap", newer, &json!(gap))?;
     }
-    let mut insert = transaction.prepare_cached(
-        "INSERT OR REPLACE INTO head VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
-    )?;
     for head in &batch.heads {
-        insert.execute(params![
-            head.url,
-            head.line,
-            head.serial,
-            head.history,
-            head.seq,
-            head.updated_unix_ms,
-            head.reachable,
-            head.error,
-            head.state,
-            head.recipe,
-            head.recipe_name,
-            head.drift_px,
-            head.last_result_unix_ms,
-        ])?;
+        insert(transaction, "OR REPLACE INTO head", "", &json!(head))?;
     }
     Ok(())
+}
+
+/// Inserts an object whose keys are columns.
+fn insert(
+    transaction: &Transaction<'_>,
+    into: &str,
+    conflict: &str,
+    row: &Value,
+) -> rusqlite::Result<()> {
+    let columns = row.as_object().into_iter().flatten();
+    let (names, values): (Vec<_>, Vec<_>) =
+        columns.map(|(name, value)| (&**name, cell(value))).unzip();
+    let marks = vec!["?"; names.len()].join(", ");
+    let names = names.join(", ");
+    let sql = format!("INSERT {into} ({names}) VALUES ({marks}) {conflict}");
+    transaction
+        .prepare_cached(&sql)?
+        .execute(params_from_iter(values))?;
+    Ok(())
+}
+
+/// A value as SQLite has it; arrays are JSON.
+fn cell(value: &Value) -> Sql {
+    match value {
+        Value::Null => Sql::Null,
+        Value::String(text) => Sql::Text(text.clone()),
+        Value::Number(number) => match (number.as_i64(), number.as_f64()) {
+            (Some(whole), _) => Sql::Integer(whole),
+            (None, real) => real.map_or(Sql::Null, Sql::Real),
+        },
+        other => Sql::Text(other.to_string()),
+    }
 }
