@@ -100,26 +100,22 @@ impl Backup {
 /// Files that were written of one head.
 async fn one(folder: PathBuf, mut client: Client) -> Result<usize> {
     let url = client.url().to_string();
-    let wrong = |words: String| Exit::Content.fail(format!("{url}: {words}"));
+    let wrong = |what: String| Exit::Content.fail(format!("{url}: {what} is no name of a file"));
     let snapshot: Value = asked(&mut client, "/api/snapshot").await?;
     let serial = snapshot["identity"]["serial"].as_str().unwrap_or_default();
     if !is_name(serial) {
-        return wrong(format!("the serial {serial:?} is no name of a file"));
+        return wrong(format!("the serial {serial:?}"));
     }
     let mut known: Value = asked(&mut client, "/api/recipes").await?;
     let malformed = Exit::Content.because(format!("{url}/api/recipes"));
     let recipes: Vec<Recipe> =
         serde_json::from_value(known["recipes"].take()).map_err(malformed)?;
     let mut written = 0;
-    for Recipe {
-        number,
-        fingerprint,
-        ..
-    } in &recipes
-    {
+    for recipe in &recipes {
+        let (number, fingerprint) = (recipe.number, &recipe.fingerprint);
         if !is_name(fingerprint) {
             return wrong(format!(
-                "the fingerprint {fingerprint:?} of recipe {number} is none"
+                "the fingerprint {fingerprint:?} of recipe {number}"
             ));
         }
         let file = folder.join("recipes").join(format!("{fingerprint}.recipe"));

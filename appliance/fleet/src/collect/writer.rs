@@ -33,7 +33,7 @@ pub(super) async fn write(store: &mut Store, mut incoming: Receiver<Batch>, tall
     }
 }
 
-/// Tries again and again what a store may not do at first.
+/// Repeats an attempt on the store until it succeeds. The log has the first failure, and the end.
 pub(super) async fn until_it_works<T>(
     what: &str,
     mut attempt: impl AsyncFnMut() -> Result<T, Complaint>,

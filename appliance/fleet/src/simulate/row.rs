@@ -73,7 +73,7 @@ pub(super) fn row(head: &Head, seq: u32) -> Row {
 
 /// A line of an answer.
 pub(super) fn line(of: &impl Serialize) -> Vec<u8> {
-    // What has names for keys can be written.
+    // Only a map whose keys are no text could not be written.
     let mut line = serde_json::to_vec(of).unwrap_or_default();
     line.push(b'\n');
     line
