@@ -132,9 +132,24 @@ fn views_have_what_the_values_come_to() {
         .lines()
         .skip(1)
         .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap());
+    let rows: Vec<_> = rows.collect();
     let values: Vec<f64> = rows
+        .iter()
         .filter_map(|row| row["gauges"][1]["value"].as_f64())
         .collect();
     assert_eq!(n as usize, values.len());
     assert!((mean - values.iter().sum::<f64>() / values.len() as f64).abs() < 1e-9);
+    // Every key of a line is a column.
+    let keys = rows[0].as_object().unwrap().keys();
+    let cells = keys.map(|key| match &**key {
+        "placement" | "gauges" => format!("'{key}', json({key})"),
+        _ => format!("'{key}', {key}"),
+    });
+    let cells = cells.collect::<Vec<_>>().join(", ");
+    let query = format!("SELECT json_object({cells}) FROM result ORDER BY seq");
+    let mut statement = connection.prepare(&query).unwrap();
+    let stored = statement.query_map((), |row| row.get::<_, String>(0));
+    let stored = stored.unwrap().map(|line| line.unwrap());
+    let stored = stored.map(|line| serde_json::from_str::<serde_json::Value>(&line).unwrap());
+    assert_eq!(stored.collect::<Vec<_>>(), rows);
 }
