@@ -12,7 +12,8 @@
 //! The wall is seen where x − t v lies on the material, over t (−∇d · v) of the plane. It is lit
 //! (n·l)/(n_z·l) times as much as the face, n its normal, l the direction to the light.
 
-use super::shape::Shape;
+use super::sample::Signals;
+use super::shape::{Foot, Shape};
 use super::view::{Setup, View};
 use crate::geometry::Vector;
 
@@ -47,7 +48,7 @@ impl Wall {
 
 /// By how much the phase of a floor that is seen at a place of the plane is larger than the plane's
 /// there, turns of ratio 1; `None` if its depth is not known or nothing tells.
-pub fn floor_phase(view: &impl View, setup: &Setup, (x, y): (f64, f64)) -> Option<f64> {
+fn floor_phase(view: &impl View, setup: &Setup, (x, y): (f64, f64)) -> Option<f64> {
     let floor = setup.floor?;
     let (right, up) = slope(setup.camera, x, y);
     // Where the light that reaches the floor passes the plane.
@@ -58,6 +59,42 @@ pub fn floor_phase(view: &impl View, setup: &Setup, (x, y): (f64, f64)) -> Optio
         Some(view.spot(u, v)?.phase)
     };
     Some(phase(u + (lamp.x - u) * share, v + (lamp.y - v) * share)? - phase(x, y)?)
+}
+
+/// By how much more the phase of a floor changes beside a piece of a contour than the plane's, turns
+/// of ratio 1: across in the second order, which an adapted pattern has within a few pixels.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Gradient {
+    across: f64,
+    bend: f64,
+    along: f64,
+}
+
+impl Gradient {
+    /// Within `band` mm from a piece that reaches `half` mm to each side; 0 where it is not known.
+    pub fn of_floor(signals: &Signals<'_, impl View>, foot: &Foot, [band, half]: [f64; 2]) -> Self {
+        let (h, (nx, ny)) = (band / 2.0, foot.normal);
+        let phase = |d: f64, t: f64| {
+            let at = (foot.x + d * nx - t * ny, foot.y + d * ny + t * nx);
+            floor_phase(signals.view, signals.setup, at)
+        };
+        let all = [(0.0, 0.0), (-h, 0.0), (-band, 0.0), (-h, -half), (-h, half)];
+        let [Some(at), Some(beside), Some(far), Some(before), Some(after)] =
+            all.map(|(d, t)| phase(d, t))
+        else {
+            return Self::default();
+        };
+        Self {
+            across: (3.0 * at - 4.0 * beside + far) / band,
+            bend: (at - 2.0 * beside + far) / (2.0 * h * h),
+            along: (after - before) / (2.0 * half),
+        }
+    }
+
+    /// The change from the piece's middle to a place `d` mm towards the material, `t` mm along it.
+    pub fn turns(&self, d: f64, t: f64) -> f64 {
+        (self.across + self.bend * d) * d + self.along * t
+    }
 }
 
 /// How wide the shadow between an edge and a floor is seen at a place with this unit vector into the

@@ -13,6 +13,9 @@ pub struct Complex {
 }
 
 impl Complex {
+    /// Light that is not known: sums and products with it are not known either.
+    pub const UNKNOWN: Self = Self::new(f64::NAN, f64::NAN);
+
     /// From its parts.
     pub const fn new(re: f64, im: f64) -> Self {
         Self { re, im }
@@ -38,6 +41,11 @@ impl Complex {
             2 => Self::new(-cos, -sin),
             _ => Self::new(sin, -cos),
         }
+    }
+
+    /// Itself, if it is known.
+    pub fn known(self) -> Option<Self> {
+        (!self.re.is_nan()).then_some(self)
     }
 
     /// The conjugate.

@@ -57,9 +57,9 @@ pub struct Contour<const N: usize> {
     pub covariance: [[f64; N]; N],
     /// σ of the camera's blur at its rim, px.
     pub blur: f64,
-    /// By how much more than above a dark background light that is off the model moves an edge: the
-    /// material's light over what the background's differs from it, at least 1.
-    pub faint: f64,
+    /// RMS of the light at its rim that neither noise nor the model explains, of the material's,
+    /// beyond what edges oblique to pixels make: a floor that is lit through another opening.
+    pub unexplained: f64,
     /// mm per px.
     pub pixel: f64,
     /// Points of its rim.
@@ -90,7 +90,7 @@ pub fn find<const N: usize>(
         parameters: *expected,
         covariance: [[0.0; N]; N],
         blur: FIRST_BLUR,
-        faint: 1.0,
+        unexplained: 0.0,
         pixel: 0.0,
         points: Vec::new(),
         outcomes: Vec::new(),
@@ -117,21 +117,15 @@ pub fn find<const N: usize>(
     if let Some(start) = start(about, &search.signals, pixel, &mut search.room.ratios) {
         contour.parameters = start;
     }
-    let (few, thin) = search.run(&mut contour, setup.thickness.unwrap_or(0.0));
+    search.run(&mut contour, setup.thickness.unwrap_or(0.0));
     if setup.thickness.is_none() && contour.state == State::Found {
-        // What a wall changes is seen on few pieces as well as on all: the noise of both ends is one.
-        let mut thick = Contour {
-            parameters: thin,
-            ..contour.clone()
-        };
-        search.approach(&mut thick, THICK * BAND * pixel, ROUGH[1], few, STILL);
-        search.judge(&mut thick);
+        let mut thick = contour.clone();
+        search.run(&mut thick, THICK * BAND * pixel);
         if thick.state == State::Found {
             let mut half = [0.0; N];
-            let both = thin.iter().zip(thick.parameters);
-            for ((half, p), (thin, thick)) in half.iter_mut().zip(&mut contour.parameters).zip(both)
-            {
-                *half = (thick - thin) / 2.0;
+            let ends = contour.parameters.iter_mut().zip(thick.parameters);
+            for (half, (p, thick)) in half.iter_mut().zip(ends) {
+                *half = (thick - *p) / 2.0;
                 *p += *half;
             }
             contour.wall = Some(half);
@@ -155,9 +149,8 @@ struct Sharpness {
 }
 
 impl<S, V: View> Search<'_, S, V> {
-    /// Goes on from where a contour is until nothing moves, with few pieces and then with all. Which
-    /// pieces the few were, as a step, and the parameters by them.
-    fn run<const N: usize>(&mut self, contour: &mut Contour<N>, thickness: f64) -> (usize, [f64; N])
+    /// Goes on from where a contour is until nothing moves, with few pieces and then with all.
+    fn run<const N: usize>(&mut self, contour: &mut Contour<N>, thickness: f64)
     where
         S: Shape<N>,
     {
@@ -165,17 +158,12 @@ impl<S, V: View> Search<'_, S, V> {
         // Casts cut off, and keep to the range of their type.
         let few = (pieces as usize / LEAST).clamp(1, FEW);
         let near = self.approach(contour, thickness, ROUGH[0], few, STILL);
-        let by_few = contour.parameters;
         if few > 1 && near {
             self.approach(contour, thickness, ROUGH[1], 1, LAST);
         } else if few > 1 {
             self.approach(contour, thickness, ROUGH[0], 1, STILL);
         }
         self.judge(contour);
-        match near {
-            true => (few, by_few),
-            false => (1, contour.parameters),
-        }
     }
 
     /// The same with one of `some` pieces, until no place moves by `still` px. Whether the pieces
@@ -232,7 +220,7 @@ impl<S, V: View> Search<'_, S, V> {
         contour.points.clear();
         contour.outcomes.clear();
         let (mut sharpness, mut face) = (Sharpness::default(), [0.0; 2]);
-        let mut faint = 0.0;
+        let (mut unexplained, mut strength) = (0.0, 0.0);
         let Room {
             pieces,
             seen,
@@ -257,14 +245,17 @@ impl<S, V: View> Search<'_, S, V> {
             contour.outcomes.push(outcome);
             if let Some(fit) = fit.filter(|_| outcome == Outcome::Accepted) {
                 sharpness.add(&fit);
-                faint += 1.0 / (fit.contrast * fit.contrast);
+                unexplained += fit.cost - fit.freedom - rough * rough * fit.strength;
+                strength += fit.strength;
                 contour.points.push(point(&problem, &fit));
                 add_face(&problem, &fit, &mut face);
             }
         }
         contour.blur = sharpness.adapted(contour.blur);
-        let count = contour.points.len().max(1) as f64;
-        contour.faint = libm::sqrt(faint / count).max(1.0);
+        contour.unexplained = match unexplained > 0.0 {
+            true => libm::sqrt(unexplained / strength),
+            false => 0.0,
+        };
         contour.face = (face[0] / face[1], 1.0 / libm::sqrt(face[1]));
     }
 

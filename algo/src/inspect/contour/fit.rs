@@ -22,8 +22,10 @@
 //! M is where in a pixel the material lies, S how far it spreads: a pixel that the edge cuts has
 //! its phase at the middle of its share, and averages over less of the fringe than a whole one. The
 //! levels of a floor differ in phase, so that what changes its phase, i k M and its own gradient
-//! beyond the plane's, has ⟨r a⟩ for r a, which pixels beyond the edge show. Of a wall a whole pixel averages over another phase than of the face, which is the real exponent. ⟨⟩
-//! is the mean over levels; elsewhere the levels' mean of r stands for it.
+//! beyond the plane's, has ⟨r a⟩ for r a, which pixels beyond the edge show; by its gradient this
+//! light turns by ⟨r³⟩/⟨r²⟩. Of a wall a whole pixel averages over another phase than of the face,
+//! which is the real exponent. ⟨⟩ is the mean over levels; elsewhere the levels' mean of r stands
+//! for it.
 //!
 //! # Shapes and units
 //! e and distances in px of the picture along d. w in counts.
@@ -78,8 +80,6 @@ pub struct Fit {
     pub material: f64,
     /// The brightness of the background over the material's.
     pub background: f64,
-    /// By how much background and material differ, over the material.
-    pub contrast: f64,
     /// What the cost would be if all of the material's light were left.
     pub strength: f64,
     /// The angle of b, turns.
@@ -224,20 +224,19 @@ impl<V: View> Problem<'_, V> {
             right: [weight * sums[3], weight * sums[4]],
             material: b.re,
             background: a.length() / b.length(),
-            contrast: (b - a).length() / b.length(),
             strength: weight * b.square() * count,
             off: libm::fabs(b.turns()),
         })
     }
 
-    /// The light of the background with each level times its share of the mean ratio; `None` if
-    /// no pixel sees it alone.
+    /// The light of the background with each level times its share of the mean ratio, as it would be
+    /// in the middle of the piece; `None` if no pixel sees it alone.
     fn rated(&self, edge: f64) -> Option<Complex> {
         let half = self.edge.reach() / 2.0;
         let (mut sum, mut count) = (Complex::default(), 0.0);
         for pixel in self.pixels {
             if (-BAND..edge - half).contains(&pixel.d) && pixel.border < -half {
-                sum += pixel.rated;
+                sum += pixel.rated * pixel.floor.conj();
                 count += 1.0;
             }
         }
@@ -247,9 +246,12 @@ impl<V: View> Problem<'_, V> {
     /// What the levels' sum of background lacks to be a times its share, which is less than 1 by
     /// `less`.
     fn shifted(&self, pixel: &Pixel, less: Complex, rated: Option<Complex>) -> Complex {
-        let ramp = TAU * self.signals.ratio * self.piece.ramp;
-        let angle = less.im - ramp * pixel.d * (1.0 - less.re);
-        rated.unwrap_or_default() * Complex::new(0.0, angle)
+        let Some(rated) = rated else {
+            return Complex::default();
+        };
+        let here = rated * pixel.floor;
+        let share = (1.0 - less.re) / self.signals.leading;
+        (rated - here) * share + here * Complex::new(0.0, less.im)
     }
 
     /// What a pixel at this distance from the edge, and at this one from another border of the

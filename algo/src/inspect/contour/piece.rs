@@ -1,6 +1,6 @@
 //! A contour in pieces of about two pixels, each with the pixels across it.
 
-use super::beyond::{Wall, border, floor_phase, shadow};
+use super::beyond::{Gradient, Wall, border, shadow};
 use super::complex::Complex;
 use super::sample::Signals;
 use super::shape::{Foot, Shape};
@@ -28,6 +28,9 @@ pub struct Pixel {
     pub light: Complex,
     /// The same with each level times its share of the mean ratio.
     pub rated: Complex,
+    /// By how much a floor's phase turns light that has each level times its ratio, from the piece's
+    /// middle to here, beyond the plane's.
+    pub floor: Complex,
     /// Signed distance from the contour, px.
     pub d: f64,
     /// Signed distance from another border of the background, px; −∞ if there is none near.
@@ -55,8 +58,6 @@ pub struct Piece {
     pub normal: (f64, f64),
     /// By how much the plane's phase changes along d, turns of ratio 1 per px.
     pub gradient: f64,
-    /// By how much more a floor's phase changes along d, turns of ratio 1 per px; 0 if not known.
-    pub ramp: f64,
     /// The wall, if it is seen; its width in px.
     pub wall: Option<Wall>,
     /// How wide a shadow lies between the edge and a floor, px per mm of the floor's depth; 0 or
@@ -73,6 +74,8 @@ pub struct Pieces {
     pub all: Vec<Piece>,
     /// The pixels of all, piece by piece.
     pub pixels: Vec<Pixel>,
+    /// A buffer for the light of a row.
+    row: Vec<Complex>,
 }
 
 /// mm per px in the picture at a place of the plane: the lengths of the sides of a pixel.
@@ -105,10 +108,6 @@ impl Pieces {
         let count = count.clamp(1, (columns * rows).max(1));
         self.all.clear();
         self.pixels.clear();
-        let ramp = ramp(
-            signals,
-            &[0.0, 0.5].map(|share| shape.foot(p, share * length)),
-        );
         for number in 0..count {
             let foot = shape.foot(p, length * (number as f64 + 0.5) / count as f64);
             let start = self.pixels.len();
@@ -120,15 +119,19 @@ impl Pieces {
                 scale: pixel,
                 normal: (1.0, 0.0),
                 gradient: 0.0,
-                ramp: 0.0,
                 wall: None,
                 shadow: 0.0,
                 pixels: start..start,
             };
             if let Some(middle) = piece.orient(signals) {
-                piece.ramp = dot(ramp, foot.normal) * piece.scale;
                 let half = length / count as f64 / 2.0;
-                piece.gather(middle, half, signals, &mut self.pixels);
+                let floor = Gradient::of_floor(signals, &foot, [BAND * piece.scale, half]);
+                piece.gather(
+                    middle,
+                    half,
+                    (signals, &floor),
+                    (&mut self.row, &mut self.pixels),
+                );
                 piece.pixels.end = self.pixels.len();
             }
             self.all.push(piece);
@@ -184,8 +187,8 @@ impl Piece {
         &self,
         middle: (f64, f64),
         half: f64,
-        signals: &Signals<'_, impl View>,
-        pixels: &mut Vec<Pixel>,
+        (signals, floor): (&Signals<'_, impl View>, &Gradient),
+        (row, pixels): (&mut Vec<Complex>, &mut Vec<Pixel>),
     ) {
         let Foot {
             x: x0,
@@ -205,6 +208,7 @@ impl Piece {
         let determinant = libm::fabs(across.0 * along.1 - across.1 * along.0);
         let tall = (libm::fabs(along.0) * band + libm::fabs(across.0) * wide) / determinant;
         let (columns, rows) = signals.view.size();
+        let per_ratio = signals.ratio * signals.leading;
         for v in whole(middle.1, (-tall, tall), rows) {
             let dv = v as f64 - middle.1;
             // Where a row is within `reach` of a line.
@@ -217,7 +221,9 @@ impl Piece {
             };
             let (d, t) = (within(across, band), within(along, wide));
             let range = (d.0.max(t.0), d.1.min(t.1));
-            for u in whole(middle.0, range, columns) {
+            let all = whole(middle.0, range, columns);
+            signals.read((all.start, v), all.len(), row);
+            for (at, u) in all.clone().enumerate() {
                 let du = u as f64 - middle.0;
                 let (d, t) = (across.0 * du + across.1 * dv, along.0 * du + along.1 * dv);
                 if libm::fabs(t) > half * (1.0 + curvature * d) + overlap {
@@ -228,16 +234,19 @@ impl Piece {
                 };
                 let (x, y) = (spot.x - x0, spot.y - y0);
                 let t = normal.0 * y - normal.1 * x;
-                let end = half * (1.0 + curvature * (normal.0 * x + normal.1 * y));
+                let d = normal.0 * x + normal.1 * y;
+                let end = half * (1.0 + curvature * d);
                 if !(-end..end).contains(&t) {
                     continue;
                 }
-                if let Some([light, rated]) = signals.light((u, v), &spot) {
+                let levels = row.iter().skip(at).step_by(all.len()).copied();
+                if let Some([light, rated]) = signals.light(levels, &spot) {
                     pixels.push(Pixel {
                         at: (u, v),
                         spot,
                         light,
                         rated,
+                        floor: Complex::turned(per_ratio * floor.turns(d, t)),
                         d: 0.0,
                         border: f64::NEG_INFINITY,
                         follow: 1.0,
@@ -247,21 +256,6 @@ impl Piece {
             }
         }
     }
-}
-
-/// By how much more the phase of a floor changes than the plane's, between two places of a contour,
-/// turns of ratio 1 per mm along x and y; 0 where it is not known.
-fn ramp(signals: &Signals<'_, impl View>, [one, other]: &[Foot; 2]) -> (f64, f64) {
-    let (x, y) = ((one.x + other.x) / 2.0, (one.y + other.y) / 2.0);
-    let phase = |x, y| floor_phase(signals.view, signals.setup, (x, y));
-    let change = |dx: f64, dy: f64| {
-        let (less, more) = (phase(x - dx, y - dy)?, phase(x + dx, y + dy)?);
-        Some(more - less)
-    };
-    (
-        change(0.5, 0.0).unwrap_or(0.0),
-        change(0.0, 0.5).unwrap_or(0.0),
-    )
 }
 
 /// The whole numbers below `end` that lie within a range about a place.

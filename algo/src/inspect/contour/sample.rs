@@ -21,6 +21,9 @@ pub struct Signals<'a, V> {
     weights: Vec<f64>,
     /// The levels' mean ratio.
     pub ratio: f64,
+    /// ⟨r³⟩ over ⟨r²⟩ times the mean ratio: by how much faster than by this ratio the light that
+    /// has each level times its ratio turns.
+    pub leading: f64,
     /// Variance of each part of the sum of levels, counts².
     pub variance: f64,
 }
@@ -36,10 +39,14 @@ impl<'a, V: View> Signals<'a, V> {
             setup,
             weights,
             ratio: 0.0,
+            leading: 1.0,
             variance: 0.0,
         };
         signals.variance = signals.mean(|of| weight(of) / whole * of.variance(setup.noise));
         signals.ratio = signals.mean(|of| of.ratio);
+        let squares = signals.mean(|of| of.ratio * of.ratio);
+        let cubes = signals.mean(|of| of.ratio * of.ratio * of.ratio);
+        signals.leading = cubes / (squares * signals.ratio);
         signals
     }
 
@@ -57,21 +64,43 @@ impl<'a, V: View> Signals<'a, V> {
         })
     }
 
-    /// The sum of levels of a pixel that looks at this spot, and the same with each times its share
-    /// of the mean ratio; `None` if one is overexposed.
-    pub fn light(&self, at: (usize, usize), spot: &Spot) -> Option<[Complex; 2]> {
-        let mut sums = [Complex::default(); 2];
-        for (level, weight) in self.weights.iter().enumerate() {
-            let light = self.level(at, spot, level)? * *weight;
-            sums[0] += light;
-            sums[1] += light * (self.setup.levels[level].ratio / self.ratio);
+    /// Reads pixels of a row that begin with `at`: so many of the first level, of the next, and so on.
+    pub fn read(&self, at: (usize, usize), count: usize, row: &mut Vec<Complex>) {
+        row.resize(count * self.weights.len(), Complex::default());
+        for (level, row) in row.chunks_exact_mut(count.max(1)).enumerate() {
+            self.view.signals(at, level, row);
         }
-        Some(sums)
+    }
+
+    /// The sum of levels of a pixel that looks at this spot, and the same with each times its share
+    /// of the mean ratio, from Z of each level; `None` if one is overexposed.
+    pub fn light(
+        &self,
+        levels: impl Iterator<Item = Complex>,
+        spot: &Spot,
+    ) -> Option<[Complex; 2]> {
+        let mut sums = [Complex::default(); 2];
+        for ((of, weight), signal) in self.setup.levels.iter().zip(&self.weights).zip(levels) {
+            let light = signal * back(of, spot) * *weight;
+            sums[0] += light;
+            sums[1] += light * (of.ratio / self.ratio);
+        }
+        sums[0].known().map(|_| sums)
+    }
+
+    /// The same of a pixel.
+    pub fn light_at(&self, at: (usize, usize), spot: &Spot) -> Option<[Complex; 2]> {
+        let signal = |level| self.view.signal(at, level).unwrap_or(Complex::UNKNOWN);
+        self.light((0..self.weights.len()).map(signal), spot)
     }
 
     /// w of one level of such a pixel.
-    pub fn level(&self, (u, v): (usize, usize), spot: &Spot, level: usize) -> Option<Complex> {
-        let back = Complex::turned(-self.setup.levels[level].ratio * spot.phase);
-        Some(self.view.signal(u, v, level)? * back)
+    pub fn level(&self, at: (usize, usize), spot: &Spot, level: usize) -> Option<Complex> {
+        Some(self.view.signal(at, level)? * back(&self.setup.levels[level], spot))
     }
+}
+
+/// e^{−2πi r Φ̂}.
+fn back(of: &Fringes, spot: &Spot) -> Complex {
+    Complex::turned(-of.ratio * spot.phase)
 }

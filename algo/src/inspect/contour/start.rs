@@ -102,7 +102,7 @@ fn read(
             continue;
         }
         if let Some(spot) = signals.view.spot(at.0 as f64, at.1 as f64)
-            && let Some([light, _]) = signals.light(at, &spot)
+            && let Some([light, _]) = signals.light_at(at, &spot)
         {
             line.push((d(spot.x, spot.y), light));
         }

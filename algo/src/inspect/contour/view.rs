@@ -28,9 +28,16 @@ pub trait View {
     /// Where the camera sees a point of the plane.
     fn pixel(&self, x: f64, y: f64) -> Option<(f64, f64)>;
 
-    /// Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) = B e^{2πiφ} of a level at a pixel, in counts;
-    /// `None` where a sample is overexposed.
-    fn signal(&self, u: usize, v: usize, level: usize) -> Option<Complex>;
+    /// Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) = B e^{2πiφ} of a level at the pixels of a row that
+    /// begin with `at`, in counts; [`Complex::UNKNOWN`] where a sample is overexposed.
+    fn signals(&self, at: (usize, usize), level: usize, row: &mut [Complex]);
+
+    /// The same of one pixel; `None` where a sample is overexposed.
+    fn signal(&self, at: (usize, usize), level: usize) -> Option<Complex> {
+        let mut signal = Complex::default();
+        self.signals(at, level, core::slice::from_mut(&mut signal));
+        signal.known()
+    }
 }
 
 /// A level's fringes.

@@ -368,8 +368,11 @@ impl View for Capture<'_> {
         Some((u + self.rendered.middle(), v + self.rendered.middle()))
     }
 
-    fn signal(&self, u: usize, v: usize, level: usize) -> Option<Complex> {
-        let place = v * self.rendered.scene.size + u;
-        Some(self.signals[place].as_ref()?[level])
+    fn signals(&self, (u, v): (usize, usize), level: usize, row: &mut [Complex]) {
+        let first = v * self.rendered.scene.size + u;
+        for (signal, place) in row.iter_mut().zip(first..) {
+            let levels = self.signals[place].as_ref();
+            *signal = levels.map_or(Complex::UNKNOWN, |levels| levels[level]);
+        }
     }
 }

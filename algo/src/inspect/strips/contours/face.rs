@@ -86,13 +86,17 @@ impl View for Face<'_> {
         self.triangulator.camera().project(self.frame.point(x, y))
     }
 
-    fn signal(&self, u: usize, v: usize, level: usize) -> Option<Complex> {
+    fn signals(&self, (u, v): (usize, usize), level: usize, row: &mut [Complex]) {
         match self.light {
-            Signal::Frames(frames) => self.levels.signal(frames, level, (u, v)),
-            Signal::Golden => self
-                .golden
-                .at(v * self.size.0 + u, self.levels.full_scale()),
-            Signal::None => None,
+            Signal::Frames(frames) => self.levels.signals(frames, level, (u, v), row),
+            Signal::Golden => {
+                let first = v * self.size.0 + u;
+                for (signal, place) in row.iter_mut().zip(first..) {
+                    let golden = self.golden.at(place, self.levels.full_scale());
+                    *signal = golden.unwrap_or(Complex::UNKNOWN);
+                }
+            }
+            Signal::None => row.fill(Complex::UNKNOWN),
         }
     }
 }

@@ -105,26 +105,48 @@ impl Levels {
             .map(|level| (level.ratio, level.frames.len()))
     }
 
-    /// Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) of a level at a pixel; `None` where a sample is
-    /// overexposed, or a frame is missing.
-    pub fn signal(
+    /// Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) of a level at the pixels of a row that begin with
+    /// (u, v); [`Complex::UNKNOWN`] where a sample is overexposed, or a frame is missing.
+    pub fn signals(
         &self,
         frames: &[FrameView<'_>],
         level: usize,
         (u, v): (usize, usize),
-    ) -> Option<Complex> {
-        let mut sum = Complex::default();
-        for (frame, weight) in &self.all.get(level)?.frames {
-            let sample = match frames.get(*frame)?.row(v) {
-                Samples::Eight(row) => f64::from(*row.get(u)?),
-                Samples::Sixteen(row) => f64::from(*row.get(u)?),
-            };
+        row: &mut [Complex],
+    ) {
+        let Some(level) = self.all.get(level) else {
+            row.fill(Complex::UNKNOWN);
+            return;
+        };
+        row.fill(Complex::default());
+        let places = u..u + row.len();
+        for &(frame, weight) in &level.frames {
+            match frames.get(frame).map(|frame| frame.row(v)) {
+                Some(Samples::Eight(all)) => self.add(all.get(places.clone()), weight, row),
+                Some(Samples::Sixteen(all)) => self.add(all.get(places.clone()), weight, row),
+                None => row.fill(Complex::UNKNOWN),
+            }
+        }
+    }
+
+    /// Adds the samples of one frame.
+    fn add<T: Copy + Into<f64>>(
+        &self,
+        samples: Option<&[T]>,
+        weight: Complex,
+        row: &mut [Complex],
+    ) {
+        let Some(samples) = samples else {
+            row.fill(Complex::UNKNOWN);
+            return;
+        };
+        for (sum, sample) in row.iter_mut().zip(samples) {
+            let sample: f64 = (*sample).into();
             if sample >= self.full_scale {
-                return None;
+                *sum = Complex::UNKNOWN;
             }
             sum.re += weight.re * sample;
             sum.im += weight.im * sample;
         }
-        Some(sum)
     }
 }

@@ -21,7 +21,8 @@ const NEAR_MM: f64 = 0.3;
 const ERODED_PX: f64 = 2.5;
 /// An opening has at least so many pixels.
 const LEAST_PIXELS: usize = 9;
-/// A floor is seen in at least this share of an opening's pixels.
+/// A floor is seen in at least this share of an opening's pixels, unless half of those that see
+/// something lie within [`NEAR_MM`]: of a small opening it may be a shadow that leaves few.
 const FLOOR_SHARE: f64 = 0.2;
 
 /// What golden's heights say of a contour.
@@ -88,9 +89,11 @@ pub fn start(
     };
     let depths = opening.iter().filter_map(|&at| pixels.above[at]);
     let mut depths: Vec<f64> = depths.filter(|above| *above < -NEAR_MM).collect();
-    let is_seen = depths.len() as f64 >= FLOOR_SHARE * opening.len() as f64;
     depths.sort_unstable_by(f64::total_cmp);
-    let floor = depths.get(depths.len() / 2).map(|above| -above);
+    let count = depths.len();
+    let floor = depths.get(count / 2).map(|above| -above);
+    let is_seen = count as f64 >= FLOOR_SHARE * opening.len() as f64
+        || count >= LEAST_PIXELS && depths[count * 3 / 4] - depths[count / 4] < NEAR_MM;
     let width = golden.size().0;
     let on_face = (0..pixels.above.len()).filter(|&at| pixels.is_face(at));
     Some(Start {

@@ -114,7 +114,7 @@ fn associated<const N: usize>(
                     .map_or([0.0; MAX_PARAMETERS], padded)
             }),
             blur: contour.blur,
-            faint: contour.faint,
+            unexplained: contour.unexplained,
             pixel: contour.pixel,
             points: contour.points,
             outcomes: contour.outcomes,

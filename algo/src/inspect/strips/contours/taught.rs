@@ -155,7 +155,7 @@ impl Contours {
             let (u, v) = (place % width, place / width);
             let Spot { phase, .. } = face.spot(u as f64, v as f64)?;
             let back = Complex::turned(-self.signal.ratio * phase);
-            Some((face.signal(u, v, 0)? * back).re)
+            Some((face.signal((u, v), 0)? * back).re)
         });
         let mut light: Vec<f64> = light.collect();
         light.sort_unstable_by(f64::total_cmp);
