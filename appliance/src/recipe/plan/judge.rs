@@ -34,6 +34,9 @@ const LEAST_TURN: f64 = 0.05;
 /// are used.
 pub(super) const ALIKE: f64 = 0.8;
 
+/// Features at most that a reason names.
+const NAMED: usize = 8;
+
 /// Why a gauge has no value.
 const NOTHING: &str = "found nothing to measure";
 
@@ -142,7 +145,12 @@ impl Demands {
         inspection.placement = findings.placed.as_ref().map(placement);
         inspection.features.clone_from(&findings.features);
         if let Some(Reason { code, words }) = self.not_judged(inspection, findings) {
-            inspection.reason = Some(words.into());
+            let unseen = match code {
+                // Its words have a feature for each gauge.
+                NOT_MEASURED => String::new(),
+                _ => self.unseen(findings),
+            };
+            inspection.reason = Some((words + &unseen).into());
             inspection.error_code = code;
         }
         inspection.judged = match &inspection.reason {
@@ -200,6 +208,25 @@ impl Demands {
             code: NOT_MEASURED,
             words: format!("gauge {missing} {NOTHING}{left_out}"),
         })
+    }
+
+    /// The names of features that were not seen, as the end of a reason; empty if all were seen.
+    fn unseen(&self, findings: &Findings) -> String {
+        let unseen = findings.features.iter();
+        let names: Vec<String> = unseen
+            .filter(|found| found.state == State::Unseen)
+            .filter_map(|found| self.features.get(found.feature))
+            .map(|name| clipped(name))
+            .collect();
+        match names.len() {
+            0 => String::new(),
+            1..=NAMED => format!("; not seen: {}", names.join(", ")),
+            count => format!(
+                "; not seen: {} and {} more",
+                names[..NAMED].join(", "),
+                count - NAMED
+            ),
+        }
     }
 
     /// How much of the surface is resolved, and how much is needed.
