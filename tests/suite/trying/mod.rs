@@ -1,6 +1,8 @@
 //! Edits that are tried before they are stored, on the shipped program: a plate with its holes as it
 //! was taught, the last part and a kept one. And what can be drawn of parts.
 
+mod beside;
+
 use crate::history::recording;
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, long};
