@@ -1,10 +1,12 @@
 //! Results for a program that collects those of many stations: a line of JSON each.
 //!
 //! Cycles must not pay for it. Database and JSON are the work of a thread of its own that runs only
-//! where a core has nothing else to do; a client that does not receive holds one page of results
-//! until its connection is closed, and no more than a few may ask at a time.
+//! where a core has nothing else to do, and rests after each page, because a core that works takes
+//! memory and clock from the others; a client that does not receive holds one page of results until
+//! its connection is closed, and no more than a few may ask at a time.
 
 use std::io::{self, Write};
+use std::time::{Duration, Instant};
 
 use axum::extract::Query;
 use axum::http::header;
@@ -23,6 +25,11 @@ use crate::system::priority;
 
 /// The most results of one answer, and how many it has unless it asks for fewer.
 const MOST: usize = 10_000;
+
+/// A rest is so many times as long as the work on a page.
+const REST: u32 = 5;
+/// But not longer than this: a client that receives slowly has waited already.
+const LONGEST: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -117,10 +124,14 @@ fn write(to: &mut ToClient, serial: &str, mut walk: After, mut page: Page) -> io
     };
     line(to, &header)?;
     while !page.results.is_empty() {
+        let begun = Instant::now();
         for entry in &page.results {
             line(to, &of(serial, &history, entry))?;
         }
         page = walk.page().map_err(io::Error::other)?;
+        if !page.results.is_empty() {
+            std::thread::sleep((begun.elapsed() * REST).min(LONGEST));
+        }
     }
     Ok(())
 }
