@@ -140,7 +140,8 @@ pub fn state(outcomes: &[Outcome], is_closed: bool, gap: f64) -> (State, f64) {
     }
     let state = if found >= FOUND && longest as f64 <= gap * count {
         State::Found
-    } else if share(Outcome::Continues) >= ABSENT && found <= EDGES {
+    } else if is_closed && share(Outcome::Continues) >= ABSENT && found <= EDGES {
+        // Where the material goes on beyond an edge the part has it elsewhere.
         State::Absent
     } else {
         State::Unseen
