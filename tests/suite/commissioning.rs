@@ -290,8 +290,8 @@ fn a_step_ends_at_once_when_somebody_or_the_daemon_stops_it_and_leaves_what_was_
     technician.passes("timing", &json!({}));
 }
 
-/// The median of times, ms.
-fn median(mut times: Vec<f64>) -> f64 {
+/// The median of some times.
+pub(crate) fn median(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }

@@ -7,7 +7,7 @@ use crate::written::{FRINGED, program};
 use appliance::recipe::archive;
 use appliance::station::Verdict;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use tests::files;
 use tests::program::Run;
@@ -20,6 +20,18 @@ fn replay(folder: &Path, more: &[&str]) -> Run {
     let mut arguments = vec!["replay", folder.to_str().unwrap()];
     arguments.extend(more);
     program().run(&arguments)
+}
+
+/// Starts the station of a place, with a new secret, and measures a part that FAILs: its SEQ, and the
+/// folder of what is kept of it.
+pub(crate) fn kept_failure(place: &Place) -> (Daemon, u32, PathBuf) {
+    fs::remove_file(place.path("state/access/secret")).unwrap();
+    let daemon = Daemon::start(place);
+    let words = Plc::connect(&daemon).measure(9);
+    assert_eq!(words[8], FAIL);
+    let seq = long(&words, 0);
+    let folder = recording(place, seq);
+    (daemon, seq, folder)
 }
 
 #[test]
@@ -77,13 +89,7 @@ fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
 fn a_kept_part_is_judged_again_by_its_own_recipe_after_that_was_edited_or_deleted_also_from_the_pages_zip()
  {
     let place = place_with_a_dent();
-    // A new recording is listed at the next start.
-    fs::remove_file(place.path("state/access/secret")).unwrap();
-    let daemon = Daemon::start(&place);
-    let words = Plc::connect(&daemon).measure(9);
-    assert_eq!(words[8], FAIL);
-    let seq = long(&words, 0);
-    let folder = recording(&place, seq);
+    let (daemon, seq, folder) = kept_failure(&place);
     let mut browser = Browser::new(&daemon);
     let (status, zip) = browser.ask("GET", &format!("/api/history/{seq}/recording.zip"), &[]);
     assert_eq!(status, 200);

@@ -27,7 +27,7 @@ fn fine(setting: Setting) -> Setting {
 }
 
 #[test]
-#[ignore = "takes an hour: `.ci/run full`"]
+#[ignore = "takes minutes: `.ci/run full`"]
 fn fine_pixels_show_holes_slots_and_edges_to_10_um() {
     let plain = Setting::default();
     let tilted = Setting {

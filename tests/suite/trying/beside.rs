@@ -1,6 +1,7 @@
 //! An editor that tries all the time beside a station that measures.
 
 use super::{TRY, list};
+use crate::commissioning::median;
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, long};
 use serde_json::{Value, json};
@@ -15,11 +16,6 @@ const BLOCKS: u16 = 20;
 const CYCLES: u16 = 15;
 /// By how much a cycle may end later.
 const LATER: f64 = 0.05;
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
 
 /// The list of a recipe with so many circles more, each about a hole that golden has.
 fn many_circles(recipe: &Value) -> Value {

@@ -3,7 +3,7 @@
 
 mod beside;
 
-use crate::history::recording;
+use crate::kept::kept_failure;
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, long};
 use crate::written::program;
@@ -13,7 +13,6 @@ use std::fs;
 use std::path::Path;
 
 const TRY: &str = "/api/recipes/1/try";
-const FAIL: u16 = 2;
 /// Where the part lies that is measured, mm along x.
 const SHIFT: f64 = 0.8;
 
@@ -166,12 +165,7 @@ fn a_list_is_tried_on_the_last_part_and_on_a_kept_one_as_replay_judges_them() {
     let defect = "[part]\nkind = \"plate\"\ndefects = [{ kind = \"dent\", x = 0.0, y = -8.0, depth_mm = 0.9, diameter_mm = 14.0 }]\n";
     let lies = format!("[placement]\nshift_mm = [{SHIFT}, 0.0, 0.0]\n");
     fs::write(place.path("small.toml"), format!("{defect}{lies}")).unwrap();
-    fs::remove_file(place.path("state/access/secret")).unwrap();
-    let daemon = Daemon::start(&place);
-    let words = Plc::connect(&daemon).measure(9);
-    assert_eq!(words[8], FAIL);
-    let seq = long(&words, 0);
-    let folder = recording(&place, seq);
+    let (daemon, seq, folder) = kept_failure(&place);
     let mut browser = Browser::new(&daemon);
     browser.sign_in(&daemon);
 

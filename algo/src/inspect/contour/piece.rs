@@ -28,8 +28,8 @@ pub struct Pixel {
     pub light: Complex,
     /// The same with each level times its share of the mean ratio.
     pub rated: Complex,
-    /// By how much a floor's phase turns light that has each level times its ratio, from the piece's
-    /// middle to here, beyond the plane's.
+    /// e^{iθ}: how a floor's phase turns `rated` light from the piece's middle to here, beyond the
+    /// plane's.
     pub floor: Complex,
     /// Signed distance from the contour, px.
     pub d: f64,

@@ -21,8 +21,8 @@ pub struct Signals<'a, V> {
     weights: Vec<f64>,
     /// The levels' mean ratio.
     pub ratio: f64,
-    /// ⟨r³⟩ over ⟨r²⟩ times the mean ratio: by how much faster than by this ratio the light that
-    /// has each level times its ratio turns.
+    /// ⟨r³⟩ / (⟨r²⟩ ⟨r⟩): how fast light turns with the phase whose levels are weighed by their
+    /// ratios, over light that turns by the mean ratio.
     pub leading: f64,
     /// Variance of each part of the sum of levels, counts².
     pub variance: f64,
@@ -64,7 +64,7 @@ impl<'a, V: View> Signals<'a, V> {
         })
     }
 
-    /// Reads pixels of a row that begin with `at`: so many of the first level, of the next, and so on.
+    /// Reads `count` pixels of a row from `at` on: Z of the first level, then of the next, and so on.
     pub fn read(&self, at: (usize, usize), count: usize, row: &mut Vec<Complex>) {
         row.resize(count * self.weights.len(), Complex::default());
         for (level, row) in row.chunks_exact_mut(count.max(1)).enumerate() {

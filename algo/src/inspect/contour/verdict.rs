@@ -56,9 +56,9 @@ pub enum Outcome {
 pub enum State {
     /// It has a place and a size.
     Found,
-    /// The material goes on where it should be.
+    /// The material goes on where it should be, of a closed contour.
     Absent,
-    /// Too little of it is seen.
+    /// Too little of it is seen, or an edge is elsewhere.
     Unseen,
 }
 
