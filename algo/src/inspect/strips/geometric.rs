@@ -1,6 +1,6 @@
 //! Stage 5, gauge: contours of features, and the readings of gauges of geometry.
 
-use super::contours::{ContourFit, FoundFeature, Signal};
+use super::contours::{ContourFit, FoundFeature, Shift, Signal};
 use super::fits::Fit;
 use super::gauges::{Gauge, MAX_FEATURES};
 use super::plan::Production;
@@ -37,7 +37,8 @@ impl Production {
         planes.chain(contours).chain(sections).collect()
     }
 
-    /// Finds the contours of features in their planes, one per task.
+    /// Finds the contours of features in their planes, one per task; those that were not found once
+    /// more where the others say that they are.
     pub(super) fn find_contours(&self, strips: &mut Strips, light: Signal<'_>) {
         let Some(contours) = &self.contours else {
             return;
@@ -53,6 +54,19 @@ impl Production {
         for_each(work, |_, (found, expected)| {
             let plane = &fits[expected.plane];
             found.find((contours, expected), &self.golden, plane, placed, light);
+        });
+        let shifts = fits.iter().enumerate();
+        let shifts: Vec<_> = shifts
+            .map(|plane| Shift::of(contours, found, plane))
+            .collect();
+        let lost = found.iter_mut().zip(&contours.all);
+        let work: Vec<_> = lost.filter(|(found, _)| found.is_lost()).collect();
+        for_each(work, |_, (found, expected)| {
+            let plane = &fits[expected.plane];
+            let moved = |shift: Shift| shift.apply(expected, &contours.frame(expected, plane)?);
+            if let Some(expected) = shifts[expected.plane].and_then(moved) {
+                found.find((contours, &expected), &self.golden, plane, placed, light);
+            }
         });
     }
 

@@ -7,7 +7,7 @@ use super::taught::{Contours, Expected, REACH_MM};
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed};
 use crate::inspect::contour::{Outcome, Point, State};
-use crate::inspect::feature::{Geometry, PlaneFrame, Rim};
+use crate::inspect::feature::{FeatureKind, Geometry, PlaneFrame, Rim};
 use crate::inspect::gauge::Sensitive;
 use crate::inspect::section::Unseen;
 use crate::inspect::strips::fits::Fit;
@@ -114,6 +114,19 @@ impl ContourFit {
     pub fn is_of(&self, features: &[usize]) -> bool {
         let own = self.of.as_ref().map(|of| of.feature);
         own.is_some() && own == features.first().copied()
+    }
+
+    /// The circle or slot that was found, in the frame of its plane.
+    pub fn closed(&self) -> Option<&Outline> {
+        self.rim.as_ref()?;
+        let outline = &self.pieces.as_ref()?.outline;
+        (outline.kind() != FeatureKind::Line).then_some(outline)
+    }
+
+    /// Whether another place to look may change what became of it.
+    pub fn is_lost(&self) -> bool {
+        let of = self.of.as_ref();
+        self.is_absent() || of.is_some_and(|of| of.lost == Some(Lost::Rim))
     }
 
     /// Whether it is surely not there.

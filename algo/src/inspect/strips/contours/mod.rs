@@ -12,8 +12,10 @@ mod find;
 mod light;
 mod outline;
 mod shape;
+mod shift;
 mod taught;
 
 pub use find::{ContourFit, FoundFeature, Lost, SeenRim};
 pub use light::{GoldenSignal, Levels, Signal};
+pub use shift::Shift;
 pub use taught::{Contours, Known};

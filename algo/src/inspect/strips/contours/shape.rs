@@ -45,6 +45,34 @@ impl Outline {
         }
     }
 
+    /// Its middle.
+    pub fn middle(&self) -> (f64, f64) {
+        match *self {
+            Self::Circle([x, y, _]) | Self::Slot([x, y, ..]) => (x, y),
+            Self::Line(..) => self.at(0.5),
+        }
+    }
+
+    /// The same, displaced and turned about its middle by the angle with this cosine and sine.
+    pub fn moved(&self, (x, y): (f64, f64), (cos, sin): (f64, f64)) -> Self {
+        match *self {
+            Self::Circle([a, b, radius]) => Self::Circle([a + x, b + y, radius]),
+            Self::Slot([a, b, half, radius, angle]) => {
+                let angle = angle + libm::atan2(sin, cos);
+                Self::Slot([a + x, b + y, half, radius, angle])
+            }
+            Self::Line(line, p) => {
+                let (u, v) = line.direction;
+                let line = Line {
+                    middle: (line.middle.0 + x, line.middle.1 + y),
+                    direction: (cos * u - sin * v, sin * u + cos * v),
+                    ..line
+                };
+                Self::Line(line, p)
+            }
+        }
+    }
+
     /// Where the ends of a line are expected; of others its centre twice.
     pub fn ends(&self) -> [(f64, f64); 2] {
         match self {

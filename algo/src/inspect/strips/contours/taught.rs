@@ -211,6 +211,14 @@ impl Contours {
 }
 
 impl Expected {
+    /// The same where its outline is this one.
+    pub fn with(&self, outline: Outline) -> Self {
+        Self {
+            outline,
+            ..self.clone()
+        }
+    }
+
     /// What it is.
     pub fn kind(&self) -> FeatureKind {
         self.outline.kind()
