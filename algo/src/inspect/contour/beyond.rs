@@ -63,7 +63,7 @@ fn floor_phase(view: &impl View, setup: &Setup, (x, y): (f64, f64)) -> Option<f6
 
 /// By how much more the phase of a floor changes beside a piece of a contour than the plane's, turns
 /// of ratio 1: across in the second order, which an adapted pattern has within a few pixels.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Gradient {
     across: f64,
     bend: f64,
@@ -71,8 +71,13 @@ pub struct Gradient {
 }
 
 impl Gradient {
-    /// Within `band` mm from a piece that reaches `half` mm to each side; 0 where it is not known.
-    pub fn of_floor(signals: &Signals<'_, impl View>, foot: &Foot, [band, half]: [f64; 2]) -> Self {
+    /// Within `band` mm from a piece that reaches `half` mm to each side; `None` where it is not
+    /// known.
+    pub fn of_floor(
+        signals: &Signals<'_, impl View>,
+        foot: &Foot,
+        [band, half]: [f64; 2],
+    ) -> Option<Self> {
         let (h, (nx, ny)) = (band / 2.0, foot.normal);
         let phase = |d: f64, t: f64| {
             let at = (foot.x + d * nx - t * ny, foot.y + d * ny + t * nx);
@@ -82,13 +87,13 @@ impl Gradient {
         let [Some(at), Some(beside), Some(far), Some(before), Some(after)] =
             all.map(|(d, t)| phase(d, t))
         else {
-            return Self::default();
+            return None;
         };
-        Self {
+        Some(Self {
             across: (3.0 * at - 4.0 * beside + far) / band,
             bend: (at - 2.0 * beside + far) / (2.0 * h * h),
             along: (after - before) / (2.0 * half),
-        }
+        })
     }
 
     /// The change from the piece's middle to a place `d` mm towards the material, `t` mm along it.

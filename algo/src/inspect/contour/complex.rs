@@ -34,13 +34,18 @@ impl Complex {
         let sin = x * (1.0 - y * (1.0 / 6.0 - sin));
         let cos = y * (1.0 / 720.0 - y * (1.0 / 40_320.0 - y / 3_628_800.0));
         let cos = 1.0 - y * (0.5 - y * (1.0 / 24.0 - cos));
-        // Casts keep to the range of their type.
-        match whole as i64 & 3 {
-            0 => Self::new(cos, sin),
-            1 => Self::new(-sin, cos),
-            2 => Self::new(-cos, -sin),
-            _ => Self::new(sin, -cos),
-        }
+        // Casts keep to the range of their type. Selections, not branches: quarters come at random.
+        let quarter = whole as i64;
+        let (re, im) = if quarter & 1 == 0 {
+            (cos, sin)
+        } else {
+            (sin, cos)
+        };
+        let sign = |is_negative: bool| if is_negative { -1.0 } else { 1.0 };
+        Self::new(
+            re * sign((quarter + 1) & 2 != 0),
+            im * sign(quarter & 2 != 0),
+        )
     }
 
     /// Itself, if it is known.

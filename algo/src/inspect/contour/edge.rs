@@ -41,7 +41,7 @@
 //! F within 2e-4 of sums over the pixel, 2e-5 from σ = 0.5 px on, odd in d: straight edges do not
 //! move (`the_profile_is_the_integral_over_the_pixel`).
 
-use core::f64::consts::{FRAC_1_SQRT_2, LOG2_E, TAU};
+use core::f64::consts::{LOG2_E, TAU};
 
 /// Below this blur the closed form is used, px.
 const SHARP: f64 = 0.35;
@@ -230,8 +230,8 @@ fn integrals(z: f64) -> [f64; 5] {
             false => [0.0; 5],
         };
     }
-    let density = libm::exp(-0.5 * square) / libm::sqrt(TAU);
-    let below = 0.5 * libm::erfc(-z * FRAC_1_SQRT_2);
+    let density = density(square);
+    let below = below(z, density);
     [
         below,
         z * below + density,
@@ -260,7 +260,7 @@ impl Profile {
     }
 }
 
-/// φ(z) of z² ≤ 40, within 1e-8: 2^n times Taylor's series of what is left.
+/// φ(z) of z² ≤ 45, within 1e-8: 2^n times Taylor's series of what is left.
 fn density(square: f64) -> f64 {
     let x = -0.5 * square;
     // Casts keep to the range of their type, and cut off: this rounds, as x is not positive.

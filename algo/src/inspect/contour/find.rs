@@ -31,8 +31,8 @@ const SHARPER: f64 = 0.29;
 /// Largest step of the blur, px.
 const STEP: f64 = 0.3;
 /// Until the contour lies still one of so many pieces is looked at, but so many pieces at least.
-const FEW: usize = 4;
-const LEAST: usize = 16;
+const FEW: usize = 8;
+const LEAST: usize = 12;
 /// The rounds with all pieces end after less movement, px: those before were off by their noise.
 const LAST: f64 = 0.1;
 /// What light may be off the model until the contour's place and the blur are known, of the
@@ -166,7 +166,7 @@ impl<S, V: View> Search<'_, S, V> {
         self.judge(contour);
     }
 
-    /// The same with one of `some` pieces, until no place moves by `still` px. Whether the pieces
+    /// Goes on with one of `some` pieces, until no place moves by `still` px. Whether the pieces
     /// determine the contour.
     fn approach<const N: usize>(
         &mut self,

@@ -30,6 +30,7 @@ mod find;
 mod fit;
 mod inputs;
 mod piece;
+mod ring;
 mod sample;
 pub mod shape;
 mod start;

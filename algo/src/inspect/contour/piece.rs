@@ -2,6 +2,7 @@
 
 use super::beyond::{Gradient, Wall, border, shadow};
 use super::complex::Complex;
+use super::ring::Ring;
 use super::sample::Signals;
 use super::shape::{Foot, Shape};
 use super::view::{Setup, Spot, View};
@@ -14,8 +15,6 @@ pub const LENGTH: f64 = 2.0;
 pub const BAND: f64 = 5.0;
 /// How far a contour may move until its pixels are gathered anew, px.
 pub const MARGIN: f64 = 0.25;
-/// By how much pieces overlap in the picture before their pixels are told apart on the plane, px.
-const OVERLAP: f64 = 0.1;
 
 /// A pixel of a piece.
 #[derive(Clone, Copy, Debug)]
@@ -47,9 +46,9 @@ pub struct Piece {
     /// Its middle.
     pub foot: Foot,
     /// By how much d changes with u and with v, mm per px.
-    across: (f64, f64),
+    pub across: (f64, f64),
     /// By how much the way along the contour changes with u and with v, mm per px.
-    along: (f64, f64),
+    pub along: (f64, f64),
     /// By how much the plane's phase changes with u and with v, turns of ratio 1 per px.
     phase: (f64, f64),
     /// mm per px along d.
@@ -63,6 +62,10 @@ pub struct Piece {
     /// How wide a shadow lies between the edge and a floor, px per mm of the floor's depth; 0 or
     /// less if there is none.
     pub shadow: f64,
+    /// Where its middle is seen; `None` if it is not.
+    pub middle: Option<(f64, f64)>,
+    /// How a floor's phase changes beside it; `None` if that is not known.
+    pub floor: Option<Gradient>,
     /// Its pixels.
     pub pixels: Range<usize>,
 }
@@ -74,8 +77,8 @@ pub struct Pieces {
     pub all: Vec<Piece>,
     /// The pixels of all, piece by piece.
     pub pixels: Vec<Pixel>,
-    /// A buffer for the light of a row.
-    row: Vec<Complex>,
+    /// Buffers.
+    ring: Ring,
 }
 
 /// mm per px in the picture at a place of the plane: the lengths of the sides of a pixel.
@@ -107,10 +110,8 @@ impl Pieces {
         let count = (length / (LENGTH * pixel) + 0.5) as usize;
         let count = count.clamp(1, (columns * rows).max(1));
         self.all.clear();
-        self.pixels.clear();
         for number in 0..count {
             let foot = shape.foot(p, length * (number as f64 + 0.5) / count as f64);
-            let start = self.pixels.len();
             let mut piece = Piece {
                 foot,
                 across: (0.0, 0.0),
@@ -121,21 +122,19 @@ impl Pieces {
                 gradient: 0.0,
                 wall: None,
                 shadow: 0.0,
-                pixels: start..start,
+                middle: None,
+                floor: None,
+                pixels: 0..0,
             };
-            if let Some(middle) = piece.orient(signals) {
+            piece.middle = piece.orient(signals);
+            if piece.middle.is_some() {
                 let half = length / count as f64 / 2.0;
-                let floor = Gradient::of_floor(signals, &foot, [BAND * piece.scale, half]);
-                piece.gather(
-                    middle,
-                    half,
-                    (signals, &floor),
-                    (&mut self.row, &mut self.pixels),
-                );
-                piece.pixels.end = self.pixels.len();
+                piece.floor = Gradient::of_floor(signals, &foot, [BAND * piece.scale, half]);
             }
             self.all.push(piece);
         }
+        let into = (&mut self.all[..], &mut self.pixels);
+        self.ring.gather((shape, p), signals, into);
     }
 
     /// Moves one of `some` pieces to a contour that has hardly moved, and works out the distances of
@@ -181,89 +180,6 @@ impl Piece {
         self.shadow = shadow(signals.setup, (x, y), normal) / self.scale;
         (self.scale > 0.0).then_some(middle)
     }
-
-    /// Gathers the pixels within the band that look at places nearest to it, `half` mm to each side.
-    fn gather(
-        &self,
-        middle: (f64, f64),
-        half: f64,
-        (signals, floor): (&Signals<'_, impl View>, &Gradient),
-        (row, pixels): (&mut Vec<Complex>, &mut Vec<Pixel>),
-    ) {
-        let Foot {
-            x: x0,
-            y: y0,
-            normal,
-            curvature,
-        } = self.foot;
-        let (across, along) = (self.across, self.along);
-        let band = (BAND + MARGIN) * self.scale;
-        // Borders of pieces pass through the centre of curvature.
-        let half = match curvature > 0.0 {
-            true => libm::tan(half * curvature) / curvature,
-            false => half,
-        };
-        let overlap = OVERLAP * self.scale;
-        let wide = half * (1.0 + curvature * band) + overlap;
-        let determinant = libm::fabs(across.0 * along.1 - across.1 * along.0);
-        let tall = (libm::fabs(along.0) * band + libm::fabs(across.0) * wide) / determinant;
-        let (columns, rows) = signals.view.size();
-        let per_ratio = signals.ratio * signals.leading;
-        for v in whole(middle.1, (-tall, tall), rows) {
-            let dv = v as f64 - middle.1;
-            // Where a row is within `reach` of a line.
-            let within = |rate: (f64, f64), reach: f64| {
-                let (one, other) = (
-                    (-reach - rate.1 * dv) / rate.0,
-                    (reach - rate.1 * dv) / rate.0,
-                );
-                (one.min(other), one.max(other))
-            };
-            let (d, t) = (within(across, band), within(along, wide));
-            let range = (d.0.max(t.0), d.1.min(t.1));
-            let all = whole(middle.0, range, columns);
-            signals.read((all.start, v), all.len(), row);
-            for (at, u) in all.clone().enumerate() {
-                let du = u as f64 - middle.0;
-                let (d, t) = (across.0 * du + across.1 * dv, along.0 * du + along.1 * dv);
-                if libm::fabs(t) > half * (1.0 + curvature * d) + overlap {
-                    continue;
-                }
-                let Some(spot) = signals.view.spot(u as f64, v as f64) else {
-                    continue;
-                };
-                let (x, y) = (spot.x - x0, spot.y - y0);
-                let t = normal.0 * y - normal.1 * x;
-                let d = normal.0 * x + normal.1 * y;
-                let end = half * (1.0 + curvature * d);
-                if !(-end..end).contains(&t) {
-                    continue;
-                }
-                let levels = row.iter().skip(at).step_by(all.len()).copied();
-                if let Some([light, rated]) = signals.light(levels, &spot) {
-                    pixels.push(Pixel {
-                        at: (u, v),
-                        spot,
-                        light,
-                        rated,
-                        floor: Complex::turned(per_ratio * floor.turns(d, t)),
-                        d: 0.0,
-                        border: f64::NEG_INFINITY,
-                        follow: 1.0,
-                        gradient: 0.0,
-                    });
-                }
-            }
-        }
-    }
-}
-
-/// The whole numbers below `end` that lie within a range about a place.
-fn whole(middle: f64, (low, high): (f64, f64), end: usize) -> Range<usize> {
-    // Casts cut off, and keep to the range of their type.
-    let after = |at: f64| ((middle + at).max(-1.0) + 1.0) as usize;
-    let (low, high) = (after(low), after(high));
-    low.min(end)..high.min(end)
 }
 
 impl Pixel {

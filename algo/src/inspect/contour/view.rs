@@ -25,6 +25,12 @@ pub trait View {
     /// the plane, or nothing is projected there.
     fn spot(&self, u: f64, v: f64) -> Option<Spot>;
 
+    /// What the lines of sight of a row meet, each asked for by its column: [`Self::spot`], where a
+    /// view knows more of a row than of a place.
+    fn row(&self, v: f64) -> impl Fn(f64) -> Option<Spot> {
+        move |u| self.spot(u, v)
+    }
+
     /// Where the camera sees a point of the plane.
     fn pixel(&self, x: f64, y: f64) -> Option<(f64, f64)>;
 

@@ -4,7 +4,7 @@ use super::light::{GoldenSignal, Levels, Signal};
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::contour::{Complex, Spot, View};
 use crate::inspect::feature::PlaneFrame;
-use crate::inspect::strips::near::Near;
+use crate::inspect::strips::near::{Near, NodeRow};
 
 /// The plane of a face as it lies now.
 #[derive(Clone, Debug)]
@@ -80,6 +80,16 @@ impl View for Face<'_> {
         let near = self.near.at(u, v);
         near.or_else(|| self.exact(u, v))
             .map(|[x, y, phase]| Spot { x, y, phase })
+    }
+
+    fn row(&self, v: f64) -> impl Fn(f64) -> Option<Spot> {
+        let mut row = NodeRow::new();
+        self.near.take_row(v, &mut row);
+        move |u| {
+            let near = self.near.in_row(&row, u);
+            let [x, y, phase] = near.or_else(|| self.exact(u, v))?;
+            Some(Spot { x, y, phase })
+        }
     }
 
     fn pixel(&self, x: f64, y: f64) -> Option<(f64, f64)> {
