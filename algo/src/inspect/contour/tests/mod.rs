@@ -1,5 +1,6 @@
 //! Contours in rendered pictures: errors, noise, and what is found.
 
+mod bits;
 mod circles;
 mod others;
 mod placed;
