@@ -1,7 +1,7 @@
 //! Gap and flush of joints of the simulated head, against the truth, over many placements.
 
 use super::gauges::{frames, plan};
-use super::placement::{Bed, bed, taught_within};
+use super::placement::{Bed, bed, square_pixels, taught_within};
 use algo::geometry::Vector;
 use algo::inspect::kinds::{Flush, Gap};
 use algo::inspect::{FeatureKind, Measure};
@@ -22,8 +22,32 @@ const TOLERANCE_MM: f64 = 5.0;
 /// Half the length of the section, and its width, mm.
 const HALF_MM: f64 = 20.0;
 const WIDTH_MM: f64 = 10.0;
-/// Largest bias at 0.41 mm per px, µm: of gap and of flush.
-const BIAS_UM: [f64; 2] = [120.0, 25.0];
+
+/// A camera, and what is promised of it.
+struct Camera {
+    size: (u32, u32),
+    /// Whether the radius of the edges is stated: at 0.4 mm per px too little of an edge is seen.
+    is_stated: bool,
+    /// Largest bias of gap and of flush, µm.
+    bias: [f64; 2],
+    /// In so many placements of all noise may hide the edge that is turned away.
+    unseen: usize,
+}
+
+const COARSE: Camera = Camera {
+    size: (512, 512),
+    is_stated: true,
+    bias: [120.0, 25.0],
+    unseen: PLACEMENTS / 2,
+};
+
+/// The camera of the reference hardware.
+const FINE: Camera = Camera {
+    size: (1456, 1088),
+    is_stated: false,
+    bias: [50.0, 15.0],
+    unseen: 0,
+};
 
 fn placement(random: &mut Random) -> Placement {
     let mut between = |reach: f64| reach * (2.0 * random.share() - 1.0);
@@ -41,12 +65,14 @@ struct Line {
 }
 
 impl Line {
-    fn new(joint: &Joint) -> Self {
+    fn new(joint: &Joint, camera: &Camera) -> Self {
         let mut scenario = Scenario {
             part: Part::Joint(joint.clone()),
             ..Scenario::default()
         };
         scenario.noise.noise_counts = Some(Noise::PAPER);
+        square_pixels(&mut scenario.rig.camera, camera.size);
+        let is_stated = camera.is_stated;
         let mut bed = bed(&scenario);
         let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
         let camera = &bed.calibration.camera;
@@ -65,8 +91,7 @@ impl Line {
             width_mm: Some(WIDTH_MM),
             left: Some([2.0, HALF_MM - beside]),
             right: Some([HALF_MM + beside, 2.0 * HALF_MM - 2.0]),
-            // At 0.4 mm per px too little of an edge is seen.
-            edge_mm: Some(joint.left_radius),
+            edge_mm: is_stated.then_some(joint.left_radius),
             ..FeatureFile::new("joint", FeatureKind::Section, Vec::new())
         };
         let gauge =
@@ -114,10 +139,22 @@ fn joints() -> Vec<Joint> {
 
 #[test]
 fn gap_and_flush_are_true_and_as_uncertain_as_they_say() {
+    judge(&COARSE);
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn fine_pixels_show_gap_and_flush_without_a_stated_radius() {
+    judge(&FINE);
+}
+
+/// Fails if joints before this camera are measured with a larger bias than it promises, or with
+/// other scatter or errors than they state.
+fn judge(camera: &Camera) {
     let (mut ratios, mut freedom, mut errors, mut within) = (0.0, 0.0, 0.0, 0.0);
     let (mut wrong, mut unseen) = (Vec::new(), 0);
     for joint in joints() {
-        let mut line = Line::new(&joint);
+        let mut line = Line::new(&joint, camera);
         let mut random = Random::new(5);
         let truth = [joint.gap, joint.flush];
         let (mut bias, mut seen) = ([0.0; 2], 0.0);
@@ -160,14 +197,13 @@ fn gap_and_flush_are_true_and_as_uncertain_as_they_say() {
         }
         let bias = bias.map(|sum| sum / seen * 1e3);
         println!("{joint:?}: bias of gap and flush {bias:.1?} µm");
-        if bias[0].abs() > BIAS_UM[0] || bias[1].abs() > BIAS_UM[1] {
+        if bias[0].abs() > camera.bias[0] || bias[1].abs() > camera.bias[1] {
             wrong.push(format!("{joint:?}: {bias:?}"));
         }
     }
     let (scatter, within): (f64, f64) = (f64::sqrt(ratios / freedom), within / errors);
     println!("scatter/σ {scatter:.2}, within U {within:.3}");
-    // At this resolution noise hides the edge that is turned away in some places.
-    assert!(unseen <= 2 * PLACEMENTS / 4, "{unseen} are unseen");
+    assert!(unseen <= camera.unseen, "{unseen} are unseen");
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert!((0.8..1.25).contains(&scatter), "{scatter}");
     assert!(within >= 0.93, "{within}");
@@ -176,7 +212,7 @@ fn gap_and_flush_are_true_and_as_uncertain_as_they_say() {
 #[test]
 fn a_change_of_gap_or_flush_is_found_with_its_sign() {
     let joint = joints().swap_remove(0);
-    let mut line = Line::new(&joint);
+    let mut line = Line::new(&joint, &COARSE);
     let mut random = Random::new(8);
     let mut unseen = 0;
     for _ in 0..3 {

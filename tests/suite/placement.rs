@@ -11,7 +11,7 @@ use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
 use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile, safe};
 use hal::head::Head;
 use sim::parts::{Cone, Face, Handset, Plane, Sawtooth, SheetMetal, Sphere, Spline};
-use sim::scenario::Noise;
+use sim::scenario::{Noise, RigDevice};
 use sim::{Part, Placement, Scenario, Stage};
 use std::time::{Duration, Instant};
 
@@ -22,6 +22,14 @@ pub(crate) struct Bed {
     pub head: Head,
     pub stage: Stage,
     pub calibration: Calibration,
+}
+
+/// Gives a camera so many square pixels, and keeps how wide it sees.
+pub(crate) fn square_pixels(camera: &mut RigDevice, (width, height): (u32, u32)) {
+    (camera.width, camera.height) = (width, height);
+    let share = f64::from(height) / f64::from(width);
+    let across = (camera.fov_deg[0] / 2.0).to_radians().tan();
+    camera.fov_deg[1] = 2.0 * (share * across).atan().to_degrees();
 }
 
 pub(crate) fn bed(scenario: &Scenario) -> Bed {

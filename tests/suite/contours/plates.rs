@@ -1,5 +1,6 @@
 //! Plates with holes, a slot and an edge, what is measured of them, and its true values.
 
+use crate::placement::square_pixels;
 use algo::geometry::{Pinhole, Vector};
 use algo::inspect::kinds::{Diameter, Distance, Length, Position, Width, X, Y};
 use algo::inspect::{FeatureKind, Measure};
@@ -234,14 +235,7 @@ impl Setting {
             ..Scenario::default()
         };
         scenario.noise.noise_counts = self.noise;
-        let camera = &mut scenario.rig.camera;
-        (camera.width, camera.height) = self.size;
-        // Pixels are square.
-        let share = f64::from(self.size.1) / f64::from(self.size.0);
-        camera.fov_deg[1] = 2.0
-            * (share * (camera.fov_deg[0] / 2.0).to_radians().tan())
-                .atan()
-                .to_degrees();
+        square_pixels(&mut scenario.rig.camera, self.size);
         scenario.optics.camera_blur_px = self.blur[0];
         scenario.optics.projector_blur_px = self.blur[1];
         // The camera is not overexposed.
