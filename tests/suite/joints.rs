@@ -46,7 +46,7 @@ const FINE: Camera = Camera {
     size: (1456, 1088),
     is_stated: false,
     bias: [50.0, 15.0],
-    unseen: 0,
+    unseen: 2,
 };
 
 fn placement(random: &mut Random) -> Placement {

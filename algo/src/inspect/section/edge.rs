@@ -10,9 +10,12 @@
 
 use super::fit::{Fit, Row};
 use super::line::Line;
-use super::view::{BLUR, View};
+use super::view::View;
 use crate::math::solve::Normal;
 
+/// The share of what blur does by which it is uncertain, along the whole edge: the camera's blur is
+/// not measured, and what blur does goes with the square of what a pixel averages.
+const BLUR: f64 = 0.35;
 /// A bin of more variance than so many times that by noise is not seen well enough to count.
 const KNOWN: f64 = 3.0;
 /// A bin of less weight does not end the arc.

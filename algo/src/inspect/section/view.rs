@@ -1,15 +1,15 @@
 //! How a bin sees a circle: by how much its height is off, and how uncertain that is.
 //!
 //! Heights near the rim are wrong: a pixel there averages the phase of a curved surface, and beyond
-//! the silhouette of a floor. The first follows from the profile; a share [`BLUR`] of it is
-//! uncertain. The second is not known: a height gets the variance that the floor's share of the
+//! the silhouette of a floor. The first follows from the profile, whose form leaves a share `BLUR` of
+//! it uncertain. The second is not known: a height gets the variance that the floor's share of the
 //! pixel makes, less if no heights follow behind the edge, so that the floor is dark.
 
 use super::bins::Bin;
 use super::profile::{Profile, Ray};
 
-/// The share of what blur does by which it is uncertain.
-pub const BLUR: f64 = 0.15;
+/// The share of what blur does that the profile's form leaves uncertain, bin by bin.
+const BLUR: f64 = 0.15;
 /// What a lit floor adds to a height, mm: its share of the pixel times a turn's depth over 2π.
 const MIX: f64 = 1.0;
 /// The same of a floor too dark for heights.

@@ -113,8 +113,7 @@ fn coarse_pixels_measure_gap_and_flush_with_stated_radii() {
 }
 
 #[test]
-fn coarse_pixels_are_refused_rather_than_wrong_where_no_radius_is_stated() {
-    let (mut seen, mut refused) = (0, 0);
+fn coarse_pixels_are_refused_where_no_radius_is_stated() {
     for (floor, rows) in FLOORS
         .into_iter()
         .flat_map(|floor| [(floor, 1), (floor, 4)])
@@ -122,32 +121,14 @@ fn coarse_pixels_are_refused_rather_than_wrong_where_no_radius_is_stated() {
         for seed in FIRST..FIRST + PLACEMENTS {
             let mut joint = Joint::draw(0.41, &mut Chance::new(seed));
             joint.floor = floor;
-            // Wide sections have less noise, and more of their radii are accepted.
+            // Wide sections have less noise.
             joint.rows *= rows;
-            let values = match values(&joint, &joint.rendered(), seed, false) {
-                Ok(values) => values,
-                Err(unseen) => {
-                    let is_remedied = std::format!("{unseen}").ends_with("state edge_mm");
-                    let is_shapeless = matches!(unseen.why, Why::NotRound | Why::Edgeless);
-                    assert!(is_remedied || is_shapeless, "{unseen}");
-                    refused += 1;
-                    continue;
-                }
-            };
-            seen += 1;
-            let (gap, flush) = truth(&joint);
-            let is = [gap, flush, joint.radii[0], joint.radii[1]];
-            for ((value, is), name) in values.iter().zip(is).zip(NAMES) {
-                let (off, most) = ((value.value - is).abs(), 3.0 * value.uncertainty());
-                assert!(
-                    off <= most,
-                    "{name} of {seed} above {floor:?}: {value:?}, is {is}"
-                );
-            }
+            let unseen = values(&joint, &joint.rendered(), seed, false).unwrap_err();
+            let is_remedied = std::format!("{unseen}").ends_with("state edge_mm");
+            let is_shapeless = matches!(unseen.why, Why::NotRound | Why::Edgeless);
+            assert!(is_remedied || is_shapeless, "{unseen}");
         }
     }
-    std::println!("{seen} seen, {refused} refused");
-    assert!(seen > 0 && refused > 10 * seen);
 }
 
 #[test]

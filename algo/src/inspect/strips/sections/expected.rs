@@ -6,8 +6,9 @@ use crate::inspect::section::{Optics, Request};
 use crate::inspect::strips::golden::Golden;
 use alloc::vec::Vec;
 
-/// σ of the camera's blur, px: as lenses have it that are well focused.
-const BLUR_PX: f64 = 0.5;
+/// σ of the camera's blur, px: between that of a lens that shows sharper edges than pixels do, and of
+/// one that is well focused, 0.5.
+const BLUR_PX: f64 = 0.35;
 
 /// The sections that gauges are of.
 #[derive(Clone, Debug, Default)]
