@@ -5,6 +5,7 @@ use super::complex::Complex;
 use super::edge::Edge;
 use super::fit::{Fit, Problem, Seen, damp};
 use super::piece::{BAND, LENGTH, MARGIN, Pieces, pixel_size};
+use super::ring::Ring;
 use super::sample::Signals;
 use super::shape::Shape;
 use super::start::start;
@@ -107,6 +108,7 @@ pub fn find<const N: usize>(
         signals: Signals::new(view, setup),
         room: Room {
             pieces: Pieces::default(),
+            ring: Ring::default(),
             moved: f64::INFINITY,
             seen: Vec::new(),
             damped: Vec::new(),
@@ -186,6 +188,7 @@ impl<S, V: View> Search<'_, S, V> {
             let of = (shape, &contour.parameters);
             if !(room.moved < MARGIN) {
                 room.pieces.divide(of, &self.signals, contour.pixel);
+                room.ring.gather(of, &self.signals, &mut room.pieces);
                 room.moved = 0.0;
             }
             room.pieces.place(of, self.signals.setup, thickness, some);
@@ -292,6 +295,7 @@ impl<const N: usize> Contour<N> {
 /// Buffers of a search.
 struct Room {
     pieces: Pieces,
+    ring: Ring,
     /// How far the contour has moved since its pieces' pixels were gathered, px.
     moved: f64,
     seen: Vec<Seen>,

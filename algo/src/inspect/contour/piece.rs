@@ -2,7 +2,6 @@
 
 use super::beyond::{Gradient, Wall, border, shadow};
 use super::complex::Complex;
-use super::ring::Ring;
 use super::sample::Signals;
 use super::shape::{Foot, Shape};
 use super::view::{Setup, Spot, View};
@@ -77,8 +76,6 @@ pub struct Pieces {
     pub all: Vec<Piece>,
     /// The pixels of all, piece by piece.
     pub pixels: Vec<Pixel>,
-    /// Buffers.
-    ring: Ring,
 }
 
 /// mm per px in the picture at a place of the plane: the lengths of the sides of a pixel.
@@ -97,7 +94,8 @@ fn frame(view: &impl View, (u, v): (f64, f64)) -> Option<[(f64, f64, f64); 2]> {
 }
 
 impl Pieces {
-    /// Divides a contour into pieces. What the camera does not see of it has pieces without pixels.
+    /// Divides a contour into pieces, whose pixels are gathered elsewhere. What the camera does not
+    /// see of it has pieces without a middle.
     pub fn divide<const N: usize>(
         &mut self,
         (shape, p): (&impl Shape<N>, &[f64; N]),
@@ -133,8 +131,6 @@ impl Pieces {
             }
             self.all.push(piece);
         }
-        let into = (&mut self.all[..], &mut self.pixels);
-        self.ring.gather((shape, p), signals, into);
     }
 
     /// Moves one of `some` pieces to a contour that has hardly moved, and works out the distances of

@@ -4,7 +4,7 @@
 //! order in memory. Between runs the distance from the contour tells how far the next one is.
 
 use super::complex::Complex;
-use super::piece::{BAND, MARGIN, Piece, Pixel};
+use super::piece::{BAND, MARGIN, Piece, Pieces, Pixel};
 use super::sample::Signals;
 use super::shape::Shape;
 use super::view::{Spot, View};
@@ -32,7 +32,10 @@ impl Ring {
         &mut self,
         (shape, p): (&impl Shape<N>, &[f64; N]),
         signals: &Signals<'_, impl View>,
-        (pieces, pixels): (&mut [Piece], &mut Vec<Pixel>),
+        Pieces {
+            all: pieces,
+            pixels,
+        }: &mut Pieces,
     ) {
         self.found.clear();
         let (columns, rows) = signals.view.size();
