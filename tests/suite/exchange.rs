@@ -2,11 +2,12 @@
 //! its part number.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, ONLINE, Place, Plc};
+use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, pause};
 use crate::written::program;
 use appliance::recipe::{RecipeFile, Store, archive};
 use serde_json::{Value, json};
 use std::fs;
+use std::time::Instant;
 use tests::files;
 use tests::program::Run;
 
@@ -35,8 +36,27 @@ fn foreign(place: &Place) -> Vec<u8> {
 
 /// Sends a recipe file to the page.
 fn import(browser: &mut Browser, query: &str, file: &[u8]) -> (u16, Value) {
-    let (status, answer) = browser.ask("POST", &format!("/api/recipes{query}"), file);
-    (status, serde_json::from_slice(&answer).unwrap())
+    once_ready(browser, &format!("/api/recipes{query}"), file)
+}
+
+/// Brings back the generation before.
+fn undo(browser: &mut Browser) -> (u16, Value) {
+    once_ready(browser, "/api/recipes/1/undo", b"{}")
+}
+
+/// Posts something, again while the station is loading a recipe.
+fn once_ready(browser: &mut Browser, path: &str, body: &[u8]) -> (u16, Value) {
+    let began = Instant::now();
+    loop {
+        let (status, answer) = browser.ask("POST", path, body);
+        let answer: Value = serde_json::from_slice(&answer).unwrap();
+        let words = answer["error"].as_str().unwrap_or_default();
+        if !words.ends_with("try again when it is ready") {
+            return (status, answer);
+        }
+        assert!(began.elapsed() < PATIENCE, "{words}");
+        pause();
+    }
 }
 
 /// Runs the command `recipe` in this place.
@@ -85,11 +105,11 @@ fn a_file_of_another_head_replaces_a_released_recipe_only_on_request_and_undo_br
     assert_eq!(fs::read(place.recipe()).unwrap(), theirs);
     // The same file again changes nothing: the released recipe stays the previous generation.
     assert_eq!(import(&mut browser, "", &theirs).0, 201);
-    let (status, answer) = browser.json("POST", "/api/recipes/1/undo", &json!({}));
+    let (status, answer) = undo(&mut browser);
     assert_eq!(status, 200, "{answer}");
     assert_eq!(fs::read(place.recipe()).unwrap(), released);
     // What this head cannot use does not come back over what it can use.
-    let (status, answer) = browser.json("POST", "/api/recipes/1/undo", &json!({}));
+    let (status, answer) = undo(&mut browser);
     assert_eq!(status, 422, "{answer}");
     assert_eq!(fs::read(place.recipe()).unwrap(), released);
     for refused in ["?number=0", "?number=10000"] {
@@ -248,10 +268,7 @@ fn the_record_of_changes_says_which_limit_went_from_what_to_what() {
         assert!(words.contains(needle), "{needle}: {words}");
     }
     browser.wait_for_another(before["fingerprint"].as_str().unwrap());
-    assert_eq!(
-        browser.json("POST", "/api/recipes/1/undo", &json!({})).0,
-        200
-    );
+    assert_eq!(undo(&mut browser).0, 200);
     let change = browser.get("/api/changes")["changes"][0].clone();
     let words = change["changed"].as_str().unwrap();
     let back = format!("gauge \"deviation\" highest from 0.375 mm to {high} mm");
