@@ -3,6 +3,7 @@
 //! Measured in release on one core for 512 × 512 pixels: about 3 ms per frame including noise (the
 //! test `speed_of_building_a_transport_and_of_one_frame` prints it).
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use super::blur;
@@ -19,6 +20,12 @@ use hal::virtual_head::Scene;
 
 /// How many frames may be kept before each further one costs an allocation.
 const MAX_KEPT_FRAMES: usize = 64;
+/// Pictures of the part in place that are kept: as many as a recipe has patterns. Together they take
+/// less memory than the part's light transport.
+const MAX_PICTURES: usize = 32;
+
+/// The patterns in view during an exposure, and their shares of it.
+type View = Vec<(Option<usize>, f32)>;
 
 /// Part, rasters and sensor of a simulated head.
 pub(crate) struct SimScene {
@@ -26,8 +33,8 @@ pub(crate) struct SimScene {
     placed: Staged,
     /// The light of each loaded raster, 1 = white, row by row, with [`PADDING`].
     rasters: Vec<Vec<f32>>,
-    /// The light on the camera; the memory is reused for each frame.
-    picture: Vec<f32>,
+    /// The light on the camera of the part in place, for what was in view.
+    pictures: VecDeque<(View, Vec<f32>)>,
     /// The light on the camera of one pattern, where several were in view.
     part: Vec<f32>,
     pool: Pool,
@@ -45,7 +52,7 @@ impl SimScene {
         Self {
             placed,
             rasters: Vec::new(),
-            picture: vec![0.0; sensor],
+            pictures: VecDeque::new(),
             part: vec![0.0; sensor],
             pool: Pool::new(format, MAX_KEPT_FRAMES),
             sensor: Sensor::new(&scenario),
@@ -57,6 +64,7 @@ impl SimScene {
     /// Puts another part in place.
     pub(super) fn place(&mut self, placed: Staged) {
         self.placed = placed;
+        self.pictures.clear();
     }
 
     /// The part in place.
@@ -72,6 +80,42 @@ impl SimScene {
     /// Restarts the noise with another seed.
     pub(super) fn reseed(&mut self, seed: u64) {
         self.sensor.reseed(seed);
+    }
+
+    /// The number of the picture of what is in view, which is computed unless it is kept: frames of
+    /// one pattern differ by their noise alone.
+    fn picture(&mut self, seen: &[(Option<usize>, f32)]) -> usize {
+        if let Some(known) = self.pictures.iter().position(|(view, _)| view == seen) {
+            return known;
+        }
+        let oldest = match self.pictures.len() {
+            MAX_PICTURES => self.pictures.pop_front(),
+            _ => None,
+        };
+        let mut picture = oldest.map_or_else(|| vec![0.0; self.part.len()], |(_, memory)| memory);
+        let transport = &self.placed.transport;
+        let raster = |shown: Option<usize>| {
+            let raster = shown.and_then(|index| self.rasters.get(index));
+            raster.map(Vec::as_slice)
+        };
+        match seen {
+            [(shown, share)] => {
+                transport.light(raster(*shown), &mut picture);
+                picture.iter_mut().for_each(|light| *light *= share);
+            }
+            several => {
+                picture.fill(0.0);
+                for (shown, share) in several {
+                    transport.light(raster(*shown), &mut self.part);
+                    let parts = picture.iter_mut().zip(&self.part);
+                    parts.for_each(|(sum, light)| *sum += share * light);
+                }
+            }
+        }
+        let width = self.scenario.rig.camera.width as usize;
+        blur::gaussian(&mut picture, width, transport.blur_px);
+        self.pictures.push_back((seen.to_vec(), picture));
+        self.pictures.len() - 1
     }
 }
 
@@ -115,6 +159,9 @@ impl Scene for SimScene {
             light.resize(light.len() + PADDING, 0.0);
             light
         };
+        let stays = |shown: &Option<usize>| shown.is_none_or(|index| index < kept);
+        self.pictures
+            .retain(|(view, _)| view.iter().all(|(shown, _)| stays(shown)));
         self.rasters.truncate(kept);
         self.rasters.extend(rasters.into_iter().map(light));
         Ok(())
@@ -130,38 +177,11 @@ impl Scene for SimScene {
         timestamp: Timestamp,
         count: u64,
     ) -> Result<Frame, Error> {
-        let raster = |shown: Option<usize>| {
-            let raster = shown.and_then(|index| self.rasters.get(index));
-            raster.map(Vec::as_slice)
-        };
-        let transport = &self.placed.transport;
-        match seen {
-            [(shown, share)] => {
-                transport.light(raster(*shown), &mut self.picture);
-                self.picture.iter_mut().for_each(|light| *light *= share);
-            }
-            several => {
-                self.picture.fill(0.0);
-                for (shown, share) in several {
-                    transport.light(raster(*shown), &mut self.part);
-                    let parts = self.picture.iter_mut().zip(&self.part);
-                    parts.for_each(|(sum, light)| *sum += share * light);
-                }
-            }
-        }
-        let camera = &self.scenario.rig.camera;
-        blur::gaussian(
-            &mut self.picture,
-            camera.width as usize,
-            self.placed.transport.blur_px,
-        );
-
+        let at = self.picture(seen);
         let (random, exposing) = (self.sensor.next_frame(), self.exposing);
-        let plane = self
-            .scenario
-            .colour
-            .then(|| self.scenario.in_frame(&self.picture));
-        let picture = plane.as_ref().unwrap_or(&self.picture);
+        let (_, whole) = &self.pictures[at];
+        let plane = self.scenario.colour.then(|| self.scenario.in_frame(whole));
+        let picture = plane.as_ref().unwrap_or(whole);
         let sensor = &self.sensor;
         self.pool.frame(timestamp, count, |pixels| match pixels {
             Pixels::Eight(samples) => sensor.read(exposing, picture, random, samples, |n| n as u8),

@@ -57,7 +57,7 @@ impl Sensor {
     }
 
     /// Reads out `light` (of an exposure of normal length, 1 = full scale at gain 1), which was
-    /// exposed `longer` times as long, with `gain`.
+    /// exposed `longer` times as long, with `gain`. `count` truncates.
     pub fn read<T>(
         &self,
         [longer, gain]: [f64; 2],
@@ -68,7 +68,7 @@ impl Sensor {
     ) {
         let full_scale = self.full_scale as f32;
         let bright = (longer * gain * self.full_scale) as f32;
-        let rounded = |value: f32| count((value.clamp(0.0, full_scale) + 0.5).floor());
+        let rounded = |value: f32| count(value.clamp(0.0, full_scale) + 0.5);
         if let Some(noise_counts) = self.noise.noise_counts {
             let half_width = (noise_counts / 255.0 * self.full_scale) as f32;
             // Half of a random word in −1…1: 2⁻³¹ times a signed half.

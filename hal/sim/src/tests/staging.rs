@@ -1,8 +1,11 @@
 //! Parts on the stage: defects, placements, and light transports that are kept.
 
-use super::{all_parts, small};
+use super::{PATIENT, all_parts, counts, small};
 use crate::parts::{Defect, Plane, SheetMetal};
 use crate::{Material, Part, Placement, Scenario, Stage, head};
+use hal::head::Head;
+use hal::projector::Raster;
+use std::sync::Arc;
 
 /// Pixels whose truth is not NaN, and the largest difference of truth from the good part.
 fn against_good(stage: &Stage, defects: Vec<Defect>) -> (usize, f32) {
@@ -174,4 +177,52 @@ fn a_part_that_is_placed_without_a_word_on_its_material_is_of_the_scenarios() {
 fn a_stage_can_be_shared_between_threads() {
     fn shared<T: Send + Sync + Clone>() {}
     shared::<Stage>();
+}
+
+#[test]
+fn a_frame_shows_the_part_and_the_patterns_that_are_there_whatever_was_shown_before() {
+    let scenario = small(Part::default());
+    let other = (Part::Plane(Plane::default()), Placement::default());
+    let load = |head: &mut Head, greys: &[u8]| {
+        let (width, height) = head.projector_size();
+        let rasters = greys
+            .iter()
+            .map(|grey| Raster::uniform(width, height, *grey));
+        head.load(rasters.map(Result::unwrap).collect()).unwrap();
+    };
+    let shown = |head: &mut Head| {
+        let mut frames = Vec::new();
+        let mut keep = |_, frame| frames.push(counts(&frame));
+        head.acquire(&[0, 1, 0, 1], PATIENT, &mut keep).unwrap();
+        frames
+    };
+    // What a new head sees, that has exposed as many frames.
+    let fresh = |part: &Part, greys: &[u8], exposed: usize| {
+        let (mut head, stage) = head(&scenario).unwrap();
+        load(&mut head, &[0, 0]);
+        (0..exposed).for_each(|_| drop(shown(&mut head)));
+        stage.place(part, &Placement::default()).unwrap();
+        load(&mut head, greys);
+        shown(&mut head)
+    };
+    let (mut head, stage) = head(&scenario).unwrap();
+    load(&mut head, &[200, 50]);
+    assert_eq!(shown(&mut head), fresh(&scenario.part, &[200, 50], 0));
+    assert_eq!(shown(&mut head), fresh(&scenario.part, &[200, 50], 1));
+    load(&mut head, &[200, 120]);
+    assert_eq!(shown(&mut head), fresh(&scenario.part, &[200, 120], 2));
+    stage.place(&other.0, &other.1).unwrap();
+    assert_eq!(shown(&mut head), fresh(&other.0, &[200, 120], 3));
+    head.aside(1, Arc::new(|| true), |head| {
+        load(head, &[90]);
+        let mut seen = Vec::new();
+        let mut keep = |_, frame| seen.push(counts(&frame));
+        head.acquire(&[0], PATIENT, &mut keep).unwrap();
+        assert_eq!(seen.len(), 1);
+    });
+    stage.reseed(scenario.noise.seed);
+    let [_, again, ..] = &shown(&mut head)[..] else {
+        panic!("four frames");
+    };
+    assert_eq!(*again, fresh(&other.0, &[200, 90], 0)[1]);
 }
