@@ -11,6 +11,7 @@
 //! - [`fuzz`]: functions of bytes that must not panic.
 //! - [`imports`]: which files of a crate name each other.
 //! - [`power`]: a model of what a loss of power leaves of a folder.
+//! - [`until`](mod@until): waits for what others do.
 
 pub mod board;
 pub mod files;
@@ -26,3 +27,4 @@ pub mod rig;
 pub mod score;
 pub mod shared;
 pub mod small_head;
+pub mod until;

@@ -1,14 +1,15 @@
 //! From a bare simulated head to verdicts, over the page's API alone: gamma, blur, delay and
 //! geometry are unknown to the station.
 
-use crate::page::Browser;
+use crate::page::{Browser, step_of};
 use crate::station_plc::{Daemon, Place};
-use crate::technician::{BOARD, STEP, Technician};
+use crate::technician::{BOARD, Technician};
 use serde_json::{Value, json};
 use sim::{Part, Placement, Scenario};
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::time::{Duration, Instant};
+use tests::until::{PATIENCE, until};
 
 /// The head: other angles and lenses than anything that the program knows, and all that is to be
 /// measured on it.
@@ -218,12 +219,9 @@ fn a_bare_head_is_commissioned_over_the_page_and_then_judges_parts_right() {
         .browser
         .json("POST", "/api/recipes/1/teach", &json!({}));
     assert_eq!(status, 202, "{answer}");
-    technician.ready();
-    assert_eq!(
-        Technician::step_of(&technician.head(), "teach")["state"],
-        "done"
-    );
-    assert_eq!(technician.measure()["verdict"], "PASS");
+    technician.browser.ready();
+    assert_eq!(step_of(&technician.head(), "teach")["state"], "done");
+    assert_eq!(technician.browser.measure()["verdict"], "PASS");
     let (rms, pixels) = rms(&heights(&technician), &Part::SheetMetal(Default::default()));
     println!("heights are {rms:.4} mm RMS off the truth over {pixels} pixels; {result}");
     assert!(
@@ -232,17 +230,17 @@ fn a_bare_head_is_commissioned_over_the_page_and_then_judges_parts_right() {
     );
     let dent = json!([{ "kind": "dent", "x": 0, "y": -8, "depth_mm": 1, "diameter_mm": 18 }]);
     technician.lay(&json!({ "part": { "kind": "sheet_metal", "defects": dent } }));
-    assert_eq!(technician.measure()["verdict"], "FAIL");
+    assert_eq!(technician.browser.measure()["verdict"], "FAIL");
 
     // Live pictures leave the recipe's patterns where a trigger finds them.
     technician.looks("white");
     technician.lay(&good);
-    assert_eq!(technician.measure()["verdict"], "PASS");
+    assert_eq!(technician.browser.measure()["verdict"], "PASS");
     // The calibration outlives a restart, and with it the recipe.
     assert!(daemon.terminate().success());
     let daemon = Daemon::start(&place);
     let mut technician = Technician::sign_in(&daemon, &secret);
-    technician.ready();
+    technician.browser.ready();
     assert_eq!(technician.head()["calibrated"], true);
 }
 
@@ -260,10 +258,13 @@ fn a_step_ends_at_once_when_somebody_or_the_daemon_stops_it_and_leaves_what_was_
         let path = "/api/head/steps/timing";
         let (status, answer) = technician.browser.json("POST", path, &json!({}));
         assert_eq!(status, 202, "{answer}");
-        let began = Instant::now();
-        while technician.head()["running"]["share"].as_f64().unwrap() == 0.0 {
-            assert!(began.elapsed() < STEP);
-        }
+        until("progress", PATIENCE, || {
+            let running = technician.head()["running"].clone();
+            match running["share"].as_f64().unwrap() > 0.0 {
+                true => Ok(()),
+                false => Err(running),
+            }
+        });
     };
     begins(&mut technician);
     let mut end = |name: &str| {
@@ -271,14 +272,15 @@ fn a_step_ends_at_once_when_somebody_or_the_daemon_stops_it_and_leaves_what_was_
         technician.browser.ask("DELETE", &path, &[]).0
     };
     assert_eq!(end("aim"), 409, "another step");
-    let stopped = Instant::now();
     assert_eq!(end("timing"), 202);
-    while !technician.head()["running"].is_null() {
-        assert!(stopped.elapsed() < AT_ONCE);
-    }
-    let head = technician.head();
-    let states =
-        ["exposure", "timing"].map(|name| Technician::step_of(&head, name)["state"].clone());
+    let head = until("end of the step", AT_ONCE, || {
+        let head = technician.head();
+        match head["running"].is_null() {
+            true => Ok(head),
+            false => Err(head),
+        }
+    });
+    let states = ["exposure", "timing"].map(|name| step_of(&head, name)["state"].clone());
     assert_eq!(states, ["done", "open"]);
     begins(&mut technician);
     let stopped = Instant::now();
@@ -309,12 +311,12 @@ fn a_cycle_is_hardly_later_while_somebody_looks_at_live_pictures() {
     let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
     let secret = rest.split(' ').next().unwrap().to_owned();
     let mut technician = Technician::sign_in(&daemon, &secret);
-    technician.ready();
+    technician.browser.ready();
     let cycles = |technician: &mut Technician, pause: u64| {
         let each = (0..40).map(|at| {
             // Triggers come at any time of a picture.
             std::thread::sleep(Duration::from_millis(pause + at * 7 % 50));
-            technician.measure()["total_us"].as_f64().unwrap() * 1e-3
+            technician.browser.measure()["total_us"].as_f64().unwrap() * 1e-3
         });
         median(each.collect())
     };

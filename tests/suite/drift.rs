@@ -5,13 +5,12 @@ use crate::station_plc::{Daemon, Place, Plc, command};
 use serde_json::Value;
 use std::fs;
 use std::time::{Duration, Instant};
+use tests::until::{PATIENCE, until};
 
 /// WARNING, bit 9.
 const GEOMETRY: u16 = 1 << 9;
 /// Cycles between two checks.
 const CYCLES: u16 = 3;
-/// Longest wait for a check.
-const PATIENCE: Duration = Duration::from_secs(60);
 /// The station rests for this long before it checks.
 const REST: Duration = Duration::from_millis(1000);
 /// Longest wait of a trigger for the measuring task, on a busy computer.
@@ -35,18 +34,19 @@ fn drift(browser: &mut Browser) -> Value {
     browser.get("/api/head")["drift"].clone()
 }
 
-fn checks(browser: &mut Browser) -> usize {
-    drift(browser)["trend"].as_array().map_or(0, Vec::len)
+fn checks(drift: &Value) -> usize {
+    drift["trend"].as_array().map_or(0, Vec::len)
 }
 
 /// The drift once there were so many checks.
 fn after(browser: &mut Browser, count: usize) -> Value {
-    let began = Instant::now();
-    while checks(browser) < count {
-        assert!(began.elapsed() < PATIENCE, "{}", drift(browser));
-        std::thread::sleep(Duration::from_millis(20));
-    }
-    drift(browser)
+    until("check", PATIENCE, || {
+        let found = drift(browser);
+        match checks(&found) >= count {
+            true => Ok(found),
+            false => Err(found),
+        }
+    })
 }
 
 /// WARNING and DRIFT.
@@ -156,12 +156,12 @@ fn a_trigger_ends_a_check_and_is_answered_in_time_with_the_recipes_patterns() {
     let (mut plc, mut browser) = (Plc::connect(&daemon), Browser::new(&daemon));
     plc.measure(1);
     let done = Instant::now();
-    let before = checks(&mut browser);
+    let before = checks(&drift(&mut browser));
     after(&mut browser, before + 1);
     let whole = done.elapsed().saturating_sub(REST);
     let (mut ended, mut longest) = (0, 0);
     for token in 2..10 {
-        let before = checks(&mut browser);
+        let before = checks(&drift(&mut browser));
         plc.measure(token);
         // The trigger comes after a part of the check.
         std::thread::sleep(REST + whole * u32::from(token) / 12);
@@ -171,7 +171,7 @@ fn a_trigger_ends_a_check_and_is_answered_in_time_with_the_recipes_patterns() {
         let mut stages = stages.as_array().unwrap().iter();
         let waited = stages.find(|stage| stage["name"] == "waiting").unwrap();
         longest = longest.max(waited["us"].as_u64().unwrap());
-        ended += u32::from(checks(&mut browser) == before);
+        ended += u32::from(checks(&drift(&mut browser)) == before);
         // What was ended is made up for.
         after(&mut browser, before + 1);
     }

@@ -2,14 +2,14 @@
 //! its part number.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, pause};
+use crate::station_plc::{Daemon, ONLINE, Place, Plc};
 use crate::written::program;
 use appliance::recipe::{RecipeFile, Store, archive};
 use serde_json::{Value, json};
 use std::fs;
-use std::time::Instant;
 use tests::files;
 use tests::program::Run;
+use tests::until::{PATIENCE, until};
 
 /// RECIPE_RESULT, and values of it.
 const MADE_FOR_ANOTHER_HEAD: u16 = 3;
@@ -46,17 +46,15 @@ fn undo(browser: &mut Browser) -> (u16, Value) {
 
 /// Posts something, again while the station is loading a recipe.
 fn once_ready(browser: &mut Browser, path: &str, body: &[u8]) -> (u16, Value) {
-    let began = Instant::now();
-    loop {
+    until("ready station", PATIENCE, || {
         let (status, answer) = browser.ask("POST", path, body);
         let answer: Value = serde_json::from_slice(&answer).unwrap();
         let words = answer["error"].as_str().unwrap_or_default();
-        if !words.ends_with("try again when it is ready") {
-            return (status, answer);
+        match words.ends_with("try again when it is ready") {
+            true => Err(answer),
+            false => Ok((status, answer)),
         }
-        assert!(began.elapsed() < PATIENCE, "{words}");
-        pause();
-    }
+    })
 }
 
 /// Runs the command `recipe` in this place.

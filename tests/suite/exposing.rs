@@ -2,11 +2,10 @@
 //! noise a recipe is judged by.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, SMALL_HEAD, pause};
+use crate::station_plc::{Daemon, Place, Plc, READY, SMALL_HEAD};
 use crate::written::program;
 use serde_json::{Value, json};
 use std::fs;
-use std::time::Instant;
 
 const PASS: u16 = 1;
 /// RECIPE_RESULT "made for another calibration, exposure or gain".
@@ -41,21 +40,7 @@ fn step(browser: &mut Browser, name: &str, body: &Value) -> Value {
     let path = format!("/api/head/steps/{name}");
     let (status, answer) = browser.json("POST", &path, body);
     assert_eq!(status, 202, "{name} {body}: {answer}");
-    ended(browser, name)
-}
-
-fn ended(browser: &mut Browser, name: &str) -> Value {
-    let began = Instant::now();
-    loop {
-        let head = browser.get("/api/head");
-        if head["running"].is_null() {
-            let steps = head["steps"].as_array().unwrap();
-            let found = steps.iter().find(|step| step["name"] == name);
-            return found.unwrap().clone();
-        }
-        assert!(began.elapsed() < 8 * PATIENCE, "{name}: {head}");
-        pause();
-    }
+    browser.ended(name)
 }
 
 /// Teaches recipe 1 anew.
@@ -102,7 +87,7 @@ fn a_step_exposure_that_is_stopped_refused_or_failed_takes_its_settings_back() {
     assert_eq!(status, 202, "{answer}");
     let (status, answer) = browser.json("DELETE", path, &json!({}));
     assert_eq!(status, 202, "{answer}");
-    ended(&mut browser, "exposure");
+    browser.ended("exposure");
     assert_eq!(camera(&mut browser), before);
     assert_eq!(plc.measure(4)[8], PASS);
     assert_eq!(daemon.terminate().code(), Some(0));

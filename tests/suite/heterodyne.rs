@@ -2,12 +2,11 @@
 //! recordings.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, PATIENCE, Place, pause};
+use crate::station_plc::{Daemon, Place};
 use crate::written::{laboratory, program};
 use hal::replay::recorder;
 use serde_json::{Value, json};
 use std::fs;
-use std::time::Instant;
 use tests::render::{Scene, levels};
 use tests::{files, shared};
 
@@ -15,22 +14,8 @@ use tests::{files, shared};
 fn judged(daemon: &Daemon) -> Value {
     let mut browser = Browser::new(daemon);
     browser.sign_in(daemon);
-    let began = Instant::now();
-    while browser.get("/api/snapshot")["ready"] != true {
-        assert!(began.elapsed() < PATIENCE);
-        pause();
-    }
-    let before = browser.get("/api/snapshot")["counters"]["sequence"].clone();
-    let (status, answer) = browser.json("POST", "/api/trigger", &json!({}));
-    assert_eq!(status, 202, "{answer}");
-    loop {
-        let snapshot = browser.get("/api/snapshot");
-        if snapshot["counters"]["sequence"] != before && snapshot["ready"] == true {
-            return snapshot["result"].clone();
-        }
-        assert!(began.elapsed() < PATIENCE, "{snapshot}");
-        pause();
-    }
+    browser.ready();
+    browser.measure()
 }
 
 /// Teaches the recording `r` of a place, imports the recipe into a station that plays it, and

@@ -1,7 +1,7 @@
 //! The history: what it shows, and that it survives kill -9.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, Place, Plc, READY, long, pause, trigger};
+use crate::station_plc::{Daemon, Place, Plc, READY, long, trigger};
 use crate::written::{FRINGED, program};
 use appliance::history::{Entry, Filter, Reader, Writer};
 use appliance::station::Verdict;
@@ -10,9 +10,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use tests::program::Program;
 use tests::random::Random;
-
-/// Longest wait for the history's own threads.
-const WRITTEN: Duration = Duration::from_secs(30);
+use tests::until::{PATIENCE, until};
 
 pub(crate) fn reader(place: &Place) -> Reader {
     Reader::of(&place.path("state"))
@@ -117,14 +115,9 @@ pub(crate) fn place_with_a_dent() -> Place {
 
 /// Waits for the recording of a result.
 pub(crate) fn recording(place: &Place, seq: u32) -> PathBuf {
-    let started = Instant::now();
-    loop {
-        if let Some(folder) = reader(place).recording(seq).unwrap() {
-            return folder;
-        }
-        assert!(started.elapsed() < WRITTEN, "no recording of result {seq}");
-        pause();
-    }
+    until(&format!("recording of result {seq}"), PATIENCE, || {
+        reader(place).recording(seq).unwrap().ok_or(())
+    })
 }
 
 #[test]
@@ -275,13 +268,13 @@ fn a_stored_result_opens_with_the_pictures_of_the_live_view_and_one_without_fram
     while reader(&place).recording(seq).unwrap().is_some() {
         assert!(last < seq + 20, "the quota removes nothing");
         last = long(&plc.measure(last as u16 + 1), 0);
-        // Waits until each has been written.
-        let started = Instant::now();
-        while reader(&place).recording(seq).unwrap().is_some()
-            && reader(&place).recording(last).unwrap().is_none()
-        {
-            assert!(started.elapsed() < WRITTEN, "no recording of result {last}");
-        }
+        // Each has been written, or the first one removed.
+        until(&format!("recording of result {last}"), PATIENCE, || {
+            let [first, newest] = [seq, last].map(|seq| reader(&place).recording(seq).unwrap());
+            (first.is_none() || newest.is_some())
+                .then_some(())
+                .ok_or(first)
+        });
     }
     let why = browser.get(&format!("/api/history/{seq}"))["no_frames"].to_string();
     assert!(why.contains("history.recordings_mib"), "{why}");
@@ -294,17 +287,16 @@ fn a_stored_result_opens_with_the_pictures_of_the_live_view_and_one_without_fram
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     let seq = long(&Plc::connect(&daemon).measure(1), 0);
-    let started = Instant::now();
-    loop {
-        let (status, answer) =
-            browser.ask("GET", &format!("/api/history/{seq}/picture/height"), &[]);
+    until("words about the recording", PATIENCE, || {
+        let path = format!("/api/history/{seq}/picture/height");
+        let (status, answer) = browser.ask("GET", &path, &[]);
         let words = String::from_utf8(answer).unwrap();
         assert_eq!(status, 404, "{words}");
-        if words.contains("switched off") {
-            break;
+        match words.contains("switched off") {
+            true => Ok(()),
+            false => Err(words),
         }
-        assert!(started.elapsed() < WRITTEN, "{words}");
-    }
+    });
 }
 
 #[test]
@@ -362,14 +354,13 @@ fn the_time_of_a_browser_dates_history_and_log_and_never_the_register() {
     let said = browser.sign_in_at(&daemon, time_ms);
     let words = plc.measure(2);
     let time = &words[TIME..TIME + 4];
-    let started = Instant::now();
-    let results = loop {
+    let results = until("second result", PATIENCE, || {
         let results = browser.get("/api/history")["results"].clone();
-        if results.as_array().unwrap().len() == 2 {
-            break results;
+        match results.as_array().unwrap().len() {
+            2 => Ok(results),
+            _ => Err(results),
         }
-        assert!(started.elapsed() < WRITTEN, "{results}");
-    };
+    });
     let log = browser.get("/api/log")["lines"].clone();
     if said == "not needed" {
         // This computer's clock is synchronised.

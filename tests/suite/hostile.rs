@@ -1,7 +1,7 @@
 //! Hostile clients, and many ordinary ones: neither slows the measurement down, and the PLC can
 //! always connect.
 
-use crate::station_plc::{PATIENCE, READY, SMALL_HEAD, long, trigger};
+use crate::station_plc::{Plc, SMALL_HEAD, long};
 use appliance::config::Config;
 use appliance::service::{Caller, Daemon};
 use appliance::system::progress::Progress;
@@ -13,8 +13,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
+use tests::until::{PATIENCE, until};
 use tokio::net::TcpSocket;
-use tokio::runtime::Runtime;
 use tokio_modbus::client::{Context, Reader as _, Writer as _, tcp};
 use tokio_modbus::prelude::ExceptionCode;
 
@@ -31,8 +31,7 @@ const PASS: u16 = 1;
 /// A daemon with one computing thread, so its processor time includes no search for work.
 struct Bed {
     daemon: Daemon,
-    runtime: Runtime,
-    plc: Context,
+    plc: Plc,
     token: u16,
     _folder: tempfile::TempDir,
 }
@@ -61,11 +60,10 @@ impl Bed {
             .enable_all()
             .build()
             .unwrap();
-        let plc = runtime.block_on(connect(daemon.modbus)).unwrap();
+        let context = runtime.block_on(connect(daemon.modbus)).unwrap();
         Self {
             daemon,
-            runtime,
-            plc,
+            plc: Plc { runtime, context },
             token: 0,
             _folder: folder,
         }
@@ -74,27 +72,8 @@ impl Bed {
     /// Runs one cycle; returns the processor time of its processing, ms.
     fn cycle(&mut self) -> f64 {
         self.token += 1;
-        let Self { runtime, plc, .. } = self;
-        let began = Instant::now();
-        let patient = || assert!(began.elapsed() < PATIENCE, "no result");
-        let token = self.token;
-        runtime.block_on(async {
-            while plc.read_holding_registers(100, 1).await.unwrap().unwrap()[0] & READY == 0 {
-                patient();
-            }
-            let fields = trigger(token);
-            let write = plc.write_multiple_registers(1, &fields);
-            write.await.unwrap().unwrap();
-            loop {
-                let words = plc.read_holding_registers(200, 120).await.unwrap().unwrap();
-                if words[2] == token {
-                    assert_eq!((words[8], long(&words, 0)), (PASS, u32::from(token)));
-                    break;
-                }
-                patient();
-                tokio::time::sleep(Duration::from_millis(5)).await;
-            }
-        });
+        let words = self.plc.measure(self.token);
+        assert_eq!((words[8], long(&words, 0)), (PASS, u32::from(self.token)));
         let result = self.daemon.station.snapshot().result.clone().unwrap();
         f64::from(result.inspection.cpu_us) / 1e3
     }
@@ -292,26 +271,17 @@ fn a_plc_measures_during_and_after_an_attack_and_nobody_else_can_trigger() {
     // New clients are served as soon as the last connections of the attack have made room; one from
     // the address of the attack may read but not write.
     let modbus = bed.daemon.modbus;
-    bed.runtime.block_on(async {
-        let began = Instant::now();
-        let patient = || assert!(began.elapsed() < PATIENCE, "no place for a new client");
-        let read = loop {
-            let mut late = connect(modbus).await.unwrap();
-            match late.read_holding_registers(200, 120).await {
-                Ok(answer) => break answer,
-                Err(_) => patient(),
-            }
-        };
-        assert!(read.is_ok(), "{read:?}");
-        let refused = loop {
-            let mut reader = tcp::connect(modbus).await.unwrap();
-            match reader.write_single_register(1, 999).await {
-                Ok(answer) => break answer,
-                Err(_) => patient(),
-            }
-        };
-        assert_eq!(refused, Err(ExceptionCode::IllegalFunction));
+    let runtime = &bed.plc.runtime;
+    let read = until("place for a new client", PATIENCE, || {
+        let mut late = runtime.block_on(connect(modbus)).unwrap();
+        runtime.block_on(late.read_holding_registers(200, 120))
     });
+    assert!(read.is_ok(), "{read:?}");
+    let refused = until("place for a reader", PATIENCE, || {
+        let mut reader = runtime.block_on(tcp::connect(modbus)).unwrap();
+        runtime.block_on(reader.write_single_register(1, 999))
+    });
+    assert_eq!(refused, Err(ExceptionCode::IllegalFunction));
     bed.daemon.stop();
 }
 

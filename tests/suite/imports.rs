@@ -2,11 +2,12 @@
 //! remains.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, PATIENCE, Place};
+use crate::station_plc::{Daemon, Place};
 use std::fs;
 use std::io::{Read as _, Write as _};
 use std::net::TcpStream;
-use std::time::{Duration, Instant};
+use std::time::Duration;
+use tests::until::{PATIENCE, until};
 
 /// Clients that send a file at the same time.
 const CLIENTS: usize = 8;
@@ -34,14 +35,6 @@ fn arriving(place: &Place) -> (usize, u64) {
         .filter_map(|entry| Some(entry.metadata().ok()?.len()))
         .collect();
     (sizes.len(), sizes.iter().sum())
-}
-
-fn wait(what: &str, within: Duration, done: impl Fn() -> bool) {
-    let began = Instant::now();
-    while !done() {
-        assert!(began.elapsed() < within, "no {what}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
 }
 
 /// Sends a body without its last byte, as far as the server reads it.
@@ -79,8 +72,9 @@ fn imports_take_no_memory(mib: usize) {
         .collect();
     let mut held: Vec<_> = held.into_iter().map(|sent| sent.join().unwrap()).collect();
     let all_but_one = ((mib as u64) << 20) - 1;
-    wait("file", PATIENCE, || {
-        arriving(&place) == (2, 2 * all_but_one)
+    until("two files", PATIENCE, || match arriving(&place) {
+        (2, bytes) if bytes == 2 * all_but_one => Ok(()),
+        others => Err(others),
     });
     let peak = memory(&daemon, "VmHWM");
     // A client that is told to come later has an answer; two still wait for their last byte.
@@ -107,9 +101,15 @@ fn imports_take_no_memory(mib: usize) {
     let said = answer(&mut last);
     assert!(said.starts_with("HTTP/1.1 422"), "{said}");
     drop(open);
-    wait("end of the files", BACK, || arriving(&place).0 == 0);
-    wait("memory given back", BACK, || {
-        memory(&daemon, "VmRSS") <= idle + LEFT
+    until("end of the files", BACK, || match arriving(&place) {
+        (0, _) => Ok(()),
+        left => Err(left),
+    });
+    until("memory given back", BACK, || {
+        match memory(&daemon, "VmRSS") {
+            much if much > idle + LEFT => Err(much),
+            _ => Ok(()),
+        }
     });
     // A recipe can still be imported.
     let (_, recipe) = browser.ask("GET", "/api/recipes/1/file", &[]);
@@ -135,7 +135,10 @@ fn what_a_kill_leaves_of_an_import_is_removed_by_the_next_start() {
     let mut browser = Browser::new(&daemon);
     browser.sign_in(&daemon);
     let stream = send(browser.begin("POST", "/api/recipes", 2 << 20), 1);
-    wait("file", PATIENCE, || arriving(&place).0 == 1);
+    until("file", PATIENCE, || match arriving(&place) {
+        (1, _) => Ok(()),
+        others => Err(others),
+    });
     daemon.kill();
     drop(stream);
     assert_eq!(arriving(&place).0, 1);

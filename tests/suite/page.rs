@@ -1,13 +1,13 @@
 //! The page's API on the real program: the PLC sees what a technician changes there.
 
 use super::written::program;
-use crate::station_plc::{Daemon, PATIENCE, Place, Plc, long, pause};
+use crate::station_plc::{Daemon, Place, Plc, long};
 use appliance::recipe::{Store, archive};
 use serde_json::{Value, json};
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};
-use std::time::Instant;
 use tests::files;
+use tests::until::{PATIENCE, until};
 
 const PASS: u16 = 1;
 const FAIL: u16 = 2;
@@ -91,17 +91,60 @@ impl Browser {
 
     /// Waits until the station is ready with a recipe whose fingerprint differs from `before`.
     pub fn wait_for_another(&mut self, before: &str) -> String {
-        let started = Instant::now();
-        loop {
+        until("other recipe", PATIENCE, || {
             let snapshot = self.get("/api/snapshot");
             let now = snapshot["recipe"]["fingerprint"].as_str().unwrap_or(before);
-            if snapshot["ready"] == true && !before.starts_with(now) {
-                return now.to_owned();
+            match snapshot["ready"] == true && !before.starts_with(now) {
+                true => Ok(now.to_owned()),
+                false => Err(snapshot),
             }
-            assert!(started.elapsed() < PATIENCE, "{snapshot}");
-            pause();
-        }
+        })
     }
+
+    /// Waits until the station is ready.
+    pub fn ready(&mut self) {
+        until("ready station", 2 * PATIENCE, || {
+            let snapshot = self.get("/api/snapshot");
+            let working = ["boot", "ready", "loading", "teaching"].map(Value::from);
+            assert!(working.contains(&snapshot["state"]), "{snapshot}");
+            match snapshot["ready"] == true {
+                true => Ok(()),
+                false => Err(snapshot),
+            }
+        });
+    }
+
+    /// The result of a trigger.
+    pub fn measure(&mut self) -> Value {
+        let before = self.get("/api/snapshot")["counters"]["sequence"].clone();
+        let (status, answer) = self.json("POST", "/api/trigger", &json!({}));
+        assert_eq!(status, 202, "{answer}");
+        until("result", PATIENCE, || {
+            let snapshot = self.get("/api/snapshot");
+            match snapshot["counters"]["sequence"] != before && snapshot["ready"] == true {
+                true => Ok(snapshot["result"].clone()),
+                false => Err(snapshot),
+            }
+        })
+    }
+
+    /// The step of commissioning of this name, once none is being carried out.
+    pub fn ended(&mut self, name: &str) -> Value {
+        until(&format!("end of {name}"), 8 * PATIENCE, || {
+            let head = self.get("/api/head");
+            match head["running"].is_null() {
+                true => Ok(step_of(&head, name)),
+                false => Err(head),
+            }
+        })
+    }
+}
+
+/// The step of commissioning of this name.
+pub fn step_of(head: &Value, name: &str) -> Value {
+    let steps = head["steps"].as_array().unwrap();
+    let found = steps.iter().find(|step| step["name"] == name);
+    found.unwrap_or_else(|| panic!("{name}: {head}")).clone()
 }
 
 /// The body of a chunked answer, which must be complete.
@@ -291,20 +334,14 @@ fn pictures_and_files_of_the_last_part_belong_to_its_result() {
     assert!(status == 200 && recording.starts_with(b"PK"));
     let names = String::from_utf8_lossy(&recording);
     assert!(names.contains("recording.json") && names.contains("frames/000.png"));
-    let started = Instant::now();
     // The history is written in parallel to the cycle.
-    while browser.get("/api/history")["results"]
-        .as_array()
-        .unwrap()
-        .is_empty()
-    {
-        assert!(
-            started.elapsed() < PATIENCE,
-            "the result is not in the history"
-        );
-        pause();
-    }
-    assert_eq!(browser.get("/api/history")["counts"]["pass"], 1);
+    until("result in the history", PATIENCE, || {
+        let counts = browser.get("/api/history")["counts"].clone();
+        match counts["pass"] == 1 {
+            true => Ok(()),
+            false => Err(counts),
+        }
+    });
     assert_eq!(
         browser.get("/api/trends")["gauges"][0]["points"][0]["seq"],
         1

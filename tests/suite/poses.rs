@@ -2,10 +2,10 @@
 //! of the models when poses change.
 
 use crate::station_plc::{Daemon, Place};
-use crate::technician::{BOARD, STEP, Technician};
+use crate::technician::{BOARD, Technician};
 use serde_json::{Value, json};
 use std::fs;
-use std::time::Instant;
+use tests::until::{PATIENCE, until};
 
 /// A head that is not calibrated yet.
 const HEAD: &str = "calibrated = false
@@ -56,10 +56,12 @@ fn a_board_that_did_not_move_is_not_there_yet_or_has_another_size_is_no_pose() {
     // The board is on its way: a pose would show the plate again.
     let mut other = Technician::sign_in(&daemon, &secret);
     let putting = std::thread::spawn(move || other.lay(&json!({ "part": "board", "pose": 1 })));
-    let began = Instant::now();
-    while technician.head()["placing"] == false {
-        assert!(began.elapsed() < STEP && !putting.is_finished());
-    }
+    until("part on its way", PATIENCE, || {
+        assert!(!putting.is_finished());
+        (technician.head()["placing"] == true)
+            .then_some(())
+            .ok_or(())
+    });
     let body = json!({ "action": "pose", "board": BOARD });
     let path = "/api/head/steps/geometry";
     let (status, answer) = technician.browser.json("POST", path, &body);

@@ -1,7 +1,7 @@
 //! Losses of power: after every file operation of a run the files are opened as a power loss may
 //! leave them, with the unsynced data complete, missing, or partly there.
 
-use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY, STOPPING, command, long, pause};
+use crate::station_plc::{Daemon, Place, Plc, READY, command, long};
 use crate::written::FRINGED;
 use appliance::history::{self, Bounds, Filter, Numbering, Reader};
 use appliance::recipe::Store;
@@ -20,6 +20,7 @@ use tests::power::disk::{Disk, Left};
 use tests::power::trace::{OPTIONS, operations};
 use tests::random::Random;
 use tests::small_head::tiny_head;
+use tests::until::{PATIENCE, until};
 
 const SEED: u64 = 0x0FF_0FF;
 /// Largest count of result numbers that a loss of power may skip.
@@ -164,20 +165,15 @@ impl Run {
 
 /// Reads a log to its end, which the tracer writes after the end of the program.
 fn whole(path: &Path) -> String {
-    let started = Instant::now();
-    loop {
+    until("end of the trace", PATIENCE, || {
         let log = fs::read_to_string(path).unwrap_or_default();
         let mut lines = log.lines();
         // The program's main thread is traced first and ends last.
         let own = lines.next().and_then(|line| line.split_whitespace().next());
         let ended =
             lines.any(|line| line.contains(" +++ ") && line.split_whitespace().next() == own);
-        if ended {
-            return log;
-        }
-        assert!(started.elapsed() < STOPPING, "the trace has no end");
-        pause();
-    }
+        ended.then_some(log).ok_or(())
+    })
 }
 
 /// What must hold after a loss of power at `time`.

@@ -2,8 +2,7 @@
 
 use crate::page::Browser;
 use crate::station_plc::{
-    Daemon as Program, ONLINE, PATIENCE, Place, Plc, READY, RECIPE_OK, SMALL_HEAD, Status, long,
-    pause, trigger,
+    Daemon as Program, ONLINE, Place, Plc, READY, RECIPE_OK, SMALL_HEAD, Status, long, trigger,
 };
 use appliance::config::Config;
 use appliance::head::calibration::Calibration;
@@ -17,7 +16,7 @@ use hal::error::DeviceKind;
 use sim::Scenario;
 use std::fs;
 use std::sync::Mutex;
-use std::time::Instant;
+use tests::until::{PATIENCE, until};
 
 /// Values of VERDICT, STATE and REJECT_REASON.
 const PASS: u16 = 1;
@@ -130,14 +129,7 @@ fn an_abort_ends_a_sequence_between_two_frames_with_one_invalid_result() {
         plc.write(1, &trigger(token));
         plc.write(0, &[ONLINE | ABORT]);
         plc.write(0, &[ONLINE]);
-        let started = Instant::now();
-        let words = loop {
-            let words = plc.read(200, 120).unwrap();
-            if words[2] == token {
-                break words;
-            }
-            assert!(started.elapsed() < PATIENCE);
-        };
+        let words = plc.result(token);
         assert_eq!(long(&words, 0), u32::from(token));
         match (words[8], words[9]) {
             (INVALID, 802) => aborted += 1,
@@ -226,12 +218,11 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
         let text = fs::read_to_string(&counter).ok()?;
         text.split_whitespace().next()?.parse().ok()
     };
-    let began = Instant::now();
     // Until enough are reserved that no more are requested.
-    while reserved() <= Some(u32::from(last) + AHEAD / 4 * 3) {
-        assert!(began.elapsed() < PATIENCE, "{:?}", reserved());
-        pause();
-    }
+    until("reserved numbers", PATIENCE, || match reserved() {
+        ahead if ahead <= Some(u32::from(last) + AHEAD / 4 * 3) => Err(ahead),
+        _ => Ok(()),
+    });
     // A folder in place of the counter's file: no write can replace it.
     fs::remove_file(&counter).unwrap();
     fs::create_dir_all(counter.join("in the way")).unwrap();
@@ -293,12 +284,13 @@ fn starts_are_counted_and_a_kill_is_seen_at_the_next_one() {
     let boots = |program: &Program| {
         let mut plc = Plc::connect(program);
         // The survey runs in its own thread.
-        loop {
+        until("survey", PATIENCE, || {
             let words = plc.read(616, 4).unwrap();
-            if long(&words, 0) > 0 {
-                break (long(&words, 0), long(&words, 2));
+            match long(&words, 0) {
+                0 => Err(()),
+                starts => Ok((starts, long(&words, 2))),
             }
-        }
+        })
     };
     let first = Program::start(&place);
     assert_eq!(boots(&first), (1, 0));

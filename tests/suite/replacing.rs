@@ -1,12 +1,13 @@
 //! Replacing, undoing and deleting recipes on the real program: no work of a technician is lost.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, READY};
+use crate::station_plc::{Daemon, ONLINE, Place, Plc, READY};
 use crate::written::program;
 use serde_json::{Value, json};
 use std::fs;
 use std::time::Instant;
 use tests::program::Run;
+use tests::until::PATIENCE;
 
 /// VERDICT of [`Plc::measure`], which returns the registers from 200 on: register 208.
 const VERDICT: usize = 8;

@@ -2,11 +2,12 @@
 
 use crate::history::reader;
 use crate::page::Browser;
-use crate::station_plc::{Daemon, Place, Plc, READY, long, pause};
+use crate::station_plc::{Daemon, Place, Plc, READY, long};
 use appliance::history::{DATABASE, Entry, GaugeEntry, Writer};
 use appliance::station::Verdict;
 use serde_json::{Value, json};
 use std::fs;
+use tests::until::{PATIENCE, until};
 
 /// Numbers of results, as a loss of power leaves them: some are skipped.
 fn kept() -> impl Iterator<Item = u32> {
@@ -61,11 +62,13 @@ fn a_collector_gets_every_result_behind_the_last_that_it_has() {
     let measured = long(&plc.measure(1), 0);
     assert!(measured > 200, "{measured}");
     let mut browser = Browser::new(&daemon);
-    let mut all = lines(&mut browser, "");
-    while all[0]["last"] != measured {
-        pause();
-        all = lines(&mut browser, "");
-    }
+    let all = until("measured result", PATIENCE, || {
+        let all = lines(&mut browser, "");
+        match all[0]["last"] == measured {
+            true => Ok(all),
+            false => Err(all[0].clone()),
+        }
+    });
     let serial = browser.get("/api/snapshot")["identity"]["serial"].clone();
     let id = reader(&place).id().unwrap();
     let header = json!({ "serial": serial, "history": id, "first": 3, "last": measured });

@@ -1,9 +1,7 @@
 //! The daemon under a service manager: its `sd_notify` messages, its journal entries, and how it
 //! ends.
 
-use crate::station_plc::{
-    Daemon, ONLINE, PATIENCE, Place, Plc, READY, SMALL_HEAD, STOPPING, command, pause,
-};
+use crate::station_plc::{Daemon, ONLINE, Place, Plc, READY, SMALL_HEAD, command, end_by};
 use crate::written::{FRINGED, program};
 use std::fs::{self, File};
 use std::io::{Read as _, Write as _};
@@ -13,6 +11,7 @@ use std::os::unix::net::UnixDatagram;
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use tests::until::{PATIENCE, until};
 
 /// Silence that these managers treat as a hang; the daemon reports after a quarter of this time.
 const WATCHDOG: Duration = Duration::from_millis(800);
@@ -75,23 +74,8 @@ fn start(mut command: Command) -> Silent {
     Silent(command.spawn().unwrap())
 }
 
-fn end(silent: Silent) -> ExitStatus {
-    end_by("-TERM", silent)
-}
-
-fn end_by(signal: &str, mut silent: Silent) -> ExitStatus {
-    let child = &mut silent.0;
-    let pid = child.id().to_string();
-    let told = Command::new("kill").args([signal, &pid]).status();
-    assert!(told.unwrap().success());
-    let began = Instant::now();
-    loop {
-        if let Some(status) = child.try_wait().unwrap() {
-            return status;
-        }
-        assert!(began.elapsed() < STOPPING, "{signal} did not end it");
-        pause();
-    }
+fn end(mut silent: Silent) -> ExitStatus {
+    end_by("-TERM", &mut silent.0)
 }
 
 #[test]
@@ -184,13 +168,12 @@ fn interrupted(place: &Place, reached: &dyn Fn(&str, SocketAddr) -> bool) -> Str
         .arg("--config")
         .arg(place.path("fringed.toml"))
         .stderr(File::create(&said).unwrap());
-    let child = start(command);
-    let began = Instant::now();
-    while !reached(&fs::read_to_string(&said).unwrap(), page) {
-        assert!(began.elapsed() < PATIENCE, "it is not reached");
-        pause();
-    }
-    assert_eq!(end_by("-INT", child).code(), Some(0));
+    let mut child = start(command);
+    until("moment to interrupt it", PATIENCE, || {
+        let said = fs::read_to_string(&said).unwrap();
+        reached(&said, page).then_some(()).ok_or(said)
+    });
+    assert_eq!(end_by("-INT", &mut child.0).code(), Some(0));
     fs::read_to_string(&said).unwrap()
 }
 

@@ -3,7 +3,7 @@
 
 use crate::history::reader;
 use crate::page::Browser;
-use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, RESULT_ACK, long, pause, trigger};
+use crate::station_plc::{Daemon, ONLINE, Place, Plc, RESULT_ACK, long, trigger};
 use crate::written::program;
 use appliance::history::{Entry, GaugeEntry};
 use appliance::recipe::archive;
@@ -12,6 +12,7 @@ use std::fs;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use tests::files;
+use tests::until::{PATIENCE, until};
 
 /// Slots of the map.
 const SLOTS: u16 = 64;
@@ -60,14 +61,9 @@ fn full() -> Place {
 
 /// The result in the history, as soon as it is there.
 fn stored(place: &Place, seq: u32) -> Entry {
-    let started = Instant::now();
-    loop {
-        if let Some(entry) = reader(place).result(seq).unwrap() {
-            return entry;
-        }
-        assert!(started.elapsed() < PATIENCE, "result {seq} is not stored");
-        pause();
-    }
+    until(&format!("stored result {seq}"), PATIENCE, || {
+        reader(place).result(seq).unwrap().ok_or(())
+    })
 }
 
 /// A block of 132 registers, read in two parts; `None` if a result came between them.

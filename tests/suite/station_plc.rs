@@ -7,8 +7,9 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tempfile::TempDir;
+use tests::until::{PATIENCE, until};
 use tokio::runtime::Runtime;
 use tokio_modbus::ExceptionCode;
 use tokio_modbus::client::{Context, Reader as _, Writer as _, tcp};
@@ -25,16 +26,8 @@ pub const RECIPE_OK: u16 = 1 << 9;
 pub const ONLINE: u16 = 1;
 pub const TRIGGER: u16 = 1 << 1;
 pub const RESULT_ACK: u16 = 1 << 2;
-/// Longest wait for any event, such as the end of a teach on a busy machine.
-pub const PATIENCE: Duration = Duration::from_secs(120);
 /// SIGTERM ends the daemon within this time.
 pub const STOPPING: Duration = Duration::from_secs(5);
-
-/// Passes the time between two questions of somebody who waits: asked without a pause, they would
-/// take the processor from what is waited for.
-pub fn pause() {
-    std::thread::sleep(Duration::from_millis(2));
-}
 
 /// A head with few pixels, for tests in which resolution does not matter: its light takes little
 /// time to compute.
@@ -163,18 +156,8 @@ impl Daemon {
             log: String::new(),
         };
         // It opens its head and teaches meanwhile.
-        let began = Instant::now();
-        let early = || {
-            assert!(began.elapsed() < 4 * PATIENCE, "it is not ready");
-            pause();
-        };
-        while TcpStream::connect(modbus).is_err() {
-            early();
-        }
-        let mut plc = Plc::at(modbus);
-        while !plc.status().has(READY) {
-            early();
-        }
+        until("server", 4 * PATIENCE, || TcpStream::connect(modbus));
+        Plc::at(modbus).wait("READY", |status| status.has(READY));
         daemon
     }
 
@@ -183,17 +166,7 @@ impl Daemon {
     }
 
     pub fn terminate(mut self) -> ExitStatus {
-        let pid = self.child.id().to_string();
-        let told = Command::new("kill").args(["-TERM", &pid]).status().unwrap();
-        assert!(told.success());
-        let started = Instant::now();
-        loop {
-            if let Some(status) = self.child.try_wait().unwrap() {
-                return status;
-            }
-            assert!(started.elapsed() < STOPPING, "SIGTERM did not end it");
-            pause();
-        }
+        end_by("-TERM", &mut self.child)
     }
 
     pub fn kill(mut self) {
@@ -208,6 +181,16 @@ impl Drop for Daemon {
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
+}
+
+/// Ends a daemon by a signal that it handles.
+pub fn end_by(signal: &str, child: &mut Child) -> ExitStatus {
+    let pid = child.id().to_string();
+    let told = Command::new("kill").args([signal, &pid]).status();
+    assert!(told.unwrap().success());
+    until(&format!("end by {signal}"), STOPPING, || {
+        child.try_wait().unwrap().ok_or(())
+    })
 }
 
 /// The STATUS block.
@@ -304,30 +287,31 @@ impl Plc {
     }
 
     pub fn wait(&mut self, what: &str, condition: impl Fn(&Status) -> bool) -> Status {
-        let started = Instant::now();
-        loop {
+        until(what, PATIENCE, || {
             let status = self.status();
-            if condition(&status) {
-                return status;
+            match condition(&status) {
+                true => Ok(status),
+                false => Err(status),
             }
-            assert!(started.elapsed() < PATIENCE, "no {what}: {status:?}");
-            pause();
-        }
+        })
     }
 
     /// Triggers by token and reads the result in one read of 120 registers.
     pub fn measure(&mut self, token: u16) -> Vec<u16> {
         self.wait("READY", |status| status.has(READY));
         self.write(1, &trigger(token));
-        let started = Instant::now();
-        loop {
+        self.result(token)
+    }
+
+    /// The result of this token, as soon as it is there.
+    pub fn result(&mut self, token: u16) -> Vec<u16> {
+        until(&format!("result of token {token}"), PATIENCE, || {
             let words = self.read(200, 120).unwrap();
-            if words[2] == token {
-                return words;
+            match words[2] == token {
+                true => Ok(words),
+                false => Err(words[2]),
             }
-            assert!(started.elapsed() < PATIENCE, "no result");
-            pause();
-        }
+        })
     }
 }
 

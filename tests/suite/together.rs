@@ -2,15 +2,15 @@
 //! measures.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, ONLINE, PATIENCE, Place, Plc, READY, long, trigger};
+use crate::station_plc::{Daemon, ONLINE, Place, Plc, READY, long, trigger};
 use appliance::history::{Filter, Reader};
 use appliance::recipe::{Store, archive};
 use std::collections::BTreeMap;
 use std::fs;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
-use std::time::Instant;
 use tests::files;
+use tests::until::{PATIENCE, until};
 
 /// Number of tokens of each PLC.
 const TOKENS: u16 = 12;
@@ -21,15 +21,14 @@ const RECIPE_LOAD: u16 = 1 << 3;
 
 /// Writes a token until it is accepted, which the answer to the same transaction shows.
 fn accepted(plc: &mut Plc, words: &[u16; 7], refused: &mut dyn FnMut(&mut Plc)) {
-    let started = Instant::now();
-    while plc.write_and_read_status(1, words).last_token() != words[0] {
-        assert!(
-            started.elapsed() < PATIENCE,
-            "token {} is never accepted",
-            words[0]
-        );
+    until("acceptance of the token", PATIENCE, || {
+        let status = plc.write_and_read_status(1, words);
+        if status.last_token() == words[0] {
+            return Ok(());
+        }
         refused(plc);
-    }
+        Err(status)
+    });
 }
 
 #[test]
@@ -126,14 +125,7 @@ fn a_part_is_measured_under_the_recipe_that_the_plc_selects_while_the_page_loads
                     refusals += 1;
                     select(plc, number);
                 });
-                let started = Instant::now();
-                let result = loop {
-                    let result = plc.read(200, 120).unwrap();
-                    if result[2] == token {
-                        break result;
-                    }
-                    assert!(started.elapsed() < PATIENCE, "no result of token {token}");
-                };
+                let result = plc.result(token);
                 assert_eq!(
                     result[3],
                     number,

@@ -2,11 +2,12 @@
 //! of two that trigger is starved.
 
 use crate::page::Browser;
-use crate::station_plc::{Daemon, PATIENCE, Place, Plc, READY};
+use crate::station_plc::{Daemon, Place, Plc, READY};
 use serde_json::{Value, json};
 use std::sync::Barrier;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
+use tests::until::PATIENCE;
 
 const ROUNDS: usize = 60;
 const DONE: u16 = 200;
