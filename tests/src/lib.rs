@@ -11,12 +11,14 @@
 //! - [`fuzz`]: functions of bytes that must not panic.
 //! - [`imports`]: which files of a crate name each other.
 //! - [`power`]: a model of what a loss of power leaves of a folder.
+//! - [`once`]: what is made once for all tests.
 //! - [`until`](mod@until): waits for what others do.
 
 pub mod board;
 pub mod files;
 pub mod fuzz;
 pub mod imports;
+pub mod once;
 pub mod oracle;
 pub mod plane;
 pub mod power;

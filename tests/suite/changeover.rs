@@ -61,8 +61,7 @@ fn part_number(number: u16) -> String {
 
 /// A station with twenty recipes for its part, and three that it must refuse.
 fn place() -> Place {
-    let place = Place::new();
-    Daemon::start(&place).terminate();
+    let place = Place::taught();
     let taught = fs::read(place.recipe()).unwrap();
     let store = Store::open(&place.path("state/recipes")).unwrap();
     for number in 1..=RECIPES {
@@ -187,7 +186,7 @@ fn nothing_is_measured(plc: &mut Plc, token: u16) {
 
 #[test]
 fn a_client_that_selects_recipe_77_while_1_is_active_gets_reason_6_and_no_verdict() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     let before = plc.wait("READY", |status| status.has(READY | RECIPE_OK));
@@ -228,8 +227,7 @@ const MANY: u16 = 5;
 #[test]
 #[ignore = "minutes: `.ci/run full` does it"]
 fn recipes_at_full_resolution_are_switched_within_a_second() {
-    let place = Place::new();
-    fs::write(place.path("small.toml"), FULL_HEAD).unwrap();
+    let place = Place::before(FULL_HEAD);
     let config = place.path("fringed.toml");
     program()
         .run(&[

@@ -6,7 +6,6 @@ use crate::station_plc::{Daemon, Place};
 use crate::technician::{BOARD, Technician};
 use serde_json::{Value, json};
 use sim::{Part, Placement, Scenario};
-use std::fs;
 use std::io::{Read as _, Write as _};
 use std::time::{Duration, Instant};
 use tests::until::{PATIENCE, until};
@@ -95,8 +94,7 @@ fn rms(measured: &[f64], part: &Part) -> (f64, usize) {
 
 #[test]
 fn a_bare_head_is_commissioned_over_the_page_and_then_judges_parts_right() {
-    let place = Place::new();
-    fs::write(place.path("small.toml"), BARE).unwrap();
+    let place = Place::before(BARE);
     let daemon = Daemon::start(&place);
     let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
     let secret = rest.split(' ').next().unwrap().to_owned();
@@ -247,8 +245,7 @@ fn a_bare_head_is_commissioned_over_the_page_and_then_judges_parts_right() {
 #[test]
 fn a_step_ends_at_once_when_somebody_or_the_daemon_stops_it_and_leaves_what_was_found_before() {
     const AT_ONCE: Duration = Duration::from_secs(1);
-    let place = Place::new();
-    fs::write(place.path("small.toml"), BARE).unwrap();
+    let place = Place::before(BARE);
     let daemon = Daemon::start(&place);
     let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
     let secret = rest.split(' ').next().unwrap().to_owned();
@@ -301,12 +298,7 @@ pub(crate) fn median(mut times: Vec<f64>) -> f64 {
 #[test]
 #[ignore = "measures times; run it alone: taskset -c 0 cargo test -p tests --test suite -- --ignored --nocapture commissioning::"]
 fn a_cycle_is_hardly_later_while_somebody_looks_at_live_pictures() {
-    let place = Place::new();
-    fs::write(
-        place.path("small.toml"),
-        "[rig.camera]\nwidth = 512\nheight = 512\n",
-    )
-    .unwrap();
+    let place = Place::before("[rig.camera]\nwidth = 512\nheight = 512\n");
     let daemon = Daemon::start(&place);
     let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
     let secret = rest.split(' ').next().unwrap().to_owned();

@@ -1,8 +1,8 @@
 //! Files of the state folder that are damaged, endless or gone, a full disk, and requests that are
 //! refused: the station says so, and serves.
 
-use crate::page::Browser;
-use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, long};
+use crate::page::{Browser, signed_in};
+use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, SMALL_HEAD, long};
 use serde_json::json;
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -12,7 +12,7 @@ const PASS: u16 = 1;
 
 #[test]
 fn a_damaged_counter_or_secret_is_put_aside_and_the_station_starts_and_says_what_is_lost() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let shown = {
         let mut plc = Plc::connect(&daemon);
@@ -46,8 +46,7 @@ fn a_damaged_counter_or_secret_is_put_aside_and_the_station_starts_and_says_what
 
 #[test]
 fn a_state_file_that_never_ends_does_not_keep_the_station_from_starting() {
-    let place = Place::new();
-    assert_eq!(Daemon::start(&place).terminate().code(), Some(0));
+    let place = Place::taught();
     let names = [
         "commissioning.json",
         "drift.json",
@@ -80,7 +79,7 @@ fn a_state_file_that_never_ends_does_not_keep_the_station_from_starting() {
 
 #[test]
 fn a_refused_upload_is_answered_with_the_reason_however_long_it_is() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     let megabyte = vec![0; 1 << 20];
@@ -108,10 +107,7 @@ fn a_refused_upload_is_answered_with_the_reason_however_long_it_is() {
 
 #[test]
 fn an_edit_on_a_full_disk_is_answered_as_a_full_disk() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (place, _daemon, mut browser) = signed_in();
     let recipe = browser.get("/api/recipes/1");
     // In place of the file under which the new version is written.
     symlink("/dev/full", place.path("state/recipes/0001.recipe.new")).unwrap();
@@ -128,9 +124,7 @@ fn an_edit_on_a_full_disk_is_answered_as_a_full_disk() {
 
 #[test]
 fn teaching_and_lengths_that_cannot_be_are_refused_at_once() {
-    let place = Place::new();
-    let bare = format!("calibrated = false\n{}", crate::station_plc::SMALL_HEAD);
-    fs::write(place.path("small.toml"), bare).unwrap();
+    let place = Place::before(&format!("calibrated = false\n{SMALL_HEAD}"));
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     browser.sign_in(&daemon);

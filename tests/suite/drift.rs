@@ -17,8 +17,7 @@ const REST: Duration = Duration::from_millis(1000);
 const MOST_WAITED_US: u64 = 150_000;
 
 fn place(scenario: &str) -> Place {
-    let place = Place::new();
-    fs::write(place.path("small.toml"), scenario).unwrap();
+    let place = Place::before(scenario);
     checked_every(&place, CYCLES);
     place
 }

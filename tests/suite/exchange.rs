@@ -1,7 +1,7 @@
 //! Recipes that come from elsewhere: none takes the place of a released one unasked, and none takes
 //! its part number.
 
-use crate::page::Browser;
+use crate::page::{Browser, signed_in};
 use crate::station_plc::{Daemon, ONLINE, Place, Plc};
 use crate::written::program;
 use appliance::recipe::{RecipeFile, Store, archive};
@@ -68,10 +68,7 @@ fn recipe(place: &Place, arguments: &[&str]) -> Run {
 
 #[test]
 fn a_file_of_another_head_replaces_a_released_recipe_only_on_request_and_undo_brings_that_back() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (place, _daemon, mut browser) = signed_in();
     let released = fs::read(place.recipe()).unwrap();
     let theirs = foreign(&place);
 
@@ -118,8 +115,7 @@ fn a_file_of_another_head_replaces_a_released_recipe_only_on_request_and_undo_br
 
 #[test]
 fn the_command_import_asks_for_replace_or_a_number_and_what_was_replaced_comes_back() {
-    let place = Place::new();
-    Daemon::start(&place).terminate();
+    let place = Place::taught();
     let released = fs::read(place.recipe()).unwrap();
     let other = changed(&place, |file| file.name = "other".into());
     let file = place.path("other.recipe");
@@ -144,10 +140,7 @@ fn the_command_import_asks_for_replace_or_a_number_and_what_was_replaced_comes_b
 
 #[test]
 fn no_two_recipes_get_the_same_part_number_and_a_plc_is_told_if_two_have_it() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (place, daemon, mut browser) = signed_in();
     let named = |number: u16, part_number: &str| {
         changed(&place, |file| {
             (file.number, file.part_number) = (number, part_number.into());
@@ -196,7 +189,7 @@ fn no_two_recipes_get_the_same_part_number_and_a_plc_is_told_if_two_have_it() {
 
 #[test]
 fn a_recipe_of_another_head_is_said_to_be_that_and_only_a_damaged_one_is_damaged() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let store = Store::at(&place.path("state/recipes"));
     let put = |number: u16, change: fn(&mut RecipeFile)| {
@@ -235,10 +228,7 @@ fn a_recipe_of_another_head_is_said_to_be_that_and_only_a_damaged_one_is_damaged
 
 #[test]
 fn the_record_of_changes_says_which_limit_went_from_what_to_what() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (_place, _daemon, mut browser) = signed_in();
     let before = browser.get("/api/recipes/1");
     let mut gauges = before["gauges"].clone();
     let high = gauges[0]["high"].as_f64().unwrap();

@@ -15,10 +15,9 @@ const HEIGHT_NOISE: usize = 26;
 
 /// A place whose head exposes for eight short refreshes.
 fn place() -> Place {
-    let place = Place::new();
-    let long = format!("refresh_hz = 240.0\n{SMALL_HEAD}[timing]\nexposure_refreshes = 8.0\n");
-    fs::write(place.path("small.toml"), long).unwrap();
-    place
+    Place::taught_before(&format!(
+        "refresh_hz = 240.0\n{SMALL_HEAD}[timing]\nexposure_refreshes = 8.0\n"
+    ))
 }
 
 /// A station there, with its users.

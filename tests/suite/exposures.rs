@@ -219,8 +219,7 @@ fn good_parts_pass_and_dented_ones_fail_with_longer_exposures_also_where_they_li
 
 #[test]
 fn a_station_measures_by_a_recipe_that_teach_makes_with_longer_exposures() {
-    let place = Place::new();
-    std::fs::write(place.path("small.toml"), MIDDLE).unwrap();
+    let place = Place::before(MIDDLE);
     let config = place.path("fringed.toml").display().to_string();
     let out = place.path("part.recipe");
     let teach = ["teach", "--number", "1", "--config", &config, "--out"];

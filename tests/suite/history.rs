@@ -26,7 +26,7 @@ fn all() -> Filter {
 /// Kills a measuring daemon `times` times at random moments; the PLC remembers every SEQ that it
 /// read.
 fn kills(times: usize) {
-    let place = Place::new();
+    let place = Place::taught();
     let mut random = Random::new(0x5EED_0019);
     let mut shown: Vec<u32> = Vec::new();
     // The last SEQ that the PLC read before each kill: it may not have been stored yet.
@@ -104,8 +104,7 @@ fn many_kills_lose_at_most_the_result_in_flight_and_no_seq_comes_back() {
 
 /// A station that was taught with a good part, and now sees a part with a dent.
 pub(crate) fn place_with_a_dent() -> Place {
-    let place = Place::new();
-    Daemon::start(&place).terminate();
+    let place = Place::taught();
     let scenario = fs::read_to_string(place.path("small.toml")).unwrap();
     let dent = "{ kind = \"dent\", x = 0.0, y = -8.0, depth_mm = 0.9, diameter_mm = 14.0 }";
     let part = format!("{scenario}\n[part]\nkind = \"sheet_metal\"\ndefects = [{dent}]\n");
@@ -171,7 +170,7 @@ fn the_history_is_shown_and_exported_while_the_station_runs() {
 
 #[test]
 fn recipes_are_listed_exported_imported_and_deleted_and_nothing_damaged_or_foreign_comes_in() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let config = place.path("fringed.toml");
     let recipe = |more: &[&str]| {

@@ -1,7 +1,7 @@
 //! Files that are uploaded to the page go to the storage: they use no memory, and no temporary file
 //! remains.
 
-use crate::page::Browser;
+use crate::page::{Browser, signed_in};
 use crate::station_plc::{Daemon, Place};
 use std::fs;
 use std::io::{Read as _, Write as _};
@@ -58,10 +58,7 @@ fn answer(stream: &mut TcpStream) -> String {
 }
 
 fn imports_take_no_memory(mib: usize) {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (place, daemon, mut browser) = signed_in();
     browser.wait_for_another("none");
     let idle = memory(&daemon, "VmRSS");
     // From here on the peak counts.
@@ -130,10 +127,7 @@ fn eight_files_of_150_mb_held_open_take_no_memory() {
 
 #[test]
 fn what_a_kill_leaves_of_an_import_is_removed_by_the_next_start() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (place, daemon, browser) = signed_in();
     let stream = send(browser.begin("POST", "/api/recipes", 2 << 20), 1);
     until("file", PATIENCE, || match arriving(&place) {
         (1, _) => Ok(()),
@@ -148,7 +142,7 @@ fn what_a_kill_leaves_of_an_import_is_removed_by_the_next_start() {
 
 #[test]
 fn nothing_of_a_file_is_taken_from_somebody_who_did_not_sign_in() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let stranger = Browser::new(&daemon);
     let mut stream = stranger.begin("POST", "/api/recipes", 20 << 20);

@@ -1,6 +1,6 @@
 //! A recipe that cannot refuse a bad part is refused itself, unless it says that it judges nothing.
 
-use crate::page::Browser;
+use crate::page::{Browser, signed_in};
 use crate::station_plc::{Daemon, Place, Plc};
 use crate::written::program;
 use algo::inspect::Basis;
@@ -85,10 +85,7 @@ fn toothless() -> [(Change, &'static str); 6] {
 
 #[test]
 fn a_recipe_whose_parts_would_all_pass_is_refused_by_page_and_command_with_the_remedy() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (place, _daemon, mut browser) = signed_in();
     let taught = fs::read(place.recipe()).unwrap();
     let (path, config) = (place.path("toothless.recipe"), place.path("fringed.toml"));
     for (change, words) in toothless() {
@@ -125,10 +122,7 @@ fn a_recipe_whose_parts_would_all_pass_is_refused_by_page_and_command_with_the_r
 #[test]
 fn a_recipe_without_limits_is_stored_if_that_is_asked_for_and_each_result_says_that_it_was_not_judged()
  {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (place, daemon, mut browser) = signed_in();
     let before = browser.get("/api/recipes/1");
     let limits = before["gauges"].clone();
     let mut gauges = limits.clone();
@@ -175,8 +169,7 @@ fn a_recipe_without_limits_is_stored_if_that_is_asked_for_and_each_result_says_t
 
 #[test]
 fn a_stored_recipe_that_judges_nothing_without_saying_so_is_not_loaded_and_can_be_mended() {
-    let place = Place::new();
-    Daemon::start(&place).terminate();
+    let place = Place::taught();
     let bytes = changed(&place, without_limits);
     let store = Store::open(&place.path("state/recipes")).unwrap();
     store.save(1, &bytes).unwrap();

@@ -6,7 +6,6 @@ use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc};
 use serde_json::json;
 use sim::{Part, Placement};
-use std::fs;
 
 const PASS: u16 = 1;
 
@@ -28,8 +27,7 @@ struct Station {
 
 impl Station {
     fn new(scenario: &str) -> Self {
-        let place = Place::new();
-        fs::write(place.path("small.toml"), scenario).unwrap();
+        let place = Place::before(scenario);
         let daemon = Daemon::start(&place);
         let mut browser = Browser::new(&daemon);
         browser.sign_in(&daemon);

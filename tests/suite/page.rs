@@ -147,6 +147,15 @@ pub fn step_of(head: &Value, name: &str) -> Value {
     found.unwrap_or_else(|| panic!("{name}: {head}")).clone()
 }
 
+/// A station that was taught before, and a browser that is signed in.
+pub fn signed_in() -> (Place, Daemon, Browser) {
+    let place = Place::taught();
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    browser.sign_in(&daemon);
+    (place, daemon, browser)
+}
+
 /// The body of a chunked answer, which must be complete.
 fn unchunked(mut body: &[u8]) -> Vec<u8> {
     let mut whole = Vec::new();
@@ -164,7 +173,7 @@ fn unchunked(mut body: &[u8]) -> Vec<u8> {
 
 #[test]
 fn limits_that_are_edited_on_the_page_change_the_verdict_and_the_fingerprint() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     let mut plc = Plc::connect(&daemon);
@@ -199,10 +208,7 @@ fn limits_that_are_edited_on_the_page_change_the_verdict_and_the_fingerprint() {
 
 #[test]
 fn an_edit_that_makes_no_recipe_is_refused_in_words_and_changes_nothing() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (_place, _daemon, mut browser) = signed_in();
     let recipe = browser.get("/api/recipes/1");
     let region = json!({ "name": "line", "kind": "surface", "region": [[1.0, 1.0], [2.0, 2.0]] });
     for (key, value) in [
@@ -243,10 +249,7 @@ fn an_edit_that_makes_no_recipe_is_refused_in_words_and_changes_nothing() {
 #[test]
 fn a_recipe_with_inverted_limits_is_refused_by_the_gauges_name_wherever_it_comes_from_and_can_be_mended()
  {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (place, _daemon, mut browser) = signed_in();
     let taught = std::fs::read(place.recipe()).unwrap();
     let (mut file, arrays) = files::recipe(&taught);
     let limits = file.gauges.clone();
@@ -290,10 +293,7 @@ fn a_recipe_with_inverted_limits_is_refused_by_the_gauges_name_wherever_it_comes
 
 #[test]
 fn an_exported_recipe_comes_back_by_import_and_a_damaged_one_does_not() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (_place, _daemon, mut browser) = signed_in();
     let (status, mut file) = browser.ask("GET", "/api/recipes/1/file", &[]);
     assert_eq!((status, &file[..2]), (200, &b"PK"[..]));
     let (status, _) = browser.ask("POST", "/api/recipes", &file);
@@ -313,7 +313,7 @@ fn an_exported_recipe_comes_back_by_import_and_a_damaged_one_does_not() {
 
 #[test]
 fn pictures_and_files_of_the_last_part_belong_to_its_result() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     assert_eq!(browser.ask("GET", "/api/picture/height", &[]).0, 204);
@@ -350,7 +350,7 @@ fn pictures_and_files_of_the_last_part_belong_to_its_result() {
 
 #[test]
 fn the_stages_of_a_cycle_add_up_to_its_time_and_its_processing_is_that_of_the_register() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     let words = plc.measure(1);

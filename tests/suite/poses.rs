@@ -4,7 +4,6 @@
 use crate::station_plc::{Daemon, Place};
 use crate::technician::{BOARD, Technician};
 use serde_json::{Value, json};
-use std::fs;
 use tests::until::{PATIENCE, until};
 
 /// A head that is not calibrated yet.
@@ -22,8 +21,7 @@ angle_deg = -7.6
 const TILT_DEGREES: f64 = 1.0;
 
 fn started() -> (Place, Daemon, String) {
-    let place = Place::new();
-    fs::write(place.path("small.toml"), HEAD).unwrap();
+    let place = Place::before(HEAD);
     let daemon = Daemon::start(&place);
     let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
     let secret = rest.split(' ').next().unwrap().to_owned();

@@ -56,7 +56,7 @@ fn error_code(status: &Status) -> u16 {
 
 #[test]
 fn a_device_that_is_unplugged_is_a_fault_that_names_it_and_ends_when_it_is_plugged_in_again() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = start(&place);
     let stage = daemon.stage.clone().unwrap();
     let mut plc = Plc::at(daemon.modbus);
@@ -90,7 +90,7 @@ fn a_device_that_is_unplugged_is_a_fault_that_names_it_and_ends_when_it_is_plugg
 
 #[test]
 fn a_trigger_that_meets_a_dead_camera_ends_in_one_invalid_result_or_is_rejected() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = start(&place);
     let stage = daemon.stage.clone().unwrap();
     let mut plc = Plc::at(daemon.modbus);
@@ -119,7 +119,7 @@ fn a_trigger_that_meets_a_dead_camera_ends_in_one_invalid_result_or_is_rejected(
 
 #[test]
 fn an_abort_ends_a_sequence_between_two_frames_with_one_invalid_result() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = start(&place);
     let mut plc = Plc::at(daemon.modbus);
     plc.write(0, &[ONLINE]);
@@ -143,7 +143,7 @@ fn an_abort_ends_a_sequence_between_two_frames_with_one_invalid_result() {
 
 #[test]
 fn an_abort_ends_a_teach_and_the_recipe_before_it_goes_on() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = start(&place);
     let mut plc = Plc::at(daemon.modbus);
     plc.write(0, &[ONLINE]);
@@ -249,8 +249,7 @@ fn a_result_counter_that_cannot_be_stored_stops_the_station_until_it_can() {
 
 #[test]
 fn a_start_ends_also_where_the_plc_asks_for_another_recipe_or_is_offline() {
-    let place = Place::new();
-    start(&place).stop();
+    let place = Place::taught();
     let select = ControlWrite {
         recipe_select: Some(77),
         ..ControlWrite::default()
@@ -280,7 +279,7 @@ fn a_start_ends_also_where_the_plc_asks_for_another_recipe_or_is_offline() {
 
 #[test]
 fn starts_are_counted_and_a_kill_is_seen_at_the_next_one() {
-    let place = Place::new();
+    let place = Place::taught();
     let boots = |program: &Program| {
         let mut plc = Plc::connect(program);
         // The survey runs in its own thread.

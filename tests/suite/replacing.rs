@@ -1,6 +1,6 @@
 //! Replacing, undoing and deleting recipes on the real program: no work of a technician is lost.
 
-use crate::page::Browser;
+use crate::page::{Browser, signed_in};
 use crate::station_plc::{Daemon, ONLINE, Place, Plc, READY};
 use crate::written::program;
 use serde_json::{Value, json};
@@ -57,10 +57,7 @@ fn edit(browser: &mut Browser) -> Value {
 
 #[test]
 fn a_number_that_is_taken_is_taught_only_with_replace_and_what_was_edited_stays_on_request() {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (_place, daemon, mut browser) = signed_in();
     let edited = edit(&mut browser);
     assert_eq!(browser.get("/api/recipes")["free"], 2);
     let teach =
@@ -109,10 +106,7 @@ fn a_number_that_is_taken_is_taught_only_with_replace_and_what_was_edited_stays_
 #[test]
 fn undo_brings_back_the_previous_generation_into_the_running_station_and_undo_again_takes_it_back()
 {
-    let place = Place::new();
-    let daemon = Daemon::start(&place);
-    let mut browser = Browser::new(&daemon);
-    browser.sign_in(&daemon);
+    let (_place, daemon, mut browser) = signed_in();
     let (status, answer) = browser.json("POST", "/api/recipes/1/undo", &json!({}));
     assert!(
         status == 404
@@ -154,7 +148,7 @@ fn undo_brings_back_the_previous_generation_into_the_running_station_and_undo_ag
 
 #[test]
 fn a_recipe_is_deleted_on_the_page_unless_it_is_active_and_comes_back() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     assert_eq!(browser.ask("DELETE", "/api/recipes/1", &[]).0, 401);
@@ -194,7 +188,7 @@ fn a_recipe_is_deleted_on_the_page_unless_it_is_active_and_comes_back() {
 
 #[test]
 fn the_plc_teaches_by_number_and_neither_names_nor_the_previous_generation_are_lost() {
-    let place = Place::new();
+    let place = Place::taught();
     let config = place.path("fringed.toml");
     let text = fs::read_to_string(&config).unwrap();
     fs::write(&config, format!("{text}[station]\nteach_allowed = true\n")).unwrap();
@@ -218,7 +212,7 @@ fn the_plc_teaches_by_number_and_neither_names_nor_the_previous_generation_are_l
 
 #[test]
 fn no_command_takes_a_recipe_from_under_a_station_and_each_says_how_it_is_done() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let taught = fs::read(place.recipe()).unwrap();
     for (command, code, page) in [

@@ -6,7 +6,6 @@ use crate::station_plc::{Daemon, Place, Plc, READY, long};
 use appliance::history::{DATABASE, Entry, GaugeEntry, Writer};
 use appliance::station::Verdict;
 use serde_json::{Value, json};
-use std::fs;
 use tests::until::{PATIENCE, until};
 
 /// Numbers of results, as a loss of power leaves them: some are skipped.
@@ -48,9 +47,8 @@ fn seqs(lines: &[Value]) -> Vec<u32> {
 
 #[test]
 fn a_collector_gets_every_result_behind_the_last_that_it_has() {
-    let place = Place::new();
+    let place = Place::taught();
     let state = place.path("state");
-    fs::create_dir_all(&state).unwrap();
     let (mut writer, _) = Writer::open(&state.join(DATABASE), 1000).unwrap();
     let entries: Vec<_> = kept().map(entry).collect();
     writer.store(entries.iter()).unwrap();

@@ -106,7 +106,7 @@ fn ready_is_told_when_a_trigger_would_be_accepted_and_not_before() {
 
 #[test]
 fn only_the_measuring_task_feeds_the_watchdog_and_a_hung_one_still_ends_in_time() {
-    let (place, manager) = (Place::new(), Manager::new());
+    let (place, manager) = (Place::taught(), Manager::new());
     let daemon = Daemon::of(manager.command(&place));
     manager.hear_until("READY=1");
     for _ in 0..5 {
@@ -279,7 +279,7 @@ fn a_journal_gets_priorities_and_a_terminal_does_not() {
 
 #[test]
 fn a_secret_that_is_given_as_a_credential_is_not_shown_and_a_weak_one_is_refused() {
-    let (place, credentials) = (Place::new(), tempfile::tempdir().unwrap());
+    let (place, credentials) = (Place::taught(), tempfile::tempdir().unwrap());
     let file = credentials.path().join("fringed.secret");
     let with = || {
         let mut command = command(&place);

@@ -10,7 +10,7 @@ const NOT_KNOWN: u32 = 0x7FC0_0000;
 
 #[test]
 fn a_share_of_whose_scatter_nothing_is_known_has_no_sigma_and_no_uncertainty_and_never_one_of_0() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     plc.measure(1);

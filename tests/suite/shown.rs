@@ -11,7 +11,6 @@ use appliance::recipe::plan::Plan;
 use serde_json::{Value, json};
 use sim::parts::{Defect, Flowerpot, SheetMetal};
 use sim::{Part, Placement, Stage};
-use std::fs;
 use std::io::Read as _;
 use std::time::Instant;
 use tests::random::Random;
@@ -81,9 +80,7 @@ struct Line {
 impl Line {
     fn of(kind: &str) -> Self {
         let pot = kind == "flowerpot";
-        let place = Place::new();
-        let head = format!("{HEAD}\n[part]\nkind = \"{kind}\"\n");
-        fs::write(place.path("small.toml"), head).unwrap();
+        let place = Place::taught_before(&format!("{HEAD}\n[part]\nkind = \"{kind}\"\n"));
         let daemon = Daemon::start(&place);
         let mut browser = Browser::new(&daemon);
         browser.sign_in(&daemon);

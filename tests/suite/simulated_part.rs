@@ -20,7 +20,7 @@ fn bracket(defects: Value, shift: [f64; 3]) -> Value {
 
 #[test]
 fn a_trigger_after_the_answer_sees_the_part_that_was_put_there_over_the_page() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     let mut plc = Plc::connect(&daemon);

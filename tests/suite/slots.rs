@@ -36,8 +36,7 @@ const NINE_READS: Duration = Duration::from_millis(5);
 /// A place whose recipe has a gauge in each slot: copies of the one that was taught, of which every
 /// third fails.
 fn full() -> Place {
-    let place = Place::new();
-    Daemon::start(&place).terminate();
+    let place = Place::taught();
     let (mut file, arrays) = files::recipe(&fs::read(place.recipe()).unwrap());
     let taught = file.gauges[0].clone();
     file.tried.clear();

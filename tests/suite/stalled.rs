@@ -95,7 +95,7 @@ fn a_log_whose_reader_is_gone_or_whose_disk_is_full_stops_nothing() {
     let (_, closed) = std::io::pipe().unwrap();
     let full = OpenOptions::new().write(true).open("/dev/full").unwrap();
     for stderr in [Stdio::from(closed), Stdio::from(full)] {
-        let place = Place::new();
+        let place = Place::taught();
         let daemon = Daemon::unheard(&place, stderr);
         works(&daemon, &mut Plc::connect(&daemon), 1..4);
         assert_eq!(daemon.terminate().code(), Some(0));
@@ -104,7 +104,7 @@ fn a_log_whose_reader_is_gone_or_whose_disk_is_full_stops_nothing() {
 
 #[test]
 fn a_history_that_is_locked_and_events_that_nobody_reads_stop_nothing() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     plc.measure(1);
@@ -127,7 +127,7 @@ fn a_history_that_is_locked_and_events_that_nobody_reads_stop_nothing() {
 
 #[test]
 fn a_card_that_hangs_stops_no_request_and_no_stop() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     plc.measure(1);

@@ -31,7 +31,7 @@ fn check_pass(words: &[u16], status: &Status) {
 
 #[test]
 fn a_good_part_passes_by_the_edge_handshake() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     let before = plc.wait("READY", |status| status.has(READY | RECIPE_OK));
@@ -61,7 +61,7 @@ fn a_good_part_passes_by_the_edge_handshake() {
 
 #[test]
 fn a_retried_token_measures_once_and_refused_requests_change_nothing() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     let before = plc.wait("READY", |status| status.has(READY));
@@ -141,7 +141,7 @@ fn damage(path: &Path) {
 
 #[test]
 fn a_damaged_recipe_gives_way_to_the_generation_before_it_and_the_daemon_says_so() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let crc = Plc::connect(&daemon).status().crc();
     daemon.kill();
@@ -164,8 +164,7 @@ fn a_damaged_recipe_gives_way_to_the_generation_before_it_and_the_daemon_says_so
 
 #[test]
 fn without_a_usable_generation_the_daemon_serves_and_says_corrupt() {
-    let place = Place::new();
-    Daemon::start(&place).kill();
+    let place = Place::taught();
     damage(&place.recipe());
     let daemon = Daemon::start(&place);
     assert!(daemon.log.contains("0001.recipe"), "{}", daemon.log);

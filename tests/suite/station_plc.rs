@@ -9,6 +9,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc;
 use std::time::Duration;
 use tempfile::TempDir;
+use tests::once::Once;
 use tests::until::{PATIENCE, until};
 use tokio::runtime::Runtime;
 use tokio_modbus::ExceptionCode;
@@ -39,12 +40,38 @@ pub struct Place {
 }
 
 impl Place {
+    /// Nothing has been started here, and the head sees the default part.
     pub fn new() -> Self {
+        Self::before(SMALL_HEAD)
+    }
+
+    /// Nothing has been started here, in front of this scene.
+    pub fn before(scene: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join("small.toml"), SMALL_HEAD).unwrap();
+        fs::write(folder.path().join("small.toml"), scene).unwrap();
         let config = "state = \"state\"\n[head]\nscenario = \"small.toml\"\n";
         fs::write(folder.path().join("fringed.toml"), config).unwrap();
         Self { folder }
+    }
+
+    /// A first start taught the default part as recipe 1. Serial, secret and history are still to
+    /// be made.
+    pub fn taught() -> Self {
+        Self::taught_before(SMALL_HEAD)
+    }
+
+    /// As [`Place::taught`], in front of this scene. Each is taught once for all tests.
+    pub fn taught_before(scene: &str) -> Self {
+        static TAUGHT: Once<String, Vec<u8>> = Once::new();
+        let place = Self::before(scene);
+        let recipe = TAUGHT.get(scene.to_owned(), || {
+            let first = Self::before(scene);
+            assert_eq!(Daemon::start(&first).terminate().code(), Some(0));
+            fs::read(first.recipe()).unwrap()
+        });
+        fs::create_dir_all(place.recipe().parent().unwrap()).unwrap();
+        fs::write(place.recipe(), &*recipe).unwrap();
+        place
     }
 
     pub fn path(&self, name: &str) -> PathBuf {

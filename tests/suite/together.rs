@@ -33,7 +33,7 @@ fn accepted(plc: &mut Plc, words: &[u16; 7], refused: &mut dyn FnMut(&mut Plc)) 
 
 #[test]
 fn two_plcs_that_trigger_at_the_same_time_get_one_result_for_each_token() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     Plc::connect(&daemon).wait("READY", |status| status.has(READY));
     thread::scope(|scope| {
@@ -68,8 +68,7 @@ fn two_plcs_that_trigger_at_the_same_time_get_one_result_for_each_token() {
 
 /// A station with the taught recipe as number 1 and as number 2.
 fn place_with_two_recipes() -> Place {
-    let place = Place::new();
-    Daemon::start(&place).terminate();
+    let place = Place::taught();
     let (mut file, arrays) = files::recipe(&fs::read(place.recipe()).unwrap());
     file.number = 2;
     file.part_number = "SECOND".into();

@@ -34,7 +34,7 @@ fn rename(browser: &mut Browser, base: &str, name: &str) -> (u16, Value) {
 
 #[test]
 fn of_two_edits_with_one_base_one_is_stored_and_the_other_is_told() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let [mut first, mut second] = two(&daemon);
     let together = Barrier::new(2);
@@ -65,7 +65,7 @@ fn of_two_edits_with_one_base_one_is_stored_and_the_other_is_told() {
 
 #[test]
 fn an_edit_does_not_undo_an_import_that_came_while_it_was_made() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let [mut editor, mut importer] = two(&daemon);
     let (status, imported) = editor.ask("GET", "/api/recipes/1/file", &[]);
@@ -119,7 +119,7 @@ fn of_two_clients_that_trigger_without_a_pause_each_is_granted_in_turn() {
     /// Cycles of both, and the least of each.
     const CYCLES: u32 = 60;
     const LEAST: u32 = CYCLES / 3;
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     let before = plc.wait("READY", |status| status.has(READY)).triggers();

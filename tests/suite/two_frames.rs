@@ -296,8 +296,7 @@ fov_deg = [10.0, 7.5]
 
 #[test]
 fn a_station_judges_by_two_frames_keeps_them_and_goes_on_with_more_for_another_part() {
-    let place = Place::new();
-    std::fs::write(place.path("small.toml"), MIDDLE).unwrap();
+    let place = Place::before(MIDDLE);
     let mut bed = bed(&Scenario::from_toml(MIDDLE, "scene").unwrap());
     let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
     let taught = taught.with_two_frames().unwrap();

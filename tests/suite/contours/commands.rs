@@ -12,9 +12,7 @@ fn at(place: &Place, name: &str) -> String {
 
 /// A head with all pixels of the default one, in front of which this part lies.
 fn whole_head(part: &str) -> Place {
-    let place = Place::new();
-    fs::write(place.path("small.toml"), part).unwrap();
-    place
+    Place::before(part)
 }
 
 /// Teaches the part that the head of a place sees, with default settings.

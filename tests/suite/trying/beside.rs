@@ -5,7 +5,6 @@ use crate::commissioning::median;
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, long};
 use serde_json::{Value, json};
-use std::fs;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
@@ -36,9 +35,7 @@ fn many_circles(recipe: &Value) -> Value {
 #[test]
 #[ignore = "measures times; run it alone: cargo test -p tests --test suite -- --ignored --nocapture trying::"]
 fn a_cycle_is_hardly_later_while_an_editor_tries() {
-    let place = Place::new();
-    let scenario = "sub_rays = 2\n\n[part]\nkind = \"plate\"\n";
-    fs::write(place.path("small.toml"), scenario).unwrap();
+    let place = Place::taught_before("sub_rays = 2\n\n[part]\nkind = \"plate\"\n");
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     browser.sign_in(&daemon);

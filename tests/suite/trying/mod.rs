@@ -18,9 +18,7 @@ const SHIFT: f64 = 0.8;
 
 /// A place whose recipe is of a plate with holes.
 fn place_with_a_plate() -> Place {
-    let place = Place::new();
-    fs::write(place.path("small.toml"), "[part]\nkind = \"plate\"\n").unwrap();
-    place
+    Place::taught_before("[part]\nkind = \"plate\"\n")
 }
 
 /// The list of a recipe with a diameter, a distance and a feature that no gauge is of.
@@ -161,7 +159,6 @@ fn a_try_reads_what_the_stored_list_reads_bit_by_bit_and_changes_nothing() {
 #[test]
 fn a_list_is_tried_on_the_last_part_and_on_a_kept_one_as_replay_judges_them() {
     let place = place_with_a_plate();
-    Daemon::start(&place).terminate();
     let defect = "[part]\nkind = \"plate\"\ndefects = [{ kind = \"dent\", x = 0.0, y = -8.0, depth_mm = 0.9, diameter_mm = 14.0 }]\n";
     let lies = format!("[placement]\nshift_mm = [{SHIFT}, 0.0, 0.0]\n");
     fs::write(place.path("small.toml"), format!("{defect}{lies}")).unwrap();
@@ -272,7 +269,7 @@ fn plane(map: &Value, words: &[u8], name: &str) -> Vec<Option<f64>> {
 
 #[test]
 fn a_surface_has_the_points_of_golden_and_of_parts_at_any_level() {
-    let place = Place::new();
+    let place = Place::taught();
     let daemon = Daemon::start(&place);
     let mut browser = Browser::new(&daemon);
     let (status, _) = browser.ask("GET", "/api/picture/surface", &[]);
