@@ -192,6 +192,11 @@ impl Pool {
         }
     }
 
+    /// Gives the memory of all free buffers back.
+    pub fn release(&mut self) {
+        self.buffers.retain(|buffer| Arc::strong_count(buffer) > 1);
+    }
+
     /// Fills a free buffer with `write` and makes a frame of it. The buffer's content before that
     /// is undefined.
     ///

@@ -20,9 +20,9 @@ use hal::virtual_head::Scene;
 
 /// How many frames may be kept before each further one costs an allocation.
 const MAX_KEPT_FRAMES: usize = 64;
-/// Pictures of the part in place that are kept: as many as a recipe has patterns. Together they take
-/// less memory than the part's light transport.
-const MAX_PICTURES: usize = 32;
+/// The pictures of the part in place are kept if those of all patterns take so many bytes at most: a
+/// recipe's for 512 × 512 pixels, and less than the part's light transport takes.
+const MAX_PICTURES: usize = 24 << 20;
 
 /// The patterns in view during an exposure, and their shares of it.
 type View = Vec<(Option<usize>, f32)>;
@@ -31,12 +31,12 @@ type View = Vec<(Option<usize>, f32)>;
 pub(crate) struct SimScene {
     scenario: Arc<Scenario>,
     placed: Staged,
-    /// The light of each loaded raster, 1 = white, row by row, with [`PADDING`].
-    rasters: Vec<Vec<f32>>,
+    /// What is loaded: as grey levels, which take a quarter of the memory of their light.
+    rasters: Vec<Raster>,
     /// The light on the camera of the part in place, for what was in view.
     pictures: VecDeque<(View, Vec<f32>)>,
-    /// The light on the camera of one pattern, where several were in view.
-    part: Vec<f32>,
+    /// Pixels of the sensor.
+    sensor_size: usize,
     pool: Pool,
     sensor: Sensor,
     /// The exposure relative to the scenario's, and the camera's gain.
@@ -53,7 +53,7 @@ impl SimScene {
             placed,
             rasters: Vec::new(),
             pictures: VecDeque::new(),
-            part: vec![0.0; sensor],
+            sensor_size: sensor,
             pool: Pool::new(format, MAX_KEPT_FRAMES),
             sensor: Sensor::new(&scenario),
             exposing: [1.0, scenario.optics.gain],
@@ -88,26 +88,26 @@ impl SimScene {
         if let Some(known) = self.pictures.iter().position(|(view, _)| view == seen) {
             return known;
         }
-        let oldest = match self.pictures.len() {
-            MAX_PICTURES => self.pictures.pop_front(),
-            _ => None,
+        let all = (self.rasters.len() + 1) * self.sensor_size * size_of::<f32>();
+        let kept = match all <= MAX_PICTURES {
+            true => self.rasters.len() + 1,
+            false => 1,
         };
-        let mut picture = oldest.map_or_else(|| vec![0.0; self.part.len()], |(_, memory)| memory);
-        let transport = &self.placed.transport;
-        let raster = |shown: Option<usize>| {
-            let raster = shown.and_then(|index| self.rasters.get(index));
-            raster.map(Vec::as_slice)
-        };
+        while self.pictures.len() >= kept {
+            self.pictures.pop_front();
+        }
+        let mut picture = vec![0.0; self.sensor_size];
+        let transport = Arc::clone(&self.placed.transport);
         match seen {
             [(shown, share)] => {
-                transport.light(raster(*shown), &mut picture);
+                transport.light(self.lit(*shown).as_deref(), &mut picture);
                 picture.iter_mut().for_each(|light| *light *= share);
             }
             several => {
-                picture.fill(0.0);
+                let mut part = vec![0.0; self.sensor_size];
                 for (shown, share) in several {
-                    transport.light(raster(*shown), &mut self.part);
-                    let parts = picture.iter_mut().zip(&self.part);
+                    transport.light(self.lit(*shown).as_deref(), &mut part);
+                    let parts = picture.iter_mut().zip(&part);
                     parts.for_each(|(sum, light)| *sum += share * light);
                 }
             }
@@ -116,6 +116,28 @@ impl SimScene {
         blur::gaussian(&mut picture, width, transport.blur_px);
         self.pictures.push_back((seen.to_vec(), picture));
         self.pictures.len() - 1
+    }
+
+    /// The light of a loaded raster, 1 = white, row by row, with [`PADDING`]; `None` where none is
+    /// shown.
+    fn lit(&self, shown: Option<usize>) -> Option<Vec<f32>> {
+        let raster = shown.and_then(|index| self.rasters.get(index))?;
+        let optics = &self.scenario.optics;
+        let response: [f32; 256] = std::array::from_fn(|grey| {
+            let share = grey as f64 / 255.0;
+            share.powf(optics.gamma) as f32
+        });
+        let greys = raster.pixels().iter();
+        let mut light = Vec::with_capacity(raster.pixels().len() + PADDING);
+        light.extend(greys.map(|grey| response[usize::from(*grey)]));
+        blur::gaussian(
+            &mut light,
+            raster.width() as usize,
+            spread::split(optics.projector_blur_px).1,
+        );
+        adapt(&mut light, optics.content_gain);
+        light.resize(light.len() + PADDING, 0.0);
+        Some(light)
     }
 }
 
@@ -140,30 +162,13 @@ impl Scene for SimScene {
     }
 
     fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
-        let optics = &self.scenario.optics;
-        let response: Vec<f32> = (0..256_u32)
-            .map(|grey| (f64::from(grey) / 255.0).powf(optics.gamma) as f32)
-            .collect();
-        let light = |raster: Raster| {
-            let mut light: Vec<f32> = raster
-                .pixels()
-                .iter()
-                .map(|grey| response[usize::from(*grey)])
-                .collect();
-            blur::gaussian(
-                &mut light,
-                raster.width() as usize,
-                spread::split(optics.projector_blur_px).1,
-            );
-            adapt(&mut light, optics.content_gain);
-            light.resize(light.len() + PADDING, 0.0);
-            light
-        };
         let stays = |shown: &Option<usize>| shown.is_none_or(|index| index < kept);
         self.pictures
             .retain(|(view, _)| view.iter().all(|(shown, _)| stays(shown)));
+        // Teaching holds more frames at a time than a cycle.
+        self.pool.release();
         self.rasters.truncate(kept);
-        self.rasters.extend(rasters.into_iter().map(light));
+        self.rasters.extend(rasters);
         Ok(())
     }
 

@@ -58,7 +58,7 @@ pub(super) struct Transport {
     /// Light of one unit of weight.
     unit: f32,
     /// Where each pixel's taps end; they start where those of the pixel before end.
-    ends: Vec<usize>,
+    ends: Vec<u32>,
     taps: Vec<Tap>,
     /// σ with which the lens blurs the finished picture, camera pixels.
     pub blur_px: f64,
@@ -166,7 +166,7 @@ impl Transport {
         let taps = rows.iter().map(|row| row.taps.len()).sum();
         let mut whole = Self::with_capacity(pixels, taps);
         for row in rows {
-            let before = whole.taps.len();
+            let before = whole.taps.len() as u32;
             whole.ends.extend(row.ends.iter().map(|end| before + end));
             whole.ambient.extend(row.ambient);
             whole.taps.extend(row.taps);
@@ -199,8 +199,9 @@ impl Transport {
         };
         let mut start = 0;
         for ((pixel, ambient), end) in picture.iter_mut().zip(&self.ambient).zip(&self.ends) {
-            let taps = &self.taps[start..*end];
-            start = *end;
+            let end = *end as usize;
+            let taps = &self.taps[start..end];
+            start = end;
             let mut sums = [0.0_f32; LANES];
             for tap in taps {
                 let lit = &raster[tap.first as usize..][..LANES];
@@ -326,7 +327,7 @@ impl Tracer<'_> {
             row.ambient
                 .push((self.scenario.light.ambient * bright * share) as f32);
             self.taps(&points, share, &mut weights, &mut row.taps);
-            row.ends.push(row.taps.len());
+            row.ends.push(row.taps.len() as u32);
         }
         row
     }
