@@ -118,7 +118,9 @@ fn triangulate_every_pixel(bencher: Bencher<'_, '_>) {
     bencher
         .counter(ItemsCount::new(PIXELS))
         .with_inputs(|| phases.clone())
-        .bench_values(|mut phases| triangulate(&triangulator, &scene.decoder, None, &mut phases));
+        .bench_values(|mut phases| {
+            triangulate(&triangulator, &scene.decoder, None, &mut phases, &|_| ())
+        });
 }
 
 #[divan::bench]

@@ -15,6 +15,7 @@ use appliance::station::{
     ActiveRecipe, Event, Identity, Limits, Micros, Settings, Station, StationHandle,
 };
 use appliance::station::{ConnectionEdges, ControlWrite, Effect};
+use appliance::system::headway::Headway;
 use hal::frame::Frame;
 use sim::Scenario;
 use std::sync::{Arc, mpsc};
@@ -51,7 +52,14 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
     .unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
     let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
-    let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
+    let taught = teach(
+        &mut head,
+        &calibration,
+        &naming(),
+        TIMEOUT,
+        Headway::silent(),
+    )
+    .unwrap();
     let mut file = taught.manifest.clone();
     file.judges_nothing = true;
     let frame = &file.features[0].region;

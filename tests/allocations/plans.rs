@@ -7,6 +7,7 @@ use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::teach;
 use appliance::recipe::{Recipe, archive};
+use appliance::system::headway::Headway;
 use sim::Scenario;
 
 const PIXELS: usize = 320 * 240;
@@ -37,7 +38,14 @@ fn a_plan_keeps_nothing_twice_and_making_it_takes_little_more_than_its_file() {
     .unwrap();
     let (mut head, stage) = sim::head(&scenario).unwrap();
     let calibration = Calibration::of_scenario(stage.scenario()).unwrap();
-    let taught = teach(&mut head, &calibration, &naming(), TIMEOUT, &|_, _| ()).unwrap();
+    let taught = teach(
+        &mut head,
+        &calibration,
+        &naming(),
+        TIMEOUT,
+        Headway::silent(),
+    )
+    .unwrap();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .build()

@@ -8,6 +8,7 @@ use appliance::head::calibration::Calibration;
 use appliance::head::seam;
 use appliance::recipe::Recipe;
 use appliance::recipe::teach::{Naming, teach};
+use appliance::system::headway::Headway;
 use hal::head::Head;
 use hal::replay::Recording;
 use hal::replay::recording::{PatternSpec, RecordedFrame};
@@ -256,7 +257,7 @@ fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe
         placement_tolerance_mm: 1.0,
         exposures: 1,
     };
-    let taught = teach(head, calibration, &naming, TIMEOUT, &|_, _| ()).expect("a sphere");
+    let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent()).expect("a sphere");
     (taught.bytes, taught.recipe)
 }
 

@@ -261,12 +261,12 @@ fn refused_without_its_light(file: &RecipeFile, arrays: &archive::Arrays) {
             ..file.clone()
         };
         let arrays = archive::Arrays {
-            amplitude,
+            amplitude: amplitude.into(),
             ..arrays.clone()
         };
         Recipe::check(&file, arrays).map(drop)
     };
-    let whole = arrays.amplitude.clone();
+    let whole = arrays.amplitude.to_vec();
     check(3, whole.clone()).unwrap();
     check(1, Vec::new()).unwrap();
     let mut dark = whole.clone();

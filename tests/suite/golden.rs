@@ -76,7 +76,7 @@ fn a_part_that_lies_as_taught_has_no_error_of_an_uncorrected_response() {
         assert!(error < AS_TAUGHT_MM, "sequence {sequence}: {error}");
     }
     let full_alone = Arrays {
-        sequence_offset: Vec::new(),
+        sequence_offset: [].into(),
         ..arrays.clone()
     };
     let error = periodic(&mut bed, &taught, &full_alone, 0);

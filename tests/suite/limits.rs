@@ -300,7 +300,7 @@ fn dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_p
     let valid = recipe.arrays.valid.iter().enumerate();
     let weighed: Vec<usize> = valid.filter(|(_, v)| **v > 1).map(|(at, _)| at).collect();
     let mut rest = recipe.clone();
-    let valid = rest.arrays.valid.iter_mut();
+    let valid = std::sync::Arc::make_mut(&mut rest.arrays.valid).iter_mut();
     valid.for_each(|valid| *valid = u8::from(*valid == 1));
     let mut without = Plan::new(rest, &bed.calibration, true).unwrap();
     let mut line = Line::new(bed, recipe, predicted);

@@ -24,6 +24,7 @@ mod exposures;
 mod faint;
 mod foreign;
 mod formats;
+mod full_size;
 mod fuzz;
 mod gauges;
 mod golden;

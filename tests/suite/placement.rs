@@ -9,6 +9,7 @@ use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
 use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile, safe};
+use appliance::system::headway::Headway;
 use hal::head::Head;
 use sim::parts::{Cone, Face, Handset, Plane, Sawtooth, SheetMetal, Sphere, Spline};
 use sim::scenario::{Noise, RigDevice};
@@ -102,14 +103,9 @@ fn teach_now(
         placement_tolerance_mm,
         exposures,
     };
-    teach(
-        &mut bed.head,
-        &bed.calibration,
-        &naming,
-        TIMEOUT,
-        &|_, _| (),
-    )
-    .map_err(|error| error.to_string())
+    let (head, calibration) = (&mut bed.head, &bed.calibration);
+    let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent());
+    taught.map_err(|error| error.to_string())
 }
 
 /// Pixels whose phase is more than half a turn off the true one, and all that were compared, for a

@@ -292,7 +292,7 @@ fn golden_sigma(recipe: &Recipe, plan: &Plan) -> Vec<f32> {
     // The modulation as taught is that of the last sequence's waveform.
     let fundamental = |at: usize| recipe.sequences[at].fundamental();
     let brighter = fundamental(0) / fundamental(recipe.sequences.len() - 1);
-    let sigma = arrays.modulation.iter().zip(&arrays.height_slope);
+    let sigma = arrays.modulation.iter().zip(&*arrays.height_slope);
     sigma
         .map(|(&counts, &slope)| {
             let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
@@ -318,11 +318,11 @@ fn golden(recipe: &Recipe, plan: &Plan) -> Golden {
     let all: Vec<_> = (0..pixels)
         .map(|at| Height::from_mm(by_first(at)))
         .collect();
-    let compared = all.iter().zip(&arrays.valid);
+    let compared = all.iter().zip(&*arrays.valid);
     Golden {
         width: recipe.conditions.camera.0 as usize,
         factor: factors(recipe, plan, &all),
-        sides: arrays.smoothing.clone(),
+        sides: arrays.smoothing.to_vec(),
         height: compared
             .map(|(&height, &valid)| match valid {
                 0 => Height::UNKNOWN,

@@ -7,10 +7,10 @@ use crate::station_plc::{
 use appliance::config::Config;
 use appliance::head::calibration::Calibration;
 use appliance::history::seqs::AHEAD;
-use appliance::recipe::teach::{Naming, TeachError, teach_while};
+use appliance::recipe::teach::{Naming, TeachError, teach};
 use appliance::service::{Caller, Daemon};
 use appliance::station::{ConnectionEdges, ControlWrite, Event, Masked, Request};
-use appliance::system::computing::Computing;
+use appliance::system::headway::Headway;
 use appliance::system::progress::Progress;
 use hal::error::DeviceKind;
 use sim::Scenario;
@@ -174,23 +174,16 @@ fn a_teach_that_is_ended_does_no_further_step() {
         placement_tolerance_mm: 1.0,
         exposures: 1,
     };
-    let computing = Computing::default();
     let told = Mutex::new(Vec::new());
     let progress = |share: f64, _: &str| {
         told.lock().unwrap().push(share);
-        share < 0.35
+        share < 0.3
     };
-    let ended = teach_while(
-        &mut head,
-        &calibration,
-        &naming,
-        PATIENCE,
-        &computing,
-        &progress,
-    );
+    let headway = Headway::new(&progress, "teaching");
+    let ended = teach(&mut head, &calibration, &naming, PATIENCE, headway);
     assert!(matches!(ended, Err(TeachError::Ended)), "{ended:?}");
     let told = told.into_inner().unwrap();
-    assert_eq!(told.last(), Some(&0.35), "{told:?}");
+    assert_eq!(told.last(), Some(&0.3), "{told:?}");
 }
 
 #[test]

@@ -25,7 +25,8 @@ const BENT_PX: f64 = 2e-4;
 /// them as [`Weight::bits`]: 1 is full weight, 60 and 190 are 60/256 and 190/256.
 fn weigh(taught: &mut TaughtRecipe) {
     let width = taught.manifest.camera.width as usize;
-    let valid = taught.recipe.arrays.valid.iter_mut().enumerate();
+    let valid = std::sync::Arc::make_mut(&mut taught.recipe.arrays.valid);
+    let valid = valid.iter_mut().enumerate();
     for (place, valid) in valid.filter(|(_, valid)| **valid != 0) {
         *valid = [1, 60, 190][(place % width / 23 + place / width / 17) % 3];
     }
@@ -117,7 +118,7 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
         });
         let (height, factor) = golden.unzip();
         Golden {
-            sides: recipe.arrays.smoothing.clone(),
+            sides: recipe.arrays.smoothing.to_vec(),
             width,
             height,
             factor,

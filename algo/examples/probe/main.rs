@@ -88,7 +88,7 @@ fn line(case: &Case, decoder: &Decoder) -> Outcome<String> {
             trust.add(&[map.trust[at] as u8]);
         }
         let rig = rig::triangulator(columns, rows)?;
-        for z in triangulate(&rig, decoder, None, &mut map).height {
+        for z in triangulate(&rig, decoder, None, &mut map, &|_| ()).height {
             height.add(&z.nm().to_le_bytes());
         }
     }
@@ -172,7 +172,7 @@ mod tests {
             let frames = image.frames(height).unwrap();
             let mut map = decode(&decoder, &frames, image.map(&case), None).unwrap();
             let rig = rig::triangulator(width, height).unwrap();
-            triangulate(&rig, &decoder, None, &mut map);
+            triangulate(&rig, &decoder, None, &mut map, &|_| ());
             for reason in Trust::REASONS {
                 // A single level is the coarsest and has no unwrapping step, so no residual; only
                 // maps have unknown pixels; 8 shifts tolerate saturation; a phase within a few

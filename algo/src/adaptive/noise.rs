@@ -22,7 +22,7 @@ use super::{AdaptError, ProjectorMap};
 use crate::math::around;
 use crate::pattern::PhaseFunction;
 use crate::phase::{Decoder, LeastModulation, NOISE_OVER_LEAST};
-use crate::pipeline::PhaseMap;
+use crate::pipeline::{Done, PhaseMap, Progress};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -91,6 +91,7 @@ impl Light {
         g: f64,
         blur: &Blur,
         noise: Option<f64>,
+        progress: Progress<'_>,
     ) -> Self {
         let full_scale = decoder.full_scale();
         let pixels = phases.modulation.iter().zip(slopes);
@@ -104,7 +105,7 @@ impl Light {
         let trusted = decoder.least_modulation().counts(full_scale);
         let least = trusted.max(noise.map_or(0.0, of_noise));
         Self {
-            modulation: medians(&modulation, phases.width),
+            modulation: medians(&modulation, phases.width, progress),
             noise: noise.unwrap_or(NOISE_OVER_LEAST * least),
             least,
         }
@@ -122,8 +123,9 @@ impl Light {
 }
 
 /// The median of the positive values around each pixel; what is not positive stays as it is.
-fn medians(values: &[f64], width: usize) -> Vec<f64> {
+fn medians(values: &[f64], width: usize, progress: Progress<'_>) -> Vec<f64> {
     let rows = values.len() / width.max(1);
+    let done = Done::new(progress, rows);
     let mut medians = values.to_vec();
     crate::pipeline::for_each_row(&mut medians, width, |v, row| {
         let mut window = Vec::new();
@@ -141,6 +143,7 @@ fn medians(values: &[f64], width: usize) -> Vec<f64> {
             let middle = window.len() / 2;
             *value = *window.select_nth_unstable_by(middle, f64::total_cmp).1;
         }
+        done.row();
     });
     medians
 }
@@ -156,8 +159,9 @@ struct Asked {
 
 /// The frequency for a surface that the camera sees with slope J: the lowest whose worth reaches
 /// 99.8 % of the maximum within both limits of pitch, or the highest with the contrast that is
-/// asked for, if that is lower.
-fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked) -> f64 {
+/// asked for, if that is lower. `near` are the steps of a similar pixel, from which the search
+/// begins, and become those of this one.
+fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked, near: &mut [usize; 3]) -> f64 {
     let blur = &optics.blur;
     let slope = libm::sqrt(ju * ju + jv * jv);
     let coarsest = 1.0 / MAX_PITCH;
@@ -172,18 +176,38 @@ fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked) -> f64 {
         let squares = replicas(blur, g, [ju, jv]);
         g * kept(g) / libm::sqrt(asked.noise * asked.noise + squares * squares / 2.0)
     };
+    let [resolved, peak, least] = near;
     // Contrast falls with g.
-    let resolved = first(STEPS, |i| kept(frequency(i + 1)) < asked.contrast);
+    *resolved = first(STEPS, *resolved, |i| {
+        kept(frequency(i + 1)) < asked.contrast
+    });
     // The worth has a single peak.
-    let peak = first(resolved, |i| worth(i) >= worth(i + 1));
-    let enough = ENOUGH * worth(peak);
-    frequency(first(peak, |i| worth(i) >= enough))
+    *peak = first(*resolved, *peak, |i| worth(i) >= worth(i + 1));
+    let enough = ENOUGH * worth(*peak);
+    *least = first(*peak, *least, |i| worth(i) >= enough);
+    frequency(*least)
 }
 
 /// The first of 0…`last` for which `holds` is true, given that it is true for all numbers after the
-/// first; `last` if it is true for none before.
-fn first(last: usize, holds: impl Fn(usize) -> bool) -> usize {
+/// first; `last` if it is true for none before. The search begins at `near`, with steps that double
+/// until the first number lies between two of them.
+fn first(last: usize, near: usize, holds: impl Fn(usize) -> bool) -> usize {
+    let near = near.min(last);
     let (mut low, mut high) = (0, last);
+    let mut step = 1;
+    if near < last && !holds(near) {
+        low = near + 1;
+        while low + step <= high && !holds(low + step - 1) {
+            (low, step) = (low + step, 2 * step);
+        }
+        high = high.min(low + step - 1);
+    } else {
+        high = near;
+        while high >= low + step && holds(high - step) {
+            (high, step) = (high - step, 2 * step);
+        }
+        low = (high + 1).saturating_sub(step);
+    }
     while low < high {
         let middle = low.midpoint(high);
         if holds(middle) {
@@ -222,7 +246,8 @@ pub fn predict(
     (count > 0.0).then(|| squares.map(|sum: f64| libm::sqrt(sum / count)))
 }
 
-/// Makes the phase function for a part, over a projector of `columns` × `rows` pixels.
+/// Makes the phase function for a part, over a projector of `columns` × `rows` pixels. `progress`
+/// gets the share of the camera's rows that are done.
 ///
 /// # Errors
 /// If no pixel of the part is known.
@@ -232,9 +257,10 @@ pub fn adapt(
     rows: usize,
     optics: &Optics,
     light: &Light,
+    progress: Progress<'_>,
 ) -> Result<PhaseFunction, AdaptError> {
     let slopes = map.slopes(MAX_SLOPE);
-    let frequencies = frequencies(&slopes, map.width, optics, light);
+    let frequencies = frequencies(&slopes, map.width, (optics, light), progress);
     let mut field = Field::uniform(columns, rows, f64::NAN);
     let mut seen = vec![false; columns * rows];
     for (point, g) in map.points.iter().zip(&frequencies) {
@@ -257,15 +283,23 @@ pub fn adapt(
     PhaseFunction::sampled(columns, rows, balanced_rows(&field, &seen)).map_err(AdaptError::Pattern)
 }
 
-fn frequencies(slopes: &[[f64; 2]], width: usize, optics: &Optics, light: &Light) -> Vec<f64> {
+fn frequencies(
+    slopes: &[[f64; 2]],
+    width: usize,
+    (optics, light): (&Optics, &Light),
+    progress: Progress<'_>,
+) -> Vec<f64> {
     let mut frequencies = vec![f64::NAN; slopes.len()];
+    let done = Done::new(progress, slopes.len() / width.max(1));
     crate::pipeline::for_each_row(&mut frequencies, width, |v, row| {
+        let mut near = [STEPS / 2; 3];
         for (u, g) in row.iter_mut().enumerate() {
             let pixel = v * width + u;
             if !slopes[pixel][0].is_nan() {
-                *g = best_frequency(optics, slopes[pixel], light.asked(pixel));
+                *g = best_frequency(optics, slopes[pixel], light.asked(pixel), &mut near);
             }
         }
+        done.row();
     });
     frequencies
 }
@@ -288,6 +322,11 @@ mod tests {
         noise: 10.0,
     };
 
+    /// The best frequency, searched for from the coarsest.
+    fn alone(optics: &Optics, slope: [f64; 2], asked: Asked) -> f64 {
+        best_frequency(optics, slope, asked, &mut [0; 3])
+    }
+
     fn blurred(projector: f64, camera: f64) -> Optics {
         let blur = Blur { projector, camera };
         Optics { blur, ..FREE }
@@ -297,7 +336,7 @@ mod tests {
     fn the_pitch_under_gaussian_blur_is_a_little_over_two_pi_sigma() {
         // A face-on surface seen very finely: only the projector matters. x·exp(−x²/2) has its
         // maximum at x = 1 (12.57 px; 12.8 px with square pixels) and 99.8 % of it at x = 0.96.
-        let pitch = 1.0 / best_frequency(&blurred(2.0, 0.0), [0.01, 0.0], NOISY);
+        let pitch = 1.0 / alone(&blurred(2.0, 0.0), [0.01, 0.0], NOISY);
         assert!((12.9..13.9).contains(&pitch), "{pitch}");
     }
 
@@ -305,7 +344,7 @@ mod tests {
     fn the_image_pitch_for_the_pixel_box_alone_is_a_little_over_two_pixels() {
         // Steep: 8 projector pixels per camera pixel, so that only the camera limits.
         // sin(π/p) has its maximum at p = 2, and 99.8 % of it at 2.08.
-        let pitch = 1.0 / (best_frequency(&FREE, [8.0, 0.0], NOISY) * 8.0);
+        let pitch = 1.0 / (alone(&FREE, [8.0, 0.0], NOISY) * 8.0);
         assert!((2.05..2.12).contains(&pitch), "{pitch}");
     }
 
@@ -318,9 +357,9 @@ mod tests {
                     contrast: wanted,
                     ..NOISY
                 };
-                let g = best_frequency(&optics, slope, asked);
+                let g = alone(&optics, slope, asked);
                 let found = contrast(&optics.blur, g, slope.map(|j| g * j));
-                let free = best_frequency(&optics, slope, NOISY);
+                let free = alone(&optics, slope, NOISY);
                 assert!(found >= wanted, "{found} for {wanted}");
                 assert!(found < 1.05 * wanted || g == free, "{found} for {wanted}");
             }
@@ -344,7 +383,7 @@ mod tests {
     fn the_squares_of_a_sharp_projector_ask_for_a_longer_pitch_where_noise_is_low() {
         let pitch = |blur: f64, noise: f64| {
             let asked = Asked { noise, ..NOISY };
-            1.0 / best_frequency(&blurred(blur, 0.0), [0.9, 0.0], asked)
+            1.0 / alone(&blurred(blur, 0.0), [0.9, 0.0], asked)
         };
         for blur in [0.25, 0.5] {
             assert!(pitch(blur, 0.003) > 1.2 * pitch(blur, 0.1), "{blur}");
@@ -354,6 +393,8 @@ mod tests {
 
     #[test]
     fn the_best_frequency_is_the_one_that_trying_all_of_them_finds() {
+        // Each search begins where the one before ended.
+        let mut near = [0; 3];
         for at in 0..6000 {
             let optics = Optics {
                 projector_pitch: 4.0 + f64::from(at % 3),
@@ -386,7 +427,7 @@ mod tests {
             };
             let best = all().map(worth).fold(0.0, f64::max);
             let found = all().find(|&g| worth(g) >= ENOUGH * best).unwrap();
-            let searched = best_frequency(&optics, [ju, jv], asked);
+            let searched = best_frequency(&optics, [ju, jv], asked, &mut near);
             assert!(
                 (searched / found - 1.0).abs() < 1e-12,
                 "{optics:?} {asked:?} {ju} {jv}: {searched} for {found}"
@@ -402,7 +443,7 @@ mod tests {
             ..FREE
         };
         for (slope, limit) in [([0.1, 0.0], 0.125), ([3.0, 4.0], 1.0 / 25.0)] {
-            let g = best_frequency(&optics, slope, NOISY);
+            let g = alone(&optics, slope, NOISY);
             assert!(g <= limit && g > 0.9 * limit, "{g}");
         }
     }

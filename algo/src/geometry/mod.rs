@@ -3,6 +3,7 @@
 
 mod lens;
 mod pinhole;
+mod rays;
 mod reference;
 mod root;
 mod sight;

@@ -4,7 +4,9 @@
 //! X_device = R · X_world + t; x = X/Z, y = Y/Z; from (x, y) to pixels as in [`Lens`]. Pixel
 //! centres at integers, x right, y down, z forward.
 
+use super::rays::Rays;
 use super::{Lens, Vector};
+use alloc::vec::Vec;
 
 /// The parameters of a device model as a calibration gives them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,6 +41,7 @@ pub struct Pinhole {
     /// Square of the normalised radius up to which the distortion is one-to-one; beyond it the
     /// distortion is continued linearly.
     radius_square: f64,
+    rays: Rays,
 }
 
 /// A device model that cannot be used.
@@ -155,6 +158,7 @@ impl Pinhole {
             centre,
             rows,
             radius_square: f64::INFINITY,
+            rays: Rays::default(),
         };
         pinhole.with_checked_distortion()
     }
@@ -218,13 +222,32 @@ impl Pinhole {
 
     /// The direction of pixel (u, v)'s ray in the world, with a component of 1 along the
     /// optical axis; `None` where the iteration does not converge (never inside the frame).
+    #[inline]
     pub fn ray(&self, u: f64, v: f64) -> Option<Vector> {
-        let (x, y) = self.lens.undistorted(u, v)?;
+        let known = self.rays.at(u, v, self.width);
+        let (x, y) = known.or_else(|| self.lens.undistorted(u, v))?;
         Some(self.rows[0] * x + self.rows[1] * y + self.rows[2])
+    }
+
+    /// The same device with these directions of its whole pixels, row-major.
+    pub(crate) fn knowing(mut self, directions: Vec<(f64, f64)>) -> Self {
+        self.rays = Rays::new(directions);
+        self
+    }
+
+    /// Whether it knows the directions of its whole pixels.
+    pub(crate) fn knows_rays(&self) -> bool {
+        self.rays.are_known()
+    }
+
+    /// Focal lengths, principal point and distortion.
+    pub(crate) fn lens(&self) -> &Lens {
+        &self.lens
     }
 
     /// The pixel (u, v) that sees a point of the world, also outside the frame; `None` behind the
     /// device.
+    #[inline]
     pub fn project(&self, point: Vector) -> Option<(f64, f64)> {
         self.pixel(self.turned(point - self.centre))
     }
@@ -232,8 +255,8 @@ impl Pinhole {
     /// A direction of the world in the device's coordinates: z along its optical axis.
     #[inline]
     pub(super) fn turned(&self, direction: Vector) -> Vector {
-        let [x, y, z] = self.rows.map(|row| row.dot(direction));
-        Vector::new(x, y, z)
+        let [x, y, z] = &self.rows;
+        Vector::new(x.dot(direction), y.dot(direction), z.dot(direction))
     }
 
     /// The pixel that sees a point given in the device's coordinates; `None` behind the device.

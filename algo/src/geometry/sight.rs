@@ -16,10 +16,20 @@ pub struct Sight<'a> {
 }
 
 impl Triangulator {
+    /// The point at height 0 that pixel (u, v) sees, and how far its line of sight takes a point
+    /// that rises by 1 mm; `None` if it does not meet every height once.
+    pub fn line(&self, u: f64, v: f64) -> Option<(Vector, Vector)> {
+        let ray = self.falling_ray(u, v)?;
+        Some((self.on_ray(ray, 0.0), ray * (1.0 / ray.z)))
+    }
+
     /// The line of sight of pixel (u, v), or `None` if it does not meet every height once.
     pub fn sight(&self, u: f64, v: f64) -> Option<Sight<'_>> {
-        let ray = self.falling_ray(u, v)?;
-        let (rise, on_plane) = (ray * (1.0 / ray.z), self.on_ray(ray, 0.0));
+        self.line(u, v).map(|line| self.sight_along(line))
+    }
+
+    /// The same along a [`Self::line`].
+    pub fn sight_along(&self, (on_plane, rise): (Vector, Vector)) -> Sight<'_> {
         let (start, rise) = match &self.reference {
             Reference::Models => {
                 let lamp = &self.projector;
@@ -28,11 +38,11 @@ impl Triangulator {
             }
             Reference::Measured { .. } => (on_plane, rise),
         };
-        Some(Sight {
+        Sight {
             triangulator: self,
             start,
             rise,
-        })
+        }
     }
 }
 

@@ -159,6 +159,12 @@ impl Triangulator {
         })
     }
 
+    /// The same geometry with the same camera, which may know the rays of its pixels or not.
+    #[must_use]
+    pub fn seen_by(self, camera: Pinhole) -> Self {
+        Self { camera, ..self }
+    }
+
     /// The working range.
     pub fn range(&self) -> HeightRange {
         self.range
@@ -314,19 +320,23 @@ impl Triangulator {
 
     /// The expansion z(Φ + δ) ≈ z + z′δ + z″δ²/2 of the height about a phase at pixel (u, v), in mm
     /// per turn and turn²; the second derivative by central differences of ± ¼ turn, 0 where there
-    /// is no height for one of these two phases.
-    pub fn expand(&self, u: f64, v: f64, phase: f64) -> Option<Expansion> {
+    /// is no height for one of these two phases. `near` is about the height of the phase, as in
+    /// [`Self::solve_near`].
+    pub fn expand(&self, u: f64, v: f64, phase: f64, near: f64) -> Option<Expansion> {
         const STEP: f64 = 0.25;
-        let solution = self.solve(u, v, phase)?;
-        let z = solution.point.z;
-        let beside = |delta| Some(self.solve(u, v, phase + delta)?.point.z);
+        let Solution { point, slope } = self.solve_near(u, v, phase, near)?;
+        let z = point.z;
+        let beside = |delta| {
+            let solution = self.solve_near(u, v, phase + delta, z + delta / slope)?;
+            Some(solution.point.z)
+        };
         let second = match (beside(-STEP), beside(STEP)) {
             (Some(below), Some(above)) => (above - 2.0 * z + below) / (STEP * STEP),
             _ => 0.0,
         };
         Some(Expansion {
             height: z,
-            first: 1.0 / solution.slope,
+            first: 1.0 / slope,
             second,
         })
     }

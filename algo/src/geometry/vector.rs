@@ -15,16 +15,19 @@ pub struct Vector {
 
 impl Vector {
     /// From its three components.
+    #[inline]
     pub const fn new(x: f64, y: f64, z: f64) -> Self {
         Self { x, y, z }
     }
 
     /// The scalar product.
+    #[inline]
     pub fn dot(self, other: Self) -> f64 {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
     /// The vector product.
+    #[inline]
     pub fn cross(self, other: Self) -> Self {
         Self::new(
             self.y * other.z - self.z * other.y,
@@ -34,6 +37,7 @@ impl Vector {
     }
 
     /// The Euclidean length.
+    #[inline]
     pub fn length(self) -> f64 {
         libm::sqrt(self.dot(self))
     }
@@ -41,6 +45,7 @@ impl Vector {
 
 impl Add for Vector {
     type Output = Self;
+    #[inline]
     fn add(self, other: Self) -> Self {
         Self::new(self.x + other.x, self.y + other.y, self.z + other.z)
     }
@@ -48,6 +53,7 @@ impl Add for Vector {
 
 impl Sub for Vector {
     type Output = Self;
+    #[inline]
     fn sub(self, other: Self) -> Self {
         Self::new(self.x - other.x, self.y - other.y, self.z - other.z)
     }
@@ -55,6 +61,7 @@ impl Sub for Vector {
 
 impl Mul<f64> for Vector {
     type Output = Self;
+    #[inline]
     fn mul(self, factor: f64) -> Self {
         Self::new(self.x * factor, self.y * factor, self.z * factor)
     }

@@ -82,7 +82,7 @@ impl DeviationNoise<'_> {
         let mut weights: Vec<Weight> = compared.iter().copied().map(Weight::from).collect();
         let mut reach = 0;
         loop {
-            let sigmas = self.of_squares(&weights, side);
+            let [sigmas] = self.of_squares(&weights, [side]);
             let mut shares = vec![1.0_f64; weights.len()];
             let ratios = sigmas.iter().map(|sigma| most / f64::from(*sigma));
             for (place, ratio) in ratios.enumerate().filter(|(_, ratio)| *ratio < 1.0) {
@@ -110,29 +110,35 @@ impl DeviationNoise<'_> {
         }
     }
 
-    /// σ of the mean over the square of `side` pixels about each pixel; NaN where the pixel is not
-    /// compared or too few pixels of the square are.
-    pub fn of_squares(&self, weights: &[Weight], side: usize) -> Vec<f32> {
+    /// σ of the means over the squares of each of these sides in pixels about each pixel; NaN where
+    /// the pixel is not compared or too few pixels of the square are.
+    pub fn of_squares<const N: usize>(
+        &self,
+        weights: &[Weight],
+        sides: [usize; N],
+    ) -> [Vec<f32>; N] {
         let width = self.width.max(1);
-        let least = MIN_SUPPORT * (side * side) as f64;
         // The number of compared pixels, Σ w and Σ w² σ_p².
         let sums = IntegralTable::new(width, weights.len(), |place| {
             let weight = weights[place].share();
             let variance = weight * weight * f64::from(self.pixel[place]);
             weights[place].compared().then_some([1.0, weight, variance])
         });
-        let mut sigma = vec![f32::NAN; weights.len()];
-        for_each_row(&mut sigma, width, |row, sigma| {
-            for (column, sigma) in sigma.iter_mut().enumerate() {
-                let place = row * width + column;
-                let [pixels, weight, own] = sums.square(row, column, side);
-                if weights[place].compared() && pixels >= least {
-                    let motion = weight * weight * f64::from(self.motion[place]);
-                    *sigma = (libm::sqrt(own.max(0.0) + motion) / pixels) as f32;
+        sides.map(|side| {
+            let least = MIN_SUPPORT * (side * side) as f64;
+            let mut sigma = vec![f32::NAN; weights.len()];
+            for_each_row(&mut sigma, width, |row, sigma| {
+                for (column, sigma) in sigma.iter_mut().enumerate() {
+                    let place = row * width + column;
+                    let [pixels, weight, own] = sums.square(row, column, side);
+                    if weights[place].compared() && pixels >= least {
+                        let motion = weight * weight * f64::from(self.motion[place]);
+                        *sigma = (libm::sqrt(own.max(0.0) + motion) / pixels) as f32;
+                    }
                 }
-            }
-        });
-        sigma
+            });
+            sigma
+        })
     }
 }
 
@@ -416,7 +422,7 @@ mod tests {
                 pixel: &pixel,
                 motion: &vec![0.0; WIDTH * WIDTH],
             };
-            let mut sigmas = noise.of_squares(&[Weight::FULL; WIDTH * WIDTH], SIDE);
+            let [mut sigmas] = noise.of_squares(&[Weight::FULL; WIDTH * WIDTH], [SIDE]);
             // Whole squares, as drawn.
             let half = SIDE / 2;
             let whole = half..WIDTH - half;
@@ -474,7 +480,7 @@ mod tests {
         assert!(lower[1..7].iter().all(|weight| weight.partial()));
         assert!(lower[1].bits() < lower[6].bits());
         assert!(lower[20..].iter().all(|weight| *weight == Weight::FULL));
-        let sigmas = noise.of_squares(&weights, SIDE);
+        let [sigmas] = noise.of_squares(&weights, [SIDE]);
         // A whole quiet square has √(0.01 / 81 + 1e-5) = 0.0116 mm.
         let quiet = f64::from(sigmas[20 * WIDTH + 20]);
         assert!((quiet - 0.011_55).abs() < 1e-5, "{quiet}");

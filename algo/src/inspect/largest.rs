@@ -86,7 +86,7 @@ impl Largest {
         };
         let mut largest = LargestDeviation::default();
         for own in taught.sides(side) {
-            let squares = noise.of_squares(&weights, own);
+            let [squares] = noise.of_squares(&weights, [own]);
             let mut inside = vec![f32::NAN; pixels];
             let places = region.places(width);
             for place in places.filter(|&place| taught.side(place, side) == own) {

@@ -7,6 +7,7 @@ mod gauge;
 pub mod good;
 mod largest;
 mod mask;
+mod missed;
 mod normal_shares;
 mod openings;
 mod region;
@@ -27,6 +28,7 @@ pub use gauge::{
 pub use largest::Largest;
 pub(crate) use mask::components;
 pub use mask::eroded;
+pub use missed::Missed;
 pub use normal_shares::normal_shares;
 pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};

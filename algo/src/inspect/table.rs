@@ -2,7 +2,6 @@
 
 use alloc::vec;
 use alloc::vec::Vec;
-use core::array::from_fn;
 
 /// Sums of N values over the pixels above and left of each corner of a map's pixels.
 #[derive(Clone, Debug)]
@@ -24,10 +23,15 @@ impl<const N: usize> IntegralTable<N> {
             let mut sum = [0.0; N];
             for column in 0..width {
                 if let Some(values) = values(row * width + column) {
-                    sum = from_fn(|i| sum[i] + values[i]);
+                    for (sum, value) in sum.iter_mut().zip(values) {
+                        *sum += value;
+                    }
                 }
-                let above = sums[row * stride + column + 1];
-                sums[(row + 1) * stride + column + 1] = from_fn(|i| above[i] + sum[i]);
+                let mut here = sums[row * stride + column + 1];
+                for (here, sum) in here.iter_mut().zip(sum) {
+                    *here += sum;
+                }
+                sums[(row + 1) * stride + column + 1] = here;
             }
         }
         Self { width, rows, sums }
@@ -41,8 +45,12 @@ impl<const N: usize> IntegralTable<N> {
             column.saturating_sub(half),
             (column + half + 1).min(self.width),
         );
-        let corners = [(bottom, right), (top, left), (bottom, left), (top, right)];
-        let [a, b, c, d] = corners.map(|(row, column)| self.sums[row * stride + column]);
-        from_fn(|i| a[i] + b[i] - c[i] - d[i])
+        let at = |row: usize, column: usize| &self.sums[row * stride + column];
+        let mut sums = *at(bottom, right);
+        let others = (at(top, left), at(bottom, left), at(top, right));
+        for (i, sum) in sums.iter_mut().enumerate() {
+            *sum = *sum + others.0[i] - others.1[i] - others.2[i];
+        }
+        sums
     }
 }

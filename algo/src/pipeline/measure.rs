@@ -1,6 +1,6 @@
 //! Whole frames: frames → phase map → height map.
 
-use super::{for_each, for_each_row, for_each_row_of_two};
+use super::{Done, Progress, for_each, for_each_row, for_each_row_of_two};
 use crate::frame::{FrameView, SampleNoise};
 use crate::geometry::Triangulator;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow, Trust};
@@ -150,16 +150,17 @@ fn each_row(
 }
 
 /// Triangulates every resolved pixel, and marks those without a height in the working range as
-/// [`Trust::OutOfRange`]. `noise` is that of one sample, for σ_z.
+/// [`Trust::OutOfRange`]. `noise` is that of one sample, for σ_z; `progress` gets the share of the
+/// rows that are done.
 pub fn triangulate(
     triangulator: &Triangulator,
     decoder: &Decoder,
     noise: Option<SampleNoise>,
     phases: &mut PhaseMap,
+    progress: Progress<'_>,
 ) -> HeightMap {
-    triangulate_with(triangulator, phases, |modulation| {
-        noise.map(|noise| decoder.phase_noise(modulation, noise))
-    })
+    let sigma = |modulation| noise.map(|noise| decoder.phase_noise(modulation, noise));
+    triangulate_with(triangulator, phases, sigma, progress)
 }
 
 /// As [`triangulate`], of phases whose σ in turns follows in another way from the modulation, or is
@@ -168,8 +169,10 @@ pub fn triangulate_with(
     triangulator: &Triangulator,
     phases: &mut PhaseMap,
     sigma: impl Fn(Modulation) -> Option<f64> + Sync + Send,
+    progress: Progress<'_>,
 ) -> HeightMap {
     let width = phases.width;
+    let done = Done::new(progress, phases.phase.len() / width.max(1));
     let mut map = HeightMap {
         width,
         height: vec![Height::UNKNOWN; phases.phase.len()],
@@ -195,6 +198,7 @@ pub fn triangulate_with(
                 }
             }
         }
+        done.row();
     });
     map
 }

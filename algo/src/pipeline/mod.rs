@@ -6,6 +6,7 @@ mod epipolar;
 mod measure;
 mod noise;
 mod plate;
+mod rays;
 mod rows;
 mod wrapped;
 
@@ -20,6 +21,6 @@ pub use measure::{
 };
 pub use noise::{sample_noise, signal_by_modulation};
 pub use plate::{Plate, PlateError};
-pub use rows::for_each_row;
-pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};
+pub(crate) use rows::{Done, for_each, for_each_item, for_each_row_of_two, map_rows};
+pub use rows::{Progress, for_each_row};
 pub use wrapped::wrapped;

@@ -1,8 +1,37 @@
 //! Loops over rows, serial or on the rayon pool.
 
 use alloc::vec::Vec;
+use core::sync::atomic::{AtomicUsize, Ordering};
 #[cfg(feature = "parallel")]
 use rayon::prelude::*;
+
+/// Gets the share of a long computation that is done, from any of its threads and often; what it
+/// does changes nothing of the result.
+pub type Progress<'a> = &'a (dyn Fn(f64) + Sync);
+
+/// Counts the rows that are done.
+pub(crate) struct Done<'a> {
+    progress: Progress<'a>,
+    rows: usize,
+    done: AtomicUsize,
+}
+
+impl<'a> Done<'a> {
+    /// Of so many rows.
+    pub fn new(progress: Progress<'a>, rows: usize) -> Self {
+        Self {
+            progress,
+            rows,
+            done: AtomicUsize::new(0),
+        }
+    }
+
+    /// One row more is done.
+    pub fn row(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        (self.progress)(done as f64 / self.rows.max(1) as f64);
+    }
+}
 
 /// Calls `each` with every row of `map` (row-major, rows of `width`).
 pub fn for_each_row<T: Send>(

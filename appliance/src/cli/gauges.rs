@@ -9,6 +9,7 @@ use crate::recipe::golden::TaughtRecipe;
 use crate::recipe::plan::Plan;
 use crate::station::GaugeValue;
 use crate::storage::folder::write_whole;
+use crate::system::headway::Headway;
 use serde_json::{Value, json};
 use std::fs::File;
 use std::io::{ErrorKind, Read as _};
@@ -66,7 +67,8 @@ impl Gauges {
             ..
         } = gauging.set(&before, arrays).map_err(unfit)?;
         let head = manifest.head().map_err(unfit)?;
-        let golden = Plan::golden(recipe, &head).map_err(|error| unfit(error.to_string()));
+        let golden = Plan::golden(recipe, &head, Headway::silent())
+            .map_err(|error| unfit(error.to_string()));
         let mut golden = golden?;
         let (golden, features) = golden.judged((&manifest).into());
         let changed = manifest.differences(&before);

@@ -128,6 +128,7 @@ pub fn main() -> ExitCode {
 /// Parses the arguments of this process, runs the command and returns its exit code. Options may
 /// stand before the command or after it.
 pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
+    crate::system::memory::give_back();
     journal::take_panics();
     let code = carry_out(run);
     stderr::end();

@@ -11,13 +11,14 @@ use crate::head::rasters::Illumination;
 use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, Opened};
 use crate::recipe::file::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
-use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe};
+use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe, UnsealedRecipe};
 use crate::recipe::teach::{TeachError, teach};
 use crate::recipe::{PatternFile, RecipeFile, Store};
 use crate::recipe::{replace, signal};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
+use crate::system::headway::Headway;
 use algo::adaptive::ProjectorMap;
 use algo::frame::SampleNoise;
 use hal::bounds::text;
@@ -171,8 +172,8 @@ impl Teach {
             None => taught,
         };
         let taught = match replaced.filter(|_| self.keep_gauges) {
-            Some(file) => pool.install(|| replace::keep_gauges(taught, &file)),
-            None => pool.install(|| taught.with_circles()),
+            Some(file) => pool.install(|| replace::keep_gauges(taught, &file, Headway::silent())),
+            None => pool.install(|| taught.with_circles(Headway::silent())),
         };
         let taught = taught.map_err(&unfit)?;
         let place = target.store(&taught)?;
@@ -241,8 +242,12 @@ impl Teach {
             calibration,
             ..
         } = opened;
-        let on_progress = |share: f64, words: &str| progress.tell(share, words);
-        let taught = pool.install(|| teach(&mut head, &calibration, naming, TIMEOUT, &on_progress));
+        let told = |share: f64, words: &str| {
+            progress.tell(share, words);
+            true
+        };
+        let headway = Headway::new(&told, "teaching");
+        let taught = pool.install(|| teach(&mut head, &calibration, naming, TIMEOUT, headway));
         progress.clear();
         let taught = taught.map_err(|error| {
             let exit = match error {
@@ -301,18 +306,21 @@ impl Teach {
             // Recordings cannot be exposed anew.
             illumination: Illumination::default(),
             full,
-            decoder,
-            triangulator: &surface.triangulator,
-            phases,
-            heights: &surface.map,
-            offsets: &[],
-            signal: &signal,
+            decoder: decoder.clone(),
+            triangulator: surface.triangulator.clone(),
+            phases: phases.clone(),
+            heights: surface.map.clone(),
+            offsets: Vec::new(),
+            signal,
             noise: SampleNoise::constant(noise),
             offset_counts: None,
             captures: 1,
             comparison: None,
         };
-        let mut taught = part.recipe(naming).map_err(|error| wrong(&error))?;
+        let mut taught = part
+            .recipe(naming, Headway::silent())
+            .and_then(UnsealedRecipe::seal)
+            .map_err(|error| wrong(&error))?;
         if full.len()
             < recording
                 .frames

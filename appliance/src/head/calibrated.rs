@@ -7,11 +7,14 @@ use crate::head::scan::{self, Scan};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::Decoder;
-use algo::pipeline::{HeightMap, PhaseMap};
+use algo::pipeline::{HeightMap, PhaseMap, Progress};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
 use hal::head::Head;
 use std::time::Duration;
+
+/// The share of a measurement's time in which its frames are taken.
+const TAKEN: f64 = 0.7;
 
 /// A head with its calibration, in front of a part.
 pub struct CalibratedHead<'a> {
@@ -59,7 +62,7 @@ impl MeasureError {
 impl CalibratedHead<'_> {
     /// Projects the shots of a phase function and measures the part in the default working range of
     /// [`Triangulator::new`]. Levels that are unwrapped about a known map take `map` (row-major),
-    /// or without one the reference phase map. `progress` gets the share of the frames taken.
+    /// or without one the reference phase map. `progress` gets the share of the measurement that is done.
     ///
     /// # Errors
     /// If a device fails, the sequence cannot be decoded, or camera and projector do not look down
@@ -69,7 +72,7 @@ impl CalibratedHead<'_> {
         function: &PhaseFunction,
         shots: &[Shot],
         map: Option<&[AbsolutePhase]>,
-        progress: &dyn Fn(f64),
+        progress: Progress<'_>,
     ) -> Result<Measured, MeasureError> {
         self.measure_lit(&Illumination::default(), function, shots, map, progress)
     }
@@ -84,13 +87,15 @@ impl CalibratedHead<'_> {
         function: &PhaseFunction,
         shots: &[Shot],
         map: Option<&[AbsolutePhase]>,
-        progress: &dyn Fn(f64),
+        progress: Progress<'_>,
     ) -> Result<Measured, MeasureError> {
         let (calibration, timeout) = (self.calibration, self.timeout);
         let triangulator = calibration.triangulator(function.clone(), None);
         let triangulator = triangulator.map_err(MeasureError::impossible)?;
         illumination.load(self.head, function, shots, calibration)?;
-        let frames = scan::take_loaded(self.head, shots.len(), timeout, progress)?;
+        let frames = scan::take_loaded(self.head, shots.len(), timeout, &|share| {
+            progress(TAKEN * share);
+        })?;
         let scan = Scan::new(function.range(), shots, &frames).map_err(MeasureError::impossible)?;
         let scan = scan.trusting(calibration.least_modulation());
         let reference;
@@ -103,7 +108,9 @@ impl CalibratedHead<'_> {
         };
         let mut phases = scan.phases(map).map_err(MeasureError::impossible)?;
         let noise = scan.noise(calibration, &phases);
-        let heights = scan.heights(&triangulator, Some(noise), &mut phases);
+        let heights = scan.heights(&triangulator, Some(noise), &mut phases, &|share| {
+            progress(TAKEN + (1.0 - TAKEN) * share);
+        });
         Ok(Measured {
             phases,
             heights,

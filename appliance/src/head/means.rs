@@ -4,6 +4,7 @@
 use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Samples};
 use hal::head::Head;
+use hal::units::Timestamp;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -33,29 +34,39 @@ pub fn take(
         if !progress(capture as f64 / CAPTURES as f64) {
             return Ok(None);
         }
-        head.acquire(&indices, timeout, &mut |at, frame| match sums.get_mut(at) {
-            Some(sum) => sum.add(&frame),
-            None => sums.push(Sum::of(frame)),
+        head.acquire(&indices, timeout, &mut |at, frame| {
+            if at == sums.len() {
+                sums.push(Sum::new(&frame));
+            }
+            if let Some(sum) = sums.get_mut(at) {
+                sum.add(&frame);
+            }
         })?;
     }
     let means: Result<_, _> = sums.into_iter().map(Sum::mean).collect();
     means.map(Some)
 }
 
-/// The sum of the frames of a pattern.
+/// The sum of the frames of a pattern, of which nothing else is kept.
 struct Sum {
     /// The sums, without padding between the rows.
     samples: Vec<u16>,
-    first: Frame,
+    /// Format, time and count of the first frame.
+    format: FrameFormat,
+    stamp: (Timestamp, u64),
 }
 
 impl Sum {
-    fn of(first: Frame) -> Self {
-        let FrameFormat { width, height, .. } = first.format();
-        let samples = vec![0; width as usize * height as usize];
-        let mut sum = Self { samples, first };
-        sum.add(&sum.first.clone());
-        sum
+    /// Of none of the frames that are like this first one.
+    fn new(first: &Frame) -> Self {
+        let format = first.format();
+        let samples = vec![0; format.width as usize * format.height as usize];
+        let stamp = (first.timestamp(), first.count());
+        Self {
+            samples,
+            format,
+            stamp,
+        }
     }
 
     fn add(&mut self, frame: &Frame) {
@@ -82,7 +93,7 @@ impl Sum {
 
     /// The mean, scaled to 16 bits.
     fn mean(mut self) -> Result<Frame, Error> {
-        let format = self.first.format();
+        let (format, (at, count)) = (self.format, self.stamp);
         let full_scale = (1_u32 << format.bit_depth.min(BITS)) - 1;
         let whole = full_scale * CAPTURES as u32;
         for sum in self.samples.iter_mut().filter(|sum| **sum != SATURATED) {
@@ -91,7 +102,6 @@ impl Sum {
             *sum = mean.min(u32::from(SATURATED) - 1) as u16;
         }
         let format = FrameFormat::packed(format.width, format.height, 16);
-        let (at, count) = (self.first.timestamp(), self.first.count());
         Frame::new(format, Arc::new(Pixels::Sixteen(self.samples)), at, count)
     }
 }
@@ -111,11 +121,10 @@ mod tests {
             8 => Pixels::Eight(row.map(|sample| sample as u8).to_vec()),
             _ => Pixels::Sixteen(row.to_vec()),
         };
-        let mut frames = rows
-            .map(|row| Frame::new(format, Arc::new(pixels(row)), Timestamp(0), 0).unwrap())
-            .into_iter();
-        let mut sum = Sum::of(frames.next().unwrap());
-        frames.for_each(|frame| sum.add(&frame));
+        let frames =
+            rows.map(|row| Frame::new(format, Arc::new(pixels(row)), Timestamp(0), 0).unwrap());
+        let mut sum = Sum::new(&frames[0]);
+        frames.iter().for_each(|frame| sum.add(frame));
         match sum.mean().unwrap().samples() {
             Samples::Sixteen(&[a, b]) => [a, b],
             other => panic!("{other:?}"),

@@ -8,7 +8,7 @@ use algo::frame::{FrameView, SampleNoise};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::{Decoder, LeastModulation};
-use algo::pipeline::{self, HeightMap, PhaseMap};
+use algo::pipeline::{self, HeightMap, PhaseMap, Progress};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
 use hal::head::Head;
@@ -156,8 +156,9 @@ impl<'a> Scan<'a> {
         triangulator: &Triangulator,
         noise: Option<SampleNoise>,
         phases: &mut PhaseMap,
+        progress: Progress<'_>,
     ) -> HeightMap {
-        pipeline::triangulate(triangulator, &self.decoder, noise, phases)
+        pipeline::triangulate(triangulator, &self.decoder, noise, phases, progress)
     }
 }
 

@@ -46,7 +46,12 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
     let sigma = SIGMA_CELLS * code.cells.width;
     let heights = stages.time("height", || {
         geometry.map(|triangulator| Surface {
-            map: triangulate_with(&triangulator, &mut phases[primary], |_| Some(sigma)),
+            map: triangulate_with(
+                &triangulator,
+                &mut phases[primary],
+                |_| Some(sigma),
+                &|_| (),
+            ),
             triangulator,
         })
     });

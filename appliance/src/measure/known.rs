@@ -116,7 +116,7 @@ impl Known {
             name: "golden",
             pattern,
             phase: golden.collect(),
-            reach: Some(recipe.arrays.phase_reach.clone()),
+            reach: Some(recipe.arrays.phase_reach.to_vec()),
         })
     }
 }

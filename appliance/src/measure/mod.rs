@@ -251,7 +251,7 @@ fn of_fringes(
     };
     let heights = stages.time("height", || {
         geometry.map(|triangulator| Surface {
-            map: channel.scan.heights(&triangulator, by_light, map),
+            map: channel.scan.heights(&triangulator, by_light, map, &|_| ()),
             triangulator,
         })
     });

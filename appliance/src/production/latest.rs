@@ -10,7 +10,7 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// Longest wait for the measuring task, which may be in the middle of a cycle.
+/// Longest wait until the measuring task, which may be in the middle of a cycle, takes a request.
 const PATIENCE: Duration = Duration::from_secs(3);
 /// Most requests that wait at a time.
 const MOST_WAITING: usize = 8;
@@ -35,16 +35,19 @@ impl LastCycleRequests {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Has the measuring task compute `answer`, and waits for it, 3 s at most. `None` if there are
-    /// no frames, too many requests wait, or the task is busy for longer: then the request stays in
-    /// the queue, and its answer is computed and dropped.
+    /// Has the measuring task compute `answer`, and waits for it: 3 s at most until it is begun, and
+    /// for as long as it takes then. `None` if there are no frames, too many requests wait, or the
+    /// task is busy for longer: then the request stays in the queue, and its answer is computed and
+    /// dropped.
     pub fn ask<T: Send + 'static>(
         &self,
         answer: impl FnOnce(&JudgedPart) -> T + Send + 'static,
     ) -> Option<T> {
         let (sender, receiver): (SyncSender<Option<T>>, _) = sync_channel(1);
+        let (begin, begun) = sync_channel(1);
         let request: Request = Box::new(move |cycle| {
             // The requester may have given up.
+            let _ = begin.send(());
             let _ = sender.send(cycle.map(answer));
         });
         let mut inside = self.inside();
@@ -53,7 +56,8 @@ impl LastCycleRequests {
         }
         inside.waiting.push(request);
         drop(inside);
-        receiver.recv_timeout(PATIENCE).ok().flatten()
+        begun.recv_timeout(PATIENCE).ok()?;
+        receiver.recv().ok().flatten()
     }
 
     /// The layers of the last cycle and the SEQ of its result. Those that were computed last are

@@ -12,6 +12,7 @@ pub mod shelf;
 pub mod simulation;
 pub mod stopwatch;
 mod teaching;
+mod telling;
 pub mod warm_up;
 
 pub use aborts::Aborts;
@@ -37,6 +38,8 @@ use crate::station::{
     StationHandle,
 };
 use crate::system::computing::Computing;
+use crate::system::headway::Headway;
+use crate::system::memory;
 use crate::system::notify::Pulse;
 use crate::system::progress::Progress;
 use hal::controller::{ControllerState, fault};
@@ -46,6 +49,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::{Duration, Instant};
+use telling::Telling;
 use warm_up::WarmUp;
 
 /// What the measuring task is to do.
@@ -137,7 +141,7 @@ impl Worker {
             let order = match orders.try_recv() {
                 Err(TryRecvError::Empty) => {
                     if self.last_cycle.wanted() {
-                        self.tell();
+                        self.answer();
                     }
                     orders.recv_timeout(SIGN_OF_LIFE)
                 }
@@ -157,10 +161,12 @@ impl Worker {
                 Ok(Order::Load(job, key)) => {
                     self.forget();
                     self.load(job, &key);
+                    memory::trim();
                 }
                 Ok(Order::Teach(job, number, keep_gauges)) => {
                     self.forget();
                     self.teach(job, number, keep_gauges);
+                    memory::trim();
                 }
                 Ok(Order::Commission(job)) => {
                     self.forget();
@@ -172,7 +178,10 @@ impl Worker {
                     self.station.event(Event::Alive);
                     self.look(look);
                 }
-                Ok(Order::Place(placing)) => placing.carry_out(),
+                Ok(Order::Place(placing)) => {
+                    placing.carry_out();
+                    memory::trim();
+                }
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
                     self.station.event(Event::Alive);
@@ -259,7 +268,7 @@ impl Worker {
     }
 
     /// Answers the requests about the last cycle.
-    fn tell(&self) {
+    fn answer(&self) {
         let (last, result) = (&self.last, self.station.snapshot().result.clone());
         let plan = self.plan.as_ref().filter(|_| !last.frames.is_empty());
         let measured = plan.zip(result);
@@ -277,7 +286,7 @@ impl Worker {
     /// Loads a recipe; if that fails, the one before stays active.
     fn load(&mut self, job: JobId, key: &RecipeKey) {
         let shown = self.plan.clone();
-        let (result, message) = match caught(|| self.prepare(key, shown)) {
+        let (result, message) = match caught(|| self.prepare((job, 0.0), key, shown)) {
             Ok(_) if self.aborts.has(job) => (RecipeResult::Busy, format!("load: {ABORTED}")),
             Ok((ready, fallback)) => {
                 let recipe = active(&ready);
@@ -319,10 +328,12 @@ impl Worker {
     }
 
     /// Makes a recipe ready to measure: plans it and loads its patterns. `shown` is the plan whose
-    /// patterns the head holds; if it is the one that is asked for, there is nothing to do. The
+    /// patterns the head holds; if it is the one that is asked for, there is nothing to do. `from` is
+    /// the share of the job that is done before. The
     /// second result warns that the previous generation of the recipe is used.
     fn prepare(
         &mut self,
+        (job, from): (JobId, f64),
         key: &RecipeKey,
         shown: Option<Arc<Plan>>,
     ) -> Result<(Arc<Plan>, Option<String>), (RecipeResult, String)> {
@@ -341,6 +352,15 @@ impl Worker {
             RecipeKey::Number(number) => *number,
             RecipeKey::PartNumber(part_number) => self.recipes.find(part_number).map_err(refuse)?,
         };
+        let telling = Telling::new(
+            &self.station,
+            &self.pulse,
+            &self.progress,
+            (&self.aborts, job),
+        );
+        let tell = |share: f64, words: &str| telling.tell(share, words);
+        let headway = Headway::new(&tell, "reading the recipe").part(from, 1.0);
+        headway.done(0.0);
         let stamp = self.recipes.stamp(number);
         let (pool, calibration) = (&self.pool, &self.opened.calibration);
         let fingerprint = calibration.fingerprint();
@@ -354,10 +374,11 @@ impl Worker {
                 // Before the arrays of the next recipe are read.
                 self.shelf.make_room(stamp.as_ref().map_or(0, Stamp::bytes));
                 let loaded = self.recipes.load(number).map_err(refuse)?;
+                let headway = headway.part(0.2, 0.8).called("planning");
                 let (played, simulated) = (&self.opened.played, self.opened.stage.is_some());
                 let planned = pool.install(|| match played {
                     Some(played) => played.plan(loaded.recipe, calibration),
-                    None => Plan::new(loaded.recipe, calibration, simulated),
+                    None => Plan::telling(loaded.recipe, calibration, simulated, headway),
                 });
                 let plan = Arc::new(planned.map_err(refuse_plan)?);
                 // The plan of the previous generation does not belong to the stamp of the newest
@@ -371,6 +392,7 @@ impl Worker {
         if shown.is_some_and(|shown| Arc::ptr_eq(&shown, &plan)) {
             return Ok((plan, fallback));
         }
+        headway.called("loading the patterns").done(0.8);
         let head = &mut self.opened.head;
         pool.install(|| plan.load(head, calibration))
             .map_err(|error| {
@@ -399,19 +421,21 @@ fn refuse_plan(error: PlanError) -> (RecipeResult, String) {
 pub(crate) fn caught<T>(
     prepare: impl FnOnce() -> Result<T, (RecipeResult, String)>,
 ) -> Result<T, (RecipeResult, String)> {
-    catch_unwind(AssertUnwindSafe(prepare)).unwrap_or_else(|panic| Err(broken(&*panic)))
+    catch_unwind(AssertUnwindSafe(prepare)).unwrap_or_else(|panic| {
+        let words = broken("load: the recipe", &*panic);
+        let message = format!(
+            "{words}: it stays stored and is not used; teach it again, and send its file with the diagnostic bundle"
+        );
+        Err((RecipeResult::Unfit, message))
+    })
 }
 
-/// The refusal of a recipe that made the computation panic.
-fn broken(panic: &(dyn Any + Send)) -> (RecipeResult, String) {
+/// What made the computation panic, in words.
+fn broken(what: &str, panic: &(dyn Any + Send)) -> String {
     let said = panic.downcast_ref::<String>().map(String::as_str);
     let said = said.or(panic.downcast_ref::<&str>().copied());
-    let message = format!(
-        "load: the recipe breaks the computation ({}): it stays stored and is not used; teach it again, and send its file \
-         with the diagnostic bundle",
-        said.unwrap_or("the log has more")
-    );
-    (RecipeResult::Unfit, message)
+    let said = said.unwrap_or("the log has more");
+    format!("{what} breaks the computation ({said})")
 }
 
 fn active(plan: &Plan) -> ActiveRecipe {

@@ -8,6 +8,7 @@ use crate::error::{Exit, Failure, Result, code_of};
 use crate::production::backend::{self, Opened};
 use crate::station::{Event, StationHandle, error_code};
 use crate::system::computing::Computing;
+use crate::system::memory;
 use crate::system::notify::Pulse;
 use crate::system::progress::Progress;
 use sim::Stage;
@@ -43,6 +44,7 @@ impl Opening<'_> {
     ) -> Option<(Opened, Event)> {
         let on_progress = |share: f64| {
             self.pulse.beat();
+            self.station.event(Event::Alive);
             self.progress
                 .tell(share, "working out the light of the scene");
         };
@@ -60,6 +62,7 @@ impl Opening<'_> {
             };
             match opened {
                 Ok(head) => {
+                    memory::trim();
                     // The receiver is gone if the start was given up.
                     drop(outcome.send(Ok(head.stage.clone())));
                     let event = match reported.is_empty() {

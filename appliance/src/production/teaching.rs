@@ -1,27 +1,42 @@
 //! Teaching on the station: from the part in front of the head to a stored recipe that is ready to
 //! measure.
 
-use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, recovery};
-use crate::recipe::teach::{TaughtRecipe, TeachError, teach_while};
+use super::telling::Telling;
+use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, recovery};
+use crate::recipe::teach::{TaughtRecipe, TeachError, teach_marking};
 use crate::recipe::{RecipeFile, replace};
-use crate::station::{Event, JobId, RecipeKey, StationHandle, error_code};
+use crate::station::{Event, JobId, RecipeKey, error_code};
+use crate::system::headway::Headway;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+
+/// The shares of a teach's time after which the recipe is taught, its gauges are settled, and it is
+/// stored.
+const TAUGHT: f64 = 0.86;
+const SETTLED: f64 = 0.92;
+const STORED: f64 = 0.94;
 
 impl Worker {
     /// Teaches the part in front of the head and stores it as recipe `number`; it is the active one
     /// then. Where that fails the recipe before stays active.
     pub(super) fn teach(&mut self, job: JobId, number: u16, keep_gauges: bool) {
         let replaced = self.recipes.present(number);
-        let taught = self
-            .taught(job, number, replaced.as_ref(), keep_gauges)
+        let taught = catch_unwind(AssertUnwindSafe(|| {
+            self.taught(job, number, replaced.as_ref(), keep_gauges)
+        }));
+        let taught = taught
+            .unwrap_or_else(|panic| Err(TeachError::Rig(broken("teach: the part", &*panic))))
             .and_then(|taught| self.check_taught(job).map(|()| taught));
         self.progress.clear();
+        let telling = (&self.aborts, job);
+        Telling::new(&self.station, &self.pulse, &self.progress, telling)
+            .tell(SETTLED, "storing the recipe");
         let stored = match taught {
             Ok(taught) => self.store(&taught, replaced.filter(|_| keep_gauges)),
             Err(error) => Err(self.refuse_teaching(error)),
         };
         let ready = stored.and_then(|()| {
             // Teaching has shown patterns of its own.
-            self.prepare(&RecipeKey::Number(number), None)
+            self.prepare((job, STORED), &RecipeKey::Number(number), None)
                 .map_err(|(_, message)| (error_code::RIG, message))
         });
         match ready {
@@ -64,37 +79,37 @@ impl Worker {
         let naming = replace::naming(number, replaced);
         let shared = self.recipes.refuse_shared(number, &naming.part_number);
         shared.map_err(TeachError::Rig)?;
-        let (station, bar, aborts) = (&self.station, &self.progress, &self.aborts);
-        let (pulse, computing) = (&self.pulse, &self.computing);
-        let progress = |fraction: f64, words: &str| {
-            pulse.beat();
-            bar.tell(fraction, words);
-            tell(station, job, fraction, words);
-            !aborts.has(job)
-        };
+        let telling = (&self.aborts, job);
+        let telling = Telling::new(&self.station, &self.pulse, &self.progress, telling);
+        let tell = |share: f64, words: &str| telling.tell(share, words);
+        let headway = Headway::new(&tell, "teaching");
         let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
+        let computing = &self.computing;
         let taught = self.pool.install(|| {
-            teach_while(
+            let headway = headway.part(0.0, TAUGHT);
+            teach_marking(
                 head,
                 calibration,
                 &naming,
                 DEVICE_TIMEOUT,
                 computing,
-                &progress,
+                headway,
             )
         })?;
-        match kept {
+        let headway = headway.part(TAUGHT, SETTLED);
+        let settled = match kept {
             Some(file) => {
-                let kept = || replace::keep_gauges(taught, file);
-                let kept = self.computing.on(|| self.pool.install(kept));
-                kept.map_err(TeachError::Rig)
+                let headway = headway.called("working out the limits of the gauges");
+                let kept = || replace::keep_gauges(taught, file, headway);
+                self.computing.on(|| self.pool.install(kept))
             }
             None => {
-                let circles = || taught.with_circles();
-                let circles = self.computing.on(|| self.pool.install(circles));
-                circles.map_err(TeachError::Rig)
+                let headway = headway.called("looking for round openings");
+                let circles = || taught.with_circles(headway);
+                self.computing.on(|| self.pool.install(circles))
             }
-        }
+        };
+        settled.map_err(TeachError::Rig)
     }
 
     /// ERROR_CODE and words of a failure; a lost head is remembered.
@@ -135,11 +150,11 @@ impl Worker {
         let Some((stage, placed)) = self.opened.stage.as_ref().zip(self.waiting.take()) else {
             return;
         };
-        let (station, pulse) = (&self.station, &self.pulse);
+        let telling = (&self.aborts, job);
+        let telling = Telling::new(&self.station, &self.pulse, &self.progress, telling);
+        let words = "putting the part in front of the head";
         let progress = |share: f64| {
-            pulse.beat();
-            let words = "putting the part in front of the head";
-            tell(station, job, share, words);
+            telling.tell(share, words);
         };
         let (part, lies) = (&placed.part, &placed.placement);
         let place = || stage.place_with_progress(part, placed.material, lies, &progress);
@@ -148,13 +163,4 @@ impl Worker {
             self.progress.warn(&error.to_string());
         }
     }
-}
-
-/// Tells the station how far a job is.
-fn tell(station: &StationHandle, job: JobId, fraction: f64, words: &str) {
-    station.event(Event::Progress {
-        job,
-        fraction: fraction as f32,
-        words: words.into(),
-    });
 }

@@ -10,6 +10,7 @@ use algo::adaptive::{Blur, Optics, ProjectorMap, Spread};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::Trust;
+use algo::pipeline::Progress;
 use algo::units::{AbsolutePhase, Height};
 
 /// Pitch of the preliminary pattern, projector pixels (c·p_P of the paper).
@@ -51,6 +52,7 @@ impl Preliminary {
 
     /// The pattern for the part that was measured with these fringes: that of least error for the
     /// part's light, the noise of the camera and the blur that the part and the calibration show.
+    /// `progress` gets the share that is done.
     ///
     /// # Errors
     /// If nothing of the part is known, or its pattern cannot be shown.
@@ -58,6 +60,7 @@ impl Preliminary {
         &self,
         part: &Measured,
         calibration: &Calibration,
+        progress: Progress<'_>,
     ) -> Result<AdaptivePattern, TeachError> {
         let map = ProjectorMap::from_heights(&part.triangulator, &part.heights);
         let slopes = map.slopes(noise::MAX_SLOPE);
@@ -68,6 +71,7 @@ impl Preliminary {
             1.0 / PRELIMINARY_PITCH_PX,
             &blur,
             Some(calibration.noise_counts),
+            &|share| progress(0.1 + 0.4 * share),
         );
         let optics = Optics {
             blur,
@@ -75,7 +79,9 @@ impl Preliminary {
             image_pitch: noise::IMAGE_PITCH,
         };
         let (columns, rows) = (self.function.columns(), self.function.rows());
-        let function = noise::adapt(&map, columns, rows, &optics, &light)?;
+        let function = noise::adapt(&map, columns, rows, &optics, &light, &|share| {
+            progress(0.5 + 0.4 * share);
+        })?;
         let trusted = map.without_blurred_silhouettes(blur.camera);
         Ok(AdaptivePattern {
             expected: trusted.expected_phase(&function),

@@ -41,7 +41,7 @@ impl GoldenPart<'_> {
         let candidates = candidates(self.calibration.waveforms(), self.full);
         let rated = |(kind, frames)| self.rated(kind, frames, arrays);
         let mut sequences: Vec<_> = candidates.into_iter().map(rated).collect();
-        for (sequence, offsets) in sequences.iter_mut().zip(self.offsets) {
+        for (sequence, offsets) in sequences.iter_mut().zip(&self.offsets) {
             sequence.ripple_mm = Some(self.ripple(offsets, arrays));
         }
         // Each other sequence's periodic error is measured against the full sequence, whose own is

@@ -14,6 +14,7 @@ use crate::head::calibrated::CalibratedHead;
 use crate::head::means;
 use crate::head::rasters::Illumination;
 use crate::head::scan::Scan;
+use crate::system::headway::Headway;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Sequence, Shot};
@@ -54,8 +55,8 @@ pub struct Captured {
 
 impl Captured {
     /// Measures the part in this light with sequences of a phase function; the last is the full
-    /// one. That is unwrapped about `expected`, the others about its result. `progress` gets the
-    /// share of the frames taken and may end the measurement by `false`.
+    /// one. That is unwrapped about `expected`, the others about its result. It ends early where
+    /// `headway` says so.
     ///
     /// # Errors
     /// As [`super::teach::teach`].
@@ -69,7 +70,7 @@ impl Captured {
         function: &PhaseFunction,
         sequences: &[&[Shot]],
         expected: &[AbsolutePhase],
-        progress: &dyn Fn(f64) -> bool,
+        headway: Headway<'_>,
     ) -> Result<Self, TeachError> {
         let [short @ .., full] = sequences else {
             return Err(TeachError::Rig("there is no sequence".into()));
@@ -91,11 +92,13 @@ impl Captured {
         let (mut noise, mut offset_counts) = (calibration.noise, None);
         let mut signals: Vec<Vec<i16>> = Vec::new();
         for mean in 0..MEANS {
-            let share = |share: f64| progress((mean as f64 + share) / MEANS as f64);
-            let means = means::take(head, shots.len(), *timeout, &share)?;
+            let taking = headway.part(0.45 * mean as f64, 0.45 * (mean + 1) as f64);
+            let taken = |share: f64| taking.tell(0.8 * share);
+            let means = means::take(head, shots.len(), *timeout, &taken)?;
             let means = means.ok_or(TeachError::Ended)?;
             let (by_modulation, offset, phases) =
                 decode(full, &means, expected).map_err(TeachError::rig)?;
+            taking.done(0.85);
             (noise, offset_counts) = (by_modulation, offset);
             let seen = scan(function, (&shots, full), &means).map_err(TeachError::rig)?;
             let most = seen.decoder.full_scale();
@@ -119,7 +122,13 @@ impl Captured {
             return Err(TeachError::Ended);
         };
         average(&mut phases, &other);
-        let heights = pipeline::triangulate(&triangulator, &decoder, Some(noise), &mut phases);
+        let heights = pipeline::triangulate(
+            &triangulator,
+            &decoder,
+            Some(noise),
+            &mut phases,
+            &|share| headway.part(0.9, 1.0).done(share),
+        );
         Ok(Self {
             phases,
             heights,

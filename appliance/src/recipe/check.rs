@@ -224,7 +224,7 @@ impl Recipe {
                 file.exposures
             ));
         }
-        let mut sides = arrays.smoothing.clone();
+        let mut sides = arrays.smoothing.to_vec();
         sides.sort_unstable();
         sides.dedup();
         if sides.len() > MAX_SIDES || sides.iter().any(|&side| side > 0 && side % 2 == 0) {
@@ -239,7 +239,7 @@ impl Recipe {
                 PhaseFunction::horizontal(columns, rows, fringes)
             }
             PatternFile::File => {
-                PhaseFunction::sampled(columns, rows, arrays.phase_function.clone())
+                PhaseFunction::sampled(columns, rows, arrays.phase_function.to_vec())
             }
         };
         let function = function.map_err(|error| format!("projector and pattern: {error}"))?;

@@ -5,6 +5,7 @@ use super::golden::TaughtRecipe;
 use super::judging::check_unique;
 use super::store::LoadedRecipe;
 use super::{ChangeError, DatumFile, FeatureFile, GaugeFile, Recipe, RecipeFile, Store};
+use crate::system::headway::Headway;
 use hal::bounds::clipped;
 use serde::Deserialize;
 
@@ -70,7 +71,8 @@ pub fn edit(
     edit.apply(&mut file);
     file.set_gauges_of(&before).map_err(ChangeError::Unfit)?;
     // Tighter limits may need a longer sequence, wider ones a shorter one.
-    let changed = TaughtRecipe::of(file, recipe.arrays).map_err(ChangeError::Unfit)?;
+    let changed =
+        TaughtRecipe::of(file, recipe.arrays, Headway::silent()).map_err(ChangeError::Unfit)?;
     fits(changed.recipe).map_err(ChangeError::Unfit)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
     match store.replace(number, &fingerprint, &changed.bytes) {

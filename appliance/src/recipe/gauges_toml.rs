@@ -8,6 +8,7 @@ use super::file::RecipeFile;
 use super::gauge_keys::placeless;
 use super::golden::TaughtRecipe;
 use super::{DatumFile, FeatureFile, GaugeFile};
+use crate::system::headway::Headway;
 use hal::bounds::{clipped, shortened};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -133,7 +134,7 @@ impl Gauging {
         file.gauges.sort_by_key(|gauge| gauge.slot);
         file.set_gauges_of(before)?;
         file.check_bounds()?;
-        TaughtRecipe::of(file, arrays)
+        TaughtRecipe::of(file, arrays, Headway::silent())
     }
 }
 

@@ -180,13 +180,13 @@ mod tests {
             "gauges": [{ "slot": 1, "name": "coverage", "kind": "coverage", "of": ["frame"], "low": 0.5 }],
         });
         let arrays = Arrays {
-            golden_phase: vec![0.0; 16],
-            golden_height: vec![0.0; 16],
-            height_slope: vec![1.0; 16],
-            height_curvature: vec![0.0; 16],
-            valid: vec![1; 16],
-            modulation: vec![50.0; 16],
-            phase_reach: vec![0.1; 16],
+            golden_phase: vec![0.0; 16].into(),
+            golden_height: vec![0.0; 16].into(),
+            height_slope: vec![1.0; 16].into(),
+            height_curvature: vec![0.0; 16].into(),
+            valid: vec![1; 16].into(),
+            modulation: vec![50.0; 16].into(),
+            phase_reach: vec![0.1; 16].into(),
             ..Arrays::default()
         };
         archive::pack(&serde_json::from_value(file).unwrap(), &arrays)

@@ -11,6 +11,7 @@ use super::sides::SIDES;
 use super::{AlignmentKind, FeatureFile, GaugeFile, PatternFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
+use crate::system::headway::Headway;
 use algo::adaptive::phase_reach;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
@@ -70,18 +71,18 @@ pub struct GoldenPart<'a> {
     /// What each frame of the full sequence shows.
     pub full: &'a [Shot],
     /// How these frames were decoded.
-    pub decoder: &'a Decoder,
+    pub decoder: Decoder,
     /// The geometry with its phase function.
-    pub triangulator: &'a Triangulator,
+    pub triangulator: Triangulator,
     /// Golden phase of each camera pixel, with its modulation and trust.
-    pub phases: &'a PhaseMap,
+    pub phases: PhaseMap,
     /// Golden height of each camera pixel, with the σ of one capture.
-    pub heights: &'a HeightMap,
+    pub heights: HeightMap,
     /// For each of the other sequences, in their order, its phase less `phases`; empty if they were
     /// not measured.
-    pub offsets: &'a [Offsets],
+    pub offsets: Vec<Offsets>,
     /// Golden's signal, as [`Arrays::golden_signal`].
-    pub signal: &'a [i16],
+    pub signal: Vec<i16>,
     /// The noise of a sample by the modulation of its pixel in one capture.
     pub noise: SampleNoise,
     /// Median of the mean samples of the part's pixels, counts; `None` where it was not measured.
@@ -91,6 +92,17 @@ pub struct GoldenPart<'a> {
     pub captures: usize,
     /// Fixed against adaptive pattern, if a fixed one was measured as well.
     pub comparison: Option<ComparisonFile>,
+}
+
+/// A recipe that is not packed yet.
+#[derive(Debug)]
+pub struct UnsealedRecipe {
+    /// The file, without its fingerprint.
+    pub manifest: RecipeFile,
+    /// Its arrays.
+    pub arrays: Arrays,
+    /// The production sequence, with the reasons.
+    pub choice: Choice,
 }
 
 /// A finished recipe.
@@ -125,20 +137,30 @@ impl TaughtRecipe {
     }
 
     pub(super) fn sealed(
-        mut manifest: RecipeFile,
+        manifest: RecipeFile,
         arrays: Arrays,
         choice: Choice,
     ) -> Result<Self, String> {
-        let mut recipe = Recipe::check(&manifest, arrays)?;
-        let (bytes, fingerprint) = archive::pack(&manifest, &recipe.arrays)?;
-        recipe.id.fingerprint.clone_from(&fingerprint);
-        manifest.fingerprint = fingerprint;
+        let (bytes, _) = archive::pack(&manifest, &arrays)?;
+        // Read back as after a restart, so that what was made is known to load.
+        let manifest = archive::manifest(Cursor::new(&bytes))?;
+        let recipe = Recipe::check(&manifest, arrays)?;
         Ok(Self {
             bytes,
             manifest,
             recipe,
             choice,
         })
+    }
+}
+
+impl UnsealedRecipe {
+    /// Packs it.
+    ///
+    /// # Errors
+    /// In words, if it could not be packed, or not be loaded again.
+    pub fn seal(self) -> Result<TaughtRecipe, String> {
+        TaughtRecipe::sealed(self.manifest, self.arrays, self.choice)
     }
 }
 
@@ -149,8 +171,12 @@ impl GoldenPart<'_> {
     /// part that have 60 pixels and room for a region, the coverage of the opening.
     ///
     /// # Errors
-    /// In words, if the recipe could not be packed, or not be loaded again.
-    pub fn recipe(&self, naming: &Naming) -> Result<TaughtRecipe, String> {
+    /// In words, if the recipe does not fit the head.
+    pub fn recipe(
+        mut self,
+        naming: &Naming,
+        headway: Headway<'_>,
+    ) -> Result<UnsealedRecipe, String> {
         // A highlight is not resolved either, but it is no opening: it moves over the part.
         let seen = |trust: &Trust| matches!(trust, Trust::Resolved | Trust::Saturated);
         let seen: Vec<bool> = self.phases.trust.iter().map(seen).collect();
@@ -160,8 +186,14 @@ impl GoldenPart<'_> {
             phase: self.phases.phase.clone(),
             height: self.heights.height.clone(),
         };
-        let mut arrays = self.arrays(&surface, naming.placement_tolerance_mm);
+        let mut arrays = self.arrays(
+            &surface,
+            naming.placement_tolerance_mm,
+            headway.part(0.0, 0.15),
+        );
         let sequences = self.sequences(&arrays);
+        self.release();
+        headway.done(0.2);
         let choice = planner::choose(&sequences, &gauges, 0);
         let range = self.triangulator.range();
         let calibration = self.calibration;
@@ -214,36 +246,49 @@ impl GoldenPart<'_> {
             good_parts: None,
             tried: Vec::new(),
         };
-        let mut words = self.set_limits(surface, &mut manifest, &mut arrays)?;
+        let mut words =
+            self.set_limits(surface, &mut manifest, &mut arrays, headway.part(0.2, 0.95))?;
         // The smaller the squares, the less noise is allowed.
         let widest = arrays.widest();
         let mut choice = planner::choose(&manifest.sequences, &manifest.gauges, widest);
         manifest.production = choice.production;
         choice.reasons.append(&mut words);
-        let (bytes, _) = archive::pack(&manifest, &arrays)?;
-        drop(arrays);
-        // Read back as after a restart, so that what was taught is known to load.
-        let (manifest, arrays) = archive::unpack(Cursor::new(&bytes), bytes.len() as u64)?;
-        let recipe = Recipe::check(&manifest, arrays)?;
-        Ok(TaughtRecipe {
-            bytes,
+        Ok(UnsealedRecipe {
             manifest,
-            recipe,
+            arrays,
             choice,
         })
     }
 
-    fn arrays(&self, surface: &KnownSurface, placement_tolerance_mm: f64) -> Arrays {
-        let (phases, heights) = (self.phases, self.heights);
+    /// Frees what the recipe's arrays hold as well: 40 MB at 1456 × 1088 pixels.
+    fn release(&mut self) {
+        self.phases.phase = Vec::new();
+        (self.heights.height, self.heights.sigma) = (Vec::new(), Vec::new());
+        self.signal = Vec::new();
+        self.offsets
+            .iter_mut()
+            .for_each(|of| *of = Offsets::default());
+    }
+
+    fn arrays(
+        &self,
+        surface: &KnownSurface,
+        placement_tolerance_mm: f64,
+        headway: Headway<'_>,
+    ) -> Arrays {
+        let (phases, heights) = (&self.phases, &self.heights);
         let width = phases.width;
         let resolved = |at: usize| phases.trust[at] == Trust::Resolved;
         let mut expansions = vec![[f32::NAN; 2]; phases.phase.len()];
+        let rows = phases.phase.len() / width.max(1);
         pipeline::for_each_row(&mut expansions, width, |v, row| {
+            // Rows are done in another order, which is near enough.
+            headway.done(0.8 * v as f64 / rows as f64);
             for (u, [first, second]) in row.iter_mut().enumerate() {
                 let at = v * width + u;
-                let phase = phases.phase[at].turns();
+                let (phase, height) = (phases.phase[at].turns(), heights.height[at].mm());
                 let expansion = resolved(at)
-                    .then(|| self.triangulator.expand(u as f64, v as f64, phase))
+                    .then(|| self.triangulator.expand(u as f64, v as f64, phase, height))
                     .flatten();
                 if let Some(expansion) = expansion {
                     (*first, *second) = (expansion.first as f32, expansion.second as f32);
@@ -263,8 +308,8 @@ impl GoldenPart<'_> {
         };
         Arrays {
             phase_function: match self.pattern {
-                PatternFile::File => function.turns(),
-                PatternFile::Vertical { .. } | PatternFile::Horizontal { .. } => Vec::new(),
+                PatternFile::File => function.turns().into(),
+                PatternFile::Vertical { .. } | PatternFile::Horizontal { .. } => [].into(),
             },
             golden_phase: (0..phases.phase.len()).map(turns).collect(),
             golden_height: heights
@@ -283,11 +328,11 @@ impl GoldenPart<'_> {
                 .iter()
                 .map(|modulation| modulation.counts(full_scale) as f32)
                 .collect(),
-            phase_reach: phase_reach(self.triangulator, surface, placement_tolerance_mm),
+            phase_reach: phase_reach(&self.triangulator, surface, placement_tolerance_mm).into(),
             sequence_offset: self.offsets.iter().flat_map(mean).collect(),
-            amplitude: self.illumination.amplitude.clone(),
-            smoothing: Vec::new(),
-            golden_signal: self.signal.to_vec(),
+            amplitude: self.illumination.amplitude.as_slice().into(),
+            smoothing: [].into(),
+            golden_signal: self.signal.as_slice().into(),
         }
     }
 }

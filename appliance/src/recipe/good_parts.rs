@@ -9,16 +9,18 @@
 //! Squares are as small as noise allows about each pixel: their largest deviation on good parts
 //! stays below a third of the limit, so that small deep defects are seen at nearly their depth
 //! (`sides`). Parts that lie elsewhere than golden deviate by more than noise, as golden is
-//! interpolated between pixels: teaching tries that with golden, displaced (`proof`).
+//! interpolated between pixels: what that misses is worked out (`algo::inspect::Missed`), and
+//! teaching tries golden, displaced (`proof`).
 //!
 //! Leaving such pixels out instead misses nearly all dents among them
 //! (`dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_pixels`).
 
-use super::sides::{Farthest, SIDES, SIGMAS, Sides};
+use super::sides::{SIDES, SIGMAS, Sides};
 use crate::station::Unit;
+use crate::system::headway::Headway;
 use algo::geometry::Triangulator;
 use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_variance};
-use algo::inspect::{GoldenSurface, Largest, Taught, Weight, normal_shares};
+use algo::inspect::{GoldenSurface, Largest, Missed, Taught, Weight, normal_shares};
 use algo::pipeline::KnownSurface;
 use hal::bounded;
 use std::ops::RangeInclusive;
@@ -107,16 +109,19 @@ pub(super) struct Weighed {
     /// The variances of [`DeviationNoise`].
     pixel: Vec<f32>,
     motion: Vec<f32>,
+    /// Shares of height differences along the normal.
+    shares: Vec<f32>,
 }
 
 impl Noise<'_> {
     /// The limit of the deviation for a tolerance, and the weights of the pixels for this limit, in
     /// squares of the largest side. `mask` is not 0 where the part can be compared.
-    pub fn weigh(&self, mask: &[u8], tolerance_mm: f64) -> Weighed {
+    pub fn weigh(&self, mask: &[u8], tolerance_mm: f64, headway: Headway<'_>) -> Weighed {
         let width = self.surface.width;
         let valid: Vec<bool> = mask.iter().map(|&valid| valid != 0).collect();
         let both = 1.0 + self.golden as f32;
         let shares = normal_shares(self.triangulator, &self.surface);
+        headway.done(0.2);
         let along_normal = |(variance, share): (&f32, &f32)| variance * share * share * both;
         let pixel = self.production.iter().zip(&shares).map(along_normal);
         let pixel: Vec<f32> = pixel.collect();
@@ -132,12 +137,14 @@ impl Noise<'_> {
         // The motion is found from pixels that count in full, and which do depends on the motion:
         // each is worked out once.
         let (_, weights) = limited(&noise, &valid, tolerance_mm);
+        headway.done(0.35);
         let taught = self.taught(&weights);
         let window = vec![0..width; valid.len() / width.max(1)];
         let mut motion = motion_variance(self.golden_surface(&taught), whole, &window);
         for (variance, share) in motion.iter_mut().zip(&shares) {
             *variance = along_normal((variance, share));
         }
+        headway.done(0.6);
         noise.motion = &motion;
         let (limit_mm, weights) = limited(&noise, &valid, tolerance_mm);
         let (mut all, mut weighed) = (0.0, 0.0);
@@ -146,6 +153,7 @@ impl Noise<'_> {
             all += area;
             weighed += if weight.partial() { area } else { 0.0 };
         }
+        headway.done(0.85);
         let compared = weights.iter().filter(|weight| weight.compared());
         let least_weight = compared
             .clone()
@@ -160,19 +168,24 @@ impl Noise<'_> {
             ..GoodPartsFile::default()
         };
         let mut weighed = Weighed {
+            shares,
             found,
             width,
             weights,
             pixel,
             motion,
         };
-        let largest = weighed.predict(&Sides::largest());
+        let sides = Sides::largest();
+        let [sigmas] = weighed.sigmas([sides.smallest]);
+        let largest = weighed.predict(&sides, std::iter::once((sides.smallest, sigmas)));
         if largest.beyond(limit_mm) > BEYOND {
-            weighed.found.limit_mm = rounded_up(largest.limit(BEYOND));
-            weighed.predict(&Sides::largest());
+            let limit_mm = rounded_up(largest.limit(BEYOND));
+            weighed.found.limit_mm = limit_mm;
+            weighed.found.beyond = largest.beyond(limit_mm);
         }
         weighed
     }
+
     /// Golden with these weights, and with the noise that production takes it to have ([`Taught`]).
     fn taught(&self, weights: &[Weight]) -> Taught {
         let sigmas = self
@@ -199,56 +212,71 @@ impl Weighed {
         self.weights.iter().map(|weight| weight.bits()).collect()
     }
 
-    /// Sets what good parts are predicted to deviate by in squares of these sides; returns the
-    /// distribution.
-    pub fn predict(&mut self, sides: &Sides) -> LargestDeviation {
-        let mut largest = LargestDeviation::default();
+    /// The places that are compared.
+    pub fn places(&self) -> impl Iterator<Item = usize> {
         let compared = |place: &usize| self.weights[*place].compared();
-        let places = || (0..self.weights.len()).filter(compared);
-        for side in sides.all() {
-            let mut sigmas = self.sigmas(side);
-            for (place, sigma) in sigmas.iter_mut().enumerate() {
-                *sigma = if sides.at(place) == side {
-                    *sigma
-                } else {
-                    f32::NAN
-                };
-            }
-            largest.add(LargestDeviation::new(&sigmas, self.width, side));
-        }
-        let wider = places().filter(|place| sides.at(*place) > sides.smallest);
-        let (wider, all) = (wider.count(), places().count());
-        let found = &mut self.found;
-        (found.largest_mm, found.scatter_mm) = largest.mean_and_scatter();
-        found.beyond = largest.beyond(found.limit_mm);
-        found.smoothing_px = sides.smallest;
-        let widest = sides.all().into_iter().max();
-        found.wider_px = widest.filter(|side| *side > sides.smallest).unwrap_or(0);
-        found.wider = wider as f64 / all.max(1) as f64;
-        largest
+        (0..self.weights.len()).filter(compared)
     }
 
-    /// Squares as small as noise allows, and as `farthest` does, where the image of a part moves by
-    /// up to `away` pixels.
-    pub fn sides(&self, farthest: &Farthest, away: usize) -> Sides {
-        let sigmas = SIDES.map(|side| self.sigmas(side));
+    /// Gives the part squares as small as noise and golden's interpolation allow, where the image of
+    /// a part moves by up to `away` pixels, and sets what good parts are predicted to deviate by in
+    /// them. The second result is what displaced parts deviate by at their sharpest crease, mm.
+    pub fn settle(&mut self, noise: &Noise<'_>, away: usize) -> (Sides, f64) {
+        let sigmas = self.sigmas(SIDES);
         let full = |place: usize| {
             let weight = self.weights[place];
             weight.compared().then_some(!weight.partial())
         };
+        let missed = Missed::new(&noise.surface, &self.shares, &self.weights);
+        let bent = |place, side| missed.at(place, side);
         let limit = self.found.limit_mm;
-        Sides::new((&sigmas, farthest), full, limit, (self.width, away))
+        let sides = Sides::new((&sigmas, bent), full, limit, (self.width, away));
+        let bend = sides.bend(&missed, self.places());
+        drop(missed);
+        self.predict(&sides, SIDES.into_iter().zip(sigmas));
+        (sides, bend)
     }
 
-    /// σ of the mean over the square of `side` pixels about each pixel, mm; NaN where there is
+    /// Sets what good parts are predicted to deviate by in squares of these sides; returns the
+    /// distribution. `sigmas` has σ of the means over all squares of each side, mm.
+    fn predict(
+        &mut self,
+        sides: &Sides,
+        sigmas: impl Iterator<Item = (usize, Vec<f32>)>,
+    ) -> LargestDeviation {
+        let mut largest = LargestDeviation::default();
+        let all = sides.all();
+        for (side, mut sigmas) in sigmas.filter(|(side, _)| all.contains(side)) {
+            for (place, sigma) in sigmas.iter_mut().enumerate() {
+                if sides.at(place) != side {
+                    *sigma = f32::NAN;
+                }
+            }
+            largest.add(LargestDeviation::new(&sigmas, self.width, side));
+        }
+        let wider = self
+            .places()
+            .filter(|place| sides.at(*place) > sides.smallest);
+        let (wider, places) = (wider.count(), self.places().count());
+        let found = &mut self.found;
+        (found.largest_mm, found.scatter_mm) = largest.mean_and_scatter();
+        found.beyond = largest.beyond(found.limit_mm);
+        found.smoothing_px = sides.smallest;
+        let widest = all.into_iter().max();
+        found.wider_px = widest.filter(|side| *side > sides.smallest).unwrap_or(0);
+        found.wider = wider as f64 / places.max(1) as f64;
+        largest
+    }
+
+    /// σ of the means over the squares of these sides about each pixel, mm; NaN where there is
     /// none.
-    fn sigmas(&self, side: usize) -> Vec<f32> {
+    fn sigmas<const N: usize>(&self, sides: [usize; N]) -> [Vec<f32>; N] {
         let noise = DeviationNoise {
             width: self.width,
             pixel: &self.pixel,
             motion: &self.motion,
         };
-        noise.of_squares(&self.weights, side)
+        noise.of_squares(&self.weights, sides)
     }
 }
 

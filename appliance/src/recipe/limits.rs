@@ -4,15 +4,16 @@
 use super::archive::Arrays;
 use super::golden::GoldenPart;
 use super::good_parts::{DENT, DEVIATION_MM, GoodPartsFile, Noise};
+use super::plan::window;
 use super::proof::{self, COVERAGE_CHANGE, Magnitudes, Proof};
-use super::sides::Farthest;
 use super::{GaugeFile, RecipeFile, SequenceFile};
 use crate::station::Inspection;
+use crate::system::headway::Headway;
 use algo::inspect::{Basis, Measure};
 use algo::pipeline::KnownSurface;
 
 /// What displaced parts deviate by beside their sharpest creases, and how far that scatters from
-/// placement to placement, as multiples of what is worked out: golden knows only what its pixels
+/// placement to placement, as multiples of what golden's interpolation misses: golden knows only what its pixels
 /// see of a crease (parts in front of the simulated head: `tests/suite/every_part.rs`).
 const BEND: f64 = 2.0;
 const BEND_SPREAD: f64 = 0.12;
@@ -27,14 +28,16 @@ impl GoldenPart<'_> {
         surface: KnownSurface,
         manifest: &mut RecipeFile,
         arrays: &mut Arrays,
+        headway: Headway<'_>,
     ) -> Result<Vec<String>, String> {
         let (sequences, production) = (&manifest.sequences, manifest.production);
         let expected = sequences[production..].iter();
         let expected = expected.filter_map(|of| self.expected_coverage(of, &arrays.phase_reach));
         let coverage = expected.fold(f64::INFINITY, f64::min) - COVERAGE_CHANGE;
         let noise = self.noise(surface, arrays, sequences, production);
-        let mut weighed = noise.weigh(&arrays.valid, DEVIATION_MM);
-        arrays.valid = weighed.bits();
+        let weighing = headway.part(0.0, 0.2);
+        let mut weighed = noise.weigh(&arrays.valid, DEVIATION_MM, weighing.part(0.0, 0.7));
+        arrays.valid = weighed.bits().into();
         for gauge in &mut manifest.gauges {
             match gauge.measures.facts().basis {
                 Basis::Squares(_) => set_deviation(gauge, &weighed.found),
@@ -43,18 +46,18 @@ impl GoldenPart<'_> {
                 _ => {}
             }
         }
-        let mut farthest = Farthest::default();
-        let proof = Proof::new(manifest, arrays, self.calibration)?;
-        proof.displaced(Some(&mut farthest));
-        let sides = weighed.sides(&farthest, proof.away());
-        let bend = sides.bend(&farthest);
-        weighed.predict(&sides);
+        let away = window::pixels(&self.triangulator, manifest.placement_tolerance_mm);
+        let (sides, bend) = weighed.settle(&noise, away);
+        weighing.done(0.9);
         let mut good_parts = weighed.found;
-        let pixel_mm = proof.pixel_mm().unwrap_or_default();
+        let pixel_mm = window::pitch(&self.triangulator).unwrap_or_default();
         good_parts.dent_mm = DENT * sides.smallest as f64 * pixel_mm;
         set_deviation(&mut manifest.gauges[0], &good_parts);
-        arrays.smoothing = sides.least;
-        let mut judged = Proof::new(manifest, arrays, self.calibration)?.displaced(None);
+        drop((weighed, noise));
+        arrays.smoothing = sides.least.into();
+        let proof = Proof::new(manifest, arrays, self.calibration, headway.part(0.2, 0.35))?;
+        let mut judged = proof.displaced(headway.part(0.35, 1.0));
+        drop(proof);
         if let Some(magnitudes) = Magnitudes::of(&judged, 0) {
             (good_parts.displaced_mm, good_parts.displaced_scatter_mm) = (
                 magnitudes.middle.max(BEND * bend),
@@ -94,7 +97,7 @@ impl GoldenPart<'_> {
             None => 1.0,
         };
         Noise {
-            triangulator: self.triangulator,
+            triangulator: &self.triangulator,
             surface,
             production,
             golden: golden / self.captures as f64,

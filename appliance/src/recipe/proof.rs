@@ -10,10 +10,10 @@ use super::failure::TeachError;
 use super::file::TriedFile;
 use super::median::median;
 use super::plan::Plan;
-use super::sides::Farthest;
 use super::{GaugeFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, Unit, Verdict};
+use crate::system::headway::Headway;
 use algo::geometry::Vector;
 use algo::inspect::{Basis, Largest, Motion};
 use algo::units::Modulation;
@@ -27,8 +27,10 @@ use std::time::{Duration, Instant};
 pub(super) const COVERAGE_CHANGE: f64 = 0.01;
 /// Cycles of the part as it lies.
 const STILL: usize = 5;
-/// Placements that are worked out: the scatter of the largest deviation is then known to a fifth.
-const PLACEMENTS: usize = 16;
+/// Placements that are worked out, with all pixels: the scatter of the largest deviation is then
+/// known to a quarter. What golden's interpolation adds is known for all placements at once
+/// ([`algo::inspect::Missed`]), so these show what noise and the error of the motion make of it.
+const PLACEMENTS: usize = 8;
 /// Placements reach this share of the tolerance: what is worked out has the error of the motion,
 /// too.
 const REACH: f64 = 0.98;
@@ -52,11 +54,13 @@ impl Proof {
         manifest: &RecipeFile,
         arrays: &Arrays,
         calibration: &Calibration,
+        headway: Headway<'_>,
     ) -> Result<Self, String> {
         let recipe = Recipe::check(manifest, arrays.clone())?;
         let sequences = 0..recipe.sequences.len();
         let light = sequences.map(|sequence| recipe.light(sequence)).collect();
-        let plan = Plan::new(recipe, calibration, false).map_err(|error| error.to_string())?;
+        let plan = Plan::telling(recipe, calibration, false, headway);
+        let plan = plan.map_err(|error| error.to_string())?;
         let places = placements(plan.corners(), REACH * manifest.placement_tolerance_mm);
         Ok(Self {
             plan,
@@ -66,27 +70,14 @@ impl Proof {
     }
 
     /// The part as taught, judged at places within the recipe's placement tolerance; none where
-    /// parts are not aligned, or if cycles begin with two frames. If `farthest` is given, it gets
-    /// what the part deviates by in squares of all sides, and the cycles have no noise.
-    pub fn displaced(&self, mut farthest: Option<&mut Farthest>) -> Vec<Inspection> {
+    /// parts are not aligned, or if cycles begin with two frames.
+    pub fn displaced(&self, headway: Headway<'_>) -> Vec<Inspection> {
         let judged = (1..).zip(&self.places);
         let judged = judged.map_while(|(seed, motion)| {
-            let farthest = farthest.as_deref_mut();
-            let seed = farthest.is_none().then_some(seed);
-            self.plan
-                .inspect_rendered(motion, &self.light, seed, farthest)
+            headway.done(seed as f64 / self.places.len() as f64);
+            self.plan.inspect_rendered(motion, &self.light, seed)
         });
         judged.collect()
-    }
-
-    /// How many pixels the image of a part moves by at most.
-    pub fn away(&self) -> usize {
-        self.plan.away()
-    }
-
-    /// What a pixel sees of a surface that faces the camera, mm.
-    pub fn pixel_mm(&self) -> Option<f64> {
-        self.plan.pixel_mm()
     }
 }
 
@@ -124,20 +115,20 @@ fn placements(corners: &[Vector], reach: f64) -> Vec<Motion> {
 /// The part in front of the head, judged as production does.
 ///
 /// # Errors
-/// If a device fails, the recipe cannot be run, or `progress` ended it.
+/// If a device fails, the recipe cannot be run, or `headway` ended it.
 pub(super) fn as_it_lies(
     plan: &Plan,
     head: &mut Head,
     calibration: &Calibration,
     timeout: Duration,
-    progress: &dyn Fn(f64) -> bool,
+    headway: Headway<'_>,
 ) -> Result<Vec<Inspection>, TeachError> {
     plan.load(head, calibration)?;
     let mut judged = Vec::new();
     while judged.len() < STILL {
         let mut sequence = 0;
         loop {
-            if !progress(judged.len() as f64 / STILL as f64) {
+            if !headway.tell(judged.len() as f64 / STILL as f64) {
                 return Err(TeachError::Ended);
             }
             let mut frames = Vec::new();

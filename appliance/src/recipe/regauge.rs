@@ -6,6 +6,7 @@ use super::golden::TaughtRecipe;
 use super::plan::{Golden, Plan, PlanError};
 use super::planner::{self, Choice};
 use super::{GaugeFile, Part, Recipe, RecipeFile};
+use crate::system::headway::Headway;
 use algo::inspect::{Findings, Missing};
 use hal::bounds::clipped;
 
@@ -19,8 +20,12 @@ impl TaughtRecipe {
     ///
     /// # Errors
     /// In words, if they do not fit each other, or golden has no value where one is needed.
-    pub(super) fn of(mut manifest: RecipeFile, arrays: Arrays) -> Result<Self, String> {
-        let settled = manifest.settle(&arrays);
+    pub(super) fn of(
+        mut manifest: RecipeFile,
+        arrays: Arrays,
+        headway: Headway<'_>,
+    ) -> Result<Self, String> {
+        let settled = manifest.settle(&arrays, headway);
         let (mut choice, _) = settled.map_err(|error| error.words)?;
         if manifest.two_frames {
             choice.reasons.push(Self::TWO_FRAMES.into());
@@ -57,6 +62,7 @@ impl RecipeFile {
     pub(super) fn settle(
         &mut self,
         arrays: &Arrays,
+        headway: Headway<'_>,
     ) -> Result<(Choice, Option<Golden>), Unsettled> {
         self.gauges.sort_by_key(|gauge| gauge.slot);
         let choose = |of: &Self| planner::choose(&of.sequences, &of.gauges, arrays.widest());
@@ -66,7 +72,7 @@ impl RecipeFile {
             return Ok((choice, None));
         }
         for _ in 0..TURNS {
-            let golden = self.golden(arrays, false)?;
+            let golden = self.golden(arrays, false, headway)?;
             self.follow(&golden.findings)?;
             choice = choose(self);
             if choice.production == self.production {
@@ -81,7 +87,12 @@ impl RecipeFile {
     ///
     /// # Errors
     /// In words: manifest and arrays do not fit each other, or golden does not have a feature.
-    pub(super) fn golden(&self, arrays: &Arrays, lenient: bool) -> Result<Golden, Unsettled> {
+    pub(super) fn golden(
+        &self,
+        arrays: &Arrays,
+        lenient: bool,
+        headway: Headway<'_>,
+    ) -> Result<Golden, Unsettled> {
         let recipe = Recipe::fit(self, arrays.clone())?;
         let name = |at: usize| {
             let feature = self.features.get(at)?;
@@ -91,7 +102,7 @@ impl RecipeFile {
             true => Plan::golden_leniently,
             false => Plan::golden,
         };
-        measure(recipe, &self.head()?).map_err(|error| Unsettled {
+        measure(recipe, &self.head()?, headway).map_err(|error| Unsettled {
             words: error.to_string(),
             of: match error {
                 PlanError::Unfit { feature, .. } => feature.and_then(name),

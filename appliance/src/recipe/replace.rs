@@ -2,6 +2,7 @@
 
 use super::golden::{Naming, TaughtRecipe};
 use super::{RecipeFile, Store};
+use crate::system::headway::Headway;
 
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
@@ -90,7 +91,11 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
 ///
 /// # Errors
 /// In words, if they do not fit what was taught.
-pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<TaughtRecipe, String> {
+pub fn keep_gauges(
+    taught: TaughtRecipe,
+    replaced: &RecipeFile,
+    headway: Headway<'_>,
+) -> Result<TaughtRecipe, String> {
     let TaughtRecipe {
         mut manifest,
         recipe,
@@ -107,5 +112,5 @@ pub fn keep_gauges(taught: TaughtRecipe, replaced: &RecipeFile) -> Result<Taught
     // The prediction is for the limits that teaching sets.
     manifest.good_parts = None;
     manifest.tried = Vec::new();
-    TaughtRecipe::of(manifest, recipe.arrays)
+    TaughtRecipe::of(manifest, recipe.arrays, headway)
 }

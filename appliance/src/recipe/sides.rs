@@ -6,7 +6,7 @@
 //! only larger squares keep good parts inside the limits. Both differ from place to place, so the
 //! side does: on a cone squares are large at its tip and its rim alone.
 
-use algo::inspect::{Production, Strips};
+use algo::inspect::Missed;
 
 /// Sides of squares in camera pixels, the smallest first. A single pixel may be a wild one. In the
 /// largest a dent of 8 mm is still seen at half its depth by 0.4 mm per pixel.
@@ -27,44 +27,13 @@ pub(super) struct Sides {
 
 /// The side of squares about pixels for which no smaller square is good enough.
 const LARGEST: usize = SIDES[SIDES.len() - 1];
-/// The deviations of displaced golden, worked out without noise, are to stay below this share of
-/// the limit: beside creases parts deviate by twice as much, as golden knows only what its pixels
+/// What is missed of golden between its pixels is to stay below this share of the limit: beside
+/// creases parts deviate by twice as much, as golden knows only what its pixels
 /// see of a crease, and noise comes on top.
 const PLACED: f64 = 0.1;
 /// A side other than the largest is used only if at least this share of the compared pixels has it:
 /// each side takes time in every cycle.
 const WORTH: f64 = 0.01;
-
-/// The two largest |means| over the squares of each of [`SIDES`] about each pixel, over placements
-/// that are worked out.
-#[derive(Debug, Default)]
-pub(super) struct Farthest([Vec<[f32; 2]>; SIDES.len()]);
-
-impl Farthest {
-    /// Takes in the deviations that were inspected last in these strips.
-    pub fn look(&mut self, production: &Production, strips: &Strips, deviation: &[f32]) {
-        for (side, farthest) in SIDES.into_iter().zip(&mut self.0) {
-            farthest.resize(deviation.len(), [0.0; 2]);
-            let means = production.square_means(strips, deviation, side);
-            for ([first, second], mean) in farthest.iter_mut().zip(means) {
-                // NaN is less than nothing.
-                let mean = mean.abs();
-                if mean > *first {
-                    (*first, *second) = (mean, *first);
-                } else if mean > *second {
-                    *second = mean;
-                }
-            }
-        }
-    }
-
-    /// The second largest deviation over all placements: a single placement can be worked out
-    /// wrong.
-    fn at(&self, side: usize, place: usize) -> f64 {
-        let second = self.0[side].get(place).map_or(0.0, |[_, second]| *second);
-        f64::from(second)
-    }
-}
 
 impl Sides {
     /// The largest side everywhere.
@@ -76,11 +45,12 @@ impl Sides {
     }
 
     /// Sides as small as they may be for a limit in mm, in a frame of `width` columns: `sigmas` are
-    /// σ of the means over squares of each of [`SIDES`] in mm, NaN where there is no square. Only
+    /// σ of the means over squares of each of [`SIDES`] in mm, NaN where there is no square;
+    /// `missed` is what displaced golden deviates by in a square of a side about a pixel, mm. Only
     /// pixels that count in full, as `full` says, have smaller sides than the largest; the image of
     /// a part moves by up to `away` pixels.
     pub fn new(
-        (sigmas, farthest): (&[Vec<f32>; SIDES.len()], &Farthest),
+        (sigmas, missed): (&[Vec<f32>; SIDES.len()], impl Fn(usize, usize) -> f64),
         full: impl Fn(usize) -> Option<bool>,
         limit: f64,
         (width, away): (usize, usize),
@@ -88,7 +58,7 @@ impl Sides {
         let quiet = |side: usize, place: usize| {
             // NaN is not above.
             let noisy = f64::from(sigmas[side][place]) * SIGMAS > ROOM * limit;
-            !noisy && farthest.at(side, place) < PLACED * limit
+            !noisy && missed(place, SIDES[side]) < PLACED * limit
         };
         let own = |place: usize| match full(place) {
             None => 0,
@@ -134,13 +104,9 @@ impl Sides {
         self.smallest.max(usize::from(least))
     }
 
-    /// The largest deviation of displaced golden, worked out without noise, in these squares, mm.
-    pub fn bend(&self, farthest: &Farthest) -> f64 {
-        let most = SIDES.iter().enumerate().map(|(at, side)| {
-            let places = 0..farthest.0[at].len();
-            let own = places.filter(|place| self.at(*place) == *side);
-            own.map(|place| farthest.at(at, place)).fold(0.0, f64::max)
-        });
+    /// The most that is missed in these squares of the places that are compared, mm.
+    pub fn bend(&self, missed: &Missed, places: impl Iterator<Item = usize>) -> f64 {
+        let most = places.map(|place| missed.at(place, self.at(place)));
         most.fold(0.0, f64::max)
     }
 
@@ -190,32 +156,25 @@ mod tests {
     fn squares_are_large_only_where_noise_or_a_displaced_part_asks_for_it() {
         let quiet = sigmas(|_| 0.01);
         let everywhere = |_: usize| Some(true);
-        let none = Farthest::default();
-        let new = |sigmas, farthest: &Farthest, away| {
-            Sides::new((sigmas, farthest), everywhere, 0.15, (WIDTH, away))
-        };
+        let none = |_, _| 0.0;
+        let new = |sigmas, away| Sides::new((sigmas, none), everywhere, 0.15, (WIDTH, away));
         let all = Sides {
             smallest: 3,
             least: Vec::new(),
         };
-        assert_eq!(new(&quiet, &none, 2), all);
+        assert_eq!(new(&quiet, 2), all);
         // One row is noisy: about it, as far as a part moves, squares are the largest.
         let noisy = sigmas(|at| if at / WIDTH == 20 { 0.1 } else { 0.01 });
-        let sides = new(&noisy, &none, 2);
+        let sides = new(&noisy, 2);
         let rows: Vec<usize> = (0..WIDTH).map(|row| sides.at(row * WIDTH + 5)).collect();
         let expected = |row: usize| if (18..=22).contains(&row) { 9 } else { 3 };
         assert_eq!(rows, (0..WIDTH).map(expected).collect::<Vec<_>>());
-        // One placement may be worked out wrong, two are believed.
-        let mut farthest = Farthest::default();
-        for side in &mut farthest.0 {
-            side.resize(PIXELS, [0.0; 2]);
-            side[0] = [0.6, 0.0];
-        }
-        assert_eq!(new(&quiet, &farthest, 0), all);
-        farthest.0.iter_mut().for_each(|side| side[0] = [0.6, 0.05]);
-        assert_eq!(new(&quiet, &farthest, 0).all(), [3, 9]);
+        // A crease is seen in small squares more than in large ones.
+        let crease = |place, side| if place == 0 { 0.1 / side as f64 } else { 0.0 };
+        let sides = Sides::new((&quiet, crease), everywhere, 0.15, (WIDTH, 0));
+        assert_eq!((sides.at(0), sides.at(1)), (7, 3));
         // All pixels are alike, and too noisy.
-        let everywhere = new(&sigmas(|_| 0.1), &none, 0);
+        let everywhere = new(&sigmas(|_| 0.1), 0);
         assert_eq!(everywhere, Sides::largest());
     }
 

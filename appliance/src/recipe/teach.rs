@@ -4,17 +4,20 @@ pub use super::failure::TeachError;
 pub use super::golden::{Naming, TaughtRecipe};
 
 use super::PatternFile;
+use super::Recipe;
 use super::adaptive::{AdaptivePattern, Preliminary};
 use super::candidates::candidates;
 use super::captures::{CAPTURES, Captured};
 use super::comparison::ComparisonFile;
-use super::golden::GoldenPart;
+use super::golden::{GoldenPart, UnsealedRecipe};
 use super::plan::Plan;
 use super::proof;
 use crate::head::calibrated::CalibratedHead;
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::system::computing::Computing;
+use crate::system::headway::Headway;
+use crate::system::memory;
 use algo::pattern::{Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
@@ -31,43 +34,43 @@ const LEAST_RESOLVED: f64 = 0.005;
 /// Measures the part in front of the head with a fixed pattern, makes its adaptive pattern,
 /// measures it several times with that pattern by every sequence that production may use, makes the
 /// recipe, and tries it on the part; nothing is stored here. The part must not move meanwhile.
-/// `progress` gets the share done and the current stage in words.
+/// It ends before the next stage or capture where `headway` says so.
 ///
 /// # Errors
-/// If a device fails or the scene cannot be taught.
+/// If a device fails or the scene cannot be taught; [`TeachError::Ended`] if `headway` ended it.
 pub fn teach(
     head: &mut Head,
     calibration: &Calibration,
     naming: &Naming,
     timeout: Duration,
-    progress: &dyn Fn(f64, &str),
+    headway: Headway<'_>,
 ) -> Result<TaughtRecipe, TeachError> {
-    let all = |share: f64, words: &str| {
-        progress(share, words);
-        true
-    };
     let computing = Computing::default();
-    teach_while(head, calibration, naming, timeout, &computing, &all)
+    teach_marking(head, calibration, naming, timeout, &computing, headway)
 }
 
-/// As [`teach`], but it ends before the next stage or capture when `progress` returns `false`.
-/// `computing` marks the stages that use no device.
+/// As [`teach`]; `computing` marks the stages that use no device.
 ///
 /// # Errors
-/// As [`teach`]; [`TeachError::Ended`] if `progress` ended it.
-pub fn teach_while(
+/// As [`teach`].
+pub fn teach_marking(
     head: &mut Head,
     calibration: &Calibration,
     naming: &Naming,
     timeout: Duration,
     computing: &Computing,
-    progress: &dyn Fn(f64, &str) -> bool,
+    headway: Headway<'_>,
 ) -> Result<TaughtRecipe, TeachError> {
-    let stage = |share: f64, words: &str| match progress(share, words) {
-        true => Ok(()),
-        false => Err(TeachError::Ended),
+    let stage = |from: f64, to: f64, words| {
+        let stage = headway.part(from, to).called(words);
+        match stage.tell(0.0) {
+            true => Ok(stage),
+            false => Err(TeachError::Ended),
+        }
     };
-    stage(0.0, "measuring the part")?;
+    let measuring = stage(0.0, 0.15, "measuring the part")?;
+    // Every stage asks for the rays of all pixels.
+    let calibration = &calibration.clone().with_rays();
     let mut head = CalibratedHead {
         head,
         calibration,
@@ -75,22 +78,24 @@ pub fn teach_while(
     };
     let raster = &calibration.projector;
     let preliminary = Preliminary::new((raster.width(), raster.height()))?;
-    // Checked before the next stage: a sequence is not interrupted.
-    let measuring = |share: f64| {
-        progress(0.3 * share, "measuring the part");
-    };
     let Preliminary { function, shots } = &preliminary;
-    let mut first = head.measure(function, shots, None, &measuring)?;
+    // Checked before the next stage: a sequence is not interrupted.
+    let measured = |share| measuring.done(share);
+    let mut first = head.measure(function, shots, None, &measured)?;
     let mut illumination = Illumination::default();
     if naming.exposures > 1 {
-        stage(0.3, "measuring the part with longer exposures")?;
+        let again = stage(0.15, 0.2, "measuring the part with longer exposures")?;
         illumination = computing.on(|| preliminary.illumination(&first, calibration, naming));
-        first = head.measure_lit(&illumination, function, shots, None, &|_| ())?;
+        let measured = |share| again.done(share);
+        first = head.measure_lit(&illumination, function, shots, None, &measured)?;
     }
     refuse_empty(&first.phases)?;
-    stage(0.35, "making the part's own pattern")?;
+    let adapting = stage(0.2, 0.3, "making the part's own pattern")?;
+    let adapted = |share| adapting.done(share);
     let AdaptivePattern { function, expected } =
-        computing.on(|| preliminary.adapt(&first, calibration))?;
+        computing.on(|| preliminary.adapt(&first, calibration, &adapted))?;
+    // Their memory is free for the captures.
+    first.frames = Vec::new();
     let full = Sequence::dense(DENSE_N, SHIFTS);
     let candidates = candidates(calibration.waveforms(), &full);
     let sequences: Vec<&[Shot]> = candidates.iter().map(|(_, frames)| &frames[..]).collect();
@@ -100,15 +105,9 @@ pub fn teach_while(
         &function,
         &sequences,
         &expected,
-        &|share| {
-            progress(
-                0.4 + 0.35 * share,
-                "measuring the part with its own pattern",
-            )
-        },
+        stage(0.3, 0.55, "measuring the part with its own pattern")?,
     )?;
     refuse_empty(&golden.phases)?;
-    stage(0.75, "working out the expansion and the safe mask")?;
     let adaptive = (full.len(), &golden.phases, &golden.heights);
     let fixed = (preliminary.shots.len(), &first.phases, &first.heights);
     let comparison = ComparisonFile::of(fixed, adaptive);
@@ -119,39 +118,50 @@ pub fn teach_while(
         pattern: PatternFile::File,
         illumination,
         full: &full,
-        decoder: &golden.decoder,
-        triangulator: &golden.triangulator,
-        phases: &golden.phases,
-        heights: &golden.heights,
-        offsets: &golden.offsets,
-        signal: &golden.signal,
+        decoder: golden.decoder,
+        triangulator: golden.triangulator,
+        phases: golden.phases,
+        heights: golden.heights,
+        offsets: golden.offsets,
+        signal: golden.signal,
         noise: golden.noise,
         offset_counts: golden.offset_counts,
         captures: CAPTURES,
         comparison: Some(comparison),
     };
-    let taught = computing.on(|| part.recipe(naming));
-    let mut taught = taught.map_err(TeachError::Rig)?;
-    taught.choice.reasons.extend(part.illumination.words());
-    drop(golden);
-    stage(0.9, "trying the recipe on the part")?;
-    let plan = computing.on(|| Plan::new(taught.recipe.clone(), calibration, false));
+    let words = part.illumination.words();
+    memory::trim();
+    let making = stage(0.55, 0.9, "working out what good parts may read")?;
+    let made = computing.on(|| part.recipe(naming, making));
+    let UnsealedRecipe {
+        mut manifest,
+        arrays,
+        mut choice,
+    } = made.map_err(TeachError::Rig)?;
+    choice.reasons.extend(words);
+    memory::trim();
+    let trying = stage(0.9, 1.0, "trying the recipe on the part")?;
+    let recipe = Recipe::check(&manifest, arrays.clone()).map_err(TeachError::Rig)?;
+    let plan = computing.on(|| Plan::telling(recipe, calibration, false, trying.part(0.0, 0.4)));
     let plan = plan.map_err(TeachError::rig)?;
-    let trying = |share: f64| progress(0.9 + 0.1 * share, "trying the recipe on the part");
-    let mut judged = proof::as_it_lies(&plan, head.head, calibration, timeout, &trying)?;
+    let trying = trying.part(0.4, 1.0);
+    let mut judged = proof::as_it_lies(&plan, head.head, calibration, timeout, trying)?;
     drop(plan);
     if let Some(words) = proof::not_judged(&judged) {
         return Err(TeachError::Scene(words));
     }
-    let mut words = proof::leave_out_covered(&mut taught.manifest, &mut judged);
-    words.extend(proof::hold(&mut taught.manifest, &judged));
-    if !words.is_empty() {
-        let reasons = taught.choice.reasons;
-        let again = computing.on(|| TaughtRecipe::of(taught.manifest, taught.recipe.arrays));
-        taught = again.map_err(TeachError::Rig)?;
-        taught.choice.reasons = reasons.into_iter().chain(words).collect();
-    }
-    stage(1.0, "taught")?;
+    let mut words = proof::leave_out_covered(&mut manifest, &mut judged);
+    words.extend(proof::hold(&mut manifest, &judged));
+    let moved = !words.is_empty();
+    choice.reasons.extend(words);
+    let reasons = choice.reasons.clone();
+    let packed = computing.on(|| match moved {
+        false => TaughtRecipe::sealed(manifest, arrays, choice),
+        // Other limits may ask for another sequence.
+        true => TaughtRecipe::of(manifest, arrays, Headway::silent()),
+    });
+    let mut taught = packed.map_err(TeachError::Rig)?;
+    taught.choice.reasons = reasons;
     Ok(taught)
 }
 

@@ -14,6 +14,7 @@ use super::regauge::Unsettled;
 use super::store::LoadedRecipe;
 use super::{FeatureFile, GaugeFile, Part, Recipe, RecipeFile, Wrong};
 use crate::station::{GaugeValue, Inspection, MAX_GAUGES};
+use crate::system::headway::Headway;
 use algo::inspect::{FeatureKind, Measure, kinds};
 use hal::bounds::clipped;
 use hal::frame::Frame;
@@ -150,10 +151,10 @@ impl Trial<'_> {
                 return Ok((file, None));
             }
             self.goes_on()?;
-            let settled = file.settle(self.arrays);
+            let settled = file.settle(self.arrays, Headway::silent());
             let golden = settled.and_then(|(_, golden)| match golden {
                 Some(golden) => Ok(golden),
-                None => file.golden(self.arrays, false),
+                None => file.golden(self.arrays, false, Headway::silent()),
             });
             match golden {
                 Ok(golden) => return Ok((file, Some(golden))),
@@ -254,7 +255,7 @@ impl Trial<'_> {
                 return Ok(());
             }
             self.goes_on()?;
-            match probing.golden(self.arrays, false) {
+            match probing.golden(self.arrays, false, Headway::silent()) {
                 Ok(mut golden) => {
                     let (_, seen) = golden.judged((&probing).into());
                     self.miss(&seen);
@@ -280,7 +281,7 @@ impl Trial<'_> {
             let mut probing = probing(file, std::iter::once(feature));
             probing.features.retain(|of| of.name != feature.name);
             probing.features.push(feature.clone());
-            if let Ok(mut golden) = probing.golden(self.arrays, true) {
+            if let Ok(mut golden) = probing.golden(self.arrays, true, Headway::silent()) {
                 let (_, seen) = golden.judged((&probing).into());
                 self.take(&seen);
             }

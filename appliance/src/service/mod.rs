@@ -99,7 +99,6 @@ impl Daemon {
         };
         // From here on no thread waits until stderr is read.
         stderr::detach();
-        crate::system::memory::give_back();
         let state = StateFolder::open(&path)?;
         let recipes = Store::of_state(&state)?;
         let access = open_access(&state, &progress)?;

@@ -8,7 +8,7 @@ use super::fault::Failure;
 use super::machine::{Station, log, push};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::refusal::reject;
-use super::state::{State, TeachProgress};
+use super::state::{LoadProgress, State, TeachProgress};
 use std::sync::Arc;
 
 impl Station {
@@ -59,8 +59,15 @@ impl Station {
         let job = self.worker.next_job();
         let ordered = key.clone();
         push(effects, Effect::Load { job, key: ordered });
-        let deadline = self.within(self.settings.limits.loading);
-        self.state = State::Loading { job, key, deadline };
+        self.state = State::Loading {
+            job,
+            key,
+            progress: LoadProgress {
+                fraction: 0.0,
+                words: "starting".into(),
+            },
+            deadline: self.within(self.settings.limits.changing),
+        };
         None
     }
 
@@ -96,7 +103,7 @@ impl Station {
                 fraction: 0.0,
                 words: "starting".into(),
             },
-            deadline: self.within(self.settings.limits.teaching),
+            deadline: self.within(self.settings.limits.changing),
         };
         None
     }
@@ -113,7 +120,7 @@ impl Station {
         }
         let job = self.worker.next_job();
         push(effects, Effect::Commission { job });
-        let deadline = self.within(self.settings.limits.teaching);
+        let deadline = self.within(self.settings.limits.changing);
         self.state = State::Commissioning { job, deadline };
     }
 
@@ -180,7 +187,7 @@ impl Station {
         }
     }
 
-    /// Teaching or commissioning goes on: its deadline moves.
+    /// A load, a teach or a step of commissioning goes on.
     pub(super) fn progress(
         &mut self,
         job: JobId,
@@ -188,25 +195,22 @@ impl Station {
         doing: Arc<str>,
         effects: &mut Effects,
     ) {
-        let until = self.within(self.settings.limits.teaching);
-        match &mut self.state {
-            State::Teaching {
-                job: awaited,
-                progress,
-                deadline,
-            } if *awaited == job => {
-                if reached.is_finite() {
-                    progress.fraction = reached.clamp(0.0, 1.0);
-                }
-                progress.words = doing;
-                *deadline = until;
+        let awaited = self.state.job() == Some(job);
+        let (fraction, words) = match &mut self.state {
+            State::Loading { progress, .. } if awaited => {
+                (&mut progress.fraction, &mut progress.words)
             }
-            State::Commissioning {
-                job: awaited,
-                deadline,
-            } if *awaited == job => *deadline = until,
-            _ => self.late("progress", job, effects),
+            State::Teaching { progress, .. } if awaited => {
+                (&mut progress.fraction, &mut progress.words)
+            }
+            // The page asks the step itself.
+            State::Commissioning { .. } if awaited => return,
+            _ => return self.late("progress", job, effects),
+        };
+        if reached.is_finite() {
+            *fraction = reached.clamp(0.0, 1.0);
         }
+        *words = doing;
     }
 
     /// The recipe is taught.

@@ -16,8 +16,8 @@ pub enum ClearedBy {
     Recovery,
     /// Results cannot be stored: clears by itself when they can.
     Storage,
-    /// The worker was silent while it had nothing to do: clears by itself with its next sign of
-    /// life.
+    /// The worker was silent while it had nothing to do, or in a load, a teach or a step of
+    /// commissioning: clears by itself with its next sign of life.
     Life,
 }
 
@@ -48,7 +48,7 @@ impl Fault {
         }
     }
 
-    /// A worker without orders that was silent for this long.
+    /// A worker that was silent for this long and works at nothing whose result must come in time.
     pub(super) fn silence(silent: Micros, since: Micros) -> Self {
         Self {
             code: error_code::DEADLINE,

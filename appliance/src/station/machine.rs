@@ -18,7 +18,7 @@ use super::state::State;
 use super::turns::Turns;
 use super::worker::Worker;
 
-/// The deadline of every wait.
+/// How long the worker may be silent, by what it does: a slow one tells how far it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
     /// The worker opens its head.
@@ -27,13 +27,11 @@ pub struct Limits {
     pub acquiring: Micros,
     /// Exposure done → result.
     pub processing: Micros,
-    /// A recipe is loaded.
-    pub loading: Micros,
-    /// Teaching and commissioning: from one sign of progress to the next.
-    pub teaching: Micros,
-    /// The worker's signs of life while it waits for orders.
+    /// Loading, teaching and commissioning.
+    pub changing: Micros,
+    /// While it waits for orders, before HEARTBEAT stands still.
     pub idle: Micros,
-    /// The worker's silence while it waits for orders, before that is a fault.
+    /// While it waits for orders, before that is a fault.
     pub silent: Micros,
     /// PLC_HEARTBEAT may stand still for this long.
     pub plc: Micros,
@@ -45,8 +43,7 @@ impl Default for Limits {
             boot: Micros::from_millis(30_000),
             acquiring: Micros::from_millis(10_000),
             processing: Micros::from_millis(10_000),
-            loading: Micros::from_millis(10_000),
-            teaching: Micros::from_millis(30_000),
+            changing: Micros::from_millis(30_000),
             idle: Micros::from_millis(1_000),
             silent: Micros::from_millis(10_000),
             plc: Micros::from_millis(5_000),
@@ -97,6 +94,9 @@ pub struct Station {
     pub(super) worker: Worker,
     pub(super) results: Results,
     pub(super) failure: Option<Failure>,
+    /// The load, teach or step of commissioning in which the worker fell silent; it goes on with the
+    /// next sign of life.
+    pub(super) suspended: Option<State>,
     pub(super) condition: Condition,
     pub(super) health: Health,
     /// Whether the history cannot be written.
@@ -120,6 +120,7 @@ impl Station {
             worker: Worker::new(now),
             results: Results::new(settings.next_seq),
             failure: None,
+            suspended: None,
             condition: Condition::default(),
             health: Health::default(),
             history_fails: false,
@@ -138,6 +139,28 @@ impl Station {
             State::Ready
         } else {
             State::Offline
+        }
+    }
+
+    /// The job that the worker is doing, or was doing when it fell silent.
+    pub(super) fn job(&self) -> Option<JobId> {
+        let suspended = self.suspended.as_ref();
+        self.state.job().or_else(|| suspended?.job())
+    }
+
+    /// How long the worker may be silent in the present state.
+    pub(super) fn limit(&self) -> Micros {
+        let limits = &self.settings.limits;
+        match self.state {
+            State::Boot { .. } => limits.boot,
+            State::Acquiring { .. } => limits.acquiring,
+            State::Processing { .. } => limits.processing,
+            State::Loading { .. } | State::Teaching { .. } | State::Commissioning { .. } => {
+                limits.changing
+            }
+            State::Ready | State::Offline | State::Fault(_) | State::Stopping { .. } => {
+                limits.silent
+            }
         }
     }
 

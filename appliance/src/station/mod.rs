@@ -42,9 +42,10 @@
 //!   head is idle, the part may move.
 //! - The PLC's heartbeat is watched from its first change on; a PLC that never uses it is never
 //!   reported lost.
-//! - A fault of a lost device, of storage and of an idle worker's silence clears by itself when its
-//!   cause is gone; only the fault of a missed deadline waits for ERROR_RESET, because it is not
-//!   known what the worker did meanwhile.
+//! - A fault of a lost device, of storage and of a worker's silence outside of a cycle clears by
+//!   itself when its cause is gone; a load or teach in which the worker was silent goes on then, and
+//!   the recipe before stays active until it ends. Only the fault of a cycle that missed its
+//!   deadline, or of a start, waits for ERROR_RESET.
 //! - A lost device ends the cycle in flight as INVALID. After its recovery the active recipe is the
 //!   one that the worker still holds. A load or teach that the loss interrupted counts as a load
 //!   that failed.
@@ -103,6 +104,6 @@ pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdi
 pub use results::Counts;
 pub use snapshot::Snapshot;
 pub use stages::{Stage, StageTime, Stages};
-pub use state::{Cycle, State, TeachProgress};
+pub use state::{Cycle, LoadProgress, State, TeachProgress};
 pub use step::step;
 pub use turns::Client;

@@ -11,7 +11,7 @@ use super::machine::{Identity, Station};
 use super::recipes::{ActiveRecipe, RecipeResult};
 use super::result::ResultRecord;
 use super::results::Counts;
-use super::state::{State, TeachProgress};
+use super::state::{LoadProgress, State, TeachProgress};
 
 /// STATUS bits, register 100.
 pub mod status {
@@ -138,6 +138,8 @@ pub struct Snapshot {
     pub result: Option<Arc<ResultRecord>>,
     /// The oldest unacknowledged result.
     pub oldest: Option<Arc<ResultRecord>>,
+    /// While loading.
+    pub load: Option<LoadProgress>,
     /// While teaching.
     pub teach: Option<TeachProgress>,
     /// Measured values of system, head and clients.
@@ -180,6 +182,10 @@ impl Station {
             (None, Some(failure)) => (failure.code, Some(failure.words.clone())),
             (None, None) => (0, None),
         };
+        let load = match &self.state {
+            State::Loading { progress, .. } => Some(progress.clone()),
+            _ => None,
+        };
         let teach = match &self.state {
             State::Teaching { progress, .. } => Some(progress.clone()),
             _ => None,
@@ -214,6 +220,7 @@ impl Station {
             counts: self.results.counts,
             result: self.results.latest.clone(),
             oldest: self.results.queue.front().cloned(),
+            load,
             teach,
             health: self.health.clone(),
         }

@@ -18,6 +18,15 @@ pub struct Cycle {
     pub exposed: Option<Micros>,
 }
 
+/// How far a load has come.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LoadProgress {
+    /// 0…1.
+    pub fraction: f32,
+    /// The present stage, for people.
+    pub words: Arc<str>,
+}
+
 /// How far teaching has come.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct TeachProgress {
@@ -59,7 +68,9 @@ pub enum State {
         job: JobId,
         /// Which recipe is loaded.
         key: RecipeKey,
-        /// It must be ready by then.
+        /// How far it has come.
+        progress: LoadProgress,
+        /// The next sign of life must come by then.
         deadline: Micros,
     },
     /// The worker teaches a recipe.
@@ -68,14 +79,14 @@ pub enum State {
         job: JobId,
         /// How far it has come.
         progress: TeachProgress,
-        /// The next sign of progress must come by then.
+        /// The next sign of life must come by then.
         deadline: Micros,
     },
     /// The worker carries out a step of commissioning.
     Commissioning {
         /// What the worker quotes in its answers.
         job: JobId,
-        /// The next sign of progress must come by then.
+        /// The next sign of life must come by then.
         deadline: Micros,
     },
     /// As ready, but the PLC does not ask for ONLINE.
@@ -121,6 +132,19 @@ impl State {
             | Self::Teaching { deadline, .. }
             | Self::Commissioning { deadline, .. } => Some(*deadline),
             Self::Ready | Self::Offline | Self::Fault(_) | Self::Stopping { .. } => None,
+        }
+    }
+
+    /// Moves the deadline, where the state waits for the worker.
+    pub(super) fn set_deadline(&mut self, to: Micros) {
+        match self {
+            Self::Boot { deadline }
+            | Self::Acquiring { deadline, .. }
+            | Self::Processing { deadline, .. }
+            | Self::Loading { deadline, .. }
+            | Self::Teaching { deadline, .. }
+            | Self::Commissioning { deadline, .. } => *deadline = to,
+            Self::Ready | Self::Offline | Self::Fault(_) | Self::Stopping { .. } => {}
         }
     }
 

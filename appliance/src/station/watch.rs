@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::clock::Micros;
 use super::event::{Effect, Effects, Unstored};
 use super::fault::{ClearedBy, Fault};
 use super::health::{FULL_STORAGE_MIB, System};
@@ -9,11 +10,16 @@ use super::machine::{Station, log, push};
 use super::recipes::ActiveRecipe;
 use super::state::State;
 
+/// Writes a fault into the log.
+fn alarm(fault: &Fault, effects: &mut Effects) {
+    let words = format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy);
+    push(effects, Effect::Alarm(words.into()));
+}
+
 impl Station {
     /// Enters a fault; what was under way ends here. A station that stops only ends its cycle.
     pub(super) fn fault(&mut self, fault: Fault, effects: &mut Effects) {
-        let words = format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy);
-        push(effects, Effect::Alarm(words.into()));
+        alarm(&fault, effects);
         match std::mem::replace(&mut self.state, State::Offline) {
             State::Acquiring { cycle, .. } | State::Processing { cycle, .. } => {
                 self.fail_cycle(cycle, fault.code, fault.cause.clone(), effects);
@@ -69,13 +75,15 @@ impl Station {
         }
     }
 
-    /// The worker gave a sign of life.
+    /// The worker gave a sign of life: a load or teach in which it was silent goes on.
     pub(super) fn lives(&mut self, effects: &mut Effects) {
-        self.worker.last_alive = self.clock.now();
+        let now = self.clock.now();
+        self.worker.last_alive = now;
         if self.fault_cleared_by(ClearedBy::Life).is_some() {
             log(effects, "the measuring task lives again");
-            self.state = self.rest();
+            self.state = self.suspended.take().unwrap_or_else(|| self.rest());
         }
+        self.state.set_deadline(now.after(self.limit()));
     }
 
     /// ERROR_RESET: the latches fall, and the fault if its cause is gone.
@@ -105,18 +113,21 @@ impl Station {
         self.clock.synchronise(utc_us);
         let in_time = self.worker_is_in_time();
         self.worker.beat(in_time, now);
-        let limits = self.settings.limits;
-        let (waiting_for, limit) = match &self.state {
-            State::Boot { .. } => ("open the head", limits.boot),
-            State::Acquiring { .. } => ("expose the sequence", limits.acquiring),
-            State::Processing { .. } => ("process the frames", limits.processing),
-            State::Loading { .. } => ("load a recipe", limits.loading),
-            State::Teaching { .. } => ("get on with teaching", limits.teaching),
-            State::Commissioning { .. } => ("get on with commissioning", limits.teaching),
+        let limit = self.limit();
+        let silent = now.since(self.worker.last_alive);
+        let waiting_for = match &self.state {
+            State::Boot { .. } => "open the head",
+            State::Acquiring { .. } => "expose the sequence",
+            State::Processing { .. } => "process the frames",
+            State::Loading { .. } | State::Teaching { .. } | State::Commissioning { .. } => {
+                if !in_time {
+                    self.suspend(silent, effects);
+                }
+                return;
+            }
             State::Ready | State::Offline => {
                 // A worker without orders that gives no sign of life would not take one either.
-                let silent = now.since(self.worker.last_alive);
-                if silent > limits.silent {
+                if silent > limit {
                     self.fault(Fault::silence(silent, now), effects);
                 }
                 return;
@@ -130,6 +141,15 @@ impl Station {
                 push(effects, Effect::Abort { job });
             }
         }
+    }
+
+    /// The worker is silent in a load, a teach or a step of commissioning: a fault until its next
+    /// sign of life, with which the job goes on. The recipe before stays the active one.
+    fn suspend(&mut self, silent: Micros, effects: &mut Effects) {
+        let fault = Fault::silence(silent, self.clock.now());
+        alarm(&fault, effects);
+        let suspended = std::mem::replace(&mut self.state, State::Fault(fault));
+        self.suspended = Some(suspended);
     }
 
     /// Takes a survey: full storage is a fault between two jobs, and clears by itself when there is

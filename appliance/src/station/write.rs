@@ -62,7 +62,7 @@ impl Station {
 
     /// Asks the worker to end its job early; a station that stops has done so already.
     pub(super) fn abort(&self, effects: &mut Effects) {
-        if let Some(job) = self.state.job()
+        if let Some(job) = self.job()
             && !matches!(self.state, State::Stopping { .. })
         {
             push(effects, Effect::Abort { job });

@@ -25,8 +25,9 @@ pub fn stored() -> SimpleFileOptions {
 /// If it cannot be made.
 pub fn packed<'a>(
     members: impl IntoIterator<Item = (&'a str, impl AsRef<[u8]>)>,
+    room: usize,
 ) -> ZipResult<Vec<u8>> {
-    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    let mut zip = ZipWriter::new(Cursor::new(Vec::with_capacity(room)));
     for (name, content) in members {
         zip.start_file(name, stored())?;
         zip.write_all(content.as_ref())?;

@@ -5,6 +5,7 @@ use crate::error::{Exit, Result};
 
 pub mod clock;
 pub mod computing;
+pub mod headway;
 pub mod host;
 pub mod journal;
 pub mod logbook;

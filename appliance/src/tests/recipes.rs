@@ -9,11 +9,13 @@ use crate::recipe::golden::Naming;
 use crate::recipe::plan::Plan;
 use crate::recipe::teach::teach;
 use crate::recipe::{DatumFile, Recipe, RecipeFile, Store};
+use crate::system::headway::Headway;
 use algo::inspect::{FeatureKind, Measure};
 use hal::frame::Frame;
 use serde_json::Value;
 use sim::Scenario;
 use std::mem::discriminant;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 const TIMEOUT: Duration = Duration::from_secs(5);
@@ -51,7 +53,7 @@ impl Bed {
             placement_tolerance_mm: 1.0,
             exposures: 1,
         };
-        let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ()).unwrap();
+        let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent()).unwrap();
         let plan = Plan::new(taught.recipe.clone(), &calibration, true).unwrap();
         head.load(plan.rasters(&calibration).unwrap()).unwrap();
         let mut frames = Vec::new();
@@ -144,12 +146,11 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
     }
     let tree = serde_json::to_value(&full).unwrap();
     let write = |tree: &Value| serde_json::to_string_pretty(tree).unwrap();
-    let members = members(file, arrays);
     let read = |text: &str| {
         // Parsed alone first: most cases are refused by the manifest, and need no archive with
         // arrays.
         parse(text)?;
-        let (bytes, _) = seal(text, members.clone()).unwrap();
+        let (bytes, _) = seal(text, members(file, arrays), 0).unwrap();
         Recipe::from_bytes(&bytes)
     };
     bed.use_recipe(read(&write(&tree)).unwrap()).unwrap();
@@ -190,15 +191,15 @@ fn arrays_of_any_numbers_never_panic() {
                 &mut arrays.phase_reach,
             ];
             if let Some(values) = single.into_iter().nth(array) {
-                let places = values.iter_mut().step_by(every);
+                let places = Arc::make_mut(values).iter_mut().step_by(every);
                 places.for_each(|value| *value = number as f32);
             } else if array < 7 {
                 let double = [&mut arrays.golden_phase, &mut arrays.phase_function];
                 let values = double.into_iter().nth(array - 5).unwrap();
-                let places = values.iter_mut().step_by(every);
+                let places = Arc::make_mut(values).iter_mut().step_by(every);
                 places.for_each(|value| *value = number);
             } else {
-                let places = arrays.valid.iter_mut().step_by(every);
+                let places = Arc::make_mut(&mut arrays.valid).iter_mut().step_by(every);
                 places.for_each(|value| *value = number as u8);
             }
             // Either result is right, as long as nothing panics.
@@ -220,7 +221,7 @@ fn a_recipe_for_a_projector_of_four_billion_columns_is_refused_and_does_not_repl
     let text = serde_json::to_string(&file).unwrap();
     let mut without = members(&file, &bed.recipe.arrays);
     without.retain(|(name, _)| *name != "phase_function.npy");
-    let (bytes, _) = seal(&text, without).unwrap();
+    let (bytes, _) = seal(&text, without, 0).unwrap();
     let words = Recipe::from_bytes(&bytes).unwrap_err();
     assert!(
         words.contains("projector.width is 4294967295: write 1 to 8192"),

@@ -294,5 +294,6 @@ fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {
         members
             .into_iter()
             .chain(calibration.map(|text| ("calibration.json", text))),
+        0,
     )
 }

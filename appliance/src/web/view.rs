@@ -43,6 +43,7 @@ pub fn snapshot(snapshot: &Snapshot) -> Value {
             "buffered": snapshot.buffered,
         },
         "last_token": snapshot.last_token,
+        "load": snapshot.load,
         "teach": snapshot.teach,
         "identity": snapshot.identity,
         "health": health(&snapshot.health),

@@ -5,6 +5,7 @@ use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
 use appliance::recipe::{Recipe, RecipeFile};
+use appliance::system::headway::Headway;
 use hal::frame::Frame;
 use sim::Scenario;
 use std::sync::LazyLock;
@@ -45,7 +46,7 @@ impl Part {
             placement_tolerance_mm: 0.5,
             exposures: 1,
         };
-        let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &|_, _| ());
+        let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent());
         let taught = taught.expect("a plane can be taught");
         let (file, recipe, bytes) = (taught.manifest, taught.recipe, taught.bytes);
         let plan = Plan::new(recipe.clone(), &calibration, true).expect("a plan");

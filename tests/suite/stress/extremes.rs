@@ -228,7 +228,7 @@ fn what_has_no_phase_has_no_height_whatever_the_frames_hold() {
             let noise = SampleNoise::new(1.5, 0.04);
             let run = || {
                 let mut phases = stack.decode();
-                let heights = triangulate(&solver, &decoder, Some(noise), &mut phases);
+                let heights = triangulate(&solver, &decoder, Some(noise), &mut phases, &|_| ());
                 (phases, heights)
             };
             let (phases, heights) = run();

@@ -185,7 +185,7 @@ fn rays_that_meet_no_light_of_their_phase_have_no_height() {
         ];
         for phase in absurd {
             assert_eq!(twins.solve(u, v, phase), None, "{phase}");
-            assert_eq!(twins.solver.expand(u, v, phase), None, "{phase}");
+            assert_eq!(twins.solver.expand(u, v, phase, f64::NAN), None, "{phase}");
             for z in absurd {
                 assert_eq!(twins.solver.solve_near(u, v, phase, z), None);
             }

@@ -55,6 +55,7 @@ impl Motion {
     }
 
     /// Where a point was when the part was taught.
+    #[inline]
     pub fn undo(&self, point: Vector) -> Vector {
         let from = point - self.centre - self.shift;
         self.centre + self.rows[0] * from.x + self.rows[1] * from.y + self.rows[2] * from.z

@@ -243,6 +243,6 @@ fn score(measured: &Measured, truth: &sim::Truth, turns: &[f64]) -> Option<Score
             .collect(),
     };
     let (triangulator, decoder) = (&measured.triangulator, &measured.decoder);
-    let heights = pipeline::triangulate(triangulator, decoder, None, &mut phases);
+    let heights = pipeline::triangulate(triangulator, decoder, None, &mut phases, &|_| ());
     Truth::from(truth).score(&phases, &heights)
 }

@@ -11,6 +11,7 @@ use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
 use appliance::recipe::{AlignmentKind, Recipe, archive};
+use appliance::system::headway::Headway;
 use hal::frame::Frame;
 use hal::head::Head;
 use serde::{Serialize, Serializer};
@@ -127,9 +128,9 @@ pub fn budgets(
         placement_tolerance_mm: PLACEMENT_MM,
         exposures: 1,
     };
-    let on_progress =
-        |share: f64, words: &str| progress(0.3 + 0.4 * share, &format!("{about}: {words}"));
-    let taught = teach(&mut head, &calibration, &naming, TIMEOUT, &on_progress).map_err(words)?;
+    progress(0.3, &format!("{about}: teaching"));
+    let headway = Headway::silent();
+    let taught = teach(&mut head, &calibration, &naming, TIMEOUT, headway).map_err(words)?;
     let sequences = &taught.manifest.sequences;
     let full = sequences.len().saturating_sub(1);
     let four = sequences

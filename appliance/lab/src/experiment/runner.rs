@@ -234,7 +234,9 @@ impl Runner {
             return Ok(Arc::clone(known));
         }
         let preliminary = self.preliminary()?;
-        let made = self.first()?.adapt(&preliminary, &self.calibration);
+        let made = self
+            .first()?
+            .adapt(&preliminary, &self.calibration, &|_| ());
         let found = Arc::new(made.map_err(MeasureError::impossible)?);
         Ok(Arc::clone(self.learnt.better.insert(found)))
     }

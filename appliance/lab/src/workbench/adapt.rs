@@ -107,8 +107,9 @@ pub fn adapt(recording: &Recording, folder: &Path, options: &AdaptOptions) -> Re
                 1.0 / before.pitches()[0],
                 &options.optics.blur,
                 measurement.report.noise_counts,
+                &|_| (),
             );
-            noise::adapt(&map, columns, rows, &options.optics, &light)
+            noise::adapt(&map, columns, rows, &options.optics, &light, &|_| ())
         }
         Method::Paper => paper::adapt(&map, columns, rows, options.optics.image_pitch),
     };

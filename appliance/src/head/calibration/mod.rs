@@ -215,6 +215,15 @@ impl Calibration {
         Triangulator::new(camera, projector, reference, function, range)
     }
 
+    /// The same head, whose camera has worked out the rays of its pixels ([`Pinhole::with_rays`]).
+    #[must_use]
+    pub fn with_rays(self) -> Self {
+        Self {
+            camera: self.camera.with_rays(),
+            ..self
+        }
+    }
+
     /// What the measured reference plane is off the models, where heights go by it.
     pub fn plane_by(&self) -> Option<&PlaneModel> {
         match self.heights_by {

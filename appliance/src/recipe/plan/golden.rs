@@ -9,7 +9,6 @@ use algo::phase::Decoder;
 use algo::pipeline::{self, KnownSurface};
 use algo::units::{AbsolutePhase, Height, Modulation, PhaseDelta};
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// The weight of each pixel's deviation, which lies by these `shares` along the normal, and the
 /// uncertainty of its taught height. The sequence has `brighter` times the modulation of golden;
@@ -21,20 +20,20 @@ pub(super) fn taught(
     decoder: &Decoder,
 ) -> Taught {
     let full_scale = f64::from(decoder.full_scale());
-    let noises = arrays.modulation.iter().zip(&arrays.height_slope);
+    let noises = arrays.modulation.iter().zip(&*arrays.height_slope);
     let sigmas = noises.map(|(&counts, &slope)| {
         let share = (f64::from(counts) / full_scale * 65_535.0).round() as u16;
         let turns = decoder.phase_noise(Modulation::from_bits(share), noise) / brighter;
         turns * f64::from(slope).abs()
     });
-    let valid = arrays.valid.iter().zip(&arrays.golden_height);
+    let valid = arrays.valid.iter().zip(&*arrays.golden_height);
     let weights = valid.map(|(&valid, height)| match height.is_finite() {
         true => Weight::from_bits(valid),
         false => Weight::NONE,
     });
     let pixels = weights.zip(shares).zip(sigmas);
     let taught = Taught::new(pixels.map(|((weight, &share), sigma)| (weight, share, sigma)));
-    taught.with_least_sides(arrays.smoothing.clone())
+    taught.with_least_sides(arrays.smoothing.to_vec())
 }
 
 /// σ of a sample, the same at all pixels, with which σ_z of the compared part has the RMS that it
@@ -100,7 +99,7 @@ pub(super) fn signal(
         .any(|gauge| gauge.needs(features).any(is_contour));
     let finest = sequences.last()?.levels.levels().last()?;
     (is_needed && !values.is_empty()).then(|| GoldenSignal {
-        values: Arc::new(values),
+        values,
         ratio: finest.ratio,
         shifts: finest.shifts(),
         brighter: 1.0,

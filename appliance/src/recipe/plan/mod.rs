@@ -11,7 +11,7 @@ mod refused;
 mod rendered;
 mod run;
 mod trial;
-mod window;
+pub(super) mod window;
 
 pub use arriving::Arriving;
 pub use layers::{GoldenView, Layers, Shown, ShownGauge};
@@ -28,6 +28,7 @@ use crate::station::result::flag::{
     FULL_SEQUENCE, JUDGES_NOTHING, SIMULATED, SINGLE_LEVEL, TWO_LEVELS,
 };
 use crate::station::{Inspection, Stage, Stages, Verdict};
+use crate::system::headway::Headway;
 use algo::frame::FrameView;
 use algo::geometry::HeightRange;
 use algo::inspect::{Findings, Input, Maps, PairPlaced, Production, Signal, Strips, normal_shares};
@@ -82,6 +83,19 @@ impl Plan {
         calibration: &Calibration,
         simulated: bool,
     ) -> Result<Self, PlanError> {
+        Self::telling(recipe, calibration, simulated, Headway::silent())
+    }
+
+    /// As [`Self::new`], telling how far it is.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn telling(
+        recipe: Recipe,
+        calibration: &Calibration,
+        simulated: bool,
+        headway: Headway<'_>,
+    ) -> Result<Self, PlanError> {
         let number = recipe.id.number;
         let present = calibration.fingerprint();
         if recipe.id.calibration != present {
@@ -99,7 +113,7 @@ impl Plan {
                 present,
             });
         }
-        Self::again(recipe, calibration, simulated)
+        Self::join(recipe, calibration, (simulated, None), headway)
     }
 
     /// As [`Self::new`], to judge a recorded part again: `calibration` is read from the recording.
@@ -114,7 +128,7 @@ impl Plan {
         calibration: &Calibration,
         simulated: bool,
     ) -> Result<Self, PlanError> {
-        Self::join(recipe, calibration, (simulated, None))
+        Self::join(recipe, calibration, (simulated, None), Headway::silent())
     }
 
     /// Joins them, for parts or as `golden` says.
@@ -122,6 +136,7 @@ impl Plan {
         recipe: Recipe,
         calibration: &Calibration,
         (simulated, golden): (bool, Option<OfGolden>),
+        headway: Headway<'_>,
     ) -> Result<Self, PlanError> {
         let number = recipe.id.number;
         refused::same_devices(&recipe.conditions, calibration)
@@ -131,13 +146,14 @@ impl Plan {
             reason: words,
             feature,
         };
-        Self::joined(recipe, calibration, (simulated, golden)).map_err(unfit)
+        Self::joined(recipe, calibration, (simulated, golden), headway).map_err(unfit)
     }
 
     fn joined(
         recipe: Recipe,
         calibration: &Calibration,
         (simulated, of_golden): (bool, Option<OfGolden>),
+        headway: Headway<'_>,
     ) -> Result<Self, Refusal> {
         let Recipe {
             id,
@@ -151,17 +167,20 @@ impl Plan {
             mut arrays,
         } = recipe;
         // Large arrays that production does not read.
-        arrays.phase_function = Vec::new();
+        arrays.phase_function = [].into();
         let illumination = Illumination {
             exposures: conditions.exposures,
-            amplitude: std::mem::take(&mut arrays.amplitude),
+            amplitude: arrays.amplitude.to_vec(),
         };
-        arrays.height_curvature = Vec::new();
+        arrays.height_curvature = [].into();
         let (columns, rows, _) = conditions.camera;
         let size = (columns as usize, rows as usize);
         let [low, high] = conditions.range_mm;
-        let triangulator = calibration.triangulator(function, Some(HeightRange { low, high }));
+        // Planning asks for the rays of all pixels several times.
+        let quick = calibration.clone().with_rays();
+        let triangulator = quick.triangulator(function, Some(HeightRange { low, high }));
         let triangulator = triangulator.map_err(|error| error.to_string())?;
+        headway.done(0.1);
         window::of_sections(&mut features, size, &triangulator)?;
         let (window, away) =
             window::of((&features, &gauges), size, &triangulator, &demands, &arrays);
@@ -171,17 +190,19 @@ impl Plan {
         let base = base.filter(|_| !arrays.sequence_offset.is_empty());
         let surface = golden::surface(size.0, &arrays, golden::offset(&arrays, base));
         let shares = normal_shares(&triangulator, &surface);
+        headway.done(0.25);
         let range = triangulator.function().range();
         let lenient = of_golden.is_some_and(|of| of.lenient);
         let signal = golden::signal(&mut arrays, &sequences, (&features, &gauges), lenient);
         let golden = (&arrays, &shares[..], base);
         let (prepared, shots) = Prepared::all(sequences, &conditions, golden, range)?;
         drop(shares);
+        headway.done(0.4);
         let golden_light = GoldenLight::of(&arrays, conditions.golden_offset_counts);
         let noise_counts = golden::even_noise(conditions.noise, &arrays);
         let modulation = match demands.aligned {
             true => std::mem::take(&mut arrays.modulation),
-            false => Vec::new(),
+            false => [].into(),
         };
         // Freed before the expansion of the height is allocated, which takes the most memory.
         drop(arrays);
@@ -195,7 +216,10 @@ impl Plan {
             size.0,
         );
         let range = conditions.expansion_range_turns;
+        headway.done(0.55);
         let cubics = HeightCubics::new(&triangulator, surface, range, &window, away.max(AROUND));
+        headway.done(0.7);
+        let triangulator = triangulator.seen_by(calibration.camera.clone());
         let shared = Shared {
             conditions: &conditions,
             aligned: demands.aligned,
@@ -215,7 +239,10 @@ impl Plan {
             .into_iter()
             .enumerate()
             .filter(wanted)
-            .map(|(_, sequence)| sequence.join(&shared))
+            .map(|(_, sequence)| {
+                headway.done(0.8);
+                sequence.join(&shared)
+            })
             .collect::<Result<Vec<_>, _>>()?;
         let first = runs.first().ok_or("it has no sequence")?;
         let strips = first.production.strips(size.1.div_ceil(STRIPS));

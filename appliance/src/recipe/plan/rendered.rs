@@ -1,8 +1,7 @@
 //! Cycles of a part that is not there: golden as a displaced part would be measured, judged as
 //! production would.
 
-use super::{Laps, Plan, window};
-use crate::recipe::sides::Farthest;
+use super::{Laps, Plan};
 use crate::station::Inspection;
 use algo::geometry::Vector;
 use algo::inspect::{Input, Maps, Motion, Signal};
@@ -12,38 +11,27 @@ use std::time::Instant;
 impl Plan {
     /// Judges the part as taught after a motion, by one sequence after the other as production
     /// does. `light` is golden's modulation by each of the plan's sequences; other seeds give other
-    /// noise, none gives none. `farthest` looks at the deviations. `None` for sequences of two
-    /// frames.
+    /// noise. `None` for sequences of two frames.
     pub(in crate::recipe) fn inspect_rendered(
         &self,
         motion: &Motion,
         light: &[Vec<Modulation>],
-        seed: Option<u64>,
-        mut farthest: Option<&mut Farthest>,
+        seed: u64,
     ) -> Option<Inspection> {
-        let mut deviation = match &farthest {
-            Some(_) => self.unknown(),
-            None => Vec::new(),
-        };
         let mut sequence = 0;
         loop {
             let run = self.runs.get(sequence).filter(|run| run.pair.is_none())?;
-            let phases = run.production.rendered(motion, &light[sequence], seed);
+            let phases = run
+                .production
+                .rendered(motion, &light[sequence], Some(seed));
             let mut laps = Laps::since(Instant::now());
             let mut strips = self.strips();
-            let input = Input::Phases(&phases);
+            let input = (Input::Phases(&phases), Signal::None);
             let placed = run.production.place_rendered(&phases, &mut strips, motion);
-            let maps = Maps {
-                heights: None,
-                deviation: farthest.is_some().then_some(&mut deviation[..]),
-            };
             let findings = placed.and_then(|placed| {
                 run.production
-                    .inspect_placed((input, Signal::None), &mut strips, placed, maps)
+                    .inspect_placed(input, &mut strips, placed, Maps::default())
             });
-            if let Some(farthest) = &mut farthest {
-                farthest.look(&run.production, &strips, &deviation);
-            }
             drop(strips);
             let findings = findings.map(|findings| (findings, None));
             let found = findings.map_err(|error| error.to_string());
@@ -58,15 +46,5 @@ impl Plan {
     /// Corners of the box around the part as taught; none if parts are not aligned.
     pub(in crate::recipe) fn corners(&self) -> &[Vector] {
         self.production().corners()
-    }
-
-    /// How many pixels the image of a part moves by at most.
-    pub(in crate::recipe) fn away(&self) -> usize {
-        window::pixels(self.production().triangulator(), self.demands.tolerance_mm)
-    }
-
-    /// What a pixel in the middle of the frame sees of a surface that faces the camera, mm.
-    pub(in crate::recipe) fn pixel_mm(&self) -> Option<f64> {
-        window::pitch(self.production().triangulator())
     }
 }

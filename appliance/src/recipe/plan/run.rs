@@ -49,7 +49,7 @@ pub(super) struct Shared<'a> {
     pub golden: GoldenNoise,
     /// Golden's modulation in counts, empty where parts are not aligned, and how far the image of a
     /// part may be displaced, pixels.
-    pub picture: (Vec<f32>, f64),
+    pub picture: (Arc<[f32]>, f64),
     /// The names of the features, in their order.
     pub names: &'a [String],
     /// What contours need; `None` if no gauge is of one.

@@ -5,6 +5,7 @@ use super::{Laps, Plan, PlanError};
 use crate::head::calibration::Calibration;
 use crate::recipe::{Demands, Recipe, Seen};
 use crate::station::Inspection;
+use crate::system::headway::Headway;
 use algo::inspect::{Drawing, Findings, Input, Maps, Signal};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
@@ -33,16 +34,24 @@ impl Plan {
     ///
     /// # Errors
     /// As [`Plan::again`].
-    pub fn golden(recipe: Recipe, head: &Calibration) -> Result<Golden, PlanError> {
-        alone(recipe, |recipe| golden(recipe, head, false))
+    pub fn golden(
+        recipe: Recipe,
+        head: &Calibration,
+        headway: Headway<'_>,
+    ) -> Result<Golden, PlanError> {
+        alone(recipe, |recipe| golden(recipe, head, false, headway))
     }
 
     /// As [`Plan::golden`], also where golden shows too little of a contour.
     ///
     /// # Errors
     /// As [`Plan::again`].
-    pub fn golden_leniently(recipe: Recipe, head: &Calibration) -> Result<Golden, PlanError> {
-        alone(recipe, |recipe| golden(recipe, head, true))
+    pub fn golden_leniently(
+        recipe: Recipe,
+        head: &Calibration,
+        headway: Headway<'_>,
+    ) -> Result<Golden, PlanError> {
+        alone(recipe, |recipe| golden(recipe, head, true, headway))
     }
 }
 
@@ -97,7 +106,12 @@ fn alone<T: Send>(
     thread.install(|| work(recipe))
 }
 
-fn golden(recipe: Recipe, head: &Calibration, lenient: bool) -> Result<Golden, PlanError> {
+fn golden(
+    recipe: Recipe,
+    head: &Calibration,
+    lenient: bool,
+    headway: Headway<'_>,
+) -> Result<Golden, PlanError> {
     let number = recipe.id.number;
     let unfit = |reason: String| PlanError::Unfit {
         number,
@@ -109,7 +123,7 @@ fn golden(recipe: Recipe, head: &Calibration, lenient: bool) -> Result<Golden, P
     let sequence = planned.ok_or_else(|| unfit("it has no sequence".into()))?;
     let light = recipe.light(sequence);
     let only = OfGolden { sequence, lenient };
-    let plan = Plan::join(recipe, head, (false, Some(only)))?;
+    let plan = Plan::join(recipe, head, (false, Some(only)), headway.part(0.0, 0.8))?;
     let production = plan.production();
     let (map, decoder) = (production.map(), production.decoder());
     let surface = production.cubics().surface();

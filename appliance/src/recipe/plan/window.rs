@@ -100,7 +100,7 @@ fn widen(columns: &mut Range<usize>, by: Range<usize>) {
 }
 
 /// About how many pixels the image of a part that is displaced by `mm` moves at most.
-pub(super) fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
+pub(in crate::recipe) fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
     let middle = triangulator.camera().width() as f64 / 2.0;
     // One pixel more for rounding.
     let pixels = |pitch: f64| (mm / pitch).ceil().min(middle) as usize + 1;
@@ -108,7 +108,7 @@ pub(super) fn pixels(triangulator: &Triangulator, mm: f64) -> usize {
 }
 
 /// What a pixel in the middle of the frame sees of a surface that faces the camera, mm.
-pub(super) fn pitch(triangulator: &Triangulator) -> Option<f64> {
+pub(in crate::recipe) fn pitch(triangulator: &Triangulator) -> Option<f64> {
     let camera = triangulator.camera();
     let (u, v) = (camera.width() / 2, camera.height() / 2);
     let at = |u: usize| triangulator.point(u, v, Height::from_nm(0));

@@ -9,7 +9,7 @@ fn recovered(recipe: Option<ActiveRecipe>) -> Event {
 #[test]
 fn every_wait_has_a_deadline_and_a_missed_one_is_a_fault_that_says_how_to_clear_it() {
     type Prepare = fn(&mut Bench);
-    let waits: [(u16, Prepare); 4] = [
+    let waits: [(u16, Prepare); 2] = [
         (2, |bench| {
             bench.token(1);
         }),
@@ -17,15 +17,6 @@ fn every_wait_has_a_deadline_and_a_missed_one_is_a_fault_that_says_how_to_clear_
             bench.token(1);
             let job = bench.job();
             bench.event(Event::ExposureDone { job });
-        }),
-        (4, |bench| {
-            bench.event(Event::Request(Request::Load(RecipeKey::Number(2))));
-        }),
-        (5, |bench| {
-            bench.event(Event::Request(Request::Teach {
-                number: 2,
-                keep_gauges: false,
-            }));
         }),
     ];
     for (state, prepare) in waits {
@@ -62,14 +53,16 @@ fn every_wait_has_a_deadline_and_a_missed_one_is_a_fault_that_says_how_to_clear_
         });
         let snapshot = bench.pulse(control::ERROR_RESET);
         assert_eq!((snapshot.state, snapshot.error_code), (1, 0));
-        let results = u32::from(state < 4);
         assert_eq!(
-            snapshot.result_seq,
-            40 + results,
+            snapshot.result_seq, 41,
             "the cycle ended once, the late answer was ignored"
         );
     }
     let mut bench = Bench::booting_with(settings());
+    for _ in 0..3 {
+        assert_eq!(bench.tick_after(29_000).state, 0, "a slow head is no fault");
+        bench.event(Event::Alive);
+    }
     assert_eq!(bench.tick_after(31_000).state, 7);
     assert_eq!(
         bench.event(Event::Started).state,
@@ -196,6 +189,73 @@ fn stopping_aborts_and_still_takes_the_result_in_flight() {
         inspection: good(),
     });
     assert_eq!((snapshot.state, snapshot.result_seq), (8, 41));
+}
+
+#[test]
+fn a_silent_load_or_teach_is_a_fault_until_the_task_goes_on_with_it_and_ends_as_it_would_have() {
+    type Begin = fn(&mut Bench) -> JobId;
+    let begin: [(u16, Begin); 2] = [
+        (4, |bench| {
+            bench.event(Event::Request(Request::Load(RecipeKey::Number(2))));
+            bench.job()
+        }),
+        (5, |bench| bench.teach(2)),
+    ];
+    for (state, begin) in begin {
+        for goes_on in [true, false] {
+            let mut bench = Bench::ready();
+            let job = begin(&mut bench);
+            assert_eq!(bench.tick_after(29_000).state, state);
+            let silent = bench.tick_after(2_000);
+            assert_eq!((silent.state, silent.error_code), (7, error_code::DEADLINE));
+            assert!(!silent.worker_alive);
+            let active = silent.recipe.map(|recipe| recipe.number);
+            assert_eq!(active, Some(1), "the recipe before is the active one");
+            assert_eq!(bench.pulse(control::ERROR_RESET).state, 7, "still silent");
+            if goes_on {
+                let progress = bench.event(Event::Progress {
+                    job,
+                    fraction: 0.5,
+                    words: "planning".into(),
+                });
+                assert_eq!((progress.state, progress.error_code), (state, 0));
+            }
+            // A late answer is taken; of another job it is not.
+            let other = Event::TeachFailed {
+                job: JobId(job.0 + 1),
+                error_code: 201,
+                message: "x".into(),
+            };
+            assert_eq!(bench.event(other).state, state);
+            let answer = match state {
+                4 => Event::RecipeLoaded {
+                    job,
+                    recipe: recipe(2),
+                },
+                _ => Event::Taught {
+                    job,
+                    recipe: recipe(2),
+                },
+            };
+            let after = bench.event(answer);
+            let active = after.recipe.map(|recipe| recipe.number);
+            assert_eq!((after.state, after.error_code, active), (1, 0, Some(2)));
+        }
+    }
+}
+
+#[test]
+fn a_stop_ends_a_job_that_is_silent() {
+    let mut bench = Bench::ready();
+    let job = bench.teach(2);
+    bench.tick_after(31_000);
+    bench.effects.clear();
+    bench.event(Event::Stop);
+    assert!(
+        bench.effects.contains(&Effect::Abort { job }),
+        "{:?}",
+        bench.effects
+    );
 }
 
 #[test]

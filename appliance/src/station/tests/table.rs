@@ -67,8 +67,8 @@ fn in_state(column: usize) -> Bench {
             });
         }
         LATE => {
-            bench.event(Event::Request(Request::Load(RecipeKey::Number(2))));
-            bench.now = bench.now.after(Limits::default().loading);
+            bench.token(1);
+            bench.now = bench.now.after(Limits::default().acquiring);
             bench.event(Event::Tick { utc_us: None });
         }
         FULL => {

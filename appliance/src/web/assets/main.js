@@ -49,7 +49,8 @@ function showSnapshot(now) {
   const waiting = now.state === "ready" && !now.ready;
   $("state").dataset.state = waiting ? "wait" : kind;
   const why = now.calibration_valid ? WAITING[now.refusal && now.refusal.reason] : "uncalibrated";
-  text("state-words", waiting ? why || "not ready" : words);
+  const loading = now.load && `${words}: ${now.load.words}, ${Math.round(100 * now.load.fraction)} %`;
+  text("state-words", waiting ? why || "not ready" : loading || words);
   show("refusal", waiting);
   text("refusal", waiting ? `No trigger is accepted: ${now.refusal.words}.` : "");
   $("trigger").disabled = !now.ready;

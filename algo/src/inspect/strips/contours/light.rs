@@ -27,7 +27,7 @@ pub enum Signal<'a> {
 #[derive(Clone, Debug)]
 pub struct GoldenSignal {
     /// Real and imaginary part of each pixel, row-major, in 1/64 count of an 8-bit sample.
-    pub values: Arc<Vec<i16>>,
+    pub values: Arc<[i16]>,
     /// r of its level.
     pub ratio: f64,
     /// N, the number of its shifts.

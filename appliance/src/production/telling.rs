@@ -1,0 +1,71 @@
+//! Tells the station, and the service manager, how far a job of the measuring task is.
+
+use super::aborts::Aborts;
+use crate::station::{Event, JobId, StationHandle};
+use crate::system::notify::Pulse;
+use crate::system::progress::Progress;
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+/// A stage is told so often at most.
+const PERIOD: Duration = Duration::from_millis(250);
+
+/// What a job tells while it goes on. Its threads may tell each row that they have done.
+pub(super) struct Telling<'a> {
+    pub station: &'a StationHandle,
+    pub pulse: &'a Pulse,
+    pub bar: &'a Progress,
+    pub aborts: &'a Aborts,
+    pub job: JobId,
+    last: Mutex<Option<Told>>,
+}
+
+/// What was told last.
+struct Told {
+    at: Instant,
+    share: f64,
+    words: String,
+}
+
+impl<'a> Telling<'a> {
+    pub fn new(
+        station: &'a StationHandle,
+        pulse: &'a Pulse,
+        bar: &'a Progress,
+        (aborts, job): (&'a Aborts, JobId),
+    ) -> Self {
+        Self {
+            station,
+            pulse,
+            bar,
+            aborts,
+            job,
+            last: Mutex::new(None),
+        }
+    }
+
+    /// Tells that a share of the job is done, and the present stage; answers whether to go on.
+    pub fn tell(&self, share: f64, words: &str) -> bool {
+        self.pulse.beat();
+        // Another thread that is telling tells the same.
+        if let Ok(mut last) = self.last.try_lock() {
+            let before = last.as_ref().map_or(0.0, |told| told.share);
+            let due = last
+                .as_ref()
+                .is_none_or(|told| told.words != words || told.at.elapsed() >= PERIOD);
+            if due {
+                // Rows are not done in their order.
+                let share = share.max(before);
+                self.bar.tell(share, words);
+                self.station.event(Event::Progress {
+                    job: self.job,
+                    fraction: share as f32,
+                    words: words.into(),
+                });
+                let (at, words) = (Instant::now(), words.to_owned());
+                *last = Some(Told { at, share, words });
+            }
+        }
+        !self.aborts.has(self.job)
+    }
+}

@@ -1,0 +1,204 @@
+//! The frames of the reference head, 1456 × 1088 pixels, by the shipped programs: taught, edited,
+//! tried and judged like small ones, telling how far each piece of work is.
+
+use crate::page::Browser;
+use crate::station_plc::{Daemon, Place, Plc};
+use crate::written::program;
+use serde_json::{Value, json};
+use std::fs;
+use std::time::{Duration, Instant};
+use tests::until::{PATIENCE, until};
+
+const PASS: u16 = 1;
+/// The camera of the reference head (docs/hardware.md), with a quarter of the rays of each pixel.
+const CAMERA: &str = "sub_rays = 2\n\n[rig.camera]\nwidth = 1456\nheight = 1088\n";
+/// Gauges and contours of a recipe that has as many as it may, and a dozen.
+const GAUGES: usize = 64;
+const CONTOURS: usize = 12;
+/// Work that is silent for this long is a fault.
+const SILENCE: Duration = Duration::from_secs(30);
+
+/// A head of full size in front of a part.
+fn scene(part: &str) -> String {
+    format!("{CAMERA}\n[part]\nkind = {part:?}\n")
+}
+
+/// What a station told while it worked.
+struct Told {
+    shares: Vec<f64>,
+    stages: Vec<String>,
+    longest: Duration,
+}
+
+/// Follows a station until it is ready with another recipe than `before`: it is never in fault, and
+/// what `key` of the snapshot tells never goes back.
+fn follow(browser: &mut Browser, key: &str, before: &Value) -> Told {
+    let (mut shares, mut stages) = (Vec::new(), Vec::new());
+    let (mut longest, mut since) = (Duration::ZERO, Instant::now());
+    until("other recipe", 8 * PATIENCE, || {
+        let snapshot = browser.get("/api/snapshot");
+        assert_ne!(snapshot["state"], "fault", "{snapshot}");
+        if let Some(share) = snapshot[key]["fraction"].as_f64() {
+            let words = snapshot[key]["words"].as_str().unwrap().to_owned();
+            if shares.last() != Some(&share) || stages.last() != Some(&words) {
+                longest = longest.max(since.elapsed());
+                since = Instant::now();
+                shares.push(share);
+            }
+            if stages.last() != Some(&words) {
+                stages.push(words);
+            }
+        }
+        match snapshot["ready"] == true && snapshot["recipe"] != *before {
+            true => Ok(()),
+            false => Err(snapshot),
+        }
+    });
+    assert!(shares.is_sorted(), "{shares:?}");
+    assert!(longest < SILENCE, "{longest:?}");
+    Told {
+        shares,
+        stages,
+        longest,
+    }
+}
+
+/// A list with as many gauges as a recipe may have, some of them of contours: the holes of a plate,
+/// each several times.
+fn long_list(recipe: &Value) -> Value {
+    let mut edit = json!({ "datums": recipe["datums"] });
+    for key in ["fingerprint", "features", "gauges"] {
+        edit[key] = recipe[key].clone();
+    }
+    let features = edit["features"].as_array().unwrap().iter();
+    let holes: Vec<Value> = features
+        .filter(|of| of["kind"] == "circle")
+        .cloned()
+        .collect();
+    assert!(!holes.is_empty(), "{recipe}");
+    let names = (0..CONTOURS).map(|at| format!("hole {}", at + 100));
+    let names: Vec<String> = names.collect();
+    for (at, name) in names.iter().enumerate() {
+        let mut hole = holes[at % holes.len()].clone();
+        hole["name"] = json!(name);
+        edit["features"].as_array_mut().unwrap().push(hole);
+    }
+    let gauges = edit["gauges"].as_array_mut().unwrap();
+    let taken: Vec<u64> = gauges
+        .iter()
+        .map(|of| of["slot"].as_u64().unwrap())
+        .collect();
+    let free = (1..=GAUGES as u64).filter(|slot| !taken.contains(slot));
+    for (at, slot) in free.enumerate() {
+        gauges.push(match names.get(at) {
+            Some(name) => json!({
+                "slot": slot, "name": format!("diameter {slot}"), "kind": "diameter", "of": [name],
+                "golden": true, "plus": 0.1, "minus": 0.1,
+            }),
+            None => json!({
+                "slot": slot, "name": format!("seen {slot}"), "kind": "coverage", "of": ["frame"],
+                "low": 0.05,
+            }),
+        });
+    }
+    assert_eq!(gauges.len(), GAUGES);
+    edit
+}
+
+#[test]
+fn a_plate_is_taught_and_tried_edited_loaded_undone_and_judged_by_sixty_four_gauges() {
+    let place = Place::before(&scene("plate"));
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    browser.sign_in(&daemon);
+    let mut plc = Plc::connect(&daemon);
+    assert_eq!(plc.measure(1)[8], PASS);
+
+    // Taught again, followed by the page.
+    let before = browser.get("/api/snapshot")["recipe"].clone();
+    let (status, answer) = browser.json("POST", "/api/recipes/2/teach", &json!({}));
+    assert_eq!(status, 202, "{answer}");
+    let told = follow(&mut browser, "teach", &before);
+    println!(
+        "taught: {} signs of progress, {:?} apart at most; {:?}",
+        told.shares.len(),
+        told.longest,
+        told.stages
+    );
+    assert!(
+        told.shares.len() > 50 && told.stages.len() > 5,
+        "{:?}",
+        told.stages
+    );
+
+    let recipe = browser.get("/api/recipes/2");
+    let edit = long_list(&recipe);
+    let (status, tried) = browser.json("POST", "/api/recipes/2/try", &edit);
+    assert_eq!((status, &tried["problems"]), (200, &json!([])), "{tried}");
+    let (status, answer) = browser.json("PUT", "/api/recipes/2", &edit);
+    assert_eq!(status, 200, "{answer}");
+    let stored = browser.get("/api/recipes/2");
+    assert_eq!(stored["gauges"].as_array().unwrap().len(), GAUGES);
+    browser.wait_for_another(recipe["fingerprint"].as_str().unwrap());
+    let result = browser.measure();
+    assert_eq!(result["verdict"], "PASS", "{result}");
+    assert_eq!(result["gauges"].as_array().unwrap().len(), GAUGES);
+    for layer in ["height", "deviation", "modulation"] {
+        let path = format!("/api/picture/{layer}");
+        let (status, picture) = browser.ask("GET", &path, &[]);
+        assert!(
+            status == 200 && picture.starts_with(b"\x89PNG"),
+            "{path}: {status}"
+        );
+    }
+
+    // The version before comes back, and is loaded, too.
+    let before = browser.get("/api/snapshot")["recipe"].clone();
+    let (status, answer) = browser.json("POST", "/api/recipes/2/undo", &json!({}));
+    assert!(status < 300, "{status}: {answer}");
+    follow(&mut browser, "load", &before);
+    assert_eq!(browser.measure()["verdict"], "PASS");
+    let (_, file) = browser.ask("GET", "/api/recipes/2/file", &[]);
+    assert!(file.len() > 30 << 20, "{}", file.len());
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn every_other_path_of_a_head_of_full_size_ends_as_that_of_a_small_one() {
+    let place = Place::before(&scene("sheet_metal"));
+    let path = |name: &str| place.path(name).to_str().unwrap().to_owned();
+    let (config, state) = (path("fringed.toml"), path("state"));
+    let timed = |words: &[&str]| {
+        let began = Instant::now();
+        let run = program().run(words).succeeded();
+        println!(
+            "{:6.1} s  fringed {}",
+            began.elapsed().as_secs_f64(),
+            words[0]
+        );
+        run
+    };
+    let at = ["--config", &*config];
+    let stored = [&at[..], &["--state", &*state]].concat();
+    timed(&[&["teach", "--number", "3"], &stored[..]].concat());
+    timed(&[&["doctor"], &at[..]].concat());
+    let file = path("three.recipe");
+    timed(&[&["recipe", "export", "3", &*file], &stored[..]].concat());
+    let import = [
+        "recipe",
+        "import",
+        &*file,
+        "--number",
+        "4",
+        "--part-number",
+        "FOUR",
+    ];
+    timed(&[&import, &stored[..]].concat());
+    let (recording, measured) = (path("recorded"), path("measured"));
+    timed(&[&["record", &*recording], &at[..]].concat());
+    timed(&["measure", &recording, "--out", &measured]);
+    assert!(fs::metadata(place.path("measured/report.json")).is_ok());
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    assert_eq!(plc.measure(1)[8], PASS);
+}
