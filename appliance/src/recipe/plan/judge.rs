@@ -1,10 +1,11 @@
 //! From findings to a verdict, or to the reason why a longer sequence should be tried.
 
-use crate::recipe::Demands;
 use crate::recipe::demands::GaugeLimits as Limits;
 use crate::recipe::light::{Cause, Light};
 use crate::recipe::lost::{MIN_SHARE, why_lost};
+use crate::recipe::{Demands, SequenceKind};
 use crate::station::error_code::{BLURRED, GUARD_BAND, NOT_MEASURED, NOT_THE_PART, OUT_OF_PLACE};
+use crate::station::result::flag::{FULL_SEQUENCE, SINGLE_LEVEL, TWO_LEVELS};
 use crate::station::{
     COVERAGE_FACTOR, GaugeLimits, GaugeValue, Inspection, Measured, Placement, Unit, Verdict,
 };
@@ -382,5 +383,14 @@ fn placement(placed: &Placed) -> Placement {
         values,
         reach_mm: placed.reach,
         outliers: placed.outliers,
+    }
+}
+
+/// The flag of a result that says which kind of sequence was used.
+pub(super) fn sequence_flag(kind: SequenceKind) -> u16 {
+    match kind {
+        SequenceKind::TwoFrames | SequenceKind::SingleLevel => SINGLE_LEVEL,
+        SequenceKind::TwoLevels => TWO_LEVELS,
+        SequenceKind::Full => FULL_SEQUENCE,
     }
 }

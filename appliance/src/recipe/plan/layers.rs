@@ -1,8 +1,9 @@
 //! Maps of a measured part for the page (height, deviation from golden, modulation), and its point
 //! cloud.
 
+use super::Plan;
+use super::laps::Laps;
 use super::window::pitch;
-use super::{Laps, Plan};
 use crate::head::calibration::Calibration;
 use crate::head::seam;
 use crate::output::cloud::{Axes, ply};

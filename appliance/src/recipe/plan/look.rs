@@ -1,6 +1,7 @@
 //! A part that is judged, with what is said and drawn of its features.
 
-use super::{Laps, Plan};
+use super::Plan;
+use super::laps::Laps;
 use crate::recipe::Seen;
 use crate::station::Inspection;
 use algo::inspect::{Drawing, Maps};

@@ -4,6 +4,7 @@
 mod arriving;
 mod golden;
 mod judge;
+mod laps;
 mod layers;
 mod look;
 mod patterns;
@@ -22,12 +23,10 @@ use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::head::seam;
 use crate::recipe::light::{GoldenLight, Light};
-use crate::recipe::{Conditions, Demands, Outline, Recipe, RecipeId, SequenceKind};
+use crate::recipe::{Conditions, Demands, Outline, Recipe, RecipeId};
 use crate::station::error_code::WRONG_FRAMES;
-use crate::station::result::flag::{
-    FULL_SEQUENCE, JUDGES_NOTHING, SIMULATED, SINGLE_LEVEL, TWO_LEVELS,
-};
-use crate::station::{Inspection, Stage, Stages, Verdict};
+use crate::station::result::flag::{JUDGES_NOTHING, SIMULATED};
+use crate::station::{Inspection, Stage, Verdict};
 use crate::system::headway::Headway;
 use algo::frame::FrameView;
 use algo::geometry::HeightRange;
@@ -36,6 +35,7 @@ use algo::pattern::{MAX_FRAMES, Shot};
 use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
 use hal::frame::Frame;
+use laps::Laps;
 use refused::Refusal;
 use run::{Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -351,7 +351,7 @@ impl Plan {
         };
         let kind = self.runs.get(sequence).map(|run| run.kind);
         let mut inspection = Inspection {
-            flags: kind.map_or(0, sequence_flag) | simulated | nothing,
+            flags: kind.map_or(0, judge::sequence_flag) | simulated | nothing,
             ..Inspection::default()
         };
         match found {
@@ -440,35 +440,5 @@ impl Plan {
             .map_err(|error| error.to_string());
         laps.end(Stage::Strips);
         Ok((findings?, None))
-    }
-}
-
-/// Measures how long the stages of an inspection take, each from the end of the one before.
-struct Laps {
-    stages: Stages,
-    since: Instant,
-}
-
-impl Laps {
-    fn since(since: Instant) -> Self {
-        let stages = Stages::default();
-        Self { stages, since }
-    }
-
-    fn end(&mut self, stage: Stage) {
-        let now = Instant::now();
-        let us = (now - self.since).as_micros();
-        self.stages
-            .add(stage, u32::try_from(us).unwrap_or(u32::MAX));
-        self.since = now;
-    }
-}
-
-/// The flag of a result that says which kind of sequence was used.
-fn sequence_flag(kind: SequenceKind) -> u16 {
-    match kind {
-        SequenceKind::TwoFrames | SequenceKind::SingleLevel => SINGLE_LEVEL,
-        SequenceKind::TwoLevels => TWO_LEVELS,
-        SequenceKind::Full => FULL_SEQUENCE,
     }
 }

@@ -1,7 +1,8 @@
 //! Cycles of a part that is not there: golden as a displaced part would be measured, judged as
 //! production would.
 
-use super::{Laps, Plan};
+use super::Plan;
+use super::laps::Laps;
 use crate::station::Inspection;
 use algo::geometry::Vector;
 use algo::inspect::{Input, Maps, Motion, Signal};

@@ -1,7 +1,8 @@
 //! Plans a recipe before it is used: whether it can be used on a head, and what it measures of
 //! golden. The plan is dropped.
 
-use super::{Laps, Plan, PlanError};
+use super::laps::Laps;
+use super::{Plan, PlanError};
 use crate::head::calibration::Calibration;
 use crate::recipe::{Demands, Recipe, Seen};
 use crate::station::Inspection;
