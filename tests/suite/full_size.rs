@@ -106,6 +106,7 @@ fn long_list(recipe: &Value) -> Value {
 }
 
 #[test]
+#[ignore = "takes minutes: `.ci/run full`"]
 fn a_plate_is_taught_and_tried_edited_loaded_undone_and_judged_by_sixty_four_gauges() {
     let place = Place::before(&scene("plate"));
     let daemon = Daemon::start(&place);

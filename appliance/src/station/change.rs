@@ -208,7 +208,8 @@ impl Station {
             _ => return self.late("progress", job, effects),
         };
         if reached.is_finite() {
-            *fraction = reached.clamp(0.0, 1.0);
+            // A check between two stages counts from 0 again.
+            *fraction = reached.clamp(*fraction, 1.0);
         }
         *words = doing;
     }
