@@ -17,7 +17,7 @@ pub enum Exit {
     Content = 65,
     /// The named folder or file does not exist.
     Missing = 66,
-    /// A port is in use or a device missing.
+    /// A port is in use or a device missing, or the processor is older than SSSE3.
     Unavailable = 69,
     /// The program itself is at fault.
     Software = 70,

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Compares the results of every back-end with the frozen bits: on this machine, and under qemu on aarch64 and on an x86-64 processor
-# without AVX2.
+# without AVX2. An older one without SSSE3 must be refused by name.
 #
 #     tests/aarch64/bits.sh DIR [PROFILE]      DIR as made by toolchain.sh; built with dist or another profile
 set -euo pipefail
@@ -17,6 +17,11 @@ older=$(CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER="$dir/bin/qemu-x86_64 -cpu 
 there=$("$dir/bin/cargo" "${probe[@]}")
 if ! grep -q "^ssse3 " <<<"$older"; then
     echo "a processor with SSSE3 does not decode with it" >&2
+    exit 1
+fi
+said=$(CARGO_TARGET_X86_64_UNKNOWN_LINUX_GNU_RUNNER="$dir/bin/qemu-x86_64 -cpu Conroe,-ssse3" cargo "${probe[@]}" 2>&1) && said="nothing, and ended with 0"
+if [[ $said != *"this processor has no SSSE3"* ]]; then
+    echo "a processor without SSSE3 is not refused by name, but said: $said" >&2
     exit 1
 fi
 for machine in here older there; do

@@ -89,7 +89,7 @@ fn heights_about_golden_are_exact_to_micrometres_within_the_declared_range() {
             for v in (0..surface.phase.len() / width).step_by(3) {
                 let row = &surface.phase[v * width..(v + 1) * width];
                 let moved: Vec<_> = row.iter().map(|&phase| phase + delta).collect();
-                cubics.heights(Backend::best(), v, &moved, &mut heights);
+                cubics.heights(Backend::best().unwrap(), v, &moved, &mut heights);
                 for (u, height) in heights.iter().enumerate() {
                     if taught.recipe.arrays.valid[v * width + u] == 0 {
                         continue;
@@ -421,7 +421,7 @@ fn levels_decoded_on_arrival_give_the_same_inspection() {
         };
         let expected = inspected(0).0;
         assert!(expected.valid_points > 5000);
-        // Buffers are reused, and a strip that starts late decodes all frames at the end.
+        // Buffers are reused, and levels that were not decoded on arrival are decoded at the end.
         for wanted in [levels - 1, levels - 1, usize::from(levels > 2), levels - 1] {
             assert_eq!(
                 inspected(wanted),
@@ -441,7 +441,7 @@ fn unknown_phases_have_no_height() {
     let cubics = plan.production().cubics();
     let mut heights = vec![Height::from_nm(0); 256];
     cubics.heights(
-        Backend::best(),
+        Backend::best().unwrap(),
         128,
         &[AbsolutePhase::UNKNOWN; 256],
         &mut heights,

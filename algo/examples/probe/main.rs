@@ -9,10 +9,9 @@
 //! ```
 //!
 //! CASE is the name of a case, one of `cases.rs` or another of that form; with `/background`
-//! appended three quarters of the frames are dark, with `/arrival` the coarser levels are decoded
-//! on arrival, with `/aligned` every frame begins at a page of 16 KiB, as a camera's buffers do,
-//! with `/quiet` a quiet head's modulations are trusted. At the end may stand a back-end, as in
-//! `single-4-8@ssse3`; without it the fastest is used.
+//! appended three quarters of the frames are dark, with `/aligned` every frame begins at a page of
+//! 16 KiB, as a camera's buffers do, with `/quiet` a quiet head's modulations are trusted. At the
+//! end may stand a back-end, as in `single-4-8@ssse3`; without it the fastest is used.
 //!
 //! The hashes must be those of `frozen.txt` on every machine and with every back-end; a test here
 //! checks it. After a change that is meant to change bits, `probe | sed 's/[^ ]* //' | awk
@@ -23,11 +22,9 @@ mod hash;
 mod rig;
 mod scene;
 
-use algo::frame::FrameView;
 use algo::phase::{Decoder, LeastModulation};
-use algo::pipeline::{PhaseMap, arrive, decode, decode_last, triangulate};
+use algo::pipeline::{decode, triangulate};
 use algo::simd::Backend;
-use algo::units::AbsolutePhase;
 use cases::Case;
 use hash::Hash;
 use scene::{Image, Lighting};
@@ -57,23 +54,6 @@ fn backends(decoder: &Decoder) -> Vec<(&'static str, Decoder)> {
 fn backend(name: &str) -> Outcome<Backend> {
     let found = Backend::available().find(|backend| backend.name() == name);
     found.ok_or_else(|| format!("{name} is not a back-end of this machine").into())
-}
-
-/// Decodes level by level, on arrival.
-fn arrival(
-    decoder: &Decoder,
-    frames: &[FrameView<'_>],
-    map: Option<&[AbsolutePhase]>,
-) -> Outcome<PhaseMap> {
-    let mut arrived = decoder.arrived(frames[0].width(), frames[0].height());
-    for (level, places) in decoder.levels().enumerate() {
-        let frames: Vec<_> = places.iter().map(|&at| frames[at]).collect();
-        if level + 1 == decoder.levels().len() {
-            return Ok(decode_last(decoder, &arrived, &frames, map, None)?);
-        }
-        arrive(decoder, &frames, &mut arrived)?;
-    }
-    Err("a sequence has levels".into())
 }
 
 /// The case's name and the hashes of phase, modulation, trust and height.
@@ -110,8 +90,8 @@ fn main() -> Outcome<()> {
         }
         ["decode", counted, rows, ref rest @ ..] if rest.len() <= 1 => {
             let (case, backend) = match counted.split_once('@') {
-                Some((case, name)) => (case, backend(name)?),
-                None => (counted, Backend::best()),
+                Some((case, name)) => (case, Some(backend(name)?)),
+                None => (counted, None),
             };
             let (name, way) = case.split_once('/').unwrap_or((case, ""));
             let light = match way {
@@ -130,15 +110,16 @@ fn main() -> Outcome<()> {
                 _ => image,
             };
             let frames = image.frames(rows.parse::<usize>()?.min(height))?;
-            let decoder = case.decoder()?.with_backend(backend);
+            let decoder = case.decoder()?;
+            let decoder = match backend {
+                Some(backend) => decoder.with_backend(backend),
+                None => decoder,
+            };
             let decoder = match (way, LeastModulation::new(QUIET_COUNTS)) {
                 ("quiet", Some(least)) => decoder.with_least_modulation(least),
                 _ => decoder,
             };
-            let map = match way {
-                "arrival" => arrival(&decoder, &frames, image.map(&case))?,
-                _ => decode(&decoder, &frames, image.map(&case), None)?,
-            };
+            let map = decode(&decoder, &frames, image.map(&case), None)?;
             Ok(writeln!(stdout(), "{}", black_box(map).phase.len())?)
         }
         _ => Err("usage: probe [decode CASE ROWS [WIDTH]]".into()),

@@ -116,8 +116,9 @@ mod tests {
     use super::*;
     use crate::frame::{FrameView, Samples};
     use crate::pattern::{Shot, Waveform, Waveforms};
-    use crate::phase::{Decoder, PhaseRow, Trust};
-    use crate::units::{AbsolutePhase, Modulation};
+    use crate::phase::{Decoder, Trust};
+    use crate::pipeline::{PhaseMap, decode};
+    use crate::units::AbsolutePhase;
     use rand_xoshiro::SplitMix64;
     use rand_xoshiro::rand_core::{Rng, SeedableRng};
     use std::vec;
@@ -181,15 +182,7 @@ mod tests {
         let decoder = Decoder::new(&sequence, RANGE, 16).unwrap();
         let view = |samples| FrameView::new(Samples::Sixteen(samples), pixels, 1, pixels).unwrap();
         let views: Vec<_> = frames.iter().map(|frame| view(&frame[..])).collect();
-        let mut phase = vec![AbsolutePhase::UNKNOWN; pixels];
-        let mut modulation = vec![Modulation::default(); pixels];
-        let mut trust = vec![Trust::default(); pixels];
-        let row = PhaseRow {
-            phase: &mut phase,
-            modulation: &mut modulation,
-            trust: &mut trust,
-        };
-        decoder.row(&views, 0, &golden, 0..pixels, row);
+        let PhaseMap { phase, trust, .. } = decode(&decoder, &views, Some(&golden), None).unwrap();
         let wrong = |at: usize| (phase[at] - golden[at]).turns() - away;
         let resolved = (0..pixels).filter(|&at| trust[at] == Trust::Resolved);
         let wrong = resolved.filter(|&at| wrong(at).abs() > 0.5).count();

@@ -50,7 +50,7 @@ pub(crate) enum ArrivedRow<W, B> {
 }
 
 /// The phase expected at the next level ([`super::unwrap_step::ExpectedPhase`]) along a row, with
-/// maps of words `W` and of bytes `B`: owned or borrowed.
+/// maps of words `W` and of bytes `B`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Expected<W, B> {
     /// Modulo one turn, 1/65536 turn.
@@ -193,26 +193,14 @@ impl Layout {
     }
 }
 
-impl<W: AsRef<[u16]>, B: AsRef<[u8]>> Expected<W, B> {
-    /// Borrowed.
+impl ExpectedRowMut<'_> {
+    /// Borrowed to be read.
     #[inline(always)]
     pub fn row(&self) -> ExpectedRow<'_> {
         Expected {
-            fraction: self.fraction.as_ref(),
-            turns: self.turns.as_ref(),
-            reason: self.reason.as_ref(),
-        }
-    }
-}
-
-impl<W: AsMut<[u16]>, B: AsMut<[u8]>> Expected<W, B> {
-    /// Borrowed to be written.
-    #[inline(always)]
-    pub fn row_mut(&mut self) -> ExpectedRowMut<'_> {
-        Expected {
-            fraction: self.fraction.as_mut(),
-            turns: self.turns.as_mut(),
-            reason: self.reason.as_mut(),
+            fraction: self.fraction,
+            turns: self.turns,
+            reason: self.reason,
         }
     }
 }

@@ -46,6 +46,8 @@ pub enum DecodeError {
     Sequence(SequenceError),
     /// Samples of fewer than 8 or more than 16 bits.
     BitDepth(u8),
+    /// The processor is an x86-64 one that is older than SSSE3.
+    Processor,
     /// The number of frames is not the sequence's.
     FrameCount {
         /// Frames of the sequence.
@@ -83,6 +85,9 @@ impl fmt::Display for DecodeError {
         match self {
             Self::Sequence(error) => error.fmt(f),
             Self::BitDepth(bits) => write!(f, "samples of {bits} bits: 8 to 16 can be decoded"),
+            Self::Processor => f.write_str(
+                "this processor has no SSSE3, with which phases are computed: take an x86-64 processor with SSSE3 or AVX2, or an aarch64 one",
+            ),
             Self::FrameCount { expected, given } => {
                 write!(
                     f,
@@ -123,7 +128,8 @@ impl Decoder {
     /// samples of `bit_depth` bits, with the least modulation of unknown noise.
     ///
     /// # Errors
-    /// If the levels are of no known form or the bit depth is not 8 to 16.
+    /// If the levels are of no known form, the bit depth is not 8 to 16, or the processor has no
+    /// back-end.
     pub fn new(sequence: &Sequence, range: PhaseRange, bit_depth: u8) -> Result<Self, DecodeError> {
         if !(8..=16).contains(&bit_depth) {
             return Err(DecodeError::BitDepth(bit_depth));
@@ -138,7 +144,7 @@ impl Decoder {
             unwrapper: Unwrapper::new(unwrapping, sequence, range)?,
             unwrapping,
             information: information(unwrapping, sequence),
-            backend: Backend::best(),
+            backend: Backend::best().ok_or(DecodeError::Processor)?,
             frame_count: sequence.frame_count(),
             bit_depth,
             least: LeastModulation::default(),

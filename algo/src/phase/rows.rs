@@ -1,15 +1,15 @@
-//! Decoding row by row: all levels at once, or each on arrival.
+//! Decoding row by row: each level on arrival, then the finest.
 //!
 //! Chooses the sample type, gathers the rows of the frames, widens columns that are fewer than a
 //! block, and calls the kernel of the sequence's form.
 
 use super::arrived::{Arrived, ArrivedRow, WrappedRow};
-use super::kernel::{about, geometric, on_arrival};
+use super::kernel::{about, geometric};
 use super::narrow::{ResultColumns, RowSample, near, near_known, near_rows, padded_rows};
 use super::unwrap::Unwrapper;
 use super::{Decoder, PhaseRow};
 use crate::frame::FrameView;
-use crate::pattern::{MAX_FRAMES, MAX_LEVELS, MAX_SHIFTS};
+use crate::pattern::{MAX_LEVELS, MAX_SHIFTS};
 use crate::simd::{MAX_PIXELS, Results};
 use crate::units::AbsolutePhase;
 use core::ops::Range;
@@ -17,29 +17,9 @@ use core::ops::Range;
 impl Decoder {
     /// Room for levels that are decoded on arrival, of frames of this size.
     pub fn arrived(&self, width: usize, height: usize) -> Arrived {
-        match &self.unwrapper {
-            Unwrapper::Geometric(_) => Arrived::geometric(width, height),
-            Unwrapper::About(_) => Arrived::about_map(width, height, self.levels.len() - 1),
-        }
-    }
-
-    /// Decodes `columns` of row `v` of frames that [`Self::check`] has passed, into the same
-    /// columns of `out`.
-    ///
-    /// `map` is the row of the known map for dense and single-level sequences; other sequences do
-    /// not read it.
-    pub fn row(
-        &self,
-        frames: &[FrameView<'_>],
-        v: usize,
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        if self.bit_depth == 8 {
-            self.typed_row::<u8>(frames, v, map, columns, out);
-        } else {
-            self.typed_row::<u16>(frames, v, map, columns, out);
+        match (&self.unwrapper, self.levels.len() - 1) {
+            (Unwrapper::Geometric(_), 1..) => Arrived::geometric(width, height),
+            (_, coarser) => Arrived::about_map(width, height, coarser),
         }
     }
 
@@ -59,9 +39,13 @@ impl Decoder {
         }
     }
 
-    /// As [`Self::row`], from the levels that have arrived, which are all but the finest, and the
-    /// frames of the finest.
-    pub fn last_row(
+    /// Decodes `columns` of row `v` into the same columns of `out`, from the levels that have
+    /// arrived, which are all but the finest, and the frames of the finest, which
+    /// [`Self::check_last`] has passed.
+    ///
+    /// `map` is the row of the known map for dense and single-level sequences; other sequences do
+    /// not read it.
+    pub fn row(
         &self,
         arrived: &Arrived,
         last: &[FrameView<'_>],
@@ -71,59 +55,9 @@ impl Decoder {
         out: PhaseRow<'_>,
     ) {
         if self.bit_depth == 8 {
-            self.typed_last::<u8>(arrived.row(v), last, v, map, columns, out);
+            self.typed_row::<u8>(arrived.row(v), last, v, map, columns, out);
         } else {
-            self.typed_last::<u16>(arrived.row(v), last, v, map, columns, out);
-        }
-    }
-
-    fn typed_row<T: RowSample>(
-        &self,
-        frames: &[FrameView<'_>],
-        v: usize,
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        let places = self.levels.iter().flat_map(|level| &level.frames);
-        // Filled in place: `collect` would move all 8 KiB of it, for every row.
-        let mut rows: heapless::Vec<&[T], MAX_FRAMES> = heapless::Vec::new();
-        rows.extend(places.map(|&at| T::row(frames[at], v)));
-        if columns.len() >= MAX_PIXELS {
-            return self.columns(&rows, map, columns, out);
-        }
-        let near = near(&columns, width(&rows));
-        let padded = padded_rows(&rows, &near);
-        let mut around: heapless::Vec<&[T], MAX_FRAMES> = heapless::Vec::new();
-        around.extend(near_rows(&rows, &padded, &near));
-        let mut few = ResultColumns::new();
-        let map = near_known(map, &near);
-        self.columns(&around, &map, 0..MAX_PIXELS, few.row());
-        few.copy_to(out, columns, near.start);
-    }
-
-    /// Decodes from the rows of all frames, level after level.
-    fn columns<T: RowSample>(
-        &self,
-        mut rows: &[&[T]],
-        map: &[AbsolutePhase],
-        columns: Range<usize>,
-        out: PhaseRow<'_>,
-    ) {
-        let mut levels: heapless::Vec<&[&[T]], MAX_LEVELS> = heapless::Vec::new();
-        for level in &self.levels {
-            let (here, rest) = rows.split_at(level.frames.len());
-            levels.extend([here]);
-            rows = rest;
-        }
-        let out = results(out, &columns);
-        match &self.unwrapper {
-            Unwrapper::Geometric(plan) => {
-                geometric::decode_row(self.backend, plan, &self.levels, &levels, columns, out);
-            }
-            Unwrapper::About(plan) => {
-                about::decode_row(self.backend, plan, &self.levels, &levels, map, columns, out);
-            }
+            self.typed_row::<u16>(arrived.row(v), last, v, map, columns, out);
         }
     }
 
@@ -156,7 +90,7 @@ impl Decoder {
         let (backend, level) = (self.backend, &self.levels[at]);
         match (&self.unwrapper, out) {
             (Unwrapper::Geometric(plan), ArrivedRow::Expected(out)) => {
-                on_arrival::level_row(backend, plan, at, level, rows, columns, out);
+                geometric::level_row(backend, plan, at, level, rows, columns, out);
             }
             (_, ArrivedRow::Wrapped { mut levels, pixels }) => {
                 if let Some((coarsest, out)) = levels.level(at, pixels) {
@@ -168,7 +102,7 @@ impl Decoder {
         }
     }
 
-    fn typed_last<T: RowSample>(
+    fn typed_row<T: RowSample>(
         &self,
         arrived: ArrivedRow<&[u16], &[u8]>,
         frames: &[FrameView<'_>],
@@ -180,7 +114,7 @@ impl Decoder {
         let mut rows = LevelRows::new();
         rows.extend(frames.iter().map(|&frame| T::row(frame, v)));
         if columns.len() >= MAX_PIXELS {
-            return self.last(&rows, (arrived, 0), map, columns, out);
+            return self.finest(&rows, (arrived, 0), map, columns, out);
         }
         let near = near(&columns, width(&rows));
         let padded = padded_rows(&rows, &near);
@@ -189,13 +123,13 @@ impl Decoder {
         let mut few = ResultColumns::new();
         let map = near_known(map, &near);
         let before = (arrived, near.start);
-        self.last(&around, before, &map, 0..MAX_PIXELS, few.row());
+        self.finest(&around, before, &map, 0..MAX_PIXELS, few.row());
         few.copy_to(out, columns, near.start);
     }
 
     /// Decodes from the rows of the finest level's frames and what has arrived from column `start`
     /// on.
-    fn last<T: RowSample>(
+    fn finest<T: RowSample>(
         &self,
         rows: &[&[T]],
         (arrived, start): (ArrivedRow<&[u16], &[u8]>, usize),
@@ -207,12 +141,12 @@ impl Decoder {
         let out = results(out, &columns);
         let there = start..start + columns.end;
         match (&self.unwrapper, arrived, levels) {
-            (Unwrapper::Geometric(plan), _, [_]) => {
-                geometric::decode_row(backend, plan, levels, &[rows], columns, out);
+            (Unwrapper::Geometric(plan), _, [level]) => {
+                geometric::single_row(backend, plan, level, rows, columns, out);
             }
             (Unwrapper::Geometric(plan), ArrivedRow::Expected(before), [.., level]) => {
                 let before = before.part(there);
-                on_arrival::finest_row(backend, plan, level, rows, before, columns, out);
+                geometric::finest_row(backend, plan, level, rows, before, columns, out);
             }
             (
                 Unwrapper::About(plan),
@@ -220,12 +154,12 @@ impl Decoder {
                     levels: row,
                     pixels,
                 },
-                _,
+                [coarser @ .., level],
             ) => {
-                let level = |at: usize| row.part(at * pixels..(at + 1) * pixels);
-                let before = (0..levels.len() - 1).map(|at| level(at).part(there.clone()));
+                let of_level = |at: usize| row.part(at * pixels..(at + 1) * pixels);
+                let before = (0..coarser.len()).map(|at| of_level(at).part(there.clone()));
                 let before: heapless::Vec<WrappedRow<'_>, MAX_LEVELS> = before.collect();
-                about::finest_row(backend, plan, levels, &before, rows, map, columns, out);
+                about::finest_row(backend, plan, level, &before, rows, map, columns, out);
             }
             // A decoder has levels, and `Decoder::arrived` makes the layout that fits the
             // unwrapper.

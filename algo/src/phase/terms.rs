@@ -52,35 +52,33 @@ pub(super) fn pointers<V: Lanes, T: BlockSample>(
     level: &LevelLanes<'_, V>,
     rows: &Rows<'_, T>,
     at: usize,
-    after: usize,
 ) -> Pointers<V> {
     if level.plan.samples != Samples::Weighted {
         match rows.count() {
-            3 => return of_shifts::<V, T, 3>(v, level, &blocks(v, &rows.all(), at, after)),
-            4 => return of_shifts::<V, T, 4>(v, level, &blocks(v, &rows.all(), at, after)),
-            5 => return of_shifts::<V, T, 5>(v, level, &blocks(v, &rows.all(), at, after)),
-            6 => return of_shifts::<V, T, 6>(v, level, &blocks(v, &rows.all(), at, after)),
-            7 => return of_shifts::<V, T, 7>(v, level, &blocks(v, &rows.all(), at, after)),
-            8 => return of_shifts::<V, T, 8>(v, level, &blocks(v, &rows.all(), at, after)),
-            9 => return of_shifts::<V, T, 9>(v, level, &blocks(v, &rows.all(), at, after)),
+            3 => return of_shifts::<V, T, 3>(v, level, &blocks(v, &rows.all(), at)),
+            4 => return of_shifts::<V, T, 4>(v, level, &blocks(v, &rows.all(), at)),
+            5 => return of_shifts::<V, T, 5>(v, level, &blocks(v, &rows.all(), at)),
+            6 => return of_shifts::<V, T, 6>(v, level, &blocks(v, &rows.all(), at)),
+            7 => return of_shifts::<V, T, 7>(v, level, &blocks(v, &rows.all(), at)),
+            8 => return of_shifts::<V, T, 8>(v, level, &blocks(v, &rows.all(), at)),
+            9 => return of_shifts::<V, T, 9>(v, level, &blocks(v, &rows.all(), at)),
             _ => {}
         }
     }
-    weighted(v, level, rows, at, after)
+    weighted(v, level, rows, at)
 }
 
-/// The blocks of N rows at `at`; samples `after` behind them are prefetched.
+/// The blocks of N rows at `at`.
 #[inline(always)]
 pub(super) fn blocks<V: Lanes, T: BlockSample, const N: usize>(
     v: V,
     rows: &[&[T]; N],
     at: usize,
-    after: usize,
 ) -> [T::Block<V>; N] {
     let mut blocks = [T::load(v, rows[0], at); N];
     let mut k = 0;
     while k < N {
-        v.fetch(rows[k], at, after);
+        v.fetch(rows[k], at, V::AHEAD);
         blocks[k] = T::load(v, rows[k], at);
         k += 1;
     }
@@ -250,7 +248,6 @@ fn weighted<V: Lanes, T: BlockSample>(
     level: &LevelLanes<'_, V>,
     rows: &Rows<'_, T>,
     at: usize,
-    after: usize,
 ) -> Pointers<V> {
     let zero = v.splat32(0);
     let mut s = [[zero; 2]; 2];
@@ -263,8 +260,8 @@ fn weighted<V: Lanes, T: BlockSample>(
             rows.row(2 * pair),
             rows.row((2 * pair + 1).min(rows.count() - 1)),
         );
-        v.fetch(first, at, after);
-        v.fetch(second, at, after);
+        v.fetch(first, at, V::AHEAD);
+        v.fetch(second, at, V::AHEAD);
         let (first, second) = (T::load(v, first, at), T::load(v, second, at));
         if level.plan.saturates {
             brightest = T::brighter(v, brightest, T::brighter(v, first, second));

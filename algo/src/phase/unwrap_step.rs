@@ -49,8 +49,7 @@ pub(super) struct UnwrapStep {
     bits: u8,
     /// Fractional bits of the coarse phase in one word.
     coarse_bits: u8,
-    /// By how much that word is shifted to the left before the product
-    /// ([`UnwrapStepLanes::expected_of_any_step`]).
+    /// By how much that word is shifted to the left before the product.
     coarse_left: u8,
     /// What the origins add to the product, and half a turn for rounding.
     offset: i16,
@@ -77,8 +76,7 @@ impl UnwrapStep {
             n
         };
         let coarse_bits = before.map_or(16, |step| step.bits);
-        // From the third step on the word may have room for more turns than there are; the first
-        // two, of which one pass consists, do without the shift.
+        // From the third step on the word may have room for more turns than there are.
         let order_bits = libm::ceil(libm::log2(2.0 * (reach + 0.5))) as u8;
         let coarse_left = match before {
             Some(step) if step.coarse_bits < 16 => (16 - coarse_bits).saturating_sub(order_bits),
@@ -218,71 +216,25 @@ impl<V: Lanes> UnwrapStepLanes<V> {
         }
     }
 
-    /// As [`Self::expected`], for any step of a sequence; the other functions are for its first
-    /// two.
-    #[inline(always)]
-    pub fn expected_of_any_step(&self, v: V, coarse: [Absolute<V>; 2]) -> [ExpectedPhase<V>; 2] {
-        let [mut low, mut high] = coarse;
-        low.word = v.shl_by(low.word, self.coarse_left);
-        high.word = v.shl_by(high.word, self.coarse_left);
-        let mut expected = self.expected(v, coarse);
-        expected[0].turns = self.turns(v, low);
-        expected[1].turns = self.turns(v, high);
-        expected
-    }
-
     /// The expected phases from coarse ones.
     #[inline(always)]
-    pub fn expected(&self, v: V, [low, high]: [Absolute<V>; 2]) -> [ExpectedPhase<V>; 2] {
-        let mut fraction = [
-            v.add(v.mul_low(low.turns.phase, self.whole), self.origin),
-            v.add(v.mul_low(high.turns.phase, self.whole), self.origin),
-        ];
-        if !self.integral {
-            fraction = [
-                v.add(fraction[0], self.part(v, low)),
-                v.add(fraction[1], self.part(v, high)),
-            ];
-        }
+    pub fn expected(&self, v: V, coarse: [Absolute<V>; 2]) -> [ExpectedPhase<V>; 2] {
+        let [low, high] = coarse;
+        let fraction = self.fractions(v, coarse);
         [
             ExpectedPhase {
                 fraction: fraction[0],
-                turns: self.turns(v, low),
+                turns: self.turns(v, v.shl_by(low.word, self.coarse_left)),
             },
             ExpectedPhase {
                 fraction: fraction[1],
-                turns: self.turns(v, high),
+                turns: self.turns(v, v.shl_by(high.word, self.coarse_left)),
             },
         ]
     }
 
-    /// Unwraps `wrapped`, the fine level's phases, by coarse ones: the absolute phases, and the
-    /// residuals' magnitudes (unsigned, 1/65536 turn). The bits of [`Self::expected`] and
-    /// [`Self::unwrap_expected`].
-    #[inline(always)]
-    pub fn unwrap(
-        &self,
-        v: V,
-        [low, high]: [Absolute<V>; 2],
-        wrapped: [V::W; 2],
-    ) -> [(Absolute<V>, V::W); 2] {
-        let mut residual = [
-            v.sub_product(v.sub(wrapped[0], self.origin), low.turns.phase, self.whole),
-            v.sub_product(v.sub(wrapped[1], self.origin), high.turns.phase, self.whole),
-        ];
-        if !self.integral {
-            residual = [
-                v.sub(residual[0], self.part(v, low)),
-                v.sub(residual[1], self.part(v, high)),
-            ];
-        }
-        [
-            self.settled(v, residual[0], self.turns(v, low), wrapped[0]),
-            self.settled(v, residual[1], self.turns(v, high), wrapped[1]),
-        ]
-    }
-
-    /// Unwraps `wrapped` by expected phases.
+    /// Unwraps `wrapped`, the fine level's phases, by expected phases: the absolute phases, and the
+    /// residuals' magnitudes (unsigned, 1/65536 turn).
     #[inline(always)]
     pub fn unwrap_expected(
         &self,
@@ -300,6 +252,43 @@ impl<V: Lanes> UnwrapStepLanes<V> {
         ]
     }
 
+    /// As [`Self::unwrap_expected`] by coarse phases, in one of the first two steps: there the
+    /// coarse word is not shifted.
+    #[inline(always)]
+    pub fn unwrap(
+        &self,
+        v: V,
+        coarse: [Absolute<V>; 2],
+        wrapped: [V::W; 2],
+    ) -> [(Absolute<V>, V::W); 2] {
+        let [low, high] = coarse;
+        let fraction = self.fractions(v, coarse);
+        let residual = [
+            v.sub(wrapped[0], fraction[0]),
+            v.sub(wrapped[1], fraction[1]),
+        ];
+        [
+            self.settled(v, residual[0], self.turns(v, low.word), wrapped[0]),
+            self.settled(v, residual[1], self.turns(v, high.word), wrapped[1]),
+        ]
+    }
+
+    /// n·Φ modulo one turn.
+    #[inline(always)]
+    fn fractions(&self, v: V, [low, high]: [Absolute<V>; 2]) -> [V::W; 2] {
+        let fraction = [
+            v.add(v.mul_low(low.turns.phase, self.whole), self.origin),
+            v.add(v.mul_low(high.turns.phase, self.whole), self.origin),
+        ];
+        if self.integral {
+            return fraction;
+        }
+        [
+            v.add(fraction[0], self.part(v, low)),
+            v.add(fraction[1], self.part(v, high)),
+        ]
+    }
+
     /// (Fraction of n) · Φ modulo one turn.
     #[inline(always)]
     fn part(&self, v: V, coarse: Absolute<V>) -> V::W {
@@ -312,10 +301,10 @@ impl<V: Lanes> UnwrapStepLanes<V> {
         v.add(orders, v.mul_q15(turns.phase, self.part_q15))
     }
 
-    /// n·Φ + ½ in the step's fixed point.
+    /// n·Φ + ½ in the step's fixed point, from the word of Φ.
     #[inline(always)]
-    fn turns(&self, v: V, coarse: Absolute<V>) -> V::W {
-        v.add(v.mul_q15(coarse.word, self.gain), self.offset)
+    fn turns(&self, v: V, coarse: V::W) -> V::W {
+        v.add(v.mul_q15(coarse, self.gain), self.offset)
     }
 
     #[inline(always)]

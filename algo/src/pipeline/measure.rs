@@ -3,6 +3,7 @@
 use super::{Done, Progress, for_each, for_each_row, for_each_row_of_two};
 use crate::frame::{FrameView, SampleNoise};
 use crate::geometry::Triangulator;
+use crate::pattern::MAX_SHIFTS;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow, Trust};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
@@ -68,8 +69,8 @@ pub struct HeightMap {
 /// The columns of each row that are needed; the others are not computed.
 pub type Window<'a> = &'a [Range<usize>];
 
-/// Decodes frames to absolute phase. `map` is the known map (row-major) for sequences that are
-/// unwrapped about one. Pixels outside `window` are not decoded and stay dark.
+/// Decodes the frames of a sequence to absolute phase. `map` is the known map (row-major) for
+/// sequences that are unwrapped about one. Pixels outside `window` are not decoded and stay dark.
 ///
 /// # Errors
 /// If the frames do not fit the decoder. Nothing else can fail.
@@ -80,14 +81,17 @@ pub fn decode(
     window: Option<Window<'_>>,
 ) -> Result<PhaseMap, DecodeError> {
     decoder.check(frames)?;
-    Ok(each_row(
-        &frames[0],
-        map,
-        window,
-        |v, known, columns, row| {
-            decoder.row(frames, v, known, columns, row);
-        },
-    ))
+    let (width, height) = (frames[0].width(), frames[0].height());
+    let mut arrived = decoder.arrived(width, height);
+    let last = arrive_rest(decoder, frames, &mut arrived)?;
+    let mut phases = PhaseMap::new(width, height);
+    let map = map.unwrap_or(&[]);
+    for_each(phases.rows(), |v, row| {
+        let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
+        let columns = window.map_or(0..width, |window| window[v].clone());
+        decoder.row(&arrived, &last, v, known, columns, row);
+    });
+    Ok(phases)
 }
 
 /// Decodes the frames of the next level on arrival, while those of finer levels are being exposed.
@@ -111,42 +115,25 @@ pub fn arrive(
     Ok(())
 }
 
-/// As [`decode`], from the coarser levels that have gone through [`arrive`] and the frames of the
-/// finest.
+/// Decodes the levels that have not arrived yet, all but the finest, of all frames of a sequence,
+/// which [`Decoder::check`] has passed; returns the frames of the finest level.
 ///
 /// # Errors
-/// If the frames do not fit the finest level, another level has not arrived, or the frames have
-/// another size.
-pub fn decode_last(
+/// If `arrived` was made for frames of another size.
+pub fn arrive_rest<'a>(
     decoder: &Decoder,
-    arrived: &Arrived,
-    last: &[FrameView<'_>],
-    map: Option<&[AbsolutePhase]>,
-    window: Option<Window<'_>>,
-) -> Result<PhaseMap, DecodeError> {
-    decoder.check_last(last, arrived)?;
-    Ok(each_row(&last[0], map, window, |v, known, columns, row| {
-        decoder.last_row(arrived, last, v, known, columns, row);
-    }))
-}
-
-/// A phase map of the size of `frame`: calls `decode` with each row, the known map's row and the
-/// columns inside the window.
-fn each_row(
-    frame: &FrameView<'_>,
-    map: Option<&[AbsolutePhase]>,
-    window: Option<Window<'_>>,
-    decode: impl Fn(usize, &[AbsolutePhase], Range<usize>, PhaseRow<'_>) + Sync + Send,
-) -> PhaseMap {
-    let width = frame.width();
-    let mut phases = PhaseMap::new(width, frame.height());
-    let map = map.unwrap_or(&[]);
-    for_each(phases.rows(), |v, row| {
-        let known = map.get(v * width..(v + 1) * width).unwrap_or(&[]);
-        let columns = window.map_or(0..width, |window| window[v].clone());
-        decode(v, known, columns, row);
-    });
-    phases
+    frames: &[FrameView<'a>],
+    arrived: &mut Arrived,
+) -> Result<heapless::Vec<FrameView<'a>, MAX_SHIFTS>, DecodeError> {
+    let mut level = heapless::Vec::new();
+    for (at, places) in decoder.levels().enumerate().skip(arrived.levels()) {
+        if at > arrived.levels() {
+            arrive(decoder, &level, arrived)?;
+        }
+        level.clear();
+        level.extend(places.iter().map(|&place| frames[place]));
+    }
+    Ok(level)
 }
 
 /// Triangulates every resolved pixel, and marks those without a height in the working range as

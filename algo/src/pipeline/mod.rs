@@ -17,7 +17,7 @@ pub(crate) use cubic::{
 pub use cubic::{HeightCubics, KnownSurface};
 pub use epipolar::Epipolar;
 pub use measure::{
-    HeightMap, PhaseMap, Window, arrive, decode, decode_last, triangulate, triangulate_with,
+    HeightMap, PhaseMap, Window, arrive, arrive_rest, decode, triangulate, triangulate_with,
 };
 pub use noise::{sample_noise, signal_by_modulation};
 pub use plate::{Plate, PlateError};

@@ -5,7 +5,7 @@
 
 use super::lanes::{Lanes, Scaled, operations, pairs, plain};
 use super::rows::{block, block_mut};
-use super::x86::{AHEAD, hint, hint_line, proof, proven, scaled_by, shared};
+use super::x86::{AHEAD, hint, proof, proven, scaled_by, shared};
 use core::arch::x86_64::*;
 use core::arch::x86_64::{
     _mm256_abs_epi16 as abs_epi16, _mm256_cvtepi32_ps as cvtepi32_ps,

@@ -11,9 +11,6 @@
 
 use core::fmt::Debug;
 
-/// Bytes of a cache line.
-pub(crate) const LINE: usize = 64;
-
 /// Pixels of the widest block of any back-end, or more.
 pub(crate) const MAX_PIXELS: usize = 64;
 
@@ -42,9 +39,6 @@ pub(crate) trait Lanes: Copy + Debug {
     const LIFTS_FAINT: bool = true;
     /// How many samples ahead of their use rows are prefetched.
     const AHEAD: usize;
-    /// The distance where the rows of several levels are read: a sample then takes longer, and
-    /// fewer waiting lines displace each other in the cache.
-    const AHEAD_OF_MANY: usize = Self::AHEAD / 2;
     /// A byte per pixel of a block.
     type B: Copy;
     /// A number that bytes are compared with.
@@ -64,26 +58,11 @@ pub(crate) trait Lanes: Copy + Debug {
     fn splat8(self, x: u8) -> Self::B;
     /// The block of `from` that starts at `at`.
     fn load8(self, from: &[u8], at: usize) -> Self::B;
-    /// The blocks of the cache line of `from` that starts at `at`: of the four the first [`LINE`] /
-    /// [`Self::PIXELS`].
-    #[inline(always)]
-    fn load_line(self, from: &[u8], at: usize) -> [Self::B; 4] {
-        let mut blocks = [self.load8(from, at); 4];
-        let mut block = 1;
-        while block < LINE / Self::PIXELS {
-            blocks[block] = self.load8(from, at + block * Self::PIXELS);
-            block += 1;
-        }
-        blocks
-    }
     /// Prefetches the samples `after` samples behind the block at `at`. `after` is [`Self::AHEAD`]
-    /// or [`Self::AHEAD_OF_MANY`] where whole rows are read, because rows follow one another in
-    /// memory; where only some columns of each row are read it is the length of a row, so that the
-    /// same columns of the next row are prefetched.
+    /// where whole rows are read, because rows follow one another in memory; where only some
+    /// columns of each row are read it is the length of a row, so that the same columns of the next
+    /// row are prefetched.
     fn fetch<T>(self, row: &[T], at: usize, after: usize);
-    /// Prefetches the cache line of sample `at`, which may lie behind the row.
-    #[inline(always)]
-    fn fetch_line<T>(self, _row: &[T], _at: usize) {}
     /// Prefetches for writing, [`Self::AHEAD`] samples behind the block at `at`.
     fn claim_ahead<T>(self, row: &[T], at: usize);
     /// Writes the block of `to` that starts at `at`.
@@ -181,11 +160,6 @@ pub(crate) trait Lanes: Copy + Debug {
     fn mul_q15(self, a: Self::W, b: Self::W) -> Self::W;
     /// The low half of a · b.
     fn mul_low(self, a: Self::W, b: Self::W) -> Self::W;
-    /// a − b · c.
-    #[inline(always)]
-    fn sub_product(self, a: Self::W, b: Self::W, c: Self::W) -> Self::W {
-        self.sub(a, self.mul_low(b, c))
-    }
     /// x · 2ⁿ.
     fn shl<const N: i32>(self, x: Self::W) -> Self::W;
     /// x / 2ⁿ rounded down, signed.

@@ -12,88 +12,73 @@
 //! without these instructions.
 #![allow(unsafe_code)]
 
-#[cfg(target_arch = "x86_64")]
-mod avx2;
 mod lanes;
-#[cfg(target_arch = "aarch64")]
-mod neon;
 pub(crate) mod plain;
-mod portable;
 mod results;
 mod rows;
-#[cfg(target_arch = "x86_64")]
-mod ssse3;
 #[cfg(test)]
 mod tests;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-#[cfg(target_arch = "x86_64")]
-pub(crate) use avx2::Avx2;
-pub(crate) use lanes::{LINE, Lanes, MAX_PIXELS};
-#[cfg(target_arch = "aarch64")]
-pub(crate) use neon::Neon;
-pub(crate) use portable::Portable;
+pub(crate) use lanes::{Lanes, MAX_PIXELS};
 pub(crate) use results::Results;
 pub(crate) use rows::Rows;
-#[cfg(target_arch = "x86_64")]
-pub(crate) use ssse3::Ssse3;
 
 /// A back-end of the phase kernels: the instructions that they are compiled for. All give the same
 /// bits.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Backend(pub(crate) Proof);
 
-/// A back-end and the proof that this machine has it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) enum Proof {
-    /// Plain code.
-    Portable(Portable),
-    /// x86-64 with SSSE3.
+/// Defines [`Proof`] and what follows from it, from the slowest back-end on.
+macro_rules! back_ends {
+    ($($(#[$attribute:meta])* $module:ident :: $name:ident;)*) => {
+        $($(#[$attribute])* mod $module; $(#[$attribute])* pub(crate) use $module::$name;)*
+
+        /// A back-end and the proof that this machine has it.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum Proof {
+            $($(#[$attribute])* $name($name),)*
+        }
+
+        impl Backend {
+            /// The back-ends that this machine has, the fastest last.
+            pub fn available() -> impl DoubleEndedIterator<Item = Self> {
+                let all = [$($(#[$attribute])* $name::detect().map(|proof| Self(Proof::$name(proof))),)*];
+                all.into_iter().flatten()
+            }
+
+            /// The word for reports: portable, ssse3, avx2 or neon.
+            pub fn name(self) -> &'static str {
+                match self.0 {
+                    $($(#[$attribute])* Proof::$name(_) => stringify!($module),)*
+                }
+            }
+        }
+    };
+}
+
+back_ends! {
+    // Plain code: the judge of the others in tests, and for processors of which no vector
+    // instructions are known, or that cannot be asked for them.
+    #[cfg(any(test, not(any(target_arch = "aarch64", all(target_arch = "x86_64", feature = "std")))))]
+    portable::Portable;
     #[cfg(target_arch = "x86_64")]
-    Ssse3(Ssse3),
-    /// x86-64 with AVX2.
+    ssse3::Ssse3;
     #[cfg(target_arch = "x86_64")]
-    Avx2(Avx2),
-    /// aarch64.
+    avx2::Avx2;
     #[cfg(target_arch = "aarch64")]
-    Neon(Neon),
+    neon::Neon;
 }
 
 impl Backend {
-    /// Plain code on arrays: slow, and the oracle of the others.
-    pub const PORTABLE: Self = Self(Proof::Portable(Portable));
+    /// The judge of the others.
+    #[cfg(test)]
+    pub(crate) const PORTABLE: Self = Self(Proof::Portable(Portable));
 
-    /// The back-ends that this machine has, the fastest last.
-    pub fn available() -> impl Iterator<Item = Self> {
-        let all = [
-            Some(Self::PORTABLE),
-            #[cfg(target_arch = "x86_64")]
-            Ssse3::detect().map(|proof| Self(Proof::Ssse3(proof))),
-            #[cfg(target_arch = "x86_64")]
-            Avx2::detect().map(|proof| Self(Proof::Avx2(proof))),
-            #[cfg(target_arch = "aarch64")]
-            Some(Self(Proof::Neon(Neon))),
-        ];
-        all.into_iter().flatten()
-    }
-
-    /// The fastest that this machine has.
-    pub fn best() -> Self {
-        Self::available().last().unwrap_or(Self::PORTABLE)
-    }
-
-    /// The word for reports: portable, ssse3, avx2 or neon.
-    pub fn name(self) -> &'static str {
-        match self.0 {
-            Proof::Portable(_) => "portable",
-            #[cfg(target_arch = "x86_64")]
-            Proof::Ssse3(_) => "ssse3",
-            #[cfg(target_arch = "x86_64")]
-            Proof::Avx2(_) => "avx2",
-            #[cfg(target_arch = "aarch64")]
-            Proof::Neon(_) => "neon",
-        }
+    /// The fastest that this machine has; none on an x86-64 processor older than SSSE3.
+    pub fn best() -> Option<Self> {
+        Self::available().next_back()
     }
 }
 
@@ -129,11 +114,13 @@ macro_rules! back_end_entry {
                 $crate::simd::align_stack();
                 $kernel(lanes, $($arg),*);
             }
+            #[cfg(any(test, not(all(target_arch = "x86_64", feature = "std"))))]
             #[inline(never)]
             fn plain<$($generics)*>(lanes: impl $crate::simd::Lanes, $($arg: $type),*) {
                 $kernel(lanes, $($arg),*);
             }
             match backend.0 {
+                #[cfg(any(test, not(any(target_arch = "aarch64", all(target_arch = "x86_64", feature = "std")))))]
                 $crate::simd::Proof::Portable(lanes) => plain(lanes, $($arg),*),
                 #[cfg(target_arch = "x86_64")]
                 $crate::simd::Proof::Ssse3(lanes) => {

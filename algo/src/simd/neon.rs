@@ -1,13 +1,20 @@
 //! The back-end of aarch64, where NEON is always available.
 
-use super::lanes::{LINE, Lanes, Scaled, operations, pairs};
+use super::lanes::{Lanes, Scaled, operations, pairs};
 use super::rows::{block, block_mut};
 use core::arch::aarch64::*;
 use core::arch::asm;
 
 /// Needs no proof: NEON is part of aarch64.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Neon;
+
+impl Neon {
+    /// Always.
+    pub fn detect() -> Option<Self> {
+        Some(Self)
+    }
+}
 
 const BYTES: usize = 16;
 
@@ -124,19 +131,6 @@ impl Lanes for Neon {
         let block = block(from, at, BYTES);
         // SAFETY: the slice holds the 16 bytes that are read.
         unsafe { vld1q_u8(block.as_ptr()) }
-    }
-    #[inline(always)]
-    fn load_line(self, from: &[u8], at: usize) -> [Self::B; 4] {
-        let start = block(from, at, LINE).as_ptr();
-        // SAFETY: the slice holds the 64 bytes that are read, 16 at a time.
-        unsafe {
-            [
-                vld1q_u8(start),
-                vld1q_u8(start.add(16)),
-                vld1q_u8(start.add(32)),
-                vld1q_u8(start.add(48)),
-            ]
-        }
     }
     #[inline(always)]
     fn fetch<T>(self, _row: &[T], _at: usize, _after: usize) {}
@@ -337,10 +331,6 @@ impl Lanes for Neon {
     #[inline(always)]
     fn merge(self, mask: Self::W, a: Self::W, b: Self::W) -> Self::W {
         in_place!("bit", "16b", b, a, mask)
-    }
-    #[inline(always)]
-    fn sub_product(self, a: Self::W, b: Self::W, c: Self::W) -> Self::W {
-        in_place!("mls", "8h", a, b, c)
     }
     #[inline(always)]
     fn store32_joined(self, to: &mut [i32], at: usize, low: [Self::W; 2], high: [Self::W; 2]) {

@@ -1,7 +1,7 @@
 //! The back-end without any particular instructions: arrays, written so that each line can be
 //! checked against [`Lanes`].
 //!
-//! It is the oracle of the other back-ends, and the fallback of machines without them. Its
+//! It is the judge of the other back-ends, and for machines of which no others are known. Its
 //! operations are not inlined, because kernels of hundreds of inlined loops take minutes to
 //! compile.
 
@@ -9,8 +9,15 @@ use super::lanes::{Lanes, Scaled, operations, plain};
 use crate::math::nearest;
 
 /// Always available.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Portable;
+
+impl Portable {
+    /// Always.
+    pub fn detect() -> Option<Self> {
+        Some(Self)
+    }
+}
 
 const BYTES: usize = 16;
 const WORDS: usize = BYTES / 2;

@@ -6,7 +6,7 @@
 
 use super::lanes::{Lanes, Scaled, operations, pairs, plain};
 use super::rows::{block, block_mut};
-use super::x86::{AHEAD, hint, hint_line, proof, proven, scaled_by, shared};
+use super::x86::{AHEAD, hint, proof, proven, scaled_by, shared};
 use core::arch::x86_64::*;
 use core::arch::x86_64::{
     _mm_abs_epi16 as abs_epi16, _mm_cvtepi32_ps as cvtepi32_ps, _mm_cvtps_epi32 as cvtps_epi32,

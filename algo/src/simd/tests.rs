@@ -1,6 +1,6 @@
 //! Every operation of every back-end gives the portable one's result, on random lanes.
 
-use super::lanes::{LINE, Lanes};
+use super::lanes::Lanes;
 use super::{Backend, back_end_entry};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -110,10 +110,6 @@ fn operations<V: Lanes>(v: V, inputs: &Inputs, out: &mut Outputs) {
         operations_of_doubles(v, inputs, at, out);
         at += V::PIXELS;
     }
-    let line = v.load_line(&inputs.bytes[0], 0);
-    for block in &line[..LINE / V::PIXELS] {
-        bytes(v, out, "load_line", *block);
-    }
     for place in 0..V::PIXELS {
         let mut row = [0; WIDTH];
         assert!(v.none8(v.load8(&row, 0)));
@@ -191,7 +187,6 @@ fn operations_of_words<V: Lanes>(v: V, inputs: &Inputs, at: usize, out: &mut Out
         words add_sat(a, b);
         words mul_q15(a, odd);
         words mul_low(a, b);
-        words sub_product(a, b, c);
         words shl::<7>(a);
         words sar::<15>(a);
         words shl_by(a; v.left(inputs.shift + 1));

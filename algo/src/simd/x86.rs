@@ -1,12 +1,13 @@
 //! What the back-ends of x86-64 share: their proof, the operations that both have by the same
 //! instructions, and prefetching.
 
-use super::lanes::{LINE, Lanes, Scaled};
-use core::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+use super::lanes::{Lanes, Scaled};
+use core::arch::x86_64::_mm_prefetch;
 
-/// Rows of a single level are prefetched this many samples ahead, which is about 350 ns of work
-/// with AVX2; rows of several levels half as far, which takes as long. docs/design.md has what
-/// other distances cost.
+/// Bytes of a cache line.
+const LINE: usize = 64;
+/// Rows are prefetched this many samples ahead, which is about 350 ns of work with AVX2.
+/// docs/design.md has what other distances cost.
 pub(super) const AHEAD: usize = 512;
 
 /// Prefetches the cache lines of the block `after` samples behind the one at `at`: there are more
@@ -26,13 +27,6 @@ pub(super) fn hint<T, const PIXELS: usize, const HINT: i32>(row: &[T], at: usize
         unsafe { _mm_prefetch::<HINT>(ahead.wrapping_add(line * LINE)) };
         line += 1;
     }
-}
-
-/// Prefetches the cache line of sample `at`, which may lie behind the row.
-#[inline(always)]
-pub(super) fn hint_line<T>(row: &[T], at: usize) {
-    // SAFETY: a hint, which no address makes fail; SSE is part of x86-64.
-    unsafe { _mm_prefetch::<_MM_HINT_T0>(row.as_ptr().wrapping_add(at).cast()) }
 }
 
 /// [`Lanes::scaled`] by the words of `scale`.
@@ -57,7 +51,7 @@ pub(super) fn scaled_by<V: Lanes>(v: V, long: V::B, short: V::B, scale: [V::W; 2
 macro_rules! proof {
     ($(#[$doc:meta])* $name:ident = $feature:tt) => {
         $(#[$doc])*
-        #[derive(Clone, Copy, Debug)]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         pub(crate) struct $name(());
 
         impl $name {
@@ -212,10 +206,6 @@ macro_rules! shared {
         #[inline(always)]
         fn fetch<T>(self, row: &[T], at: usize, after: usize) {
             hint::<T, BYTES, _MM_HINT_T0>(row, at, after);
-        }
-        #[inline(always)]
-        fn fetch_line<T>(self, row: &[T], at: usize) {
-            hint_line(row, at);
         }
         #[inline(always)]
         fn claim_ahead<T>(self, row: &[T], at: usize) {

@@ -37,6 +37,8 @@ use crate::VERSION;
 use crate::error::{Exit, Result};
 use crate::system::journal::{self, Severity};
 use crate::system::stderr;
+use algo::phase::DecodeError;
+use algo::simd::Backend;
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, Parser, Subcommand};
 use std::process::ExitCode;
@@ -141,7 +143,7 @@ fn carry_out<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
         Ok(arguments) => arguments,
         Err(error) => return refused(&error),
     };
-    match run(arguments) {
+    match known_processor().and_then(|()| run(arguments)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
             journal::write_of(
@@ -151,6 +153,14 @@ fn carry_out<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
             );
             failure.exit.into()
         }
+    }
+}
+
+/// Refuses a processor that phases cannot be computed with.
+fn known_processor() -> Result<()> {
+    match Backend::best() {
+        Some(_) => Ok(()),
+        None => Exit::Unavailable.fail(DecodeError::Processor),
     }
 }
 

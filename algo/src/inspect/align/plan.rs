@@ -70,6 +70,7 @@ impl Alignment {
         let centre = Vector::new(sum(&|p| p.x), sum(&|p| p.y), sum(&|p| p.z)) * share;
         let radius = libm::sqrt(sum(&|p| (p - centre).dot(p - centre)) * share);
         let mut alignment = Self {
+            backend: Backend::best()?,
             centre,
             radius: radius.max(1e-3),
             left_out: [false; 6],
@@ -101,7 +102,7 @@ impl Alignment {
             golden,
             plan: self,
             from: None,
-            backend: Backend::best(),
+            backend: self.backend,
         }
     }
 }

@@ -2,17 +2,14 @@
 
 use super::golden::Golden;
 use crate::frame::{FrameView, SampleNoise};
-use crate::pattern::MAX_SHIFTS;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow};
 use crate::pipeline::PhaseMap;
 use crate::units::{AbsolutePhase, Modulation};
 use core::ops::Range;
 
-/// What a part is inspected from; either form gives the same bits.
+/// What a part is inspected from.
 #[derive(Clone, Copy, Debug)]
 pub enum Input<'a> {
-    /// All frames of the sequence.
-    Frames(&'a [FrameView<'a>]),
     /// What was decoded of all other levels when they arrived ([`crate::pipeline::arrive`]), and
     /// the frames of the finest level.
     Finest(&'a Arrived, &'a [FrameView<'a>]),
@@ -35,37 +32,26 @@ pub struct PhasePlan {
 }
 
 impl PhasePlan {
-    /// Checks number and size of the frames.
-    pub fn check(&self, input: Input<'_>, expected: (usize, usize)) -> Result<(), DecodeError> {
-        let size = |frames: &[FrameView<'_>]| (frames[0].width(), frames[0].height());
-        let given = match input {
-            Input::Frames(frames) => self.decoder.check(frames).map(|()| size(frames)),
-            Input::Finest(arrived, frames) => {
-                let checked = self.decoder.check_last(frames, arrived);
-                checked.map(|()| size(frames))
-            }
-            Input::Phases(map) => Ok((map.width, map.phase.len() / map.width.max(1))),
-        }?;
-        match given == expected {
-            true => Ok(()),
-            false => Err(DecodeError::FrameSize {
-                frame: 0,
-                expected,
-                given,
-            }),
-        }
+    /// Checks number, size and samples of the frames of a sequence.
+    pub fn check_frames(
+        &self,
+        frames: &[FrameView<'_>],
+        expected: (usize, usize),
+    ) -> Result<(), DecodeError> {
+        self.decoder.check(frames)?;
+        check_size((frames[0].width(), frames[0].height()), expected)
     }
 
-    /// The frames of the finest level; none of phases.
-    pub fn finest<'a>(&self, input: Input<'a>) -> Option<heapless::Vec<FrameView<'a>, MAX_SHIFTS>> {
-        match input {
-            Input::Frames(frames) => {
-                let places = self.decoder.levels().last()?;
-                places.iter().map(|&at| frames.get(at).copied()).collect()
+    /// Checks that all levels are there, and their size.
+    pub fn check(&self, input: Input<'_>, expected: (usize, usize)) -> Result<(), DecodeError> {
+        let given = match input {
+            Input::Finest(arrived, frames) => {
+                self.decoder.check_last(frames, arrived)?;
+                arrived.size()
             }
-            Input::Finest(_, frames) => heapless::Vec::from_slice(frames).ok(),
-            Input::Phases(_) => None,
-        }
+            Input::Phases(map) => (map.width, map.phase.len() / map.width.max(1)),
+        };
+        check_size(given, expected)
     }
 
     /// Decodes columns of row `v` into a map of one row; the others keep what they had.
@@ -84,9 +70,8 @@ impl PhasePlan {
         };
         let (decoder, map) = (&self.decoder, self.map_row(golden, v));
         match input {
-            Input::Frames(frames) => decoder.row(frames, v, map, columns, out),
             Input::Finest(arrived, frames) => {
-                decoder.last_row(arrived, frames, v, map, columns, out);
+                decoder.row(arrived, frames, v, map, columns, out);
             }
             Input::Phases(phases) => {
                 let there = v * phases.width + columns.start..v * phases.width + columns.end;
@@ -111,5 +96,16 @@ impl PhasePlan {
     pub fn sigma_nm(&self, modulation: Modulation, slope: f64) -> f64 {
         let turns = self.decoder.phase_noise(modulation, self.noise);
         libm::fabs(turns * slope) * 1e6
+    }
+}
+
+fn check_size(given: (usize, usize), expected: (usize, usize)) -> Result<(), DecodeError> {
+    match given == expected {
+        true => Ok(()),
+        false => Err(DecodeError::FrameSize {
+            frame: 0,
+            expected,
+            given,
+        }),
     }
 }

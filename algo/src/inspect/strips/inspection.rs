@@ -11,7 +11,7 @@ use super::strip::{CellBuffers, Strip, Strips};
 use crate::frame::FrameView;
 use crate::inspect::align::{FitBuffers, Motion, Placed};
 use crate::phase::DecodeError;
-use crate::pipeline::{for_each, for_each_item};
+use crate::pipeline::{arrive_rest, for_each, for_each_item};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -40,6 +40,14 @@ impl Production {
         }
     }
 
+    /// Checks that `frames` are those of the sequence: their number, size and samples.
+    ///
+    /// # Errors
+    /// Naming the frame that is not.
+    pub fn check(&self, frames: &[FrameView<'_>]) -> Result<(), DecodeError> {
+        self.phase.check_frames(frames, self.golden.size())
+    }
+
     /// Inspects a part, in strips from [`Self::strips`]. If `heights` is given (as long as a frame,
     /// row-major), it gets z in mm, NaN where not resolved and outside of [`Self::window`]. The
     /// same as [`Self::place`] and [`Self::inspect_placed`].
@@ -52,7 +60,11 @@ impl Production {
         strips: &mut Strips,
         heights: Option<&mut [f32]>,
     ) -> Result<Findings, DecodeError> {
-        let input = Input::Frames(frames);
+        self.check(frames)?;
+        let (width, height) = self.golden.size();
+        let mut arrived = self.decoder().arrived(width, height);
+        let last = arrive_rest(self.decoder(), frames, &mut arrived)?;
+        let input = Input::Finest(&arrived, &last);
         let placed = self.place(input, strips)?;
         let maps = Maps {
             heights,

@@ -3,8 +3,7 @@
 //! A block goes back and forth between two states: [`UnwrappedBlock`], absolute up to a level, and
 //! [`ExpectedBlock`], what that predicts for the next one. [`crate::phase::unwrap_step`] has the
 //! equations; the reasons to reject pixels are collected on the way ([`Quality`]).
-//! [`super::geometric`] runs through all levels of a block, [`super::on_arrival`] stores the
-//! prediction between two levels.
+//! [`super::geometric`] stores the prediction between two levels.
 
 use super::quality::{Quality, resolved_mask, trust};
 use crate::phase::angle::AngleLanes;
@@ -122,24 +121,11 @@ pub(super) struct UnwrappedBlock<V: Lanes> {
 }
 
 impl<V: Lanes> UnwrappedBlock<V> {
-    /// What the next level is unwrapped by in the same pass: with few registers by the prediction,
-    /// which is then computed at once.
-    #[inline(always)]
-    pub fn before(self, v: V, step: &UnwrapStepLanes<V>) -> Coarser<V> {
-        if V::FEW_REGISTERS {
-            return Coarser::Expected(ExpectedBlock {
-                phase: step.expected(v, self.phase),
-                quality: self.quality,
-            });
-        }
-        Coarser::Unwrapped(self)
-    }
-
     /// What it predicts for the next level.
     #[inline(always)]
     pub fn expected(&self, v: V, step: &UnwrapStepLanes<V>) -> ExpectedBlock<V> {
         ExpectedBlock {
-            phase: step.expected_of_any_step(v, self.phase),
+            phase: step.expected(v, self.phase),
             quality: self.quality,
         }
     }
@@ -152,41 +138,7 @@ pub(super) struct ExpectedBlock<V: Lanes> {
     pub quality: Quality<V>,
 }
 
-/// What a finer level is unwrapped by.
-#[derive(Clone, Copy)]
-pub(super) enum Coarser<V: Lanes> {
-    /// The coarser level itself.
-    Unwrapped(UnwrappedBlock<V>),
-    /// What it predicts.
-    Expected(ExpectedBlock<V>),
-}
-
-impl<V: Lanes> Coarser<V> {
-    #[inline(always)]
-    fn quality(&self) -> Quality<V> {
-        match self {
-            Self::Unwrapped(block) => block.quality,
-            Self::Expected(block) => block.quality,
-        }
-    }
-
-    /// The phases of the finer level, and the magnitudes of the residuals.
-    #[inline(always)]
-    fn unwrap(
-        &self,
-        v: V,
-        step: &UnwrapStepLanes<V>,
-        phase: [V::W; 2],
-    ) -> [(Absolute<V>, V::W); 2] {
-        match self {
-            Self::Unwrapped(block) => step.unwrap(v, block.phase, phase),
-            Self::Expected(block) => step.unwrap_expected(v, block.phase, phase),
-        }
-    }
-}
-
 /// A level, its frames and the unwrapping step to it.
-#[derive(Clone, Copy)]
 pub(super) struct FinerLevel<'a, V: Lanes, S> {
     pub level: LevelLanes<'a, V>,
     pub frames: S,
@@ -209,7 +161,7 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
         &self,
         v: V,
         lanes: &GeometricLanes<V>,
-        coarser: &Coarser<V>,
+        coarser: &ExpectedBlock<V>,
         folded: &Folded<V>,
     ) -> UnwrappedBlock<V> {
         self.unwrap(v, coarser, lanes.rough(v, folded), folded)
@@ -221,7 +173,7 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
         &self,
         v: V,
         lanes: &GeometricLanes<V>,
-        coarser: &Coarser<V>,
+        coarser: &ExpectedBlock<V>,
         folded: &Folded<V>,
     ) -> (UnwrappedBlock<V>, [V::W; 2]) {
         let (block, modulation) = (self.level).fine(v, &lanes.angle, folded, S::DOUBLED);
@@ -232,12 +184,13 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
     fn unwrap(
         &self,
         v: V,
-        coarser: &Coarser<V>,
+        coarser: &ExpectedBlock<V>,
         phase: [V::W; 2],
         folded: &Folded<V>,
     ) -> UnwrappedBlock<V> {
-        let [(low, residual_low), (high, residual_high)] = coarser.unwrap(v, &self.step, phase);
-        let before = coarser.quality();
+        let [(low, residual_low), (high, residual_high)] =
+            self.step.unwrap_expected(v, coarser.phase, phase);
+        let before = coarser.quality;
         let mut quality = before;
         quality.add(v, folded.strong, folded.brightest);
         quality.residual = [
@@ -249,27 +202,6 @@ impl<'a, V: Lanes, S: Frames> FinerLevel<'a, V, S> {
             quality,
         }
     }
-}
-
-/// The rows of levels of N shifts of 8 bits each, up to three, for the kernels that are compiled
-/// for N; empty for other levels.
-pub(super) fn rows_of_bytes<'r, 'a, T: BlockSample, const N: usize>(
-    levels: &[Level],
-    rows: &[&'r [&'a [T]]],
-) -> heapless::Vec<&'r [&'a [u8]; N], 3> {
-    let mut bytes = heapless::Vec::new();
-    if rows.len() <= 3 {
-        bytes.extend(
-            levels
-                .iter()
-                .zip(rows)
-                .map_while(|(level, rows)| of_bytes(level, rows)),
-        );
-    }
-    if bytes.len() < rows.len() {
-        bytes.clear();
-    }
-    bytes
 }
 
 /// The rows of a level of N shifts of 8 bits that start at 0.

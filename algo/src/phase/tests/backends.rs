@@ -1,9 +1,9 @@
 //! All back-ends of this machine give the same bits.
 
 use super::super::{Decoder, LeastModulation, PhaseRow, Trust};
-use super::arrive;
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
+use crate::pipeline::arrive_rest;
 use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Modulation};
 use rand_xoshiro::SplitMix64;
@@ -65,7 +65,7 @@ fn frames(count: usize, depth: u8, random: &mut SplitMix64) -> Vec<Vec<u16>> {
         .collect()
 }
 
-fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePhase]) -> [Map; 2] {
+fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePhase]) -> Map {
     let bytes: Vec<Vec<u8>> = samples
         .iter()
         .map(|frame| frame.iter().map(|&x| x as u8).collect())
@@ -79,30 +79,18 @@ fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePha
             FrameView::new(samples, WIDTH, HEIGHT, WIDTH).unwrap()
         })
         .collect();
-    let mut whole = Map::new();
-    for (v, row) in whole.rows() {
-        let map = &map[v * WIDTH..(v + 1) * WIDTH];
-        decoder.row(&views, v, map, 0..WIDTH, row);
-    }
-    let levels: Vec<Vec<_>> = decoder
-        .levels()
-        .map(|places| places.iter().map(|&at| views[at]).collect())
-        .collect();
-    let (last, coarser) = levels.split_last().unwrap();
     let mut arrived = decoder.arrived(WIDTH, HEIGHT);
-    for level in coarser {
-        arrive(decoder, level, &mut arrived);
-    }
-    let mut late = Map::new();
-    for (v, row) in late.rows() {
+    let last = arrive_rest(decoder, &views, &mut arrived).unwrap();
+    let mut found = Map::new();
+    for (v, row) in found.rows() {
         let map = &map[v * WIDTH..(v + 1) * WIDTH];
-        decoder.last_row(&arrived, last, v, map, 0..WIDTH, row);
+        decoder.row(&arrived, &last, v, map, 0..WIDTH, row);
     }
-    [whole, late]
+    found
 }
 
 #[test]
-fn every_back_end_and_levels_on_arrival_give_the_same_bits() {
+fn every_back_end_gives_the_same_bits() {
     let mut random = SplitMix64::seed_from_u64(1);
     let ratios: [&[f64]; 5] = [
         &[0.009, 0.1, 1.0],
@@ -136,14 +124,13 @@ fn every_back_end_and_levels_on_arrival_give_the_same_bits() {
                 let mut expected = None;
                 for backend in Backend::available() {
                     let decoder = decoder.clone().with_backend(backend);
-                    for found in decode(&decoder, &samples, depth, &map) {
-                        let expected = expected.get_or_insert_with(|| found.clone());
-                        assert!(
-                            *expected == found,
-                            "{} differs: ratios {ratios:?}, N = {steps}, {depth} bit",
-                            backend.name()
-                        );
-                    }
+                    let found = decode(&decoder, &samples, depth, &map);
+                    let expected = expected.get_or_insert_with(|| found.clone());
+                    assert!(
+                        *expected == found,
+                        "{} differs: ratios {ratios:?}, N = {steps}, {depth} bit",
+                        backend.name()
+                    );
                 }
             }
         }

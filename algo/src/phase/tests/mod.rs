@@ -79,7 +79,8 @@ fn wrap(decoder: &Decoder, depth: u8, rows: &[Vec<u16>]) -> Demodulated {
         modulation: &mut modulation,
         trust: &mut trust,
     };
-    decoder.row(&frames, 0, &map, 0..width, out);
+    let nothing = decoder.arrived(width, 1);
+    decoder.row(&nothing, &frames, 0, &map, 0..width, out);
     Demodulated(arrived, modulation)
 }
 

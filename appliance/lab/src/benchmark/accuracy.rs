@@ -183,7 +183,7 @@ impl Study {
             named.extend([(name, false), (name, true)]);
         }
         let mut sets = [Rotation::of(set, self.effort.bytes)];
-        let rounds = interleaved(&mut contenders, &mut sets, base, &self.effort);
+        let rounds = interleaved(&mut contenders, &mut sets, base, &self.effort)?;
         let mut points = Vec::new();
         for (((implementation, skipping), contender), rounds) in
             named.into_iter().zip(&mut contenders).zip(rounds)

@@ -5,7 +5,7 @@ use super::effort::Effort;
 use super::frames::{FrameSet, Rotation};
 use super::gauges::Gauges;
 use super::median::median;
-use super::timing::{Kernel, rotate};
+use super::timing::{Kernel, alone, rotate};
 use super::words;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
@@ -243,10 +243,7 @@ fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64;
     let decoder = plan.production().decoder().clone();
     let mut kernel = Decoding::new(decoder, Some(plan.production().window().to_vec()));
     let mut whole = Inspecting::new(plan.production());
-    let alone = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .map_err(words)?;
+    let alone = alone()?;
     let (mut inspected, mut decoded, mut ratios) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..effort.rounds {
         let [inspection, phase] = alone.install(|| {

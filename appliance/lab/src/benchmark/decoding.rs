@@ -2,66 +2,58 @@
 
 use super::frames::FrameSet;
 use super::timing::Kernel;
-use algo::inspect::{Production, Strips};
-use algo::phase::{Arrived, Decoder, PhaseRow};
-use algo::pipeline::{PhaseMap, arrive};
+use algo::inspect::{Input, Maps, Production, Signal, Strips};
+use algo::phase::{Arrived, DecodeError, Decoder, PhaseRow};
+use algo::pipeline::{PhaseMap, arrive_rest};
 use appliance::recipe::plan::STRIPS;
 use std::collections::VecDeque;
 use std::hint::black_box;
 use std::ops::Range;
 
-/// A decoder on one thread that writes into memory allocated before.
+/// A decoder that writes into memory allocated before.
 pub struct Decoding {
     decoder: Decoder,
-    /// The columns of each row that are decoded; `None` for all.
+    /// The columns of each row whose finest level is decoded; `None` for all.
     window: Option<Vec<Range<usize>>>,
-    /// What is decoded on arrival, before the clock starts; `None` for nothing.
-    on_arrival: Option<OnArrival>,
-}
-
-/// The coarser levels of frame sets that are decoded in turn. All sets of a rotation have the same
-/// samples, but every set needs its own decoded levels: they were last used as long ago as the
-/// frames, so that they come from no cache either.
-struct OnArrival {
-    /// How many sets' levels are kept.
+    /// Whether only the last level is timed.
+    only_last: bool,
+    /// How many frame sets are decoded in turn with coarser levels of their own.
     copies: usize,
-    /// The levels of each set, with those of the current one in front.
+    /// The coarser levels, with those of the current set in front.
     levels: VecDeque<Arrived>,
 }
 
 impl Decoding {
-    /// Decoding by a decoder; rows without a column in `window` are left out.
+    /// Decoding of all levels, one after the other, by a decoder; of the finest, rows without a
+    /// column in `window` are left out.
     pub fn new(decoder: Decoder, window: Option<Vec<Range<usize>>>) -> Self {
         Self {
             decoder,
             window,
-            on_arrival: None,
+            only_last: false,
+            copies: 1,
+            levels: VecDeque::new(),
         }
     }
 
     /// Decoding by a decoder that is timed on the last level only, for `copies` frame sets with the
-    /// same samples.
+    /// same samples. Every set has its own decoded levels: they were last used as long ago as the
+    /// frames, so that they come from no cache either.
     pub fn after_the_last(decoder: Decoder, copies: usize) -> Self {
         Self {
-            decoder,
-            window: None,
-            on_arrival: Some(OnArrival {
-                copies,
-                levels: VecDeque::new(),
-            }),
+            only_last: true,
+            copies,
+            ..Self::new(decoder, None)
         }
     }
 
-    /// Demodulates all levels but the last.
-    fn before(&self, set: &mut FrameSet) -> Arrived {
+    /// Room for the levels of a set, decoded if only the last is timed.
+    fn room(&self, set: &mut FrameSet) -> Arrived {
         let (width, height) = (set.width(), set.out.phase.len() / set.width().max(1));
-        let (frames, _, _) = set.parts();
         let mut arrived = self.decoder.arrived(width, height);
-        let coarser = self.decoder.levels().len().saturating_sub(1);
-        for places in self.decoder.levels().take(coarser) {
-            let frames: Vec<_> = places.iter().map(|&at| frames[at]).collect();
+        if self.only_last {
             // The frames are those that the decoder was made for.
-            let _ = arrive(&self.decoder, &frames, &mut arrived);
+            let _ = arrive_rest(&self.decoder, &set.parts().0, &mut arrived);
         }
         arrived
     }
@@ -70,6 +62,7 @@ impl Decoding {
 /// Production from frames to the readings of gauges, on all threads of the current pool.
 pub struct Inspecting<'a> {
     production: &'a Production,
+    arrived: Arrived,
     strips: Strips,
 }
 
@@ -77,19 +70,34 @@ impl<'a> Inspecting<'a> {
     /// Production with strips as high as those of a plan.
     pub fn new(production: &'a Production) -> Self {
         let rows = production.window().len();
+        let width = production.cubics().surface().width;
         Self {
+            arrived: production.decoder().arrived(width, rows),
             strips: production.strips(rows.div_ceil(STRIPS)),
             production,
         }
+    }
+
+    fn inspect(&mut self, set: &mut FrameSet) -> Result<(), DecodeError> {
+        let (frames, _, _) = set.parts();
+        self.arrived.restart();
+        let last = arrive_rest(self.production.decoder(), &frames, &mut self.arrived)?;
+        let input = Input::Finest(&self.arrived, &last);
+        let placed = self.production.place(input, &mut self.strips)?;
+        let input = (input, Signal::Frames(&frames));
+        let maps = Maps::default();
+        let found = self
+            .production
+            .inspect_placed(input, &mut self.strips, placed, maps)?;
+        black_box(found);
+        Ok(())
     }
 }
 
 impl Kernel for Inspecting<'_> {
     fn run(&mut self, set: &mut FrameSet) {
-        let (frames, _, _) = set.parts();
         // The frames are those that it was made for.
-        let inspected = self.production.inspect(&frames, &mut self.strips, None);
-        drop(black_box(inspected));
+        let _ = self.inspect(set);
     }
 
     /// Empty: production keeps no phase map.
@@ -99,28 +107,27 @@ impl Kernel for Inspecting<'_> {
 }
 
 impl Kernel for Decoding {
-    /// Takes the decoded levels that were used least recently; the first time, decodes those of all
-    /// sets.
+    /// Takes the levels that were used least recently; the first time, makes those of all sets.
     fn prepare(&mut self, set: &mut FrameSet) {
-        let Some(mut on_arrival) = self.on_arrival.take() else {
-            return;
-        };
-        let OnArrival { copies, levels } = &mut on_arrival;
-        if levels.is_empty() {
-            levels.extend((0..*copies).map(|_| self.before(set)));
+        if self.levels.is_empty() {
+            self.levels = (0..self.copies).map(|_| self.room(set)).collect();
         } else {
-            levels.rotate_left(1);
+            self.levels.rotate_left(1);
         }
-        self.on_arrival = Some(on_arrival);
     }
 
     fn run(&mut self, set: &mut FrameSet) {
         let width = set.width().max(1);
         let (frames, map, out) = set.parts();
-        let arrived = self.on_arrival.as_ref().and_then(|on| on.levels.front());
-        let last: Vec<_> = match self.decoder.levels().last() {
-            Some(places) => places.iter().map(|&at| frames[at]).collect(),
-            None => Vec::new(),
+        let Some(arrived) = self.levels.front_mut() else {
+            return;
+        };
+        if !self.only_last {
+            arrived.restart();
+        }
+        // The frames are those that the decoder was made for.
+        let Ok(last) = arrive_rest(&self.decoder, &frames, arrived) else {
+            return;
         };
         let PhaseMap {
             phase,
@@ -143,10 +150,7 @@ impl Kernel for Decoding {
                 trust,
             };
             let map = map.map_or(&[][..], |map| &map[v * width..(v + 1) * width]);
-            match arrived {
-                Some(arrived) => self.decoder.last_row(arrived, &last, v, map, columns, row),
-                None => self.decoder.row(&frames, v, map, columns, row),
-            }
+            self.decoder.row(arrived, &last, v, map, columns, row);
         }
     }
 

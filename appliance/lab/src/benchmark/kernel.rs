@@ -94,7 +94,7 @@ pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<Ker
         let sets = [packed].into_iter().chain(aligned);
         let mut rotations: Vec<_> = sets.map(|set| Rotation::of(set, effort.bytes)).collect();
         let (names, mut contenders) = contenders(workload, effort, &rotations)?;
-        let rounds = interleaved(&mut contenders, &mut rotations, &mut base, effort);
+        let rounds = interleaved(&mut contenders, &mut rotations, &mut base, effort)?;
         floors.extend(
             rounds
                 .first()

@@ -5,6 +5,7 @@ use std::ops::{Add, Div, Mul, Sub};
 /// `f32` or `f64`.
 pub trait Real:
     Copy
+    + Send
     + PartialOrd
     + Add<Output = Self>
     + Sub<Output = Self>

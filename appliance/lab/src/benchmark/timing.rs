@@ -4,12 +4,14 @@ use super::counter::Counter;
 use super::effort::Effort;
 use super::floor::FloorSets;
 use super::frames::{FrameSet, Rotation};
+use super::words;
 use appliance::production::stopwatch::timed;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::hint::black_box;
 use std::time::Duration;
 
 /// An implementation that computes the phases of a set of frames.
-pub trait Kernel {
+pub trait Kernel: Send {
     /// What precedes the timed part for this set: nothing, or the levels that are decoded on
     /// arrival.
     fn prepare(&mut self, _: &mut FrameSet) {}
@@ -69,9 +71,30 @@ impl Round {
     }
 }
 
-/// The rounds of each kernel. In every round the floor is timed first and then each kernel in turn,
-/// so that other work on the machine affects all of them alike.
+/// One thread, on which kernels are timed.
+///
+/// # Errors
+/// If the system has no more threads.
+pub fn alone() -> Result<ThreadPool, String> {
+    let builder = ThreadPoolBuilder::new().num_threads(1);
+    builder.build().map_err(words)
+}
+
+/// The rounds of each kernel, on one thread. In every round the floor is timed first and then each
+/// kernel in turn, so that other work on the machine affects all of them alike.
+///
+/// # Errors
+/// As [`alone`].
 pub fn interleaved(
+    contenders: &mut [Contender],
+    rotations: &mut [Rotation],
+    base: &mut FloorSets,
+    effort: &Effort,
+) -> Result<Vec<Vec<Round>>, String> {
+    Ok(alone()?.install(|| in_turn(contenders, rotations, base, effort)))
+}
+
+fn in_turn(
     contenders: &mut [Contender],
     rotations: &mut [Rotation],
     base: &mut FloorSets,

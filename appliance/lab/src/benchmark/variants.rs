@@ -75,7 +75,7 @@ pub fn quiet(workload: &Workload, copies: usize) -> Result<Vec<Named<String>>, S
     Ok(variants)
 }
 
-/// A decoder of all levels at once, and of the last alone.
+/// A decoder of all levels, and of the last alone.
 fn of(workload: &Workload, name: &str, decoder: &Decoder, copies: usize) -> Vec<Named<String>> {
     let mut variants: Vec<Named<String>> = Vec::new();
     if decoder.levels().len() > 1 && workload.has_references {

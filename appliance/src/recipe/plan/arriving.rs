@@ -5,8 +5,8 @@ use super::run::Run;
 use crate::head::seam;
 use algo::frame::FrameView;
 use algo::pattern::MAX_SHIFTS;
-use algo::phase::Arrived;
-use algo::pipeline::arrive;
+use algo::phase::{Arrived, DecodeError};
+use algo::pipeline::{arrive, arrive_rest};
 use hal::frame::Frame;
 use std::sync::PoisonError;
 
@@ -14,17 +14,11 @@ use std::sync::PoisonError;
 #[derive(Debug)]
 pub struct Arriving {
     sequence: usize,
-    /// `None` if nothing can be decoded before the last frame.
+    /// `None` if the recipe has no such sequence, or its frames do not fit it.
     arrived: Option<Arrived>,
 }
 
 impl Arriving {
-    /// A measurement without decoding on arrival.
-    pub(super) fn none(sequence: usize) -> Self {
-        let arrived = None;
-        Self { sequence, arrived }
-    }
-
     /// The index of the sequence.
     pub(super) fn sequence(&self) -> usize {
         self.sequence
@@ -34,10 +28,9 @@ impl Arriving {
 impl Plan {
     /// Begins a measurement with a sequence.
     pub fn arriving(&self, sequence: usize) -> Arriving {
-        let room = self.runs.get(sequence).and_then(Run::room);
         Arriving {
             sequence,
-            arrived: room,
+            arrived: self.runs.get(sequence).map(Run::room),
         }
     }
 
@@ -65,36 +58,6 @@ impl Plan {
             arriving.arrived = None;
         }
     }
-
-    /// Calls `inspect` with the decoded levels and the frames of the finest one, if all levels but
-    /// the finest are decoded. Their memory goes back to the run.
-    pub(super) fn with_arrived<R>(
-        &self,
-        arriving: Arriving,
-        frames: &[Frame],
-        inspect: impl FnOnce(Option<(&Arrived, &[FrameView<'_>])>) -> R,
-    ) -> R {
-        let Arriving {
-            sequence,
-            arrived: Some(arrived),
-        } = arriving
-        else {
-            return inspect(None);
-        };
-        let Some(run) = self
-            .runs
-            .get(sequence)
-            .filter(|run| run.indices.len() == frames.len())
-        else {
-            return inspect(None);
-        };
-        let complete = arrived.levels() == run.coarser().len();
-        let last = run.production.decoder().levels().last().unwrap_or(&[]);
-        let views = views(last, frames).filter(|_| complete);
-        let done = inspect(views.as_deref().map(|views| (&arrived, views)));
-        *run.arrived.lock().unwrap_or_else(PoisonError::into_inner) = Some(arrived);
-        done
-    }
 }
 
 impl Run {
@@ -105,11 +68,26 @@ impl Run {
         levels.take(coarser)
     }
 
-    /// Memory for them; `None` if the sequence has one level only.
-    fn room(&self) -> Option<Arrived> {
-        if self.coarser().len() == 0 {
-            return None;
-        }
+    /// The decoded levels of a sequence, all but the finest, and the views of that. The levels that
+    /// have not arrived yet are decoded.
+    pub(super) fn complete<'a>(
+        &self,
+        arriving: Arriving,
+        frames: &[FrameView<'a>],
+    ) -> Result<(Arrived, heapless::Vec<FrameView<'a>, MAX_SHIFTS>), DecodeError> {
+        self.production.check(frames)?;
+        let mut arrived = arriving.arrived.unwrap_or_else(|| self.room());
+        let finest = arrive_rest(self.production.decoder(), frames, &mut arrived)?;
+        Ok((arrived, finest))
+    }
+
+    /// Keeps the memory of decoded levels for the next measurement.
+    pub(super) fn keep(&self, arrived: Arrived) {
+        *self.arrived.lock().unwrap_or_else(PoisonError::into_inner) = Some(arrived);
+    }
+
+    /// Memory for decoded levels.
+    fn room(&self) -> Arrived {
         let mut kept = self.arrived.lock().unwrap_or_else(PoisonError::into_inner);
         let production = &self.production;
         let (width, height) = (
@@ -119,7 +97,7 @@ impl Run {
         let room = kept.take();
         let mut room = room.unwrap_or_else(|| production.decoder().arrived(width, height));
         room.restart();
-        Some(room)
+        room
     }
 }
 

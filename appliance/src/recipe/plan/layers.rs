@@ -135,7 +135,12 @@ impl Plan {
         };
         let mut strips = self.strips();
         let mut laps = Laps::since(Instant::now());
-        let found = self.run(&mut strips, (sequence, frames), None, maps, &mut laps);
+        let found = self.run(
+            &mut strips,
+            (self.arriving(sequence), frames),
+            maps,
+            &mut laps,
+        );
         let shown = self.shown(&found.ok()?.0);
         let production = &self.runs.get(sequence)?.production;
         let deviation_mm = production.square_means(&strips, &deviation_mm, shown.side);
@@ -162,13 +167,8 @@ impl Plan {
             deviation: None,
         };
         let mut laps = Laps::since(Instant::now());
-        let found = self.run(
-            &mut self.strips(),
-            (sequence, frames),
-            None,
-            maps,
-            &mut laps,
-        );
+        let of = (self.arriving(sequence), frames);
+        let found = self.run(&mut self.strips(), of, maps, &mut laps);
         found.ok().map(|_| height_mm)
     }
 

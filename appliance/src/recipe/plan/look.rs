@@ -14,9 +14,9 @@ impl Plan {
     pub fn look(&self, sequence: usize, frames: &[Frame]) -> (Inspection, Vec<Seen<'_>>) {
         let mut laps = Laps::since(Instant::now());
         let mut strips = self.strips();
-        let of = (sequence, frames);
-        let found = self.run(&mut strips, of, None, Maps::default(), &mut laps);
-        let inspection = self.judged(of, found, &mut laps);
+        let of = (self.arriving(sequence), frames);
+        let found = self.run(&mut strips, of, Maps::default(), &mut laps);
+        let inspection = self.judged((sequence, frames), found, &mut laps);
         let seen = self.runs.get(sequence).map(|run| {
             let drawing = Drawing::new(&run.production, &strips);
             self.outline.features(&inspection, &drawing)

@@ -32,7 +32,6 @@ use algo::frame::FrameView;
 use algo::geometry::HeightRange;
 use algo::inspect::{Findings, Input, Maps, PairPlaced, Production, Signal, Strips, normal_shares};
 use algo::pattern::{MAX_FRAMES, Shot};
-use algo::phase::Arrived;
 use algo::pipeline::HeightCubics;
 use hal::frame::Frame;
 use laps::Laps;
@@ -318,7 +317,7 @@ impl Plan {
     /// Judges a part from the frames of a sequence; the times of its stages begin at `exposed`. A
     /// part that cannot be measured is INVALID with a reason.
     pub fn inspect(&self, sequence: usize, frames: &[Frame], exposed: Instant) -> Inspection {
-        self.inspect_arrived(frames, Arriving::none(sequence), exposed)
+        self.inspect_arrived(frames, self.arriving(sequence), exposed)
     }
 
     /// As [`Self::inspect`], with the levels that were decoded on arrival.
@@ -330,10 +329,8 @@ impl Plan {
     ) -> Inspection {
         let sequence = arriving.sequence();
         let mut laps = Laps::since(exposed);
-        let found = self.with_arrived(arriving, frames, |finest| {
-            let of = (sequence, frames);
-            self.run(&mut self.strips(), of, finest, Maps::default(), &mut laps)
-        });
+        let of = (arriving, frames);
+        let found = self.run(&mut self.strips(), of, Maps::default(), &mut laps);
         self.judged((sequence, frames), found, &mut laps)
     }
 
@@ -399,11 +396,11 @@ impl Plan {
     fn run(
         &self,
         strips: &mut Strips,
-        (sequence, frames): (usize, &[Frame]),
-        finest: Option<(&Arrived, &[FrameView<'_>])>,
+        (arriving, frames): (Arriving, &[Frame]),
         maps: Maps<'_>,
         laps: &mut Laps,
     ) -> Result<(Findings, Option<f64>), String> {
+        let sequence = arriving.sequence();
         let run = self.runs.get(sequence);
         let run = run.ok_or_else(|| format!("the recipe has no sequence {sequence}"))?;
         // On the stack: a trigger allocates nothing.
@@ -413,10 +410,6 @@ impl Plan {
             let full = |_| format!("{} frames are more than any sequence has", frames.len());
             views.push(view).map_err(full)?;
         }
-        let input = match finest {
-            Some((arrived, last)) => Input::Finest(arrived, last),
-            None => Input::Frames(&views),
-        };
         let production = &run.production;
         if let Some(buffers) = &run.pair {
             let mut buffers = buffers.lock().unwrap_or_else(PoisonError::into_inner);
@@ -430,6 +423,8 @@ impl Plan {
             laps.end(Stage::Strips);
             return findings.map_err(|error| error.to_string());
         }
+        let (arrived, finest) = run.complete(arriving, &views).map_err(|e| e.to_string())?;
+        let input = Input::Finest(&arrived, &finest);
         let placed = production.place(input, strips);
         laps.end(Stage::Alignment);
         let findings = placed
@@ -439,6 +434,7 @@ impl Plan {
             })
             .map_err(|error| error.to_string());
         laps.end(Stage::Strips);
+        run.keep(arrived);
         Ok((findings?, None))
     }
 }

@@ -57,7 +57,7 @@ impl Scene {
 
     /// The phases that are measured about the expected ones.
     fn measured(&self, seed: u64, about: &Self, tops: &[usize]) -> PhaseMap {
-        self.measured_on(Backend::best(), seed, about, tops)
+        self.measured_on(Backend::best().unwrap(), seed, about, tops)
     }
 
     fn measured_on(&self, backend: Backend, seed: u64, about: &Self, tops: &[usize]) -> PhaseMap {

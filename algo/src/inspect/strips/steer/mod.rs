@@ -66,8 +66,10 @@ impl Production {
         strips: &mut Strips,
     ) -> Option<Placed> {
         let picture = self.picture.as_ref().filter(|_| !placed.free.is_empty())?;
-        let frames = self.phase.finest(input)?;
-        let frames = (self.phase.decoder.backend(), &frames[..]);
+        let Input::Finest(_, frames) = input else {
+            return None;
+        };
+        let frames = (self.phase.decoder.backend(), frames);
         let triangulator = &self.golden.triangulator;
         let motion = picture.steer(triangulator, frames, placed, &mut strips.pictures)?;
         let mut fitting = self.alignment.as_ref()?.fitting(self.golden.surface());

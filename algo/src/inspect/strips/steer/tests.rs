@@ -9,7 +9,7 @@ use crate::inspect::strips::{CalibrationError, Gauge, Input, Parts, Production};
 use crate::inspect::{Largest, Region, Taught, Weight};
 use crate::pattern::{PhaseFunction, Sequence, Shot};
 use crate::phase::Decoder;
-use crate::pipeline::{HeightCubics, KnownSurface, arrive, for_each_row};
+use crate::pipeline::{HeightCubics, KnownSurface, arrive_rest, for_each_row};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::sync::Arc;
 use rand_xoshiro::SplitMix64;
@@ -390,33 +390,23 @@ fn a_plate_that_is_worked_out_lies_where_it_was_moved_to_if_it_has_a_picture() {
 }
 
 #[test]
-fn the_bits_of_a_steered_part_depend_neither_on_threads_nor_on_when_levels_were_decoded() {
+fn the_bits_of_a_steered_part_do_not_depend_on_threads() {
     let head = Head::new();
     let with = head.production(&PLATE);
     let with = with.with_picture(&head.modulation(&PLATE), AWAY);
     let motion = motion(centre(&with), [0.9, -0.5, 0.2], [0.2, 0.1, -0.8]);
     let frames = head.frames(&PLATE, &motion);
     let frames = views(&frames);
-    let (decoder, mut arrived) = (with.decoder(), with.decoder().arrived(SIDE, SIDE));
-    let levels: Vec<Vec<_>> = decoder
-        .levels()
-        .map(|level| level.iter().map(|&at| frames[at]).collect())
-        .collect();
-    let (finest, coarser) = levels.split_last().unwrap();
-    for level in coarser {
-        arrive(decoder, level, &mut arrived).unwrap();
-    }
-    let place = |input| with.place(input, &mut with.strips(64)).unwrap().unwrap();
-    let placed = place(Input::Frames(&frames));
+    let mut arrived = with.decoder().arrived(SIDE, SIDE);
+    let finest = arrive_rest(with.decoder(), &frames, &mut arrived).unwrap();
+    let input = Input::Finest(&arrived, &finest);
+    let place = || with.place(input, &mut with.strips(64)).unwrap().unwrap();
+    let placed = place();
     assert!(placed.steered);
-    assert_eq!(place(Input::Finest(&arrived, finest)), placed);
     #[cfg(feature = "parallel")]
     for threads in 1..=4 {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
-        let again = pool
-            .build()
-            .unwrap()
-            .install(|| place(Input::Frames(&frames)));
+        let again = pool.build().unwrap().install(place);
         assert_eq!(again, placed, "{threads} threads");
     }
 }
