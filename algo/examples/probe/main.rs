@@ -32,6 +32,7 @@ use std::env;
 use std::error::Error;
 use std::hint::black_box;
 use std::io::{Write, stdout};
+use std::process::ExitCode;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -76,8 +77,18 @@ fn line(case: &Case, decoder: &Decoder) -> Outcome<String> {
     Ok(format!("{name} {phase} {modulation} {trust} {height}"))
 }
 
-fn main() -> Outcome<()> {
+fn main() -> ExitCode {
     let arguments: Vec<String> = env::args().skip(1).collect();
+    match run(&arguments) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("{error}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(arguments: &[String]) -> Outcome<()> {
     match arguments.iter().map(String::as_str).collect::<Vec<_>>()[..] {
         [] => {
             for case in cases::all() {

@@ -8,6 +8,8 @@ mod noise;
 mod plate;
 mod rays;
 mod rows;
+#[cfg(test)]
+mod slips;
 mod wrapped;
 
 pub(crate) use cubic::{

@@ -305,9 +305,11 @@ macro_rules! pairs {
 pub(super) use pairs;
 
 /// The expression itself, for operations that need no proof.
+#[cfg(any(test, not(target_arch = "aarch64")))]
 macro_rules! plain {
     ($e:expr) => {
         $e
     };
 }
+#[cfg(any(test, not(target_arch = "aarch64")))]
 pub(super) use plain;
