@@ -134,8 +134,11 @@ def hourly(asked):
     hours = grouped(asked.every, lambda one: one.at // HOUR * HOUR)
     for hour, found in hours.items():
         if asked.begin <= hour <= asked.end:
-            heads = grouped(found, lambda one: (one.serial, one.recipe)).values()
-            yield [text(hour), min(cpk([one for one in head if one.gauges.get(asked.gauge, [None])[0] is not None], asked.gauge) for head in heads)]
+            measured = [one for one in found if one.gauges.get(asked.gauge, [None])[0] is not None]
+            # One value has no standard deviation.
+            heads = grouped(measured, lambda one: (one.serial, one.recipe)).values()
+            if heads:
+                yield [text(hour), min((cpk(head, asked.gauge) for head in heads if len(head) > 1), default=None)]
 
 
 def daily(asked):
