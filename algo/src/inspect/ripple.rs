@@ -25,6 +25,7 @@
 
 use super::gauge::MIN_SUPPORT;
 use super::table::IntegralTable;
+use crate::pipeline::map_rows;
 
 /// Sides of a patch and of a square.
 const PATCH: usize = 4;
@@ -33,6 +34,9 @@ const NOISE: f64 = 3.0 / PATCH as f64 / 2.0;
 /// A patch has squares about at least this share of its pixels.
 const FILLED: f64 = 0.5;
 
+/// Rows that are looked at together: as many as keep their tables of sums small.
+const BAND: usize = 128;
+
 /// What the means of two maps over squares of `side` pixels have in common, RMS over the patch
 /// where that is largest, in frames of `width` columns with so many `pixels`. `values` gives the
 /// values of a pixel in both maps; pixels without values are left out, and so are squares and
@@ -40,27 +44,40 @@ const FILLED: f64 = 0.5;
 pub fn ripple(
     (width, pixels): (usize, usize),
     side: usize,
-    values: impl Fn(usize) -> Option<[f64; 2]>,
+    values: impl Fn(usize) -> Option<[f64; 2]> + Sync,
 ) -> f64 {
     let width = width.max(1);
-    let place = |at: usize| (at / width, at % width);
-    let sums = IntegralTable::new(width, pixels, |at| values(at).map(|[a, b]| [1.0, a, b]));
-    let products = IntegralTable::new(width, pixels, |at| {
-        let (row, column) = place(at);
-        values(at)?;
-        let [count, a, b] = sums.square(row, column, side);
-        let enough = count >= MIN_SUPPORT * (side * side) as f64;
-        let (a, b) = (a / count, b / count);
-        enough.then_some([1.0, a * b - NOISE * (a - b) * (a - b)])
-    });
+    let rows = pixels / width;
     let patch = PATCH * side;
-    let least = FILLED * (patch * patch) as f64;
-    let mean = |at: usize| {
-        let (row, column) = place(at);
-        let [count, product] = products.square(row, column, patch);
-        (count >= least).then(|| product / count)
-    };
-    libm::sqrt((0..pixels).filter_map(mean).fold(0.0, f64::max))
+    let reach = patch / 2 + side / 2;
+    let squares = map_rows(rows.div_ceil(BAND), |band| {
+        let inside = band * BAND..rows.min((band + 1) * BAND);
+        // The rows that patches about those inside reach.
+        let first = inside.start.saturating_sub(reach);
+        let (start, end) = (first * width, rows.min(inside.end + reach) * width);
+        let place = |at: usize| (at / width, at % width);
+        let values = |at: usize| values(start + at);
+        let sums = IntegralTable::new(width, end - start, |at| {
+            values(at).map(|[a, b]| [1.0, a, b])
+        });
+        let products = IntegralTable::new(width, end - start, |at| {
+            let (row, column) = place(at);
+            values(at)?;
+            let [count, a, b] = sums.square(row, column, side);
+            let enough = count >= MIN_SUPPORT * (side * side) as f64;
+            let (a, b) = (a / count, b / count);
+            enough.then_some([1.0, a * b - NOISE * (a - b) * (a - b)])
+        });
+        let least = FILLED * (patch * patch) as f64;
+        let mean = |at: usize| {
+            let (row, column) = place(at);
+            let [count, product] = products.square(row, column, patch);
+            (count >= least).then(|| product / count)
+        };
+        let inside = (inside.start - first) * width..(inside.end - first) * width;
+        inside.filter_map(mean).fold(0.0, f64::max)
+    });
+    libm::sqrt(squares.into_iter().fold(0.0, f64::max))
 }
 
 #[cfg(test)]

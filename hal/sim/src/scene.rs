@@ -88,12 +88,7 @@ impl SimScene {
         if let Some(known) = self.pictures.iter().position(|(view, _)| view == seen) {
             return known;
         }
-        let all = (self.rasters.len() + 1) * self.sensor_size * size_of::<f32>();
-        let kept = match all <= MAX_PICTURES {
-            true => self.rasters.len() + 1,
-            false => 1,
-        };
-        while self.pictures.len() >= kept {
+        if self.pictures.len() > self.rasters.len() {
             self.pictures.pop_front();
         }
         let mut picture = vec![0.0; self.sensor_size];
@@ -116,6 +111,11 @@ impl SimScene {
         blur::gaussian(&mut picture, width, transport.blur_px);
         self.pictures.push_back((seen.to_vec(), picture));
         self.pictures.len() - 1
+    }
+
+    /// Whether there is memory for the pictures of all patterns and of none.
+    fn keeps_pictures(&self) -> bool {
+        (self.rasters.len() + 1) * self.sensor_size * size_of::<f32>() <= MAX_PICTURES
     }
 
     /// The light of a loaded raster, 1 = white, row by row, with [`PADDING`]; `None` where none is
@@ -188,12 +188,16 @@ impl Scene for SimScene {
         let plane = self.scenario.colour.then(|| self.scenario.in_frame(whole));
         let picture = plane.as_ref().unwrap_or(whole);
         let sensor = &self.sensor;
-        self.pool.frame(timestamp, count, |pixels| match pixels {
+        let frame = self.pool.frame(timestamp, count, |pixels| match pixels {
             Pixels::Eight(samples) => sensor.read(exposing, picture, random, samples, |n| n as u8),
             Pixels::Sixteen(samples) => {
                 sensor.read(exposing, picture, random, samples, |n| n as u16);
             }
-        })
+        });
+        if !self.keeps_pictures() {
+            self.pictures.clear();
+        }
+        frame
     }
 }
 
