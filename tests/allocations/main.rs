@@ -59,6 +59,8 @@ fn a_trigger_allocates_nothing_until_its_result_is_handed_over() {
         TIMEOUT,
         Headway::silent(),
     )
+    .unwrap()
+    .seal()
     .unwrap();
     let mut file = taught.manifest.clone();
     file.judges_nothing = true;

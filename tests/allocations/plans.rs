@@ -45,6 +45,8 @@ fn a_plan_keeps_nothing_twice_and_making_it_takes_little_more_than_its_file() {
         TIMEOUT,
         Headway::silent(),
     )
+    .unwrap()
+    .seal()
     .unwrap();
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)

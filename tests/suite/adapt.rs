@@ -258,6 +258,7 @@ fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe
         exposures: 1,
     };
     let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent()).expect("a sphere");
+    let taught = taught.seal().expect("packed");
     (taught.bytes, taught.recipe)
 }
 

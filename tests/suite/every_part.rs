@@ -2,7 +2,7 @@
 //! placement tolerance pass, and dents do not.
 
 use super::limits::cycle;
-use super::placement::{Bed, bed, taught_exposed, taught_within};
+use super::placement::{Bed, bed, taught_exposed, taught_within, with_two_frames};
 use algo::geometry::Vector;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
@@ -253,7 +253,7 @@ fn ways(taught: TaughtRecipe) -> Vec<(String, Recipe)> {
         (format!("{frames} frames first"), recipe)
     };
     let mut all: Vec<_> = (0..manifest.sequences.len()).map(begin_with).collect();
-    let two = taught.with_two_frames().unwrap();
+    let two = with_two_frames(taught);
     all.push(("two frames first".into(), two.recipe));
     all
 }

@@ -7,7 +7,7 @@ use appliance::head::calibrated::CalibratedHead;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
-use appliance::recipe::teach::{Naming, TaughtRecipe, teach};
+use appliance::recipe::teach::{Naming, TaughtRecipe, UnsealedRecipe, teach};
 use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile, safe};
 use appliance::system::headway::Headway;
 use hal::head::Head;
@@ -105,7 +105,17 @@ fn teach_now(
     };
     let (head, calibration) = (&mut bed.head, &bed.calibration);
     let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent());
-    taught.map_err(|error| error.to_string())
+    taught.map_err(|error| error.to_string())?.seal()
+}
+
+/// The same recipe, whose cycles begin with two frames.
+pub(crate) fn with_two_frames(taught: TaughtRecipe) -> TaughtRecipe {
+    let unsealed = UnsealedRecipe {
+        manifest: taught.manifest,
+        arrays: taught.recipe.arrays,
+        choice: taught.choice,
+    };
+    unsealed.with_two_frames().seal().unwrap()
 }
 
 /// Pixels whose phase is more than half a turn off the true one, and all that were compared, for a

@@ -4,7 +4,7 @@
 use crate::gauges::frames;
 use crate::history::recording;
 use crate::page::Browser;
-use crate::placement::{bed, scenario, taught};
+use crate::placement::{bed, scenario, taught, with_two_frames};
 use crate::station_plc::{Daemon, Place, Plc, long};
 use appliance::recipe::Recipe;
 use appliance::recipe::plan::Plan;
@@ -223,7 +223,7 @@ fn the_pictures_of_fifty_displaced_parts_have_their_largest_squares_where_and_as
 #[test]
 fn the_map_of_square_means_has_the_reading_of_the_gauge_at_its_place() {
     let mut bed = bed(&scenario(part(false, Vec::new())));
-    let taught = taught(&mut bed).unwrap().with_two_frames().unwrap();
+    let taught = with_two_frames(taught(&mut bed).unwrap());
     let recipe = Recipe::from_bytes(&taught.bytes).unwrap();
     let plan = Plan::new(recipe, &bed.calibration, true).unwrap();
     bed.head

@@ -3,7 +3,7 @@
 
 use super::gauges::frames;
 use super::history::recording;
-use super::placement::{Bed, bed, taught_within};
+use super::placement::{Bed, bed, taught_within, with_two_frames};
 use super::station_plc::{Daemon, Place, Plc, command, long};
 use super::written::program;
 use appliance::head::seam;
@@ -55,7 +55,7 @@ impl Line {
     fn new(scenario: &Scenario) -> Self {
         let mut bed = bed(scenario);
         let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
-        let taught = taught.with_two_frames().unwrap();
+        let taught = with_two_frames(taught);
         let recipe = Recipe::from_bytes(&taught.bytes).unwrap();
         let plan = Plan::new(recipe, &bed.calibration, true).unwrap();
         assert_eq!(plan.indices(0).len(), 2);
@@ -299,7 +299,7 @@ fn a_station_judges_by_two_frames_keeps_them_and_goes_on_with_more_for_another_p
     let place = Place::before(MIDDLE);
     let mut bed = bed(&Scenario::from_toml(MIDDLE, "scene").unwrap());
     let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
-    let taught = taught.with_two_frames().unwrap();
+    let taught = with_two_frames(taught);
     std::fs::create_dir_all(place.recipe().parent().unwrap()).unwrap();
     std::fs::write(place.recipe(), taught.bytes).unwrap();
     // FLAGS 1: one level, 3: the full sequence, 4: after a shorter one.

@@ -246,8 +246,11 @@ pub fn predict(
     (count > 0.0).then(|| squares.map(|sum: f64| libm::sqrt(sum / count)))
 }
 
+/// The share of the time of [`adapt`] after which the frequencies are found.
+const FOUND: f64 = 0.8;
+
 /// Makes the phase function for a part, over a projector of `columns` × `rows` pixels. `progress`
-/// gets the share of the camera's rows that are done.
+/// gets the share that is done.
 ///
 /// # Errors
 /// If no pixel of the part is known.
@@ -260,7 +263,8 @@ pub fn adapt(
     progress: Progress<'_>,
 ) -> Result<PhaseFunction, AdaptError> {
     let slopes = map.slopes(MAX_SLOPE);
-    let frequencies = frequencies(&slopes, map.width, (optics, light), progress);
+    let found = |share| progress(FOUND * share);
+    let frequencies = frequencies(&slopes, map.width, (optics, light), &found);
     let mut field = Field::uniform(columns, rows, f64::NAN);
     let mut seen = vec![false; columns * rows];
     for (point, g) in map.points.iter().zip(&frequencies) {
@@ -277,6 +281,7 @@ pub fn adapt(
         return Err(AdaptError::Empty);
     }
     field.fill_near(FILL);
+    progress((1.0 + FOUND) / 2.0);
     field.fill_columns();
     field.fill_rows(1.0 / optics.projector_pitch);
     let field = field.minimum(MINIMUM_REACH).smoothed(SMOOTHING);

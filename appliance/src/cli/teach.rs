@@ -166,16 +166,17 @@ impl Teach {
             Some(golden) => pool.install(|| self.teach_recordings(golden, &naming))?,
             None => self.teach_head(&config, &pool, &naming)?,
         };
-        let unfit = Exit::Content.because("teach");
         let taught = match self.frames {
-            Some(_) => taught.with_two_frames().map_err(&unfit)?,
+            Some(_) => taught.with_two_frames(),
             None => taught,
         };
         let taught = match replaced.filter(|_| self.keep_gauges) {
             Some(file) => pool.install(|| replace::keep_gauges(taught, &file, Headway::silent())),
             None => pool.install(|| taught.with_circles(Headway::silent())),
         };
-        let taught = taught.map_err(&unfit)?;
+        let taught = taught
+            .and_then(UnsealedRecipe::seal)
+            .map_err(Exit::Content.because("teach"))?;
         let place = target.store(&taught)?;
         let file = &taught.manifest;
         let summary = serde_json::json!({
@@ -231,7 +232,7 @@ impl Teach {
         config: &Config,
         pool: &rayon::ThreadPool,
         naming: &Naming,
-    ) -> Result<TaughtRecipe> {
+    ) -> Result<UnsealedRecipe> {
         let options = &self.measuring;
         let progress = options.output.progress();
         let on_progress = |share: f64| progress.tell(share, "working out the light of the scene");
@@ -261,7 +262,7 @@ impl Teach {
         Ok(taught)
     }
 
-    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<TaughtRecipe> {
+    fn teach_recordings(&self, folder: &Path, naming: &Naming) -> Result<UnsealedRecipe> {
         let recording = Recording::open(folder)?;
         let manifest = folder.join("recording.json");
         let wrong = |error: &dyn std::fmt::Display| {
@@ -319,7 +320,6 @@ impl Teach {
         };
         let mut taught = part
             .recipe(naming, Headway::silent())
-            .and_then(UnsealedRecipe::seal)
             .map_err(|error| wrong(&error))?;
         if full.len()
             < recording

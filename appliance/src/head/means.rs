@@ -30,8 +30,10 @@ pub fn take(
 ) -> Result<Option<Vec<Frame>>, Error> {
     let indices: Vec<usize> = (0..patterns).collect();
     let mut sums: Vec<Sum> = Vec::with_capacity(patterns);
-    for capture in 0..CAPTURES {
-        if !progress(capture as f64 / CAPTURES as f64) {
+    let mut taken = 0;
+    let mut goes_on = progress(0.0);
+    for _ in 0..CAPTURES {
+        if !goes_on {
             return Ok(None);
         }
         head.acquire(&indices, timeout, &mut |at, frame| {
@@ -41,6 +43,9 @@ pub fn take(
             if let Some(sum) = sums.get_mut(at) {
                 sum.add(&frame);
             }
+            taken += 1;
+            // A sequence is not interrupted.
+            goes_on = progress(taken as f64 / (CAPTURES * patterns) as f64);
         })?;
     }
     let means: Result<_, _> = sums.into_iter().map(Sum::mean).collect();

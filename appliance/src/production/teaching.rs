@@ -7,12 +7,14 @@ use crate::recipe::teach::{TaughtRecipe, TeachError, teach_marking};
 use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, error_code};
 use crate::system::headway::Headway;
+use crate::system::memory;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// The shares of a teach's time after which the recipe is taught, its gauges are settled, and it is
-/// stored.
-const TAUGHT: f64 = 0.86;
-const SETTLED: f64 = 0.92;
+/// The shares of a teach's time after which the recipe is taught, its gauges are settled, the
+/// geometry is checked, and it is stored.
+const TAUGHT: f64 = 0.8;
+const SETTLED: f64 = 0.9;
+const CHECKED: f64 = 0.93;
 const STORED: f64 = 0.94;
 
 impl Worker {
@@ -25,11 +27,11 @@ impl Worker {
         }));
         let taught = taught
             .unwrap_or_else(|panic| Err(TeachError::Rig(broken("teach: the part", &*panic))))
-            .and_then(|taught| self.check_taught(job).map(|()| taught));
+            .and_then(|taught| self.check_taught(job, (SETTLED, CHECKED)).map(|()| taught));
         self.progress.clear();
         let telling = (&self.aborts, job);
         Telling::new(&self.station, &self.pulse, &self.progress, telling)
-            .tell(SETTLED, "storing the recipe");
+            .tell(CHECKED, "storing the recipe");
         let stored = match taught {
             Ok(taught) => self.store(&taught, replaced.filter(|_| keep_gauges)),
             Err(error) => Err(self.refuse_teaching(error)),
@@ -97,19 +99,25 @@ impl Worker {
             )
         })?;
         let headway = headway.part(TAUGHT, SETTLED);
+        let round = headway.part(0.0, 0.8);
         let settled = match kept {
             Some(file) => {
-                let headway = headway.called("working out the limits of the gauges");
+                let headway = round.called("working out the limits of the gauges");
                 let kept = || replace::keep_gauges(taught, file, headway);
                 self.computing.on(|| self.pool.install(kept))
             }
             None => {
-                let headway = headway.called("looking for round openings");
+                let headway = round.called("looking for round openings");
                 let circles = || taught.with_circles(headway);
                 self.computing.on(|| self.pool.install(circles))
             }
         };
-        settled.map_err(TeachError::Rig)
+        let packing = headway.part(0.8, 1.0).called("packing the recipe");
+        packing.done(0.0);
+        memory::trim();
+        let packed =
+            settled.and_then(|settled| self.computing.on(|| settled.seal_telling(packing)));
+        packed.map_err(TeachError::Rig)
     }
 
     /// ERROR_CODE and words of a failure; a lost head is remembered.

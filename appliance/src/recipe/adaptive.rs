@@ -63,6 +63,7 @@ impl Preliminary {
         progress: Progress<'_>,
     ) -> Result<AdaptivePattern, TeachError> {
         let map = ProjectorMap::from_heights(&part.triangulator, &part.heights);
+        progress(0.03);
         let slopes = map.slopes(noise::MAX_SLOPE);
         let blur = self.blur(part, calibration, &slopes)?;
         let light = Light::of(
@@ -82,6 +83,7 @@ impl Preliminary {
         let function = noise::adapt(&map, columns, rows, &optics, &light, &|share| {
             progress(0.5 + 0.4 * share);
         })?;
+        progress(0.9);
         let trusted = map.without_blurred_silhouettes(blur.camera);
         Ok(AdaptivePattern {
             expected: trusted.expected_phase(&function),

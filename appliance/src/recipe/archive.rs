@@ -3,6 +3,7 @@
 use super::file::{FORMAT, RecipeFile, VERSION};
 use crate::storage::archive::{Members, packed};
 use crate::storage::hex;
+use crate::system::headway::Headway;
 use hal::bounds::{self, shortened};
 use hal::npy;
 use sha2::{Digest, Sha256};
@@ -121,12 +122,21 @@ pub(super) fn broken(what: impl std::fmt::Display) -> String {
 /// # Errors
 /// In words: the archive cannot be made.
 pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), String> {
+    pack_telling(file, arrays, Headway::silent())
+}
+
+/// As [`pack`], telling how far it is.
+pub(super) fn pack_telling(
+    file: &RecipeFile,
+    arrays: &Arrays,
+    headway: Headway<'_>,
+) -> Result<(Vec<u8>, String), String> {
     let zeroed = RecipeFile {
         fingerprint: NO_FINGERPRINT.into(),
         ..file.clone()
     };
     let manifest = serde_json::to_string_pretty(&zeroed).map_err(broken)?;
-    seal(&manifest, members(file, arrays), arrays.size())
+    seal(&manifest, members(file, arrays), arrays.size(), headway)
 }
 
 /// The arrays by their members' names; one that is empty has no member.
@@ -147,12 +157,17 @@ pub(crate) fn seal(
     manifest: &str,
     members: Vec<Member<'_>>,
     size: usize,
+    headway: Headway<'_>,
 ) -> Result<(Vec<u8>, String), String> {
     let fingerprint = fingerprint(manifest.as_bytes(), &members);
     let manifest = manifest.replacen(NO_FINGERPRINT, &fingerprint, 1);
     let room = size + manifest.len() + HEADERS * (members.len() + 1);
     let first = (MANIFEST, manifest.into_bytes());
-    let others = members.iter().map(|(name, content)| (*name, content()));
+    let all = members.len() as f64;
+    let others = (0..).zip(&members).map(|(at, (name, content))| {
+        headway.done(0.5 + 0.5 * f64::from(at) / all);
+        (*name, content())
+    });
     let bytes = packed(std::iter::once(first).chain(others), room).map_err(broken)?;
     Ok((bytes, fingerprint))
 }
@@ -363,7 +378,7 @@ mod tests {
         let manifest = format!("{{\"fingerprint\": \"{NO_FINGERPRINT}\"}}");
         let content = |bytes: &'static [u8]| Box::new(|| bytes.to_vec()) as Content<'static>;
         let members = vec![("b.npy", content(b"second")), ("a.npy", content(b"first"))];
-        let (_, fingerprint) = seal(&manifest, members, 0).unwrap();
+        let (_, fingerprint) = seal(&manifest, members, 0, Headway::silent()).unwrap();
         // docs/formats.md: of each member, recipe.json first and the others by name, the length of
         // its name, its name, the number of its bytes, its bytes.
         let all = [

@@ -6,6 +6,7 @@ use super::captures::Offsets;
 use super::golden::GoldenPart;
 use super::sides::SIDES;
 use super::{SequenceFile, SequenceKind, UnseenFile};
+use crate::system::headway::Headway;
 use algo::inspect::ripple;
 use algo::pattern::{Sequence, Shot, Slips, Waveform, Waveforms};
 use algo::phase::Trust;
@@ -37,11 +38,16 @@ impl GoldenPart<'_> {
     /// The candidates, each with its predicted noise, the share of the surface where it is safe
     /// (where no placement within the tolerance makes its phase ambiguous), and how often its
     /// orders are wrong unseen.
-    pub(super) fn sequences(&self, arrays: &Arrays) -> Vec<SequenceFile> {
+    pub(super) fn sequences(&self, arrays: &Arrays, headway: Headway<'_>) -> Vec<SequenceFile> {
         let candidates = candidates(self.calibration.waveforms(), self.full);
-        let rated = |(kind, frames)| self.rated(kind, frames, arrays);
-        let mut sequences: Vec<_> = candidates.into_iter().map(rated).collect();
-        for (sequence, offsets) in sequences.iter_mut().zip(&self.offsets) {
+        let all = 2.0 * candidates.len() as f64;
+        let rated = |(at, (kind, frames))| {
+            headway.done(at as f64 / all);
+            self.rated(kind, frames, arrays)
+        };
+        let mut sequences: Vec<_> = (0..).zip(candidates).map(rated).collect();
+        for ((at, sequence), offsets) in (1..).zip(&mut sequences).zip(&self.offsets) {
+            headway.done(0.5 + at as f64 / all);
             sequence.ripple_mm = Some(self.ripple(offsets, arrays));
         }
         // Each other sequence's periodic error is measured against the full sequence, whose own is

@@ -103,8 +103,9 @@ impl Captured {
             let seen = scan(function, (&shots, full), &means).map_err(TeachError::rig)?;
             let most = seen.decoder.full_scale();
             signals.push(signal::of(full, &seen.frames, most));
-            let offsets = short.iter().map(|shown| {
+            let offsets = (1..).zip(short).map(|(known, shown)| {
                 let (.., by) = decode(shown, &means, &phases.phase)?;
+                taking.done(0.85 + 0.15 * known as f64 / short.len() as f64);
                 Ok(offsets(&by, &phases))
             });
             let offsets: Result<_, String> = offsets.collect();

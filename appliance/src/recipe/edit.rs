@@ -1,7 +1,7 @@
 //! Edits a taught recipe: names, features, datum systems, gauges, guard band and least coverage.
 
 use super::file::LONGEST_NAME;
-use super::golden::TaughtRecipe;
+use super::golden::UnsealedRecipe;
 use super::judging::check_unique;
 use super::store::LoadedRecipe;
 use super::{ChangeError, DatumFile, FeatureFile, GaugeFile, Recipe, RecipeFile, Store};
@@ -71,8 +71,9 @@ pub fn edit(
     edit.apply(&mut file);
     file.set_gauges_of(&before).map_err(ChangeError::Unfit)?;
     // Tighter limits may need a longer sequence, wider ones a shorter one.
-    let changed =
-        TaughtRecipe::of(file, recipe.arrays, Headway::silent()).map_err(ChangeError::Unfit)?;
+    let changed = UnsealedRecipe::of(file, recipe.arrays, Headway::silent())
+        .and_then(UnsealedRecipe::seal)
+        .map_err(ChangeError::Unfit)?;
     fits(changed.recipe).map_err(ChangeError::Unfit)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
     match store.replace(number, &fingerprint, &changed.bytes) {

@@ -6,7 +6,7 @@
 use super::archive::Arrays;
 use super::file::RecipeFile;
 use super::gauge_keys::placeless;
-use super::golden::TaughtRecipe;
+use super::golden::{TaughtRecipe, UnsealedRecipe};
 use super::{DatumFile, FeatureFile, GaugeFile};
 use crate::system::headway::Headway;
 use hal::bounds::{clipped, shortened};
@@ -134,7 +134,7 @@ impl Gauging {
         file.gauges.sort_by_key(|gauge| gauge.slot);
         file.set_gauges_of(before)?;
         file.check_bounds()?;
-        TaughtRecipe::of(file, arrays, Headway::silent())
+        UnsealedRecipe::of(file, arrays, Headway::silent())?.seal()
     }
 }
 

@@ -118,7 +118,7 @@ pub struct TaughtRecipe {
     pub choice: Choice,
 }
 
-impl TaughtRecipe {
+impl UnsealedRecipe {
     /// What is said of recipes whose cycles begin with two frames.
     pub(super) const TWO_FRAMES: &str = "2 frames are tried first, the sequence taken follows in the same cycle where they do not hold";
 
@@ -127,40 +127,43 @@ impl TaughtRecipe {
         "contours need three shifts or more: cycles do not begin with two frames";
 
     /// The same recipe, whose cycles begin with two frames.
-    ///
-    /// # Errors
-    /// In words, if it could not be packed.
-    pub fn with_two_frames(mut self) -> Result<Self, String> {
+    #[must_use]
+    pub fn with_two_frames(mut self) -> Self {
         self.manifest.two_frames = true;
         self.choice.reasons.push(Self::TWO_FRAMES.into());
-        Self::sealed(self.manifest, self.recipe.arrays, self.choice)
+        self
     }
 
-    pub(super) fn sealed(
-        manifest: RecipeFile,
-        arrays: Arrays,
-        choice: Choice,
-    ) -> Result<Self, String> {
-        let (bytes, _) = archive::pack(&manifest, &arrays)?;
-        // Read back as after a restart, so that what was made is known to load.
-        let manifest = archive::manifest(Cursor::new(&bytes))?;
-        let recipe = Recipe::check(&manifest, arrays)?;
-        Ok(Self {
-            bytes,
-            manifest,
-            recipe,
-            choice,
-        })
-    }
-}
-
-impl UnsealedRecipe {
     /// Packs it.
     ///
     /// # Errors
     /// In words, if it could not be packed, or not be loaded again.
     pub fn seal(self) -> Result<TaughtRecipe, String> {
-        TaughtRecipe::sealed(self.manifest, self.arrays, self.choice)
+        self.seal_telling(Headway::silent())
+    }
+
+    /// As [`Self::seal`], telling how far it is.
+    ///
+    /// # Errors
+    /// As [`Self::seal`].
+    pub fn seal_telling(self, headway: Headway<'_>) -> Result<TaughtRecipe, String> {
+        let Self {
+            manifest,
+            arrays,
+            choice,
+        } = self;
+        let packing = headway.part(0.0, 0.8);
+        let (bytes, _) = archive::pack_telling(&manifest, &arrays, packing)?;
+        headway.done(0.8);
+        // Read back as after a restart, so that what was made is known to load.
+        let manifest = archive::manifest(Cursor::new(&bytes))?;
+        let recipe = Recipe::check(&manifest, arrays)?;
+        Ok(TaughtRecipe {
+            bytes,
+            manifest,
+            recipe,
+            choice,
+        })
     }
 }
 
@@ -189,11 +192,10 @@ impl GoldenPart<'_> {
         let mut arrays = self.arrays(
             &surface,
             naming.placement_tolerance_mm,
-            headway.part(0.0, 0.15),
+            headway.part(0.0, 0.1),
         );
-        let sequences = self.sequences(&arrays);
+        let sequences = self.sequences(&arrays, headway.part(0.1, 0.2));
         self.release();
-        headway.done(0.2);
         let choice = planner::choose(&sequences, &gauges, 0);
         let range = self.triangulator.range();
         let calibration = self.calibration;
@@ -295,6 +297,7 @@ impl GoldenPart<'_> {
                 }
             }
         });
+        headway.done(0.8);
         let certain = |at: usize| resolved(at) && f64::from(heights.sigma[at]) <= MAX_SIGMA_MM;
         let certain: Vec<bool> = (0..phases.phase.len()).map(certain).collect();
         let full_scale = self.decoder.full_scale();

@@ -147,6 +147,7 @@ impl Noise<'_> {
         headway.done(0.6);
         noise.motion = &motion;
         let (limit_mm, weights) = limited(&noise, &valid, tolerance_mm);
+        headway.done(0.7);
         let (mut all, mut weighed) = (0.0, 0.0);
         for (area, weight) in areas(whole).into_iter().zip(&weights) {
             let area = f64::from(area);
@@ -221,16 +222,19 @@ impl Weighed {
     /// Gives the part squares as small as noise and golden's interpolation allow, where the image of
     /// a part moves by up to `away` pixels, and sets what good parts are predicted to deviate by in
     /// them. The second result is what displaced parts deviate by at their sharpest crease, mm.
-    pub fn settle(&mut self, noise: &Noise<'_>, away: usize) -> (Sides, f64) {
+    pub fn settle(&mut self, noise: &Noise<'_>, away: usize, headway: Headway<'_>) -> (Sides, f64) {
         let sigmas = self.sigmas(SIDES);
+        headway.done(0.3);
         let full = |place: usize| {
             let weight = self.weights[place];
             weight.compared().then_some(!weight.partial())
         };
         let missed = Missed::new(&noise.surface, &self.shares, &self.weights);
+        headway.done(0.5);
         let bent = |place, side| missed.at(place, side);
         let limit = self.found.limit_mm;
         let sides = Sides::new((&sigmas, bent), full, limit, (self.width, away));
+        headway.done(0.8);
         let bend = sides.bend(&missed, self.places());
         drop(missed);
         self.predict(&sides, SIDES.into_iter().zip(sigmas));

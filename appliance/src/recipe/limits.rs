@@ -47,8 +47,7 @@ impl GoldenPart<'_> {
             }
         }
         let away = window::pixels(&self.triangulator, manifest.placement_tolerance_mm);
-        let (sides, bend) = weighed.settle(&noise, away);
-        weighing.done(0.9);
+        let (sides, bend) = weighed.settle(&noise, away, weighing.part(0.7, 1.0));
         let mut good_parts = weighed.found;
         let pixel_mm = window::pitch(&self.triangulator).unwrap_or_default();
         good_parts.dent_mm = DENT * sides.smallest as f64 * pixel_mm;

@@ -132,8 +132,14 @@ pub(super) fn as_it_lies(
                 return Err(TeachError::Ended);
             }
             let mut frames = Vec::new();
-            let mut keep = |_, frame| frames.push(frame);
-            head.acquire(plan.indices(sequence), timeout, &mut keep)?;
+            let indices = plan.indices(sequence);
+            let mut keep = |_, frame| {
+                frames.push(frame);
+                let taken = frames.len() as f64 / (indices.len() + 1) as f64;
+                // A sequence is not interrupted.
+                headway.done((judged.len() as f64 + taken) / STILL as f64);
+            };
+            head.acquire(indices, timeout, &mut keep)?;
             let inspection = plan.inspect(sequence, &frames, Instant::now());
             sequence += 1;
             if inspection.step_up.is_none() || sequence == plan.sequence_count() {

@@ -2,7 +2,7 @@
 //! gauges or the production sequence change.
 
 use super::archive::Arrays;
-use super::golden::TaughtRecipe;
+use super::golden::UnsealedRecipe;
 use super::plan::{Golden, Plan, PlanError};
 use super::planner::{self, Choice};
 use super::{GaugeFile, Part, Recipe, RecipeFile};
@@ -14,9 +14,9 @@ use hal::bounds::clipped;
 /// the limits: more turns than this change nothing that matters.
 const TURNS: usize = 3;
 
-impl TaughtRecipe {
-    /// Works out limits and masters, chooses the production sequence for the gauges of a manifest,
-    /// and packs it with its arrays.
+impl UnsealedRecipe {
+    /// Works out limits and masters, and chooses the production sequence for the gauges of a
+    /// manifest.
     ///
     /// # Errors
     /// In words, if they do not fit each other, or golden has no value where one is needed.
@@ -33,7 +33,11 @@ impl TaughtRecipe {
         if manifest.gauge_of_contour().is_some() {
             choice.reasons.push(Self::CONTOURS.into());
         }
-        Self::sealed(manifest, arrays, choice)
+        Ok(Self {
+            manifest,
+            arrays,
+            choice,
+        })
     }
 }
 
@@ -71,8 +75,9 @@ impl RecipeFile {
         if self.gauge_of_contour().is_none() && !self.gauges.iter().any(GaugeFile::needs_golden) {
             return Ok((choice, None));
         }
-        for _ in 0..TURNS {
-            let golden = self.golden(arrays, false, headway)?;
+        for turn in 0..TURNS {
+            let [from, to] = [turn, turn + 1].map(|turn| turn as f64 / TURNS as f64);
+            let golden = self.golden(arrays, false, headway.part(from, to))?;
             self.follow(&golden.findings)?;
             choice = choose(self);
             if choice.production == self.production {

@@ -1,6 +1,6 @@
 //! Teaching under a number that is taken: what the new recipe keeps of the one that it replaces.
 
-use super::golden::{Naming, TaughtRecipe};
+use super::golden::{Naming, UnsealedRecipe};
 use super::{RecipeFile, Store};
 use crate::system::headway::Headway;
 
@@ -92,13 +92,13 @@ pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<
 /// # Errors
 /// In words, if they do not fit what was taught.
 pub fn keep_gauges(
-    taught: TaughtRecipe,
+    taught: UnsealedRecipe,
     replaced: &RecipeFile,
     headway: Headway<'_>,
-) -> Result<TaughtRecipe, String> {
-    let TaughtRecipe {
+) -> Result<UnsealedRecipe, String> {
+    let UnsealedRecipe {
         mut manifest,
-        recipe,
+        arrays,
         ..
     } = taught;
     check_kept(replaced, (manifest.camera.width, manifest.camera.height))?;
@@ -112,5 +112,5 @@ pub fn keep_gauges(
     // The prediction is for the limits that teaching sets.
     manifest.good_parts = None;
     manifest.tried = Vec::new();
-    TaughtRecipe::of(manifest, recipe.arrays, headway)
+    UnsealedRecipe::of(manifest, arrays, headway)
 }

@@ -2,7 +2,7 @@
 //! its rim should be, wherever the part lies and whatever is seen through it.
 
 use super::archive::Arrays;
-use super::golden::TaughtRecipe;
+use super::golden::UnsealedRecipe;
 use super::plan::{Plan, PlanError};
 use super::planner::{self, Choice};
 use super::{FeatureFile, GaugeFile, Recipe, RecipeFile};
@@ -25,21 +25,19 @@ const CORNERS: usize = 8;
 /// The least share of a rim that good parts have.
 const LEAST_FOUND: f64 = 0.4;
 
-impl TaughtRecipe {
+impl UnsealedRecipe {
     /// The same recipe, in which the openings that teaching has found are circles where they are
     /// round. Two frames cannot find a rim: recipes that begin with them stay as they are.
     ///
     /// # Errors
-    /// In words, if it could not be packed.
+    /// In words, if its manifest has no models of a head.
     pub fn with_circles(self, headway: Headway<'_>) -> Result<Self, String> {
         let Self {
             mut manifest,
-            recipe,
+            arrays,
             choice,
-            bytes,
         } = self;
-        drop(bytes);
-        let (arrays, head) = (recipe.arrays, manifest.head()?);
+        let head = manifest.head()?;
         let openings = openings(&manifest);
         let reach = AROUND_PX.max(AROUND_MM / pixel_mm(&head));
         let circles = openings
@@ -62,7 +60,11 @@ impl TaughtRecipe {
             manifest.features[opening.feature] = circle;
         }
         if names.is_empty() {
-            return Self::sealed(manifest, arrays, choice);
+            return Ok(Self {
+                manifest,
+                arrays,
+                choice,
+            });
         }
         manifest.tried.retain(|tried| !names.contains(&tried.gauge));
         let mut reasons = choice.reasons;
@@ -71,7 +73,12 @@ impl TaughtRecipe {
         // Golden was seen to have them, so nothing is left to settle but the sequence.
         let choice = planner::choose(&manifest.sequences, &manifest.gauges, arrays.widest());
         manifest.production = choice.production;
-        Self::sealed(manifest, arrays, Choice { reasons, ..choice })
+        let choice = Choice { reasons, ..choice };
+        Ok(Self {
+            manifest,
+            arrays,
+            choice,
+        })
     }
 }
 
@@ -131,7 +138,7 @@ fn round(
     arrays: &Arrays,
     head: &Calibration,
     circles: &[FeatureFile],
-    headway: Headway<'_>,
+    mut headway: Headway<'_>,
 ) -> Vec<bool> {
     let mut round = vec![false; circles.len()];
     let mut left: Vec<usize> = (0..circles.len()).collect();
@@ -139,7 +146,9 @@ fn round(
         let looked = left.iter().map(|&at| circles[at].clone()).collect();
         let recipe = Recipe::fit(&of_roundness(manifest, looked), arrays.clone());
         let Ok(recipe) = recipe else { break };
-        match Plan::golden_leniently(recipe, head, headway) {
+        let looking = headway.part(0.0, 0.5);
+        headway = headway.part(0.5, 1.0);
+        match Plan::golden_leniently(recipe, head, looking) {
             Ok(golden) => {
                 for (at, is_round) in left.into_iter().zip(are_round(&golden.findings)) {
                     round[at] = is_round;

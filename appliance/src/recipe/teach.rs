@@ -1,7 +1,7 @@
 //! Teaching: from a good part in front of the head to a recipe.
 
 pub use super::failure::TeachError;
-pub use super::golden::{Naming, TaughtRecipe};
+pub use super::golden::{Naming, TaughtRecipe, UnsealedRecipe};
 
 use super::PatternFile;
 use super::Recipe;
@@ -9,7 +9,7 @@ use super::adaptive::{AdaptivePattern, Preliminary};
 use super::candidates::candidates;
 use super::captures::{CAPTURES, Captured};
 use super::comparison::ComparisonFile;
-use super::golden::{GoldenPart, UnsealedRecipe};
+use super::golden::GoldenPart;
 use super::plan::Plan;
 use super::proof;
 use crate::head::calibrated::CalibratedHead;
@@ -44,7 +44,7 @@ pub fn teach(
     naming: &Naming,
     timeout: Duration,
     headway: Headway<'_>,
-) -> Result<TaughtRecipe, TeachError> {
+) -> Result<UnsealedRecipe, TeachError> {
     let computing = Computing::default();
     teach_marking(head, calibration, naming, timeout, &computing, headway)
 }
@@ -60,7 +60,7 @@ pub fn teach_marking(
     timeout: Duration,
     computing: &Computing,
     headway: Headway<'_>,
-) -> Result<TaughtRecipe, TeachError> {
+) -> Result<UnsealedRecipe, TeachError> {
     let stage = |from: f64, to: f64, words| {
         let stage = headway.part(from, to).called(words);
         match stage.tell(0.0) {
@@ -145,7 +145,9 @@ pub fn teach_marking(
     let plan = computing.on(|| Plan::telling(recipe, calibration, false, trying.part(0.0, 0.4)));
     let plan = plan.map_err(TeachError::rig)?;
     let trying = trying.part(0.4, 1.0);
-    let mut judged = proof::as_it_lies(&plan, head.head, calibration, timeout, trying)?;
+    let lying = trying.part(0.0, 0.8);
+    let mut judged = proof::as_it_lies(&plan, head.head, calibration, timeout, lying)?;
+    trying.done(0.8);
     drop(plan);
     if let Some(words) = proof::not_judged(&judged) {
         return Err(TeachError::Scene(words));
@@ -154,15 +156,19 @@ pub fn teach_marking(
     words.extend(proof::hold(&mut manifest, &judged));
     let moved = !words.is_empty();
     choice.reasons.extend(words);
-    let reasons = choice.reasons.clone();
-    let packed = computing.on(|| match moved {
-        false => TaughtRecipe::sealed(manifest, arrays, choice),
-        // Other limits may ask for another sequence.
-        true => TaughtRecipe::of(manifest, arrays, Headway::silent()),
-    });
-    let mut taught = packed.map_err(TeachError::Rig)?;
-    taught.choice.reasons = reasons;
-    Ok(taught)
+    if !moved {
+        return Ok(UnsealedRecipe {
+            manifest,
+            arrays,
+            choice,
+        });
+    }
+    // Other limits may ask for another sequence.
+    let settling = trying.part(0.8, 1.0);
+    let settled = computing.on(|| UnsealedRecipe::of(manifest, arrays, settling));
+    let mut settled = settled.map_err(TeachError::Rig)?;
+    settled.choice.reasons = choice.reasons;
+    Ok(settled)
 }
 
 /// Refuses a scene that shows too little to be taught.

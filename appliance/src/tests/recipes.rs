@@ -54,6 +54,7 @@ impl Bed {
             exposures: 1,
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent()).unwrap();
+        let taught = taught.seal().unwrap();
         let plan = Plan::new(taught.recipe.clone(), &calibration, true).unwrap();
         head.load(plan.rasters(&calibration).unwrap()).unwrap();
         let mut frames = Vec::new();
@@ -150,7 +151,7 @@ fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_par
         // Parsed alone first: most cases are refused by the manifest, and need no archive with
         // arrays.
         parse(text)?;
-        let (bytes, _) = seal(text, members(file, arrays), 0).unwrap();
+        let (bytes, _) = seal(text, members(file, arrays), 0, Headway::silent()).unwrap();
         Recipe::from_bytes(&bytes)
     };
     bed.use_recipe(read(&write(&tree)).unwrap()).unwrap();
@@ -221,7 +222,7 @@ fn a_recipe_for_a_projector_of_four_billion_columns_is_refused_and_does_not_repl
     let text = serde_json::to_string(&file).unwrap();
     let mut without = members(&file, &bed.recipe.arrays);
     without.retain(|(name, _)| *name != "phase_function.npy");
-    let (bytes, _) = seal(&text, without, 0).unwrap();
+    let (bytes, _) = seal(&text, without, 0, Headway::silent()).unwrap();
     let words = Recipe::from_bytes(&bytes).unwrap_err();
     assert!(
         words.contains("projector.width is 4294967295: write 1 to 8192"),

@@ -47,7 +47,8 @@ impl Part {
             exposures: 1,
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent());
-        let taught = taught.expect("a plane can be taught");
+        let taught = taught.expect("a plane can be taught").seal();
+        let taught = taught.expect("and packed");
         let (file, recipe, bytes) = (taught.manifest, taught.recipe, taught.bytes);
         let plan = Plan::new(recipe.clone(), &calibration, true).expect("a plan");
         let rasters = plan.rasters(&calibration).expect("rasters");

@@ -15,7 +15,7 @@ pub(crate) use row::{
     VARIANCE_UNIT_NM, offset_row, sum_variances,
 };
 
-use super::{Window, for_each};
+use super::{Done, Progress, Window, for_each};
 use crate::geometry::Triangulator;
 use crate::phase::Trust;
 use crate::simd::Backend;
@@ -62,13 +62,14 @@ impl HeightCubics {
     ///
     /// Where z₀ is known and Φ₀ is not, Φ₀ is computed from z₀: exactly within `around` pixels of a
     /// pixel where it is known; further away, where nothing is expected and there are no cubics,
-    /// interpolated between exact values.
+    /// interpolated between exact values. `progress` gets the share that is done.
     pub fn new(
         triangulator: &Triangulator,
         surface: KnownSurface,
         range: f64,
         window: Window<'_>,
         around: usize,
+        progress: Progress<'_>,
     ) -> Self {
         let pixels = surface.phase.len();
         let width = surface.width.max(1);
@@ -93,6 +94,7 @@ impl HeightCubics {
             .zip(cubics.third.chunks_mut(width))
             .zip(cubics.reach.chunks_mut(width))
             .collect();
+        let done = Done::new(progress, pixels / width);
         for_each(rows, |v, ((((phases, first), second), third), reach)| {
             let heights = &heights[v * width..(v + 1) * width];
             for (columns, near) in near.row(v) {
@@ -110,6 +112,7 @@ impl HeightCubics {
                     }
                 }
             }
+            done.row();
         });
         cubics
     }

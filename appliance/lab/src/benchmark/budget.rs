@@ -131,6 +131,7 @@ pub fn budgets(
     progress(0.3, &format!("{about}: teaching"));
     let headway = Headway::silent();
     let taught = teach(&mut head, &calibration, &naming, TIMEOUT, headway).map_err(words)?;
+    let taught = taught.seal()?;
     let sequences = &taught.manifest.sequences;
     let full = sequences.len().saturating_sub(1);
     let four = sequences

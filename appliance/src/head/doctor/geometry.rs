@@ -12,7 +12,7 @@ pub(super) fn geometry(subject: &mut Subject<'_>) -> Checked {
             "cannot be judged before the head is calibrated",
         ));
     }
-    let fringes = CrossedFringes::take(subject.head, calibration, PATIENCE, &|| ())?;
+    let fringes = CrossedFringes::take(subject.head, calibration, PATIENCE, &|_| ())?;
     let Some(seen) = fringes.compare(calibration)? else {
         return Ok(Check::skipped(
             "cannot be judged: too little of the picture shows fringes; put a larger part into view",

@@ -28,8 +28,8 @@ pub const DRIFT_REMEDY: &str = "camera or projector was knocked or refocused sin
 pub struct CrossedFringes([(PhaseRange, Vec<Shot>, Vec<Frame>); 2]);
 
 impl CrossedFringes {
-    /// Takes the frames. The head's timing must be calibrated. `progress` is called after each
-    /// frame.
+    /// Takes the frames. The head's timing must be calibrated. `progress` gets the share that is
+    /// taken.
     ///
     /// # Errors
     /// The error of a device, or if the projector is too small for the fringes.
@@ -37,12 +37,13 @@ impl CrossedFringes {
         head: &mut Head,
         calibration: &Calibration,
         timeout: Duration,
-        progress: &dyn Fn(),
+        progress: &dyn Fn(f64),
     ) -> Result<Self, Error> {
         let mut take = |vertical: bool| {
             let function = seam::fringes(vertical, head.projector_size(), PITCH)?;
             let shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
-            let said = |_| progress();
+            let before = if vertical { 0.0 } else { 0.5 };
+            let said = |share: f64| progress(before + share / 2.0);
             let taken = scan::take(head, calibration, &function, &shots, timeout, &said)?;
             Ok::<_, Error>((function.range(), shots, taken))
         };

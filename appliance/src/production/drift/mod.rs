@@ -96,7 +96,7 @@ impl Worker {
         let at_rest = move || station.snapshot().is_at_rest();
         // Its patterns take the place of those for live pictures.
         self.live = false;
-        match self.crossed_fringes(kept, Arc::new(at_rest), &|| ()) {
+        match self.crossed_fringes(kept, Arc::new(at_rest), &|_| ()) {
             Ok(fringes) => {
                 self.watch.due.done(doubtful);
                 self.judge(fringes, report);
@@ -110,25 +110,30 @@ impl Worker {
         }
     }
 
-    /// Checks the geometry on the part that was taught.
+    /// Checks the geometry on the part that was taught, between two shares of the job.
     ///
     /// # Errors
     /// A device is lost, or the teach was ended.
-    pub(super) fn check_taught(&mut self, job: JobId) -> Result<(), TeachError> {
+    pub(super) fn check_taught(
+        &mut self,
+        job: JobId,
+        (from, to): (f64, f64),
+    ) -> Result<(), TeachError> {
         if !(self.watch.due.is_on() && self.can_be_checked()) {
             return Ok(());
         }
         let (aborts, station) = (self.aborts.clone(), self.station.clone());
         let goes_on = move || !aborts.has(job);
-        let progress = |fraction: f32| {
+        let progress = |share: f64| {
             let words = "checking the geometry".into();
+            let fraction = (from + 0.6 * (to - from) * share) as f32;
             station.event(Event::Progress {
                 job,
                 fraction,
                 words,
             });
         };
-        let taken = self.crossed_fringes(0, Arc::new(goes_on), &|| progress(1.0));
+        let taken = self.crossed_fringes(0, Arc::new(goes_on), &progress);
         let fringes = match taken {
             Ok(fringes) => fringes,
             Err(Error::Ended { .. }) => return Err(TeachError::Ended),
@@ -174,14 +179,14 @@ impl Worker {
         &mut self,
         kept: usize,
         go_on: hal::head::GoOn,
-        progress: &(dyn Fn() + Sync),
+        progress: &(dyn Fn(f64) + Sync),
     ) -> Result<CrossedFringes, Error> {
         let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
         let (station, pulse) = (&self.station, &self.pulse);
-        let lives = || {
+        let lives = |share| {
             station.event(Event::Alive);
             pulse.beat();
-            progress();
+            progress(share);
         };
         self.pool.install(|| {
             head.aside(kept, go_on, |head| {

@@ -216,8 +216,9 @@ impl Plan {
         );
         let range = conditions.expansion_range_turns;
         headway.done(0.55);
-        let cubics = HeightCubics::new(&triangulator, surface, range, &window, away.max(AROUND));
-        headway.done(0.7);
+        let fitted = |share| headway.done(0.55 + 0.15 * share);
+        let around = away.max(AROUND);
+        let cubics = HeightCubics::new(&triangulator, surface, range, &window, around, &fitted);
         let triangulator = triangulator.seen_by(calibration.camera.clone());
         let shared = Shared {
             conditions: &conditions,

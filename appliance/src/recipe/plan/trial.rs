@@ -124,7 +124,7 @@ fn golden(
     let sequence = planned.ok_or_else(|| unfit("it has no sequence".into()))?;
     let light = recipe.light(sequence);
     let only = OfGolden { sequence, lenient };
-    let plan = Plan::join(recipe, head, (false, Some(only)), headway.part(0.0, 0.8))?;
+    let plan = Plan::join(recipe, head, (false, Some(only)), headway.part(0.0, 0.6))?;
     let production = plan.production();
     let (map, decoder) = (production.map(), production.decoder());
     let surface = production.cubics().surface();
@@ -141,11 +141,13 @@ fn golden(
             }
         };
     }
+    headway.done(0.65);
     let input = Input::Phases(&phases);
     let mut strips = plan.strips();
     let placed = production.place(input, &mut strips);
     let found = placed
         .and_then(|placed| {
+            headway.done(0.8);
             let input = (input, Signal::Golden);
             production.inspect_placed(input, &mut strips, placed, Maps::default())
         })

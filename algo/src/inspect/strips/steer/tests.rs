@@ -225,7 +225,7 @@ impl Head {
             phase: pixels.iter().map(|pixel| pixel.1).collect(),
         };
         let window = vec![0..SIDE; SIDE];
-        let cubics = HeightCubics::new(&self.triangulator, surface, 0.4, &window, 16);
+        let cubics = HeightCubics::new(&self.triangulator, surface, 0.4, &window, 16, &|_| ());
         let range = self.triangulator.function().range();
         let camera = self.triangulator.camera();
         let (x, y, r) = HOLES[HOLES.len() - 1];
