@@ -38,6 +38,7 @@ mod ill_head;
 mod imports;
 mod independent_simulator;
 mod inputs;
+mod interrupted;
 mod joints;
 mod judging;
 mod kept;

@@ -19,20 +19,20 @@ use std::sync::Mutex;
 use tests::until::{PATIENCE, until};
 
 /// Values of VERDICT, STATE and REJECT_REASON.
-const PASS: u16 = 1;
+pub(crate) const PASS: u16 = 1;
 const INVALID: u16 = 3;
 const FAULT: u16 = 7;
 const REJECTED_BY_FAULT: u16 = 5;
 /// ABORT in CONTROL.
-const ABORT: u16 = 1 << 5;
+pub(crate) const ABORT: u16 = 1 << 5;
 
-fn start(place: &Place) -> Daemon {
+pub(crate) fn start(place: &Place) -> Daemon {
     let daemon = starting(place);
     daemon.wait_until_ready().unwrap();
     daemon
 }
 
-fn starting(place: &Place) -> Daemon {
+pub(crate) fn starting(place: &Place) -> Daemon {
     let mut config = Config::read(&place.path("fringed.toml")).unwrap();
     config.modbus.listen = "127.0.0.1:0".parse().unwrap();
     config.http.listen = config.modbus.listen;

@@ -101,8 +101,7 @@ impl Recipes {
         self.result = result;
     }
 
-    /// A load or a teach was interrupted. What the worker holds now is not known, so no recipe is
-    /// active.
+    /// A load was interrupted. What the worker holds now is not known, so no recipe is active.
     pub(super) fn interrupt(&mut self) {
         self.active = None;
         self.result = RecipeResult::Busy;

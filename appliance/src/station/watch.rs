@@ -24,7 +24,9 @@ impl Station {
             State::Acquiring { cycle, .. } | State::Processing { cycle, .. } => {
                 self.fail_cycle(cycle, fault.code, fault.cause.clone(), effects);
             }
-            State::Loading { .. } | State::Teaching { .. } => self.recipes.interrupt(),
+            State::Loading { .. } => self.recipes.interrupt(),
+            // No other recipe was asked for: the one before may come back with the head.
+            State::Teaching { .. } => self.recipes.active = None,
             State::Stopping { cycle } => {
                 self.state = State::Stopping { cycle: None };
                 if let Some(cycle) = cycle {

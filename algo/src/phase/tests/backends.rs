@@ -1,9 +1,9 @@
 //! All back-ends of this machine give the same bits.
 
 use super::super::{Decoder, LeastModulation, PhaseRow, Trust};
+use super::arrive;
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{PhaseRange, Sequence, Shot};
-use crate::pipeline::arrive_rest;
 use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Modulation};
 use rand_xoshiro::SplitMix64;
@@ -80,7 +80,12 @@ fn decode(decoder: &Decoder, samples: &[Vec<u16>], depth: u8, map: &[AbsolutePha
         })
         .collect();
     let mut arrived = decoder.arrived(WIDTH, HEIGHT);
-    let last = arrive_rest(decoder, &views, &mut arrived).unwrap();
+    let level = |places: &[usize]| places.iter().map(|&place| views[place]).collect();
+    let mut levels: Vec<Vec<_>> = decoder.levels().map(level).collect();
+    let last = levels.pop().unwrap();
+    for level in &levels {
+        arrive(decoder, level, &mut arrived);
+    }
     let mut found = Map::new();
     for (v, row) in found.rows() {
         let map = &map[v * WIDTH..(v + 1) * WIDTH];

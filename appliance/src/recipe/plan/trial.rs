@@ -18,8 +18,8 @@ use std::time::Instant;
 static ONE: Mutex<()> = Mutex::new(());
 
 impl Plan {
-    /// Plans a recipe on one thread of its own, so that the computing threads are left to the
-    /// measurement.
+    /// Plans a recipe on threads of its own, with the caller's priority, so that the computing
+    /// threads are left to the measurement.
     ///
     /// # Errors
     /// As [`Plan::new`].
@@ -31,7 +31,7 @@ impl Plan {
 
     /// What the recipe measures of golden, that is, of a part that lies as taught and is seen
     /// without noise by the first of its sequences; σ is that of one measurement. `head` has the
-    /// models that it was taught with. On one thread as [`Plan::try_out`].
+    /// models that it was taught with. On threads as [`Plan::try_out`].
     ///
     /// # Errors
     /// As [`Plan::again`].
@@ -91,20 +91,20 @@ impl Golden {
     }
 }
 
-/// Does something with a recipe on one thread, one recipe at a time.
+/// Does something with a recipe on threads of its own, one recipe at a time.
 fn alone<T: Send>(
     recipe: Recipe,
     work: impl FnOnce(Recipe) -> Result<T, PlanError> + Send,
 ) -> Result<T, PlanError> {
     let number = recipe.id.number;
     let _alone = ONE.lock().unwrap_or_else(PoisonError::into_inner);
-    let thread = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-    let thread = thread.map_err(|error| PlanError::Unfit {
+    let threads = rayon::ThreadPoolBuilder::new().build();
+    let threads = threads.map_err(|error| PlanError::Unfit {
         number,
         reason: format!("it cannot be tried out: {error}: end other programs"),
         feature: None,
     })?;
-    thread.install(|| work(recipe))
+    threads.install(|| work(recipe))
 }
 
 fn golden(

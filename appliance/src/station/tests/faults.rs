@@ -289,6 +289,11 @@ fn a_lost_head_comes_back_with_what_the_worker_still_holds() {
     assert_eq!(bench.token(1).reject_reason, reject::OTHER_RECIPE);
     let snapshot = bench.load(1, Ok(()));
     assert!(snapshot.is(status::READY) && snapshot.is(status::RECIPE_OK));
+    // A teach asks for no other recipe.
+    bench.teach(3);
+    assert_eq!(bench.event(fault.clone()).recipe, None);
+    let snapshot = bench.event(recovered(Some(recipe(1))));
+    assert!(snapshot.is(status::READY) && snapshot.is(status::RECIPE_OK));
     bench.event(fault);
     let snapshot = bench.event(recovered(None));
     assert_eq!((snapshot.state, snapshot.is(status::READY)), (1, false));
