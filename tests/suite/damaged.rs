@@ -55,6 +55,7 @@ fn a_state_file_that_never_ends_does_not_keep_the_station_from_starting() {
         "result-seq",
         "access/secret",
     ];
+    assert_eq!(Daemon::start(&place).terminate().code(), Some(0));
     let serial = fs::read_to_string(place.path("state/serial")).unwrap();
     for endless in [true, false] {
         for name in names {

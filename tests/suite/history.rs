@@ -344,7 +344,6 @@ const TIME: usize = 14;
 #[test]
 fn the_time_of_a_browser_dates_history_and_log_and_never_the_register() {
     let place = place_with_a_dent();
-    fs::remove_file(place.path("state/access/secret")).unwrap();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     let before = long(&plc.measure(1), 0);

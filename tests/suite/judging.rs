@@ -173,8 +173,6 @@ fn a_stored_recipe_that_judges_nothing_without_saying_so_is_not_loaded_and_can_b
     let bytes = changed(&place, without_limits);
     let store = Store::open(&place.path("state/recipes")).unwrap();
     store.save(1, &bytes).unwrap();
-    // The secret is shown once.
-    fs::remove_dir_all(place.path("state/access")).unwrap();
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     plc.wait("RECIPE_RESULT 5", |status| status.recipe_result() == UNFIT);

@@ -27,9 +27,12 @@ impl Rays {
     pub fn at(&self, u: f64, v: f64, width: usize) -> Option<(f64, f64)> {
         // Casts keep to the range of their type.
         let (column, row) = (u as usize, v as usize);
-        let whole = column as f64 == u && row as f64 == v && column < width;
-        let known = self.0.get(row * width + column).filter(|_| whole);
-        known.copied().filter(|(x, _)| !x.is_nan())
+        // No row of theirs is beyond their number.
+        let inside = column < width && row < self.0.len();
+        let whole = inside && column as f64 == u && row as f64 == v;
+        let at = whole.then(|| row * width + column)?;
+        let known = self.0.get(at).copied();
+        known.filter(|(x, _)| !x.is_nan())
     }
 }
 
