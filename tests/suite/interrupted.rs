@@ -139,7 +139,11 @@ fn fail(teaches: usize, loads: usize) {
             fs::remove_file(&station.file).unwrap();
         } else {
             assert_eq!(after.crc(), before, "{cause:?} at {share}");
-            assert!(!station.file.exists(), "{cause:?} at {share}");
+            // What was stored before its patterns could be loaded stays stored.
+            if station.file.exists() {
+                assert!(share > 0.9, "{cause:?} at {share}");
+                fs::remove_file(&station.file).unwrap();
+            }
         }
     }
     println!("{late} of {teaches} teaches had ended before their failure");
