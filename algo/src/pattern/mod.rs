@@ -6,7 +6,7 @@ mod function;
 mod interpolate;
 mod sequence;
 mod shot;
-mod slips;
+pub(crate) mod slips;
 mod split;
 mod waveform;
 

@@ -112,24 +112,24 @@ pub(super) fn unseen(sigma: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::pattern::{Shot, Waveform, Waveforms};
     use std::vec::Vec;
 
-    const RANGE: PhaseRange = PhaseRange {
+    pub(crate) const RANGE: PhaseRange = PhaseRange {
         min: 0.0,
         max: 100.0,
     };
     /// σ of uniform noise of ±2.5 % of full scale, counts of 255.
-    const PAPER: f64 = 3.68;
+    pub(crate) const PAPER: f64 = 3.68;
 
-    fn two(shifts: usize, waveforms: Waveforms) -> Vec<Shot> {
+    pub(crate) fn two(shifts: usize, waveforms: Waveforms) -> Vec<Shot> {
         let level = |ratio| Shot::level_as(ratio, shifts, waveforms);
         level(0.8).chain(level(1.0)).collect()
     }
 
-    fn slips(shots: &[Shot]) -> Slips {
+    pub(crate) fn slips(shots: &[Shot]) -> Slips {
         Slips::of(&Sequence::from_frames(shots).unwrap(), RANGE).unwrap()
     }
 

@@ -1,9 +1,10 @@
-//! Pixels whose fringe order is wrong, in phase maps of frames with noise: as many as [`Slips`]
-//! predicts.
+//! Pixels whose fringe order is wrong, in phase maps of frames with noise: as many as
+//! [`Slips`](crate::pattern::Slips) predicts.
 
 use super::{PhaseMap, decode};
 use crate::frame::{FrameView, Samples};
-use crate::pattern::{PhaseRange, Sequence, Shot, Slips, Waveform, Waveforms};
+use crate::pattern::slips::tests::{PAPER, RANGE, slips, two};
+use crate::pattern::{Sequence, Shot, Waveform};
 use crate::phase::{Decoder, Trust};
 use crate::units::AbsolutePhase;
 use core::f64::consts::TAU;
@@ -11,22 +12,6 @@ use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::vec;
 use std::vec::Vec;
-
-const RANGE: PhaseRange = PhaseRange {
-    min: 0.0,
-    max: 100.0,
-};
-/// σ of uniform noise of ±2.5 % of full scale, counts of 255.
-const PAPER: f64 = 3.68;
-
-fn two(shifts: usize, waveforms: Waveforms) -> Vec<Shot> {
-    let level = |ratio| Shot::level_as(ratio, shifts, waveforms);
-    level(0.8).chain(level(1.0)).collect()
-}
-
-fn slips(shots: &[Shot]) -> Slips {
-    Slips::of(&Sequence::from_frames(shots).unwrap(), RANGE).unwrap()
-}
 
 /// Simulated over predicted rates: see *Accuracy*.
 const SIMULATED: core::ops::Range<f64> = 0.75..1.75;

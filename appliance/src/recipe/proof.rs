@@ -303,9 +303,8 @@ pub(super) fn not_judged(judged: &[Inspection]) -> Option<String> {
     ))
 }
 
-/// Where the part as it lies deviates by more than its noise explains, good parts deviate by that:
-/// beside silhouettes that are steep and seen faintly, the error of the motion is not noise alone.
-/// `reasons` has the words of the prediction.
+/// Where the part as it lies deviates by more than its noise explains, good parts are taken to
+/// deviate by that. `reasons` has the words of the prediction.
 pub(super) fn expect(manifest: &mut RecipeFile, judged: &[Inspection], reasons: &mut [String]) {
     let Some((good, found)) = manifest.good_parts.as_mut().zip(Magnitudes::of(judged, 0)) else {
         return;
