@@ -36,8 +36,6 @@ const PLACEMENTS: usize = 8;
 const REACH: f64 = 0.98;
 /// At most this share of an opening is covered by good parts.
 const MOST_COVERED: f64 = 0.5;
-/// The middle of [`STILL`] values is off by noise alone by less than this many scatters of one.
-const NOISE: f64 = 3.0;
 /// Limits are this many times as far from the expected value as the farthest of the cycles.
 const FARTHER: f64 = 1.2;
 
@@ -301,27 +299,6 @@ pub(super) fn not_judged(judged: &[Inspection]) -> Option<String> {
         reasons.len(),
         judged.len()
     ))
-}
-
-/// Where the part as it lies deviates by more than its noise explains, good parts are taken to
-/// deviate by that. `reasons` has the words of the prediction.
-pub(super) fn expect(manifest: &mut RecipeFile, judged: &[Inspection], reasons: &mut [String]) {
-    let Some((good, found)) = manifest.good_parts.as_mut().zip(Magnitudes::of(judged, 0)) else {
-        return;
-    };
-    if found.middle <= good.largest_mm + NOISE * good.scatter_mm {
-        return;
-    }
-    let before = good.words();
-    good.largest_mm = found.middle;
-    if good.displaced_mm > 0.0 {
-        good.displaced_mm = good.displaced_mm.max(found.middle);
-    }
-    for (before, after) in before.iter().zip(good.words()) {
-        if let Some(reason) = reasons.iter_mut().find(|reason| *reason == before) {
-            *reason = after;
-        }
-    }
 }
 
 /// What a gauge's values are in magnitude: middle and spread.

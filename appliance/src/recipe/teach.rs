@@ -152,7 +152,6 @@ pub fn teach_marking(
     if let Some(words) = proof::not_judged(&judged) {
         return Err(TeachError::Scene(words));
     }
-    proof::expect(&mut manifest, &judged, &mut choice.reasons);
     let mut words = proof::leave_out_covered(&mut manifest, &mut judged);
     words.extend(proof::hold(&mut manifest, &judged));
     let moved = !words.is_empty();

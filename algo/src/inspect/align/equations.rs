@@ -18,8 +18,8 @@ pub(super) struct Equation {
     /// What a further motion takes off the residual, see
     /// [`Facet::jacobian`](super::Facet::jacobian).
     pub jacobian: [f64; 6],
-    /// Error of the x and y of the facet's lift (1 σ).
-    pub lift_noise: f64,
+    /// Variance of the x and y of the facet's lift.
+    pub lift_variance: f64,
     /// From the centre to the point, in radii.
     pub lever: Vector,
     /// Variance of the point's height, mm².
@@ -38,7 +38,7 @@ pub(super) struct FourEquations {
     jacobian: [Four; 6],
     lever: [Four; 3],
     /// Variance of the x and y of the facet's lift.
-    lift_noise: Four,
+    lift_variance: Four,
     variance: Four,
 }
 
@@ -79,7 +79,7 @@ impl Equations {
         for (four, value) in four.lever.iter_mut().zip([x, y, z]) {
             four[at] = value;
         }
-        four.lift_noise[at] = equation.lift_noise * equation.lift_noise;
+        four.lift_variance[at] = equation.lift_variance;
         four.variance[at] = equation.variance;
         self.both += equation.both;
         self.points += 1;
@@ -308,7 +308,7 @@ fn sum_products<V: Lanes>(
             add_product(&mut sums[SQUARES + i], &weighted, &four.residual);
         }
         let [x, y, z] = &four.lever;
-        let n = product(weight, &four.lift_noise);
+        let n = product(weight, &four.lift_variance);
         let (nx, ny, nz) = (product(&n, x), product(&n, y), product(&n, z));
         let lifts = &mut sums[SQUARES + 6..];
         add_product(&mut lifts[0], &n, &[1.0; 4]);
@@ -361,7 +361,7 @@ mod tests {
         Equation {
             residual: if point.is_multiple_of(5) { 2.0 } else { 0.1 } * value(6),
             jacobian: [lift.x, lift.y, lift.z, turning.x, turning.y, turning.z],
-            lift_noise: value(7),
+            lift_variance: value(7),
             lever,
             variance: value(8) * value(8),
             both: 0.01,
@@ -398,7 +398,7 @@ mod tests {
                     let dot = |r: &[f64; 6]| r.iter().zip(probe).map(|(r, p)| r * p).sum::<f64>();
                     let Vector { x, y, z } = e.lever;
                     let (by_x, by_y) = ([1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x]);
-                    let n = weight * e.lift_noise * e.lift_noise;
+                    let n = weight * e.lift_variance;
                     squares += weight * dot(&e.jacobian) * dot(&e.jacobian);
                     right += weight * dot(&e.jacobian) * e.residual;
                     noise += n * (dot(&by_x) * dot(&by_x) + dot(&by_y) * dot(&by_y));

@@ -313,7 +313,7 @@ impl Fitting<'_> {
         Equation {
             residual: above,
             jacobian: facet.jacobian(point, (self.plan.centre, self.plan.radius)),
-            lift_noise: facet.lift_noise,
+            lift_variance: facet.lift_variance,
             lever: (point - self.plan.centre) * (1.0 / self.plan.radius),
             variance,
             both: variance + facet.sigma * facet.sigma,

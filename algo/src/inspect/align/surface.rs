@@ -24,11 +24,12 @@ pub struct Facet {
     pub lift: Vector,
     /// The area in x and y that a pixel sees, mm².
     pub area: f64,
-    /// Error of m's x and y, 1 σ: the one that follows from the noise of the heights of one
-    /// measurement. Golden may be the mean of several measurements, but errors of slopes that
-    /// pattern, blur and lenses cause are not lowered by a mean: on a body that can turn about its
-    /// axis they would be taken for a shape that determines this turn.
-    pub lift_noise: f64,
+    /// Variance of the error of m's x and y. One part follows from the noise of the heights of one
+    /// measurement: golden may be the mean of several, but errors of slopes that pattern, blur and
+    /// lenses cause are not lowered by a mean. The other is how far slopes change unevenly over the
+    /// facet's square, so that its plane is off the slope in its middle. Without either, a body that
+    /// can turn about its axis would have a shape that determines this turn.
+    pub lift_variance: f64,
     /// Error of a height that follows from the noise of one measurement, mm (1 σ).
     pub sigma: f64,
 }
@@ -55,6 +56,15 @@ const REACH: usize = 2;
 const DELTA_MM: f64 = 0.01;
 /// Σ i² over the square of a facet.
 const SQUARES: f64 = 50.0;
+/// Of five heights a, b, c, d, e the slope over the outer ones less that over the inner ones is
+/// (−a + 2b − 2d + e)/4 = f‴/2, and the slope of the line through all is off by Σi⁴/(6 Σi²) f‴: this
+/// many times as far, squared.
+const UNEVEN: f64 = (3.4 / 3.0) * (3.4 / 3.0);
+/// The weights of that difference. Noise of the heights with a variance of 1 gives its mean over
+/// five rows one of 0.125; golden is the mean of two measurements or more, and is uneven along and
+/// down.
+const CUBIC: [i64; 2 * REACH + 1] = [-1, 2, 0, -2, 1];
+const OF_NOISE: f64 = 2.0 * 0.125 / 2.0;
 
 impl GoldenSurface<'_> {
     fn rows(&self) -> usize {
@@ -103,22 +113,26 @@ impl GoldenSurface<'_> {
             return None;
         }
         let place = v as usize * width + u as usize;
-        let (mut along, mut down) = (0, 0);
-        for i in 0..=2 * REACH {
+        // Of the slopes, and of their unevenness.
+        let (mut along, mut down) = ([0; 2], [0; 2]);
+        for (i, row_cubic) in CUBIC.into_iter().enumerate() {
             let start = place + i * width - REACH * width - REACH;
-            let row = start..start + 2 * REACH + 1;
+            let row = start..start + CUBIC.len();
             if !count(self.taught, row.clone()) {
                 return None;
             }
             let mut sum = 0;
-            for (j, height) in self.surface.height[row].iter().enumerate() {
+            for (j, (height, cubic)) in self.surface.height[row].iter().zip(CUBIC).enumerate() {
                 let z = i64::from(height.nm());
-                along += z * (j as i64 - REACH as i64);
+                along[0] += z * (j as i64 - REACH as i64);
+                along[1] += z * cubic;
                 sum += z;
             }
-            down += sum * (i as i64 - REACH as i64);
+            down[0] += sum * (i as i64 - REACH as i64);
+            down[1] += sum * row_cubic;
         }
-        let (along, down) = (along as f64 / SQUARES * 1e-6, down as f64 / SQUARES * 1e-6);
+        let [uneven_along, uneven_down] = [along[1], down[1]].map(|sum| sum as f64 / 20.0 * 1e-6);
+        let [along, down] = [along[0], down[0]].map(|sum| sum as f64 / SQUARES * 1e-6);
         let camera = self.triangulator.camera();
         let beside = |x, y, z| {
             let (u, v) = camera.project(point + Vector::new(x, y, z) * DELTA_MM)?;
@@ -137,11 +151,13 @@ impl GoldenSurface<'_> {
         let (yu, yv) = (y.0 + z.0 * rise_y, y.1 + z.1 * rise_y);
         let area = 1.0 / libm::fabs(xu * yv - xv * yu);
         let sigma = self.taught.sigma_mm(place);
-        let scale = libm::sqrt(x.0 * x.0 + x.1 * x.1);
+        let (scale, noise) = (x.0 * x.0 + x.1 * x.1, sigma * sigma);
+        let uneven = uneven_along * uneven_along + uneven_down * uneven_down;
+        let uneven = UNEVEN * (uneven - OF_NOISE * noise).max(0.0);
         area.is_finite().then_some(Facet {
             lift,
             area,
-            lift_noise: sigma / libm::sqrt(SQUARES) * scale,
+            lift_variance: (noise / SQUARES + uneven) * scale,
             sigma,
         })
     }

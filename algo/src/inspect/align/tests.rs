@@ -258,3 +258,66 @@ fn the_share_along_the_normal_of_a_plane_is_that_of_its_tilt_and_of_the_ray() {
         }
     }
 }
+
+/// How a quiet part lies that was taught, and the picture of it with this modulation.
+fn still(f: impl Fn(f64, f64) -> f64, modulation: impl Fn(usize, usize) -> f32) -> Still {
+    let mut made = made(f);
+    let part = made.surface.height.iter().map(|z| z.mm() > FLOOR_MM);
+    made.taught = Taught::new(part.map(|part| (Weight::from(part), 1.0, 1e-4)));
+    let alignment = made.alignment();
+    let modulation: Vec<f32> = (0..SIDE * SIDE)
+        .map(|at| modulation(at % SIDE, at / SIDE))
+        .collect();
+    let Made {
+        triangulator,
+        surface,
+        ..
+    } = &made;
+    let picture = Picture::new(triangulator, surface, &modulation, alignment.centre, 4.0);
+    let placed = alignment.still(made.golden()).unwrap();
+    Still {
+        shown: picture.map_or(0, |picture| picture.shown(triangulator, &placed).len()),
+        placed,
+    }
+}
+
+struct Still {
+    placed: Placed,
+    /// How many of the directions that heights leave free the picture's edges determine.
+    shown: usize,
+}
+
+/// What lies deeper is no part.
+const FLOOR_MM: f64 = -69.0;
+/// The rows in which the tube is seen.
+const PART: core::ops::Range<usize> = 9..SIDE - 9;
+
+/// A tube along the rows, whose flanks are seen at grazing angles.
+fn tube(_: f64, y: f64) -> f64 {
+    libm::sqrt(84.0 * 84.0 - (y * y).min(83.0 * 83.0)) - 84.0
+}
+
+#[test]
+fn the_facets_of_a_quiet_body_of_revolution_do_not_determine_its_turns() {
+    let dark = |_, _| 50.0;
+    let tube = still(tube, dark).placed;
+    // Along and about its axis.
+    assert_eq!(tube.free.len(), 2, "{tube:?}");
+    let sphere = |x: f64, y: f64| libm::sqrt((28_900.0 - x * x - y * y).max(1e4)) - 170.0;
+    assert_eq!(still(sphere, dark).placed.free.len(), 3);
+    assert_eq!(still(hills, dark).placed.free.len(), 0);
+}
+
+#[test]
+fn the_outline_of_a_tube_does_not_show_its_turn_and_a_stripe_does() {
+    let outline = |_: usize, v: usize| if PART.contains(&v) { 90.0 } else { 5.0 };
+    assert_eq!(still(tube, outline).shown, 0);
+    let stripe = |u, v| {
+        if (98..104).contains(&v) {
+            5.0
+        } else {
+            outline(u, v)
+        }
+    };
+    assert_eq!(still(tube, stripe).shown, 1);
+}

@@ -17,8 +17,8 @@ use crate::pipeline::PhaseMap;
 impl Production {
     /// With golden's picture, from its modulation in counts (row-major), for parts within
     /// `tolerance_px` pixels. It is left out where it would not be looked at: where parts are not
-    /// aligned, where the shape determines their motion and frames are no pair, and where it has no
-    /// edges.
+    /// aligned, and, unless frames are a pair, where the shape determines their motion or edges say
+    /// nothing of what the shape leaves free.
     #[must_use]
     pub fn with_picture(mut self, modulation: &[f32], tolerance_px: f64) -> Self {
         let pair = self.phase.decoder.is_pair();
@@ -30,7 +30,12 @@ impl Production {
             let centre = alignment.centre;
             Picture::new(triangulator, surface, modulation, centre, tolerance_px)
         });
-        self.picture = picture.filter(|picture| pair || picture.has_edges());
+        let placed = alignment.and_then(|alignment| alignment.still(self.golden.surface()));
+        let shown = |picture: &Picture| {
+            let of = |placed: &Placed| !picture.shown(&self.golden.triangulator, placed).is_empty();
+            placed.as_ref().is_some_and(of)
+        };
+        self.picture = picture.filter(|picture| pair || shown(picture));
         self
     }
 
