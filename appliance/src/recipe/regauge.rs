@@ -6,6 +6,7 @@ use super::golden::UnsealedRecipe;
 use super::plan::{Golden, Plan, PlanError};
 use super::planner::{self, Choice};
 use super::{GaugeFile, Part, Recipe, RecipeFile};
+use crate::head::calibration::Calibration;
 use crate::system::headway::Headway;
 use algo::inspect::{Findings, Missing};
 use hal::bounds::clipped;
@@ -25,7 +26,8 @@ impl UnsealedRecipe {
         arrays: Arrays,
         headway: Headway<'_>,
     ) -> Result<Self, String> {
-        let settled = manifest.settle(&arrays, headway);
+        let head = manifest.head()?;
+        let settled = manifest.settle((&arrays, &head), headway);
         let (mut choice, _) = settled.map_err(|error| error.words)?;
         if manifest.two_frames {
             choice.reasons.push(Self::TWO_FRAMES.into());
@@ -59,13 +61,14 @@ impl From<String> for Unsettled {
 
 impl RecipeFile {
     /// Sorts the gauges by their slots, works out limits and masters, and chooses the production
-    /// sequence. The answer also has golden as the recipe measures it, where that was needed.
+    /// sequence. The answer also has golden as the recipe measures it, where that was needed. `head`
+    /// has the models of the recipe ([`Self::head`]).
     ///
     /// # Errors
     /// In words, if they do not fit each other, or golden has no value where one is needed.
     pub(super) fn settle(
         &mut self,
-        arrays: &Arrays,
+        (arrays, head): (&Arrays, &Calibration),
         headway: Headway<'_>,
     ) -> Result<(Choice, Option<Golden>), Unsettled> {
         self.gauges.sort_by_key(|gauge| gauge.slot);
@@ -75,9 +78,10 @@ impl RecipeFile {
         if self.gauge_of_contour().is_none() && !self.gauges.iter().any(GaugeFile::needs_golden) {
             return Ok((choice, None));
         }
+        let head = &head.clone().with_rays();
         for turn in 0..TURNS {
             let [from, to] = [turn, turn + 1].map(|turn| turn as f64 / TURNS as f64);
-            let golden = self.golden(arrays, false, headway.part(from, to))?;
+            let golden = self.golden((arrays, head), false, headway.part(from, to))?;
             self.follow(&golden.findings)?;
             choice = choose(self);
             if choice.production == self.production {
@@ -88,13 +92,14 @@ impl RecipeFile {
         Ok((choice, None))
     }
 
-    /// Golden as the recipe measures it; leniently also where golden shows too little of a contour.
+    /// Golden as the recipe measures it with a head that has its models; leniently also where golden
+    /// shows too little of a contour.
     ///
     /// # Errors
     /// In words: manifest and arrays do not fit each other, or golden does not have a feature.
     pub(super) fn golden(
         &self,
-        arrays: &Arrays,
+        (arrays, head): (&Arrays, &Calibration),
         lenient: bool,
         headway: Headway<'_>,
     ) -> Result<Golden, Unsettled> {
@@ -107,7 +112,7 @@ impl RecipeFile {
             true => Plan::golden_leniently,
             false => Plan::golden,
         };
-        measure(recipe, &self.head()?, headway).map_err(|error| Unsettled {
+        measure(recipe, head, headway).map_err(|error| Unsettled {
             words: error.to_string(),
             of: match error {
                 PlanError::Unfit { feature, .. } => feature.and_then(name),

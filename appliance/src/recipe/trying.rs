@@ -13,6 +13,7 @@ use super::plan::{Golden, Plan};
 use super::regauge::Unsettled;
 use super::store::LoadedRecipe;
 use super::{FeatureFile, GaugeFile, Part, Recipe, RecipeFile, Wrong};
+use crate::head::calibration::Calibration;
 use crate::station::{GaugeValue, Inspection, MAX_GAUGES};
 use crate::system::headway::Headway;
 use algo::inspect::{FeatureKind, Measure, kinds};
@@ -28,13 +29,8 @@ const FINE: f64 = 4.0;
 pub struct Opened {
     file: RecipeFile,
     arrays: Arrays,
-}
-
-impl From<LoadedRecipe> for Opened {
-    fn from(LoadedRecipe { file, recipe, .. }: LoadedRecipe) -> Self {
-        let arrays = recipe.arrays;
-        Self { file, arrays }
-    }
+    /// The models of the recipe, with the rays of all pixels.
+    head: Calibration,
 }
 
 /// The asker does not want the answer any more.
@@ -56,18 +52,16 @@ pub struct Tried {
 }
 
 impl Opened {
+    /// # Errors
+    /// In words, if its models are none.
+    pub fn new(LoadedRecipe { file, recipe, .. }: LoadedRecipe) -> Result<Self, String> {
+        let (head, arrays) = (file.head()?.with_rays(), recipe.arrays);
+        Ok(Self { file, arrays, head })
+    }
+
     /// The recipe's number and the fingerprint of what is stored.
     pub fn id(&self) -> (u16, &str) {
         (self.file.number, &self.file.fingerprint)
-    }
-
-    /// Bytes of its arrays, about.
-    pub fn bytes(&self) -> usize {
-        let lengths = self.arrays.lengths();
-        lengths
-            .iter()
-            .map(|(_, length)| length * size_of::<f32>())
-            .sum()
     }
 
     /// Tries an edit. `is_over` is asked before each longer step.
@@ -81,7 +75,7 @@ impl Opened {
         let mut trial = Trial {
             wrong: sent.wrong(),
             sent,
-            arrays: &self.arrays,
+            of: (&self.arrays, &self.head),
             is_over,
             features: Vec::new(),
             missed: Vec::new(),
@@ -132,7 +126,8 @@ impl Tried {
 struct Trial<'a> {
     /// The recipe with the whole list.
     sent: RecipeFile,
-    arrays: &'a Arrays,
+    /// The recipe's arrays and models.
+    of: (&'a Arrays, &'a Calibration),
     is_over: &'a dyn Fn() -> bool,
     wrong: Vec<Wrong>,
     /// What golden has of features, with their places in the list.
@@ -151,10 +146,10 @@ impl Trial<'_> {
                 return Ok((file, None));
             }
             self.goes_on()?;
-            let settled = file.settle(self.arrays, Headway::silent());
+            let settled = file.settle(self.of, Headway::silent());
             let golden = settled.and_then(|(_, golden)| match golden {
                 Some(golden) => Ok(golden),
-                None => file.golden(self.arrays, false, Headway::silent()),
+                None => file.golden(self.of, false, Headway::silent()),
             });
             match golden {
                 Ok(golden) => return Ok((file, Some(golden))),
@@ -255,7 +250,7 @@ impl Trial<'_> {
                 return Ok(());
             }
             self.goes_on()?;
-            match probing.golden(self.arrays, false, Headway::silent()) {
+            match probing.golden(self.of, false, Headway::silent()) {
                 Ok(mut golden) => {
                     let (_, seen) = golden.judged((&probing).into());
                     self.miss(&seen);
@@ -281,7 +276,7 @@ impl Trial<'_> {
             let mut probing = probing(file, std::iter::once(feature));
             probing.features.retain(|of| of.name != feature.name);
             probing.features.push(feature.clone());
-            if let Ok(mut golden) = probing.golden(self.arrays, true, Headway::silent()) {
+            if let Ok(mut golden) = probing.golden(self.of, true, Headway::silent()) {
                 let (_, seen) = golden.judged((&probing).into());
                 self.take(&seen);
             }

@@ -13,6 +13,7 @@ use tokio::sync::{Mutex, Semaphore, oneshot};
 
 use super::problem::{Problem, Result};
 use super::slots::Slots;
+use super::tries::LastOpened;
 use super::turns::Tries;
 use crate::head::calibration::Current;
 use crate::history::Reader;
@@ -22,7 +23,6 @@ use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
 use crate::recipe::plan::Layers;
-use crate::recipe::trying::Opened;
 use crate::station::{Snapshot, StationHandle};
 use crate::system::logbook::Logbook;
 use crate::system::socket;
@@ -101,7 +101,7 @@ pub struct Site {
     /// one.
     pub(super) kept: Arc<Mutex<LastKept>>,
     /// The recipe of which an edit was tried last; locked while one is tried.
-    pub(super) opened: Arc<Mutex<Option<Opened>>>,
+    pub(super) opened: Arc<Mutex<LastOpened>>,
     /// The tries that are being answered.
     pub(super) tries: Tries,
     looking: Arc<Semaphore>,

@@ -3,10 +3,11 @@
 //! Of each session one try is answered at a time, and the newest wins: an older one is answered at
 //! once and given up at its next step. One is worked out at a time, on a thread with a lower priority
 //! than the measuring task. What does not change between tries, the recipe as it is stored, is kept
-//! for the one that was tried last.
+//! for a minute for the one that was tried last.
 
 use std::collections::HashMap;
-use std::time::Instant;
+use std::sync::Arc;
+use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::{Path, Request};
@@ -16,6 +17,9 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer};
 use serde_json::value::RawValue;
 use serde_json::{Value, json};
+use tokio::runtime::Handle;
+use tokio::sync::Mutex;
+use tokio::time::{Instant, sleep};
 
 use super::body;
 use super::gate::{signed_in, token};
@@ -28,12 +32,12 @@ use crate::recipe::edit::Edit;
 use crate::recipe::plan::Plan;
 use crate::recipe::trying::{Opened, Over, Tried};
 use crate::station::result::flag::SIMULATED;
-use crate::system::priority;
+use crate::system::{memory, priority};
 
 /// Most kept parts of one try.
 const MAX_PARTS: usize = 20;
-/// Largest recipe that is kept between tries, bytes.
-const MAX_OPEN: usize = 64 << 20;
+/// How long a recipe is kept for the next try of an edit of it: at full size it is 70 MB.
+const KEPT: Duration = Duration::from_secs(60);
 
 /// On which parts an edit is tried, beside golden.
 #[derive(Clone, Debug, Default, Deserialize)]
@@ -109,13 +113,16 @@ pub(super) async fn attempt(
     let watched = turn.watched();
     let worked = async {
         // Waiting here takes no thread from other requests.
-        let mut opened = site.opened.clone().lock_owned().await;
+        let (kept, runtime) = (site.opened.clone(), Handle::current());
+        let mut opened = kept.clone().lock_owned().await;
         let site = site.clone();
         let failed = "trying the edit failed; see the log";
         let work = move || {
             priority::give_way();
             let is_over = || watched.is_over();
-            tried(&site, number, asked, (&mut opened, &is_over))
+            let answer = tried(&site, number, asked, (&mut opened, &is_over));
+            runtime.spawn(forget(kept));
+            answer
         };
         alone("trying", failed, work).await?
     };
@@ -125,22 +132,37 @@ pub(super) async fn attempt(
     }
 }
 
+/// The recipe of which an edit was tried last, and when.
+pub(super) type LastOpened = Option<(Opened, Instant)>;
+
+/// Lets the recipe go when no edit of it has been tried for [`KEPT`].
+async fn forget(opened: Arc<Mutex<LastOpened>>) {
+    sleep(KEPT).await;
+    let mut opened = opened.lock_owned().await;
+    if opened
+        .take_if(|(_, tried)| tried.elapsed() >= KEPT)
+        .is_some()
+    {
+        memory::trim();
+    }
+}
+
 /// Tries an edit, with the recipe that was tried last.
 fn tried(
     site: &Site,
     number: u16,
     Asked { edit, on }: Asked,
-    (opened, is_over): (&mut Option<Opened>, &dyn Fn() -> bool),
+    (opened, is_over): (&mut LastOpened, &dyn Fn() -> bool),
 ) -> Result<Value> {
     let begun = Instant::now();
     if is_over() {
         return Err(superseded());
     }
     let stored = site.recipes.manifest(number).map_err(Problem::missing)?;
-    let same = |opened: &Opened| opened.id() == (number, &*stored.fingerprint);
+    let same = |(opened, _): &(Opened, Instant)| opened.id() == (number, &*stored.fingerprint);
     let open = match opened.take().filter(same) {
-        Some(open) => open,
-        None => site.recipes.load_to_edit(number)?.into(),
+        Some((open, _)) => open,
+        None => Opened::new(site.recipes.load_to_edit(number)?).map_err(Problem::unfit)?,
     };
     let fingerprint = open.id().1.to_owned();
     if edit.fingerprint != fingerprint {
@@ -155,9 +177,7 @@ fn tried(
         tried.problems.insert(0, problem);
     }
     let parts = parts(site, (&open, &tried), &on, is_over)?;
-    if open.bytes() <= MAX_OPEN {
-        *opened = Some(open);
-    }
+    *opened = Some((open, Instant::now()));
     Ok(json!({
         "fingerprint": fingerprint, "on": on.json(), "features": tried.features, "gauges": tried.gauges,
         "problems": tried.problems, "parts": parts, "ms": begun.elapsed().as_millis() as u64,
