@@ -3,7 +3,8 @@
 
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc};
-use crate::written::program;
+use crate::technician::Technician;
+use crate::written::{laboratory, program};
 use serde_json::{Value, json};
 use std::fs;
 use std::time::{Duration, Instant};
@@ -183,11 +184,105 @@ fn every_other_path_of_a_head_of_full_size_ends_as_that_of_a_small_one() {
     timed(&[&["recipe", "export", "1", &*file], &stored[..]].concat());
     timed(&[&["recipe", "delete", "1"], &stored[..]].concat());
     timed(&[&["recipe", "import", &*file], &stored[..]].concat());
-    let (recording, measured) = (path("recorded"), path("measured"));
-    timed(&[&["record", &*recording], &at[..]].concat());
-    timed(&["measure", &recording, "--out", &measured]);
-    assert!(fs::metadata(place.path("measured/report.json")).is_ok());
+    // A recording of the recipe's frames is judged, one of many frames measured, and its pictures
+    // are imported.
+    let recorded = path("recorded");
+    timed(&[&["record", &*recorded, "--recipe", &*file], &at[..]].concat());
+    let judged = timed(&["replay", &recorded, "--recipe", &file]);
+    assert!(judged.stdout.contains("PASS"), "{}", judged.stdout);
+    let (many, pictures) = (path("many"), path("many/frames"));
+    let steps = ["--fringes", "64", "--steps", "8"];
+    timed(&[&["record", &*many], &steps[..], &at[..]].concat());
+    let imported = path("imported");
+    let projector = [
+        "--projector",
+        "1024x768",
+        "--fringes",
+        "1,8,64",
+        "--steps",
+        "8",
+    ];
+    let import = [&["import", &*pictures, "--out", &*imported], &projector[..]].concat();
+    laboratory().run(&import).succeeded();
+    for recording in [&recorded, &many, &imported] {
+        let out = format!("{recording}-measured");
+        timed(&["measure", recording, "--out", &out]);
+        assert!(fs::metadata(format!("{out}/report.json")).is_ok());
+    }
     let daemon = Daemon::start(&place);
     let mut plc = Plc::connect(&daemon);
     assert_eq!(plc.measure(1)[8], PASS);
+}
+
+/// Sections of a joint.
+const SECTIONS: usize = 16;
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn sixteen_sections_of_a_joint_are_tried_stored_judged_and_shown_in_space() {
+    let place = Place::before(&scene("joint"));
+    let daemon = Daemon::start(&place);
+    let mut browser = Browser::new(&daemon);
+    browser.sign_in(&daemon);
+    let recipe = browser.get("/api/recipes/1");
+    let mut edit = json!({ "datums": recipe["datums"], "fingerprint": recipe["fingerprint"] });
+    let mut features = recipe["features"].as_array().unwrap().clone();
+    let mut gauges = Vec::new();
+    for at in 0..SECTIONS {
+        let (name, row) = (format!("joint {at}"), 350 + 25 * at);
+        features.push(json!({
+            "name": name, "kind": "section", "from": [588, row], "to": [868, row], "width_mm": 2.0,
+            "left": [2.0, 12.0], "right": [28.0, 36.0],
+        }));
+        for kind in ["gap", "flush"] {
+            gauges.push(json!({
+                "slot": gauges.len() + 1, "name": format!("{kind} {at}"), "kind": kind, "of": [name],
+                "golden": true, "plus": 0.5, "minus": 0.5,
+            }));
+        }
+    }
+    (edit["features"], edit["gauges"]) = (features.into(), gauges.into());
+    let (status, tried) = browser.json("POST", "/api/recipes/1/try", &edit);
+    assert_eq!((status, &tried["problems"]), (200, &json!([])), "{tried}");
+    let (status, answer) = browser.json("PUT", "/api/recipes/1", &edit);
+    assert_eq!(status, 200, "{answer}");
+    browser.wait_for_another(recipe["fingerprint"].as_str().unwrap());
+    let result = browser.measure();
+    assert_eq!(result["verdict"], "PASS", "{result}");
+    assert_eq!(result["gauges"].as_array().unwrap().len(), 2 * SECTIONS);
+    let (status, surface) = browser.ask("GET", "/api/picture/surface?level=0", &[]);
+    // Five words of each pixel.
+    assert_eq!((status, surface.len()), (200, 5 * 2 * 1456 * 1088));
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn a_bare_head_is_commissioned_with_ten_poses_teaches_and_watches_for_drift() {
+    let rig = "angle_deg = 20.7\n[rig.projector]\nangle_deg = -7.6\n";
+    let place = Place::before(&format!("calibrated = false\n{CAMERA}{rig}"));
+    let daemon = Daemon::start(&place);
+    let (_, rest) = daemon.log.split_once("shown this once: ").unwrap();
+    let mut technician = Technician::sign_in(&daemon, rest.split(' ').next().unwrap());
+    technician.lay(&json!({ "part": "plane" }));
+    for step in ["devices", "aim", "exposure", "timing"] {
+        technician.passes(step, &json!({}));
+    }
+    for number in 1..=10 {
+        let pose = technician.pose(number);
+        assert_eq!(pose["usable"], true, "{pose}");
+    }
+    technician.passes("geometry", &json!({ "action": "solve" }));
+    technician.lay(&json!({ "part": "plane" }));
+    technician.passes("plane", &json!({}));
+    technician.lay(&json!({ "part": "sheet_metal" }));
+    let (status, answer) = (technician.browser).json("POST", "/api/recipes/1/teach", &json!({}));
+    assert_eq!(status, 202, "{answer}");
+    follow(&mut technician.browser, "teach", &Value::Null);
+    assert_eq!(technician.browser.measure()["verdict"], "PASS");
+    let drift = technician.head()["drift"].clone();
+    assert_eq!(
+        (&drift["drifted"], &drift["remedy"]),
+        (&json!(false), &Value::Null),
+        "{drift}"
+    );
 }
