@@ -10,10 +10,10 @@ use axum::http::request::Parts as RequestParts;
 use ipnet::IpNet;
 use serde_json::Value;
 use tokio::sync::{Mutex, Semaphore, oneshot};
+use tokio::time::Instant;
 
 use super::problem::{Problem, Result};
 use super::slots::Slots;
-use super::tries::LastOpened;
 use super::turns::Tries;
 use crate::head::calibration::Current;
 use crate::history::Reader;
@@ -23,6 +23,7 @@ use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
 use crate::recipe::plan::Layers;
+use crate::recipe::trying::Opened;
 use crate::station::{Snapshot, StationHandle};
 use crate::system::logbook::Logbook;
 use crate::system::socket;
@@ -47,6 +48,8 @@ const MAX_COLLECTING: usize = 4;
 
 /// The maps that were computed last, and the SEQ of their result.
 pub(super) type LastKept = Option<(u32, Arc<Layers>)>;
+/// The recipe of which an edit was tried last, and when.
+pub(super) type LastOpened = Option<(Opened, Instant)>;
 
 /// What the daemon hands to the page.
 pub struct Parts {

@@ -25,7 +25,7 @@ use super::body;
 use super::gate::{signed_in, token};
 use super::kept::{broken, recording};
 use super::problem::{Problem, Result};
-use super::site::{Site, alone};
+use super::site::{LastOpened, Site, alone};
 use crate::history::kept::Kept;
 use crate::recipe::ChangeError;
 use crate::recipe::edit::Edit;
@@ -131,9 +131,6 @@ pub(super) async fn attempt(
         () = turn.over() => Err(superseded()),
     }
 }
-
-/// The recipe of which an edit was tried last, and when.
-pub(super) type LastOpened = Option<(Opened, Instant)>;
 
 /// Lets the recipe go when no edit of it has been tried for [`KEPT`].
 async fn forget(opened: Arc<Mutex<LastOpened>>) {
