@@ -160,7 +160,7 @@ impl Picture {
     }
 
     /// The directions that heights leave free and along which edges place the part.
-    pub fn shown(
+    pub fn steerable(
         &self,
         triangulator: &Triangulator,
         placed: &Placed,
@@ -202,7 +202,7 @@ impl Picture {
         placed: &Placed,
         pictures: &mut Vec<Coarse>,
     ) -> Option<Motion> {
-        let along = self.shown(triangulator, placed);
+        let along = self.steerable(triangulator, placed);
         if along.is_empty() {
             return None;
         }

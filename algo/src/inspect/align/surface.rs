@@ -56,15 +56,17 @@ const REACH: usize = 2;
 const DELTA_MM: f64 = 0.01;
 /// Σ i² over the square of a facet.
 const SQUARES: f64 = 50.0;
-/// Of five heights a, b, c, d, e the slope over the outer ones less that over the inner ones is
-/// (−a + 2b − 2d + e)/4 = f‴/2, and the slope of the line through all is off by Σi⁴/(6 Σi²) f‴: this
-/// many times as far, squared.
-const UNEVEN: f64 = (3.4 / 3.0) * (3.4 / 3.0);
-/// The weights of that difference. Noise of the heights with a variance of 1 gives its mean over
-/// five rows one of 0.125; golden is the mean of two measurements or more, and is uneven along and
-/// down.
+/// Weights of five heights whose sum, over [`CUBIC_SHARE`], is f‴/2: the slope over the outer two
+/// less that over the inner two.
 const CUBIC: [i64; 2 * REACH + 1] = [-1, 2, 0, -2, 1];
-const OF_NOISE: f64 = 2.0 * 0.125 / 2.0;
+const CUBIC_SHARE: f64 = 4.0;
+/// The slope of the line through all five is off by Σi⁴/(6 Σi²) f‴: this many times that sum,
+/// squared.
+const UNEVEN: f64 = (3.4 / 3.0) * (3.4 / 3.0);
+/// Variance that noise alone gives that sum, as a mean over five rows, along and down together,
+/// where golden is the mean of two measurements, over the variance of one. Golden of one measurement
+/// passes for less even than it is.
+const OF_NOISE: f64 = 0.125;
 
 impl GoldenSurface<'_> {
     fn rows(&self) -> usize {
@@ -131,7 +133,8 @@ impl GoldenSurface<'_> {
             down[0] += sum * (i as i64 - REACH as i64);
             down[1] += sum * row_cubic;
         }
-        let [uneven_along, uneven_down] = [along[1], down[1]].map(|sum| sum as f64 / 20.0 * 1e-6);
+        let cubics = CUBIC_SHARE * CUBIC.len() as f64;
+        let uneven = [along[1], down[1]].map(|sum| sum as f64 / cubics * 1e-6);
         let [along, down] = [along[0], down[0]].map(|sum| sum as f64 / SQUARES * 1e-6);
         let camera = self.triangulator.camera();
         let beside = |x, y, z| {
@@ -152,7 +155,7 @@ impl GoldenSurface<'_> {
         let area = 1.0 / libm::fabs(xu * yv - xv * yu);
         let sigma = self.taught.sigma_mm(place);
         let (scale, noise) = (x.0 * x.0 + x.1 * x.1, sigma * sigma);
-        let uneven = uneven_along * uneven_along + uneven_down * uneven_down;
+        let uneven = uneven[0] * uneven[0] + uneven[1] * uneven[1];
         let uneven = UNEVEN * (uneven - OF_NOISE * noise).max(0.0);
         area.is_finite().then_some(Facet {
             lift,

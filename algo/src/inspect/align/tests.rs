@@ -276,7 +276,7 @@ fn still(f: impl Fn(f64, f64) -> f64, modulation: impl Fn(usize, usize) -> f32) 
     let picture = Picture::new(triangulator, surface, &modulation, alignment.centre, 4.0);
     let placed = alignment.still(made.golden()).unwrap();
     Still {
-        shown: picture.map_or(0, |picture| picture.shown(triangulator, &placed).len()),
+        steerable: picture.map_or(0, |picture| picture.steerable(triangulator, &placed).len()),
         placed,
     }
 }
@@ -284,7 +284,7 @@ fn still(f: impl Fn(f64, f64) -> f64, modulation: impl Fn(usize, usize) -> f32) 
 struct Still {
     placed: Placed,
     /// How many of the directions that heights leave free the picture's edges determine.
-    shown: usize,
+    steerable: usize,
 }
 
 /// What lies deeper is no part.
@@ -311,7 +311,7 @@ fn the_facets_of_a_quiet_body_of_revolution_do_not_determine_its_turns() {
 #[test]
 fn the_outline_of_a_tube_does_not_show_its_turn_and_a_stripe_does() {
     let outline = |_: usize, v: usize| if PART.contains(&v) { 90.0 } else { 5.0 };
-    assert_eq!(still(tube, outline).shown, 0);
+    assert_eq!(still(tube, outline).steerable, 0);
     let stripe = |u, v| {
         if (98..104).contains(&v) {
             5.0
@@ -319,5 +319,5 @@ fn the_outline_of_a_tube_does_not_show_its_turn_and_a_stripe_does() {
             outline(u, v)
         }
     };
-    assert_eq!(still(tube, stripe).shown, 1);
+    assert_eq!(still(tube, stripe).steerable, 1);
 }

@@ -31,11 +31,13 @@ impl Production {
             Picture::new(triangulator, surface, modulation, centre, tolerance_px)
         });
         let placed = alignment.and_then(|alignment| alignment.still(self.golden.surface()));
-        let shown = |picture: &Picture| {
-            let of = |placed: &Placed| !picture.shown(&self.golden.triangulator, placed).is_empty();
-            placed.as_ref().is_some_and(of)
+        let steers = |picture: &Picture| {
+            let along = |placed| picture.steerable(&self.golden.triangulator, placed);
+            placed
+                .as_ref()
+                .is_some_and(|placed| !along(placed).is_empty())
         };
-        self.picture = picture.filter(|picture| pair || shown(picture));
+        self.picture = picture.filter(|picture| pair || steers(picture));
         self
     }
 
