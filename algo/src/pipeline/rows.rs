@@ -9,8 +9,8 @@ use rayon::prelude::*;
 /// does changes nothing of the result.
 pub type Progress<'a> = &'a (dyn Fn(f64) + Sync);
 
-/// Counts the rows that are done.
-pub(crate) struct Done<'a> {
+/// Counts the rows that are done, in whatever order.
+pub struct Done<'a> {
     progress: Progress<'a>,
     rows: usize,
     done: AtomicUsize,

@@ -283,9 +283,9 @@ impl GoldenPart<'_> {
         let resolved = |at: usize| phases.trust[at] == Trust::Resolved;
         let mut expansions = vec![[f32::NAN; 2]; phases.phase.len()];
         let rows = phases.phase.len() / width.max(1);
+        let expanded = |share| headway.done(0.8 * share);
+        let done = pipeline::Done::new(&expanded, rows);
         pipeline::for_each_row(&mut expansions, width, |v, row| {
-            // Rows are done in another order, which is near enough.
-            headway.done(0.8 * v as f64 / rows as f64);
             for (u, [first, second]) in row.iter_mut().enumerate() {
                 let at = v * width + u;
                 let (phase, height) = (phases.phase[at].turns(), heights.height[at].mm());
@@ -296,8 +296,8 @@ impl GoldenPart<'_> {
                     (*first, *second) = (expansion.first as f32, expansion.second as f32);
                 }
             }
+            done.row();
         });
-        headway.done(0.8);
         let certain = |at: usize| resolved(at) && f64::from(heights.sigma[at]) <= MAX_SIGMA_MM;
         let certain: Vec<bool> = (0..phases.phase.len()).map(certain).collect();
         let full_scale = self.decoder.full_scale();
