@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import random
 import shutil
 import signal
 import socket
@@ -36,12 +37,23 @@ def broken(words):
     sys.exit(f"broken promise: {words}")
 
 
+# Below those that the kernel gives to connections (Linux: 32768 to 60999), so that none takes one before its server does.
+PORTS = range(10000, 32768)
+given = set()
+
+
 def ports(count):
-    """Ports that are free now."""
-    sockets = [socket.create_server(("127.0.0.1", 0)) for _ in range(count)]
-    numbers = [one.getsockname()[1] for one in sockets]
-    for one in sockets:
-        one.close()
+    """Ports that are free now and were not given before."""
+    numbers = []
+    while len(numbers) < count:
+        number = random.choice(PORTS)
+        try:
+            socket.create_server(("127.0.0.1", number)).close()
+        except OSError:
+            continue
+        if number not in given:
+            numbers.append(number)
+            given.add(number)
     return numbers
 
 
@@ -183,7 +195,13 @@ class ZooKeeper(Process):
         jars = "/usr/share/java/zookeeper.jar:/usr/share/java/slf4j-simple.jar"
         main = "org.apache.zookeeper.server.quorum.QuorumPeerMain"
         super().__init__(folder, "zookeeper", ["java", "-Xmx256m", "-cp", jars, main, place / "zoo.cfg"])
-        wait_for("zookeeper serves", 60, lambda: socket.create_connection(("127.0.0.1", self.port), 1).close() or True)
+        wait_for("zookeeper serves", 60, self.serves)
+
+    def serves(self):
+        """Whether it answers for its data: it accepts connections before it reads them."""
+        with socket.create_connection(("127.0.0.1", self.port), 1) as connection:
+            connection.sendall(b"srvr")
+            return b"Mode: standalone" in connection.makefile("rb").read()
 
 
 class Plant(Process):
