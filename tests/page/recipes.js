@@ -71,7 +71,7 @@ export async function recipes({ page, step, verdict, trigger }) {
   await step("a file whose number is taken asks where it goes, and replaces nothing unasked", async () => {
     await open();
     const before = await recipe(1);
-    const bytes = await page.evaluate(async () => Array.from(new Uint8Array(await (await fetch("/api/recipes/1/file")).arrayBuffer())));
+    const bytes = await (await page.request.get(new URL("/api/recipes/1/file", page.url()).href)).body();
     const undo = async () => {
       const button = page.locator("#recipe-rows tr.before button").first();
       const [, wanted] = /\(([0-9a-f]{8}),/.exec(await button.textContent());
@@ -81,7 +81,7 @@ export async function recipes({ page, step, verdict, trigger }) {
     };
     await undo();
     const other = await recipe(1);
-    await page.setInputFiles("#import-file", { name: "1.recipe", mimeType: "application/zip", buffer: Buffer.from(bytes) });
+    await page.setInputFiles("#import-file", { name: "1.recipe", mimeType: "application/zip", buffer: bytes });
     await page.click("#import button");
     await page.waitForSelector("#question:not([hidden])");
     assert.ok((await page.textContent("#question-words")).includes(`Recipe 1 is ${other.name} with`));
