@@ -197,38 +197,31 @@ fn ten_poses_of_a_bowed_board_give_heights_to_15_micrometres_and_lengths_to_30()
     assert!(libm::sqrt(squares.1) < 0.030, "{squares:?}");
 }
 
-#[test]
-fn the_predicted_errors_cover_the_true_ones_of_50_heads() {
+/// The true errors of heights and of lengths of some heads, over the predicted ones.
+type Shares = Vec<[f64; 2]>;
+
+/// Of heads whose board is as large as it says to 2 in 10,000.
+fn with_a_scaled_board(heads: u64) -> Shares {
     let board = Board {
         columns: 6,
         rows: 8,
         square: 14.0,
     };
     let scale = 2e-4;
-    let mut covered = [[0; 2]; 2];
-    for seed in 0..50 {
+    let share = |seed| {
         let mut random = Random::new(100 + seed);
         let off = scale * random.normal();
         let truth = head(&mut random, &board, 10, off);
         let adjusted = calibrate(&board, FRAME, &views(&mut random, &truth)).unwrap();
         let prediction = adjusted.prediction(FRAME, RASTER, scale).unwrap();
         let (height, length) = errors(&truth, &adjusted.rig);
-        for (sigmas, covered) in [1.0, 2.0].into_iter().zip(&mut covered) {
-            covered[0] += i32::from(height <= sigmas * prediction.height);
-            covered[1] += i32::from(length <= sigmas * prediction.length);
-        }
-    }
-    for of in 0..2 {
-        assert!(
-            (25..=43).contains(&covered[0][of]),
-            "within 1 σ: {covered:?}"
-        );
-        assert!(covered[1][of] >= 45, "within 2 σ: {covered:?}");
-    }
+        [height / prediction.height, length / prediction.length]
+    };
+    (0..heads).map(share).collect()
 }
 
-#[test]
-fn the_predicted_errors_cover_the_true_ones_of_50_heads_with_a_bad_print() {
+/// Of heads whose board's corners are printed off their places.
+fn with_a_bad_print(heads: u64) -> Shares {
     let board = Board {
         columns: 9,
         rows: 13,
@@ -236,8 +229,7 @@ fn the_predicted_errors_cover_the_true_ones_of_50_heads_with_a_bad_print() {
     };
     // 0.12 camera px, more than twice the noise of a corner.
     let print = 0.02;
-    let mut covered = [[0; 2]; 2];
-    for seed in 0..50 {
+    let share = |seed| {
         let mut random = Random::new(300 + seed);
         let truth = head(&mut random, &board, 10, 0.0);
         let off = |_| (print * random.normal(), print * random.normal());
@@ -245,18 +237,46 @@ fn the_predicted_errors_cover_the_true_ones_of_50_heads_with_a_bad_print() {
         let adjusted = calibrate(&board, FRAME, &printed(&mut random, &truth, &off)).unwrap();
         let prediction = adjusted.prediction(FRAME, RASTER, 0.0).unwrap();
         let (height, length) = errors(&truth, &adjusted.rig);
-        for (sigmas, covered) in [1.0, 2.0].into_iter().zip(&mut covered) {
-            covered[0] += i32::from(height <= sigmas * prediction.height);
-            covered[1] += i32::from(length <= sigmas * prediction.length);
+        [height / prediction.height, length / prediction.length]
+    };
+    (0..heads).map(share).collect()
+}
+
+#[test]
+fn the_predicted_errors_are_the_true_ones_of_a_few_heads() {
+    for shares in [with_a_scaled_board(8), with_a_bad_print(8)] {
+        for of in 0..2 {
+            let squares = shares.iter().map(|share| share[of] * share[of]);
+            let mean = squares.sum::<f64>() / shares.len() as f64;
+            std::println!("mean square of error over σ, quantity {of}: {mean:.2}");
+            // Of 8 normal numbers it is 1 ± 0.5; with a σ that is wrong by 2 it is 4 or 0.25.
+            assert!((0.35..2.5).contains(&mean), "quantity {of}: {mean}");
         }
     }
-    std::println!("within 1 and 2 σ, heights and lengths: {covered:?}");
+}
+
+#[test]
+#[ignore = "takes a minute: `.ci/run full`"]
+fn the_predicted_errors_cover_the_true_ones_of_50_heads() {
+    are_covered(&with_a_scaled_board(50));
+}
+
+#[test]
+#[ignore = "takes a minute: `.ci/run full`"]
+fn the_predicted_errors_cover_the_true_ones_of_50_heads_with_a_bad_print() {
+    are_covered(&with_a_bad_print(50));
+}
+
+/// Of 50 heads about 68 and 95 % are within 1 and 2 σ.
+fn are_covered(shares: &Shares) {
     for of in 0..2 {
-        assert!(
-            (25..=43).contains(&covered[0][of]),
-            "within 1 σ: {covered:?}"
-        );
-        assert!(covered[1][of] >= 45, "within 2 σ: {covered:?}");
+        let [one, two] = [1.0, 2.0].map(|sigmas| {
+            let within = shares.iter().filter(|share| share[of] <= sigmas);
+            within.count()
+        });
+        std::println!("quantity {of}: {one} within 1 σ, {two} within 2");
+        assert!((25..=43).contains(&one), "within 1 σ: {one}");
+        assert!(two >= 45, "within 2 σ: {two}");
     }
 }
 
