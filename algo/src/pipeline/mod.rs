@@ -23,6 +23,6 @@ pub use measure::{
 };
 pub use noise::{sample_noise, signal_by_modulation};
 pub use plate::{Plate, PlateError};
-pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};
 pub use rows::{Done, Progress, for_each_row};
+pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};
 pub use wrapped::wrapped;
