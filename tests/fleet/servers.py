@@ -37,8 +37,9 @@ def broken(words):
     sys.exit(f"broken promise: {words}")
 
 
-# Below those that the kernel gives to connections (Linux: 32768 to 60999), so that none takes one before its server does.
+# Below the ephemeral ports (Linux: 32768 to 60999), so that no outgoing connection takes one before its server listens.
 PORTS = range(10000, 32768)
+# Ports that `ports` has returned: their servers may not listen yet.
 given = set()
 
 

@@ -14,6 +14,7 @@ use sim::{Part, Placement, Scenario};
 use std::time::Instant;
 use tests::random::Random;
 
+/// Placements of each joint, in the long form and in the quick one.
 const PLACEMENTS: usize = 12;
 const FEW_PLACEMENTS: usize = 5;
 const REPEATS: usize = 4;
@@ -31,7 +32,8 @@ struct Camera {
     is_stated: bool,
     /// Largest bias of gap and of flush, µm.
     bias: [f64; 2],
-    /// In so many placements of all noise may hide the edge that is turned away.
+    /// Noise may hide the edge that is turned away in so many of all placements of the long form, and
+    /// in the same share of them in the quick one.
     unseen: usize,
 }
 
@@ -210,7 +212,8 @@ fn judge(camera: &Camera, placements: usize) {
     }
     let (scatter, within): (f64, f64) = (f64::sqrt(ratios / freedom), within / errors);
     println!("scatter/σ {scatter:.2}, within U {within:.3}");
-    assert!(unseen <= camera.unseen, "{unseen} are unseen");
+    let is_seldom = unseen * PLACEMENTS <= camera.unseen * placements;
+    assert!(is_seldom, "{unseen} are unseen");
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert!((0.8..1.25).contains(&scatter), "{scatter}");
     assert!(within >= 0.93, "{within}");
