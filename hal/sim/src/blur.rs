@@ -11,36 +11,34 @@ pub(super) fn gaussian(picture: &mut [f32], width: usize, sigma: f64) {
         return;
     }
     let kernel = kernel(sigma);
+    let reach = kernel.len() / 2;
     let height = picture.len() / width;
     let mut across = vec![0.0_f32; picture.len()];
     across
         .par_chunks_mut(width)
         .zip(picture.par_chunks(width))
         .for_each(|(to, from)| {
-            for (x, to) in to.iter_mut().enumerate() {
-                *to = weighted(&kernel, x, width, |x| from[x]);
-            }
+            let [first, last] =
+                [from[0], from[width - 1]].map(|edge| std::iter::repeat_n(edge, reach));
+            let longer: Vec<f32> = first.chain(from.iter().copied()).chain(last).collect();
+            weigh(&kernel, to, |d| &longer[d..]);
         });
     picture
         .par_chunks_mut(width)
         .enumerate()
         .for_each(|(y, to)| {
-            for (x, to) in to.iter_mut().enumerate() {
-                *to = weighted(&kernel, y, height, |y| across[y * width + x]);
-            }
+            let inside = |d: usize| (y + d).saturating_sub(reach).min(height - 1);
+            weigh(&kernel, to, |d| &across[inside(d) * width..]);
         });
 }
 
-/// Σ kernel[d] · at(place + d − reach), where places outside 0…length − 1 are replaced by the
-/// nearest inside.
-fn weighted(kernel: &[f32], place: usize, length: usize, at: impl Fn(usize) -> f32) -> f32 {
-    let reach = kernel.len() / 2;
-    let inside = |d: usize| (place + d).saturating_sub(reach).min(length - 1);
-    kernel
-        .iter()
-        .enumerate()
-        .map(|(d, weight)| weight * at(inside(d)))
-        .sum()
+/// Writes Σ kernel[d] · row(d), pixel by pixel.
+fn weigh<'a>(kernel: &[f32], to: &mut [f32], row: impl Fn(usize) -> &'a [f32]) {
+    to.fill(0.0);
+    for (d, weight) in kernel.iter().enumerate() {
+        let pixels = to.iter_mut().zip(row(d));
+        pixels.for_each(|(to, from)| *to += weight * from);
+    }
 }
 
 fn kernel(sigma: f64) -> Vec<f32> {

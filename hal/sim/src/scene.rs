@@ -24,6 +24,10 @@ const MAX_KEPT_FRAMES: usize = 64;
 /// recipe's for 512 × 512 pixels, and less than the part's light transport takes.
 const MAX_PICTURES: usize = 24 << 20;
 
+/// Of so many patterns the light is kept while exposures see one pattern change to another: the next
+/// exposures often see the same two, with other shares.
+const MAX_LIGHTS: usize = 3;
+
 /// The patterns in view during an exposure, and their shares of it.
 type View = Vec<(Option<usize>, f32)>;
 
@@ -35,6 +39,9 @@ pub(crate) struct SimScene {
     rasters: Vec<Raster>,
     /// The light on the camera of the part in place, for what was in view.
     pictures: VecDeque<(View, Vec<f32>)>,
+    /// The light of patterns that were seen with others in one exposure, before the camera's blur; the
+    /// latest last.
+    lights: VecDeque<(Option<usize>, Vec<f32>)>,
     /// Pixels of the sensor.
     sensor_size: usize,
     pool: Pool,
@@ -53,6 +60,7 @@ impl SimScene {
             placed,
             rasters: Vec::new(),
             pictures: VecDeque::new(),
+            lights: VecDeque::new(),
             sensor_size: sensor,
             pool: Pool::new(format, MAX_KEPT_FRAMES),
             sensor: Sensor::new(&scenario),
@@ -65,6 +73,7 @@ impl SimScene {
     pub(super) fn place(&mut self, placed: Staged) {
         self.placed = placed;
         self.pictures.clear();
+        self.lights.clear();
     }
 
     /// The part in place.
@@ -92,25 +101,38 @@ impl SimScene {
             self.pictures.pop_front();
         }
         let mut picture = vec![0.0; self.sensor_size];
-        let transport = Arc::clone(&self.placed.transport);
         match seen {
             [(shown, share)] => {
-                transport.light(self.lit(*shown).as_deref(), &mut picture);
+                self.lights.clear();
+                let raster = self.lit(*shown);
+                self.placed.transport.light(raster.as_deref(), &mut picture);
                 picture.iter_mut().for_each(|light| *light *= share);
             }
             several => {
-                let mut part = vec![0.0; self.sensor_size];
                 for (shown, share) in several {
-                    transport.light(self.lit(*shown).as_deref(), &mut part);
-                    let parts = picture.iter_mut().zip(&part);
+                    let parts = picture.iter_mut().zip(self.light(*shown));
                     parts.for_each(|(sum, light)| *sum += share * light);
                 }
             }
         }
         let width = self.scenario.rig.camera.width as usize;
-        blur::gaussian(&mut picture, width, transport.blur_px);
+        blur::gaussian(&mut picture, width, self.placed.transport.blur_px);
         self.pictures.push_back((seen.to_vec(), picture));
         self.pictures.len() - 1
+    }
+
+    /// The light on the camera while this pattern is shown, or none.
+    fn light(&mut self, shown: Option<usize>) -> &[f32] {
+        let known = self.lights.iter().position(|(of, _)| *of == shown);
+        let oldest = || (self.lights.len() >= MAX_LIGHTS).then_some(0);
+        let kept = known.or_else(oldest).and_then(|at| self.lights.remove(at));
+        let mut light = kept.map_or_else(|| vec![0.0; self.sensor_size], |(_, light)| light);
+        if known.is_none() {
+            let raster = self.lit(shown);
+            self.placed.transport.light(raster.as_deref(), &mut light);
+        }
+        self.lights.push_back((shown, light));
+        self.lights.back().map_or(&[], |(_, light)| light)
     }
 
     /// Whether there is memory for the pictures of all patterns and of none.
@@ -165,6 +187,7 @@ impl Scene for SimScene {
         let stays = |shown: &Option<usize>| shown.is_none_or(|index| index < kept);
         self.pictures
             .retain(|(view, _)| view.iter().all(|(shown, _)| stays(shown)));
+        self.lights.retain(|(shown, _)| stays(shown));
         // Teaching holds more frames at a time than a cycle.
         self.pool.release();
         self.rasters.truncate(kept);

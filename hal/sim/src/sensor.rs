@@ -16,6 +16,9 @@ use super::scenario::{Noise, Scenario};
 /// Separates the random numbers of the pixels' responses from those of frames.
 const RESPONSES: u64 = 0x5052_4e55;
 
+/// So many pixels are read out at a time.
+const BLOCK: usize = 64;
+
 /// A sensor, and its random numbers.
 pub(super) struct Sensor {
     noise: Noise,
@@ -31,7 +34,7 @@ impl Sensor {
         let (width, height) = scenario.frame_size();
         let noise = scenario.noise;
         let mut random = Xoshiro256PlusPlus::seed_from_u64(noise.seed ^ RESPONSES);
-        let response = |_| 1.0 + noise.prnu as f32 * normal(&mut random);
+        let response = |_| 1.0 + noise.prnu as f32 * normal(random.next_u64());
         Self {
             full_scale: scenario.full_scale(),
             responses: (0..width * height).map(response).collect(),
@@ -69,36 +72,47 @@ impl Sensor {
         let full_scale = self.full_scale as f32;
         let bright = (longer * gain * self.full_scale) as f32;
         let rounded = |value: f32| count(value.clamp(0.0, full_scale) + 0.5);
-        if let Some(noise_counts) = self.noise.noise_counts {
-            let half_width = (noise_counts / 255.0 * self.full_scale) as f32;
-            // Half of a random word in −1…1: 2⁻³¹ times a signed half.
-            let unit = half_width / 2_147_483_648.0_f32;
-            for (pair, light) in samples.chunks_mut(2).zip(light.chunks(2)) {
-                let word = random.next_u64();
-                for (half, (sample, light)) in pair.iter_mut().zip(light).enumerate() {
-                    let noise = ((word >> (32 * half)) as u32 as i32) as f32 * unit;
-                    *sample = rounded(bright * light + noise);
-                }
-            }
-            return;
-        }
         let [read, shot] = self
             .noise
             .variance(gain * self.full_scale)
             .map(|v| v as f32);
-        let pixels = light.iter().zip(&self.responses);
-        for (sample, (light, response)) in samples.iter_mut().zip(pixels) {
-            let mean = bright * light * response;
-            *sample = rounded(mean + (read + shot * mean).sqrt() * normal(&mut random));
+        let half_width = self
+            .noise
+            .noise_counts
+            .map(|counts| (counts / 255.0 * self.full_scale) as f32);
+        // First the random numbers, which come one after the other; the rest is done in lanes.
+        let mut words = [0; BLOCK / 2];
+        let mut normals = [0.0; BLOCK];
+        let pixels = light.chunks(BLOCK).zip(self.responses.chunks(BLOCK));
+        for (samples, (light, responses)) in samples.chunks_mut(BLOCK).zip(pixels) {
+            if let Some(half_width) = half_width {
+                // Half of a random word in −1…1: 2⁻³¹ times a signed half.
+                let unit = half_width / 2_147_483_648.0_f32;
+                let drawn = &mut words[..samples.len().div_ceil(2)];
+                drawn.fill_with(|| random.next_u64());
+                let halves = drawn
+                    .iter()
+                    .flat_map(|word| [*word as u32, (*word >> 32) as u32]);
+                for ((sample, light), half) in samples.iter_mut().zip(light).zip(halves) {
+                    *sample = rounded(bright * light + (half as i32) as f32 * unit);
+                }
+            } else {
+                let drawn = &mut normals[..samples.len()];
+                drawn.fill_with(|| normal(random.next_u64()));
+                let pixels = light.iter().zip(responses).zip(drawn);
+                for (sample, ((light, response), normal)) in samples.iter_mut().zip(pixels) {
+                    let mean = bright * light * response;
+                    *sample = rounded(mean + (read + shot * mean).sqrt() * *normal);
+                }
+            }
         }
     }
 }
 
-/// The sum of the four quarters of a random word, of mean 0 and variance 1.
-fn normal(random: &mut Xoshiro256PlusPlus) -> f32 {
-    let word = random.next_u64();
-    let quarter = |at: u32| (word >> (16 * at)) as u16 as i32;
+/// The sum of the four quarters of a random word, of mean 0 and variance 1. All sums are exact.
+fn normal(word: u64) -> f32 {
+    let quarter = |at: u32| f32::from((word >> (16 * at)) as u16);
     let sum = quarter(0) + quarter(1) + quarter(2) + quarter(3);
     // Each quarter is uniform in 0…65535, of variance (2³² − 1) / 12; √3 / 2¹⁶ = 2.6429e-5.
-    (sum - 2 * 65_535) as f32 * 2.642_899_8e-5
+    (sum - 131_070.0) * 2.642_899_8e-5
 }
