@@ -129,16 +129,23 @@ impl Round {
     /// For each frame its mean, the share p of its exposure in which white is in view if light
     /// comes `delay` after its flip, and dp/d(delay).
     fn shares(&self, exposure: f64, delay: f64) -> impl Iterator<Item = (f64, f64, f64)> {
+        let sign = |white: bool| if white { 1.0 } else { -1.0 };
+        // The share in view after each number of changes.
+        let mut after = vec![0.0];
+        for (at, (_, white)) in self.changes.iter().enumerate() {
+            after.push(after[at] + sign(*white));
+        }
         self.frames.iter().map(move |(start, mean)| {
-            let (mut share, mut slope) = (0.0, 0.0);
-            for (flip, white) in &self.changes {
+            let left = |flip: f64| start + exposure - (flip + delay);
+            let before = self
+                .changes
+                .partition_point(|(flip, _)| left(*flip) >= exposure);
+            let (mut share, mut slope) = (after[before], 0.0);
+            let within = self.changes[before..].iter();
+            for (flip, white) in within.take_while(|(flip, _)| left(*flip) > 0.0) {
                 // A change to white adds the rest of the exposure, a change to black subtracts it.
-                let left = start + exposure - (flip + delay);
-                let sign = if *white { 1.0 } else { -1.0 };
-                share += sign * (left / exposure).clamp(0.0, 1.0);
-                if left > 0.0 && left < exposure {
-                    slope -= sign / exposure;
-                }
+                share += sign(*white) * left(*flip) / exposure;
+                slope -= sign(*white) / exposure;
             }
             (*mean, share, slope)
         })
