@@ -1,5 +1,6 @@
 //! A checkerboard in front of a camera and a projector, rendered to recordings without models.
 
+use crate::once::Once;
 use crate::random::Random;
 use serde_json::json;
 use std::f64::consts::TAU;
@@ -81,43 +82,66 @@ fn turned([x, y, z]: V, [a, b, c]: V) -> V {
     [x, y * a.cos() - z * a.sin(), y * a.sin() + z * a.cos()]
 }
 
-/// Albedo and projector pixel of what a ray of the camera meets; `None` beside the board.
-fn met(pose: &Pose, (x, y): (f64, f64), shift: f64) -> Option<(f64, f64, f64)> {
-    let axes =
-        [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turned(axis, pose.turn));
-    let (ray, centre) = ([x, y, 1.0], less(pose.centre, [-shift, 0.0, 0.0]));
-    let far = dot(axes[2], centre) / dot(axes[2], ray);
-    let point = ray.map(|along| along * far);
-    let on_board = less(point, centre);
-    let (columns, rows, square) = BOARD;
-    let side =
-        |axis: V, corners: usize| dot(axis, on_board) / square + (corners as f64 - 1.0) / 2.0;
-    let (column, row) = (side(axes[0], columns), side(axes[1], rows));
-    let within =
-        |at: f64, corners: usize, margin: f64| at > -1.0 - margin && at < corners as f64 + margin;
-    if !(within(column, columns, 0.8) && within(row, rows, 0.8)) {
-        return None;
+/// Where the board and the projector look, in the camera's coordinates.
+struct View {
+    /// Along columns and rows of the board, and its normal.
+    board: [V; 3],
+    centre: V,
+    /// Across, down and along the axis of the projector.
+    projector: [V; 3],
+}
+
+impl View {
+    /// Of a board that has moved along x by `shift`.
+    fn new(pose: &Pose, shift: f64) -> Self {
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        // The projector's axis goes through (0, 0, 400).
+        let z = less([0.0, 0.0, 400.0], PROJECTOR);
+        let z = z.map(|along| along / dot(z, z).sqrt());
+        let across = [z[2], 0.0, -z[0]];
+        let across = across.map(|along| along / dot(across, across).sqrt());
+        let down = [
+            z[1] * across[2] - z[2] * across[1],
+            z[2] * across[0] - z[0] * across[2],
+            z[0] * across[1] - z[1] * across[0],
+        ];
+        Self {
+            board: axes.map(|axis| turned(axis, pose.turn)),
+            centre: less(pose.centre, [-shift, 0.0, 0.0]),
+            projector: [across, down, z],
+        }
     }
-    let squares = within(column, columns, 0.0) && within(row, rows, 0.0);
-    let black = squares && (column.floor() + row.floor()) as i64 % 2 != 0;
-    // The projector's axis goes through (0, 0, 400).
-    let z = less([0.0, 0.0, 400.0], PROJECTOR);
-    let z = z.map(|along| along / dot(z, z).sqrt());
-    let across = [z[2], 0.0, -z[0]];
-    let across = across.map(|along| along / dot(across, across).sqrt());
-    let down = [
-        z[1] * across[2] - z[2] * across[1],
-        z[2] * across[0] - z[0] * across[2],
-        z[0] * across[1] - z[1] * across[0],
-    ];
-    let from = less(point, PROJECTOR);
-    let pixel =
-        |axis: V, size: usize| FOCAL.1 * dot(axis, from) / dot(z, from) + (size as f64 - 1.0) / 2.0;
-    Some((
-        if black { 0.3 } else { 0.9 },
-        pixel(across, RASTER.0),
-        pixel(down, RASTER.1),
-    ))
+
+    /// Albedo and projector pixel of what a ray of the camera meets; `None` beside the board.
+    fn met(&self, (x, y): (f64, f64)) -> Option<(f64, f64, f64)> {
+        let [along_columns, along_rows, normal] = self.board;
+        let ray = [x, y, 1.0];
+        let far = dot(normal, self.centre) / dot(normal, ray);
+        let point = ray.map(|along| along * far);
+        let on_board = less(point, self.centre);
+        let (columns, rows, square) = BOARD;
+        let side =
+            |axis: V, corners: usize| dot(axis, on_board) / square + (corners as f64 - 1.0) / 2.0;
+        let (column, row) = (side(along_columns, columns), side(along_rows, rows));
+        let within = |at: f64, corners: usize, margin: f64| {
+            at > -1.0 - margin && at < corners as f64 + margin
+        };
+        if !(within(column, columns, 0.8) && within(row, rows, 0.8)) {
+            return None;
+        }
+        let squares = within(column, columns, 0.0) && within(row, rows, 0.0);
+        let black = squares && (column.floor() + row.floor()) as i64 % 2 != 0;
+        let [across, down, z] = self.projector;
+        let from = less(point, PROJECTOR);
+        let pixel = |axis: V, size: usize| {
+            FOCAL.1 * dot(axis, from) / dot(z, from) + (size as f64 - 1.0) / 2.0
+        };
+        Some((
+            if black { 0.3 } else { 0.9 },
+            pixel(across, RASTER.0),
+            pixel(down, RASTER.1),
+        ))
+    }
 }
 
 /// What is projected, vertical first, then horizontal.
@@ -175,20 +199,26 @@ pub fn write(pose: &Pose, seed: u64, folder: &Path) {
 
 /// As [`write()`], under something else.
 pub fn write_as(pose: &Pose, projected: Projected, seed: u64, folder: &Path) {
+    /// Of each pose, light and seed the frames of both patterns, which several tests write.
+    static RENDERED: Once<String, [Vec<Vec<u8>>; 2]> = Once::new();
     fs::create_dir_all(folder.join("frames")).expect("the folder can be made");
-    let mut random = Random::new(seed);
     let (mut entries, mut codes) = (Vec::new(), Vec::new());
     let dark = projected.light(0.0).len();
-    for pattern in 0..2 {
-        let shift = if pattern == 0 { 0.0 } else { pose.moved };
-        let frames = seen(pose, shift, dark, &mut random, |xi, eta| {
-            let phase = [xi / RASTER.0 as f64, eta / RASTER.1 as f64][pattern] * FRINGES;
-            projected.light(phase)
-        });
+    let rendered = RENDERED.get(format!("{pose:?} {projected:?} {seed}"), || {
+        let mut random = Random::new(seed);
+        [0, 1].map(|pattern| {
+            let shift = if pattern == 0 { 0.0 } else { pose.moved };
+            seen(pose, shift, dark, &mut random, |xi, eta| {
+                let phase = [xi / RASTER.0 as f64, eta / RASTER.1 as f64][pattern] * FRINGES;
+                projected.light(phase)
+            })
+        })
+    });
+    for (pattern, frames) in rendered.iter().enumerate() {
         let files: Vec<String> = (0..dark)
             .map(|at| format!("frames/{pattern}-{at}.png"))
             .collect();
-        for (file, counts) in files.iter().zip(&frames) {
+        for (file, counts) in files.iter().zip(frames) {
             png(&folder.join(file), counts);
         }
         let levels = projected.levels();
@@ -257,6 +287,7 @@ fn seen(
     random: &mut Random,
     light: impl Fn(f64, f64) -> Vec<f64>,
 ) -> Vec<Vec<u8>> {
+    let view = View::new(pose, shift);
     let mut frames = vec![Vec::new(); count];
     for at in 0..FRAME.0 * FRAME.1 {
         let mut sums = vec![0.0; count];
@@ -267,7 +298,7 @@ fn seen(
             };
             let x = place(at % FRAME.0, FRAME.0, ray % SUB);
             let y = place(at / FRAME.0, FRAME.1, ray / SUB);
-            let Some((albedo, xi, eta)) = met(pose, (x, y), shift) else {
+            let Some((albedo, xi, eta)) = view.met((x, y)) else {
                 continue;
             };
             if xi < pose.dark {
@@ -293,6 +324,7 @@ fn png(path: &Path, counts: &[u8]) {
     let file = fs::File::create(path).expect("it can be written");
     let mut encoder = png::Encoder::new(file, FRAME.0 as u32, FRAME.1 as u32);
     encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_compression(png::Compression::Fast);
     let mut writer = encoder.write_header().expect("it can be written");
     writer.write_image_data(counts).expect("it can be written");
 }
