@@ -16,8 +16,8 @@ use tests::random::Random;
 
 /// Placements of each joint, in the long form and in the quick one.
 const PLACEMENTS: usize = 12;
-const FEW_PLACEMENTS: usize = 5;
-const REPEATS: usize = 4;
+const FEW_PLACEMENTS: usize = 3;
+const REPEATS: usize = 8;
 const SHIFT_MM: f64 = 1.0;
 const TILT_DEG: f64 = 1.0;
 const TOLERANCE_MM: f64 = 5.0;
@@ -221,11 +221,22 @@ fn judge(camera: &Camera, placements: usize) {
 
 #[test]
 fn a_change_of_gap_or_flush_is_found_with_its_sign() {
+    is_found(1);
+}
+
+#[test]
+#[ignore = "takes a minute: `.ci/run full`"]
+fn a_change_of_gap_or_flush_is_found_with_its_sign_at_three_placements() {
+    is_found(3);
+}
+
+/// Fails if a change is not found at these placements, of which two in three may hide an edge once.
+fn is_found(placements: usize) {
     let joint = joints().swap_remove(0);
     let mut line = Line::new(&joint, &COARSE);
     let mut random = Random::new(8);
     let mut unseen = 0;
-    for _ in 0..3 {
+    for _ in 0..placements {
         let lies = placement(&mut random);
         let before = line.inspect(&joint, &lies);
         for change in [-0.1, 0.1] {
@@ -244,5 +255,5 @@ fn a_change_of_gap_or_flush_is_found_with_its_sign() {
             }
         }
     }
-    assert!(unseen <= 2, "{unseen} are unseen");
+    assert!(unseen <= placements * 2 / 3, "{unseen} are unseen");
 }

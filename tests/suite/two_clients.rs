@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use tests::until::PATIENCE;
 
-const ROUNDS: usize = 60;
+const ROUNDS: usize = 20;
 const DONE: u16 = 200;
 const CONFLICT: u16 = 409;
 
@@ -126,7 +126,7 @@ fn of_two_clients_that_trigger_without_a_pause_each_is_granted_in_turn() {
     let ended = AtomicBool::new(false);
     let (fast, slow) = std::thread::scope(|scope| {
         let fast = scope.spawn(|| trigger(&daemon, 1, 0, &ended));
-        let slow = scope.spawn(|| trigger(&daemon, 30_000, 20, &ended));
+        let slow = scope.spawn(|| trigger(&daemon, 30_000, 8, &ended));
         let began = Instant::now();
         while plc.status().triggers() - before < CYCLES && began.elapsed() < PATIENCE {}
         ended.store(true, Ordering::Relaxed);

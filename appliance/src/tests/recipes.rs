@@ -89,7 +89,7 @@ impl Bed {
 
 #[test]
 fn a_boundary_value_in_a_recipe_is_refused_by_its_key_or_the_recipe_judges_a_part() {
-    put_boundary_values(5);
+    put_boundary_values(20);
 }
 
 #[test]

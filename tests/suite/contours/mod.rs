@@ -15,8 +15,9 @@ use sim::parts::{Defect, Floor, Plate};
 use std::time::Instant;
 use tests::random::Random;
 
-/// Placements of a plate.
+/// Placements of a plate, in the long form and in the quick one.
 const PLACEMENTS: usize = 12;
+const FEW_PLACEMENTS: usize = 5;
 
 fn bright(plate: Plate) -> Plate {
     let floor = Floor {
@@ -121,7 +122,7 @@ fn settings() -> Vec<(&'static str, Setting, f64)> {
 #[test]
 fn holes_slots_and_edges_are_true_and_as_uncertain_as_they_say() {
     let mut judged = Judged::default();
-    Line::new(&Setting::default()).judge("plain", PLACEMENTS, &mut judged);
+    Line::new(&Setting::default()).judge("plain", FEW_PLACEMENTS, &mut judged);
     let [scatter, within, _] = judged.figures();
     assert_eq!(judged.missing, 0);
     assert!(judged.bias <= 8.0, "{}", judged.bias);
@@ -153,7 +154,7 @@ fn judge(settings: Vec<(&'static str, Setting, f64)>) {
 
 #[test]
 fn a_closed_hole_is_absent_and_changes_nothing_else() {
-    closed_holes_are_absent(4);
+    closed_holes_are_absent(2);
 }
 
 /// Closes one hole, or two, in so many placements.
@@ -197,7 +198,7 @@ fn closed_holes_are_absent(placements: usize) {
 
 #[test]
 fn a_displaced_hole_and_a_larger_one_fail_and_good_plates_pass() {
-    defects_fail(6);
+    defects_fail(2);
 }
 
 /// Measures good plates, larger holes and displaced ones in so many placements.
