@@ -40,6 +40,7 @@ fn naming() -> Naming {
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
         exposures: 1,
+        everything: false,
     }
 }
 

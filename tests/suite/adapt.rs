@@ -256,6 +256,7 @@ fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
         exposures: 1,
+        everything: false,
     };
     let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent()).expect("a sphere");
     let taught = taught.seal().expect("packed");

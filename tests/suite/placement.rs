@@ -102,6 +102,7 @@ fn teach_now(
         taught_at_unix_s: 0,
         placement_tolerance_mm,
         exposures,
+        everything: false,
     };
     let (head, calibration) = (&mut bed.head, &bed.calibration);
     let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent());

@@ -173,6 +173,7 @@ fn a_teach_that_is_ended_does_no_further_step() {
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
         exposures: 1,
+        everything: false,
     };
     let told = Mutex::new(Vec::new());
     let progress = |share: f64, _: &str| {

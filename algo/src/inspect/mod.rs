@@ -14,6 +14,7 @@ mod region;
 mod ripple;
 pub mod section;
 mod strips;
+mod surroundings;
 mod table;
 mod taught;
 mod weight;
@@ -38,5 +39,6 @@ pub use strips::{
     Lost, MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Place,
     Production, Profile, SeenRim, Signal, Skipped, Strips, Unmeasurable,
 };
+pub use surroundings::{Surroundings, surroundings};
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

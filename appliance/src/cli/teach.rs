@@ -14,7 +14,7 @@ use crate::recipe::file::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_
 use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe, UnsealedRecipe};
 use crate::recipe::teach::{TeachError, teach};
 use crate::recipe::{PatternFile, RecipeFile, Store};
-use crate::recipe::{replace, signal};
+use crate::recipe::{replace, signal, surroundings};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
@@ -55,6 +55,10 @@ pub struct Teach {
     /// or 1.
     #[arg(long, value_name = "N", conflicts_with = "golden", value_parser = number(1, MAX_EXPOSURES))]
     exposures: Option<u32>,
+    /// Take all that is seen for the part, also a flat surface that lies behind it all round: the base of
+    /// a part that is larger than the picture. A recipe that is replaced says so for the next one.
+    #[arg(long)]
+    everything: bool,
     /// Let cycles begin with two frames, the fringe and its complement; where they do not hold, the
     /// sequence that the limits ask for follows in the same cycle.
     #[arg(long, value_name = "2", value_parser = number(2_u16, 2))]
@@ -223,6 +227,7 @@ impl Teach {
             name: self.name.clone().unwrap_or(kept.name),
             placement_tolerance_mm: self.tolerance.unwrap_or(kept.placement_tolerance_mm),
             exposures: self.exposures.unwrap_or(kept.exposures),
+            everything: self.everything || kept.everything,
             ..kept
         }
     }
@@ -301,6 +306,14 @@ impl Teach {
         let at = measured.primary;
         let full = &measured.shots;
         let signal = signal::of_recording(&recording, at).map_err(|error| wrong(&error))?;
+        let (mut phases, mut heights) = (phases.clone(), surface.map.clone());
+        let found = match naming.everything {
+            true => None,
+            false => surroundings::of(&heights, &surface.triangulator),
+        };
+        if let Some(found) = &found {
+            surroundings::leave_out(found, &mut phases, &mut heights);
+        }
         let part = GoldenPart {
             calibration: &calibration,
             pattern: PatternFile::of(&recording.patterns[at]),
@@ -309,12 +322,13 @@ impl Teach {
             full,
             decoder: decoder.clone(),
             triangulator: surface.triangulator.clone(),
-            phases: phases.clone(),
-            heights: surface.map.clone(),
+            phases,
+            heights,
             offsets: Vec::new(),
             signal,
             noise: SampleNoise::constant(noise),
             offset_counts: None,
+            surroundings: found,
             captures: 1,
             comparison: None,
         };

@@ -89,6 +89,8 @@ pub struct Conditions {
     pub calibration: CalibrationError,
     /// |ΔΦ| in turns up to which the expansion of the height holds.
     pub expansion_range_turns: f64,
+    /// How far behind golden's heights the surroundings begin, mm; `None` if there are none.
+    pub surroundings_mm: Option<f64>,
     /// What is known of good parts' deviations.
     pub good_parts: Option<GoodPartsFile>,
 }
@@ -386,6 +388,7 @@ impl From<&RecipeFile> for Conditions {
                     length: sigma.length_mm / LENGTH,
                 }),
             expansion_range_turns: file.expansion_range_turns,
+            surroundings_mm: file.surroundings_mm,
             good_parts: file.good_parts,
         }
     }

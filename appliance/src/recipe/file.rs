@@ -107,6 +107,13 @@ bounded! {
         /// not known.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub calibration_sigma: Option<CalibrationSigma> = Fields,
+        /// Whether all that was seen was taken for the part, also what lies behind it all round.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        pub everything: bool,
+        /// Heights that lie so many mm behind golden's, or farther, are those of what the part lies on;
+        /// `None` if nothing else was seen.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub surroundings_mm: Option<f64> = 0.0..=1000.0,
         /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and
         /// `height_curvature.npy` give the height accurately.
         pub expansion_range_turns: f64 = 1e-3..=MAX_FRINGES,

@@ -8,6 +8,7 @@ use super::good_parts::DEVIATION_MM;
 use super::models::ModelsFile;
 use super::planner::{self, Choice};
 use super::sides::SIDES;
+use super::surroundings;
 use super::{AlignmentKind, FeatureFile, GaugeFile, PatternFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
@@ -15,7 +16,7 @@ use crate::system::headway::Headway;
 use algo::adaptive::phase_reach;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
-use algo::inspect::{Measure, eroded, openings};
+use algo::inspect::{Measure, Surroundings, eroded, openings};
 use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
@@ -58,6 +59,8 @@ pub struct Naming {
     pub placement_tolerance_mm: f64,
     /// Each frame is exposed so many times as long as the head is set to, 1 to 4.
     pub exposures: u32,
+    /// Whether all that is seen is the part, also what lies behind it all round.
+    pub everything: bool,
 }
 
 /// A measured golden part.
@@ -87,6 +90,8 @@ pub struct GoldenPart<'a> {
     pub noise: SampleNoise,
     /// Median of the mean samples of the part's pixels, counts; `None` where it was not measured.
     pub offset_counts: Option<f64>,
+    /// What was left out of `phases` and `heights`; `None` if nothing but the part was seen.
+    pub surroundings: Option<Surroundings>,
     /// Number of captures that `phases` and `heights` are the mean of; their σ is that of one
     /// capture.
     pub captures: usize,
@@ -237,6 +242,8 @@ impl GoldenPart<'_> {
             least_modulation: self.decoder.least_modulation().eight_bit(),
             models: ModelsFile::of(calibration),
             calibration_sigma: calibration.sigma,
+            everything: naming.everything,
+            surroundings_mm: self.surroundings.as_ref().map(|found| found.step_mm / 2.0),
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,
             judges_nothing: false,
@@ -255,6 +262,9 @@ impl GoldenPart<'_> {
         let mut choice = planner::choose(&manifest.sequences, &manifest.gauges, widest);
         manifest.production = choice.production;
         choice.reasons.append(&mut words);
+        choice
+            .reasons
+            .extend(self.surroundings.as_ref().map(surroundings::words));
         Ok(UnsealedRecipe {
             manifest,
             arrays,

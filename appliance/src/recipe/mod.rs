@@ -69,6 +69,7 @@ mod shots;
 mod sides;
 pub mod signal;
 pub mod store;
+pub mod surroundings;
 pub mod teach;
 pub mod tolerance;
 pub mod trying;

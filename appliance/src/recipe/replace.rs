@@ -7,8 +7,8 @@ use crate::system::headway::Headway;
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 
-/// Names, placement tolerance and exposures of a recipe that is taught under a number: those of the
-/// recipe that it replaces, if any.
+/// Names, placement tolerance, exposures and what is the part, of a recipe that is taught under a
+/// number: those of the recipe that it replaces, if any.
 pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
     let kept = replaced.cloned();
     let exposures = replaced.map_or(1, |file| file.exposures);
@@ -27,6 +27,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
         taught_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
         placement_tolerance_mm,
         exposures,
+        everything: replaced.is_some_and(|file| file.everything),
     }
 }
 

@@ -12,6 +12,7 @@ use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use super::plan::Plan;
 use super::proof;
+use super::surroundings;
 use crate::head::calibrated::CalibratedHead;
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
@@ -90,6 +91,13 @@ pub fn teach_marking(
         first = head.measure_lit(&illumination, function, shots, None, &measured)?;
     }
     refuse_empty(&first.phases)?;
+    let found = match naming.everything {
+        true => None,
+        false => computing.on(|| surroundings::of(&first.heights, &first.triangulator)),
+    };
+    if let Some(found) = &found {
+        surroundings::leave_out(found, &mut first.phases, &mut first.heights);
+    }
     let adapting = stage(0.2, 0.3, "making the part's own pattern")?;
     let adapted = |share| adapting.done(share);
     let AdaptivePattern { function, expected } =
@@ -99,7 +107,7 @@ pub fn teach_marking(
     let full = Sequence::dense(DENSE_N, SHIFTS);
     let candidates = candidates(calibration.waveforms(), &full);
     let sequences: Vec<&[Shot]> = candidates.iter().map(|(_, frames)| &frames[..]).collect();
-    let golden = Captured::take(
+    let mut golden = Captured::take(
         &mut head,
         &illumination,
         &function,
@@ -107,6 +115,9 @@ pub fn teach_marking(
         &expected,
         stage(0.3, 0.55, "measuring the part with its own pattern")?,
     )?;
+    if let Some(found) = &found {
+        surroundings::leave_out(found, &mut golden.phases, &mut golden.heights);
+    }
     refuse_empty(&golden.phases)?;
     let adaptive = (full.len(), &golden.phases, &golden.heights);
     let fixed = (preliminary.shots.len(), &first.phases, &first.heights);
@@ -126,6 +137,7 @@ pub fn teach_marking(
         signal: golden.signal,
         noise: golden.noise,
         offset_counts: golden.offset_counts,
+        surroundings: found,
         captures: CAPTURES,
         comparison: Some(comparison),
     };

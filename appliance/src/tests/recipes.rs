@@ -53,6 +53,7 @@ impl Bed {
             taught_at_unix_s: 0,
             placement_tolerance_mm: 1.0,
             exposures: 1,
+            everything: false,
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent()).unwrap();
         let taught = taught.seal().unwrap();

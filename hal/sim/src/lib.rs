@@ -8,6 +8,7 @@ mod blur;
 mod body;
 pub mod controller;
 mod footprint;
+mod ground;
 mod limits;
 pub mod material;
 mod mechanics;
@@ -24,6 +25,7 @@ pub mod timing;
 mod trace;
 pub mod transport;
 
+pub use ground::Ground;
 pub use hal::virtual_head::Faults;
 pub use material::Material;
 pub use parts::Part;

@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Deserializer};
 
+use super::ground::Ground;
 use super::material::{Lighting, Material};
 use super::optics::{Lens, turn, turned};
 use super::parts::Part;
@@ -47,6 +48,9 @@ bounded! {
         pub optics: Optics = Fields,
         /// What is measured.
         pub part: Part,
+        /// What it lies on; nothing if it is not given.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub floor: Option<Ground> = Fields,
         /// How the part lies.
         pub placement: Placement = Fields,
         /// Exposure, readout and delays.

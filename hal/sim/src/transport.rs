@@ -17,6 +17,7 @@ use rayon::prelude::*;
 
 use super::body::{Body, Hit};
 use super::footprint::Footprint;
+use super::ground::Floor;
 use super::material::Lighting;
 use super::material::Material;
 use super::optics::{Lens, Vector, dot, minus, normalised, plus, turned, turned_back};
@@ -130,6 +131,9 @@ impl Transport {
             placed: &placed,
             reflection: &reflection,
             body,
+            floor: scenario
+                .floor
+                .map(|ground| Floor::below(&scenario.part, &ground)),
             footprint: Footprint::bare(scenario.sub_rays),
         };
         let (width, height) = (scenario.rig.camera.width, scenario.rig.camera.height);
@@ -223,6 +227,7 @@ struct Tracer<'a> {
     placed: &'a Placed,
     reflection: &'a Reflection,
     body: Option<&'a dyn Body>,
+    floor: Option<Floor>,
     footprint: Footprint,
 }
 
@@ -332,10 +337,20 @@ impl Tracer<'_> {
         row
     }
 
-    /// Where the ray of camera point (u, v) meets the part, in the part's coordinates.
+    /// Where the ray of camera point (u, v) meets the part or the floor, in the part's coordinates.
     fn hit(&self, u: f64, v: f64) -> Option<(Hit, Vector)> {
-        let direction = turned_back(&self.placed.rotation, self.camera.ray(u, v));
-        let hit = self.body?.first_hit(self.placed.eye, direction)?;
+        let (rotation, eye) = (&self.placed.rotation, self.placed.eye);
+        let ray = self.camera.ray(u, v);
+        let direction = turned_back(rotation, ray);
+        let met = self.body.and_then(|body| body.first_hit(eye, direction));
+        let floor = self.floor.as_ref();
+        let floor = floor
+            .and_then(|floor| floor.meets((self.camera.centre(), ray), rotation, (eye, direction)));
+        let hit = match (met, floor) {
+            (Some(met), Some((t, _))) if dot(minus(met.point, eye), direction) <= t => met,
+            (_, Some((_, floor))) => floor,
+            (met, None) => met?,
+        };
         Some((hit, direction))
     }
 
@@ -358,7 +373,11 @@ impl Tracer<'_> {
         if !on(raster[0], device.width) || !on(raster[1], device.height) {
             return None;
         }
-        (!self.body?.shadowed(hit, towards)).then_some(Lit { raster, share })
+        let is_shadowed = self.body.is_some_and(|body| match hit.is_on_floor() {
+            true => body.first_hit(hit.point, towards).is_some(),
+            false => body.shadowed(hit, towards),
+        });
+        (!is_shadowed).then_some(Lit { raster, share })
     }
 
     /// The taps of a camera pixel whose sub-rays, each of so large a `share`, meet these points.

@@ -45,6 +45,7 @@ impl Part {
             taught_at_unix_s: 0,
             placement_tolerance_mm: 0.5,
             exposures: 1,
+            everything: false,
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent());
         let taught = taught.expect("a plane can be taught").seal();

@@ -81,8 +81,8 @@ impl Counts {
                 let span = common(columns, &extent);
                 let offsets = &heights.offset[span.clone()];
                 let modulations = &decoded.modulation[span];
-                count_known(backend, offsets, &mut self.covered[at]);
                 let (threshold, variance) = (&gauges.threshold, &mut self.variance[at]);
+                count_known(backend, threshold, offsets, &mut self.covered[at]);
                 add_variances(backend, threshold, offsets, modulations, variance);
             }
         }

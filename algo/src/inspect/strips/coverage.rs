@@ -27,7 +27,7 @@ use crate::pattern::Unwrapping;
 use crate::phase::Decoder;
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};
-use crate::units::Modulation;
+use crate::units::{Height, Modulation};
 
 /// The modulations at which it is uncertain whether a pixel is resolved, in units of full scale
 /// / 65535.
@@ -39,6 +39,8 @@ pub struct Threshold {
     variance: f64,
     /// From here on a pixel says nothing of the density at the threshold.
     beyond: u16,
+    /// Pixels whose height is this far from golden's or lower are not of the part, nm.
+    behind: i32,
 }
 
 /// Width above the threshold, in σ, within which the density of modulations is taken for a straight
@@ -70,7 +72,15 @@ impl Threshold {
             },
             // Not a number becomes 0: then no pixel is uncertain.
             beyond: (least + WIDTH * sigma) as u16,
+            behind: NO_OFFSET,
         }
+    }
+
+    /// The same, where heights that lie `mm` behind golden's, or farther, are those of the part's
+    /// surroundings.
+    pub fn in_front_of(mut self, mm: Option<f64>) -> Self {
+        self.behind = mm.map_or(NO_OFFSET, |mm| Height::from_mm(-mm).nm());
+        self
     }
 
     /// Whether a modulation is just above the threshold; pixels that are not resolved have a
@@ -93,8 +103,8 @@ impl Threshold {
 const BLOCK: usize = 64;
 
 back_end_entry! {
-    /// Adds the number of pixels with a height to `count`.
-    fn count_known [] = known(offsets: &[i32], count: &mut u64)
+    /// Adds the number of pixels with a height of the part to `count`.
+    fn count_known [] = known(threshold: &Threshold, offsets: &[i32], count: &mut u64)
 }
 
 back_end_entry! {
@@ -108,10 +118,11 @@ back_end_entry! {
 }
 
 #[inline(always)]
-fn known<V: Lanes>(_: V, offsets: &[i32], count: &mut u64) {
+fn known<V: Lanes>(_: V, threshold: &Threshold, offsets: &[i32], count: &mut u64) {
     let mut known = 0_u32;
+    // [`NO_OFFSET`] is the least of all.
     for &offset in offsets {
-        known = known.wrapping_add(u32::from(offset != NO_OFFSET));
+        known = known.wrapping_add(u32::from(offset > threshold.behind));
     }
     *count += u64::from(known);
 }
@@ -133,7 +144,7 @@ fn variances<V: Lanes>(
             continue;
         }
         for (&offset, &modulation) in offsets.iter().zip(modulations) {
-            if offset != NO_OFFSET && threshold.is_near(modulation) {
+            if offset > threshold.behind && threshold.is_near(modulation) {
                 *sum += threshold.variance(modulation);
             }
         }

@@ -66,6 +66,9 @@ pub struct Parts {
     pub calibration: CalibrationError,
     /// RMS of the periodic error of a mean height by this sequence, mm.
     pub ripple: f64,
+    /// Heights that lie so many mm behind golden's, or farther, are those of the part's surroundings;
+    /// `None` where nothing else is seen.
+    pub surroundings: Option<f64>,
     /// How contours are demodulated, and golden's light; only read if gauges are of contours.
     pub light: Option<(Levels, GoldenSignal)>,
 }
@@ -113,6 +116,7 @@ impl Production {
             displaced,
             calibration,
             ripple,
+            surroundings,
             light,
         } = parts;
         let turns = decoder.phase_noise(
@@ -126,7 +130,7 @@ impl Production {
         };
         let range = golden.triangulator.range();
         let span_nm = (range.high - range.low) * 1e6;
-        let threshold = Threshold::new(&decoder, noise);
+        let threshold = Threshold::new(&decoder, noise).in_front_of(surroundings);
         let surface = golden.surface();
         let gauges = Gauges::new(
             &features,

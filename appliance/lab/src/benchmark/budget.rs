@@ -127,6 +127,7 @@ pub fn budgets(
         taught_at_unix_s: 0,
         placement_tolerance_mm: PLACEMENT_MM,
         exposures: 1,
+        everything: false,
     };
     progress(0.3, &format!("{about}: teaching"));
     let headway = Headway::silent();

@@ -250,6 +250,7 @@ impl Prepared {
             displaced: shared.gauges.iter().map(displaced).collect(),
             calibration: shared.conditions.calibration,
             ripple: ripple_mm,
+            surroundings: shared.conditions.surroundings_mm,
             light: signal.map(|signal| (levels, signal)),
         });
         let production = production.map_err(|error| refusal(error, shared))?;

@@ -237,6 +237,13 @@ impl Part {
         })
     }
 
+    /// z of its lowest point as designed, mm; 0 of nothing.
+    pub(crate) fn lowest(&self) -> f64 {
+        let thin = self.surface().map(|surface| surface.bounds()[0][2]);
+        thin.or_else(|| self.solid().map(|solid| solid.lowest()))
+            .unwrap_or(0.0)
+    }
+
     /// The solid to trace, of plate and joint.
     pub(crate) fn solid(&self) -> Option<Solid> {
         match self {

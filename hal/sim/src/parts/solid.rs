@@ -34,6 +34,12 @@ impl Solid {
             floor: (floor.albedo > 0.0).then_some([z - floor.depth, floor.albedo]),
         }
     }
+
+    /// z of the lowest corner of its sheets.
+    pub(super) fn lowest(&self) -> f64 {
+        let sheets = self.sheets.iter().map(Sheet::lowest);
+        sheets.fold(f64::INFINITY, f64::min)
+    }
 }
 
 impl Body for Solid {

@@ -259,6 +259,7 @@ impl Head {
             displaced: vec![None],
             calibration: CalibrationError::default(),
             ripple: 0.0,
+            surroundings: None,
             light: None,
         });
         production.unwrap()
