@@ -96,7 +96,7 @@ impl Line {
     fn defects_fail(&mut self, defects: &[Defect]) {
         for defect in defects {
             let mut part = self.part.clone();
-            part.defects_mut().unwrap().push(defect.clone());
+            part.defects_mut().unwrap().push(*defect);
             let found = self.judge(&part, &Placement::default());
             assert_eq!(found.verdict(), Verdict::Fail, "{defect:?}: {found:#?}");
         }
