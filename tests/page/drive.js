@@ -92,10 +92,15 @@ try {
     for (const layer of ["deviation", "modulation", "height"]) {
       await page.click(`[data-layer=${layer}]`);
       await page.waitForFunction(() => document.querySelector("#no-picture").hidden);
-      await page.hover("#map");
+      // The picture of the layer before is there until this one comes.
       const unit = layer === "modulation" ? "counts" : "mm";
-      const words = await page.textContent("#cursor");
-      assert.ok(words.includes(unit) || words.includes("nothing measured"), words);
+      const due = Date.now() + PATIENCE;
+      for (let words = ""; !words.includes(unit) && !words.includes("nothing measured");) {
+        await page.mouse.move(1, 1);
+        await page.hover("#map");
+        words = await page.textContent("#cursor");
+        assert.ok(Date.now() < due, `${layer}: ${words}`);
+      }
     }
     assert.ok(await page.locator("#gauge-rows tr").count() >= 2);
     assert.ok(await page.locator("#gauge-rows .trend path.line").count() >= 2);

@@ -92,12 +92,6 @@ fn every_stock_part_that_is_taught_with_one_click_passes() {
 }
 
 #[test]
-#[ignore = "takes two minutes: `.ci/run full`"]
-fn every_stock_part_that_is_taught_with_one_click_over_a_grey_floor_passes() {
-    good_parts_pass(1, "sub_rays = 2\n[floor]\nalbedo = 0.35\ndepth_mm = 20.0\n");
-}
-
-#[test]
 #[ignore = "takes minutes: `.ci/run full`"]
 fn every_stock_part_that_is_taught_with_one_click_passes_twenty_times() {
     good_parts_pass(20, "");
