@@ -6,7 +6,7 @@ use crate::placement::{Bed, bed, taught};
 use appliance::recipe::plan::Plan;
 use appliance::station::{Inspection, Verdict};
 use sim::parts::{Defect, Plate, SheetMetal};
-use sim::{Ground, Part, Placement, Scenario};
+use sim::{Ground, Part, Placement, Scenario, Stage};
 use tests::random::Random;
 
 /// The limit that every teach asks for, ± mm.
@@ -169,4 +169,30 @@ fn a_stamped_bracket_over_a_floor_is_judged_right() {
         Defect::MissingHole { index: 0 },
         Defect::BentFlange { degrees: 3.0 },
     ]);
+}
+
+#[test]
+fn the_floor_lies_below_the_part_that_is_put_there_and_not_below_the_first_one() {
+    let small = |part: &Part| {
+        let mut scenario = scenario(part, Some(GREY));
+        (scenario.rig.camera.width, scenario.rig.camera.height) = (64, 64);
+        scenario
+    };
+    let (_head, stage) = sim::head(&small(&plate())).unwrap();
+    let bits = |stage: &Stage| {
+        stage
+            .truth()
+            .height
+            .iter()
+            .map(|z| z.to_bits())
+            .collect::<Vec<_>>()
+    };
+    for part in Part::stock()
+        .into_iter()
+        .filter(|part| *part != (Part::Empty {}))
+    {
+        stage.place(&part, &Placement::default()).unwrap();
+        let (_head, own) = sim::head(&small(&part)).unwrap();
+        assert_eq!(bits(&stage), bits(&own), "{part:?}");
+    }
 }

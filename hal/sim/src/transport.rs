@@ -131,9 +131,10 @@ impl Transport {
             placed: &placed,
             reflection: &reflection,
             body,
-            floor: scenario
-                .floor
-                .map(|ground| Floor::below(&scenario.part, &ground)),
+            floor: scenario.floor.map(|ground| {
+                let is_nothing = matches!(part, Part::Empty {});
+                Floor::below(if is_nothing { &scenario.part } else { part }, &ground)
+            }),
             footprint: Footprint::bare(scenario.sub_rays),
         };
         let (width, height) = (scenario.rig.camera.width, scenario.rig.camera.height);
