@@ -73,25 +73,31 @@ async function handles(page, where) {
   await page.click("#recipe-rows tr button:has-text('Edit')");
   await page.waitForSelector("#editor-regions .handle");
   const tap = async (at) => page.touchscreen.tap(at.x, at.y);
+  // Scrolls to one of what fits, and says where it lies, in one step: all are drawn anew when what a trial found arrives.
+  const place = (fits, index) => page.evaluate(([fits, index]) => {
+    const one = Array.from(document.querySelectorAll(fits)).at(index);
+    one.scrollIntoView({ block: "center", behavior: "instant" });
+    const { x, y, width, height } = one.getBoundingClientRect();
+    return { x, y, width, height };
+  }, [fits, index]);
   for (const index of [0, 1]) {
     // The second region is a small one; the first, the whole frame, is chosen already.
     if (index) {
-      const region = page.locator("#editor-regions .region").nth(index);
-      await region.scrollIntoViewIfNeeded();
-      const box = await region.boundingBox();
-      await tap({ x: box.x + box.width / 2, y: box.y + box.height / 2 });
+      const region = await place("#editor-regions .region", index);
+      await tap({ x: region.x + region.width / 2, y: region.y + region.height / 2 });
       await page.waitForFunction((at) => document.querySelectorAll("#editor-regions .region")[at].classList.contains("chosen"), index);
     }
     const all = await page.locator("#editor-regions .handle").count();
     for (let corner = 0; corner < all; corner += 1) {
-      const handle = page.locator("#editor-regions .handle").nth(corner);
-      await handle.scrollIntoViewIfNeeded();
-      const reached = await handle.evaluate((one, finger) => {
+      // As above, in one step.
+      const reached = await page.evaluate(([corner, finger]) => {
+        const one = document.querySelectorAll("#editor-regions .handle")[corner];
+        one.scrollIntoView({ block: "center", behavior: "instant" });
         const box = (one.querySelector(".target") || one).getBoundingClientRect();
         const middle = [(box.left + box.right) / 2, (box.top + box.bottom) / 2], by = finger / 2 - 0.5;
         const corners = [[-by, -by], [by, -by], [-by, by], [by, by]].map(([x, y]) => document.elementFromPoint(middle[0] + x, middle[1] + y));
         return corners.every((found) => found && found.closest(".handle") === one);
-      }, FINGER);
+      }, [corner, FINGER]);
       assert.ok(reached, `corner ${corner + 1} of region ${index + 1} is smaller than ${FINGER} px at ${where}`);
     }
   }
@@ -104,7 +110,7 @@ async function handles(page, where) {
   });
   assert.ok(inside, `a small region cannot be dragged by its inside at ${where}`);
   const last = page.locator("#editor-regions .handle").last();
-  const box = await last.locator(".target").boundingBox();
+  const box = await place("#editor-regions .handle .target", -1);
   await tap({ x: box.x + 2, y: box.y + box.height / 2 });
   assert.equal(await page.locator("#editor-regions .handle.chosen").getAttribute("aria-label"), await last.getAttribute("aria-label"));
   await page.click("#editor-close");
