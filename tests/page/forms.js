@@ -102,8 +102,9 @@ async function handles(page, where) {
     }
   }
   // The smaller region is selected; its centre must not hit a corner.
-  const inside = await page.locator("#editor-regions .region.chosen").evaluate((one) => {
-    one.scrollIntoView({ block: "center" });
+  const inside = await page.evaluate(() => {
+    const one = document.querySelector("#editor-regions .region.chosen");
+    one.scrollIntoView({ block: "center", behavior: "instant" });
     const box = one.getBoundingClientRect();
     const found = document.elementFromPoint((box.left + box.right) / 2, (box.top + box.bottom) / 2);
     return found === one;
