@@ -1,17 +1,22 @@
-//! The floor on which a part lies: a plane of the world, which stays where it is when the part moves.
+//! What a part lies on and among: a floor, pins, clamps and the next part, which stay where they are in the
+//! world when the part moves.
 
 use hal::bounded;
+use hal::bounds::{Fields, MAX_PLACEMENT_MM};
 
-use super::body::Hit;
-use super::optics::{Vector, along, dot, minus, turn, turned, turned_back};
+use super::body::{Body, Hit, clip};
+use super::optics::{Vector, along, dot, minus, plus, turn, turned, turned_back};
 use super::parts::Part;
 
-/// The number of its face: no part has so many.
+/// The numbers of their faces begin with this: no part has so many.
 const FACE: u16 = u16::MAX / 4;
+/// What the darker squares of a print reflect, as a share of the lighter ones.
+const INK: f64 = 0.3;
+/// Shadow rays start at this distance from a surface, mm.
+const LIFT_MM: f64 = 1e-4;
 
 bounded! {
-    /// A matte floor without an end.
-    #[derive(Copy)]
+    /// A matte floor without an end, and what stands on it.
     pub struct Ground: Default {
         /// What it reflects of the light that the part would reflect.
         pub albedo: f64 = 0.0..=1.0 => 0.35,
@@ -20,53 +25,186 @@ bounded! {
         pub depth_mm: f64 = 0.0..=1000.0 => 20.0,
         /// Tilt about x and about y, degrees.
         pub tilt_deg: [f64; 2] = -45.0..=45.0,
+        /// Side of the squares of a printed checkerboard, mm; 0 is no print.
+        pub print_mm: f64 = 0.0..=1000.0,
+        /// Pins that stand on it, as bright as the part.
+        pub pins: Vec<Pin> = Fields,
+        /// Clamps, as bright as the part.
+        pub clamps: Vec<Clamp> = Fields,
+        /// Shift in x and y from the designed part to another one like it, mm; none without.
+        pub next_mm: Option<[f64; 2]> = -MAX_PLACEMENT_MM..=MAX_PLACEMENT_MM,
+    }
+
+    /// An upright cylinder.
+    #[derive(Copy)]
+    pub struct Pin: Default {
+        /// Its axis, mm.
+        pub x: f64 = -MAX_PLACEMENT_MM..=MAX_PLACEMENT_MM,
+        /// See above.
+        pub y: f64 = -MAX_PLACEMENT_MM..=MAX_PLACEMENT_MM,
+        /// Diameter, mm.
+        pub diameter_mm: f64 = 0.1..=1000.0 => 8.0,
+        /// How far its top lies above the floor, mm.
+        pub height_mm: f64 = 0.1..=1000.0 => 20.0,
+    }
+
+    /// An upright block.
+    #[derive(Copy)]
+    pub struct Clamp: Default {
+        /// Its lowest corner, mm.
+        pub low: [f64; 3] = -MAX_PLACEMENT_MM..=MAX_PLACEMENT_MM => [-10.0; 3],
+        /// Its highest corner, mm.
+        pub high: [f64; 3] = -MAX_PLACEMENT_MM..=MAX_PLACEMENT_MM => [10.0; 3],
     }
 }
 
-/// A floor in the world.
-pub(crate) struct Floor {
+/// The world around a part.
+pub(crate) struct World<'a> {
     albedo: f64,
-    /// Where it crosses the z axis, and its unit normal.
+    print_mm: f64,
+    /// Where the floor crosses the z axis, its unit normal, and two directions in it.
     point: Vector,
-    normal: Vector,
+    axes: [Vector; 3],
+    pins: Vec<Pin>,
+    clamps: Vec<Clamp>,
+    next: Option<(&'a dyn Body, Vector)>,
 }
 
-impl Floor {
-    /// The floor below this part, wherever that lies and whatever defects it has.
-    pub fn below(part: &Part, ground: &Ground) -> Self {
+impl<'a> World<'a> {
+    /// The world below a part as designed, wherever that lies, with another one like it, as what rays meet.
+    pub fn below(part: &Part, ground: &Ground, another: Option<&'a dyn Body>) -> Self {
         let [x, y] = ground.tilt_deg;
-        let mut part = part.clone();
-        part.defects_mut().map(Vec::clear);
+        let turn = turn([x, y, 0.0]);
+        let next = ground.next_mm.zip(another);
         Self {
             albedo: ground.albedo,
+            print_mm: ground.print_mm,
             point: [0.0, 0.0, part.lowest() - ground.depth_mm],
-            normal: turned(&turn([x, y, 0.0]), [0.0, 0.0, 1.0]),
+            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+                .map(|axis| turned(&turn, axis)),
+            pins: ground.pins.clone(),
+            clamps: ground.clamps.clone(),
+            next: next.map(|([x, y], body)| (body, [x, y, 0.0])),
         }
     }
 
-    /// Where a ray of the world meets it, in front of its origin: the distance, and the hit in the
-    /// coordinates of a part that is turned by `rotation` and sees the ray as `origin` and `direction`.
+    /// The first point of the world on a ray: the distance, and the hit, in the world's coordinates.
+    fn first(&self, origin: Vector, direction: Vector) -> Option<(f64, Hit)> {
+        let solids = self.solid(origin, direction);
+        let hits = solids.into_iter().chain(self.floor(origin, direction));
+        hits.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    fn floor(&self, origin: Vector, direction: Vector) -> Option<(f64, Hit)> {
+        let [right, up, normal] = self.axes;
+        let above = dot(normal, minus(origin, self.point));
+        let t = -above / dot(normal, direction);
+        let is_met = above > 0.0 && t > 0.0 && t.is_finite();
+        is_met.then(|| {
+            let point = along(origin, direction, t);
+            let square = |axis| (dot(axis, minus(point, self.point)) / self.print_mm).floor();
+            let is_inked =
+                self.print_mm > 0.0 && (square(right) + square(up)).rem_euclid(2.0) != 0.0;
+            let albedo = self.albedo * if is_inked { INK } else { 1.0 };
+            (t, hit(point, normal, albedo, 2 * u16::from(is_inked)))
+        })
+    }
+
+    /// The first point of what stands on the floor.
+    fn solid(&self, origin: Vector, direction: Vector) -> Option<(f64, Hit)> {
+        let pins = self.pins.iter().filter_map(|pin| {
+            let foot = self.height(pin.x, pin.y);
+            cylinder(pin, foot, origin, direction)
+        });
+        let clamps = self
+            .clamps
+            .iter()
+            .filter_map(|clamp| block(clamp, origin, direction));
+        let next = self.next.and_then(|(body, shift)| {
+            let mut found = body.first_hit(minus(origin, shift), direction)?;
+            found.point = plus(found.point, shift);
+            found.face += FACE + 8;
+            Some((dot(minus(found.point, origin), direction), found))
+        });
+        let solids = pins.chain(clamps).chain(next);
+        solids.min_by(|a, b| a.0.total_cmp(&b.0))
+    }
+
+    /// z of the floor.
+    fn height(&self, x: f64, y: f64) -> f64 {
+        let [a, b, c] = self.axes[2];
+        self.point[2] - (a * x + b * y) / c
+    }
+
+    /// Where a ray of the world meets it: the distance, and the hit in the coordinates of a part that is
+    /// turned by `rotation` and lies at `shift`.
     pub fn meets(
         &self,
         (from, towards): (Vector, Vector),
-        rotation: &[f64; 9],
-        (origin, direction): (Vector, Vector),
+        (rotation, shift): (&[f64; 9], Vector),
     ) -> Option<(f64, Hit)> {
-        let above = dot(self.normal, minus(from, self.point));
-        let t = -above / dot(self.normal, towards);
-        let hit = Hit {
-            point: along(origin, direction, t),
-            normal: turned_back(rotation, self.normal),
-            albedo: self.albedo,
-            face: FACE,
-        };
-        (above > 0.0 && t > 0.0 && t.is_finite()).then_some((t, hit))
+        let (t, mut hit) = self.first(from, towards)?;
+        hit.point = turned_back(rotation, minus(hit.point, shift));
+        hit.normal = turned_back(rotation, hit.normal);
+        Some((t, hit))
+    }
+
+    /// Whether something on the floor lies between a point of the world and a distant one in direction `towards`.
+    pub fn shades(&self, point: Vector, normal: Vector, towards: Vector) -> bool {
+        let start = along(point, normal, LIFT_MM);
+        self.solid(start, towards).is_some()
     }
 }
 
+fn hit(point: Vector, normal: Vector, albedo: f64, face: u16) -> Hit {
+    Hit {
+        point,
+        normal,
+        albedo,
+        face: FACE + face,
+    }
+}
+
+/// Where a ray enters a pin that stands at this height.
+fn cylinder(pin: &Pin, foot: f64, origin: Vector, direction: Vector) -> Option<(f64, Hit)> {
+    let (radius, top) = (pin.diameter_mm / 2.0, foot + pin.height_mm);
+    let [x, y, z] = minus(origin, [pin.x, pin.y, 0.0]);
+    let [dx, dy, dz] = direction;
+    let (a, b, c) = (
+        dx * dx + dy * dy,
+        x * dx + y * dy,
+        x * x + y * y - radius * radius,
+    );
+    let t = (-b - (b * b - a * c).sqrt()) / a;
+    let at = along(origin, direction, t);
+    if t > 0.0 && (foot..=top).contains(&at[2]) {
+        let normal = [(at[0] - pin.x) / radius, (at[1] - pin.y) / radius, 0.0];
+        return Some((t, hit(at, normal, 1.0, 4)));
+    }
+    let t = (top - z) / dz;
+    let at = along(origin, direction, t);
+    let is_top = dz < 0.0 && t > 0.0 && (at[0] - pin.x).hypot(at[1] - pin.y) <= radius;
+    is_top.then(|| (t, hit(at, [0.0, 0.0, 1.0], 1.0, 5)))
+}
+
+/// Where a ray enters a clamp.
+fn block(clamp: &Clamp, origin: Vector, direction: Vector) -> Option<(f64, Hit)> {
+    let (t, _) = clip(&[clamp.low, clamp.high], origin, direction)?;
+    let point = along(origin, direction, t);
+    // The side on which the point lies.
+    let off = |axis: usize| {
+        let off = [clamp.low, clamp.high].map(|corner| (point[axis] - corner[axis]).abs());
+        off[0].min(off[1])
+    };
+    let axis = (0..3).min_by(|a, b| off(*a).total_cmp(&off(*b)))?;
+    let mut normal = [0.0; 3];
+    normal[axis] = -direction[axis].signum();
+    (t > 0.0).then(|| (t, hit(point, normal, 1.0, 6)))
+}
+
 impl Hit {
-    /// Whether it is on the floor.
-    pub fn is_on_floor(&self) -> bool {
-        self.face == FACE
+    /// Whether it is of the world around the part.
+    pub fn is_of_world(&self) -> bool {
+        self.face >= FACE
     }
 }

@@ -25,7 +25,7 @@ pub mod timing;
 mod trace;
 pub mod transport;
 
-pub use ground::Ground;
+pub use ground::{Clamp, Ground, Pin};
 pub use hal::virtual_head::Faults;
 pub use material::Material;
 pub use parts::Part;

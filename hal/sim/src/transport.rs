@@ -17,11 +17,11 @@ use rayon::prelude::*;
 
 use super::body::{Body, Hit};
 use super::footprint::Footprint;
-use super::ground::Floor;
+use super::ground::World;
 use super::material::Lighting;
 use super::material::Material;
 use super::optics::{Lens, Vector, dot, minus, normalised, plus, turned, turned_back};
-use super::parts::Part;
+use super::parts::{Part, Solid};
 use super::placement::Placement;
 use super::scenario::Scenario;
 use super::spread::{self, Spread};
@@ -117,10 +117,18 @@ impl Transport {
         let surface = part.surface();
         let thin = surface.as_deref().map(Traced::new);
         let solid = part.solid();
-        let body = match (&thin, &solid) {
-            (Some(thin), _) => Some(thin as &dyn Body),
-            (None, solid) => solid.as_ref().map(|solid| solid as &dyn Body),
+        let body = body_of(&thin, &solid);
+        // The next part stays when this one is taken away or damaged.
+        let mut designed = match part {
+            Part::Empty {} => scenario.part.clone(),
+            part => part.clone(),
         };
+        designed.defects_mut().map(Vec::clear);
+        let ground = scenario.floor.as_ref();
+        let another = ground.and_then(|ground| ground.next_mm).map(|_| &designed);
+        let surface_of_next = another.and_then(Part::surface);
+        let solid_of_next = another.and_then(Part::solid);
+        let thin_of_next = surface_of_next.as_deref().map(Traced::new);
         let light = &scenario.light;
         let reflection = Reflection::new(&material.map_or(*light, |made| made.under(light)));
         let mut tracer = Tracer {
@@ -131,9 +139,9 @@ impl Transport {
             placed: &placed,
             reflection: &reflection,
             body,
-            floor: scenario.floor.map(|ground| {
-                let is_nothing = matches!(part, Part::Empty {});
-                Floor::below(if is_nothing { &scenario.part } else { part }, &ground)
+            world: ground.map(|ground| {
+                let next = body_of(&thin_of_next, &solid_of_next);
+                World::below(&designed, ground, next)
             }),
             footprint: Footprint::bare(scenario.sub_rays),
         };
@@ -228,7 +236,7 @@ struct Tracer<'a> {
     placed: &'a Placed,
     reflection: &'a Reflection,
     body: Option<&'a dyn Body>,
-    floor: Option<Floor>,
+    world: Option<World<'a>>,
     footprint: Footprint,
 }
 
@@ -338,18 +346,18 @@ impl Tracer<'_> {
         row
     }
 
-    /// Where the ray of camera point (u, v) meets the part or the floor, in the part's coordinates.
+    /// Where the ray of camera point (u, v) meets the part or the world around it, in the part's coordinates.
     fn hit(&self, u: f64, v: f64) -> Option<(Hit, Vector)> {
         let (rotation, eye) = (&self.placed.rotation, self.placed.eye);
         let ray = self.camera.ray(u, v);
         let direction = turned_back(rotation, ray);
         let met = self.body.and_then(|body| body.first_hit(eye, direction));
-        let floor = self.floor.as_ref();
-        let floor = floor
-            .and_then(|floor| floor.meets((self.camera.centre(), ray), rotation, (eye, direction)));
-        let hit = match (met, floor) {
+        let lies = (rotation, self.placed.shift);
+        let world = self.world.as_ref();
+        let world = world.and_then(|world| world.meets((self.camera.centre(), ray), lies));
+        let hit = match (met, world) {
             (Some(met), Some((t, _))) if dot(minus(met.point, eye), direction) <= t => met,
-            (_, Some((_, floor))) => floor,
+            (_, Some((_, world))) => world,
             (met, None) => met?,
         };
         Some((hit, direction))
@@ -374,11 +382,16 @@ impl Tracer<'_> {
         if !on(raster[0], device.width) || !on(raster[1], device.height) {
             return None;
         }
-        let is_shadowed = self.body.is_some_and(|body| match hit.is_on_floor() {
+        let is_shadowed = self.body.is_some_and(|body| match hit.is_of_world() {
             true => body.first_hit(hit.point, towards).is_some(),
             false => body.shadowed(hit, towards),
         });
-        (!is_shadowed).then_some(Lit { raster, share })
+        let is_shaded = self.world.as_ref().is_some_and(|world| {
+            let [normal, towards] =
+                [hit.normal, towards].map(|way| turned(&self.placed.rotation, way));
+            world.shades(self.placed.to_world(hit.point), normal, towards)
+        });
+        (!is_shadowed && !is_shaded).then_some(Lit { raster, share })
     }
 
     /// The taps of a camera pixel whose sub-rays, each of so large a `share`, meet these points.
@@ -429,6 +442,14 @@ impl Tracer<'_> {
                 }
             }
         }
+    }
+}
+
+/// A thin surface or a solid as what rays meet.
+fn body_of<'a>(thin: &'a Option<Traced<'_>>, solid: &'a Option<Solid>) -> Option<&'a dyn Body> {
+    match (thin, solid) {
+        (Some(thin), _) => Some(thin as &dyn Body),
+        (None, solid) => solid.as_ref().map(|solid| solid as &dyn Body),
     }
 }
 
