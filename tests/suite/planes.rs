@@ -6,9 +6,9 @@ use super::placement::{Bed, bed, taught_within};
 use algo::geometry::{Pinhole, Vector};
 use algo::inspect::kinds::{Angle, Distance, Z};
 use algo::inspect::{FeatureKind, Measure, Region};
-use appliance::recipe::{FeatureFile, GaugeFile};
+use appliance::recipe::{DatumFile, FeatureFile, GaugeFile};
 use appliance::station::{GaugeValue, Inspection, Unit};
-use sim::parts::Sawtooth;
+use sim::parts::{Defect, Sawtooth, SheetMetal};
 use sim::scenario::Noise;
 use sim::{Part, Placement, Scenario};
 use std::time::Instant;
@@ -29,12 +29,13 @@ const BIAS_DEG: f64 = 0.01;
 const SCATTER: std::ops::Range<f64> = 0.8..1.2;
 const WITHIN: f64 = 0.93;
 
-/// A face of a part: z = z₀ + slope · x between two x, for |y| up to [`HALF_MM`].
+/// A face of a part: z = z₀ + slope · x between two x, for |y| up to `half`.
 #[derive(Clone, Copy)]
 struct Flat {
     z: f64,
     slope: f64,
     x: [f64; 2],
+    half: f64,
 }
 
 const HALF_MM: f64 = 25.0;
@@ -52,7 +53,12 @@ impl Sheet {
     /// Bent towards the head along y.
     fn bent(degrees: f64) -> Self {
         let slope = (degrees / 2.0).to_radians().tan();
-        let face = |slope, x| Flat { z: 20.0, slope, x };
+        let face = |slope, x| Flat {
+            z: 20.0,
+            slope,
+            x,
+            half: HALF_MM,
+        };
         Self {
             name: format!("bent by {degrees}°"),
             part: Sawtooth {
@@ -74,6 +80,7 @@ impl Sheet {
             z: -4.0 - slope * low,
             slope,
             x,
+            half: HALF_MM,
         };
         Self {
             name: "levels".into(),
@@ -96,7 +103,7 @@ impl Flat {
         let [left, right] = self.x;
         let corners = [(left, -1.0), (right, -1.0), (right, 1.0), (left, 1.0)];
         let corners = corners.map(|(x, side)| {
-            let point = Vector::new(x, side * HALF_MM, self.z + self.slope * x);
+            let point = Vector::new(x, side * self.half, self.z + self.slope * x);
             let (u, v) = camera.project(point).unwrap();
             [u, v]
         });
@@ -281,4 +288,117 @@ fn judge(placements: usize) {
     assert!(judged.wrong.is_empty(), "{:?}", judged.wrong);
     assert!(SCATTER.contains(&scatter), "{scatter}");
     assert!(within >= WITHIN, "{within}");
+}
+
+/// The stock bracket (`hal/sim/src/parts/sheet_metal.rs`): height of the plate, where it begins to bend along y, the
+/// radius of the bend's upper side, and its angle.
+const PLATE_Z: f64 = 8.0;
+const BEND_LINE: f64 = 50.0;
+const BEND_RADIUS: f64 = 4.0;
+const BEND_DEG: f64 = 35.0;
+
+/// The flange of a bracket that is bent by so much more: its angle in radians, and x where its plane crosses that of
+/// the plate.
+fn flange(more_deg: f64) -> [f64; 2] {
+    let angle = (BEND_DEG + more_deg).to_radians();
+    [angle, BEND_LINE + BEND_RADIUS * (angle / 2.0).tan()]
+}
+
+#[test]
+fn a_bent_flange_reads_how_far_it_lies_from_the_plate_and_not_how_the_whole_part_was_fitted() {
+    // Rims of holes need as many rays as a scenario has by default.
+    let mut bed = bed(&Scenario::default());
+    let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
+    let [angle, crossing] = flange(0.0);
+    let plate = Flat {
+        z: PLATE_Z,
+        slope: 0.0,
+        x: [-50.0, 8.0],
+        half: 20.0,
+    };
+    let bent = Flat {
+        z: PLATE_Z + crossing * angle.tan(),
+        slope: -angle.tan(),
+        x: [55.0, 68.0],
+        half: 25.0,
+    };
+    let camera = bed.calibration.camera.clone();
+    let around = |y: f64| {
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        let corners = corners.map(|(right, up)| {
+            let corner = Vector::new(-60.0 + 9.0 * right, y + 9.0 * up, PLATE_Z);
+            let (u, v) = camera.project(corner).unwrap();
+            [u, v]
+        });
+        corners.to_vec()
+    };
+    let mut file = taught.manifest.clone();
+    file.features.extend([
+        FeatureFile {
+            thickness_mm: Some(0.0),
+            ..FeatureFile::new("plate", FeatureKind::Plane, plate.polygon(&camera))
+        },
+        FeatureFile::new("flange", FeatureKind::Plane, bent.polygon(&camera)),
+        FeatureFile::new("upper", FeatureKind::Circle, around(40.0)),
+        FeatureFile::new("lower", FeatureKind::Circle, around(-40.0)),
+    ]);
+    let system = |name: &str, of: &[&str]| DatumFile {
+        name: name.into(),
+        of: of.iter().map(|&of| of.into()).collect(),
+    };
+    file.datums = vec![
+        system("A", &["plate"]),
+        system("ABC", &["plate", "upper", "lower"]),
+    ];
+    let in_system = |name: &str| GaugeFile {
+        datum: Some(name.into()),
+        ..gauge(name, "flange", Z {})
+    };
+    file.gauges = vec![
+        GaugeFile::new(1, "distance", Distance {}, &["plate", "flange"]),
+        GaugeFile {
+            slot: 2,
+            ..in_system("A")
+        },
+        GaugeFile {
+            slot: 3,
+            ..in_system("ABC")
+        },
+    ];
+    let plan = plan(&bed, &file, &taught.recipe.arrays);
+    bed.head
+        .load(plan.rasters(&bed.calibration).unwrap())
+        .unwrap();
+    let middle = bent.middle(&camera, bed.calibration.frames().0 as usize);
+    let from_crossing = (middle.x - crossing) / angle.cos();
+    let mut random = Random::new(7);
+    let (mut within, mut all) = (0_u32, 0_u32);
+    for degrees in [-1.0, -0.4, 0.0, 0.4, 1.0] {
+        let [angle, crossing] = flange(degrees);
+        let off = from_crossing * angle.sin();
+        let truth = [off, -off, -(middle.x - crossing) * angle.tan()];
+        let defects = vec![Defect::BentFlange { degrees }];
+        let part = Part::SheetMetal(SheetMetal { defects });
+        for at in 0..4 {
+            let mut lies = placement(&mut random);
+            lies.shift_mm = lies.shift_mm.map(|way| way * f64::from(at) / 4.0);
+            lies.tilt_deg = lies.tilt_deg.map(|turn| turn * f64::from(at) / 10.0);
+            lies.rotation_deg *= f64::from(at) / 10.0;
+            bed.stage.place(&part, &lies).unwrap();
+            let found = plan.inspect(0, &frames(&mut bed, &plan, 0), Instant::now());
+            for (found, truth) in found.gauges.iter().zip(truth) {
+                let (value, u) = (found.value.unwrap(), found.uncertainty.unwrap());
+                println!(
+                    "{degrees}°, {}: {value:+.4} ± {u:.4} for {truth:+.4}",
+                    found.name
+                );
+                all += 1;
+                within += u32::from((value - truth).abs() <= u);
+            }
+        }
+    }
+    assert!(
+        f64::from(within) >= 0.95 * f64::from(all),
+        "{within} of {all} within U"
+    );
 }

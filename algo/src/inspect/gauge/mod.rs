@@ -27,6 +27,7 @@ mod position;
 mod propagate;
 mod radius;
 mod reading;
+mod region;
 mod rms_deviation;
 mod roundness;
 mod step;

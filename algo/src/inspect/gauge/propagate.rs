@@ -27,6 +27,7 @@
 use super::datum::DatumFrame;
 use super::kind::{Kind, MAX_PLACES};
 use super::reading::Found;
+use super::region;
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed, form};
 use crate::inspect::contour::Source;
@@ -69,6 +70,8 @@ pub struct Characteristic<'a> {
     pub of: &'a [Sensitive<'a>],
     /// Those of its datum system, at most [`MAX_DATUMS`]; none: the frame as taught.
     pub datum: &'a [Sensitive<'a>],
+    /// Both as taught; planes keep the point that they have where they are empty.
+    pub taught: [&'a [Geometry]; 2],
 }
 
 /// Most features of a datum system.
@@ -171,15 +174,36 @@ impl Characteristic<'_> {
             self.of.iter().map(|of| of.geometry(change)).collect();
         let datum: heapless::Vec<Geometry, MAX_DATUMS> =
             self.datum.iter().map(|of| of.geometry(change)).collect();
-        let value = match self.datum.is_empty() {
-            true => self.kind.value(&of),
-            false => DatumFrame::of(&datum).and_then(|frame| {
-                let of: heapless::Vec<Geometry, MAX_PLACES> =
-                    of.iter().map(|of| frame.coordinates(of)).collect();
-                self.kind.value(&of)
-            }),
-        };
-        value.unwrap_or(f64::NAN)
+        self.of_geometry(of, &datum).unwrap_or(f64::NAN)
+    }
+
+    /// The value of these geometries; none where there is none.
+    fn of_geometry(
+        &self,
+        mut of: heapless::Vec<Geometry, MAX_PLACES>,
+        datum: &[Geometry],
+    ) -> Option<f64> {
+        let [taught, system] = self.taught;
+        match (datum, system, taught) {
+            ([], _, &[first, second]) => of[1] = region::beside(of[1], of[0], [second, first]),
+            (&[reference], &[before], _) => {
+                for (of, taught) in of.iter_mut().zip(taught) {
+                    *of = region::beside(*of, reference, [*taught, before]);
+                }
+            }
+            _ => {}
+        }
+        if datum.is_empty() {
+            return self.kind.value(&of);
+        }
+        let frame = DatumFrame::of(datum)?;
+        of.iter_mut().for_each(|of| *of = frame.coordinates(of));
+        if let (true, Some(before)) = (datum.len() > 1, DatumFrame::of(system)) {
+            for (of, taught) in of.iter_mut().zip(taught) {
+                *of = region::above(*of, before.coordinates(taught));
+            }
+        }
+        self.kind.value(&of)
     }
 
     fn all(&self) -> impl Iterator<Item = &Sensitive<'_>> + Clone {

@@ -255,8 +255,12 @@ fn sensitive<'a>(both: &'a [(FittedPlane, Vec<[f64; 3]>)]) -> Vec<Sensitive<'a>>
 
 /// The value of a kind with its errors.
 fn propagate(kind: &dyn Kind, of: &[Sensitive<'_>], placed: Option<&Placed>) -> Option<Found> {
-    let datum = &[];
-    let value = Characteristic { kind, of, datum };
+    let value = Characteristic {
+        kind,
+        of,
+        datum: &[],
+        taught: [&[]; 2],
+    };
     Some(value.propagate(placed, 0.0)?.found)
 }
 

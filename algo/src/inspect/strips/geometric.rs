@@ -8,6 +8,7 @@ use super::pose::PoseField;
 use super::strip::Strips;
 use super::uncertainty::Made;
 use crate::inspect::contour::State;
+use crate::inspect::feature::Geometry;
 use crate::inspect::gauge::{
     Characteristic, MAX_DATUMS, MAX_PLACES, OfRim, Propagated, Reading, Sensitive,
 };
@@ -93,10 +94,18 @@ impl Production {
         let Gauge { of, datum, measure } = &self.gauges.list[gauge];
         let of: heapless::Vec<_, MAX_PLACES> = sensitive(of, fits, contours)?;
         let datum: heapless::Vec<_, MAX_DATUMS> = sensitive(datum, fits, contours)?;
+        let Gauge {
+            of: places,
+            datum: system,
+            ..
+        } = &self.gauges.list[gauge];
+        let taught: heapless::Vec<_, MAX_PLACES> = self.taught(places).unwrap_or_default();
+        let before: heapless::Vec<_, MAX_DATUMS> = self.taught(system).unwrap_or_default();
         let value = Characteristic {
             kind: measure.kind(),
             of: &of,
             datum: &datum,
+            taught: [&taught, &before],
         };
         let placed = pose.placed.as_ref();
         let propagated = value.propagate(placed, budget.calibration.length)?;
@@ -109,6 +118,27 @@ impl Production {
             compared: with(of.compared, 2.0 * own),
             ..of
         })
+    }
+
+    /// The geometry of features as taught, of contours where they are and which way they go; `None` where
+    /// it is not known.
+    fn taught<const N: usize>(&self, features: &[usize]) -> Option<heapless::Vec<Geometry, N>> {
+        let geometry = |at: &usize| {
+            let contours = self.contours.as_ref();
+            let contour = contours.and_then(|all| {
+                let expected = all.all.iter().find(|expected| expected.feature == *at)?;
+                let frame = all.frame(expected, &self.planes[expected.plane])?;
+                Some(expected.outline.geometry(&frame))
+            });
+            let plane = || {
+                self.planes
+                    .iter()
+                    .find(|fit| fit.feature == *at)?
+                    .geometry()
+            };
+            contour.or_else(plane)
+        };
+        features.iter().map(geometry).collect()
     }
 
     /// The reading of a gauge of the points of a contour.

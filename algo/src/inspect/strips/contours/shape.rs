@@ -2,7 +2,7 @@
 
 use crate::inspect::contour::shape::{Circle, Line, Shape, Slot};
 use crate::inspect::contour::{Contour, Input, Setup, Source, View, find, inputs};
-use crate::inspect::feature::{FeatureKind, MAX_PARAMETERS, Parameters};
+use crate::inspect::feature::{FeatureKind, Geometry, MAX_PARAMETERS, Parameters, PlaneFrame};
 use alloc::vec::Vec;
 
 /// A contour's shape with its place, in the frame of its plane.
@@ -42,6 +42,32 @@ impl Outline {
             Self::Circle(_) => Self::Circle([a, b, c]),
             Self::Slot(_) => Self::Slot([a, b, c, d, e]),
             Self::Line(line, _) => Self::Line(line, [a, b]),
+        }
+    }
+
+    /// Its geometry in the frame of its plane.
+    pub fn geometry(&self, frame: &PlaneFrame) -> Geometry {
+        let [from, to] = self.ends().map(|(x, y)| frame.point(x, y));
+        let (x, y) = self.middle();
+        let (centre, normal) = (frame.point(x, y), frame.normal());
+        match *self {
+            Self::Circle([.., radius]) => Geometry::Circle {
+                centre,
+                normal,
+                radius,
+            },
+            Self::Slot([.., half, radius, angle]) => Geometry::Slot {
+                centre,
+                direction: frame.point(x + libm::cos(angle), y + libm::sin(angle)) - centre,
+                normal,
+                length: 2.0 * (half + radius),
+                width: 2.0 * radius,
+            },
+            Self::Line(..) => Geometry::Line {
+                middle: centre,
+                direction: (to - from) * (1.0 / (to - from).length()),
+                normal,
+            },
         }
     }
 
