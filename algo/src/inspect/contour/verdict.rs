@@ -24,8 +24,9 @@ const NARROW: f64 = 0.03;
 const MIXED: f64 = 1.5;
 /// The least share of a contour that is found, of its pieces.
 const FOUND: f64 = 0.4;
-/// The least share of pieces in which the material of an absent contour goes on.
+/// The least share in which the material of an absent contour goes on, of the pieces that could show it, and of all.
 const ABSENT: f64 = 0.5;
+const ABSENT_OF_ALL: f64 = 0.25;
 /// The largest share of pieces with an edge of an absent contour.
 const EDGES: f64 = 0.1;
 
@@ -82,7 +83,11 @@ impl Outcome {
             && fit.background > LIT
             && problem.piece.shadow * problem.signals.setup.deepest > NARROW
         {
-            Self::Shadowed
+            // Where the material goes on there is no edge that a shadow could lie beside.
+            match Self::edgeless(problem) {
+                Self::Continues => Self::Continues,
+                _ => Self::Shadowed,
+            }
         } else {
             Self::Accepted
         }
@@ -121,6 +126,14 @@ impl Outcome {
     }
 }
 
+/// Whether the material goes on in enough of the pieces that are not hidden. A dark place hides nothing: it may be
+/// the opening, elsewhere.
+fn is_absent(share: impl Fn(Outcome) -> f64) -> bool {
+    let hidden = share(Outcome::Unseen) + share(Outcome::Shadowed);
+    let continues = share(Outcome::Continues);
+    continues >= ABSENT_OF_ALL && continues >= ABSENT * (1.0 - hidden)
+}
+
 /// The state of a contour by its pieces, and the share of pieces with an edge. Nothing longer than
 /// `gap` of it may be missing in one stretch.
 pub fn state(outcomes: &[Outcome], is_closed: bool, gap: f64) -> (State, f64) {
@@ -140,7 +153,7 @@ pub fn state(outcomes: &[Outcome], is_closed: bool, gap: f64) -> (State, f64) {
     }
     let state = if found >= FOUND && longest as f64 <= gap * count {
         State::Found
-    } else if is_closed && share(Outcome::Continues) >= ABSENT && found <= EDGES {
+    } else if is_closed && is_absent(share) && found <= EDGES {
         // Where the material goes on beyond an edge the part has it elsewhere.
         State::Absent
     } else {

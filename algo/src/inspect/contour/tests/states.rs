@@ -72,6 +72,26 @@ fn a_closed_hole_is_absent() {
 }
 
 #[test]
+fn a_closed_hole_of_a_thick_sheet_is_absent() {
+    for thickness in [0.5, 1.0, 1.5, 3.0] {
+        for tilt in [-10.0, 0.0, 5.0, 10.0] {
+            for radius in [3.0, 5.0] {
+                for seed in 0..PLACEMENTS {
+                    let mut scene = quiet(0.41, LEVELS);
+                    (scene.thickness, scene.tilt) = (thickness, (tilt, 0.0));
+                    let (contour, ..) = look(&scene, radius, seed, false);
+                    assert_eq!(
+                        contour.state,
+                        State::Absent,
+                        "{thickness} {tilt} {contour:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn a_hole_that_something_covers_is_unseen_and_never_absent() {
     for seed in 0..PLACEMENTS {
         let mut scene = quiet(0.41, LEVELS);
