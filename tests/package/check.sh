@@ -25,7 +25,7 @@ fleet=${package/fringed_/fringed-fleet_}
 dpkg-deb --raw-extract "$fleet" "$work-fleet"
 for file in usr/bin/fringed usr/lib/systemd/system/fringed.service usr/lib/sysusers.d/fringed.conf usr/lib/tmpfiles.d/fringed.conf \
     usr/lib/udev/rules.d/60-fringed.rules etc/security/limits.d/fringed.conf usr/share/{bash-completion/completions/fringed,zsh/vendor-completions/_fringed,fish/vendor_completions.d/fringed.fish} \
-    usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/fringed.toml}; do
+    usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/{fringed.toml,fringed.st,verdict.st,plc.py,handshakes.py}}; do
     [[ -s $work/$file ]] || broken "there is no $file"
 done
 for file in fringed.service 60-fringed.rules; do

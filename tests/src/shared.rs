@@ -30,6 +30,11 @@ pub fn case(name: &str) -> Option<PathBuf> {
     unless_absent(root().join("../shared/cases").join(name), "README.md")
 }
 
+/// The folder of a tool that tests use. If it is absent, as with [`folder`].
+pub fn tool(name: &str) -> Option<PathBuf> {
+    unless_absent(root().join("../shared/tools").join(name), "README.md")
+}
+
 /// A folder that has this file, else a mark for the calling test.
 fn unless_absent(folder: PathBuf, file: &str) -> Option<PathBuf> {
     if folder.join(file).is_file() {

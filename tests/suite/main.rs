@@ -81,6 +81,7 @@ mod stalled;
 mod station;
 mod station_plc;
 mod stress;
+mod structured_text;
 mod surroundings;
 mod technician;
 mod together;
