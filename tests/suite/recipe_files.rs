@@ -250,6 +250,34 @@ fn hostile(random: &mut Random, base: &str) -> String {
 }
 
 #[test]
+fn a_recipe_that_another_program_changes_is_left_alone_and_a_link_to_one_stays() {
+    let mut bench = Bench::new();
+    let text = bench
+        .get()
+        .replace("name = \"deviation\"", "name = \"other\"");
+    let other = fs::File::open(&bench.recipe).unwrap();
+    other.lock().unwrap();
+    let before = fs::read(&bench.recipe).unwrap();
+    let refused = bench.set(&text);
+    assert_eq!(refused.code, 69, "{}", refused.stderr);
+    assert!(
+        refused
+            .stderr
+            .contains("another program is changing it: try again"),
+        "{}",
+        refused.stderr
+    );
+    assert_eq!(fs::read(&bench.recipe).unwrap(), before);
+    drop(other);
+    let file = bench.recipe.clone();
+    bench.recipe = bench.place.path("link.recipe");
+    std::os::unix::fs::symlink(&file, &bench.recipe).unwrap();
+    bench.set(&text).succeeded();
+    assert!(fs::symlink_metadata(&bench.recipe).unwrap().is_symlink());
+    assert_ne!(fs::read(&file).unwrap(), before);
+}
+
+#[test]
 fn hostile_texts_are_refused_by_name_at_once_and_nothing_is_written() {
     let bench = Bench::new();
     let (base, bytes) = (bench.get(), fs::read(&bench.recipe).unwrap());

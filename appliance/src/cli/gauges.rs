@@ -11,8 +11,9 @@ use crate::station::GaugeValue;
 use crate::storage::folder::write_whole;
 use crate::system::headway::Headway;
 use serde_json::{Value, json};
-use std::fs::File;
+use std::fs::{File, Metadata, TryLockError};
 use std::io::{ErrorKind, Read as _};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 
 /// Print or replace the features, datum systems and gauges of a recipe's file.
@@ -36,7 +37,8 @@ impl Gauges {
     /// Prints or replaces them. On an error nothing is written.
     ///
     /// # Errors
-    /// If a file is missing (66) or has wrong content (65), or the recipe cannot be written (73).
+    /// If a file is missing (66) or has wrong content (65), another program changes the recipe (69), or it cannot be
+    /// written (73).
     pub fn run(&self) -> Result<()> {
         match &self.set {
             None => {
@@ -57,8 +59,12 @@ impl Gauges {
 
     fn replace(&self, text: &Path) -> Result<()> {
         let gauging = read(text)?;
-        let (before, arrays) = self.unpacked()?;
         let what = format!("set the gauges of {}", self.recipe.display());
+        // A link stays, and what it leads to is replaced.
+        let target = self.recipe.canonicalize();
+        let target = target.map_err(Exit::Missing.because(&what))?;
+        let _alone = alone(&target, &what)?;
+        let (before, arrays) = self.unpacked()?;
         let unfit = |error: String| Failure::because(Exit::Content, &what, error);
         let TaughtRecipe {
             bytes,
@@ -80,7 +86,7 @@ impl Gauges {
             true => before.fingerprint,
             false => {
                 let what = format!("write {}", self.recipe.display());
-                write_whole(&self.recipe, &bytes).map_err(Exit::CannotCreate.because(what))?;
+                write_whole(&target, &bytes).map_err(Exit::CannotCreate.because(what))?;
                 manifest.fingerprint
             }
         };
@@ -105,6 +111,22 @@ impl Gauges {
         let what = format!("read {}", self.recipe.display());
         let size = size.map_err(Exit::Missing.because(&what))?;
         archive::unpack(file, size).map_err(Exit::Content.because(&what))
+    }
+}
+
+/// Keeps other programs from changing this file until the answer is dropped: what two of them read would be
+/// written by the last one alone.
+fn alone(recipe: &Path, what: &str) -> Result<File> {
+    let file = open(recipe)?;
+    let busy = "another program is changing it: try again when that has ended";
+    if let Err(TryLockError::WouldBlock) = file.try_lock() {
+        return Exit::Unavailable.fail(format!("{what}: {busy}"));
+    }
+    // Replaced between opening and locking.
+    let id = |about: std::io::Result<Metadata>| about.map(|about| (about.dev(), about.ino())).ok();
+    match id(file.metadata()) == id(recipe.metadata()) {
+        true => Ok(file),
+        false => Exit::Unavailable.fail(format!("{what}: {busy}")),
     }
 }
 

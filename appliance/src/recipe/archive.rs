@@ -16,7 +16,7 @@ const MANIFEST: &str = "recipe.json";
 /// The manifest and twelve arrays.
 const MAX_MEMBERS: usize = 13;
 /// The largest manifest that is read, in bytes.
-const MAX_MANIFEST: u64 = 1 << 20;
+const MAX_MANIFEST: u64 = 8 << 20;
 /// Room for what the archive and the array say of a member, bytes.
 const HEADERS: usize = 512;
 /// The fingerprint in the manifest while the fingerprint is computed.
@@ -161,6 +161,13 @@ pub(crate) fn seal(
 ) -> Result<(Vec<u8>, String), String> {
     let fingerprint = fingerprint(manifest.as_bytes(), &members);
     let manifest = manifest.replacen(NO_FINGERPRINT, &fingerprint, 1);
+    // What is written can be read.
+    if manifest.len() as u64 > MAX_MANIFEST {
+        let size = manifest.len();
+        return Err(format!(
+            "{MANIFEST} would have {size} bytes where at most {MAX_MANIFEST} are read: draw features with fewer corners"
+        ));
+    }
     let room = size + manifest.len() + HEADERS * (members.len() + 1);
     let first = (MANIFEST, manifest.into_bytes());
     let all = members.len() as f64;
@@ -372,6 +379,24 @@ pub fn short(fingerprint: &str) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_manifest_that_could_not_be_read_again_is_not_written() {
+        for (size, fits) in [(MAX_MANIFEST, true), (MAX_MANIFEST + 1, false)] {
+            let manifest = " ".repeat(size as usize);
+            let sealed = seal(&manifest, Vec::new(), 0, Headway::silent());
+            let read = sealed.and_then(|(bytes, _)| {
+                let mut zip = Members::open(std::io::Cursor::new(bytes), MAX_MEMBERS).unwrap();
+                manifest_text(&mut zip)
+            });
+            assert_eq!(
+                read.is_ok(),
+                fits,
+                "{size}: {:?}",
+                read.map(|text| text.len())
+            );
+        }
+    }
 
     #[test]
     fn the_fingerprint_is_computed_as_the_documentation_says() {
