@@ -227,7 +227,7 @@ fn read<T>(path: &Path, find: impl FnOnce(&Node) -> Result<T, String>) -> Result
     }
     let bytes = fs::read(path).map_err(|error| failed(error.to_string()))?;
     tree::read(&bytes)
-        .and_then(|tree| find(&tree))
+        .and_then(|tree| names::refuse_other_models(&tree).and_then(|()| find(&tree)))
         .map_err(failed)
 }
 

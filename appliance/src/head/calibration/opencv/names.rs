@@ -102,6 +102,94 @@ pub const PLATE: &[Row] = &[
     ("plate_rvec", PLATE_TRANSLATION),
 ];
 
+/// Words for models of distortion that are a pinhole camera's with the coefficients k1, k2, p1, p2, k3, in
+/// letters and digits alone.
+const OWN_DISTORTIONS: [&str; 11] = [
+    "plumbbob",
+    "radtan",
+    "radialtangential",
+    "brown",
+    "brownconrady",
+    "modifiedbrownconrady",
+    "opencv",
+    "pinhole",
+    "standard",
+    "rationalpolynomial",
+    "none",
+];
+/// Parts of words for other models than a pinhole camera's.
+const OTHER_MODELS: [&str; 17] = [
+    "fisheye",
+    "equidistant",
+    "equisolid",
+    "stereographic",
+    "kannala",
+    "omni",
+    "eucm",
+    "unified",
+    "doublesphere",
+    "fov",
+    "atan",
+    "mei",
+    "ocam",
+    "scaramuzza",
+    "ftheta",
+    "division",
+    "spherical",
+];
+/// Whole words for some of them.
+const OTHER_WORDS: [&str; 4] = ["ds", "kb", "kb4", "ucm"];
+
+/// Refuses a file that names another model than a pinhole camera's, anywhere in it: its coefficients would be read
+/// as k1, k2, p1, p2.
+///
+/// # Errors
+/// In words, with the node and the model.
+pub fn refuse_other_models(tree: &Node) -> Result<(), String> {
+    let all = match tree {
+        Node::Map(all) => all,
+        Node::List(all) => return all.iter().try_for_each(refuse_other_models),
+        Node::Value(_) => return Ok(()),
+    };
+    for (name, node) in all {
+        let key = plain(name);
+        let word = match node {
+            Node::Value(word) => plain(word),
+            _ => String::new(),
+        };
+        let is_off = ["0", "false", "no", "off"].contains(&&*word);
+        let is_other = |word: &str| {
+            OTHER_WORDS.contains(&word) || OTHER_MODELS.iter().any(|other| word.contains(other))
+        };
+        let names_a_model = ["model", "type", "projection"]
+            .iter()
+            .any(|of| key.contains(of));
+        let of_distortion = names_a_model && key.contains("distortion");
+        let is_wrong = key == "xi"
+            || (OTHER_MODELS[..6].iter().any(|other| key.contains(other)) && !is_off)
+            || (names_a_model && !is_off && is_other(&word))
+            || (of_distortion && !word.is_empty() && !OWN_DISTORTIONS.contains(&&*word));
+        if is_wrong {
+            let value = match node {
+                Node::Value(word) => format!(": {word}"),
+                _ => String::new(),
+            };
+            return Err(format!(
+                "{name}{value} is not the model of a pinhole camera with k1, k2, p1, p2, k3, the only one that is read: calibrate \
+                 the device with cv2.calibrateCamera"
+            ));
+        }
+        refuse_other_models(node)?;
+    }
+    Ok(())
+}
+
+/// Letters and digits of a name, in lower case.
+fn plain(name: &str) -> String {
+    let letters = name.chars().filter(|letter| letter.is_alphanumeric());
+    letters.collect::<String>().to_lowercase()
+}
+
 /// Whether the tree has any of the rows' first nodes.
 pub fn has(tree: &Node, rows: &[Row]) -> bool {
     rows.iter().any(|(name, _)| tree.get(name).is_some())
@@ -140,10 +228,6 @@ fn none_of(names: &[&str]) -> String {
 /// The node that holds all of a device's nodes, if there is one.
 pub fn nested<'a>(tree: &'a Node, device: &Device) -> Option<&'a Node> {
     let Node::Map(all) = tree else { return None };
-    let plain = |name: &str| {
-        let letters = name.chars().filter(|letter| !" -_".contains(*letter));
-        letters.collect::<String>().to_lowercase()
-    };
     device.nested.iter().find_map(|known| {
         let mut maps = all.iter().filter(|(_, node)| matches!(node, Node::Map(_)));
         maps.find(|(name, _)| plain(name) == *known)

@@ -83,3 +83,52 @@ fn models_without_a_plate_are_read_under_the_names_of_other_programs_and_stand_w
         "{error}"
     );
 }
+
+#[test]
+fn a_file_that_names_another_model_than_a_pinhole_camera_s_is_refused_by_that_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let read = |more: &str| {
+        let text = format!("{FOUR}{more}\n");
+        from_one(
+            &written(folder.path(), &text),
+            SIZES,
+            Declared {
+                unit: Some(Unit::M),
+                plane_at: None,
+                z_away: false,
+            },
+        )
+    };
+    for (more, named) in [
+        (
+            "distortion_model: equidistant",
+            "distortion_model: equidistant",
+        ),
+        (
+            "distortion_model: thin_prism",
+            "distortion_model: thin_prism",
+        ),
+        ("camera_model: omni", "camera_model: omni"),
+        ("camera_model: ds", "camera_model: ds"),
+        ("cameraModel: KANNALA_BRANDT4", "KANNALA_BRANDT4"),
+        ("fisheye_model: 1", "fisheye_model: 1"),
+        ("cam0:\n  fisheye: [1, 2]", "fisheye"),
+        ("projection: fisheye", "projection: fisheye"),
+        ("xi: 1.2", "xi"),
+    ] {
+        let refused = read(more).unwrap_err();
+        assert!(
+            refused.contains(named) && refused.contains("pinhole"),
+            "{refused}"
+        );
+    }
+    for more in [
+        "distortion_model: plumb_bob",
+        "distortion_model: rational_polynomial",
+        "camera_model: pinhole",
+        "camera_model: acA1440-220um",
+        "fisheye_model: 0",
+    ] {
+        read(more).unwrap();
+    }
+}
