@@ -41,10 +41,11 @@ impl Line {
         let mut bed = bed(scenario);
         let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
         let limit_mm = taught.manifest.gauges[0].high.unwrap();
-        Self::of(bed, taught.recipe, limit_mm, scenario)
+        Self::of(bed, taught.recipe, limit_mm, scenario.part.clone())
     }
 
-    fn of(mut bed: Bed, recipe: Recipe, limit_mm: f64, scenario: &Scenario) -> Self {
+    /// A part that was taught with this limit of the deviation.
+    pub(crate) fn of(mut bed: Bed, recipe: Recipe, limit_mm: f64, part: Part) -> Self {
         let arrays = &recipe.arrays;
         let (height, valid) = (arrays.golden_height.clone(), arrays.valid.clone());
         let plan = planned(&mut bed, recipe);
@@ -62,7 +63,7 @@ impl Line {
         let corner = |i: usize| Vector::new(ends[i & 1][0], ends[i >> 1 & 1][1], ends[i >> 2][2]);
         Self {
             corners: (0..8).map(corner).collect(),
-            part: scenario.part.clone(),
+            part,
             bed,
             plan,
             limit_mm,
@@ -272,7 +273,7 @@ fn good_parts_of_every_stock_kind_pass_by_every_sequence_exposure_and_bit_depth(
             let mut bed = bed(&scenario);
             let taught = taught_exposed(&mut bed, TOLERANCE_MM, exposures).unwrap();
             let limit_mm = taught.manifest.gauges[0].high.unwrap();
-            let mut line = Line::of(bed, taught.recipe.clone(), limit_mm, &scenario);
+            let mut line = Line::of(bed, taught.recipe.clone(), limit_mm, scenario.part.clone());
             let ways = match (bit_depth, exposures) {
                 (8, 1) => ways(taught),
                 _ => vec![("first as taught".into(), taught.recipe)],

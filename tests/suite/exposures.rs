@@ -2,10 +2,11 @@
 //! they are bright.
 
 use super::gauges::frames;
-use super::placement::{Bed, bed, scenario, taught_exposed};
+use super::placement::{Bed, bed, naming, scenario, taught_asking};
 use super::station_plc::{Daemon, Place, Plc, command, long};
 use super::two_frames::MIDDLE;
 use super::written::program;
+use appliance::recipe::golden::Naming;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::{Recipe, RecipeFile, SequenceKind, archive, replace};
 use appliance::station::{Inspection, Verdict};
@@ -17,6 +18,8 @@ use std::time::Instant;
 
 /// How far any corner may lie from where it was taught: a shift of 2 mm along x and y.
 const TOLERANCE_MM: f64 = 3.0;
+/// What good parts that lie so far off keep beside steep edges, ± mm.
+const LIMIT_MM: f64 = 0.25;
 /// Exposures of the recipe with longer ones.
 const EXPOSURES: u32 = 4;
 /// A pixel is dark if golden's modulation by one exposure is below this, in counts.
@@ -39,7 +42,12 @@ struct Line {
 impl Line {
     fn new(scenario: &Scenario, exposures: u32) -> Self {
         let mut bed = bed(scenario);
-        let taught = taught_exposed(&mut bed, TOLERANCE_MM, exposures).unwrap();
+        let naming = Naming {
+            exposures,
+            limit_mm: Some(LIMIT_MM),
+            ..naming(TOLERANCE_MM)
+        };
+        let taught = taught_asking(&mut bed, &naming).unwrap();
         let recipe = Recipe::from_bytes(&taught.bytes).unwrap();
         let plan = Plan::new(recipe.clone(), &bed.calibration, true).unwrap();
         let own = bed.head.camera_timing().exposure / bed.head.exposures();
@@ -231,7 +239,7 @@ fn a_station_measures_by_a_recipe_that_teach_makes_with_longer_exposures() {
     let (file, arrays) = archive::unpack(std::io::Cursor::new(&bytes), bytes.len() as u64).unwrap();
     assert_eq!(file.exposures, 3);
     // Taught again, it stays so.
-    assert_eq!(replace::naming(1, Some(&file)).exposures, 3);
+    assert_eq!(replace::naming(1, Some(&file), false).exposures, 3);
     refused_without_its_light(&file, &arrays);
     std::fs::create_dir_all(place.recipe().parent().unwrap()).unwrap();
     std::fs::copy(&out, place.recipe()).unwrap();

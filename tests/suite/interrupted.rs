@@ -4,7 +4,7 @@
 use crate::recovery::{ABORT, PASS, start, starting};
 use crate::station_plc::{ONLINE, Place, Plc, READY, RECIPE_OK, SMALL_HEAD, Status};
 use appliance::service::Daemon;
-use appliance::station::{Event, RecipeKey, Request, Snapshot};
+use appliance::station::{Event, RecipeKey, Request, Snapshot, Teaching};
 use hal::error::DeviceKind;
 use std::fs;
 use std::path::PathBuf;
@@ -109,10 +109,7 @@ impl<'a> Station<'a> {
 }
 
 fn teach(number: u16) -> Request {
-    Request::Teach {
-        number,
-        keep_gauges: false,
-    }
+    Request::Teach(Teaching::of(number))
 }
 
 fn load(number: u16) -> Request {

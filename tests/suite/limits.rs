@@ -1,9 +1,10 @@
 //! The limits that teaching sets: good parts are within them, as predicted, and dents are not.
 
-use super::placement::{Bed, TIMEOUT, bed, taught_within};
+use super::placement::{Bed, TIMEOUT, bed, naming, taught_asking};
 use algo::geometry::Vector;
 use algo::units::Height;
 use appliance::recipe::Recipe;
+use appliance::recipe::golden::Naming;
 use appliance::recipe::good_parts::GoodPartsFile;
 use appliance::recipe::plan::Plan;
 use appliance::station::{Inspection, Verdict};
@@ -66,8 +67,19 @@ fn line(scenario: &Scenario) -> Line {
 
 /// A head, and the recipe and prediction that were taught from the part in front of it.
 fn taught(scenario: &Scenario) -> (Bed, Recipe, GoodPartsFile) {
+    taught_with_limit(scenario, TOLERANCE_MM).unwrap()
+}
+
+fn taught_with_limit(
+    scenario: &Scenario,
+    limit_mm: f64,
+) -> Result<(Bed, Recipe, GoodPartsFile), String> {
     let mut bed = bed(scenario);
-    let taught = taught_within(&mut bed, 3.0).unwrap();
+    let naming = Naming {
+        limit_mm: Some(limit_mm),
+        ..naming(3.0)
+    };
+    let taught = taught_asking(&mut bed, &naming)?;
     let predicted = taught.manifest.good_parts.unwrap();
     let words = predicted.words();
     assert!(
@@ -75,7 +87,7 @@ fn taught(scenario: &Scenario) -> (Bed, Recipe, GoodPartsFile) {
             .iter()
             .all(|reason| taught.choice.reasons.contains(reason))
     );
-    (bed, taught.recipe, predicted)
+    Ok((bed, taught.recipe, predicted))
 }
 
 /// Runs a cycle as in production: longer sequences follow if a shorter one is not enough.
@@ -325,20 +337,20 @@ fn dents_where_pixels_have_weights_are_found_and_would_be_missed_without_these_p
 }
 
 #[test]
-fn a_head_that_is_too_noisy_for_the_tolerance_says_so_with_the_numbers_and_good_parts_pass() {
+fn a_head_that_is_too_noisy_for_the_limit_is_refused_with_one_that_good_parts_keep() {
     let mut scenario = small("plane", 1);
     (scenario.rig.camera.width, scenario.rig.camera.height) = (128, 128);
     scenario.noise.noise_counts = Some(4.3 * Noise::PAPER);
-    let mut line = line(&scenario);
-    let GoodPartsFile {
-        limit_mm,
-        largest_mm,
-        ..
-    } = line.predicted;
-    assert!(limit_mm > TOLERANCE_MM && largest_mm < limit_mm);
-    let words = &line.predicted.words()[0];
-    for number in ["±0.15 mm", "cannot be held", &format!("±{limit_mm:.2} mm")] {
-        assert!(words.contains(number), "{words}");
-    }
+    let refused = taught_with_limit(&scenario, TOLERANCE_MM).err().unwrap();
+    assert!(
+        refused.contains("noise alone would exceed the limit of the deviation, ±0.15 mm"),
+        "{refused}"
+    );
+    let (_, proposed) = refused.split_once("choose the limit: ±").unwrap();
+    let limit_mm: f64 = proposed.split_once(' ').unwrap().0.parse().unwrap();
+    assert!(limit_mm > TOLERANCE_MM);
+    let (bed, recipe, predicted) = taught_with_limit(&scenario, limit_mm).unwrap();
+    assert!(predicted.limit_mm == limit_mm && predicted.largest_mm < limit_mm);
+    let mut line = Line::new(bed, recipe, predicted);
     line.good("noisy", 25);
 }

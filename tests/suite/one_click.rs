@@ -3,8 +3,8 @@
 
 use crate::every_part::stock;
 use crate::page::Browser;
-use crate::station_plc::{Daemon, Place, Plc};
-use serde_json::json;
+use crate::station_plc::{Daemon, Place, Plc, SMALL_HEAD};
+use serde_json::{Value, json};
 use sim::{Part, Placement};
 
 const PASS: u16 = 1;
@@ -47,9 +47,13 @@ impl Station {
     }
 
     fn teach(&mut self, number: usize) {
+        self.teach_asking(number, &json!({}));
+    }
+
+    fn teach_asking(&mut self, number: usize, wanted: &Value) {
         let before = self.browser.get("/api/snapshot")["recipe"]["fingerprint"].clone();
         let path = format!("/api/recipes/{number}/teach");
-        let (status, answer) = self.browser.json("POST", &path, &json!({}));
+        let (status, answer) = self.browser.json("POST", &path, wanted);
         assert_eq!(status, 202, "{answer}");
         self.browser.wait_for_another(before.as_str().unwrap());
     }
@@ -89,6 +93,26 @@ fn good_parts_pass(still: usize, scenario: &str) {
 #[test]
 fn every_stock_part_that_is_taught_with_one_click_passes() {
     good_parts_pass(1, "sub_rays = 2\n");
+}
+
+#[test]
+fn the_limit_that_is_asked_for_is_the_recipe_s_and_stays_with_the_number() {
+    let mut station = Station::new(SMALL_HEAD);
+    let limit =
+        |station: &mut Station| station.browser.get("/api/recipes/2")["gauges"][0]["high"].clone();
+    station.teach_asking(2, &json!({ "limit_mm": 0.3 }));
+    assert_eq!(limit(&mut station), 0.3);
+    station.teach_asking(2, &json!({ "replace": true }));
+    assert_eq!(limit(&mut station), 0.3);
+    for refused in [0.0, -1.0, 1e9] {
+        let wanted = json!({ "replace": true, "limit_mm": refused });
+        let (status, answer) = station
+            .browser
+            .json("POST", "/api/recipes/2/teach", &wanted);
+        assert_eq!(status, 422, "{answer}");
+        assert!(answer.to_string().contains("limit_mm"), "{answer}");
+    }
+    assert!(station.passes().is_ok());
 }
 
 #[test]

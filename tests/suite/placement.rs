@@ -65,20 +65,28 @@ pub(crate) fn taught_within(
     bed: &mut Bed,
     placement_tolerance_mm: f64,
 ) -> Result<TaughtRecipe, String> {
-    taught_exposed(bed, placement_tolerance_mm, 1)
+    taught_asking(bed, &naming(placement_tolerance_mm))
 }
 
 /// As [`taught_within`], with frames that are exposed so many times as long as the head is set to.
-/// Each scene is taught once for all tests.
 pub(crate) fn taught_exposed(
     bed: &mut Bed,
     placement_tolerance_mm: f64,
     exposures: u32,
 ) -> Result<TaughtRecipe, String> {
+    let naming = Naming {
+        exposures,
+        ..naming(placement_tolerance_mm)
+    };
+    taught_asking(bed, &naming)
+}
+
+/// Teaches the part as is asked for. Each scene is taught once for all tests.
+pub(crate) fn taught_asking(bed: &mut Bed, naming: &Naming) -> Result<TaughtRecipe, String> {
     static TAUGHT: Once<String, Result<TaughtRecipe, String>> = Once::new();
     let (scenario, placed) = (bed.stage.scenario().clone(), bed.stage.placed());
-    let scene = format!("{scenario:?} {placed:?} {placement_tolerance_mm} {exposures}");
-    let taught = TAUGHT.get(scene, || teach_now(bed, placement_tolerance_mm, exposures));
+    let scene = format!("{scenario:?} {placed:?} {naming:?}");
+    let taught = TAUGHT.get(scene, || teach_now(bed, naming));
     // The noise of what is measured is the same whoever has taught, and not that of golden.
     bed.stage.reseed(!scenario.noise.seed);
     let taught = taught.as_ref().as_ref().map_err(String::clone)?;
@@ -90,22 +98,23 @@ pub(crate) fn taught_exposed(
     })
 }
 
-fn teach_now(
-    bed: &mut Bed,
-    placement_tolerance_mm: f64,
-    exposures: u32,
-) -> Result<TaughtRecipe, String> {
-    let naming = Naming {
+/// The names of a part, with this placement tolerance and else what the program takes.
+pub(crate) fn naming(placement_tolerance_mm: f64) -> Naming {
+    Naming {
         number: 1,
         part_number: "P".into(),
         name: "part".into(),
         taught_at_unix_s: 0,
         placement_tolerance_mm,
-        exposures,
+        exposures: 1,
         everything: false,
-    };
+        limit_mm: Some(0.15),
+    }
+}
+
+fn teach_now(bed: &mut Bed, naming: &Naming) -> Result<TaughtRecipe, String> {
     let (head, calibration) = (&mut bed.head, &bed.calibration);
-    let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent());
+    let taught = teach(head, calibration, naming, TIMEOUT, Headway::silent());
     taught.map_err(|error| error.to_string())?.seal()
 }
 

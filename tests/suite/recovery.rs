@@ -9,7 +9,7 @@ use appliance::head::calibration::Calibration;
 use appliance::history::seqs::AHEAD;
 use appliance::recipe::teach::{Naming, TeachError, teach};
 use appliance::service::{Caller, Daemon};
-use appliance::station::{ConnectionEdges, ControlWrite, Event, Masked, Request};
+use appliance::station::{ConnectionEdges, ControlWrite, Event, Masked, Request, Teaching};
 use appliance::system::headway::Headway;
 use appliance::system::progress::Progress;
 use hal::error::DeviceKind;
@@ -148,10 +148,7 @@ fn an_abort_ends_a_teach_and_the_recipe_before_it_goes_on() {
     let mut plc = Plc::at(daemon.modbus);
     plc.write(0, &[ONLINE]);
     let before = plc.status();
-    let request = Event::Request(Request::Teach {
-        number: 2,
-        keep_gauges: false,
-    });
+    let request = Event::Request(Request::Teach(Teaching::of(2)));
     assert_eq!(daemon.station.event(request).state_word, "teaching");
     plc.write(0, &[ONLINE | ABORT]);
     let ended = plc.wait("READY", |status| status.has(READY | RECIPE_OK));
@@ -174,6 +171,7 @@ fn a_teach_that_is_ended_does_no_further_step() {
         placement_tolerance_mm: 1.0,
         exposures: 1,
         everything: false,
+        limit_mm: Some(0.15),
     };
     let told = Mutex::new(Vec::new());
     let progress = |share: f64, _: &str| {

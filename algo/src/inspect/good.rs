@@ -167,6 +167,13 @@ pub fn motion_variance(
     })
 }
 
+/// Whether heights leave open how far a part is moved along some direction: a flat plate may lie anywhere in its
+/// plane. Also if it has too few points for any motion.
+pub fn leaves_open(golden: GoldenSurface<'_>, window: crate::pipeline::Window<'_>) -> bool {
+    let alignment = Alignment::new(golden, window);
+    alignment.is_none_or(|alignment| alignment.left_out.contains(&true))
+}
+
 /// The area of the surface that each compared pixel sees, mm².
 pub fn areas(golden: GoldenSurface<'_>) -> Vec<f32> {
     of_facets(golden, |facet, _| {

@@ -1,11 +1,14 @@
-//! What a part lies on: a plane that is seen all round the part and lies behind it.
+//! What a part lies on: a plane that is seen beside it and lies behind it.
 //!
-//! The plane is fitted to the points at the picture's border (trimmed least squares: again and again
-//! to the nearer half; P. J. Rousseeuw, 1984). It is what the part lies on if all four sides of the picture
-//! show it, if something lies in front of it, and if that begins with a step: the height in front of
-//! the plane that is reached at [`NEAR`] pixels from the plane's last pixel is nearly that at twice
-//! the distance. A face that rises out of its own base does not step, and a block that fills the
-//! picture has nothing in front of it; both are taken for the part as a whole.
+//! The plane is looked for in two ways. First through the points at the picture's border (trimmed least
+//! squares: again and again to the nearer half; P. J. Rousseeuw, 1984); it is taken if all four sides
+//! of the picture show it. Else, for parts that hide a side, among the flat surfaces that end at
+//! the border, each of them all pixels whose heights continue each other without a bend: the largest is taken behind which
+//! nothing lies.
+//!
+//! Either is what the part lies on only if enough lies in front of it, and, if not all sides show it, that stands
+//! out by [`FAR_MM`] or more, so that the lower one of two sheets is no floor. A part whose own flat base fills
+//! the picture's border looks the same.
 //!
 //! A pixel beside a step mixes both surfaces, and its height may lie anywhere between them: pixels
 //! within [`MARGIN`] of the plane's are left out. That covers the footprint of a pixel and 2 σ of a
@@ -17,6 +20,7 @@
 
 use super::mask::{components, eroded};
 use crate::geometry::Vector;
+use crate::math::around;
 use crate::math::solve::Normal;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -34,13 +38,28 @@ const KEPT: f64 = 0.5;
 /// Heights belong to the plane within so many σ of it and this much more, mm.
 const SIGMAS: f64 = 5.0;
 const ROUGH_MM: f64 = 0.15;
-/// Distance from the plane's last pixel at which a step is over, pixels.
+/// Heights of neighbours that differ by more than this are not of one surface, mm; nor are those at so many pixels to
+/// either side that together lie so far off the pixel between them, mm.
+const JUMP_MM: f64 = 1.5;
+const BENT_PX: isize = 4;
+const BEND_MM: f64 = 0.3;
+/// A flat surface at the border has at least this share of the picture, and of its own pixels at least
+/// [`FLAT`] belong to its plane. At most [`BEHIND`] of the picture lies behind what the part lies on.
+const LEAST_FLAT: f64 = 0.005;
+const FLAT: f64 = 0.9;
+const BEHIND: f64 = 0.005;
+/// From a plane that not all sides show, half of what lies in front stands out by this much, mm.
+const FAR_MM: f64 = 5.0;
+/// A part has at least this share of the picture.
+const LEAST_PART: f64 = 0.02;
+/// A step is over at this distance from the plane's last pixel, pixels: the height there is at least a share of
+/// [`STEP`] of that at twice the distance.
 const NEAR: isize = 3;
-/// Least height at that distance over the height at twice the distance, and least number of places
-/// where it is asked.
 const STEP: f64 = 0.7;
+/// A part that begins with a step does so at this share of its edge and at so many places; its step is
+/// the height that this share of them have less than.
+const STEPPED: f64 = 0.5;
 const LEAST_STEPS: usize = 40;
-/// This share of the steps is lower than [`Surroundings::step_mm`].
 const LOW: f64 = 0.1;
 /// Pixels beside the plane's that are left out.
 const MARGIN: usize = 2;
@@ -54,66 +73,148 @@ const PIECE: f64 = 0.1;
 pub struct Surroundings {
     /// The pixels of the part, row by row.
     pub part: Vec<bool>,
-    /// The part stands out from its surroundings by this much or more, mm.
+    /// The part stands out from its surroundings by this much, mm: its lowest steps, or half of it where it
+    /// rises out of them.
     pub step_mm: f64,
-    /// Share of all pixels that see other things in front of the plane.
-    pub others: f64,
+    /// The pixels of other things in front of what the part lies on.
+    pub others: Vec<bool>,
+}
+
+impl Surroundings {
+    /// Without the part's pixels beside other things, which hide others of them where the part is moved by up to
+    /// `away` pixels.
+    #[must_use]
+    pub fn clear_of_others(mut self, width: usize, away: usize) -> Self {
+        let rows = self.part.len() / width.max(1);
+        let reach = away + MARGIN;
+        for at in (0..self.others.len()).filter(|at| self.others[*at]) {
+            for row in around(at / width, reach, rows) {
+                let columns = around(at % width, reach, width);
+                self.part[row * width + columns.start..row * width + columns.end].fill(false);
+            }
+        }
+        self
+    }
 }
 
 /// Finds what surrounds a part in a picture of `pixels` pixels with `width` columns. `point` gives the
 /// point in mm that a pixel sees, `None` where it has no height; `sigma_mm` is the σ of a height. `None` if
-/// no plane is seen all round something that steps out of it.
+/// no plane is seen beside something that lies in front of it.
 pub fn surroundings(
     pixels: usize,
     width: usize,
     sigma_mm: f64,
     point: impl Fn(usize) -> Option<Vector>,
 ) -> Option<Surroundings> {
-    let rows = pixels / width.max(1);
+    let size = [width, pixels / width.max(1)];
     let reach = SIGMAS * sigma_mm + ROUGH_MM;
-    let plane = plane(&point, [width, rows], reach)?;
-    // Not a number where there is no height.
+    let all_round = all_round(&point, size, reach);
+    let plane = all_round.or_else(|| flat(&point, size, reach))?;
     let above = |at: usize| point(at).map_or(f64::NAN, |point| plane.above(point)) as f32;
-    let above: Vec<f32> = (0..pixels).map(above).collect();
-    let apart: Vec<bool> = above
-        .iter()
-        .map(|above| !(f64::from(*above) <= reach))
-        .collect();
-    let step_mm = step(&above, &apart, width, reach)?;
-    let apart = eroded(&apart, width, MARGIN);
-    let front = apart
-        .iter()
-        .zip(&above)
-        .map(|(apart, above)| *apart && !above.is_nan());
-    let mut pieces = components(&front.collect::<Vec<_>>(), width, false);
-    pieces.retain(|piece| piece.len() >= CRUMB);
-    let is_border = |&at: &usize| {
-        let (u, v) = (at % width, at / width);
-        u <= MARGIN || v <= MARGIN || u + MARGIN + 1 >= width || v + MARGIN + 1 >= rows
+    let front = Front {
+        above: (0..pixels).map(above).collect(),
+        size,
+        reach,
     };
-    let is_cut = |piece: &Vec<usize>| piece.iter().any(is_border);
-    let sizes = |whole: bool| {
-        let wanted = pieces.iter().filter(move |piece| !whole || !is_cut(piece));
-        wanted.map(Vec::len).max().unwrap_or(0) as f64
-    };
-    let (whole, largest) = (sizes(true), sizes(false));
-    let is_inside = whole >= PIECE * largest;
-    let least = PIECE * if is_inside { whole } else { largest };
-    let mut part = vec![false; pixels];
-    let (mut kept, mut others) = (0, 0);
-    for piece in &pieces {
-        if (piece.len() as f64) < least || (is_inside && is_cut(piece)) {
-            others += piece.len();
-            continue;
-        }
-        kept += piece.len();
-        piece.iter().for_each(|&at| part[at] = true);
+    let [part, others] = front.part();
+    let heights = part.iter().zip(&front.above).filter(|(part, _)| **part);
+    let mut heights: Vec<f64> = heights.map(|(_, above)| f64::from(*above)).collect();
+    if (heights.len() as f64) < LEAST_PART * pixels as f64 {
+        return None;
     }
-    (kept > 0).then(|| Surroundings {
+    let middle = quantile(&mut heights, 0.5);
+    (all_round.is_some() || middle >= FAR_MM).then(|| Surroundings {
         part,
-        step_mm,
-        others: others as f64 / pixels as f64,
+        step_mm: front.step().unwrap_or(middle),
+        others,
     })
+}
+
+/// The value that a share of others are less than.
+fn quantile(values: &mut [f64], share: f64) -> f64 {
+    let at = (share * values.len() as f64) as usize;
+    *values.select_nth_unstable_by(at, f64::total_cmp).1
+}
+
+/// A picture of what lies in front of a plane.
+struct Front {
+    /// How far each pixel's point lies in front of it, mm; not a number where there is no height.
+    above: Vec<f32>,
+    size: [usize; 2],
+    /// The plane's own pixels lie less far in front of it, mm.
+    reach: f64,
+}
+
+impl Front {
+    /// Whether a pixel is not the plane's own.
+    fn is_apart(&self, at: usize) -> bool {
+        !(f64::from(self.above[at]) <= self.reach)
+    }
+
+    /// The pixels of the part, and those of other things.
+    fn part(&self) -> [Vec<bool>; 2] {
+        let (width, pixels) = (self.size[0], self.above.len());
+        let apart: Vec<bool> = (0..pixels).map(|at| self.is_apart(at)).collect();
+        let apart = eroded(&apart, width, MARGIN);
+        let is_front = |at: usize| apart[at] && !self.above[at].is_nan();
+        let jumps = |at: usize| {
+            let beside = beside(at, self.size).filter(|next| is_front(*next));
+            let mut off = beside.map(|next| (self.above[next] - self.above[at]).abs());
+            off.any(|off| f64::from(off) > JUMP_MM)
+        };
+        let smooth: Vec<bool> = (0..pixels).map(|at| is_front(at) && !jumps(at)).collect();
+        let mut pieces = components(&smooth, width, false);
+        pieces.retain(|piece| piece.len() >= CRUMB);
+        let is_cut = |piece: &Vec<usize>| piece.iter().any(|at| is_border(*at, self.size));
+        let sizes = |whole: bool| {
+            let wanted = pieces.iter().filter(move |piece| !whole || !is_cut(piece));
+            wanted.map(Vec::len).max().unwrap_or(0) as f64
+        };
+        let (whole, largest) = (sizes(true), sizes(false));
+        let is_inside = whole >= PIECE * largest;
+        let least = PIECE * if is_inside { whole } else { largest };
+        let [mut part, mut others] = [vec![false; pixels], vec![false; pixels]];
+        for piece in &pieces {
+            let is_other = (piece.len() as f64) < least || (is_inside && is_cut(piece));
+            let kind = if is_other { &mut others } else { &mut part };
+            piece.iter().for_each(|&at| kind[at] = true);
+        }
+        // A step of the part's own.
+        let own = |at: usize| {
+            let is_beside = |kind: &[bool]| beside(at, self.size).any(|next| kind[next]);
+            is_front(at) && !smooth[at] && is_beside(&part) && !is_beside(&others)
+        };
+        let own: Vec<usize> = (0..pixels).filter(|at| own(*at)).collect();
+        own.into_iter().for_each(|at| part[at] = true);
+        [part, others]
+    }
+
+    /// How far the lowest steps stand out from the plane; `None` if what lies in front of it rises out of it.
+    fn step(&self) -> Option<f64> {
+        let [width, rows] = self.size;
+        let (mut edges, mut steps) = (0, Vec::new());
+        for at in (0..self.above.len()).filter(|at| !self.is_apart(*at)) {
+            let (u, v) = ((at % width) as isize, (at / width) as isize);
+            for (right, down) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
+                let beyond = |by: isize| {
+                    let (u, v) = (u + right * by, v + down * by);
+                    let inside = u >= 0 && v >= 0 && u < width as isize && v < rows as isize;
+                    inside.then(|| v as usize * width + u as usize)
+                };
+                let places = [1, NEAR, 2 * NEAR].map(beyond);
+                let [Some(next), Some(near), Some(far)] = places else {
+                    continue;
+                };
+                let [near, far] = [near, far].map(|at| f64::from(self.above[at]));
+                if self.is_apart(next) && far > self.reach && !near.is_nan() {
+                    edges += 1;
+                    steps.extend((near >= STEP * far).then_some(near));
+                }
+            }
+        }
+        let is_stepped = steps.len() >= LEAST_STEPS && steps.len() as f64 >= STEPPED * edges as f64;
+        is_stepped.then(|| quantile(&mut steps, LOW))
+    }
 }
 
 /// z = a + b x + c y.
@@ -132,10 +233,26 @@ impl Plane {
             .map(|point| ([1.0, point.x, point.y], point.z));
         Normal::of(rows).solve().map(Self)
     }
+
+    /// Through the nearer half of these points, found again and again.
+    fn trimmed(known: &[Vector]) -> Option<Self> {
+        let mut plane = Self::through(known)?;
+        for _ in 0..ROUNDS {
+            let off = |point: &Vector| plane.above(*point).abs();
+            let limit = quantile(&mut known.iter().map(off).collect::<Vec<_>>(), KEPT);
+            let near: Vec<Vector> = known
+                .iter()
+                .filter(|point| off(point) <= limit)
+                .copied()
+                .collect();
+            plane = Self::through(&near)?;
+        }
+        Some(plane)
+    }
 }
 
 /// The plane that all four sides of a picture show.
-fn plane(
+fn all_round(
     point: &impl Fn(usize) -> Option<Vector>,
     [width, rows]: [usize; 2],
     reach: f64,
@@ -152,18 +269,8 @@ fn plane(
         points(0..width, 0..border),
         points(0..width, rows - border..rows),
     ];
-    let mut near: Vec<Vector> = sides.iter().flatten().flatten().copied().collect();
-    let known = near.clone();
-    let mut plane = Plane::through(&near)?;
-    for _ in 0..ROUNDS {
-        let off = |point: &Vector| plane.above(*point).abs();
-        let mut all: Vec<f64> = known.iter().map(off).collect();
-        let kept = (KEPT * all.len() as f64) as usize;
-        let limit = *all.select_nth_unstable_by(kept, f64::total_cmp).1;
-        near.clear();
-        near.extend(known.iter().filter(|point| off(point) <= limit));
-        plane = Plane::through(&near)?;
-    }
+    let known: Vec<Vector> = sides.iter().flatten().flatten().copied().collect();
+    let plane = Plane::trimmed(&known)?;
     let is_shown = |side: &Vec<Option<Vector>>| {
         let known = side.iter().flatten();
         let on_plane = known
@@ -175,38 +282,77 @@ fn plane(
     sides.iter().all(is_shown).then_some(plane)
 }
 
-/// How far the lowest places of what lies in front of the plane stand out from it; `None` if that does
-/// not begin with a step. `apart` is false for the plane's own pixels.
-fn step(above: &[f32], apart: &[bool], width: usize, reach: f64) -> Option<f64> {
-    let rows = apart.len() / width.max(1);
-    let (mut ratios, mut heights) = (Vec::new(), Vec::new());
-    for at in (0..apart.len()).filter(|at| !apart[*at]) {
-        let (u, v) = ((at % width) as isize, (at / width) as isize);
-        for (right, down) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-            let beyond = |by: isize| {
-                let (u, v) = (u + right * by, v + down * by);
-                let inside = u >= 0 && v >= 0 && u < width as isize && v < rows as isize;
-                inside.then(|| v as usize * width + u as usize)
-            };
-            let places = [1, NEAR, 2 * NEAR].map(beyond);
-            let [Some(next), Some(near), Some(far)] = places else {
-                continue;
-            };
-            let [near, far] = [near, far].map(|at| f64::from(above[at]));
-            if apart[next] && far > reach && !near.is_nan() {
-                ratios.push(near / far);
-                heights.push(near);
-            }
-        }
-    }
-    if heights.len() < LEAST_STEPS {
-        return None;
-    }
-    let share = |values: &mut Vec<f64>, share: f64| {
-        let at = (share * values.len() as f64) as usize;
-        *values.select_nth_unstable_by(at, f64::total_cmp).1
+/// The largest flat surface at the border of a picture behind which nothing lies.
+fn flat(
+    point: &impl Fn(usize) -> Option<Vector>,
+    [width, rows]: [usize; 2],
+    reach: f64,
+) -> Option<Plane> {
+    let pixels = width * rows;
+    let height = |at| point(at).map_or(f64::NAN, |point: Vector| point.z);
+    let heights: Vec<f64> = (0..pixels).map(height).collect();
+    let along = |at: usize, [right, down]: [isize; 2]| {
+        let (u, v) = ((at % width) as isize + right, (at / width) as isize + down);
+        let inside = (0..width as isize).contains(&u) && (0..rows as isize).contains(&v);
+        let height = if inside {
+            heights[v as usize * width + u as usize]
+        } else {
+            f64::NAN
+        };
+        height - heights[at]
     };
-    (share(&mut ratios, 0.5) >= STEP).then(|| share(&mut heights, LOW))
+    let continues = |at: usize| {
+        [[1, 0], [0, 1]].into_iter().all(|[right, down]| {
+            let far = [BENT_PX * right, BENT_PX * down];
+            let bend = along(at, far) + along(at, far.map(|way| -way));
+            // Not a number where a height is missing.
+            !(along(at, [right, down]).abs() > JUMP_MM || bend.abs() > BEND_MM)
+        })
+    };
+    let continues = |at: usize| heights[at].is_finite() && continues(at);
+    let continues: Vec<bool> = (0..pixels).map(continues).collect();
+    let mut pieces = components(&continues, width, false);
+    pieces.retain(|piece| {
+        let is_large = piece.len() as f64 >= LEAST_FLAT * pixels as f64;
+        is_large && piece.iter().any(|at| is_border(*at, [width, rows]))
+    });
+    pieces.sort_by_key(|piece| core::cmp::Reverse(piece.len()));
+    pieces.into_iter().find_map(|piece| {
+        let own: Vec<Vector> = piece.into_iter().filter_map(point).collect();
+        let plane = Plane::trimmed(&own)?;
+        let on_plane = own.iter().filter(|own| plane.above(**own).abs() <= reach);
+        let all = (0..pixels).filter_map(point);
+        let behind = all.clone().filter(|point| plane.above(*point) < -FAR_MM);
+        let is_flat = on_plane.count() as f64 >= FLAT * own.len() as f64;
+        if !is_flat || behind.count() as f64 > BEHIND * pixels as f64 {
+            return None;
+        }
+        // Pieces that the part keeps apart are of one plane.
+        let near: Vec<Vector> = all
+            .filter(|point| plane.above(*point).abs() <= reach)
+            .collect();
+        Plane::through(&near)
+    })
+}
+
+/// The pixels that share an edge with a pixel.
+fn beside(at: usize, [width, rows]: [usize; 2]) -> impl Iterator<Item = usize> {
+    let (u, v) = (at % width, at / width);
+    let inside = [u > 0, u + 1 < width, v > 0, v + 1 < rows];
+    let next = [
+        at.wrapping_sub(1),
+        at + 1,
+        at.wrapping_sub(width),
+        at + width,
+    ];
+    next.into_iter()
+        .zip(inside)
+        .filter_map(|(next, inside)| inside.then_some(next))
+}
+
+fn is_border(at: usize, [width, rows]: [usize; 2]) -> bool {
+    let (u, v) = (at % width, at / width);
+    u <= MARGIN || v <= MARGIN || u + MARGIN + 1 >= width || v + MARGIN + 1 >= rows
 }
 
 #[cfg(test)]
@@ -269,8 +415,22 @@ mod tests {
         })
         .unwrap();
         assert_eq!(alone.part, among.part);
-        assert_eq!(alone.others, 0.0);
-        assert!((0.04..0.07).contains(&among.others), "{}", among.others);
+        assert!(!alone.others.contains(&true));
+        let others = among.others.iter().filter(|other| **other).count();
+        assert!((450..800).contains(&others), "{others}");
+    }
+
+    #[test]
+    fn a_pin_that_touches_the_part_is_another_thing_and_the_part_keeps_clear_of_it() {
+        let found = found(|u, v| match (u - 92.0).hypot(v - 50.0) < 5.0 {
+            true => 12.0,
+            false => plate(10.0, u, v),
+        });
+        let found = found.unwrap();
+        assert!(found.others[50 * WIDTH + 92] && !found.part[50 * WIDTH + 92]);
+        assert!(found.part[50 * WIDTH + 82]);
+        let clear = found.clear_of_others(WIDTH, 4);
+        assert!(!clear.part[50 * WIDTH + 83] && clear.part[50 * WIDTH + 78]);
     }
 
     #[test]
@@ -285,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn where_no_plane_lies_behind_a_step_all_round_everything_is_the_part() {
+    fn where_no_plane_lies_behind_something_everything_is_the_part() {
         let hole = |u: f64, v: f64| (u - 60.0).hypot(v - 50.0) < 20.0;
         assert_eq!(found(|_, _| f64::NAN), None);
         assert_eq!(found(|_, _| 0.0), None);
@@ -294,10 +454,59 @@ mod tests {
         assert_eq!(found(|u, v| if hole(u, v) { -9.0 } else { 0.0 }), None);
         // A plate in black.
         assert_eq!(found(|u, v| if hole(u, v) { 0.0 } else { f64::NAN }), None);
-        // A hill of 45° on its own base.
+        // Two sheets.
+        assert_eq!(found(|u, _| if u < 60.0 { 0.0 } else { -2.0 }), None);
+    }
+
+    #[test]
+    fn a_hill_that_rises_out_of_the_floor_is_the_part() {
         let hill = |u: f64, v: f64| (40.0 - (u - 60.0).hypot(v - 50.0)).max(0.0) * PITCH_MM;
-        assert_eq!(found(hill), None);
-        // A part that covers a side of the picture.
-        assert_eq!(found(|u, _| if u < 60.0 { 0.0 } else { -9.0 }), None);
+        let found = found(hill).unwrap();
+        assert!((3.0..8.0).contains(&found.step_mm), "{}", found.step_mm);
+        for (at, part) in found.part.iter().enumerate() {
+            let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
+            // The plane's own pixels reach 0.25 mm into the hill, and the margin is square.
+            let inside = hill(u, v) / PITCH_MM;
+            assert!(*part || inside < 4.5, "({u}, {v})");
+            assert!(!*part || inside > 2.0, "({u}, {v})");
+        }
+    }
+
+    #[test]
+    fn a_dome_that_hides_sides_and_rises_out_of_the_floor_is_the_part() {
+        let dome = |u: f64, v: f64| {
+            let off = (u - 80.0).hypot(v - 50.0) * PITCH_MM;
+            ((40.0_f64.powi(2) - off * off).max(0.0).sqrt() - 32.0).max(0.0)
+        };
+        let part = found(dome).unwrap().part;
+        assert!(part[50 * WIDTH + 80] && part[50 * WIDTH + 26] && !part[50 * WIDTH + 15]);
+    }
+
+    #[test]
+    fn a_part_that_hides_sides_of_the_picture_is_told_from_the_floor() {
+        // A ridge across the picture over a tilted floor, a ring of which corners and the inside show the floor.
+        let ridge = |u: f64, v: f64| {
+            let floor = -9.0 - 0.02 * v * PITCH_MM;
+            if u < 30.0 {
+                floor
+            } else {
+                5.0 * (u * 0.2).sin()
+            }
+        };
+        let ring = |u: f64, v: f64| {
+            let radius = (u - 60.0).hypot(v - 50.0);
+            if within(radius, [20.0, 62.0]) {
+                radius * PITCH_MM
+            } else {
+                -30.0
+            }
+        };
+        let ridge = found(ridge).unwrap();
+        let of_row = |u: usize| ridge.part[50 * WIDTH + u];
+        assert!(!of_row(29) && !of_row(31) && of_row(33) && of_row(110));
+        let ring = found(ring).unwrap();
+        let of_row = |u: usize| ring.part[50 * WIDTH + u];
+        assert!(of_row(20) && !of_row(45) && !of_row(60) && of_row(100));
+        assert!(!ring.part[WIDTH + 1]);
     }
 }

@@ -12,6 +12,7 @@ use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, Opened};
 use crate::recipe::file::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
 use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe, UnsealedRecipe};
+use crate::recipe::replace::{LEAST_LIMIT_MM, MOST_LIMIT_MM};
 use crate::recipe::teach::{TeachError, teach};
 use crate::recipe::{PatternFile, RecipeFile, Store};
 use crate::recipe::{replace, signal, surroundings};
@@ -50,6 +51,10 @@ pub struct Teach {
     /// recipe that is replaced, or 1.
     #[arg(long, value_name = "MM", value_parser = number(0.0, MAX_TOLERANCE_MM))]
     tolerance: Option<f64>,
+    /// Limit of the deviation from golden, ± mm: a part whose good ones would not keep it is refused;
+    /// without it as in the recipe that is replaced, or 0.15.
+    #[arg(long, value_name = "MM", value_parser = number(LEAST_LIMIT_MM, MOST_LIMIT_MM))]
+    limit: Option<f64>,
     /// Expose each frame so many times as long as the head is set to, with less light where the
     /// part is bright: dark places have less noise; without it as in the recipe that is replaced,
     /// or 1.
@@ -221,13 +226,14 @@ impl Teach {
     }
 
     fn naming(&self, replaced: Option<&RecipeFile>) -> Naming {
-        let kept = replace::naming(self.number, replaced);
+        let kept = replace::naming(self.number, replaced, self.keep_gauges);
         Naming {
             part_number: self.part_number.clone().unwrap_or(kept.part_number),
             name: self.name.clone().unwrap_or(kept.name),
             placement_tolerance_mm: self.tolerance.unwrap_or(kept.placement_tolerance_mm),
             exposures: self.exposures.unwrap_or(kept.exposures),
             everything: self.everything || kept.everything,
+            limit_mm: self.limit.or(kept.limit_mm),
             ..kept
         }
     }
@@ -309,7 +315,10 @@ impl Teach {
         let (mut phases, mut heights) = (phases.clone(), surface.map.clone());
         let found = match naming.everything {
             true => None,
-            false => surroundings::of(&heights, &surface.triangulator),
+            false => {
+                let tolerance_mm = naming.placement_tolerance_mm;
+                surroundings::of(&heights, &surface.triangulator, tolerance_mm)
+            }
         };
         if let Some(found) = &found {
             surroundings::leave_out(found, &mut phases, &mut heights);

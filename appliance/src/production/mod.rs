@@ -35,7 +35,7 @@ use crate::recipe::{LoadError, Store};
 use crate::station::snapshot::warning;
 use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, ProjectorHealth, RecipeKey, RecipeResult, Request,
-    StationHandle,
+    StationHandle, Teaching,
 };
 use crate::system::computing::Computing;
 use crate::system::headway::Headway;
@@ -58,9 +58,8 @@ pub enum Order {
     Measure(Job),
     /// Load a recipe.
     Load(JobId, RecipeKey),
-    /// Teach the part in front of the head as the recipe of this number; whether to keep the gauges
-    /// of the one that it replaces.
-    Teach(JobId, u16, bool),
+    /// Teach the part in front of the head.
+    Teach(JobId, Teaching),
     /// Carry out the step of commissioning that waits.
     Commission(JobId),
     /// Take a live picture.
@@ -163,9 +162,9 @@ impl Worker {
                     self.load(job, &key);
                     memory::trim();
                 }
-                Ok(Order::Teach(job, number, keep_gauges)) => {
+                Ok(Order::Teach(job, teaching)) => {
                     self.forget();
-                    self.teach(job, number, keep_gauges);
+                    self.teach(job, &teaching);
                     memory::trim();
                 }
                 Ok(Order::Commission(job)) => {

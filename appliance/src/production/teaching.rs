@@ -5,7 +5,7 @@ use super::telling::Telling;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, recovery};
 use crate::recipe::teach::{TaughtRecipe, TeachError, teach_marking};
 use crate::recipe::{RecipeFile, replace};
-use crate::station::{Event, JobId, RecipeKey, error_code};
+use crate::station::{Event, JobId, RecipeKey, Teaching, error_code};
 use crate::system::headway::Headway;
 use crate::system::memory;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,12 +18,13 @@ const CHECKED: f64 = 0.93;
 const STORED: f64 = 0.94;
 
 impl Worker {
-    /// Teaches the part in front of the head and stores it as recipe `number`; it is the active one
+    /// Teaches the part in front of the head and stores its recipe, which is the active one
     /// then. Where that fails the recipe before stays active.
-    pub(super) fn teach(&mut self, job: JobId, number: u16, keep_gauges: bool) {
+    pub(super) fn teach(&mut self, job: JobId, teaching: &Teaching) {
+        let (number, keep_gauges) = (teaching.number, teaching.keep_gauges);
         let replaced = self.recipes.present(number);
         let taught = catch_unwind(AssertUnwindSafe(|| {
-            self.taught(job, number, replaced.as_ref(), keep_gauges)
+            self.taught(job, teaching, replaced.as_ref())
         }));
         let taught = taught
             .unwrap_or_else(|panic| Err(TeachError::Rig(broken("teach: the part", &*panic))))
@@ -66,10 +67,15 @@ impl Worker {
     fn taught(
         &mut self,
         job: JobId,
-        number: u16,
+        teaching: &Teaching,
         replaced: Option<&RecipeFile>,
-        keep_gauges: bool,
     ) -> Result<TaughtRecipe, TeachError> {
+        let Teaching {
+            number,
+            keep_gauges,
+            everything,
+            limit_um,
+        } = *teaching;
         if let Some(problem) = &self.opened.problem {
             return Err(TeachError::NotCalibrated(problem.clone()));
         }
@@ -78,7 +84,11 @@ impl Worker {
         if let Some(file) = kept {
             replace::check_kept(file, (width, height)).map_err(TeachError::Rig)?;
         }
-        let naming = replace::naming(number, replaced);
+        let mut naming = replace::naming(number, replaced, keep_gauges);
+        naming.everything = everything.unwrap_or(naming.everything);
+        naming.limit_mm = limit_um
+            .map(|um| f64::from(um) / 1000.0)
+            .or(naming.limit_mm);
         let shared = self.recipes.refuse_shared(number, &naming.part_number);
         shared.map_err(TeachError::Rig)?;
         let telling = (&self.aborts, job);

@@ -2,7 +2,7 @@
 
 use super::tolerance::{About, Master, Tolerance};
 use crate::station::Unit;
-use algo::inspect::Measure;
+use algo::inspect::{Basis, Measure};
 use hal::bounds::within;
 use std::fmt::Display;
 
@@ -32,6 +32,11 @@ pub struct GaugeFile {
 }
 
 impl GaugeFile {
+    /// Whether it is the largest deviation from golden.
+    pub(super) fn is_deviation(&self) -> bool {
+        matches!(self.measures.facts().basis, Basis::Squares(_))
+    }
+
     /// A gauge of features without limits.
     pub fn new(slot: u16, name: &str, measures: impl Into<Measure>, of: &[&str]) -> Self {
         Self {

@@ -3,6 +3,7 @@
 use super::archive::{self, Arrays};
 use super::captures::Offsets;
 use super::comparison::ComparisonFile;
+use super::failure::TeachError;
 use super::file::{CameraFile, FORMAT, RasterFile, VERSION};
 use super::good_parts::DEVIATION_MM;
 use super::models::ModelsFile;
@@ -59,8 +60,10 @@ pub struct Naming {
     pub placement_tolerance_mm: f64,
     /// Each frame is exposed so many times as long as the head is set to, 1 to 4.
     pub exposures: u32,
-    /// Whether all that is seen is the part, also what lies behind it all round.
+    /// Whether all that is seen is the part, also what lies behind it.
     pub everything: bool,
+    /// The limit of the deviation, ± mm, that good parts must keep; `None` where teaching promises none.
+    pub limit_mm: Option<f64>,
 }
 
 /// A measured golden part.
@@ -179,12 +182,12 @@ impl GoldenPart<'_> {
     /// part that have 60 pixels and room for a region, the coverage of the opening.
     ///
     /// # Errors
-    /// In words, if the recipe does not fit the head.
+    /// If the recipe does not fit the head, or good parts would not keep the limit that is asked for.
     pub fn recipe(
         mut self,
         naming: &Naming,
         headway: Headway<'_>,
-    ) -> Result<UnsealedRecipe, String> {
+    ) -> Result<UnsealedRecipe, TeachError> {
         // A highlight is not resolved either, but it is no opening: it moves over the part.
         let seen = |trust: &Trust| matches!(trust, Trust::Resolved | Trust::Saturated);
         let seen: Vec<bool> = self.phases.trust.iter().map(seen).collect();
@@ -255,8 +258,13 @@ impl GoldenPart<'_> {
             good_parts: None,
             tried: Vec::new(),
         };
-        let mut words =
-            self.set_limits(surface, &mut manifest, &mut arrays, headway.part(0.2, 0.95))?;
+        let mut words = self.set_limits(
+            surface,
+            &mut manifest,
+            &mut arrays,
+            naming.limit_mm,
+            headway.part(0.2, 0.95),
+        )?;
         // The smaller the squares, the less noise is allowed.
         let widest = arrays.widest();
         let mut choice = planner::choose(&manifest.sequences, &manifest.gauges, widest);

@@ -1,10 +1,9 @@
-//! Predicts what the deviation gauge reads on good parts, and sets its limit accordingly.
+//! Predicts what the deviation gauge reads on good parts, and whether they keep its limit.
 //!
-//! The limit is the requested tolerance if the part can be measured that well. In squares that are
-//! too noisy for it, deviations get less weight, and teaching reports on how much of the surface,
-//! and by which factor a deviation must be larger there to be found. If that concerned more than a
-//! small share of the pixels, the limit is wider instead, and teaching reports that the tolerance
-//! cannot be held.
+//! The limit is the requested tolerance. In squares that are too noisy for it, deviations get less weight,
+//! and teaching reports on how much of the surface, and by which factor a deviation must be larger
+//! there to be found. If that concerns more than a small share of the pixels, the part cannot be taught
+//! with this limit, and teaching says which one could be held.
 //!
 //! Squares are as small as noise allows about each pixel: their largest deviation on good parts
 //! stays below a third of the limit, so that small deep defects are seen at nearly their depth
@@ -19,22 +18,20 @@ use super::sides::{SIDES, SIGMAS, Sides};
 use crate::station::Unit;
 use crate::system::headway::Headway;
 use algo::geometry::Triangulator;
-use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, motion_variance};
+use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, leaves_open, motion_variance};
 use algo::inspect::{GoldenSurface, Largest, Missed, Taught, Weight, normal_shares};
 use algo::pipeline::KnownSurface;
 use hal::bounded;
 use std::ops::RangeInclusive;
 
-/// Requested tolerance of the deviation, ± mm. It becomes the gauge's limit if the part can be
-/// measured that well, else the limit is wider.
+/// Limit of the deviation unless another one is asked for, ± mm.
 pub(super) const DEVIATION_MM: f64 = 0.15;
-/// At most this share of the compared pixels counts with less weight or not at all; else the limit
-/// is wider.
+/// At most this share of the compared pixels counts with less weight or not at all.
 const WEIGHED: f64 = 0.05;
 /// At most this share of good parts is predicted to exceed the limit.
 const BEYOND: f64 = 1e-6;
-/// Limits wider than the tolerance are rounded up to a multiple of this, mm; each is wider than the
-/// one before by this factor, and at most so many times the tolerance.
+/// Limits that could be held are rounded up to a multiple of this, mm; each that is tried is wider than the
+/// one before by this factor, and at most so many times the one that is asked for.
 const STEP_MM: f64 = 0.01;
 const WIDER: f64 = 1.1;
 const WIDEST: f64 = 20.0;
@@ -52,9 +49,9 @@ bounded! {
     /// The deviation of good parts, as predicted when the part was taught.
     #[derive(Copy, Default)]
     pub struct GoodPartsFile {
-        /// The tolerance that was asked for, ± mm.
+        /// The limit that was asked for, ± mm.
         pub tolerance_mm: f64 = length(),
-        /// The limit that was set, ± mm.
+        /// The limit that was set, ± mm: the same, but in recipes of versions that widened it.
         pub limit_mm: f64 = length(),
         /// The largest deviation of a good part that lies as taught: mean and standard deviation
         /// over parts and goldens, mm.
@@ -187,6 +184,13 @@ impl Noise<'_> {
         weighed
     }
 
+    /// Whether the heights of these pixels leave open how far the part is moved along some direction.
+    pub fn leaves_open(&self, mask: &[u8]) -> bool {
+        let full: Vec<Weight> = mask.iter().map(|&valid| Weight::from(valid != 0)).collect();
+        let window = vec![0..self.surface.width; mask.len() / self.surface.width.max(1)];
+        leaves_open(self.golden_surface(&self.taught(&full)), &window)
+    }
+
     /// Golden with these weights, and with the noise that production takes it to have ([`Taught`]).
     fn taught(&self, weights: &[Weight]) -> Taught {
         let sigmas = self
@@ -304,7 +308,8 @@ fn count(mask: &[bool]) -> f64 {
     mask.iter().filter(|on| **on).count() as f64
 }
 
-fn rounded_up(mm: f64) -> f64 {
+/// A limit that is not narrower, in hundredths of a millimetre.
+pub(super) fn rounded_up(mm: f64) -> f64 {
     // A division by 100 prints as hundredths: 0.29, not 0.29000000000000004.
     (mm / STEP_MM).ceil() / (1.0 / STEP_MM).round()
 }
@@ -322,7 +327,7 @@ impl GoodPartsFile {
     /// The prediction in words: one line, and further ones if the tolerance is not held everywhere.
     pub fn words(&self) -> Vec<String> {
         let Self {
-            tolerance_mm,
+            tolerance_mm: _,
             limit_mm,
             largest_mm,
             scatter_mm,
@@ -346,13 +351,7 @@ impl GoodPartsFile {
             "good parts deviate by up to {largest_mm:.3} ± {scatter_mm:.3} mm, {} exceeds ±{limit_mm:.2} mm",
             one_in(beyond)
         );
-        let mut lines = vec![match limit_mm > tolerance_mm {
-            true => format!(
-                "the deviation of ±{tolerance_mm:.2} mm that is asked for cannot be held: {expected}, which is the \
-                 limit; more light, less noise or another pose narrows it"
-            ),
-            false => format!("deviation: {expected}"),
-        }];
+        let mut lines = vec![format!("deviation: {expected}")];
         let elsewhere = match wider_px {
             0 => String::new(),
             side => format!(

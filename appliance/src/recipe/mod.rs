@@ -62,6 +62,7 @@ pub mod planner;
 mod proof;
 mod recorded;
 mod references;
+mod refusal;
 mod regauge;
 pub mod replace;
 mod rounds;

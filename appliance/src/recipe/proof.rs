@@ -3,7 +3,8 @@
 //!
 //! Limits are predicted from noise; what noise does not explain is found here, where nothing is at
 //! stake yet. Each cycle is that of a [`Plan`]: the same sequences, limits and guard band. A limit
-//! that would refuse the recipe's own part is moved until it holds, and teaching says so.
+//! that would refuse the recipe's own part is moved until it holds, and teaching says so; that of the
+//! deviation is never moved (`refusal`).
 
 use super::archive::Arrays;
 use super::failure::TeachError;
@@ -183,17 +184,18 @@ pub(super) fn leave_out_covered(
     words
 }
 
-/// Moves the limits that some of these cycles of good parts do not keep, so that all do; says
-/// which.
+/// Moves the limits that some of these cycles of good parts do not keep, but not those of the deviation, so
+/// that all do; says which.
 pub(super) fn hold(manifest: &mut RecipeFile, judged: &[Inspection]) -> Vec<String> {
     let mut words = Vec::new();
     let guard_k = manifest.guard_k;
-    for (at, gauge) in manifest.gauges.iter_mut().enumerate() {
+    let gauges = manifest.gauges.iter_mut().enumerate();
+    for (at, gauge) in gauges.filter(|(_, gauge)| !gauge.is_deviation()) {
         let found = judged
             .iter()
             .filter_map(|inspection| inspection.gauges.get(at));
         let ranges = found.filter_map(|found| {
-            let band = guard_k * found.uncertainty.unwrap_or(0.0) / COVERAGE_FACTOR;
+            let band = band(found, guard_k);
             found.value.map(|value| (value, band))
         });
         let ranges: Vec<(f64, f64)> = ranges.collect();
@@ -217,13 +219,6 @@ pub(super) fn hold(manifest: &mut RecipeFile, judged: &[Inspection]) -> Vec<Stri
         if let Some(high) = gauge.high.filter(|high| most > *high) {
             gauge.high = Some(wider(high, most, 1.0));
         }
-        // A deviation is as wide to both sides.
-        if let (Basis::Squares(_), Some(low), Some(high)) =
-            (gauge.measures.facts().basis, gauge.low, gauge.high)
-        {
-            let limit = high.max(-low);
-            (gauge.low, gauge.high) = (Some(-limit), Some(limit));
-        }
         if before != (gauge.low, gauge.high) {
             let limit = |limit: Option<f64>| limit.map_or("none".into(), |at| format!("{at:+.3}"));
             words.push(format!(
@@ -245,11 +240,8 @@ pub(super) fn tried(manifest: &RecipeFile, judged: &[Inspection]) -> Vec<TriedFi
         let found = judged
             .iter()
             .filter_map(|inspection| inspection.gauges.get(at));
-        let band = |found: &GaugeValue| {
-            let band = found.uncertainty.unwrap_or(0.0) / COVERAGE_FACTOR;
-            manifest.guard_k * band
-        };
-        let bands = found.clone().map(band).fold(0.0, f64::max);
+        let bands = found.clone().map(|found| band(found, manifest.guard_k));
+        let bands = bands.fold(0.0, f64::max);
         let values: Vec<f64> = found.filter_map(|found| found.value).collect();
         let basis = gauge.measures.facts().basis;
         let parts = match (basis, manifest.good_parts) {
@@ -270,6 +262,11 @@ pub(super) fn tried(manifest: &RecipeFile, judged: &[Inspection]) -> Vec<TriedFi
     };
     let gauges = manifest.gauges.iter().enumerate();
     gauges.filter_map(passes).collect()
+}
+
+/// The guard band of a value.
+pub(super) fn band(found: &GaugeValue, guard_k: f64) -> f64 {
+    guard_k * found.uncertainty.unwrap_or(0.0) / COVERAGE_FACTOR
 }
 
 /// Mean and scatter of some values, for the next one; none of fewer than two.

@@ -1,15 +1,32 @@
 //! Teaching under a number that is taken: what the new recipe keeps of the one that it replaces.
 
 use super::golden::{Naming, UnsealedRecipe};
+use super::good_parts::DEVIATION_MM;
 use super::{RecipeFile, Store};
 use crate::system::headway::Headway;
+use hal::bounds::within;
+
+/// Least and largest limit of the deviation that may be asked for, ± mm.
+pub const LEAST_LIMIT_MM: f64 = 0.001;
+/// See above.
+pub const MOST_LIMIT_MM: f64 = 100.0;
+/// Refuses a limit of the deviation that cannot be asked for.
+///
+/// # Errors
+/// In words, with the bounds.
+pub fn check_limit(limit_mm: Option<f64>) -> Result<(), String> {
+    limit_mm.map_or(Ok(()), |limit| {
+        within("limit_mm", limit, LEAST_LIMIT_MM, MOST_LIMIT_MM)
+    })
+}
 
 /// Placement tolerance of a recipe that replaces none, mm.
 pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 
-/// Names, placement tolerance, exposures and what is the part, of a recipe that is taught under a
-/// number: those of the recipe that it replaces, if any.
-pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
+/// Names, placement tolerance, exposures, what is the part and the limit of its deviation, of a recipe that
+/// is taught under a number: those of the recipe that it replaces, if any. With `keep_gauges` the limit is the
+/// widest of its deviations'.
+pub fn naming(number: u16, replaced: Option<&RecipeFile>, keep_gauges: bool) -> Naming {
     let kept = replaced.cloned();
     let exposures = replaced.map_or(1, |file| file.exposures);
     let (part_number, name, placement_tolerance_mm) = match kept {
@@ -28,7 +45,21 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>) -> Naming {
         placement_tolerance_mm,
         exposures,
         everything: replaced.is_some_and(|file| file.everything),
+        limit_mm: match replaced {
+            Some(file) if keep_gauges => kept_limit(file),
+            Some(file) => Some(file.good_parts.map_or(DEVIATION_MM, |of| of.tolerance_mm)),
+            None => Some(DEVIATION_MM),
+        },
     }
+}
+
+/// The widest limit of the deviations of a recipe, ± mm; `None` if it has none.
+fn kept_limit(file: &RecipeFile) -> Option<f64> {
+    let deviations = file.gauges.iter().filter(|gauge| gauge.is_deviation());
+    let limits = deviations
+        .flat_map(|gauge| [gauge.low, gauge.high])
+        .flatten();
+    limits.map(f64::abs).max_by(f64::total_cmp)
 }
 
 /// Refuses to `attempt` something under a number that is taken, naming the recipe, how to `replace`

@@ -1,13 +1,19 @@
 //! Leaves out what a part lies on and what lies beside it, before golden is made.
 
+use super::plan::window;
 use algo::geometry::Triangulator;
 use algo::inspect::{self, Surroundings};
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, PhaseMap};
 use algo::units::{AbsolutePhase, Height, Modulation};
 
-/// The surroundings of a measured part; `None` if nothing but the part is seen.
-pub fn of(heights: &HeightMap, triangulator: &Triangulator) -> Option<Surroundings> {
+/// The surroundings of a measured part that may be displaced by `tolerance_mm`; `None` if nothing but the part is
+/// seen.
+pub fn of(
+    heights: &HeightMap,
+    triangulator: &Triangulator,
+    tolerance_mm: f64,
+) -> Option<Surroundings> {
     let (width, pixels) = (heights.width, heights.height.len());
     let mut sigmas: Vec<f32> = heights
         .sigma
@@ -21,7 +27,8 @@ pub fn of(heights: &HeightMap, triangulator: &Triangulator) -> Option<Surroundin
     let middle = sigmas.len() / 2;
     let sigma = f64::from(*sigmas.select_nth_unstable_by(middle, f32::total_cmp).1);
     let point = |at: usize| triangulator.point(at % width, at / width, heights.height[at]);
-    inspect::surroundings(pixels, width, sigma, point)
+    let found = inspect::surroundings(pixels, width, sigma, point)?;
+    Some(found.clear_of_others(width, window::pixels(triangulator, tolerance_mm)))
 }
 
 /// Makes pixels that are not of the part those of nothing.
@@ -43,13 +50,13 @@ pub fn words(surroundings: &Surroundings) -> String {
         step_mm,
         others,
     } = surroundings;
-    let share = part.iter().filter(|part| **part).count() as f64 / part.len().max(1) as f64;
-    let others = match others * 100.0 {
+    let share = |of: &[bool]| of.iter().filter(|is| **is).count() as f64 / of.len().max(1) as f64;
+    let others = match share(others) * 100.0 {
         percent if percent < 0.05 => String::new(),
         percent => format!("; other things on {percent:.1} % of the picture are left out"),
     };
     format!(
         "the part is {:.1} % of the picture and stands out from what it lies on by {step_mm:.2} mm or more{others}",
-        share * 100.0
+        share(part) * 100.0
     )
 }

@@ -12,6 +12,7 @@ use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
 use super::plan::Plan;
 use super::proof;
+use super::refusal;
 use super::surroundings;
 use crate::head::calibrated::CalibratedHead;
 use crate::head::calibration::Calibration;
@@ -93,7 +94,10 @@ pub fn teach_marking(
     refuse_empty(&first.phases)?;
     let found = match naming.everything {
         true => None,
-        false => computing.on(|| surroundings::of(&first.heights, &first.triangulator)),
+        false => computing.on(|| {
+            let tolerance_mm = naming.placement_tolerance_mm;
+            surroundings::of(&first.heights, &first.triangulator, tolerance_mm)
+        }),
     };
     if let Some(found) = &found {
         surroundings::leave_out(found, &mut first.phases, &mut first.heights);
@@ -149,7 +153,7 @@ pub fn teach_marking(
         mut manifest,
         arrays,
         mut choice,
-    } = made.map_err(TeachError::Rig)?;
+    } = made?;
     choice.reasons.extend(words);
     memory::trim();
     let trying = stage(0.9, 1.0, "trying the recipe on the part")?;
@@ -163,6 +167,10 @@ pub fn teach_marking(
     drop(plan);
     if let Some(words) = proof::not_judged(&judged) {
         return Err(TeachError::Scene(words));
+    }
+    let asked = naming.limit_mm.is_some();
+    if asked && let Some(exceeded) = refusal::exceeded(&manifest, &judged) {
+        return Err(TeachError::Scene(exceeded.words("")));
     }
     let mut words = proof::leave_out_covered(&mut manifest, &mut judged);
     words.extend(proof::hold(&mut manifest, &judged));

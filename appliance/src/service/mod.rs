@@ -28,6 +28,7 @@ use crate::production::simulation::Simulation;
 use crate::production::{Aborts, Order};
 use crate::station::{
     Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
+    Teaching,
 };
 use crate::storage::state::{StateFolder, random};
 use crate::system::computing::Computing;
@@ -282,11 +283,7 @@ fn effects(
         match effect {
             Effect::Measure(job) => order(Order::Measure(job)),
             Effect::Load { job, key } => order(Order::Load(job, key)),
-            Effect::Teach {
-                job,
-                number,
-                keep_gauges,
-            } => order(Order::Teach(job, number, keep_gauges)),
+            Effect::Teach { job, teaching } => order(Order::Teach(job, teaching)),
             Effect::Commission { job } => order(Order::Commission(job)),
             Effect::PersistSeq(seq) => {
                 let failed = history.take(seq).err();
@@ -309,9 +306,6 @@ fn first_request(config: &Config, recipes: &Store) -> Option<Request> {
         Some(Request::Load(RecipeKey::Number(number)))
     } else {
         let simulated = config.head.backend == Backend::Sim;
-        simulated.then_some(Request::Teach {
-            number,
-            keep_gauges: false,
-        })
+        simulated.then_some(Request::Teach(Teaching::of(number)))
     }
 }

@@ -134,7 +134,7 @@ impl Rooms<'_> {
     ) -> Room {
         let mut config = self.config.head_in(self.path);
         let waiting = match first {
-            Some(Request::Teach { .. }) => Placed::after_teaching(&mut config.part),
+            Some(Request::Teach(_)) => Placed::after_teaching(&mut config.part),
             _ => None,
         };
         let watch = Watch::every(self.config.station.geometry_check_cycles);

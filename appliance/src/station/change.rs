@@ -3,7 +3,7 @@
 
 use super::control::BY_PART_NUMBER;
 use super::error_code;
-use super::event::{Effect, Effects, JobId};
+use super::event::{Effect, Effects, JobId, Teaching};
 use super::fault::Failure;
 use super::machine::{Station, log, push};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
@@ -40,7 +40,9 @@ impl Station {
                 Some(reject::OTHER_RECIPE)
             }
             // The PLC chose the number; the recipe that had it stays as the previous generation.
-            (0 | BY_PART_NUMBER, Some(number)) | (number, _) => self.teach(number, false, effects),
+            (0 | BY_PART_NUMBER, Some(number)) | (number, _) => {
+                self.teach(Teaching::of(number), effects)
+            }
         };
         if let Some(reason) = reason {
             self.requests.reject(reason);
@@ -72,12 +74,8 @@ impl Station {
     }
 
     /// Orders a teach. Answers with the reason if it is refused; then nothing has changed.
-    pub(super) fn teach(
-        &mut self,
-        number: u16,
-        keep_gauges: bool,
-        effects: &mut Effects,
-    ) -> Option<u16> {
+    pub(super) fn teach(&mut self, teaching: Teaching, effects: &mut Effects) -> Option<u16> {
+        let number = teaching.number;
         let refused = self.busy();
         if refused.is_some() {
             let state = self.state.word();
@@ -88,14 +86,7 @@ impl Station {
             return refused;
         }
         let job = self.worker.next_job();
-        push(
-            effects,
-            Effect::Teach {
-                job,
-                number,
-                keep_gauges,
-            },
-        );
+        push(effects, Effect::Teach { job, teaching });
         self.state = State::Teaching {
             job,
             progress: TeachProgress {

@@ -21,16 +21,34 @@ pub enum Request {
     /// Load a recipe.
     Load(RecipeKey),
     /// Teach a recipe; allowed also where the PLC must not teach.
-    Teach {
-        /// 1–9999.
-        number: u16,
-        /// Whether regions, gauges and limits of the recipe that it replaces stay.
-        keep_gauges: bool,
-    },
+    Teach(Teaching),
     /// Carry out the step of commissioning that is waiting for the worker.
     Commission,
     /// End the step of commissioning that is under way.
     EndStep,
+}
+
+/// As what the part in front of the head is taught.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Teaching {
+    /// The recipe's number, 1–9999.
+    pub number: u16,
+    /// Whether regions, gauges and limits of the recipe that it replaces stay.
+    pub keep_gauges: bool,
+    /// Whether everything that is seen is the part; as in the recipe that it replaces if it is not said.
+    pub everything: Option<bool>,
+    /// The limit of the deviation, ± µm; as in the recipe that it replaces if it is not said.
+    pub limit_um: Option<u32>,
+}
+
+impl Teaching {
+    /// A recipe with this number, of which nothing else is said.
+    pub fn of(number: u16) -> Self {
+        Self {
+            number,
+            ..Self::default()
+        }
+    }
 }
 
 /// What the worker knows about the head, sent whenever it changes.
@@ -239,10 +257,8 @@ pub enum Effect {
     Teach {
         /// To quote.
         job: JobId,
-        /// 1–9999.
-        number: u16,
-        /// Whether regions, gauges and limits of the recipe that it replaces stay.
-        keep_gauges: bool,
+        /// As what.
+        teaching: Teaching,
     },
     /// Carry out the step of commissioning that is waiting for the worker.
     Commission {

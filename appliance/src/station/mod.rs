@@ -91,7 +91,7 @@ mod tests;
 
 pub use clock::Micros;
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
-pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Unstored};
+pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Teaching, Unstored};
 pub use fault::Fault;
 pub use gauge::{COVERAGE_FACTOR, Decision, GaugeLimits, GaugeValue, Measured, Square, Unit};
 pub use handle::{StationHandle, tick};

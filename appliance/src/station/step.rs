@@ -32,11 +32,8 @@ impl Station {
             Event::Request(Request::Load(key)) => {
                 self.load(key, effects);
             }
-            Event::Request(Request::Teach {
-                number,
-                keep_gauges,
-            }) => {
-                self.teach(number, keep_gauges, effects);
+            Event::Request(Request::Teach(teaching)) => {
+                self.teach(teaching, effects);
             }
             Event::Request(Request::Commission) => self.commission(effects),
             Event::Request(Request::EndStep) => self.end_step(effects),

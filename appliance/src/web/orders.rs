@@ -17,7 +17,9 @@ use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::recipe::replace;
 use crate::station::control::{ERROR_RESET, MAX_RECIPE, TRIGGER};
-use crate::station::{Client, ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot};
+use crate::station::{
+    Client, ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot, Teaching,
+};
 
 /// The answer to an accepted order; its progress comes with the events.
 pub(super) type Accepted = (StatusCode, Json<Value>);
@@ -136,11 +138,15 @@ pub(super) fn begin_load(site: &Site, number: u16) -> Result<()> {
 /// What may happen to a recipe that has the number already; without a body it is not replaced.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct Teaching {
+struct Wanted {
     /// It may be replaced; it stays as the previous generation.
     replace: bool,
     /// Its regions, gauges and limits stay.
     keep_gauges: bool,
+    /// Everything that is seen is the part.
+    everything: Option<bool>,
+    /// The limit of the deviation, ± mm.
+    limit_mm: Option<f64>,
 }
 
 pub(super) async fn teach(
@@ -158,10 +164,14 @@ pub(super) async fn teach(
     if let Some(problem) = unknown {
         return Err(Problem::busy(format!("teach: {problem}")));
     }
-    let Teaching {
+    let Wanted {
         replace: may_replace,
         keep_gauges,
+        everything,
+        limit_mm,
     } = body::json_if_any(request.into_body()).await?;
+    let limit = replace::check_limit(limit_mm);
+    limit.map_err(|words| Problem::unfit(format!("teach: {words}")))?;
     site.change(move |site| {
         let replaced = site.recipes.present(number);
         match (may_replace, keep_gauges) {
@@ -183,15 +193,17 @@ pub(super) async fn teach(
             }
             (true, _) => {}
         }
-        let part_number = replace::naming(number, replaced.as_ref()).part_number;
+        let part_number = replace::naming(number, replaced.as_ref(), keep_gauges).part_number;
         let shared = site.recipes.refuse_shared(number, &part_number);
         shared.map_err(|words| Problem::busy(format!("teach: {words}")))
     })
     .await?;
-    let order = Request::Teach {
+    let order = Request::Teach(Teaching {
         number,
         keep_gauges,
-    };
+        everything,
+        limit_um: limit_mm.map(|mm| (mm * 1000.0).round() as u32),
+    });
     let after = site.station.event(Event::Request(order));
     if after.state_word == "teaching" {
         Ok(accepted())

@@ -15,6 +15,7 @@ mod mechanics;
 pub mod optics;
 pub mod parts;
 pub mod placement;
+mod reflection;
 pub mod scenario;
 mod scene;
 mod sensor;

@@ -18,14 +18,14 @@ use rayon::prelude::*;
 use super::body::{Body, Hit};
 use super::footprint::Footprint;
 use super::ground::World;
-use super::material::Lighting;
 use super::material::Material;
 use super::optics::{Lens, Vector, dot, minus, normalised, plus, turned, turned_back};
 use super::parts::{Part, Solid};
 use super::placement::Placement;
+use super::reflection::Reflection;
 use super::scenario::Scenario;
 use super::spread::{self, Spread};
-use super::trace::{Traced, facing};
+use super::trace::Traced;
 
 /// A pixel has a depth edge if a sub-ray meets the surface farther than this from the tangent plane
 /// at the central ray's hit, measured along the ray, mm.
@@ -124,7 +124,9 @@ impl Transport {
             part => part.clone(),
         };
         designed.defects_mut().map(Vec::clear);
+        // A board is held in the air.
         let ground = scenario.floor.as_ref();
+        let ground = ground.filter(|_| !matches!(part, Part::Board(_)));
         let another = ground.and_then(|ground| ground.next_mm).map(|_| &designed);
         let surface_of_next = another.and_then(Part::surface);
         let solid_of_next = another.and_then(Part::solid);
@@ -238,45 +240,6 @@ struct Tracer<'a> {
     body: Option<&'a dyn Body>,
     world: Option<World<'a>>,
     footprint: Footprint,
-}
-
-/// How a part reflects: shares of the brightest that it can be, so that no weight is larger than
-/// [`WHOLE`].
-struct Reflection {
-    /// diffuse + specular.
-    brightest: f64,
-    diffuse: f64,
-    specular: f64,
-    shininess: f64,
-}
-
-impl Reflection {
-    fn new(light: &Lighting) -> Self {
-        let brightest = light.diffuse + light.specular;
-        // A black part has weights, which are multiplied by 0.
-        let [diffuse, specular] = match brightest > 0.0 {
-            true => [light.diffuse / brightest, light.specular / brightest],
-            false => [1.0, 0.0],
-        };
-        Self {
-            brightest,
-            diffuse,
-            specular,
-            shininess: light.shininess,
-        }
-    }
-
-    /// The share of the light from `towards` that goes to `eye`; none if it comes from behind.
-    fn share(&self, normal: Vector, towards: Vector, eye: Vector) -> Option<f64> {
-        let cosine = facing(normal, towards)?;
-        let mut share = self.diffuse * cosine;
-        if self.specular > 0.0 {
-            // r·v with r = 2 (n·l) n − l.
-            let mirrored = 2.0 * cosine * dot(normal, eye) - dot(towards, eye);
-            share += self.specular * mirrored.max(0.0).powf(self.shininess);
-        }
-        Some(share)
-    }
 }
 
 /// A point of the part that the projector lights: its place on the raster, and the share of the

@@ -126,8 +126,8 @@ impl Plant {
                     };
                     self.handle.event(Event::RecipeLoaded { job, recipe });
                 }
-                Effect::Teach { job, number, .. } => {
-                    let recipe = recipe(number, "P-1".into());
+                Effect::Teach { job, teaching } => {
+                    let recipe = recipe(teaching.number, "P-1".into());
                     self.handle.event(Event::Taught { job, recipe });
                 }
                 _ => {}

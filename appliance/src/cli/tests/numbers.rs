@@ -60,6 +60,7 @@ const TABLE: &[(&str, &str, Takes)] = &[
     ("teach", "part_number", Words),
     ("teach", "name", Words),
     ("teach", "tolerance", Number(0.0, 20.0)),
+    ("teach", "limit", Number(0.001, 100.0)),
     ("teach", "exposures", Number(1.0, 4.0)),
     ("teach", "frames", Number(2.0, 2.0)),
     ("history", "recipe", Number(1.0, 9999.0)),

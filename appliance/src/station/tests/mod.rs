@@ -161,10 +161,7 @@ impl Bench {
 
     /// Begins to teach a recipe.
     fn teach(&mut self, number: u16) -> JobId {
-        self.event(Event::Request(Request::Teach {
-            number,
-            keep_gauges: false,
-        }));
+        self.event(Event::Request(Request::Teach(Teaching::of(number))));
         self.job()
     }
 

@@ -150,8 +150,7 @@ fn the_plc_teaches_only_where_the_config_allows_it() {
     assert_eq!(bench.pulse(control::TEACH).state, 5);
     assert!(bench.effects.contains(&Effect::Teach {
         job: bench.job(),
-        number: 3,
-        keep_gauges: false,
+        teaching: Teaching::of(3),
     }));
     let job = bench.job();
     let snapshot = bench.event(Event::TeachFailed {

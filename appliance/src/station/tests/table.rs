@@ -51,10 +51,7 @@ fn in_state(column: usize) -> Bench {
             bench.event(Event::Request(Request::Load(RecipeKey::Number(2))));
         }
         5 => {
-            bench.event(Event::Request(Request::Teach {
-                number: 2,
-                keep_gauges: false,
-            }));
+            bench.event(Event::Request(Request::Teach(Teaching::of(2))));
         }
         6 => {
             bench.write(online_off);
@@ -153,10 +150,7 @@ fn events(job: JobId) -> Vec<(Event, [u16; 13])> {
             [0, 4, 2, 3, 4, 5, 4, 7, 7, 7, 7, 8, 9],
         ),
         (
-            Event::Request(Request::Teach {
-                number: 9,
-                keep_gauges: false,
-            }),
+            Event::Request(Request::Teach(Teaching::of(9))),
             [0, 5, 2, 3, 4, 5, 5, 7, 7, 7, 7, 8, 9],
         ),
         (Event::Started, [1, 1, 2, 3, 4, 5, 6, 7, 1, 7, 1, 8, 9]),

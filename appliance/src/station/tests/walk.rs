@@ -118,10 +118,10 @@ fn any_event(random: &mut Random, edges: &mut ConnectionEdges, last: JobId) -> E
             ..Pace::default()
         }),
         31 if random.below(4) == 0 => Event::Request(Request::Load(RecipeKey::Number(number))),
-        32 if random.below(9) == 0 => Event::Request(Request::Teach {
-            number,
+        32 if random.below(9) == 0 => Event::Request(Request::Teach(Teaching {
             keep_gauges: number.is_multiple_of(2),
-        }),
+            ..Teaching::of(number)
+        })),
         32 if random.below(12) == 0 => Event::Request(Request::Commission),
         36 => Event::Commissioned {
             job,

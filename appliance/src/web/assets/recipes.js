@@ -125,14 +125,23 @@ async function take(file) {
   }
 }
 
+// What the form says of the part beside its number: nothing where it was left as it is.
+function taught() {
+  const wanted = {}, limit = $("teach-limit").value;
+  if (limit !== "") wanted.limit_mm = Number(limit);
+  if ($("teach-everything").checked) wanted.everything = true;
+  return wanted;
+}
+
 // The body of a request to teach a number; none if a recipe has the number and is to stay.
 async function consent(number) {
   await list();
   const taken = stored.find((recipe) => recipe.number === number);
-  if (!taken) return {};
+  const wanted = taught();
+  if (!taken) return wanted;
   const words = `It is ${content(taken)}. Features and gauges are made anew, or kept; features that are kept stay where they are in the picture. Name and part number stay, and Undo in the list of recipes brings this version back.`;
-  const keep = taken.error ? [] : [["Replace, keep features and gauges", { replace: true, keep_gauges: true }]];
-  return choose(`Replace recipe ${number}?`, words, keep.concat([["Replace, with new gauges", { replace: true }]]));
+  const keep = taken.error ? [] : [["Replace, keep features and gauges", { replace: true, keep_gauges: true, ...wanted }]];
+  return choose(`Replace recipe ${number}?`, words, keep.concat([["Replace, with new gauges", { replace: true, ...wanted }]]));
 }
 
 async function teach(number) {
@@ -149,14 +158,12 @@ export async function teachNext() {
   await teach(free);
 }
 
-// How the limit of the deviation was set when the part was taught. The requested limit is the default of teaching.
+// What good parts deviate by, as predicted when the part was taught.
 function held(good) {
   if (!good) return "";
   const limit = `±${good.limit_mm.toFixed(2)} mm`;
   const expected = `Good parts deviate by up to ${good.largest_mm.toFixed(3)} ± ${good.scatter_mm.toFixed(3)} mm`;
-  const words = [good.limit_mm > good.tolerance_mm
-    ? `The default limit of ±${good.tolerance_mm.toFixed(2)} mm would reject good parts: the limit was set to ${limit}. ${expected}. More light, less noise or another pose narrows it.`
-    : `${expected}; the limit was set to ${limit}.`];
+  const words = [`${expected}; the limit was set to ${limit}.`];
   if (good.smoothing_px) words.push(`Deviations are means over ${good.smoothing_px} × ${good.smoothing_px} pixels${good.wider_px ? `, over up to ${good.wider_px} × ${good.wider_px} on ${(100 * good.wider).toFixed(1)} % of the part, where it is too noisy or too bent for that` : ""}: ${good.dent_mm > 0 ? `a dent of ${good.dent_mm.toFixed(1)} mm across is seen at nine tenths of its depth, a narrower one at less, which U does not cover` : "a defect that is narrower is seen at less than its depth"}.`);
   if (good.weighed > 0) words.push(`${(100 * good.weighed).toFixed(2)} % of the surface is so dark or so steep that a deviation there must be larger to be found, by a factor of ${(1 / good.least_weight).toFixed(1)} at its worst place: another pose or more light lowers it.`);
   if (good.left_out > 0) words.push(`${(100 * good.left_out).toFixed(2)} % of the surface's pixels are too dark or too steep to be compared: another pose brings them back.`);
