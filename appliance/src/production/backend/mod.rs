@@ -17,7 +17,7 @@ use crate::recipe::{PatternFile, Recipe, archive};
 use algo::pattern::Shot;
 use hal::head::{Head, Timing};
 use hal::replay::Recording;
-use sim::{Scenario, Stage};
+use sim::{Ground, Scenario, Stage};
 use std::fs;
 use std::path::Path;
 
@@ -346,13 +346,16 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration> {
     }
 }
 
-/// The scenario of a file, or the default one.
+/// The scenario of a file, or the default one: a stock part on a grey floor.
 ///
 /// # Errors
 /// If the file does not exist or is not a scenario.
 pub fn scenario(path: Option<&Path>) -> Result<Scenario> {
     let Some(path) = path else {
-        return Ok(Scenario::default());
+        return Ok(Scenario {
+            floor: Some(Ground::default()),
+            ..Scenario::default()
+        });
     };
     let place = path.display().to_string();
     let what = format!("read scenario {place}");
