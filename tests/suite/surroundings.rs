@@ -3,10 +3,14 @@
 use crate::every_part;
 use crate::gauges::plan;
 use crate::limits::cycle;
-use crate::placement::{Bed, bed, naming, taught, taught_asking};
+use crate::placement::{Bed, TIMEOUT, bed, naming, taught, taught_asking};
+use algo::inspect::FeatureKind;
+use appliance::recipe::FeatureFile;
 use appliance::recipe::golden::Naming;
 use appliance::recipe::plan::Plan;
+use appliance::recipe::teach::teach;
 use appliance::station::{Inspection, Verdict};
+use appliance::system::headway::Headway;
 use sim::parts::{Across, Defect, Joint, Plate, SheetMetal};
 use sim::{Clamp, Ground, Part, Pin, Placement, Scenario, Stage};
 use tests::random::Random;
@@ -180,6 +184,28 @@ fn a_stamped_bracket_over_a_floor_is_judged_right() {
     ]);
 }
 
+/// Openings that teaching finds to be round, by their rims.
+fn round_openings(part: &Part, floor: Option<Ground>) -> usize {
+    let mut bed = bed(&Scenario {
+        part: part.clone(),
+        floor,
+        ..Scenario::default()
+    });
+    let (head, calibration) = (&mut bed.head, &bed.calibration);
+    let taught = teach(head, calibration, &naming(1.0), TIMEOUT, Headway::silent());
+    let taught = taught.unwrap().with_circles(Headway::silent()).unwrap();
+    let is_round = |of: &&FeatureFile| of.kind == FeatureKind::Circle;
+    taught.manifest.features.iter().filter(is_round).count()
+}
+
+#[test]
+fn round_openings_over_a_floor_are_found_by_their_rims() {
+    assert_eq!(round_openings(&plate(), Some(grey())), 3);
+    // Those of the bracket's small holes are disturbed by what other openings light.
+    let bracket = Part::SheetMetal(SheetMetal::default());
+    assert!(round_openings(&bracket, Some(grey())) >= 1);
+}
+
 #[test]
 fn a_floor_that_is_taken_for_the_part_is_refused_by_its_place_and_opens_no_limit() {
     let mut bed = bed(&scenario(&plate(), Some(grey())));
@@ -295,84 +321,93 @@ fn parts() -> Vec<(String, Part)> {
     parts
 }
 
+/// What became of a part in some surroundings.
+struct Judged {
+    scene: String,
+    /// Why it was not taught.
+    refused: Option<String>,
+    fails: usize,
+    invalid: usize,
+}
+
+/// Teaches a part in these surroundings and judges it, good, at so many places within the tolerance.
+fn judged(
+    (name, floor): (&str, Option<Ground>),
+    kind: &str,
+    part: &Part,
+    placements: usize,
+) -> Judged {
+    let mut found = Judged {
+        scene: format!("{kind}, {name}"),
+        refused: None,
+        fails: 0,
+        invalid: 0,
+    };
+    let mut bed = bed(&scenario(part, floor));
+    match taught(&mut bed) {
+        Ok(taught) => {
+            assert_eq!(
+                taught.manifest.gauges[0].high,
+                Some(ASKED_MM),
+                "{}",
+                found.scene
+            );
+            let mut line = every_part::Line::of(bed, taught.recipe, ASKED_MM, part.clone());
+            let mut random = Random::new(5);
+            for _ in 0..placements {
+                let placement = line.placement(&mut random);
+                let verdict = line.judge(&placement).verdict();
+                found.fails += usize::from(verdict == Verdict::Fail);
+                found.invalid += usize::from(verdict == Verdict::Invalid);
+            }
+        }
+        Err(words) => found.refused = Some(words),
+    }
+    let Judged {
+        scene,
+        refused,
+        fails,
+        invalid,
+    } = &found;
+    println!("{scene}: {fails} FAIL, {invalid} INVALID of {placements}; refused: {refused:?}");
+    found
+}
+
+#[test]
+fn a_plate_among_pins_on_a_print_and_beside_the_next_one_is_judged_right() {
+    for (name, floor) in everywhere() {
+        if ["pins", "print", "next"].contains(&name) {
+            let found = judged((name, floor), "plate", &plate(), FEW_PLACEMENTS);
+            assert_eq!(
+                (found.refused, found.fails, found.invalid),
+                (None, 0, 0),
+                "{name}"
+            );
+        }
+    }
+}
+
 #[test]
 #[ignore = "takes an hour: `.ci/run full`"]
 fn every_part_is_taught_and_judged_right_in_all_surroundings() {
-    let (mut refused, mut invalid, mut judged) = (0, 0, 0);
-    let mut wrong = Vec::new();
-    let only = std::env::var("ONLY").unwrap_or_default();
+    let mut all = Vec::new();
     for (name, floor) in everywhere() {
-        if !only.is_empty() && !name.contains(&only) {
-            continue;
-        }
         for (kind, part) in parts() {
-            if ["pins", "next"].contains(&name) && FILL.contains(&&*kind) {
-                continue;
-            }
-            if !std::env::var("KIND").unwrap_or_default().is_empty()
-                && !kind.contains(&std::env::var("KIND").unwrap())
-            {
-                continue;
-            }
-            let mut bed = bed(&scenario(&part, floor.clone()));
-            let taught = match taught(&mut bed) {
-                Ok(taught) => taught,
-                Err(words) => {
-                    println!("{name}, {kind}: refused: {words}");
-                    refused += 1;
-                    continue;
-                }
-            };
-            let limit = taught.manifest.gauges[0].high;
-            let words: Vec<_> = taught
-                .choice
-                .reasons
-                .iter()
-                .filter(|words| words.contains("the picture"))
-                .collect();
-            let mut line = every_part::Line::of(bed, taught.recipe, limit.unwrap(), part);
-            let mut random = Random::new(5);
-            let (mut fails, mut invalids) = (0, 0);
-            for _ in 0..if floor == Some(grey()) || floor.is_none() {
-                6
-            } else {
-                3
-            } {
-                let placement = line.placement(&mut random);
-                let found = line.judge(&placement);
-                if !std::env::var("KIND").unwrap_or_default().is_empty() {
-                    println!("{placement:?} found {:?}", found.placement);
-                }
-                judged += 1;
-                match found.verdict() {
-                    Verdict::Pass => {}
-                    Verdict::Invalid => {
-                        invalids += 1;
-                        println!("  INVALID {:?}", found.reason)
-                    }
-                    _ => {
-                        fails += 1;
-                        println!(
-                            "  FAIL {:?} {:?}",
-                            found.reason,
-                            found
-                                .gauges
-                                .iter()
-                                .map(|g| (g.value, g.uncertainty))
-                                .collect::<Vec<_>>()
-                        )
-                    }
-                }
-            }
-            println!(
-                "{name}, {kind}: limit {limit:?}, {fails} FAIL, {invalids} INVALID, {words:?}"
-            );
-            invalid += invalids;
-            if fails > 0 || limit != Some(ASKED_MM) {
-                wrong.push(format!("{name}, {kind}: limit {limit:?}, {fails} FAIL"));
+            let has_room = !FILL.contains(&&*kind);
+            // A sheet without thickness that its floor touches is that floor.
+            let is_floor = name == "touched" && kind == "plane";
+            if !is_floor && (has_room || !["pins", "next"].contains(&name)) {
+                all.push(judged((name, floor.clone()), &kind, &part, 2 * PLACEMENTS));
             }
         }
     }
-    println!("{refused} refused, {invalid} of {judged} INVALID");
-    assert!(wrong.is_empty(), "{wrong:#?}");
+    let count = |of: fn(&Judged) -> usize| all.iter().map(of).sum::<usize>();
+    let placements = 2 * PLACEMENTS * all.len();
+    let refused = count(|of| usize::from(of.refused.is_some()));
+    let (fails, invalid) = (count(|of| of.fails), count(|of| of.invalid));
+    println!(
+        "{} scenes: {refused} refused, {fails} FAIL, {invalid} INVALID of {placements}",
+        all.len()
+    );
+    assert!(refused <= 1 && fails == 0 && 100 * invalid <= placements);
 }

@@ -78,6 +78,8 @@ pub struct Surroundings {
     pub step_mm: f64,
     /// The pixels of other things in front of what the part lies on.
     pub others: Vec<bool>,
+    /// The plane that it lies on: z at x = y = 0, mm, and what z rises by along x and y, mm per mm.
+    pub ground: [f64; 3],
 }
 
 impl Surroundings {
@@ -127,6 +129,7 @@ pub fn surroundings(
         part,
         step_mm: front.step().unwrap_or(middle),
         others,
+        ground: plane.0,
     })
 }
 

@@ -141,6 +141,11 @@ impl Taught {
         self.pixels[place] & COMPARED != 0
     }
 
+    /// Whether the part has a height at a place that was measured.
+    pub(super) fn is_seen(&self, place: usize) -> bool {
+        self.pixels[place] & SIGMA != 0
+    }
+
     /// Whether the part is compared at all of these places.
     pub(super) fn all_compared(&self, places: Range<usize>) -> bool {
         let common = self.pixels[places]

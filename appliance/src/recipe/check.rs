@@ -91,6 +91,8 @@ pub struct Conditions {
     pub expansion_range_turns: f64,
     /// How far behind golden's heights the surroundings begin, mm; `None` if there are none.
     pub surroundings_mm: Option<f64>,
+    /// The plane that the part lies on: z at x = y = 0, mm, and its rise along x and y.
+    pub ground_mm: Option<[f64; 3]>,
     /// What is known of good parts' deviations.
     pub good_parts: Option<GoodPartsFile>,
 }
@@ -389,6 +391,7 @@ impl From<&RecipeFile> for Conditions {
                 }),
             expansion_range_turns: file.expansion_range_turns,
             surroundings_mm: file.surroundings_mm,
+            ground_mm: file.ground_mm,
             good_parts: file.good_parts,
         }
     }

@@ -114,6 +114,9 @@ bounded! {
         /// `None` if nothing else was seen.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub surroundings_mm: Option<f64> = 0.0..=1000.0,
+        /// The plane that the part lies on: z at x = y = 0, mm, and its rise along x and y, mm per mm.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub ground_mm: Option<[f64; 3]> = -1e4..=1e4,
         /// |ΔΦ| about the golden phase, in turns, up to which `height_slope.npy` and
         /// `height_curvature.npy` give the height accurately.
         pub expansion_range_turns: f64 = 1e-3..=MAX_FRINGES,

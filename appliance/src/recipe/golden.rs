@@ -247,6 +247,7 @@ impl GoldenPart<'_> {
             calibration_sigma: calibration.sigma,
             everything: naming.everything,
             surroundings_mm: self.surroundings.as_ref().map(|found| found.step_mm / 2.0),
+            ground_mm: self.surroundings.as_ref().map(|found| found.ground),
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,
             judges_nothing: false,

@@ -49,6 +49,7 @@ pub fn words(surroundings: &Surroundings) -> String {
         part,
         step_mm,
         others,
+        ..
     } = surroundings;
     let share = |of: &[bool]| of.iter().filter(|is| **is).count() as f64 / of.len().max(1) as f64;
     let others = match share(others) * 100.0 {

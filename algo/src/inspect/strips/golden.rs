@@ -24,6 +24,9 @@ pub struct Golden {
     pub compared: u64,
     /// The middle of its heights and half their span, mm.
     pub levels: (f64, f64),
+    /// The plane that it lies on, as z at x = y = 0, mm, and its rise along x and y; `None` where nothing else is
+    /// seen.
+    pub ground: Option<[f64; 3]>,
 }
 
 impl Golden {
@@ -33,6 +36,7 @@ impl Golden {
         map: Option<Vec<AbsolutePhase>>,
         mut taught: Taught,
         window: Vec<Range<usize>>,
+        ground: Option<[f64; 3]>,
     ) -> Self {
         let width = cubics.surface().width;
         taught.mark_squares(width.max(1));
@@ -48,7 +52,24 @@ impl Golden {
             map,
             taught,
             window,
+            ground,
         }
+    }
+
+    /// Whether a place is surely of the part: where it is compared. Beside what it lies on it ends as far before
+    /// its rim as it is compared otherwise, and more of it may not be compared.
+    pub fn is_part(&self, place: usize) -> bool {
+        match self.ground {
+            Some(_) => self.taught.is_seen(place),
+            None => self.taught.compared(place),
+        }
+    }
+
+    /// What it lies on, above or below a point.
+    pub fn ground_at(&self, point: Vector) -> Option<Vector> {
+        let [z, along_x, along_y] = self.ground?;
+        let z = z + along_x * point.x + along_y * point.y;
+        Some(Vector { z, ..point })
     }
 
     /// Columns and rows of the frame.

@@ -69,6 +69,8 @@ pub struct Parts {
     /// Heights that lie so many mm behind golden's, or farther, are those of the part's surroundings;
     /// `None` where nothing else is seen.
     pub surroundings: Option<f64>,
+    /// The plane that the part lies on: z at x = y = 0, mm, and its rise along x and y.
+    pub ground: Option<[f64; 3]>,
     /// How contours are demodulated, and golden's light; only read if gauges are of contours.
     pub light: Option<(Levels, GoldenSignal)>,
 }
@@ -117,13 +119,14 @@ impl Production {
             calibration,
             ripple,
             surroundings,
+            ground,
             light,
         } = parts;
         let turns = decoder.phase_noise(
             Modulation::from_bits(1),
             SampleNoise::constant(noise_counts),
         ) / cubics.range();
-        let golden = Golden::new(triangulator, cubics, map, taught, window);
+        let golden = Golden::new(triangulator, cubics, map, taught, window, ground);
         let alignment = match aligned {
             true => Alignment::new(golden.surface(), &golden.window),
             false => None,

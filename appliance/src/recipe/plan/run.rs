@@ -251,6 +251,7 @@ impl Prepared {
             calibration: shared.conditions.calibration,
             ripple: ripple_mm,
             surroundings: shared.conditions.surroundings_mm,
+            ground: shared.conditions.ground_mm,
             light: signal.map(|signal| (levels, signal)),
         });
         let production = production.map_err(|error| refusal(error, shared))?;

@@ -31,7 +31,7 @@ pub struct Start {
     pub outline: Outline,
     /// Places of the frame that see the face.
     pub face: Vec<usize>,
-    /// How far below the plane a floor lies, mm, if golden has one.
+    /// How far below the plane a floor lies, mm, if golden has one or lies on one.
     pub floor: Option<f64>,
 }
 
@@ -94,6 +94,11 @@ pub fn start(
     let floor = depths.get(count / 2).map(|above| -above);
     let is_seen = count as f64 >= FLOOR_SHARE * opening.len() as f64
         || count >= LEAST_PIXELS && depths[count * 3 / 4] - depths[count / 4] < NEAR_MM;
+    let ground = || {
+        let below = golden.ground_at(face.frame.origin)?;
+        let depth = face.frame.normal().dot(face.frame.origin - below);
+        (depth > NEAR_MM).then_some(depth)
+    };
     let width = golden.size().0;
     let on_face = (0..pixels.above.len()).filter(|&at| pixels.is_face(at));
     Some(Start {
@@ -102,7 +107,7 @@ pub fn start(
             .map(|at| pixels.place(at))
             .map(|(u, v)| v * width + u)
             .collect(),
-        floor: floor.filter(|_| is_seen),
+        floor: floor.filter(|_| is_seen).or_else(ground),
     })
 }
 
@@ -130,8 +135,7 @@ impl Pixels {
             for u in span.clone() {
                 let place = row * golden.size().0 + u;
                 let point = golden
-                    .taught
-                    .compared(place)
+                    .is_part(place)
                     .then(|| golden.seen(u, *row, golden.height_mm(place)));
                 let above = |point: Vector| normal.dot(point - origin);
                 pixels.above[(row - top) * width + u - left] =

@@ -260,6 +260,7 @@ impl Head {
             calibration: CalibrationError::default(),
             ripple: 0.0,
             surroundings: None,
+            ground: None,
             light: None,
         });
         production.unwrap()
