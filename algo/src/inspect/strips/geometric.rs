@@ -111,6 +111,26 @@ impl Production {
         let propagated = value.propagate(placed, budget.calibration.length)?;
         let Propagated { found, shared, own } = propagated;
         let of = budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed);
+        // Where golden says where a plane's point lies, golden's error is in the value: as much as it would be
+        // if the point were found from this part.
+        let alone = Characteristic {
+            taught: [&[]; 2],
+            ..value
+        };
+        let alone = alone.propagate(placed, budget.calibration.length)?.found;
+        let golden = match alone.pixels == found.pixels {
+            true => 0.0,
+            false => {
+                let of_golden = (noisier, 1.0);
+                let compared = budget.reading_of(alone, Made::OfDeviations, of_golden, placed);
+                compared.compared
+            }
+        };
+        let of = Reading {
+            systematic: libm::hypot(of.systematic, golden),
+            compared: libm::hypot(of.compared, golden),
+            ..of
+        };
         // Where golden was measured its own inputs were others, too.
         let with = |error: f64, inputs: f64| libm::sqrt(error * error + inputs);
         Some(Reading {
