@@ -3,8 +3,8 @@
 //! The plane is looked for in two ways. First through the points at the picture's border (trimmed least
 //! squares: again and again to the nearer half; P. J. Rousseeuw, 1984); it is taken if all four sides
 //! of the picture show it. Else, for parts that hide a side, among the flat surfaces that end at
-//! the border, each of them all pixels whose heights continue each other without a bend: the largest is taken behind which
-//! nothing lies.
+//! the border, each of them all pixels whose heights continue each other without a bend: the
+//! largest is taken behind which nothing lies.
 //!
 //! Either is what the part lies on only if enough lies in front of it, and, if not all sides show it, that stands
 //! out by [`FAR_MM`] or more, so that the lower one of two sheets is no floor. A part whose own flat base fills
@@ -14,7 +14,7 @@
 //! within [`MARGIN`] of the plane's are left out. That covers the footprint of a pixel and 2 σ of a
 //! lens of σ = 0.5 px.
 //!
-//! Of what is left in front of the plane, pieces that are much smaller than the largest, or that
+//! What is left in front of the plane is divided by steps. Pieces that are much smaller than the largest, or that
 //! reach the picture's border while a large one does not, are other things, such as pins, clamps or the next
 //! part.
 

@@ -64,8 +64,8 @@ impl Exceeded {
         });
         format!(
             "good parts that lie within {within_mm} mm would not keep the limit of {gauge}, ±{limit_mm} mm: they deviate by \
-             {deviation_mm:.3} mm{place}. {}, or choose the limit: ±{} mm would be kept",
-            "Cover or remove what is not of the part, give a smaller placement tolerance",
+             {deviation_mm:.3} mm{place}. Cover or remove what is not of the part, give a smaller placement tolerance, or choose \
+             the limit: ±{} mm would be kept",
             rounded_up(WIDER * deviation_mm)
         )
     }

@@ -113,17 +113,21 @@ impl Production {
         let of = budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed);
         // Where golden says where a plane's point lies, golden's error is in the value: as much as it would be
         // if the point were found from this part.
-        let alone = Characteristic {
-            taught: [&[]; 2],
-            ..value
-        };
-        let alone = alone.propagate(placed, budget.calibration.length)?.found;
-        let golden = match alone.pixels == found.pixels {
-            true => 0.0,
-            false => {
-                let of_golden = (noisier, 1.0);
-                let compared = budget.reading_of(alone, Made::OfDeviations, of_golden, placed);
-                compared.compared
+        let has_plane = value.of.iter().any(|of| matches!(of, Sensitive::Plane(_)));
+        let golden = match has_plane {
+            false => 0.0,
+            true => {
+                let alone = Characteristic {
+                    taught: [&[]; 2],
+                    ..value
+                };
+                let alone = alone.propagate(placed, budget.calibration.length)?.found;
+                let error = budget.reading_of(alone, Made::OfDeviations, (noisier, 1.0), placed);
+                if alone.pixels == found.pixels {
+                    0.0
+                } else {
+                    error.compared
+                }
             }
         };
         let of = Reading {
