@@ -22,6 +22,7 @@ mod latest;
 #[cfg(any(test, feature = "libcamera"))]
 pub mod libcamera;
 pub mod lines;
+pub mod mean;
 pub mod model;
 pub mod npy;
 pub mod projector;

@@ -2,6 +2,7 @@
 
 use appliance::recipe::RecipeFile;
 use appliance::recipe::archive::{Arrays, unpack};
+use hal::npy::Array;
 use std::io::Cursor;
 use std::path::Path;
 
@@ -10,37 +11,16 @@ pub fn recipe(bytes: &[u8]) -> (RecipeFile, Arrays) {
     unpack(Cursor::new(bytes), bytes.len() as u64).expect("a whole recipe")
 }
 
-/// A two-dimensional array of `f32`.
-#[derive(Clone, Debug)]
-pub struct Array {
-    /// Rows.
-    pub rows: usize,
-    /// Columns.
-    pub columns: usize,
-    /// Row-major.
-    pub values: Vec<f32>,
-}
-
 /// Reads a `.npy` of `f32`.
-pub fn array(path: &Path) -> Array {
+pub fn array(path: &Path) -> Array<f32> {
     let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    let file = npyz::NpyFile::new(&bytes[..]).expect("a NumPy array");
-    let [rows, columns] = file.shape() else {
-        panic!("{} has shape {:?}", path.display(), file.shape());
-    };
-    let (rows, columns) = (*rows as usize, *columns as usize);
-    Array {
-        rows,
-        columns,
-        values: file.into_vec().expect("elements of f32"),
-    }
+    hal::npy::read(&bytes).unwrap_or_else(|e| panic!("{}: {e}", path.display()))
 }
 
 /// Reads the elements of a `.npy` of `u8`.
 pub fn flags(path: &Path) -> Vec<u8> {
     let bytes = std::fs::read(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
-    let file = npyz::NpyFile::new(&bytes[..]).expect("a NumPy array");
-    file.into_vec().expect("elements of u8")
+    hal::npy::read(&bytes).expect("elements of u8").elements
 }
 
 /// The model of a device as OpenCV writes it (YAML); `unit` is a millimetre in the file's unit of

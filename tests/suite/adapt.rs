@@ -43,10 +43,8 @@ fn json(run: &Run) -> serde_json::Value {
 /// Reads a phase function from a file of f64: rows, columns and turns.
 pub fn turns(path: &Path) -> (usize, usize, Vec<f64>) {
     let bytes = std::fs::read(path).expect("a phase function");
-    let file = npyz::NpyFile::new(&bytes[..]).expect("a NumPy array");
-    let shape = file.shape().to_vec();
-    let values = file.into_vec().expect("elements of f64");
-    (shape[0] as usize, shape[1] as usize, values)
+    let array = hal::npy::read(&bytes).expect("elements of f64");
+    (array.rows, array.columns, array.elements)
 }
 
 /// Checks a phase function of the better method for a recording with truth: its size, a minimum of
@@ -357,7 +355,7 @@ fn with_a_recipe_a_few_frames_give_the_heights_of_the_full_sequence() {
     let measured = |recording: &Recording| {
         let written = Written::new(recording);
         written.measure(&["--recipe", &recipe]).succeeded();
-        let read = |name: &str| files::array(&written.out().join(name)).values;
+        let read = |name: &str| files::array(&written.out().join(name)).elements;
         let report = files::report(&written.out());
         assert_eq!(report["recipe"]["number"], 7);
         let fingerprint = report["recipe"]["fingerprint"]

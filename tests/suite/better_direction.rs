@@ -97,8 +97,8 @@ fn the_case_of_a_projector_above_the_camera_is_measured_by_its_horizontal_fringe
     }
     laboratory().run(&import).succeeded();
     program().measure(&recording, &out, &[]).succeeded();
-    let found = files::array(&out.join("height.npy")).values;
-    let expected = files::array(&case.join("expected_height.npy")).values;
+    let found = files::array(&out.join("height.npy")).elements;
+    let expected = files::array(&case.join("expected_height.npy")).elements;
     let off = found
         .iter()
         .zip(&expected)

@@ -49,7 +49,7 @@ fn levels_with_a_chain_of_beats_give_absolute_phase_without_models_and_heights_w
         assert_eq!(report["kind"], "heterodyne", "{report}");
         assert!(report["chain"].as_array().unwrap().len() >= 2, "{report}");
         assert!(report["no_height"].is_string() && report["no_phase"].is_null());
-        let phase = files::array(&written.out().join("phase.npy")).values;
+        let phase = files::array(&written.out().join("phase.npy")).elements;
         let (compared, wrong) = orders(&recording, &phase);
         assert!(compared > 8000 && wrong == 0, "{compared} {wrong}");
     }
@@ -76,7 +76,7 @@ fn numbers_of_fringes_without_a_common_factor_give_absolute_phase() {
     let report = files::report(&written.out());
     assert_eq!(report["kind"], "heterodyne", "{report}");
     recording = scene(13.0, &[1.0, 7.0 / 13.0], 4);
-    let phase = files::array(&written.out().join("phase.npy")).values;
+    let phase = files::array(&written.out().join("phase.npy")).elements;
     let (compared, wrong) = orders(&recording, &phase);
     assert!(compared > 8000 && wrong == 0, "{compared} {wrong}");
 }
@@ -93,14 +93,14 @@ fn levels_whose_coarsest_has_some_fringes_are_unwrapped_about_the_reference_or_a
     assert!(report["ambiguous"].is_null(), "{report}");
     // About its own phase without models.
     let map = written.out().join("phase.npy");
-    let known = files::array(&map).values;
+    let known = files::array(&map).elements;
     let mut bare = recording;
     (bare.camera_model, bare.projector.model) = (None, None);
     let bare = Written::new(&bare);
     bare.measure(&["--about", map.to_str().unwrap()])
         .succeeded();
     assert_eq!(files::report(&bare.out())["map"], "given");
-    let again = files::array(&bare.out().join("phase.npy")).values;
+    let again = files::array(&bare.out().join("phase.npy")).elements;
     let pairs = known
         .iter()
         .zip(&again)

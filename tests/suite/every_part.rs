@@ -310,10 +310,10 @@ const DENTED: [(&str, [f64; 2]); 5] = [
     ("cone", [-20.0, 35.0]),
 ];
 
-/// Puts a dent of 0.3 mm and 8 mm where both devices see it on parts that lie anywhere: all fail.
-fn dents_fail(placements: usize, scenario: fn(Part) -> Scenario) {
+/// Puts a dent of 0.3 mm and 8 mm where both devices see it on parts of these kinds that lie anywhere: all fail.
+fn dents_fail(kinds: &[&str], placements: usize, scenario: fn(Part) -> Scenario) {
     let mut missed = 0;
-    for (kind, [x, y]) in DENTED {
+    for (kind, [x, y]) in DENTED.into_iter().filter(|(kind, _)| kinds.contains(kind)) {
         let (_, part) = stock().into_iter().find(|(name, _)| name == kind).unwrap();
         let mut line = Line::new(&scenario(part.clone()));
         let mut dented = part;
@@ -378,14 +378,14 @@ fn fifty_narrow_dents_fail_in_the_frames_of_small_and_large_cameras() {
 }
 
 #[test]
-fn a_dent_fails_on_every_kind_of_part_wherever_it_lies_within_the_tolerance() {
-    dents_fail(1, quick);
+fn a_dent_fails_on_two_kinds_of_parts_wherever_it_lies_within_the_tolerance() {
+    dents_fail(&["sheet_metal", "flowerpot"], 1, quick);
 }
 
 #[test]
 #[ignore = "takes minutes: `.ci/run full`"]
 fn fifty_dents_fail_on_every_kind_of_part_wherever_it_lies_within_the_tolerance() {
-    dents_fail(50, |part| Scenario {
+    dents_fail(&DENTED.map(|(kind, _)| kind), 50, |part| Scenario {
         part,
         ..Scenario::default()
     });

@@ -161,8 +161,8 @@ fn the_oracle_shares_no_code_with_what_it_judges() {
     let rule = "The f64 textbook oracle judges algo without sharing its mistakes: it imports nothing \
                 from algo or appliance, and nothing of the simulator.";
     let judged = ["algo::", "appliance::", "sim::", "libm::"];
-    forbid(rule, "tests/src/oracle", &judged);
-    forbid(rule, "tests/src/render", &judged);
+    forbid(rule, "tests/scenes/src/oracle", &judged);
+    forbid(rule, "tests/scenes/src/render", &judged);
 }
 
 #[test]
@@ -258,6 +258,7 @@ fn no_files_name_each_other_in_a_circle() {
         "appliance/src",
         "appliance/fleet/src",
         "appliance/lab/src",
+        "tests/scenes/src",
         "tests/src",
     ] {
         let circles = circles(&files_of(folder));
@@ -324,6 +325,7 @@ fn files_hold_one_concept_each_and_say_which() {
         "appliance/src",
         "appliance/fleet/src",
         "appliance/lab/src",
+        "tests/scenes/src",
         "tests/src",
         "tests/suite",
     ] {

@@ -16,7 +16,7 @@ use tests::random::Random;
 
 /// Placements of each joint, in the long form and in the quick one.
 const PLACEMENTS: usize = 12;
-const FEW_PLACEMENTS: usize = 3;
+const FEW_PLACEMENTS: usize = 2;
 const REPEATS: usize = 8;
 const SHIFT_MM: f64 = 1.0;
 const TILT_DEG: f64 = 1.0;

@@ -46,7 +46,7 @@ fn what_is_recorded_with_a_recipe_is_measured_with_it() {
         ])
         .succeeded();
     let heights = tests::files::array(&result.join("height.npy"));
-    let known = heights.values.iter().filter(|mm| mm.is_finite()).count();
+    let known = heights.elements.iter().filter(|mm| mm.is_finite()).count();
     assert!(known > 1000, "{known}\n{}", measured.stdout);
 }
 

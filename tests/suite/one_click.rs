@@ -92,7 +92,7 @@ fn good_parts_pass(still: usize, scenario: &str) {
 
 #[test]
 fn every_stock_part_that_is_taught_with_one_click_passes() {
-    good_parts_pass(1, "sub_rays = 2\n");
+    good_parts_pass(1, "sub_rays = 2\n[rig.camera]\nwidth = 256\nheight = 256\n");
 }
 
 #[test]

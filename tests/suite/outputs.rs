@@ -50,12 +50,12 @@ fn phase_and_height_are_nan_exactly_where_the_definition_rejects() {
     let (mut resolved, mut out_of_range) = (0, 0);
     for pixel in 0..96 * 96 {
         let rejected = twin.reason[pixel] != Reason::Resolved;
-        assert_eq!(phase.values[pixel].is_nan(), rejected, "pixel {pixel}");
+        assert_eq!(phase.elements[pixel].is_nan(), rejected, "pixel {pixel}");
         let (u, v) = ((pixel % 96) as f64, (pixel / 96) as f64);
         let found = (!rejected).then(|| rig.height(&pattern, u, v, twin.phase[pixel]));
         let missing = !matches!(found, Some(Some(_)));
-        assert_eq!(height.values[pixel].is_nan(), missing, "pixel {pixel}");
-        assert_eq!(sigma.values[pixel].is_nan(), missing, "pixel {pixel}");
+        assert_eq!(height.elements[pixel].is_nan(), missing, "pixel {pixel}");
+        assert_eq!(sigma.elements[pixel].is_nan(), missing, "pixel {pixel}");
         seen.insert(twin.reason[pixel]);
         resolved += usize::from(!missing);
         out_of_range += usize::from(found == Some(None));
@@ -139,8 +139,8 @@ fn the_cloud_has_one_vertex_per_resolved_pixel_on_that_pixels_ray() {
     let written = Written::new(&recording);
     written.measure(&[]).succeeded();
     let cloud = files::cloud(&written.out().join("cloud.ply"));
-    let height = files::array(&written.out().join("height.npy")).values;
-    let sigma = files::array(&written.out().join("sigma.npy")).values;
+    let height = files::array(&written.out().join("height.npy")).elements;
+    let sigma = files::array(&written.out().join("sigma.npy")).elements;
     let resolved: Vec<usize> = (0..height.len())
         .filter(|&pixel| !height[pixel].is_nan())
         .collect();
@@ -236,7 +236,7 @@ fn of_two_patterns_the_vertical_one_is_the_phase_and_gives_the_height() {
     assert_eq!(files::names(&written.out()), names);
     let read = |name: &str| fs::read(written.out().join(name)).unwrap();
     assert_eq!(read("phase.npy"), read("phase-1.npy"));
-    let horizontal = files::array(&written.out().join("phase-0.npy")).values;
+    let horizontal = files::array(&written.out().join("phase-0.npy")).elements;
     let twin = oracle::decode(&recording, 0);
     for (pixel, phase) in horizontal.iter().enumerate() {
         assert_eq!(phase.is_nan(), twin.phase[pixel].is_nan(), "{pixel}");
@@ -283,7 +283,7 @@ fn three_shifts_without_stated_noise_give_no_sigma_and_say_why() {
     let report = files::report(&written.out());
     assert!(report["noise_counts"].is_null());
     assert!(report["no_sigma"].as_str().unwrap().contains("noise"));
-    let sigma = files::array(&written.out().join("sigma.npy")).values;
+    let sigma = files::array(&written.out().join("sigma.npy")).elements;
     assert!(sigma.iter().all(|sigma| sigma.is_nan()));
     assert!(report["resolved"].as_u64().unwrap() > 8000);
 }
@@ -341,7 +341,7 @@ fn wrapped_phase_modulation_mask_and_picture_are_those_of_the_finest_level() {
     let written = Written::new(&recording);
     written.measure(&[]).succeeded();
     let twin = oracle::decode(&recording, 0);
-    let array = |name: &str| files::array(&written.out().join(name)).values;
+    let array = |name: &str| files::array(&written.out().join(name)).elements;
     let (phase, wrapped) = (array("phase.npy"), array("wrapped.npy"));
     let modulation = array("modulation.npy");
     let mask = files::flags(&written.out().join("mask.npy"));
@@ -396,7 +396,7 @@ fn levels_that_need_a_map_and_have_none_give_the_wrapped_phase_and_name_the_reme
             assert!(why.contains(word) && run.stdout.contains(word), "{why}");
         }
         let absolute = oracle::decode(&with_models, 0);
-        let wrapped = files::array(&written.out().join("wrapped.npy")).values;
+        let wrapped = files::array(&written.out().join("wrapped.npy")).elements;
         let mask = files::flags(&written.out().join("mask.npy"));
         let mut compared = 0;
         for (pixel, &phase) in wrapped.iter().enumerate() {

@@ -126,7 +126,7 @@ fn left_out(poses: &[PathBuf], at: usize) -> LeftOut {
         sides.iter().map(side).sum::<f64>().abs() == 4.0
     };
     let mut points = Vec::new();
-    for (at, height) in heights.values.iter().enumerate() {
+    for (at, height) in heights.elements.iter().enumerate() {
         let (u, v) = (at % heights.columns, at / heights.columns);
         let (u, v) = (u as f64, v as f64);
         if on_board(u, v) && height.is_finite() {
@@ -169,7 +169,7 @@ fn left_out(poses: &[PathBuf], at: usize) -> LeftOut {
     let phases = ["phase-0.npy", "phase-1.npy"].map(|name| {
         let array = files::array(&path("measured").join(name));
         let mut map = PhaseMap::new(array.columns, array.rows);
-        for (at, turns) in array.values.iter().enumerate() {
+        for (at, turns) in array.elements.iter().enumerate() {
             if turns.is_finite() {
                 map.phase[at] = AbsolutePhase::from_turns(f64::from(*turns));
                 map.trust[at] = Trust::Resolved;

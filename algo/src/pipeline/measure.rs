@@ -35,6 +35,41 @@ impl PhaseMap {
         }
     }
 
+    /// For each pixel, its phase less that of the same pixel by another sequence, 1/65536 turn; 0
+    /// where one of both is not resolved, or they differ by more than half a turn: a wrong order.
+    pub fn offsets_from(&self, other: &Self) -> Vec<i16> {
+        let offset = |at: usize| {
+            let offset = (self.phase[at] - other.phase[at]).to_bits();
+            let both = [self, other].map(|map| map.trust[at]) == [Trust::Resolved; 2];
+            i16::try_from(offset).ok().filter(|_| both).unwrap_or(0)
+        };
+        (0..self.phase.len()).map(offset).collect()
+    }
+
+    /// Makes this the mean of two maps by the same sequence. A pixel is resolved if it is in both,
+    /// with the same fringe order.
+    pub fn average(&mut self, other: &Self) {
+        const QUARTER_TURN: i32 = 1 << 14;
+        for at in 0..self.phase.len() {
+            let (a, b) = (self.phase[at], other.phase[at]);
+            let apart = (b - a).to_bits();
+            let trust = match (self.trust[at], other.trust[at]) {
+                (Trust::Resolved, Trust::Resolved) if apart.abs() > QUARTER_TURN => Trust::Residual,
+                (Trust::Resolved, other) => other,
+                (own, _) => own,
+            };
+            let counts = [&*self, other].map(|map| u32::from(map.modulation[at].to_bits()));
+            self.trust[at] = trust;
+            (self.phase[at], self.modulation[at]) = match trust == Trust::Resolved {
+                true => (
+                    AbsolutePhase::from_bits(a.to_bits() + apart / 2),
+                    Modulation::from_bits(counts.iter().sum::<u32>().div_ceil(2) as u16),
+                ),
+                false => (AbsolutePhase::UNKNOWN, Modulation::default()),
+            };
+        }
+    }
+
     pub(crate) fn rows(&mut self) -> Vec<PhaseRow<'_>> {
         let width = self.width.max(1);
         self.phase

@@ -8,6 +8,7 @@ mod noise;
 mod plate;
 mod rays;
 mod rows;
+mod signal;
 #[cfg(test)]
 mod slips;
 mod wrapped;
@@ -25,4 +26,5 @@ pub use noise::{sample_noise, signal_by_modulation};
 pub use plate::{Plate, PlateError};
 pub use rows::{Done, Progress, for_each_row};
 pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};
+pub use signal::{mean_signal, signal};
 pub use wrapped::wrapped;

@@ -15,7 +15,7 @@ use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe, UnsealedRecipe};
 use crate::recipe::replace::{LEAST_LIMIT_MM, MOST_LIMIT_MM};
 use crate::recipe::teach::{TeachError, teach};
 use crate::recipe::{PatternFile, RecipeFile, Store};
-use crate::recipe::{replace, signal, surroundings};
+use crate::recipe::{captures, replace, surroundings};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
@@ -311,7 +311,7 @@ impl Teach {
         crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
         let at = measured.primary;
         let full = &measured.shots;
-        let signal = signal::of_recording(&recording, at).map_err(|error| wrong(&error))?;
+        let signal = captures::recorded_signal(&recording, at).map_err(|error| wrong(&error))?;
         let (mut phases, mut heights) = (phases.clone(), surface.map.clone());
         let found = match naming.everything {
             true => None,

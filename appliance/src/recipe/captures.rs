@@ -9,24 +9,26 @@
 //! The captures are averaged as two means, from which follows what of that difference is noise.
 
 use super::failure::TeachError;
-use super::{light, signal};
+use super::light;
 use crate::head::calibrated::CalibratedHead;
 use crate::head::means;
 use crate::head::rasters::Illumination;
 use crate::head::scan::Scan;
+use crate::head::seam;
 use crate::system::headway::Headway;
-use algo::frame::SampleNoise;
+use algo::frame::{FrameError, SampleNoise};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Sequence, Shot};
-use algo::phase::{Decoder, Trust};
+use algo::phase::Decoder;
 use algo::pipeline::{self, HeightMap, PhaseMap};
-use algo::units::{AbsolutePhase, Modulation};
+use algo::units::AbsolutePhase;
 use hal::frame::Frame;
+use hal::replay::Recording;
 
 /// Means of captures.
 const MEANS: usize = 2;
 /// All captures.
-pub const CAPTURES: usize = MEANS * means::CAPTURES;
+pub const CAPTURES: usize = MEANS * hal::mean::CAPTURES;
 
 /// For each mean, the phase of each pixel by a sequence less its phase by the full sequence,
 /// 1/65536 turn; 0 where one of both phases is not resolved.
@@ -102,11 +104,11 @@ impl Captured {
             (noise, offset_counts) = (by_modulation, offset);
             let seen = scan(function, (&shots, full), &means).map_err(TeachError::rig)?;
             let most = seen.decoder.full_scale();
-            signals.push(signal::of(full, &seen.frames, most));
+            signals.push(pipeline::signal(full, &seen.frames, most));
             let offsets = (1..).zip(short).map(|(known, shown)| {
                 let (.., by) = decode(shown, &means, &phases.phase)?;
                 taking.done(0.85 + 0.15 * known as f64 / short.len() as f64);
-                Ok(offsets(&by, &phases))
+                Ok(by.offsets_from(&phases))
             });
             let offsets: Result<_, String> = offsets.collect();
             all.push((phases, offsets.map_err(TeachError::rig)?));
@@ -122,7 +124,7 @@ impl Captured {
         let Ok([(mut phases, first), (other, second)]) = <[_; MEANS]>::try_from(all) else {
             return Err(TeachError::Ended);
         };
-        average(&mut phases, &other);
+        phases.average(&other);
         let heights = pipeline::triangulate(
             &triangulator,
             &decoder,
@@ -142,7 +144,7 @@ impl Captured {
                 .collect(),
             signal: signals
                 .into_iter()
-                .reduce(|a, b| signal::mean(&a, &b))
+                .reduce(|a, b| pipeline::mean_signal(&a, &b))
                 .unwrap_or_default(),
             noise,
             offset_counts,
@@ -172,37 +174,15 @@ fn distinct(sequences: &[&[Shot]]) -> Vec<Shot> {
     shots
 }
 
-/// Phases less those by the full sequence.
-fn offsets(by: &PhaseMap, full: &PhaseMap) -> Vec<i16> {
-    let resolved = |map: &PhaseMap, at: usize| map.trust[at] == Trust::Resolved;
-    let offset = |at: usize| {
-        let offset = (by.phase[at] - full.phase[at]).to_bits();
-        let both = resolved(by, at) && resolved(full, at);
-        // More than half a turn is a wrong order.
-        i16::try_from(offset).ok().filter(|_| both).unwrap_or(0)
-    };
-    (0..by.phase.len()).map(offset).collect()
-}
-
-/// The mean of two maps. A pixel is resolved if it is in both, with the same fringe order.
-fn average(first: &mut PhaseMap, second: &PhaseMap) {
-    const QUARTER_TURN: i32 = 1 << 14;
-    for at in 0..first.phase.len() {
-        let (a, b) = (first.phase[at], second.phase[at]);
-        let apart = (b - a).to_bits();
-        let trust = match (first.trust[at], second.trust[at]) {
-            (Trust::Resolved, Trust::Resolved) if apart.abs() > QUARTER_TURN => Trust::Residual,
-            (Trust::Resolved, second) => second,
-            (first, _) => first,
-        };
-        let counts = [&*first, second].map(|map| u32::from(map.modulation[at].to_bits()));
-        first.trust[at] = trust;
-        (first.phase[at], first.modulation[at]) = match trust == Trust::Resolved {
-            true => (
-                AbsolutePhase::from_bits(a.to_bits() + apart / 2),
-                Modulation::from_bits(counts.iter().sum::<u32>().div_ceil(2) as u16),
-            ),
-            false => (AbsolutePhase::UNKNOWN, Modulation::default()),
-        };
-    }
+/// The signal of a pattern of a recording ([`pipeline::signal`]).
+///
+/// # Errors
+/// If a frame's samples do not make up its size.
+pub fn recorded_signal(recording: &Recording, pattern: usize) -> Result<Vec<i16>, FrameError> {
+    let frames = recording.frames.iter();
+    let frames = frames.filter(|frame| frame.pattern == pattern);
+    let shots: Vec<Shot> = frames.clone().map(seam::shot).collect();
+    let views: Result<Vec<_>, _> = frames.map(|frame| seam::view(&frame.frame)).collect();
+    let full_scale = u16::try_from((1_u32 << recording.bit_depth) - 1).unwrap_or(u16::MAX);
+    Ok(pipeline::signal(&shots, &views?, full_scale))
 }

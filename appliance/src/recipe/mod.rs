@@ -68,7 +68,6 @@ pub mod replace;
 mod rounds;
 mod shots;
 mod sides;
-pub mod signal;
 pub mod store;
 pub mod surroundings;
 pub mod teach;

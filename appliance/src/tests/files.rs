@@ -1,6 +1,6 @@
 //! Boundary values in calibrations, models of OpenCV, recordings, scenarios and configurations.
 
-use super::{Place, Tally, values};
+use super::{Place, Tally, one_in, values};
 use crate::config::Config;
 use crate::head::calibration::file::{
     CalibrationFile, CameraFile, ContrastFile, FORMAT, LevelFile, MapFile, NoiseFile, PitchFile,
@@ -318,18 +318,8 @@ fn in_toml(value: &str) -> &str {
 
 #[test]
 fn a_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit() {
-    put_in_scenarios(5);
-}
-
-#[test]
-#[ignore = "takes a minute: `.ci/run full`"]
-fn every_boundary_value_in_a_scenario_is_refused_by_its_key_or_the_scene_can_be_lit() {
-    put_in_scenarios(1);
-}
-
-/// Puts boundary values at each place of scenarios, each of which is read; of those that can be read
-/// one in `lit` lights its scene.
-fn put_in_scenarios(lit: usize) {
+    // Of those that can be read one in so many lights its scene.
+    let lit = one_in();
     let readable = Cell::new(0);
     let light = |scenario: &Scenario| {
         readable.set(readable.get() + 1);

@@ -17,7 +17,7 @@ use tests::random::Random;
 
 /// Placements of a plate, in the long form and in the quick one.
 const PLACEMENTS: usize = 12;
-const FEW_PLACEMENTS: usize = 5;
+const FEW_PLACEMENTS: usize = 3;
 
 fn bright(plate: Plate) -> Plate {
     let floor = Floor {

@@ -36,7 +36,7 @@ fn off(path: &std::path::Path, along: usize) -> (f64, f64, usize) {
     let map = files::array(path);
     assert_eq!((map.rows, map.columns), (HEIGHT, WIDTH));
     let known = map
-        .values
+        .elements
         .iter()
         .enumerate()
         .filter(|(_, place)| !place.is_nan());
@@ -82,8 +82,8 @@ fn a_gray_code_alone_gives_column_and_row_within_half_a_cell_and_better_between_
             "{name}: {mean} {most} {count}"
         );
     }
-    let phase = files::array(&out.join("phase-0.npy")).values;
-    let column = files::array(&out.join("column.npy")).values;
+    let phase = files::array(&out.join("phase-0.npy")).elements;
+    let column = files::array(&out.join("column.npy")).elements;
     // A turn is a cell.
     for (phase, column) in phase.iter().zip(&column) {
         assert!((phase * 16.0 - column).abs() < 1e-2, "{phase} {column}");
@@ -207,7 +207,7 @@ fn models_are_made_of_five_poses_of_a_board_under_a_gray_code_alone() {
         (0.3..1.2).contains(&number(&report["sigma_mm"])),
         "{report}"
     );
-    let heights = files::array(&heights.join("height.npy")).values;
+    let heights = files::array(&heights.join("height.npy")).elements;
     let mut known: Vec<f32> = heights.into_iter().filter(|z| z.is_finite()).collect();
     known.sort_by(f32::total_cmp);
     assert!(known.len() > 20_000, "{}", known.len());
@@ -227,10 +227,9 @@ fn a_shared_gray_code_alone_gives_its_columns() {
     let run = import(&case.join("frames"), &recording, "640x400", &options).succeeded();
     assert_eq!(notes(&run), [""; 0]);
     program().measure(&recording, &out, &[]).succeeded();
-    let found = files::array(&out.join("column.npy")).values;
+    let found = files::array(&out.join("column.npy")).elements;
     let bytes = fs::read(case.join("expected_column.npy")).unwrap();
-    let file = npyz::NpyFile::new(&bytes[..]).unwrap();
-    let expected: Vec<i16> = file.into_vec().unwrap();
+    let expected = hal::npy::read::<i16>(&bytes).unwrap().elements;
     assert_eq!(found.len(), expected.len());
     for (found, expected) in found.iter().zip(expected) {
         assert!(

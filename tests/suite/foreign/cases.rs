@@ -47,8 +47,8 @@ impl<'a> Case<'a> {
         let out = self.place.path().join("out");
         let recording = self.place.path().join("recording");
         program().measure(&recording, &out, &[]).succeeded();
-        let found = files::array(&out.join(phase)).values;
-        let expected = files::array(expected).values;
+        let found = files::array(&out.join(phase)).elements;
+        let expected = files::array(expected).elements;
         let pairs = || {
             found
                 .iter()
@@ -157,14 +157,14 @@ fn shared_levels_whose_coarsest_has_some_fringes_are_right_about_a_map() {
         case.place.path().join("recording"),
         case.place.path().join("out"),
     );
-    let expected = files::array(&folder.join("expected_height.npy")).values;
+    let expected = files::array(&folder.join("expected_height.npy")).elements;
     let map = path("about.npy");
     let with_map = ["--about", map.as_str()];
     for about in [&with_map[..0], &with_map] {
         let said = case.said(&format!("--fringes 8,64 --steps 4 {models}"));
         assert_eq!(said, [""; 0]);
         program().measure(&recording, &out, about).succeeded();
-        let found = files::array(&out.join("height.npy")).values;
+        let found = files::array(&out.join("height.npy")).elements;
         let pairs = found
             .iter()
             .zip(&expected)

@@ -310,7 +310,7 @@ fn frames_that_are_imported_with_models_of_opencv_give_the_heights_of_their_reco
     );
     let out = path("out");
     program().measure(&imported, &out, &[]).succeeded();
-    let heights = |folder: &Path| files::array(&folder.join("height.npy")).values;
+    let heights = |folder: &Path| files::array(&folder.join("height.npy")).elements;
     let pairs = heights(&out).into_iter().zip(heights(&direct.out()));
     let mut compared = 0;
     for (found, expected) in pairs.filter(|(a, b)| !a.is_nan() && !b.is_nan()) {

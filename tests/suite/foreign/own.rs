@@ -82,7 +82,7 @@ fn written_patterns_make_a_recording_when_their_frames_are_filled_in() {
         }
         let out = path(&format!("out-{at}"));
         program().measure(&folder, &out, &[]).succeeded();
-        let phase = files::array(&out.join("phase.npy")).values;
+        let phase = files::array(&out.join("phase.npy")).elements;
         for (pixel, &turns) in phase.iter().enumerate() {
             let error = f64::from(turns) - expected(pixel);
             // Rounding to 8 bits twice: 0.4 counts RMS of 100.

@@ -241,7 +241,7 @@ fn shared_pictures_with_noise_range_and_fringes_per_direction_are_right() {
         program().measure(&recording, &out, &[]).succeeded();
         out
     };
-    let values = |path: &Path| files::array(path).values;
+    let values = |path: &Path| files::array(path).elements;
     if let Some(case) = shared::case("54-dim-pictures") {
         let options = ["--fringes", "1,8,64", "--noise", "0.5"];
         let out = measured(&case, "640x400", &options);

@@ -117,7 +117,7 @@ pub fn check_phase(
     let phase = files::array(path);
     assert_eq!((phase.rows, phase.columns), (HEIGHT, WIDTH));
     let known = phase
-        .values
+        .elements
         .iter()
         .enumerate()
         .filter(|(_, turns)| !turns.is_nan());

@@ -1,11 +1,13 @@
 //! A body that is made while it is sent, never held as a whole, and may be slow or end too early.
 
 use super::fault::Fault;
-use http_body_util::channel::Channel;
-use hyper::body::Bytes;
+use http_body_util::StreamBody;
+use hyper::body::{Bytes, Frame};
 use std::io;
 use std::time::Duration;
+use tokio::sync::mpsc;
 use tokio::time::sleep;
+use tokio_stream::wrappers::ReceiverStream;
 
 /// Bytes of a piece.
 pub(super) const PIECE: usize = 64 << 10;
@@ -16,14 +18,14 @@ const PAUSE: Duration = Duration::from_millis(100);
 const CUT: usize = 700;
 
 /// What is sent.
-pub(super) type Body = Channel<Bytes, io::Error>;
+pub(super) type Body = StreamBody<ReceiverStream<Result<Frame<Bytes>, io::Error>>>;
 
 /// A body of lines, on a head with a fault or without one.
 pub(super) fn body(
     mut lines: impl Iterator<Item = Vec<u8>> + Send + 'static,
     fault: Option<Fault>,
 ) -> Body {
-    let (mut sender, body) = Channel::new(1);
+    let (sender, pieces) = mpsc::channel(1);
     let (most, mut left) = match fault {
         Some(Fault::Slow) => (SLOW, usize::MAX),
         Some(Fault::Cut) => (usize::MAX, CUT),
@@ -37,16 +39,17 @@ pub(super) fn body(
                 }
                 let part = Bytes::copy_from_slice(&part[..part.len().min(left)]);
                 left -= part.len();
-                if sender.send_data(part).await.is_err() {
+                if sender.send(Ok(Frame::data(part))).await.is_err() {
                     return;
                 }
                 if left == 0 {
-                    return sender.abort(io::ErrorKind::ConnectionAborted.into());
+                    let broken = Err(io::ErrorKind::ConnectionAborted.into());
+                    return drop(sender.send(broken).await);
                 }
             }
         }
     });
-    body
+    StreamBody::new(ReceiverStream::new(pieces))
 }
 
 fn piece(lines: &mut impl Iterator<Item = Vec<u8>>) -> Option<Vec<u8>> {

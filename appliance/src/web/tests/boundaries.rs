@@ -4,7 +4,7 @@
 use super::*;
 use crate::history::{Bounds, Numbering};
 use crate::storage::state::StateFolder;
-use crate::tests::{Bed, Tally, places, values};
+use crate::tests::{Bed, Tally, cases, places, values};
 
 /// What stands in for a number or a word of an address.
 const WORDS: [&str; 14] = [
@@ -56,32 +56,30 @@ async fn a_boundary_value_in_an_edit_is_refused_by_its_key_or_the_recipe_judges_
     // What is longer than a request may be is not read at all.
     let long = values.pop().unwrap();
     values.push(format!("{}\"", &long[..60_000]));
-    for place in places(&edit) {
-        for value in &values {
-            let body = place.replaced(&edit, value, Value::to_string);
-            let answer = served.change("PUT", "/api/recipes/1", &cookie, &body).await;
-            let stored = std::fs::read(&store.generations(1)[0]).unwrap();
-            let used = match answer.status {
-                200 => {
-                    let used = bed.use_recipe(store.load(1).unwrap().recipe);
-                    store.save(1, &bed.bytes).unwrap();
-                    assert_eq!(used, Ok(()), "{place} = {value}");
-                    used
-                }
-                400 | 409 | 413 | 422 => {
-                    assert!(stored == bed.bytes, "{place} = {value} was stored");
-                    // A recipe that was changed meanwhile is refused for its fingerprint.
-                    let about = if answer.status == 409 {
-                        " (fingerprint)"
-                    } else {
-                        ""
-                    };
-                    Err(words_of(&answer) + about)
-                }
-                status => panic!("{place} = {value}: {status} {}", words_of(&answer)),
-            };
-            tally.take(&place, value, used);
-        }
+    for (place, value) in cases(places(&edit), |_| values.clone()) {
+        let body = place.replaced(&edit, &value, Value::to_string);
+        let answer = served.change("PUT", "/api/recipes/1", &cookie, &body).await;
+        let stored = std::fs::read(&store.generations(1)[0]).unwrap();
+        let used = match answer.status {
+            200 => {
+                let used = bed.use_recipe(store.load(1).unwrap().recipe);
+                store.save(1, &bed.bytes).unwrap();
+                assert_eq!(used, Ok(()), "{place} = {value}");
+                used
+            }
+            400 | 409 | 413 | 422 => {
+                assert!(stored == bed.bytes, "{place} = {value} was stored");
+                // A recipe that was changed meanwhile is refused for its fingerprint.
+                let about = if answer.status == 409 {
+                    " (fingerprint)"
+                } else {
+                    ""
+                };
+                Err(words_of(&answer) + about)
+            }
+            status => panic!("{place} = {value}: {status} {}", words_of(&answer)),
+        };
+        tally.take(&place, &value, used);
     }
     tally.end("edit", 1000);
 }

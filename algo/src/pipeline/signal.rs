@@ -1,19 +1,19 @@
-//! Golden's signal: the light of each pixel as it was demodulated, for measurements that need more
+//! The signal of a part: the light of each pixel as it was demodulated, for measurements that need more
 //! than the phase.
 //!
 //! **Equation.** Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) = B e^{2πiφ} over the N shifts s_k of the
-//! finest level, in which samples are I_k = A + B sin 2π(φ + s_k) (`algo/src/phase/fold.rs`). It is
+//! finest level, in which samples are I_k = A + B sin 2π(φ + s_k) (`phase/fold.rs`). It is
 //! linear in the light: where an edge cuts a pixel, Z is the mean of both sides.
 //!
 //! **Shape and unit.** Per pixel the real and the imaginary part behind each other, in 1/64 count
 //! of an 8-bit sample, whatever the camera's.
 
-use crate::head::seam;
-use algo::frame::{FrameError, FrameView, Samples};
-use algo::pattern::Shot;
-use algo::pipeline;
-use hal::replay::Recording;
-use std::f64::consts::TAU;
+use super::for_each_row;
+use crate::frame::{FrameView, Samples};
+use crate::pattern::Shot;
+use alloc::vec;
+use alloc::vec::Vec;
+use core::f64::consts::TAU;
 
 /// Steps of the signal per count.
 const STEPS: f64 = 64.0;
@@ -21,7 +21,7 @@ const STEPS: f64 = 64.0;
 const EIGHT_BIT: f64 = 255.0;
 
 /// The signal of the frames of `shots`, whose samples are `full_scale` at most.
-pub(super) fn of(shots: &[Shot], frames: &[FrameView<'_>], full_scale: u16) -> Vec<i16> {
+pub fn signal(shots: &[Shot], frames: &[FrameView<'_>], full_scale: u16) -> Vec<i16> {
     let finest = shots.iter().map(|shot| shot.ratio).fold(0.0, f64::max);
     let level: Vec<_> = shots
         .iter()
@@ -34,7 +34,7 @@ pub(super) fn of(shots: &[Shot], frames: &[FrameView<'_>], full_scale: u16) -> V
     let (width, height) = (first.width(), first.height());
     let unit = 2.0 / level.len() as f64 * EIGHT_BIT / f64::from(full_scale) * STEPS;
     let mut signal = vec![[0_i16; 2]; width * height];
-    pipeline::for_each_row(&mut signal, width, |v, row| {
+    for_each_row(&mut signal, width, |v, row| {
         let mut sums = vec![[0.0; 2]; row.len()];
         for (shot, frame) in &level {
             let (sin, cos) = (TAU * shot.shift).sin_cos();
@@ -52,23 +52,6 @@ pub(super) fn of(shots: &[Shot], frames: &[FrameView<'_>], full_scale: u16) -> V
     signal.into_flattened()
 }
 
-/// The signal of a pattern of a recording.
-///
-/// # Errors
-/// If a frame's samples do not make up its size.
-pub fn of_recording(recording: &Recording, pattern: usize) -> Result<Vec<i16>, FrameError> {
-    let frames = recording.frames.iter();
-    let frames = frames.filter(|frame| frame.pattern == pattern);
-    let shots: Vec<Shot> = frames.clone().map(seam::shot).collect();
-    let views: Result<Vec<_>, _> = frames.map(|frame| seam::view(&frame.frame)).collect();
-    let full_scale = (1_u32 << recording.bit_depth) - 1;
-    Ok(of(
-        &shots,
-        &views?,
-        u16::try_from(full_scale).unwrap_or(u16::MAX),
-    ))
-}
-
 fn add<T: Copy + Into<f64>>(sums: &mut [[f64; 2]], samples: &[T], [sin, cos]: [f64; 2]) {
     for ([real, imaginary], &sample) in sums.iter_mut().zip(samples) {
         let sample: f64 = sample.into();
@@ -78,7 +61,7 @@ fn add<T: Copy + Into<f64>>(sums: &mut [[f64; 2]], samples: &[T], [sin, cos]: [f
 }
 
 /// The mean of two signals.
-pub(super) fn mean(first: &[i16], second: &[i16]) -> Vec<i16> {
+pub fn mean_signal(first: &[i16], second: &[i16]) -> Vec<i16> {
     let pairs = first.iter().zip(second);
     pairs.map(|(a, b)| a.midpoint(*b)).collect()
 }
@@ -103,7 +86,7 @@ mod tests {
                 .iter()
                 .map(|samples| FrameView::new(Samples::Sixteen(samples), 2, 1, 2).unwrap());
             let views: Vec<_> = views.collect();
-            let signal = of(&shots, &views, u16::MAX);
+            let signal = signal(&shots, &views, u16::MAX);
             let (sin, cos) = (TAU * phase).sin_cos();
             for pair in signal.chunks(2) {
                 for (part, expected) in pair.iter().zip([cos, sin]) {
