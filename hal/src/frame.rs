@@ -148,6 +148,16 @@ impl Frame {
         self.pixels.samples()
     }
 
+    /// The samples without padding, row by row.
+    #[must_use]
+    pub fn counts(&self) -> Vec<f32> {
+        let (width, stride) = (self.format.width as usize, self.format.stride);
+        match self.samples() {
+            Samples::Eight(all) => rows(all, width, stride),
+            Samples::Sixteen(all) => rows(all, width, stride),
+        }
+    }
+
     /// Start of the exposure.
     #[must_use]
     pub fn timestamp(&self) -> Timestamp {
@@ -226,6 +236,14 @@ impl Pool {
         }
         Frame::new(self.format, buffer, timestamp, count)
     }
+}
+
+fn rows<T: Copy + Into<f32>>(all: &[T], width: usize, stride: usize) -> Vec<f32> {
+    let mut counts = Vec::with_capacity(all.len());
+    for row in all.chunks(stride.max(1)) {
+        counts.extend(row.iter().take(width).map(|sample| (*sample).into()));
+    }
+    counts
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! The last program of `cargo test --workspace`: prints how many tests were skipped because the shared
+//! The last program of `cargo test --release --workspace`: prints how many tests were skipped because the shared
 //! recordings are not beside the project. It has no tests of its own; the suite marks the tests
 //! that it skips.
 

@@ -198,12 +198,12 @@ fn fail_at_first(times: usize) {
 
 #[test]
 fn the_recipe_before_goes_on_wherever_a_teach_or_a_load_fails() {
-    fail(12, 8);
+    fail(6, 4);
 }
 
 #[test]
 fn a_first_teach_that_fails_anywhere_can_be_repeated() {
-    fail_at_first(4);
+    fail_at_first(2);
 }
 
 #[test]

@@ -11,8 +11,8 @@ const HEAD: &str = "calibrated = false
 sub_rays = 2
 part = { kind = \"plane\" }
 [rig.camera]
-width = 512
-height = 512
+width = 384
+height = 384
 angle_deg = 20.7
 [rig.projector]
 angle_deg = -7.6

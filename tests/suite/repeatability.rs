@@ -249,7 +249,7 @@ fn every_kind_of_gauge_repeats_as_well_as_it_says_wherever_a_good_part_lies() {
 
 #[test]
 fn with_shot_noise_every_kind_of_gauge_repeats_as_well_as_it_says() {
-    repeats(shot, false, 16, 40);
+    repeats(shot, false, 6, 40);
 }
 
 #[test]

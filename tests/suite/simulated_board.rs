@@ -182,6 +182,7 @@ fn errors(scenario: &Scenario, found: &Geometry) -> (f64, f64) {
 }
 
 #[test]
+#[ignore = "takes a minute: `.ci/run full`"]
 fn ten_poses_of_a_bowed_board_of_wrong_scale_calibrate_a_simulated_head_of_unknown_lens_and_pose() {
     let taking = Taking {
         side: 512,

@@ -201,6 +201,11 @@ fn round_openings(part: &Part, floor: Option<Ground>) -> usize {
 #[test]
 fn round_openings_over_a_floor_are_found_by_their_rims() {
     assert_eq!(round_openings(&plate(), Some(grey())), 3);
+}
+
+#[test]
+#[ignore = "takes a minute: `.ci/run full`"]
+fn round_openings_of_a_bracket_over_a_floor_are_found_by_their_rims() {
     // Those of the bracket's small holes are disturbed by what other openings light.
     let bracket = Part::SheetMetal(SheetMetal::default());
     assert!(round_openings(&bracket, Some(grey())) >= 1);
@@ -374,9 +379,20 @@ fn judged(
 }
 
 #[test]
-fn a_plate_among_pins_on_a_print_and_beside_the_next_one_is_judged_right() {
+fn a_plate_among_pins_is_judged_right() {
+    is_right_in(&["pins"]);
+}
+
+#[test]
+#[ignore = "takes a minute: `.ci/run full`"]
+fn a_plate_on_a_print_and_beside_the_next_one_is_judged_right() {
+    is_right_in(&["print", "next"]);
+}
+
+/// Fails if a plate in these surroundings is refused or judged wrong.
+fn is_right_in(names: &[&str]) {
     for (name, floor) in everywhere() {
-        if ["pins", "print", "next"].contains(&name) {
+        if names.contains(&name) {
             let found = judged((name, floor), "plate", &plate(), FEW_PLACEMENTS);
             assert_eq!(
                 (found.refused, found.fails, found.invalid),

@@ -8,7 +8,7 @@
 //! an exposure determines d: a relative noise ε of the mean, as a share of white, gives an error of
 //! ε·T, which falls with the square root of the number of such changes.
 
-use super::pictures::{Lit, counts, load_black_and_white};
+use super::pictures::{Lit, load_black_and_white};
 use super::{PATIENCE, refreshes};
 use hal::error::Error;
 use hal::head::{Head, Showing};
@@ -101,7 +101,7 @@ impl Round {
             refreshes: whole + LONGEST,
             settle: 0,
         });
-        let seen = head.watch(&showings, PATIENCE, &mut |frame| lit.mean(&counts(frame)))?;
+        let seen = head.watch(&showings, PATIENCE, &mut |frame| lit.mean(&frame.counts()))?;
         let Some(first) = seen.flips.first() else {
             return Ok(Self {
                 changes: Vec::new(),

@@ -25,8 +25,8 @@ pub use first_light::{LONGEST_DARK, first_light};
 pub use noise::noise;
 pub use pace::{Spaced, pace};
 pub use pictures::{
-    LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, counts, load_black_and_white, median,
-    picture, pictures,
+    LEAST_BRIGHT, LEAST_LIT, Lit, MOST_SATURATED, SETTLE, load_black_and_white, median, picture,
+    pictures,
 };
 pub use plate::{PITCH as PLATE_PITCH, ReferencePlane, plate};
 pub use response::{lights, response};

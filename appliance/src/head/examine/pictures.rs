@@ -4,7 +4,7 @@
 use super::{PATIENCE, refreshes};
 use hal::camera::Starts;
 use hal::error::Error;
-use hal::frame::{Frame, Samples};
+use hal::frame::Frame;
 use hal::head::{Head, Showing, Watched};
 use hal::projector::Raster;
 use std::cell::Cell;
@@ -26,21 +26,6 @@ const BATCH: usize = 8;
 const ATTEMPTS: u32 = 3;
 /// A pixel is lit if white is this share of full scale above black.
 const LIT: f64 = 0.05;
-
-/// The samples of a frame without padding.
-pub fn counts(frame: &Frame) -> Vec<f32> {
-    let format = frame.format();
-    let (width, stride) = (format.width as usize, format.stride);
-    match frame.samples() {
-        Samples::Eight(all) => rows(all, width, stride),
-        Samples::Sixteen(all) => rows(all, width, stride),
-    }
-}
-
-fn rows<T: Copy + Into<f32>>(all: &[T], width: usize, stride: usize) -> Vec<f32> {
-    let rows = all.chunks(stride).flat_map(|row| row.iter().take(width));
-    rows.map(|sample| (*sample).into()).collect()
-}
 
 /// Shows each pattern, waits `settle` refreshes for its light, and hands a picture of it to `keep`,
 /// in order, in counts.
@@ -80,7 +65,7 @@ fn take(
         let picture = |at: usize| settled(head, &seen, at, settle);
         let taken: Option<Vec<_>> = (0..count).map(picture).collect();
         if let Some(taken) = taken {
-            taken.into_iter().for_each(|frame| keep(counts(frame)));
+            taken.into_iter().for_each(|frame| keep(frame.counts()));
             return Ok(());
         }
     }

@@ -3,6 +3,7 @@
 
 use super::*;
 use crate::modbus::map;
+use crate::tests::one_in;
 
 /// Ends of a register and of its halves.
 const WORDS: [u16; 5] = [0, 1, 0x7FFF, 0x8000, 0xFFFF];
@@ -126,10 +127,12 @@ async fn a_boundary_value_in_a_write_of_a_register_is_refused_as_the_map_says_or
         .flat_map(|block| block.first..=block.last + 1)
         .chain([99, u16::MAX])
     {
-        for word in WORDS {
+        // Other values at each address.
+        let first = usize::from(address) % one_in();
+        for word in WORDS.into_iter().skip(first).step_by(one_in()) {
             writer.words(address, &[word]).await;
         }
-        for pair in PAIRS {
+        for pair in PAIRS.into_iter().skip(first).step_by(one_in()) {
             let pair = [(pair >> 16) as u16, pair as u16];
             writer.words(address, &pair).await;
         }
@@ -169,7 +172,10 @@ async fn a_boundary_value_in_a_write_of_a_register_is_refused_as_the_map_says_or
     }
     let Writer { cases, written, .. } = writer;
     println!("{cases} boundary values in registers, {written} of them were stored");
-    assert_eq!((cases, written), (81_775, 743));
+    match one_in() {
+        1 => assert_eq!((cases, written), (81_775, 743)),
+        _ => assert!(cases > 20_000 && written > 100),
+    }
 }
 
 #[tokio::test]
