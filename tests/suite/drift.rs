@@ -149,7 +149,7 @@ fn without_checks_neither_a_teach_nor_a_cycle_makes_one() {
 #[test]
 fn a_trigger_ends_a_check_and_is_answered_in_time_with_the_recipes_patterns() {
     // Frames of many rays, so that a check takes long enough to be met.
-    let place = place("sub_rays = 6\n\n[rig.camera]\nwidth = 384\nheight = 384\n");
+    let place = place("sub_rays = 6\n\n[rig.camera]\nwidth = 512\nheight = 512\n");
     checked_every(&place, 1);
     let daemon = Daemon::of(command(&place));
     let (mut plc, mut browser) = (Plc::connect(&daemon), Browser::new(&daemon));

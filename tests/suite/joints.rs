@@ -142,7 +142,7 @@ fn joints() -> Vec<Joint> {
 
 #[test]
 fn gap_and_flush_are_true_and_as_uncertain_as_they_say() {
-    judge(&joints()[..1], &COARSE, FEW_PLACEMENTS);
+    judge(&joints(), &COARSE, FEW_PLACEMENTS);
 }
 
 #[test]
