@@ -37,7 +37,7 @@ pub fn signal(shots: &[Shot], frames: &[FrameView<'_>], full_scale: u16) -> Vec<
     for_each_row(&mut signal, width, |v, row| {
         let mut sums = vec![[0.0; 2]; row.len()];
         for (shot, frame) in &level {
-            let (sin, cos) = (TAU * shot.shift).sin_cos();
+            let (sin, cos) = libm::sincos(TAU * shot.shift);
             let weights = [sin * unit, cos * unit];
             match frame.row(v) {
                 Samples::Eight(samples) => add(&mut sums, samples, weights),
@@ -46,7 +46,7 @@ pub fn signal(shots: &[Shot], frames: &[FrameView<'_>], full_scale: u16) -> Vec<
         }
         for (pixel, sum) in row.iter_mut().zip(sums) {
             // Casts keep to the range of their type.
-            *pixel = sum.map(|part| part.round() as i16);
+            *pixel = sum.map(|part| libm::round(part) as i16);
         }
     });
     signal.into_flattened()
