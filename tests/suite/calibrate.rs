@@ -312,7 +312,7 @@ fn kill_9_while_it_is_written_leaves_the_old_calibration_or_the_new_one() {
         names
     };
     let mut kept = 0;
-    for changes in 1..=3 {
+    for changes in 1..=6 {
         // The noise differs each time, so every file changes.
         let scenario = format!("{HEAD}[noise]\nseed = {changes}\n");
         fs::write(folder.path().join("scenario.toml"), scenario).unwrap();
@@ -338,7 +338,7 @@ fn kill_9_while_it_is_written_leaves_the_old_calibration_or_the_new_one() {
         kept += u32::from(now == last);
         last = now;
     }
-    println!("3 kills while writing: {kept} left the old calibration, the others the new one");
+    println!("6 kills while writing: {kept} left the old calibration, the others the new one");
     // Kills leave files behind. They are ignored and removed; here is every kind of them.
     for left in [
         "calibration.json.new",

@@ -259,7 +259,7 @@ fn keep_their_limits(
 /// Places dents at random on both parts: all are found.
 fn are_found(dents: usize, scenario: fn(&str, u64) -> Scenario) {
     for kind in ["sheet_metal", "flowerpot"] {
-        let mut line = line(&scenario(kind, 1));
+        let mut line = line(&scenario(kind, 3));
         let pot = kind == "flowerpot";
         let mut smallest = f64::INFINITY;
         for place in line.places(pot, dents, 11) {

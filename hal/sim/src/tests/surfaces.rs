@@ -155,7 +155,7 @@ fn a_ray_meets_every_part_where_small_steps_meet_it() {
     let lens = Lens::new(Scenario::default().rig.camera.model());
     for part in all_parts() {
         let surface = part.surface();
-        for k in 0..20_u32 {
+        for k in 0..60_u32 {
             let (u, v) = (f64::from(k * 197 % 512), f64::from(k * 331 % 512));
             let ray = lens.ray(u, v);
             let slow = marched(&part, lens.centre(), ray);
