@@ -18,6 +18,8 @@ const GAUGES: usize = 64;
 const CONTOURS: usize = 12;
 /// Work that is silent for this long is a fault.
 const SILENCE: Duration = Duration::from_secs(30);
+/// Work is never silent for as much as one part in so many of it, on any computer.
+const SIGNS: u32 = 4;
 
 /// A head of full size in front of a part.
 fn scene(part: &str) -> String {
@@ -29,13 +31,15 @@ struct Told {
     shares: Vec<f64>,
     stages: Vec<String>,
     longest: Duration,
+    whole: Duration,
 }
 
 /// Follows a station until it is ready with another recipe than `before`: it is never in fault, and
 /// what `key` of the snapshot tells never goes back.
 fn follow(browser: &mut Browser, key: &str, before: &Value) -> Told {
     let (mut shares, mut stages) = (Vec::new(), Vec::new());
-    let (mut longest, mut since) = (Duration::ZERO, Instant::now());
+    let began = Instant::now();
+    let (mut longest, mut since) = (Duration::ZERO, began);
     until("other recipe", 8 * PATIENCE, || {
         let snapshot = browser.get("/api/snapshot");
         assert_ne!(snapshot["state"], "fault", "{snapshot}");
@@ -61,6 +65,7 @@ fn follow(browser: &mut Browser, key: &str, before: &Value) -> Told {
         shares,
         stages,
         longest,
+        whole: began.elapsed(),
     }
 }
 
@@ -133,16 +138,13 @@ fn goes_all_ways(scene: &str, bytes: usize) {
     assert_eq!(status, 202, "{answer}");
     let told = follow(&mut browser, "teach", &before);
     println!(
-        "taught: {} signs of progress, {:?} apart at most; {:?}",
+        "taught in {:?}: {} signs of progress, {:?} apart at most; {:?}",
+        told.whole,
         told.shares.len(),
         told.longest,
         told.stages
     );
-    assert!(
-        told.shares.len() > 50 && told.stages.len() > 5,
-        "{:?}",
-        told.stages
-    );
+    assert!(SIGNS * told.longest < told.whole && told.stages.len() > 5);
 
     let recipe = browser.get("/api/recipes/2");
     let edit = long_list(&recipe);
