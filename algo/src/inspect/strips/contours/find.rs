@@ -177,7 +177,7 @@ impl ContourFit {
             if let Some(pixel) = face.spot_size(0.0, 0.0) {
                 face.look_about(expected.outline.places(), AROUND_PX + REACH_MM / pixel);
             }
-            let setup = contours.setup(expected, &face);
+            let setup = contours.setup(expected, &face, golden);
             if let Some(setup) = setup {
                 let mut found = expected.outline.find(&face, &setup, expected.rim);
                 self.pieces = Some(Pieces {
@@ -236,7 +236,7 @@ fn rim(expected: &Expected, frame: PlaneFrame, eye: Vector, found: Associated) -
 }
 
 /// A frame of the part as taught, after its motion.
-fn moved(frame: &PlaneFrame, motion: &Motion) -> PlaneFrame {
+pub fn moved(frame: &PlaneFrame, motion: &Motion) -> PlaneFrame {
     let along = |way| motion.apply(motion.centre + way) - motion.apply(motion.centre);
     PlaneFrame {
         origin: motion.apply(frame.origin),

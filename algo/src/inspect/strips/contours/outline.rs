@@ -9,7 +9,7 @@ use super::shape::Outline;
 use crate::geometry::Vector;
 use crate::inspect::contour::View;
 use crate::inspect::contour::shape::{Circle, Line, Slot};
-use crate::inspect::feature::FeatureKind;
+use crate::inspect::feature::{FeatureKind, PlaneFrame};
 use crate::inspect::region::Region;
 use crate::inspect::strips::golden::Golden;
 use alloc::vec;
@@ -94,11 +94,7 @@ pub fn start(
     let floor = depths.get(count / 2).map(|above| -above);
     let is_seen = count as f64 >= FLOOR_SHARE * opening.len() as f64
         || count >= LEAST_PIXELS && depths[count * 3 / 4] - depths[count / 4] < NEAR_MM;
-    let ground = || {
-        let below = golden.ground_at(face.frame.origin)?;
-        let depth = face.frame.normal().dot(face.frame.origin - below);
-        (depth > NEAR_MM).then_some(depth)
-    };
+    let ground = || ground_below(golden, &face.frame).filter(|depth| *depth > NEAR_MM);
     let width = golden.size().0;
     let on_face = (0..pixels.above.len()).filter(|&at| pixels.is_face(at));
     Some(Start {
@@ -109,6 +105,12 @@ pub fn start(
             .collect(),
         floor: floor.filter(|_| is_seen).or_else(ground),
     })
+}
+
+/// How far below a plane that lies so the part's ground is, mm.
+pub fn ground_below(golden: &Golden, frame: &PlaneFrame) -> Option<f64> {
+    let ground = golden.ground_at(frame.origin)?;
+    Some(frame.normal().dot(frame.origin - ground))
 }
 
 /// A radius without the pixels whose heights are not certain.

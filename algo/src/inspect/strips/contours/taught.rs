@@ -2,7 +2,7 @@
 
 use super::face::Face;
 use super::light::{GoldenSignal, Levels, Signal};
-use super::outline::{Start, start};
+use super::outline::{Start, ground_below, start};
 use super::shape::Outline;
 use crate::geometry::Vector;
 use crate::inspect::contour::{Complex, Fringes, Setup, Spot, State, View};
@@ -18,6 +18,8 @@ pub const REACH_MM: f64 = 0.5;
 /// The same on golden, where only its outline is known, px and mm.
 const FIRST_REACH_PX: f64 = 3.0;
 const FIRST_REACH_MM: f64 = 0.75;
+/// A floor within this distance of the part's ground is that ground, mm.
+const NEAR_MM: f64 = 0.3;
 
 /// The contours that gauges are of.
 #[derive(Clone, Debug)]
@@ -48,6 +50,8 @@ pub struct Expected {
     pub rim: f64,
     thickness: Option<f64>,
     floor: Option<f64>,
+    /// Whether its floor is what the part lies on, which stays where the part is moved.
+    is_on_ground: bool,
     deepest: f64,
 }
 
@@ -134,9 +138,12 @@ impl Contours {
             rim: of.rim,
             thickness: plane.thickness,
             floor,
+            is_on_ground: floor
+                .zip(ground_below(golden, &face.frame))
+                .is_some_and(|(floor, ground)| libm::fabs(floor - ground) < NEAR_MM),
             deepest: (origin.z - range.low).max(0.0),
         };
-        let mut setup = self.setup(&expected, &face)?;
+        let mut setup = self.setup(&expected, &face, golden)?;
         let pixel = face.spot_size(0.0, 0.0)?;
         setup.reach = FIRST_REACH_MM.max(FIRST_REACH_PX * pixel);
         let found = expected.outline.find(&face, &setup, 0.0);
@@ -173,7 +180,7 @@ impl Contours {
     }
 
     /// What is known of light, material and camera where a contour's plane lies as in `face`.
-    pub fn setup(&self, of: &Expected, face: &Face<'_>) -> Option<Setup> {
+    pub fn setup(&self, of: &Expected, face: &Face<'_>, golden: &Golden) -> Option<Setup> {
         let device = |centre: Vector| face.frame.coordinates(centre);
         let own: Vec<(f64, usize)> = self.levels.fringes().collect();
         let (levels, noise): (Vec<(f64, usize)>, f64) = match face.light {
@@ -203,7 +210,10 @@ impl Contours {
             noise,
             least: self.least,
             thickness: of.thickness,
-            floor: of.floor,
+            floor: match of.is_on_ground {
+                true => ground_below(golden, &face.frame).map(|below| below.max(0.0)),
+                false => of.floor,
+            },
             deepest: of.deepest,
             reach: REACH_MM,
         })
