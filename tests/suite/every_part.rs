@@ -112,7 +112,7 @@ fn planned(bed: &mut Bed, recipe: Recipe) -> Plan {
 }
 
 /// Where a placement takes a point.
-fn way(placement: &Placement, point: Vector) -> Vector {
+pub(crate) fn way(placement: &Placement, point: Vector) -> Vector {
     let [a, b] = placement.tilt_deg.map(f64::to_radians);
     let c = placement.rotation_deg.to_radians();
     let [x, y, z] = placement.shift_mm;

@@ -51,6 +51,7 @@ mod messages;
 mod one_click;
 mod outputs;
 mod page;
+mod placed;
 mod placement;
 mod planes;
 mod poses;

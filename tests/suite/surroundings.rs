@@ -42,7 +42,7 @@ fn white() -> Ground {
     }
 }
 
-fn plate() -> Part {
+pub(crate) fn plate() -> Part {
     Part::Plate(Plate {
         thickness_mm: 1.0,
         ..Plate::default()
@@ -255,7 +255,7 @@ fn the_floor_lies_below_the_part_that_is_put_there_and_not_below_the_first_one()
 }
 
 /// The surroundings of the ensemble, by name.
-fn everywhere() -> Vec<(&'static str, Option<Ground>)> {
+pub(crate) fn everywhere() -> Vec<(&'static str, Option<Ground>)> {
     let at = |depth_mm| Some(Ground { depth_mm, ..grey() });
     let pin = |x, y| Pin {
         x,

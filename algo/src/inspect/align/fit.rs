@@ -52,14 +52,14 @@ pub struct Placed {
     pub covariance: Matrix6,
     /// The part's radius, mm.
     pub radius: f64,
-    /// Components that the shape does not determine: they are taken as 0, or are `steered`.
+    /// Components that neither the shape nor contours determine: they are taken as 0, or are `steered`.
     pub left_out: [bool; 6],
-    /// The directions that the shape does not determine: unit vectors in the coordinates of the
+    /// The directions that are not determined: unit vectors in the coordinates of the
     /// covariance, which is 0 along them though their variance is infinite. What depends on them is
     /// not known.
     pub free: heapless::Vec<[f64; 6], 6>,
-    /// Whether the picture says how far the part is moved along them, so that regions follow; else
-    /// it is taken not to be.
+    /// Whether the picture or contours say how far the part is moved along directions that its shape leaves open, so
+    /// that regions follow; else it is taken not to be.
     pub steered: bool,
     /// Points that agree with the motion.
     pub points: usize,
@@ -202,7 +202,7 @@ impl Fitting<'_> {
     }
 
     /// A motion followed by a further one.
-    fn then(&self, motion: &Motion, further: &[f64; 6]) -> Motion {
+    pub fn then(&self, motion: &Motion, further: &[f64; 6]) -> Motion {
         let [x, y, z, a, b, c] = *further;
         let turn = Vector::new(a, b, c) * (1.0 / self.plan.radius);
         let shift = Vector::new(x, y, z);
@@ -224,6 +224,22 @@ impl Fitting<'_> {
             outliers: 1.0 - solved.inside as f64 / equations.len() as f64,
             reach,
             reach_sigma,
+        }
+    }
+
+    /// The same where the directions that the shape leaves open are determined otherwise, with this covariance along them.
+    pub fn determined(&self, placed: &Placed, along_open: &Matrix6) -> Placed {
+        let sum = |i: usize, j: usize| placed.covariance[i][j] + along_open[i][j];
+        let covariance = core::array::from_fn(|i| core::array::from_fn(|j| sum(i, j)));
+        let (reach, reach_sigma) = self.reach(&placed.motion, &[], &covariance);
+        Placed {
+            covariance,
+            left_out: [false; 6],
+            free: heapless::Vec::new(),
+            steered: true,
+            reach,
+            reach_sigma,
+            ..placed.clone()
         }
     }
 
@@ -267,8 +283,8 @@ impl Fitting<'_> {
         (reach, libm::sqrt(form(&g, covariance, &g).max(0.0)))
     }
 
-    /// Where a small motion takes a point.
-    fn way(&self, &[x, y, z, a, b, c]: &[f64; 6], point: Vector) -> Vector {
+    /// How far a small motion takes a point.
+    pub fn way(&self, &[x, y, z, a, b, c]: &[f64; 6], point: Vector) -> Vector {
         let turn = Vector::new(a, b, c) * (1.0 / self.plan.radius);
         Vector::new(x, y, z) + turn.cross(point - self.plan.centre)
     }

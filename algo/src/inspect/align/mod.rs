@@ -13,8 +13,8 @@ mod surface;
 mod weight;
 
 pub use coarse::Coarse;
-pub use directions::form;
-pub use fit::{FitBuffers, Placed, Sample};
+pub use directions::{Matrix6, form};
+pub use fit::{FitBuffers, Fitting, Placed, Sample};
 pub use motion::Motion;
 pub use picture::{Found, Picture};
 pub use spots::{Alignment, Spot};

@@ -39,6 +39,13 @@ pub enum Source {
     Wall,
 }
 
+impl Source {
+    /// Whether it is another one wherever the part lies.
+    pub fn is_of_place(self) -> bool {
+        matches!(self, Self::Pixels | Self::Wall)
+    }
+}
+
 /// An input of the uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Input<const N: usize> {

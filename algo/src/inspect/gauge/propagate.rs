@@ -262,7 +262,7 @@ impl Characteristic<'_> {
                     continue;
                 }
                 let off = slope(1.0, &|by| Change::Input(id, input, by));
-                match is_of_place(*source) {
+                match source.is_of_place() {
                     true => own += off * off,
                     false => shared += off * off,
                 }
@@ -305,11 +305,6 @@ impl Characteristic<'_> {
             own,
         })
     }
-}
-
-/// Whether an input is another one wherever the part lies.
-fn is_of_place(source: Source) -> bool {
-    matches!(source, Source::Pixels | Source::Wall)
 }
 
 /// A motion by so much along each of the components of the covariance: shifts in mm, and turns as

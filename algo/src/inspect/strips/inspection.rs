@@ -35,6 +35,7 @@ impl Production {
                 Some(contours) => vec![ContourFit::default(); contours.all.len()],
                 None => Vec::new(),
             },
+            anchors: vec![ContourFit::default(); self.anchors.len()],
             sights: vec![SectionSight::default(); self.sections.all.len()],
             sections: vec![SectionFit::default(); self.sections.all.len()],
         }
@@ -113,7 +114,8 @@ impl Production {
     }
 
     /// The second half: the readings of a part that lies so, from the input and strips that it was
-    /// placed with, and `maps` of it. Contours are found in `light`.
+    /// placed with, and `maps` of it. Contours are found in `light`, and place the part where heights leave its
+    /// motion open.
     ///
     /// # Errors
     /// As [`Self::inspect`].
@@ -125,6 +127,9 @@ impl Production {
         maps: Maps<'_>,
     ) -> Result<Findings, DecodeError> {
         self.phase.check(input, self.golden.size())?;
+        let by_contours = placed.as_ref();
+        let by_contours = by_contours.and_then(|of| self.place_by_contours(of, light, strips));
+        let placed = by_contours.or(placed);
         let regions = &self.gauges.regions;
         strips.pose.set(&self.golden, regions, placed);
         let Strips {

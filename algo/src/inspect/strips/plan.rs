@@ -1,6 +1,6 @@
 //! What inspecting parts needs, worked out once.
 
-use super::contours::{Contours, GoldenSignal, Known, Levels};
+use super::contours::{Anchors, Contours, GoldenSignal, Known, Levels, anchors};
 use super::coordinates::Comparison;
 use super::coverage::Threshold;
 use super::decode::PhasePlan;
@@ -89,6 +89,8 @@ pub struct Production {
     pub(super) planes: Vec<Fit>,
     /// `None` if no gauge is of one.
     pub(super) contours: Option<Contours>,
+    /// Those that the part is placed by where heights leave its motion open.
+    pub(super) anchors: Anchors,
     pub(super) sections: Sections,
     pub(super) budget: ErrorBudget,
 }
@@ -163,12 +165,20 @@ impl Production {
                 Some(Contours::new(wanted, (&features, &planes), &golden, known)?)
             }
         };
+        let is_open = alignment
+            .as_ref()
+            .is_some_and(|of| of.left_out.contains(&true));
+        let anchors = match contours.as_ref().filter(|_| is_open) {
+            Some(contours) => anchors(contours, &planes, &gauges.list),
+            None => Anchors::new(),
+        };
         let sections = Sections::new(gauges.sections.iter().copied(), &features, &golden);
         let sections = sections.map_err(|feature| Unmeasurable::NoSection { feature })?;
         Ok(Self {
             sections,
             planes,
             contours,
+            anchors,
             budget: ErrorBudget {
                 golden_noise,
                 largest,

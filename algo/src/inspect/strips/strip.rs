@@ -37,8 +37,9 @@ pub struct Strips {
     pub(super) cells: CellBuffers,
     /// One per plane that a gauge needs.
     pub(super) fits: Vec<Fit>,
-    /// One per contour that a gauge needs.
+    /// One per contour that a gauge needs, and one per contour that the part is placed by.
     pub(super) contours: Vec<ContourFit>,
+    pub(super) anchors: Vec<ContourFit>,
     /// One per section that a gauge needs: what pixels see of it, and what was found.
     pub(super) sights: Vec<SectionSight>,
     pub(super) sections: Vec<SectionFit>,

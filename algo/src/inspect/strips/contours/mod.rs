@@ -7,6 +7,7 @@
 //!
 //! Each contour is found by one thread, so the bits do not depend on the number of threads.
 
+mod anchors;
 mod face;
 mod find;
 mod light;
@@ -15,7 +16,8 @@ mod shape;
 mod shift;
 mod taught;
 
-pub use find::{ContourFit, FoundFeature, Lost, SeenRim};
+pub use anchors::{Anchors, LEAST, MOST, anchors};
+pub use find::{ContourFit, FoundFeature, Lost, SeenRim, moved};
 pub use light::{GoldenSignal, Levels, Signal};
 pub use shift::Shift;
-pub use taught::{Contours, Known};
+pub use taught::{Contours, Expected, Known};

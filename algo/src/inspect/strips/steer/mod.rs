@@ -87,5 +87,6 @@ impl Production {
     }
 }
 
+mod contours;
 #[cfg(test)]
 mod tests;

@@ -1,0 +1,54 @@
+//! Which contours a part is placed by whose heights leave its motion open.
+
+use super::taught::{Contours, Expected};
+use crate::geometry::Vector;
+use crate::inspect::feature::FeatureKind;
+use crate::inspect::strips::fits::Fit;
+use crate::inspect::strips::gauges::Gauge;
+use alloc::vec::Vec;
+
+/// Contours that a part is placed by at most.
+pub const MOST: usize = 4;
+/// Fewer determine nothing.
+pub const LEAST: usize = 2;
+
+/// The numbers of these contours.
+pub type Anchors = heapless::Vec<usize, MOST>;
+
+/// The contours that a part is placed by: as far apart as there are. A contour whose own place is measured in the
+/// frame as taught is none of them.
+pub fn anchors(contours: &Contours, planes: &[Fit], gauges: &[Gauge]) -> Anchors {
+    let is_placed = |feature: usize| {
+        let mut gauges = gauges.iter().filter(|gauge| gauge.datum.is_empty());
+        gauges.any(|gauge| gauge.measure.facts().datum && gauge.of.contains(&feature))
+    };
+    let place = |(at, expected): (usize, &Expected)| {
+        let frame = contours.frame(expected, planes.get(expected.plane)?)?;
+        let (x, y) = expected.outline.middle();
+        let serves = expected.kind() != FeatureKind::Line && !is_placed(expected.feature);
+        serves.then(|| (at, frame.point(x, y)))
+    };
+    let places: Vec<(usize, Vector)> = contours.all.iter().enumerate().filter_map(place).collect();
+    let sum = places.iter().fold(Vector::default(), |sum, of| sum + of.1);
+    let mean = sum * (1.0 / places.len().max(1) as f64);
+    let mut taken = heapless::Vec::<Vector, MOST>::new();
+    let mut chosen = Anchors::new();
+    for _ in 0..MOST.min(places.len()) {
+        let to_nearest = |at: Vector| {
+            let ways = taken.iter().map(|taken| (at - *taken).length());
+            ways.fold(f64::INFINITY, f64::min)
+        };
+        let apart = |at: Vector| match taken.is_empty() {
+            true => (at - mean).length(),
+            false => to_nearest(at),
+        };
+        let free = places.iter().filter(|(at, _)| !chosen.contains(at));
+        if let Some(&(at, place)) = free.max_by(|a, b| apart(a.1).total_cmp(&apart(b.1))) {
+            let _ = (chosen.push(at), taken.push(place));
+        }
+    }
+    match chosen.len() < LEAST {
+        true => Anchors::new(),
+        false => chosen,
+    }
+}
