@@ -184,8 +184,8 @@ fn a_stamped_bracket_over_a_floor_is_judged_right() {
     ]);
 }
 
-/// Openings that teaching finds to be round, by their rims.
-fn round_openings(part: &Part, floor: Option<Ground>) -> usize {
+/// Openings that teaching finds to be round, and to be slots, by their rims.
+fn rims(part: &Part, floor: Option<Ground>) -> [usize; 2] {
     let mut bed = bed(&Scenario {
         part: part.clone(),
         floor,
@@ -193,14 +193,17 @@ fn round_openings(part: &Part, floor: Option<Ground>) -> usize {
     });
     let (head, calibration) = (&mut bed.head, &bed.calibration);
     let taught = teach(head, calibration, &naming(1.0), TIMEOUT, Headway::silent());
-    let taught = taught.unwrap().with_circles(Headway::silent()).unwrap();
-    let is_round = |of: &&FeatureFile| of.kind == FeatureKind::Circle;
-    taught.manifest.features.iter().filter(is_round).count()
+    let taught = taught.unwrap().with_rims(Headway::silent()).unwrap();
+    let features = &taught.manifest.features;
+    [FeatureKind::Circle, FeatureKind::Slot].map(|kind| {
+        let is_it = |of: &&FeatureFile| of.kind == kind;
+        features.iter().filter(is_it).count()
+    })
 }
 
 #[test]
-fn round_openings_over_a_floor_are_found_by_their_rims() {
-    assert_eq!(round_openings(&plate(), Some(grey())), 3);
+fn round_openings_and_slots_over_a_floor_are_found_by_their_rims() {
+    assert_eq!(rims(&plate(), Some(grey())), [3, 1]);
 }
 
 #[test]
@@ -208,7 +211,7 @@ fn round_openings_over_a_floor_are_found_by_their_rims() {
 fn round_openings_of_a_bracket_over_a_floor_are_found_by_their_rims() {
     // Those of the bracket's small holes are disturbed by what other openings light.
     let bracket = Part::SheetMetal(SheetMetal::default());
-    assert!(round_openings(&bracket, Some(grey())) >= 1);
+    assert!(rims(&bracket, Some(grey()))[0] >= 1);
 }
 
 #[test]

@@ -181,7 +181,7 @@ impl Teach {
         };
         let taught = match replaced.filter(|_| self.keep_gauges) {
             Some(file) => pool.install(|| replace::keep_gauges(taught, &file, Headway::silent())),
-            None => pool.install(|| taught.with_circles(Headway::silent())),
+            None => pool.install(|| taught.with_rims(Headway::silent())),
         };
         let taught = taught
             .and_then(UnsealedRecipe::seal)

@@ -117,9 +117,9 @@ impl Worker {
                 self.computing.on(|| self.pool.install(kept))
             }
             None => {
-                let headway = round.called("looking for round openings");
-                let circles = || taught.with_circles(headway);
-                self.computing.on(|| self.pool.install(circles))
+                let headway = round.called("looking for round openings and slots");
+                let rims = || taught.with_rims(headway);
+                self.computing.on(|| self.pool.install(rims))
             }
         };
         let packing = headway.part(0.8, 1.0).called("packing the recipe");

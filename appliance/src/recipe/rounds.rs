@@ -1,4 +1,4 @@
-//! Round openings of a part that was taught become circles: whether a hole is there is found where
+//! Round openings of a part that was taught become circles, and long ones slots: whether a hole is there is found where
 //! its rim should be, wherever the part lies and whatever is seen through it.
 
 use super::archive::Arrays;
@@ -9,17 +9,28 @@ use super::{FeatureFile, GaugeFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use crate::system::headway::Headway;
 use algo::inspect::kinds::{Found, Roundness};
-use algo::inspect::{Basis, FeatureKind, Findings, FoundFeature, Reading, SeenRim, State};
+use algo::inspect::{
+    Basis, FeatureKind, Findings, FoundFeature, Geometry, Reading, SeenRim, State,
+};
 use std::f64::consts::TAU;
 
 /// An opening is round if its rim is off a circle by at most this much, beside what noise makes, px.
 const ROUND_PX: f64 = 0.5;
+/// An opening is a slot if its rim is off one by at most this much (RMS), px.
+const SLOT_PX: f64 = 0.15;
 /// It is only found by its rim if golden shows this share of it: where pixels are coarse, or the rim
 /// is disturbed, good parts would come near the least share.
 const GOLDEN_FOUND: f64 = 0.8;
+/// The same of a slot, whose length shows more of what other openings light.
+const GOLDEN_SLOT: f64 = 0.6;
 /// A region reaches so far beyond the opening: in pixels, and in mm at least, which fine pixels need.
 const AROUND_PX: f64 = 12.0;
 const AROUND_MM: f64 = 3.0;
+/// What an opening may be, and what is said of it.
+const SHAPES: [(FeatureKind, &str); 2] = [
+    (FeatureKind::Circle, "round"),
+    (FeatureKind::Slot, "a slot"),
+];
 /// Corners of a region.
 const CORNERS: usize = 8;
 /// The least share of a rim that good parts have.
@@ -27,37 +38,57 @@ const LEAST_FOUND: f64 = 0.4;
 
 impl UnsealedRecipe {
     /// The same recipe, in which the openings that teaching has found are circles where they are
-    /// round. Two frames cannot find a rim: recipes that begin with them stay as they are.
+    /// round, and slots where they are that. Two frames cannot find a rim: recipes that begin with them stay as they are.
     ///
     /// # Errors
     /// In words, if its manifest has no models of a head.
-    pub fn with_circles(self, headway: Headway<'_>) -> Result<Self, String> {
+    pub fn with_rims(self, headway: Headway<'_>) -> Result<Self, String> {
         let Self {
             mut manifest,
             arrays,
             choice,
         } = self;
         let head = manifest.head()?;
-        let openings = openings(&manifest);
+        let mut openings = openings(&manifest);
         let reach = AROUND_PX.max(AROUND_MM / pixel_mm(&head));
-        let circles = openings
-            .iter()
-            .map(|opening| around(&manifest.features[opening.feature], reach));
-        let circles: Vec<FeatureFile> = circles.collect();
-        let round = match manifest.two_frames {
-            true => vec![false; circles.len()],
-            false => round(&manifest, &arrays, &head, &circles, headway),
-        };
+        let mut reasons = choice.reasons.clone();
         let mut names = Vec::new();
-        let found = openings.into_iter().zip(circles).zip(round);
-        for ((opening, circle), _) in found.filter(|(_, is_round)| *is_round) {
-            let gauge = &mut manifest.gauges[opening.gauge];
-            names.push(gauge.name.clone());
-            *gauge = GaugeFile {
-                low: Some(LEAST_FOUND),
-                ..GaugeFile::new(gauge.slot, &gauge.name, Found {}, &[&circle.name])
+        let looking = [headway.part(0.0, 0.6), headway.part(0.6, 1.0)];
+        for ((kind, word), headway) in SHAPES.into_iter().zip(looking) {
+            if manifest.two_frames || openings.is_empty() {
+                break;
+            }
+            let around = |of: &Opening| {
+                let diamond = &manifest.features[of.feature];
+                let corners = match kind {
+                    FeatureKind::Slot => {
+                        enclosing(diamond, &arrays.valid, head.camera.width(), reach)
+                    }
+                    _ => around(diamond, reach),
+                };
+                FeatureFile::new(&*diamond.name, kind, corners)
             };
-            manifest.features[opening.feature] = circle;
+            let rims: Vec<FeatureFile> = openings.iter().map(around).collect();
+            let found = found(&manifest, &arrays, &head, &rims, headway);
+            let (mut others, mut here) = (Vec::new(), Vec::new());
+            for ((opening, rim), is_found) in openings.into_iter().zip(rims).zip(found) {
+                if !is_found {
+                    others.push(opening);
+                    continue;
+                }
+                let gauge = &mut manifest.gauges[opening.gauge];
+                here.push(gauge.name.clone());
+                *gauge = GaugeFile {
+                    low: Some(LEAST_FOUND),
+                    ..GaugeFile::new(gauge.slot, &gauge.name, Found {}, &[&rim.name])
+                };
+                manifest.features[opening.feature] = rim;
+            }
+            if !here.is_empty() {
+                reasons.push(format!("{}: {word}, found by the rim", here.join(", ")));
+            }
+            names.append(&mut here);
+            openings = others;
         }
         if names.is_empty() {
             return Ok(Self {
@@ -67,8 +98,6 @@ impl UnsealedRecipe {
             });
         }
         manifest.tried.retain(|tried| !names.contains(&tried.gauge));
-        let mut reasons = choice.reasons;
-        reasons.push(format!("{}: round, found by the rim", names.join(", ")));
         reasons.push(Self::CONTOURS.into());
         // Golden was seen to have them, so nothing is left to settle but the sequence.
         let choice = planner::choose(&manifest.sequences, &manifest.gauges, arrays.widest());
@@ -109,10 +138,20 @@ fn pixel_mm(head: &Calibration) -> f64 {
     camera.centre().z / -camera.axis().z / camera.model().fx
 }
 
+/// The middle of a feature's corners.
+fn middle(of: &FeatureFile) -> [f64; 2] {
+    let count = of.region.len().max(1) as f64;
+    [0, 1].map(|i| of.region.iter().map(|of| of[i]).sum::<f64>() / count)
+}
+
+/// Hundredths print shortly.
+fn short(at: f64) -> f64 {
+    (at * 100.0).round() / 100.0
+}
+
 /// The region about an opening, of which a diamond is the feature, and so many pixels beyond it.
-fn around(diamond: &FeatureFile, beyond: f64) -> FeatureFile {
-    let count = diamond.region.len().max(1) as f64;
-    let [u, v] = [0, 1].map(|i| diamond.region.iter().map(|of| of[i]).sum::<f64>() / count);
+fn around(diamond: &FeatureFile, beyond: f64) -> Vec<[f64; 2]> {
+    let [u, v] = middle(diamond);
     let reach = diamond
         .region
         .iter()
@@ -120,38 +159,70 @@ fn around(diamond: &FeatureFile, beyond: f64) -> FeatureFile {
         .fold(0.0, f64::max);
     let corner = |at: usize| {
         let (sin, cos) = (TAU * at as f64 / CORNERS as f64).sin_cos();
-        // Hundredths print shortly.
-        let near = |at: f64| (at * 100.0).round() / 100.0;
         [
-            near(u + (reach + beyond) * cos),
-            near(v + (reach + beyond) * sin),
+            short(u + (reach + beyond) * cos),
+            short(v + (reach + beyond) * sin),
         ]
     };
-    let corners = (0..CORNERS).map(corner).collect();
-    FeatureFile::new(&*diamond.name, FeatureKind::Circle, corners)
+    (0..CORNERS).map(corner).collect()
 }
 
-/// Which of these circles are round holes of golden: all are looked for by one plan, without those
+/// The region of [`CORNERS`] sides about all pixels of an opening that golden is not compared at, from the middle of
+/// its diamond on, and so many pixels beyond them.
+fn enclosing(diamond: &FeatureFile, valid: &[u8], width: usize, beyond: f64) -> Vec<[f64; 2]> {
+    let side = |at: usize| (TAU * at as f64 / CORNERS as f64).sin_cos();
+    let mut reach = [0.0; CORNERS];
+    let [u, v] = middle(diamond);
+    let mut is_seen = vec![false; valid.len()];
+    let mut next = vec![(u.round() as usize, v.round() as usize)];
+    while let Some((column, row)) = next.pop() {
+        let place = row * width + column;
+        let is_open = column < width && valid.get(place) == Some(&0);
+        if !is_open || std::mem::replace(&mut is_seen[place], true) {
+            continue;
+        }
+        for (at, reach) in reach.iter_mut().enumerate() {
+            let (sin, cos) = side(at);
+            *reach = f64::max(*reach, (column as f64 - u) * cos + (row as f64 - v) * sin);
+        }
+        next.extend([(column + 1, row), (column, row + 1)]);
+        next.extend(column.checked_sub(1).map(|column| (column, row)));
+        next.extend(row.checked_sub(1).map(|row| (column, row)));
+    }
+    // Where two sides that follow each other meet.
+    let corner = |at: usize| {
+        let ((sin, cos), (sin_1, cos_1)) = (side(at), side(at + 1));
+        let (one, other) = (reach[at] + beyond, reach[(at + 1) % CORNERS] + beyond);
+        let turn = cos * sin_1 - sin * cos_1;
+        [
+            short(u + (one * sin_1 - other * sin) / turn),
+            short(v + (other * cos - one * cos_1) / turn),
+        ]
+    };
+    (0..CORNERS).map(corner).collect()
+}
+
+/// Which of these circles or slots golden has: all are looked for by one plan, without those
 /// of which it sees nothing.
-fn round(
+fn found(
     manifest: &RecipeFile,
     arrays: &Arrays,
     head: &Calibration,
-    circles: &[FeatureFile],
+    rims: &[FeatureFile],
     mut headway: Headway<'_>,
 ) -> Vec<bool> {
-    let mut round = vec![false; circles.len()];
-    let mut left: Vec<usize> = (0..circles.len()).collect();
+    let mut found = vec![false; rims.len()];
+    let mut left: Vec<usize> = (0..rims.len()).collect();
     while !left.is_empty() {
-        let looked = left.iter().map(|&at| circles[at].clone()).collect();
-        let recipe = Recipe::fit(&of_roundness(manifest, looked), arrays.clone());
+        let looked = left.iter().map(|&at| rims[at].clone()).collect();
+        let recipe = Recipe::fit(&of_rims(manifest, looked), arrays.clone());
         let Ok(recipe) = recipe else { break };
         let looking = headway.part(0.0, 0.5);
         headway = headway.part(0.5, 1.0);
         match Plan::golden_leniently(recipe, head, looking) {
             Ok(golden) => {
-                for (at, is_round) in left.into_iter().zip(are_round(&golden.findings)) {
-                    round[at] = is_round;
+                for (at, is_found) in left.into_iter().zip(are_found(&golden.findings)) {
+                    found[at] = is_found;
                 }
                 break;
             }
@@ -162,35 +233,44 @@ fn round(
             Err(_) => break,
         }
     }
-    round
+    found
 }
 
-/// A recipe of the roundness of these circles.
-fn of_roundness(manifest: &RecipeFile, circles: Vec<FeatureFile>) -> RecipeFile {
-    let roundness = |(slot, circle): (u16, &FeatureFile)| {
-        let name = &*circle.name;
-        GaugeFile::new(slot, name, Roundness {}, &[name])
+/// A recipe of the form of these circles and slots.
+fn of_rims(manifest: &RecipeFile, rims: Vec<FeatureFile>) -> RecipeFile {
+    let form = |(slot, rim): (u16, &FeatureFile)| {
+        let name = &*rim.name;
+        match rim.kind {
+            FeatureKind::Circle => GaugeFile::new(slot, name, Roundness {}, &[name]),
+            _ => GaugeFile::new(slot, name, Found {}, &[name]),
+        }
     };
     RecipeFile {
-        gauges: (1..).zip(&circles).map(roundness).collect(),
-        features: circles,
+        gauges: (1..).zip(&rims).map(form).collect(),
+        features: rims,
         datums: Vec::new(),
         judges_nothing: true,
         ..manifest.clone()
     }
 }
 
-/// Which features are seen and round, in the order of the gauges of their roundness.
-fn are_round(findings: &Findings) -> impl Iterator<Item = bool> {
-    let is_round = |(at, reading): (usize, &Option<Reading>)| {
-        let seen = |of: &&FoundFeature| {
-            of.feature == at && of.state == State::Found && of.found >= GOLDEN_FOUND
-        };
-        let rim = findings.features.iter().find(seen)?.rim;
-        let SeenRim { pixel_mm, .. } = rim?;
+/// Which features are seen and of their form, in the order of the gauges of it.
+fn are_found(findings: &Findings) -> impl Iterator<Item = bool> {
+    let is_found = |(at, reading): (usize, &Option<Reading>)| {
+        let seen = |of: &&FoundFeature| of.feature == at && of.state == State::Found;
+        let feature = findings.features.iter().find(seen)?;
+        let SeenRim {
+            pixel_mm, off_mm, ..
+        } = feature.rim?;
         let reading = reading.as_ref()?;
-        Some(reading.value - reading.expected.unwrap_or(0.0) <= ROUND_PX * pixel_mm)
+        Some(match feature.geometry? {
+            Geometry::Slot { .. } => feature.found >= GOLDEN_SLOT && off_mm <= SLOT_PX * pixel_mm,
+            _ => {
+                let off = reading.value - reading.expected.unwrap_or(0.0);
+                feature.found >= GOLDEN_FOUND && off <= ROUND_PX * pixel_mm
+            }
+        })
     };
     let readings = findings.readings.iter().enumerate();
-    readings.map(move |reading| is_round(reading).unwrap_or(false))
+    readings.map(move |reading| is_found(reading).unwrap_or(false))
 }

@@ -43,6 +43,8 @@ pub struct SeenRim {
     pub blur_px: f64,
     /// What a pixel sees of the plane, mm.
     pub pixel_mm: f64,
+    /// RMS of how far its points are off its shape, mm.
+    pub off_mm: f64,
 }
 
 /// A feature of a part with a geometry.
@@ -195,6 +197,7 @@ impl ContourFit {
                     of.rim = Some(SeenRim {
                         blur_px: found.contour.blur,
                         pixel_mm: found.contour.pixel,
+                        off_mm: rms(found.residuals.iter().map(|(off, _)| *off)),
                     });
                     if libm::fabs(off) > FACE_SIGMA * sigma && libm::fabs(above) > FACE_MM {
                         of.state = State::Unseen;
@@ -212,6 +215,12 @@ impl ContourFit {
         of.geometry = rim.map(|rim| rim.geometry(&rim.parameters, rim.frame.normal(), |at| at));
         self.of = Some(of);
     }
+}
+
+/// The root of the mean square; 0 of nothing.
+fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len().max(1) as f64;
+    libm::sqrt(values.map(|value| value * value).sum::<f64>() / count)
 }
 
 fn rim(expected: &Expected, frame: PlaneFrame, eye: Vector, found: Associated) -> Rim {
