@@ -113,16 +113,28 @@ impl Golden {
         pixel.map_or(0.0, |(one, next)| (next - one).length())
     }
 
-    /// The exact height of a phase.
+    /// The exact height of a phase. Where it is not near golden's, what the part lies on is tried first: most of such
+    /// pixels see that.
     pub fn solve(&self, (u, v): (usize, usize), phase: AbsolutePhase) -> Option<Solution> {
         let (column, row) = (u as f64, v as f64);
         let place = v * self.size().0 + u;
-        match self.cubics.near(place, phase) {
+        let near = self.cubics.near(place, phase);
+        match near.or_else(|| self.ground_seen(column, row)) {
             Some(near) => self
                 .triangulator
                 .solve_near(column, row, phase.turns(), near),
             None => self.triangulator.solve(column, row, phase.turns()),
         }
+    }
+
+    /// The height at which the line of sight through a place meets what the part lies on, mm.
+    fn ground_seen(&self, u: f64, v: f64) -> Option<f64> {
+        let [z, along_x, along_y] = self.ground?;
+        let camera = self.triangulator.camera();
+        let (eye, ray) = (camera.centre(), camera.ray(u, v)?);
+        let above = eye.z - z - along_x * eye.x - along_y * eye.y;
+        let way = above / (along_x * ray.x + along_y * ray.y - ray.z);
+        way.is_finite().then_some(eye.z + way * ray.z)
     }
 
     /// ∂z/∂Φ in mm per turn.
