@@ -18,7 +18,7 @@
 //! ([`Source`](crate::inspect::contour::Source)) is golden's, too, and no part of r.
 //!
 //! # Accuracy
-//! `a_flat_plate_is_placed_by_its_holes_as_well_as_it_says`: 5 µm and .004°.
+//! `a_flat_plate_is_placed_by_its_holes_in_all_surroundings`: 1.6 µm and 0.0016°.
 
 use crate::geometry::Vector;
 use crate::inspect::align::{Fitting, Matrix6, Placed};
@@ -107,7 +107,11 @@ impl Production {
             let motion = fitting.then(&placed.motion, &further);
             let mut again = fitting;
             again.from = Some(motion);
-            placed = again.fit(&strips.samples, &mut strips.fitting)?;
+            let fitted = again.fit(&strips.samples, &mut strips.fitting)?;
+            if fitted.free.len() != placed.free.len() {
+                return None;
+            }
+            placed = fitted;
             let is_near = further.iter().map(|way| way * way).sum::<f64>() < NEAR_MM * NEAR_MM;
             if is_near {
                 return Some(fitting.determined(&placed, &covariance));
