@@ -167,12 +167,11 @@ fn around(diamond: &FeatureFile, beyond: f64) -> Vec<[f64; 2]> {
     (0..CORNERS).map(corner).collect()
 }
 
-/// The region of [`CORNERS`] sides about all pixels of an opening that golden is not compared at, from the middle of
-/// its diamond on, and so many pixels beyond them.
+/// The box about all pixels of an opening that golden is not compared at, from the middle of its diamond on, and so many
+/// pixels beyond them. It has few corners: fingers move them.
 fn enclosing(diamond: &FeatureFile, valid: &[u8], width: usize, beyond: f64) -> Vec<[f64; 2]> {
-    let side = |at: usize| (TAU * at as f64 / CORNERS as f64).sin_cos();
-    let mut reach = [0.0; CORNERS];
     let [u, v] = middle(diamond);
+    let (mut low, mut high) = ([u, v], [u, v]);
     let mut is_seen = vec![false; valid.len()];
     let mut next = vec![(u.round() as usize, v.round() as usize)];
     while let Some((column, row)) = next.pop() {
@@ -181,25 +180,16 @@ fn enclosing(diamond: &FeatureFile, valid: &[u8], width: usize, beyond: f64) -> 
         if !is_open || std::mem::replace(&mut is_seen[place], true) {
             continue;
         }
-        for (at, reach) in reach.iter_mut().enumerate() {
-            let (sin, cos) = side(at);
-            *reach = f64::max(*reach, (column as f64 - u) * cos + (row as f64 - v) * sin);
+        for (i, at) in [column as f64, row as f64].into_iter().enumerate() {
+            (low[i], high[i]) = (low[i].min(at), high[i].max(at));
         }
         next.extend([(column + 1, row), (column, row + 1)]);
         next.extend(column.checked_sub(1).map(|column| (column, row)));
         next.extend(row.checked_sub(1).map(|row| (column, row)));
     }
-    // Where two sides that follow each other meet.
-    let corner = |at: usize| {
-        let ((sin, cos), (sin_1, cos_1)) = (side(at), side(at + 1));
-        let (one, other) = (reach[at] + beyond, reach[(at + 1) % CORNERS] + beyond);
-        let turn = cos * sin_1 - sin * cos_1;
-        [
-            short(u + (one * sin_1 - other * sin) / turn),
-            short(v + (other * cos - one * cos_1) / turn),
-        ]
-    };
-    (0..CORNERS).map(corner).collect()
+    let [left, top] = low.map(|low| short(low - beyond));
+    let [right, bottom] = high.map(|high| short(high + beyond));
+    vec![[left, top], [right, top], [right, bottom], [left, bottom]]
 }
 
 /// Which of these circles or slots golden has: all are looked for by one plan, without those
