@@ -168,7 +168,7 @@ fn around(diamond: &FeatureFile, beyond: f64) -> Vec<[f64; 2]> {
 }
 
 /// The box about all pixels of an opening that golden is not compared at, from the middle of its diamond on, and so many
-/// pixels beyond them. It has few corners: fingers move them.
+/// pixels beyond them inside the frame. It has few corners: fingers move them.
 fn enclosing(diamond: &FeatureFile, valid: &[u8], width: usize, beyond: f64) -> Vec<[f64; 2]> {
     let [u, v] = middle(diamond);
     let (mut low, mut high) = ([u, v], [u, v]);
@@ -187,8 +187,9 @@ fn enclosing(diamond: &FeatureFile, valid: &[u8], width: usize, beyond: f64) -> 
         next.extend(column.checked_sub(1).map(|column| (column, row)));
         next.extend(row.checked_sub(1).map(|row| (column, row)));
     }
-    let [left, top] = low.map(|low| short(low - beyond));
-    let [right, bottom] = high.map(|high| short(high + beyond));
+    let last = [width, valid.len() / width.max(1)].map(|pixels| pixels.saturating_sub(1) as f64);
+    let [left, top] = low.map(|low| short((low - beyond).max(0.0)));
+    let [right, bottom] = [0, 1].map(|i| short((high[i] + beyond).min(last[i])));
     vec![[left, top], [right, top], [right, bottom], [left, bottom]]
 }
 

@@ -29,18 +29,13 @@ pub fn anchors(contours: &Contours, planes: &[Fit], gauges: &[Gauge]) -> Anchors
         serves.then(|| (at, frame.point(x, y)))
     };
     let places: Vec<(usize, Vector)> = contours.all.iter().enumerate().filter_map(place).collect();
-    let sum = places.iter().fold(Vector::default(), |sum, of| sum + of.1);
-    let mean = sum * (1.0 / places.len().max(1) as f64);
     let mut taken = heapless::Vec::<Vector, MOST>::new();
     let mut chosen = Anchors::new();
     for _ in 0..MOST.min(places.len()) {
-        let to_nearest = |at: Vector| {
+        // From the nearest that is taken; the first to be taken is any.
+        let apart = |at: Vector| {
             let ways = taken.iter().map(|taken| (at - *taken).length());
             ways.fold(f64::INFINITY, f64::min)
-        };
-        let apart = |at: Vector| match taken.is_empty() {
-            true => (at - mean).length(),
-            false => to_nearest(at),
         };
         let free = places.iter().filter(|(at, _)| !chosen.contains(at));
         if let Some(&(at, place)) = free.max_by(|a, b| apart(a.1).total_cmp(&apart(b.1))) {

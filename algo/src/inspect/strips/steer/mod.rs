@@ -1,11 +1,12 @@
 //! Parts whose shape leaves their motion open, such as plates: the picture without fringes steers
-//! them along the directions that heights do not determine.
+//! them along the directions that heights do not determine, and from there contours place them
+//! (`contours`).
 //!
 //! # Idea
 //! Heights come first and keep what they determine: the picture moves a part along the other
 //! directions only ([`Picture::steer`](crate::inspect::Picture::steer)), and from there the heights
-//! are fitted again, which hardly changes anything on a plate. Regions follow; nothing is measured:
-//! what depends on these directions has no value ([`Placed::component`]).
+//! are fitted again, which hardly changes anything on a plate. Regions follow; the picture measures nothing:
+//! what depends on these directions has no value unless contours determine them ([`Placed::component`]).
 
 use super::decode::Input;
 use super::plan::Production;
