@@ -18,7 +18,7 @@
 //! ([`Source`](crate::inspect::contour::Source)) is golden's, too, and no part of r.
 //!
 //! # Accuracy
-//! `a_flat_plate_is_placed_by_its_holes_in_all_surroundings`: 1.6 µm and 0.0016°.
+//! `a_flat_plate_is_placed_by_its_holes_in_all_surroundings`: 1.6 µm and 0.0016° over black and grey, 2.1 µm over white.
 
 use crate::geometry::Vector;
 use crate::inspect::align::{Fitting, Matrix6, Placed};
