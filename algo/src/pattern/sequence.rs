@@ -297,6 +297,17 @@ pub enum Unwrapping {
 }
 
 impl Unwrapping {
+    /// Phases that differ by so many turns look the same; infinite where none do.
+    #[must_use]
+    pub fn period(self) -> f64 {
+        match self {
+            Self::Geometric => f64::INFINITY,
+            Self::DenseThree { n } => n * n,
+            Self::DenseTwo { n } => n,
+            Self::Single => 1.0,
+        }
+    }
+
     /// Recognises the form of a sequence for a phase function with this range.
     ///
     /// # Errors

@@ -1,5 +1,6 @@
 //! The golden part as the camera sees it: what all stages count heights from and compare with.
 
+use super::ground::Ground;
 use crate::geometry::{Solution, Triangulator, Vector};
 use crate::inspect::align::{Alignment, GoldenSurface, Placed};
 use crate::inspect::taught::Taught;
@@ -24,9 +25,8 @@ pub struct Golden {
     pub compared: u64,
     /// The middle of its heights and half their span, mm.
     pub levels: (f64, f64),
-    /// The plane that it lies on, as z at x = y = 0, mm, and its rise along x and y; `None` where nothing else is
-    /// seen.
-    pub ground: Option<[f64; 3]>,
+    /// What it lies on; `None` where nothing else is seen.
+    pub ground: Option<Ground>,
 }
 
 impl Golden {
@@ -36,7 +36,7 @@ impl Golden {
         map: Option<Vec<AbsolutePhase>>,
         mut taught: Taught,
         window: Vec<Range<usize>>,
-        ground: Option<[f64; 3]>,
+        ground: Option<([f64; 3], f64)>,
     ) -> Self {
         let width = cubics.surface().width;
         taught.mark_squares(width.max(1));
@@ -47,29 +47,24 @@ impl Golden {
         Self {
             compared: compared.sum(),
             levels: levels(&cubics.surface().height, width, &window),
+            ground: ground.map(|(plane, period)| {
+                Ground::new(&triangulator, plane, (width, window.len()), period)
+            }),
             triangulator,
             cubics,
             map,
             taught,
             window,
-            ground,
         }
     }
 
     /// Whether a place is surely of the part: where it is compared. Beside what it lies on it ends as far before
     /// its rim as it is compared otherwise, and more of it may not be compared.
     pub fn is_part(&self, place: usize) -> bool {
-        match self.ground {
+        match &self.ground {
             Some(_) => self.taught.is_seen(place),
             None => self.taught.compared(place),
         }
-    }
-
-    /// What it lies on, above or below a point.
-    pub fn ground_at(&self, point: Vector) -> Option<Vector> {
-        let [z, along_x, along_y] = self.ground?;
-        let z = z + along_x * point.x + along_y * point.y;
-        Some(Vector { z, ..point })
     }
 
     /// Columns and rows of the frame.
@@ -119,22 +114,20 @@ impl Golden {
         let (column, row) = (u as f64, v as f64);
         let place = v * self.size().0 + u;
         let near = self.cubics.near(place, phase);
-        match near.or_else(|| self.ground_seen(column, row)) {
+        let on_ground = || {
+            Some(
+                self.ground
+                    .as_ref()?
+                    .seen(&self.triangulator, column, row)?
+                    .z,
+            )
+        };
+        match near.or_else(on_ground) {
             Some(near) => self
                 .triangulator
                 .solve_near(column, row, phase.turns(), near),
             None => self.triangulator.solve(column, row, phase.turns()),
         }
-    }
-
-    /// The height at which the line of sight through a place meets what the part lies on, mm.
-    fn ground_seen(&self, u: f64, v: f64) -> Option<f64> {
-        let [z, along_x, along_y] = self.ground?;
-        let camera = self.triangulator.camera();
-        let (eye, ray) = (camera.centre(), camera.ray(u, v)?);
-        let above = eye.z - z - along_x * eye.x - along_y * eye.y;
-        let way = above / (along_x * ray.x + along_y * ray.y - ray.z);
-        way.is_finite().then_some(eye.z + way * ray.z)
     }
 
     /// ∂z/∂Φ in mm per turn.

@@ -1,11 +1,12 @@
 //! Stage 2, height: absolute phase → height offset, how far each pixel lies above the golden
 //! surface on its own ray.
 //!
-//! A cubic per pixel gives the offset ([`HeightCubics`](crate::pipeline::HeightCubics)); what it
-//! does not reach is triangulated exactly.
+//! A cubic per pixel gives the offset ([`HeightCubics`](crate::pipeline::HeightCubics)). What it does not reach is what
+//! the part lies on ([`Ground`](super::ground::Ground)), or is triangulated exactly.
 
 use super::decode::PhasePlan;
 use super::golden::{Golden, base_nm};
+use super::near::NodeRow;
 use super::recent::RecentRows;
 use super::squares::narrow::MAX_NARROW_NM;
 use crate::frame::SampleNoise;
@@ -28,6 +29,7 @@ pub struct HeightRow {
     pub tally: HeightTally,
     /// How many heights were triangulated exactly.
     pub exact: u64,
+    ground: NodeRow<4>,
 }
 
 /// Variances are summed in every so many rows: their mean needs no more.
@@ -42,6 +44,7 @@ impl HeightRow {
             offset: vec![NO_OFFSET; width],
             tally: HeightTally::default(),
             exact: 0,
+            ground: NodeRow::new(),
         }
     }
 
@@ -118,20 +121,33 @@ impl HeightRow {
             offset,
             tally,
             exact,
+            ground: nodes,
         } = self;
         let width = offset.len();
+        if let Some(ground) = &golden.ground {
+            ground.take_row(v, nodes);
+        }
         for u in columns {
             if decoded.trust[u] != Trust::Resolved || offset[u] != NO_OFFSET {
                 continue;
             }
-            *exact += 1;
-            let place = v * width + u;
-            let Some(solution) = golden.solve((u, v), decoded.phase[u]) else {
+            let (place, seen) = (v * width + u, decoded.phase[u]);
+            let compared = golden.taught.compared(place);
+            let ground = golden.ground.as_ref().filter(|_| !compared);
+            let on_ground = ground.and_then(|ground| ground.height(nodes, u, seen));
+            let exactly = || {
+                let solution = golden.solve((u, v), seen)?;
+                Some((solution.point.z, solution.slope))
+            };
+            *exact += u64::from(on_ground.is_none());
+            // Slopes are asked for where a pixel is compared.
+            let found = on_ground.map(|z| (z, f64::INFINITY)).or_else(exactly);
+            let Some((z, slope)) = found else {
                 decoded.trust[u] = Trust::OutOfRange;
                 tally.resolved -= 1;
                 continue;
             };
-            let height = Height::from_mm(solution.point.z).nm();
+            let height = Height::from_mm(z).nm();
             // One above the value for "no offset".
             let base = base_nm(golden.cubics.surface().height[place]);
             let nm = height.saturating_sub(base).max(NO_OFFSET + 1);
@@ -140,7 +156,6 @@ impl HeightRow {
             }
             offset[u] = nm;
             tally.measured += 1;
-            let compared = golden.taught.compared(place);
             if compared {
                 recent.row_mut(v).0[u] = nm;
                 tally.compared += 1;
@@ -154,7 +169,7 @@ impl HeightRow {
                 tally.summed += 1;
                 let noise = SampleNoise::constant(phase.noise_counts);
                 let turns = phase.decoder.phase_noise(decoded.modulation[u], noise);
-                let units = turns / solution.slope * 1e6 / VARIANCE_UNIT_NM;
+                let units = turns / slope * 1e6 / VARIANCE_UNIT_NM;
                 tally.variance += libm::rint((units * units).min(MAX_VARIANCE)) as u64;
             }
         }

@@ -51,6 +51,7 @@ mod fits;
 mod gauges;
 mod geometric;
 mod golden;
+mod ground;
 mod height;
 mod inspection;
 mod maps;

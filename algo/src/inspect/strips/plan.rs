@@ -128,6 +128,7 @@ impl Production {
             Modulation::from_bits(1),
             SampleNoise::constant(noise_counts),
         ) / cubics.range();
+        let ground = ground.map(|plane| (plane, decoder.unwrapping().period()));
         let golden = Golden::new(triangulator, cubics, map, taught, window, ground);
         let alignment = match aligned {
             true => Alignment::new(golden.surface(), &golden.window),

@@ -109,7 +109,7 @@ pub fn start(
 
 /// How far below a plane that lies so the part's ground is, mm.
 pub fn ground_below(golden: &Golden, frame: &PlaneFrame) -> Option<f64> {
-    let ground = golden.ground_at(frame.origin)?;
+    let ground = golden.ground.as_ref()?.at(frame.origin);
     Some(frame.normal().dot(frame.origin - ground))
 }
 
