@@ -23,6 +23,8 @@ const SLOT_PX: f64 = 0.15;
 const GOLDEN_FOUND: f64 = 0.8;
 /// The same of a slot, whose length shows more of what other openings light.
 const GOLDEN_SLOT: f64 = 0.6;
+/// A slot is so many times as long as it is wide: a round opening whose rim is disturbed is none.
+const LONG: f64 = 1.5;
 /// A region reaches so far beyond the opening: in pixels, and in mm at least, which fine pixels need.
 const AROUND_PX: f64 = 12.0;
 const AROUND_MM: f64 = 3.0;
@@ -49,11 +51,11 @@ impl UnsealedRecipe {
             choice,
         } = self;
         let head = manifest.head()?;
+        let taught = manifest.clone();
         let mut openings = openings(&manifest);
         let reach = AROUND_PX.max(AROUND_MM / pixel_mm(&head));
-        let mut reasons = choice.reasons.clone();
-        let mut names = Vec::new();
-        let looking = [headway.part(0.0, 0.6), headway.part(0.6, 1.0)];
+        let mut rims = Vec::new();
+        let looking = [headway.part(0.0, 0.5), headway.part(0.5, 0.8)];
         for ((kind, word), headway) in SHAPES.into_iter().zip(looking) {
             if manifest.two_frames || openings.is_empty() {
                 break;
@@ -68,36 +70,48 @@ impl UnsealedRecipe {
                 };
                 FeatureFile::new(&*diamond.name, kind, corners)
             };
-            let rims: Vec<FeatureFile> = openings.iter().map(around).collect();
-            let found = found(&manifest, &arrays, &head, &rims, headway);
-            let (mut others, mut here) = (Vec::new(), Vec::new());
-            for ((opening, rim), is_found) in openings.into_iter().zip(rims).zip(found) {
+            let regions: Vec<FeatureFile> = openings.iter().map(around).collect();
+            let found = found(&manifest, &arrays, &head, &regions, headway);
+            let mut others = Vec::new();
+            for ((opening, region), is_found) in openings.into_iter().zip(regions).zip(found) {
                 if !is_found {
                     others.push(opening);
                     continue;
                 }
                 let gauge = &mut manifest.gauges[opening.gauge];
-                here.push(gauge.name.clone());
                 *gauge = GaugeFile {
                     low: Some(LEAST_FOUND),
-                    ..GaugeFile::new(gauge.slot, &gauge.name, Found {}, &[&rim.name])
+                    ..GaugeFile::new(gauge.slot, &gauge.name, Found {}, &[&region.name])
                 };
-                manifest.features[opening.feature] = rim;
+                manifest.features[opening.feature] = region;
+                rims.push((opening, word));
             }
-            if !here.is_empty() {
-                reasons.push(format!("{}: {word}, found by the rim", here.join(", ")));
-            }
-            names.append(&mut here);
             openings = others;
         }
-        if names.is_empty() {
+        let sealed = headway.part(0.8, 1.0);
+        keep_fitting((&mut manifest, &taught), &mut rims, &arrays, &head, sealed)?;
+        if rims.is_empty() {
             return Ok(Self {
-                manifest,
+                manifest: taught,
                 arrays,
                 choice,
             });
         }
-        manifest.tried.retain(|tried| !names.contains(&tried.gauge));
+        let mut reasons = choice.reasons;
+        for (_, word) in SHAPES {
+            let of_kind = rims.iter().filter(|(_, of)| *of == word);
+            let names: Vec<&str> = of_kind
+                .map(|(of, _)| &*manifest.gauges[of.gauge].name)
+                .collect();
+            if !names.is_empty() {
+                reasons.push(format!("{}: {word}, found by the rim", names.join(", ")));
+            }
+        }
+        let is_rim = |name: &str| {
+            let mut names = rims.iter().map(|(of, _)| &manifest.gauges[of.gauge].name);
+            names.any(|own| own == name)
+        };
+        manifest.tried.retain(|tried| !is_rim(&tried.gauge));
         reasons.push(Self::CONTOURS.into());
         // Golden was seen to have them, so nothing is left to settle but the sequence.
         let choice = planner::choose(&manifest.sequences, &manifest.gauges, arrays.widest());
@@ -115,6 +129,35 @@ impl UnsealedRecipe {
 struct Opening {
     gauge: usize,
     feature: usize,
+}
+
+/// Takes back the rims with which production cannot be planned: of which another sequence shows too little.
+fn keep_fitting(
+    (manifest, taught): (&mut RecipeFile, &RecipeFile),
+    rims: &mut Vec<(Opening, &str)>,
+    arrays: &Arrays,
+    head: &Calibration,
+    mut headway: Headway<'_>,
+) -> Result<(), String> {
+    while !rims.is_empty() {
+        let recipe = Recipe::fit(manifest, arrays.clone())?;
+        let planning = headway.part(0.0, 0.5);
+        headway = headway.part(0.5, 1.0);
+        let unfit = match Plan::check(recipe, head, planning) {
+            Ok(()) => break,
+            Err(PlanError::Unfit {
+                feature: Some(unfit),
+                ..
+            }) => unfit,
+            Err(error) => return Err(error.to_string()),
+        };
+        let at = rims.iter().position(|(of, _)| of.feature == unfit);
+        let at = at.ok_or_else(|| format!("feature {unfit} cannot be planned: teach again"))?;
+        let (Opening { gauge, feature }, _) = rims.remove(at);
+        manifest.gauges[gauge] = taught.gauges[gauge].clone();
+        manifest.features[feature] = taught.features[feature].clone();
+    }
+    Ok(())
 }
 
 fn openings(manifest: &RecipeFile) -> Vec<Opening> {
@@ -255,7 +298,10 @@ fn are_found(findings: &Findings) -> impl Iterator<Item = bool> {
         } = feature.rim?;
         let reading = reading.as_ref()?;
         Some(match feature.geometry? {
-            Geometry::Slot { .. } => feature.found >= GOLDEN_SLOT && off_mm <= SLOT_PX * pixel_mm,
+            Geometry::Slot { length, width, .. } => {
+                let is_long = length >= LONG * width;
+                is_long && feature.found >= GOLDEN_SLOT && off_mm <= SLOT_PX * pixel_mm
+            }
             _ => {
                 let off = reading.value - reading.expected.unwrap_or(0.0);
                 feature.found >= GOLDEN_FOUND && off <= ROUND_PX * pixel_mm

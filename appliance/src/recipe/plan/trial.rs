@@ -54,6 +54,20 @@ impl Plan {
     ) -> Result<Golden, PlanError> {
         alone(recipe, |recipe| golden(recipe, head, true, headway))
     }
+
+    /// Whether production can be planned with a recipe, by every one of its sequences. `head` has the models that it was
+    /// taught with. On threads as [`Plan::try_out`].
+    ///
+    /// # Errors
+    /// As [`Plan::again`].
+    pub fn check(
+        recipe: Recipe,
+        head: &Calibration,
+        headway: Headway<'_>,
+    ) -> Result<(), PlanError> {
+        let join = |recipe| Plan::join(recipe, head, (false, None), headway);
+        alone(recipe, join).map(drop)
+    }
 }
 
 /// How golden is planned, by one of the sequences alone.
