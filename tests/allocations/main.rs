@@ -41,6 +41,7 @@ fn naming() -> Naming {
         placement_tolerance_mm: 1.0,
         exposures: 1,
         everything: false,
+        marking: Default::default(),
         limit_mm: Some(0.15),
     }
 }

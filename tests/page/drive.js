@@ -6,6 +6,7 @@ import { chromium } from "playwright-core";
 import { Daemon, Place } from "./daemon.js";
 import { editor } from "./editor.js";
 import { forms } from "./forms.js";
+import { part } from "./part.js";
 import { pictures } from "./pictures.js";
 import { recipes } from "./recipes.js";
 import { view } from "./view.js";
@@ -424,6 +425,7 @@ try {
 
   assert.deepEqual(complaints, [], "the browser complains");
   await editor({ browser, program, step, folder });
+  await part({ browser, program, step, folder });
   await wizard({ browser, program, step, folder });
   if (folder) await step("pictures", () => pictures(browser, program, folder));
   console.log("the page does what it promises");

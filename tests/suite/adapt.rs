@@ -255,6 +255,7 @@ fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe
         placement_tolerance_mm: 1.0,
         exposures: 1,
         everything: false,
+        marking: Default::default(),
         limit_mm: Some(0.15),
     };
     let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent()).expect("a sphere");

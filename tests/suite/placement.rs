@@ -98,6 +98,15 @@ pub(crate) fn taught_asking(bed: &mut Bed, naming: &Naming) -> Result<TaughtReci
     })
 }
 
+/// Teaches the part as one click on the page does.
+pub(crate) fn one_click(bed: &mut Bed) -> Result<TaughtRecipe, String> {
+    let (head, calibration) = (&mut bed.head, &bed.calibration);
+    let naming = naming(TOLERANCE_MM);
+    let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent());
+    let taught = taught.map_err(|error| error.to_string())?;
+    taught.with_rims(Headway::silent())?.seal()
+}
+
 /// The names of a part, with this placement tolerance and else what the program takes.
 pub(crate) fn naming(placement_tolerance_mm: f64) -> Naming {
     Naming {
@@ -108,6 +117,7 @@ pub(crate) fn naming(placement_tolerance_mm: f64) -> Naming {
         placement_tolerance_mm,
         exposures: 1,
         everything: false,
+        marking: Default::default(),
         limit_mm: Some(0.15),
     }
 }

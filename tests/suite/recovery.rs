@@ -171,6 +171,7 @@ fn a_teach_that_is_ended_does_no_further_step() {
         placement_tolerance_mm: 1.0,
         exposures: 1,
         everything: false,
+        marking: Default::default(),
         limit_mm: Some(0.15),
     };
     let told = Mutex::new(Vec::new());

@@ -39,6 +39,6 @@ pub use strips::{
     Lost, MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Place,
     Production, Profile, SeenRim, Signal, Skipped, Strips, Unmeasurable,
 };
-pub use surroundings::{Surroundings, surroundings};
+pub use surroundings::{Marking, NothingTouched, Surroundings, surroundings};
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

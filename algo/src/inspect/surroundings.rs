@@ -17,8 +17,12 @@
 //! What is left in front of the plane is divided by steps. Pieces that are much smaller than the largest, or that
 //! reach the picture's border while a large one does not, are other things, such as pins, clamps or the next
 //! part.
+//!
+//! A person may say otherwise ([`Marking`]): which pieces are the part and which are not, and an outline inside which
+//! all pieces are.
 
 use super::mask::{components, eroded};
+use super::region::polygon_spans;
 use crate::geometry::Vector;
 use crate::math::around;
 use crate::math::solve::Normal;
@@ -39,10 +43,11 @@ const KEPT: f64 = 0.5;
 const SIGMAS: f64 = 5.0;
 const ROUGH_MM: f64 = 0.15;
 /// Heights of neighbours that differ by more than this are not of one surface, mm; nor are those at so many pixels to
-/// either side that together lie so far off the pixel between them, mm.
+/// either side that together lie so far off the pixel between them, mm, or so many σ of that.
 const JUMP_MM: f64 = 1.5;
 const BENT_PX: isize = 4;
 const BEND_MM: f64 = 0.3;
+const BEND_SIGMAS: f64 = 4.0;
 /// A flat surface at the border has at least this share of the picture, and of its own pixels at least
 /// [`FLAT`] belong to its plane. At most [`BEHIND`] of the picture lies behind what the part lies on.
 const LEAST_FLAT: f64 = 0.005;
@@ -68,18 +73,51 @@ const CRUMB: usize = 20;
 /// Pieces smaller than this share of the largest one are other things.
 const PIECE: f64 = 0.1;
 
+/// A touch means the piece that is nearest to it within so many pixels.
+const TOUCH: isize = 8;
+
+/// What a person says of which pixels are the part, by places (column, row) of the frame. A touch counts more than the
+/// outline.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct Marking {
+    /// Corners of a polygon with the whole part inside; none where nothing was marked.
+    pub outline: Vec<[u16; 2]>,
+    /// Places on pieces of the part.
+    pub part: Vec<[u16; 2]>,
+    /// Places on pieces that are not of the part.
+    pub others: Vec<[u16; 2]>,
+}
+
+impl Marking {
+    /// Whether nothing was said.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.outline.is_empty() && self.part.is_empty() && self.others.is_empty()
+    }
+}
+
+/// No piece stands out where a person has touched the part.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "nothing stands out about column {}, row {} from what it lies on: touch the part elsewhere, or draw an outline around it",
+    .0[0], .0[1]
+)]
+pub struct NothingTouched(pub [u16; 2]);
+
 /// What surrounds a part.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surroundings {
     /// The pixels of the part, row by row.
     pub part: Vec<bool>,
-    /// The part stands out from its surroundings by this much, mm: its lowest steps, or half of it where it
-    /// rises out of them.
-    pub step_mm: f64,
+    /// The part stands out from what it lies on by this much, mm: its lowest steps, or half of it where it
+    /// rises out of that. `None` where no plane is seen behind it.
+    pub step_mm: Option<f64>,
     /// The pixels of other things in front of what the part lies on.
     pub others: Vec<bool>,
     /// The plane that it lies on: z at x = y = 0, mm, and what z rises by along x and y, mm per mm.
-    pub ground: [f64; 3],
+    pub ground: Option<[f64; 3]>,
 }
 
 impl Surroundings {
@@ -101,36 +139,47 @@ impl Surroundings {
 
 /// Finds what surrounds a part in a picture of `pixels` pixels with `width` columns. `point` gives the
 /// point in mm that a pixel sees, `None` where it has no height; `sigma_mm` is the σ of a height. `None` if
-/// no plane is seen beside something that lies in front of it.
+/// no plane is seen beside something that lies in front of it, and nothing was marked.
+///
+/// # Errors
+/// If nothing stands out where a person has touched the part.
 pub fn surroundings(
     pixels: usize,
     width: usize,
     sigma_mm: f64,
+    marking: &Marking,
     point: impl Fn(usize) -> Option<Vector>,
-) -> Option<Surroundings> {
+) -> Result<Option<Surroundings>, NothingTouched> {
     let size = [width, pixels / width.max(1)];
     let reach = SIGMAS * sigma_mm + ROUGH_MM;
     let all_round = all_round(&point, size, reach);
-    let plane = all_round.or_else(|| flat(&point, size, reach))?;
-    let above = |at: usize| point(at).map_or(f64::NAN, |point| plane.above(point)) as f32;
+    let plane = all_round.or_else(|| flat(&point, size, sigma_mm, reach));
+    let is_marked = !marking.is_empty();
+    if plane.is_none() && !is_marked {
+        return Ok(None);
+    }
+    // Without a plane nothing is behind.
+    let above = |point: Vector| plane.map_or(point.z, |plane| plane.above(point));
+    let above = |at: usize| point(at).map_or(f64::NAN, above) as f32;
     let front = Front {
         above: (0..pixels).map(above).collect(),
         size,
-        reach,
+        reach: plane.map_or(f64::NEG_INFINITY, |_| reach),
     };
-    let [part, others] = front.part();
+    let [part, others] = front.part(marking)?;
     let heights = part.iter().zip(&front.above).filter(|(part, _)| **part);
     let mut heights: Vec<f64> = heights.map(|(_, above)| f64::from(*above)).collect();
-    if (heights.len() as f64) < LEAST_PART * pixels as f64 {
-        return None;
+    if (heights.len() as f64) < LEAST_PART * pixels as f64 && !is_marked || heights.is_empty() {
+        return Ok(None);
     }
     let middle = quantile(&mut heights, 0.5);
-    (all_round.is_some() || middle >= FAR_MM).then(|| Surroundings {
+    let stands_out = is_marked || all_round.is_some() || middle >= FAR_MM;
+    Ok(stands_out.then(|| Surroundings {
         part,
-        step_mm: front.step().unwrap_or(middle),
+        step_mm: plane.map(|_| front.step().unwrap_or(middle)),
         others,
-        ground: plane.0,
-    })
+        ground: plane.map(|plane| plane.0),
+    }))
 }
 
 /// The value that a share of others are less than.
@@ -155,7 +204,7 @@ impl Front {
     }
 
     /// The pixels of the part, and those of other things.
-    fn part(&self) -> [Vec<bool>; 2] {
+    fn part(&self, marking: &Marking) -> Result<[Vec<bool>; 2], NothingTouched> {
         let (width, pixels) = (self.size[0], self.above.len());
         let apart: Vec<bool> = (0..pixels).map(|at| self.is_apart(at)).collect();
         let apart = eroded(&apart, width, MARGIN);
@@ -176,11 +225,31 @@ impl Front {
         let (whole, largest) = (sizes(true), sizes(false));
         let is_inside = whole >= PIECE * largest;
         let least = PIECE * if is_inside { whole } else { largest };
+        let touched = |places: &[[u16; 2]]| -> Vec<Option<usize>> {
+            let piece = |at: &[u16; 2]| self.touched(*at, &pieces);
+            places.iter().map(piece).collect()
+        };
+        let [own, not] = [touched(&marking.part), touched(&marking.others)];
+        if let Some(missed) = own.iter().position(Option::is_none) {
+            return Err(NothingTouched(marking.part[missed]));
+        }
+        let corners = marking.outline.iter();
+        let corners: Vec<(f64, f64)> = corners.map(|[u, v]| ((*u).into(), (*v).into())).collect();
+        let mut inside = vec![corners.is_empty(); pixels];
+        for (row, columns) in polygon_spans(&corners, width, self.size[1]) {
+            inside[row * width + columns.start..row * width + columns.end].fill(true);
+        }
         let [mut part, mut others] = [vec![false; pixels], vec![false; pixels]];
-        for piece in &pieces {
-            let is_other = (piece.len() as f64) < least || (is_inside && is_cut(piece));
-            let kind = if is_other { &mut others } else { &mut part };
-            piece.iter().for_each(|&at| kind[at] = true);
+        for (number, piece) in pieces.iter().enumerate() {
+            let is_own = own.contains(&Some(number));
+            let is_small = corners.is_empty() && (piece.len() as f64) < least;
+            let is_beside = corners.is_empty() && is_inside && is_cut(piece);
+            let is_other = !is_own && (not.contains(&Some(number)) || is_small || is_beside);
+            for &at in piece {
+                let is_part = is_own || !is_other && inside[at];
+                let kind = if is_part { &mut part } else { &mut others };
+                kind[at] = true;
+            }
         }
         // A step of the part's own.
         let own = |at: usize| {
@@ -189,7 +258,22 @@ impl Front {
         };
         let own: Vec<usize> = (0..pixels).filter(|at| own(*at)).collect();
         own.into_iter().for_each(|at| part[at] = true);
-        [part, others]
+        Ok([part, others])
+    }
+
+    /// The piece that is meant by a touch.
+    fn touched(&self, at: [u16; 2], pieces: &[Vec<usize>]) -> Option<usize> {
+        let [u, v] = at.map(|at| at as isize);
+        let off = |place: usize| {
+            let (column, row) = (place % self.size[0], place / self.size[0]);
+            (column as isize - u).abs().max((row as isize - v).abs())
+        };
+        let nearest = |(number, piece): (usize, &Vec<usize>)| {
+            let off = piece.iter().map(|at| off(*at)).min()?;
+            (off <= TOUCH).then_some((off, number))
+        };
+        let nearest = pieces.iter().enumerate().filter_map(nearest).min();
+        nearest.map(|(_, number)| number)
     }
 
     /// How far the lowest steps stand out from the plane; `None` if what lies in front of it rises out of it.
@@ -289,9 +373,13 @@ fn all_round(
 fn flat(
     point: &impl Fn(usize) -> Option<Vector>,
     [width, rows]: [usize; 2],
+    sigma_mm: f64,
     reach: f64,
 ) -> Option<Plane> {
     let pixels = width * rows;
+    // Of two heights less twice a third.
+    let noise = sigma_mm * libm::sqrt(6.0);
+    let most = BEND_MM.max(BEND_SIGMAS * noise);
     let height = |at| point(at).map_or(f64::NAN, |point: Vector| point.z);
     let heights: Vec<f64> = (0..pixels).map(height).collect();
     let along = |at: usize, [right, down]: [isize; 2]| {
@@ -309,7 +397,7 @@ fn flat(
             let far = [BENT_PX * right, BENT_PX * down];
             let bend = along(at, far) + along(at, far.map(|way| -way));
             // Not a number where a height is missing.
-            !(along(at, [right, down]).abs() > JUMP_MM || bend.abs() > BEND_MM)
+            !(along(at, [right, down]).abs() > JUMP_MM || bend.abs() > most)
         })
     };
     let continues = |at: usize| heights[at].is_finite() && continues(at);
@@ -361,6 +449,8 @@ fn is_border(at: usize, [width, rows]: [usize; 2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use rand_xoshiro::SplitMix64;
+    use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
     const WIDTH: usize = 120;
     const ROWS: usize = 100;
@@ -368,7 +458,14 @@ mod tests {
 
     /// What is found in a picture of these heights, mm, which are not finite where nothing is seen.
     fn found(height: impl Fn(f64, f64) -> f64) -> Option<Surroundings> {
-        surroundings(WIDTH * ROWS, WIDTH, 0.02, |at| {
+        marked(&Marking::default(), height).unwrap()
+    }
+
+    fn marked(
+        marking: &Marking,
+        height: impl Fn(f64, f64) -> f64,
+    ) -> Result<Option<Surroundings>, NothingTouched> {
+        surroundings(WIDTH * ROWS, WIDTH, 0.02, marking, |at| {
             let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
             let z = height(u, v);
             z.is_finite()
@@ -393,7 +490,7 @@ mod tests {
     fn a_plate_is_told_from_the_floor_that_it_touches_or_lies_above() {
         for depth in [1.0, 5.0, 40.0] {
             let found = found(|u, v| plate(depth, u, v)).unwrap();
-            assert!(found.step_mm > 0.9 * depth, "{depth}: {}", found.step_mm);
+            assert!(found.step_mm.unwrap() > 0.9 * depth, "{depth}: {found:?}");
             for (at, part) in found.part.iter().enumerate() {
                 let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
                 let rim = (30.0 - (u - 60.0).abs()).min(25.0 - (v - 50.0).abs());
@@ -465,7 +562,7 @@ mod tests {
     fn a_hill_that_rises_out_of_the_floor_is_the_part() {
         let hill = |u: f64, v: f64| (40.0 - (u - 60.0).hypot(v - 50.0)).max(0.0) * PITCH_MM;
         let found = found(hill).unwrap();
-        assert!((3.0..8.0).contains(&found.step_mm), "{}", found.step_mm);
+        assert!((3.0..8.0).contains(&found.step_mm.unwrap()), "{found:?}");
         for (at, part) in found.part.iter().enumerate() {
             let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
             // The plane's own pixels reach 0.25 mm into the hill, and the margin is square.
@@ -511,5 +608,76 @@ mod tests {
         let of_row = |u: usize| ring.part[50 * WIDTH + u];
         assert!(of_row(20) && !of_row(45) && !of_row(60) && of_row(100));
         assert!(!ring.part[WIDTH + 1]);
+    }
+
+    /// A plate, a pin beside it, and the next part at the border.
+    fn among(u: f64, v: f64) -> f64 {
+        let pin = (u - 18.0).hypot(v - 30.0) < 8.0;
+        if pin || (u > 100.0 && within(v, [30.0, 70.0])) {
+            2.0
+        } else {
+            plate(10.0, u, v)
+        }
+    }
+
+    #[test]
+    fn a_touch_makes_a_piece_the_part_or_another_thing_and_one_beside_everything_is_refused() {
+        let [on_plate, on_pin, on_next] = [30 * WIDTH + 60, 30 * WIDTH + 20, 50 * WIDTH + 108];
+        let pin = Marking {
+            part: vec![[22, 36]],
+            ..Marking::default()
+        };
+        let found = marked(&pin, among).unwrap().unwrap();
+        assert!(found.part[on_pin] && found.part[on_plate] && found.others[on_next]);
+        let next = Marking {
+            part: vec![[108, 50]],
+            others: vec![[60, 30]],
+            ..Marking::default()
+        };
+        let found = marked(&next, among).unwrap().unwrap();
+        assert!(found.part[on_next] && found.others[on_plate] && found.others[on_pin]);
+        let missed = Marking {
+            part: vec![[5, 90]],
+            ..Marking::default()
+        };
+        assert_eq!(marked(&missed, among), Err(NothingTouched([5, 90])));
+    }
+
+    #[test]
+    fn what_stands_out_inside_an_outline_is_the_part_also_where_no_plane_is_seen() {
+        let marking = Marking {
+            outline: vec![[5, 5], [70, 5], [70, 95], [5, 95]],
+            ..Marking::default()
+        };
+        let found = marked(&marking, among).unwrap().unwrap();
+        let is_part = |u: usize, v: usize| found.part[v * WIDTH + u];
+        assert!(is_part(20, 30) && is_part(40, 30) && !is_part(60, 50) && !is_part(80, 30));
+        assert!(found.others[30 * WIDTH + 80] && found.ground.is_some());
+        let bent = |u: f64, v: f64| 0.01 * (u - 60.0) * (v - 50.0);
+        let found = marked(&marking, bent).unwrap().unwrap();
+        assert_eq!((found.ground, found.step_mm), (None, None));
+        assert!(found.part[50 * WIDTH + 60] && !found.part[50 * WIDTH + 72]);
+    }
+
+    #[test]
+    fn a_noisy_floor_that_a_part_keeps_from_a_side_is_one_surface() {
+        let mut random = SplitMix64::seed_from_u64(4);
+        let noise: Vec<f64> = (0..WIDTH * ROWS)
+            .map(|_| {
+                let twelve = (0..12).map(|_| random.next_u64() as f64 / u64::MAX as f64);
+                0.15 * (twelve.sum::<f64>() - 6.0)
+            })
+            .collect();
+        let found = surroundings(WIDTH * ROWS, WIDTH, 0.15, &Marking::default(), |at| {
+            let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
+            let z = if u > 80.0 {
+                0.0
+            } else {
+                plate(20.0, u + 30.0, v)
+            };
+            Some(Vector::new(u * PITCH_MM, v * PITCH_MM, z + noise[at]))
+        });
+        let ground = found.unwrap().unwrap().ground.unwrap();
+        assert!((ground[0] + 20.24).abs() < 0.05, "{ground:?}");
     }
 }

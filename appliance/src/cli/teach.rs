@@ -264,9 +264,10 @@ impl Teach {
         let taught = taught.map_err(|error| {
             let exit = match error {
                 TeachError::Device(_) | TeachError::Ended => Exit::Unavailable,
-                TeachError::Scene(_) | TeachError::Rig(_) | TeachError::NotCalibrated(_) => {
-                    Exit::Content
-                }
+                TeachError::Scene(_)
+                | TeachError::Limit { .. }
+                | TeachError::Rig(_)
+                | TeachError::NotCalibrated(_) => Exit::Content,
             };
             Failure::new(exit, error)
         })?;
@@ -313,13 +314,8 @@ impl Teach {
         let full = &measured.shots;
         let signal = captures::recorded_signal(&recording, at).map_err(|error| wrong(&error))?;
         let (mut phases, mut heights) = (phases.clone(), surface.map.clone());
-        let found = match naming.everything {
-            true => None,
-            false => {
-                let tolerance_mm = naming.placement_tolerance_mm;
-                surroundings::of(&heights, &surface.triangulator, tolerance_mm)
-            }
-        };
+        let found = surroundings::of(&heights, &surface.triangulator, naming);
+        let found = found.map_err(|error| wrong(&error))?;
         if let Some(found) = &found {
             surroundings::leave_out(found, &mut phases, &mut heights);
         }

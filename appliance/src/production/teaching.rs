@@ -3,7 +3,7 @@
 
 use super::telling::Telling;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, recovery};
-use crate::recipe::teach::{TaughtRecipe, TeachError, teach_marking};
+use crate::recipe::teach::{TaughtRecipe, TeachError, teach_showing};
 use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, Teaching, error_code};
 use crate::system::headway::Headway;
@@ -70,12 +70,13 @@ impl Worker {
         teaching: &Teaching,
         replaced: Option<&RecipeFile>,
     ) -> Result<TaughtRecipe, TeachError> {
-        let Teaching {
+        let &Teaching {
             number,
             keep_gauges,
             everything,
+            ref marking,
             limit_um,
-        } = *teaching;
+        } = teaching;
         if let Some(problem) = &self.opened.problem {
             return Err(TeachError::NotCalibrated(problem.clone()));
         }
@@ -86,6 +87,7 @@ impl Worker {
         }
         let mut naming = replace::naming(number, replaced, keep_gauges);
         naming.everything = everything.unwrap_or(naming.everything);
+        naming.marking = marking.clone().unwrap_or(naming.marking);
         naming.limit_mm = limit_um
             .map(|um| f64::from(um) / 1000.0)
             .or(naming.limit_mm);
@@ -96,17 +98,10 @@ impl Worker {
         let tell = |share: f64, words: &str| telling.tell(share, words);
         let headway = Headway::new(&tell, "teaching");
         let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
-        let computing = &self.computing;
+        let marked = (&self.computing, &self.seen);
         let taught = self.pool.install(|| {
             let headway = headway.part(0.0, TAUGHT);
-            teach_marking(
-                head,
-                calibration,
-                &naming,
-                DEVICE_TIMEOUT,
-                computing,
-                headway,
-            )
+            teach_showing(head, calibration, &naming, DEVICE_TIMEOUT, marked, headway)
         })?;
         let headway = headway.part(TAUGHT, SETTLED);
         let round = headway.part(0.0, 0.8);
@@ -137,6 +132,9 @@ impl Worker {
             _ => error.to_string(),
         };
         let failed = (error.code(), words);
+        if let TeachError::Limit { place, .. } = error {
+            self.seen.refuse(place);
+        }
         if let TeachError::Device(error) = error {
             self.lost = Some(error).filter(recovery::is_lost);
         }
@@ -175,7 +173,12 @@ impl Worker {
             telling.tell(share, words);
         };
         let (part, lies) = (&placed.part, &placed.placement);
-        let place = || stage.place_with_progress(part, placed.material, lies, &progress);
+        let place = || {
+            if let Some(floor) = &placed.floor {
+                stage.surround(floor.clone())?;
+            }
+            stage.place_with_progress(part, placed.material, lies, &progress)
+        };
         let shown = self.computing.on(|| self.pool.install(place));
         if let Err(error) = shown {
             self.progress.warn(&error.to_string());

@@ -2,7 +2,7 @@
 
 use crate::error::code_of;
 use crate::head::calibrated::MeasureError;
-use crate::station::error_code;
+use crate::station::{Square, error_code};
 use algo::adaptive::AdaptError;
 use std::fmt::Display;
 
@@ -15,6 +15,14 @@ pub enum TeachError {
     /// No recipe can be made of this scene.
     #[error("teach: {0}")]
     Scene(String),
+    /// Good parts would not keep the limit of the deviation.
+    #[error("teach: {words}")]
+    Limit {
+        /// In words, with the remedy.
+        words: String,
+        /// Where they deviate most, if that is known.
+        place: Option<Square>,
+    },
     /// The geometry or the pattern is impossible.
     #[error("teach: {0}")]
     Rig(String),
@@ -36,7 +44,7 @@ impl TeachError {
     pub fn code(&self) -> u16 {
         match self {
             Self::Device(error) => code_of(error),
-            Self::Scene(_) => error_code::NOTHING_TO_TEACH,
+            Self::Scene(_) | Self::Limit { .. } => error_code::NOTHING_TO_TEACH,
             Self::Rig(_) => error_code::RIG,
             Self::NotCalibrated(_) => error_code::NOT_CALIBRATED,
             Self::Ended => error_code::ABORTED,

@@ -9,6 +9,7 @@ use super::models::ModelsFile;
 use crate::head::calibration::{Calibration, CalibrationSigma};
 use crate::head::exposing::Exposing;
 use crate::station::control::MAX_RECIPE;
+use algo::inspect::Marking;
 use algo::pattern::Shot;
 use algo::phase::LeastModulation;
 use algo::units::AbsolutePhase;
@@ -110,6 +111,9 @@ bounded! {
         /// Whether all that was seen was taken for the part, also what lies behind it all round.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         pub everything: bool,
+        /// What a person has marked in the picture when it was taught.
+        #[serde(default, skip_serializing_if = "Marking::is_empty")]
+        pub marking: Marking,
         /// Heights that lie so many mm behind golden's, or farther, are those of what the part lies on;
         /// `None` if nothing else was seen.
         #[serde(skip_serializing_if = "Option::is_none")]

@@ -17,7 +17,7 @@ use crate::system::headway::Headway;
 use algo::adaptive::phase_reach;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
-use algo::inspect::{Measure, Surroundings, eroded, openings};
+use algo::inspect::{Marking, Measure, Surroundings, eroded, openings};
 use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
@@ -62,6 +62,8 @@ pub struct Naming {
     pub exposures: u32,
     /// Whether all that is seen is the part, also what lies behind it.
     pub everything: bool,
+    /// What a person has marked in the picture.
+    pub marking: Marking,
     /// The limit of the deviation, ± mm, that good parts must keep; `None` where teaching promises none.
     pub limit_mm: Option<f64>,
 }
@@ -209,6 +211,7 @@ impl GoldenPart<'_> {
         let calibration = self.calibration;
         let (width, height, bit_depth) = calibration.frames();
         let (columns, rows) = calibration.raster();
+        let surroundings = self.surroundings.as_ref();
         let mut manifest = RecipeFile {
             format: FORMAT.into(),
             version: VERSION,
@@ -246,8 +249,9 @@ impl GoldenPart<'_> {
             models: ModelsFile::of(calibration),
             calibration_sigma: calibration.sigma,
             everything: naming.everything,
-            surroundings_mm: self.surroundings.as_ref().map(|found| found.step_mm / 2.0),
-            ground_mm: self.surroundings.as_ref().map(|found| found.ground),
+            marking: naming.marking.clone(),
+            surroundings_mm: surroundings.and_then(|found| Some(found.step_mm? / 2.0)),
+            ground_mm: surroundings.and_then(|found| found.ground),
             expansion_range_turns: EXPANSION_TURNS,
             min_coverage: MIN_COVERAGE,
             judges_nothing: false,

@@ -96,7 +96,7 @@ impl GoldenPart<'_> {
             && let Some(exceeded) = refusal::exceeded(manifest, &judged)
         {
             let cause = self.cause(exceeded.square, &arrays.golden_height);
-            return Err(TeachError::Scene(exceeded.words(cause)));
+            return Err(exceeded.refusal(cause));
         }
         words.extend(proof::hold(manifest, &judged));
         manifest.tried = proof::tried(manifest, &judged);

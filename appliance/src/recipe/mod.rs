@@ -57,6 +57,7 @@ mod lost;
 mod median;
 pub mod models;
 mod outline;
+pub mod part_seen;
 pub mod plan;
 pub mod planner;
 mod proof;

@@ -3,6 +3,7 @@
 //! A limit that good parts would not keep is never widened: whoever opens it has to say so.
 
 use super::RecipeFile;
+use super::failure::TeachError;
 use super::golden::GoldenPart;
 use super::good_parts::rounded_up;
 use super::proof::band;
@@ -51,7 +52,7 @@ pub(super) fn exceeded(manifest: &RecipeFile, judged: &[Inspection]) -> Option<E
 
 impl Exceeded {
     /// What to say of it; `cause` says what is seen at the place.
-    pub fn words(&self, cause: &str) -> String {
+    pub fn refusal(&self, cause: &str) -> TeachError {
         let Self {
             gauge,
             limit_mm,
@@ -62,12 +63,16 @@ impl Exceeded {
         let place = square.map_or(String::new(), |at| {
             format!(" about column {}, row {}{cause}", at.column, at.row)
         });
-        format!(
+        let words = format!(
             "good parts that lie within {within_mm} mm would not keep the limit of {gauge}, ±{limit_mm} mm: they deviate by \
-             {deviation_mm:.3} mm{place}. Cover or remove what is not of the part, give a smaller placement tolerance, or choose \
+             {deviation_mm:.3} mm{place}. Mark the part in the picture, cover or remove what is not of it, give a smaller placement tolerance, or choose \
              the limit: ±{} mm would be kept",
             rounded_up(WIDER * deviation_mm)
-        )
+        );
+        TeachError::Limit {
+            words,
+            place: *square,
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use super::golden::{Naming, UnsealedRecipe};
 use super::good_parts::DEVIATION_MM;
 use super::{RecipeFile, Store};
 use crate::system::headway::Headway;
+use algo::inspect::Marking;
 use hal::bounds::within;
 
 /// Least and largest limit of the deviation that may be asked for, ± mm.
@@ -45,6 +46,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>, keep_gauges: bool) -> 
         placement_tolerance_mm,
         exposures,
         everything: replaced.is_some_and(|file| file.everything),
+        marking: replaced.map_or_else(Marking::default, |file| file.marking.clone()),
         limit_mm: match replaced {
             Some(file) if keep_gauges => kept_limit(file),
             Some(file) => Some(file.good_parts.map_or(DEVIATION_MM, |of| of.tolerance_mm)),

@@ -1,19 +1,58 @@
 //! Leaves out what a part lies on and what lies beside it, before golden is made.
 
+use super::failure::TeachError;
+use super::golden::Naming;
 use super::plan::window;
 use algo::geometry::Triangulator;
-use algo::inspect::{self, Surroundings};
+use algo::inspect::{self, Marking, Surroundings};
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, PhaseMap};
 use algo::units::{AbsolutePhase, Height, Modulation};
 
-/// The surroundings of a measured part that may be displaced by `tolerance_mm`; `None` if nothing but the part is
-/// seen.
+/// Most corners of an outline, and most touches of each kind.
+const MAX_CORNERS: usize = 256;
+const MAX_TOUCHES: usize = 64;
+
+/// Refuses a marking that is no outline, or too long.
+///
+/// # Errors
+/// In words, with the bounds.
+pub fn check_marking(marking: &Marking) -> Result<(), String> {
+    let Marking {
+        outline,
+        part,
+        others,
+    } = marking;
+    if !outline.is_empty() && !(3..=MAX_CORNERS).contains(&outline.len()) {
+        return Err(format!(
+            "marking.outline has {} corners: write 3 to {MAX_CORNERS}, or none",
+            outline.len()
+        ));
+    }
+    for (key, touches) in [("part", part), ("others", others)] {
+        if touches.len() > MAX_TOUCHES {
+            return Err(format!(
+                "marking.{key} has {} places: write at most {MAX_TOUCHES}",
+                touches.len()
+            ));
+        }
+    }
+    Ok(())
+}
+
+/// The surroundings of a measured part that may be displaced by as much as `naming` says; `None` if nothing but the part
+/// is seen.
+///
+/// # Errors
+/// If nothing stands out where a person has touched the part.
 pub fn of(
     heights: &HeightMap,
     triangulator: &Triangulator,
-    tolerance_mm: f64,
-) -> Option<Surroundings> {
+    naming: &Naming,
+) -> Result<Option<Surroundings>, TeachError> {
+    if naming.everything {
+        return Ok(None);
+    }
     let (width, pixels) = (heights.width, heights.height.len());
     let mut sigmas: Vec<f32> = heights
         .sigma
@@ -22,13 +61,15 @@ pub fn of(
         .filter(|sigma| sigma.is_finite())
         .collect();
     if sigmas.is_empty() {
-        return None;
+        return Ok(None);
     }
     let middle = sigmas.len() / 2;
     let sigma = f64::from(*sigmas.select_nth_unstable_by(middle, f32::total_cmp).1);
     let point = |at: usize| triangulator.point(at % width, at / width, heights.height[at]);
-    let found = inspect::surroundings(pixels, width, sigma, point)?;
-    Some(found.clear_of_others(width, window::pixels(triangulator, tolerance_mm)))
+    let found = inspect::surroundings(pixels, width, sigma, &naming.marking, point);
+    let found = found.map_err(|missed| TeachError::Scene(missed.to_string()))?;
+    let away = window::pixels(triangulator, naming.placement_tolerance_mm);
+    Ok(found.map(|found| found.clear_of_others(width, away)))
 }
 
 /// Makes pixels that are not of the part those of nothing.
@@ -52,12 +93,15 @@ pub fn words(surroundings: &Surroundings) -> String {
         ..
     } = surroundings;
     let share = |of: &[bool]| of.iter().filter(|is| **is).count() as f64 / of.len().max(1) as f64;
+    let stands_out = step_mm.map_or(String::new(), |step| {
+        format!(" and stands out from what it lies on by {step:.2} mm or more")
+    });
     let others = match share(others) * 100.0 {
         percent if percent < 0.05 => String::new(),
         percent => format!("; other things on {percent:.1} % of the picture are left out"),
     };
     format!(
-        "the part is {:.1} % of the picture and stands out from what it lies on by {step_mm:.2} mm or more{others}",
+        "the part is {:.1} % of the picture{stands_out}{others}",
         share(part) * 100.0
     )
 }

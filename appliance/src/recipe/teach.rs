@@ -10,6 +10,7 @@ use super::candidates::candidates;
 use super::captures::{CAPTURES, Captured};
 use super::comparison::ComparisonFile;
 use super::golden::GoldenPart;
+use super::part_seen::{LastSeen, PartSeen};
 use super::plan::Plan;
 use super::proof;
 use super::refusal;
@@ -47,20 +48,27 @@ pub fn teach(
     timeout: Duration,
     headway: Headway<'_>,
 ) -> Result<UnsealedRecipe, TeachError> {
-    let computing = Computing::default();
-    teach_marking(head, calibration, naming, timeout, &computing, headway)
+    let seen = (Computing::default(), LastSeen::default());
+    teach_showing(
+        head,
+        calibration,
+        naming,
+        timeout,
+        (&seen.0, &seen.1),
+        headway,
+    )
 }
 
-/// As [`teach`]; `computing` marks the stages that use no device.
+/// As [`teach`]; `computing` marks the stages that use no device, and `seen` shows what is taken for the part.
 ///
 /// # Errors
 /// As [`teach`].
-pub fn teach_marking(
+pub fn teach_showing(
     head: &mut Head,
     calibration: &Calibration,
     naming: &Naming,
     timeout: Duration,
-    computing: &Computing,
+    (computing, seen): (&Computing, &LastSeen),
     headway: Headway<'_>,
 ) -> Result<UnsealedRecipe, TeachError> {
     let stage = |from: f64, to: f64, words| {
@@ -92,13 +100,11 @@ pub fn teach_marking(
         first = head.measure_lit(&illumination, function, shots, None, &measured)?;
     }
     refuse_empty(&first.phases)?;
-    let found = match naming.everything {
-        true => None,
-        false => computing.on(|| {
-            let tolerance_mm = naming.placement_tolerance_mm;
-            surroundings::of(&first.heights, &first.triangulator, tolerance_mm)
-        }),
-    };
+    let found = computing.on(|| surroundings::of(&first.heights, &first.triangulator, naming));
+    let full_scale = first.decoder.full_scale();
+    let shown = |part| seen.show(PartSeen::of(&first.phases, full_scale, part));
+    let found = found.inspect_err(|_| shown(None))?;
+    shown(found.as_ref().map(|found| &found.part[..]));
     if let Some(found) = &found {
         surroundings::leave_out(found, &mut first.phases, &mut first.heights);
     }
@@ -170,7 +176,7 @@ pub fn teach_marking(
     }
     let asked = naming.limit_mm.is_some();
     if asked && let Some(exceeded) = refusal::exceeded(&manifest, &judged) {
-        return Err(TeachError::Scene(exceeded.words("")));
+        return Err(exceeded.refusal(""));
     }
     let mut words = proof::leave_out_covered(&mut manifest, &mut judged);
     words.extend(proof::hold(&mut manifest, &judged));

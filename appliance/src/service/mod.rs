@@ -12,6 +12,7 @@ mod stopping;
 pub mod survey;
 
 use crate::recipe::Store;
+use crate::recipe::part_seen::LastSeen;
 pub use caller::Caller;
 use rooms::Rooms;
 
@@ -135,6 +136,7 @@ impl Daemon {
             progress: progress.clone(),
             calibration: Current::default(),
             last_cycle: LastCycleRequests::default(),
+            seen: LastSeen::default(),
             simulation: Simulation::new(orders.clone()),
             live: Live::new(orders.clone(), commission.clone()),
             commission,

@@ -19,6 +19,7 @@ use crate::production::simulation::Simulation;
 use crate::production::warm_up::WarmUp;
 use crate::production::{Aborts, JudgedBy, Order, Worker};
 use crate::recipe::Store;
+use crate::recipe::part_seen::LastSeen;
 use crate::station::{Request, StationHandle};
 use crate::system::computing::Computing;
 use crate::system::progress::Progress;
@@ -43,6 +44,7 @@ pub(super) struct Rooms<'a> {
     pub progress: Progress,
     pub calibration: Current,
     pub last_cycle: LastCycleRequests,
+    pub seen: LastSeen,
     pub simulation: Simulation,
     pub commission: Commission,
     pub live: Live,
@@ -90,6 +92,7 @@ impl Rooms<'_> {
             recipes: self.recipes.clone(),
             calibration: self.calibration.clone(),
             last_cycle: self.last_cycle.clone(),
+            seen: self.seen.clone(),
             simulation: self.simulation.clone(),
             commission: self.commission.clone(),
             live: self.live.clone(),
@@ -146,6 +149,7 @@ impl Rooms<'_> {
             progress,
             calibration,
             last_cycle,
+            seen,
             simulation,
             commission,
             computing,
@@ -172,6 +176,7 @@ impl Rooms<'_> {
                 recipes,
                 station,
                 last_cycle,
+                seen,
                 history,
                 progress,
                 config,

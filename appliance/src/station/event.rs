@@ -8,6 +8,7 @@ use super::health::{Drift, Pace, ProjectorHealth, System};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
 use super::turns::Client;
+use algo::inspect::Marking;
 
 /// The number of one order to the worker. Each answer carries it, so that a late answer is
 /// recognised.
@@ -29,7 +30,7 @@ pub enum Request {
 }
 
 /// As what the part in front of the head is taught.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Teaching {
     /// The recipe's number, 1–9999.
     pub number: u16,
@@ -37,6 +38,8 @@ pub struct Teaching {
     pub keep_gauges: bool,
     /// Whether everything that is seen is the part; as in the recipe that it replaces if it is not said.
     pub everything: Option<bool>,
+    /// What is marked in the picture; as in the recipe that it replaces if it is not said.
+    pub marking: Option<Marking>,
     /// The limit of the deviation, ± µm; as in the recipe that it replaces if it is not said.
     pub limit_um: Option<u32>,
 }

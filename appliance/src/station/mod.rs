@@ -89,6 +89,7 @@ mod write;
 #[cfg(test)]
 mod tests;
 
+pub use algo::inspect::Marking;
 pub use clock::Micros;
 pub use control::{ConnectionEdges, ControlRegisters, ControlWrite, Masked, RefusedWrite};
 pub use event::{Condition, Effect, Effects, Event, Job, JobId, Request, Teaching, Unstored};

@@ -54,6 +54,7 @@ impl Bed {
             placement_tolerance_mm: 1.0,
             exposures: 1,
             everything: false,
+            marking: Default::default(),
             limit_mm: Some(0.15),
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent()).unwrap();

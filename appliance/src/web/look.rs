@@ -126,6 +126,25 @@ pub(super) async fn picture(
     .await
 }
 
+/// What teaching took for the part, and the place for which it was refused.
+pub(super) async fn part_seen(site: Site) -> Result<Response> {
+    site.aside(|site| {
+        let Some(seen) = site.seen.get() else {
+            let words = "nothing was taught since the start";
+            return Ok((StatusCode::NO_CONTENT, [("x-none", words)]).into_response());
+        };
+        let of = (seen.width, usual_stride(seen.width));
+        let planes = [
+            Plane::of("modulation", "counts", (&seen.modulation, of), Drawn::Plain),
+            Plane::of("part", "", (&seen.part, of), Drawn::Plain),
+        ];
+        let mut picture = surface(&planes, of, None);
+        picture.description["place"] = json!(seen.place);
+        Ok(picture.into_response())
+    })
+    .await
+}
+
 /// The place of a picture in [`LAYERS`].
 ///
 /// # Errors

@@ -16,9 +16,10 @@ use super::gate;
 use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::recipe::replace;
+use crate::recipe::surroundings::check_marking;
 use crate::station::control::{ERROR_RESET, MAX_RECIPE, TRIGGER};
 use crate::station::{
-    Client, ControlWrite, Event, RecipeKey, RecipeResult, Request, Snapshot, Teaching,
+    Client, ControlWrite, Event, Marking, RecipeKey, RecipeResult, Request, Snapshot, Teaching,
 };
 
 /// The answer to an accepted order; its progress comes with the events.
@@ -145,6 +146,8 @@ struct Wanted {
     keep_gauges: bool,
     /// Everything that is seen is the part.
     everything: Option<bool>,
+    /// What is marked in the picture.
+    marking: Option<Marking>,
     /// The limit of the deviation, ± mm.
     limit_mm: Option<f64>,
 }
@@ -168,10 +171,13 @@ pub(super) async fn teach(
         replace: may_replace,
         keep_gauges,
         everything,
+        marking,
         limit_mm,
     } = body::json_if_any(request.into_body()).await?;
     let limit = replace::check_limit(limit_mm);
-    limit.map_err(|words| Problem::unfit(format!("teach: {words}")))?;
+    let marked = marking.as_ref().map_or(Ok(()), check_marking);
+    let fits = limit.and(marked);
+    fits.map_err(|words| Problem::unfit(format!("teach: {words}")))?;
     site.change(move |site| {
         let replaced = site.recipes.present(number);
         match (may_replace, keep_gauges) {
@@ -202,6 +208,7 @@ pub(super) async fn teach(
         number,
         keep_gauges,
         everything,
+        marking,
         limit_um: limit_mm.map(|mm| (mm * 1000.0).round() as u32),
     });
     let after = site.station.event(Event::Request(order));

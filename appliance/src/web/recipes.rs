@@ -78,6 +78,7 @@ fn summary(file: &RecipeFile) -> Value {
         "number": file.number, "name": file.name, "part_number": file.part_number,
         "fingerprint": file.fingerprint, "taught_at_unix_s": file.taught_at_unix_s,
         "features": file.features.len(), "gauges": file.gauges.len(), "judges_nothing": file.judges_nothing,
+        "everything": file.everything,
         "frames": file.sequences.get(file.production).map(|sequence| sequence.frames.len()),
     })
 }

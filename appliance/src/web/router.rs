@@ -74,6 +74,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/openapi.json", look::openapi),
         look("/api/snapshot", look::snapshot),
         look("/api/picture/{layer}", look::picture),
+        look("/api/teach/part", look::part_seen),
         look("/api/trends", history::trends),
         look("/api/registers", look::registers),
         look("/api/log", look::log),

@@ -22,6 +22,7 @@ use crate::production::commissioning::live::Live;
 use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
+use crate::recipe::part_seen::LastSeen;
 use crate::recipe::plan::Layers;
 use crate::recipe::trying::Opened;
 use crate::station::{Snapshot, StationHandle};
@@ -63,6 +64,8 @@ pub struct Parts {
     pub calibration: Current,
     /// Requests about the last cycle: its maps and downloads.
     pub last_cycle: LastCycleRequests,
+    /// What teaching took for the part.
+    pub seen: LastSeen,
     /// The part in front of a simulated head.
     pub simulation: Simulation,
     /// Steps of commissioning.

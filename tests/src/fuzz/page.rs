@@ -66,6 +66,7 @@ impl Page {
             recipes: Store::open(&recipes).expect("a store"),
             calibration: Default::default(),
             last_cycle: no_cycle(),
+            seen: Default::default(),
             simulation: Simulation::new(orders.clone()),
             live: Live::new(orders, commission.clone()),
             commission,

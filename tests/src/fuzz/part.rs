@@ -46,6 +46,7 @@ impl Part {
             placement_tolerance_mm: 0.5,
             exposures: 1,
             everything: false,
+            marking: Default::default(),
             limit_mm: Some(0.15),
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent());

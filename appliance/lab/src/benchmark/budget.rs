@@ -128,6 +128,7 @@ pub fn budgets(
         placement_tolerance_mm: PLACEMENT_MM,
         exposures: 1,
         everything: false,
+        marking: Default::default(),
         limit_mm: Some(0.15),
     };
     progress(0.3, &format!("{about}: teaching"));

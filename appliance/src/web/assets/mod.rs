@@ -71,6 +71,7 @@ assets! {
         "colour.js"
         "question.js"
         "recipes.js"
+        "part.js"
         "editor.js"
         "editor-list.js"
         "editor-shapes.js"

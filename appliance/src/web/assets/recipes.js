@@ -4,6 +4,7 @@ import { ask } from "./api.js";
 import { change, notice } from "./session.js";
 import { choose } from "./question.js";
 import { edit } from "./editor.js";
+import { showPart, start as startPart } from "./part.js";
 
 let active = null;
 // Number and fingerprint of the active recipe when the list was read last.
@@ -11,6 +12,8 @@ let listedFor = "";
 // The listed recipes, and the number that the page proposed to teach.
 let stored = [];
 let proposed = "";
+// The number whose recipe the form follows.
+let followed = "";
 
 function day(unix_s) {
   return unix_s ? new Date(unix_s * 1000).toISOString().slice(0, 10) : "not known";
@@ -103,6 +106,7 @@ export async function list() {
     // A number that somebody typed stays.
     const typed = $("teach-as").value;
     if (typed === "" || typed === proposed) $("teach-as").value = proposed = free === null ? "" : String(free);
+    follow();
     return free;
   } catch (error) { notice(error.message, true); return null; }
 }
@@ -125,12 +129,18 @@ async function take(file) {
   }
 }
 
-// What the form says of the part beside its number: nothing where it was left as it is.
+// What the form says of the part beside its number.
 function taught() {
-  const wanted = {}, limit = $("teach-limit").value;
-  if (limit !== "") wanted.limit_mm = Number(limit);
-  if ($("teach-everything").checked) wanted.everything = true;
-  return wanted;
+  const limit = $("teach-limit").value;
+  return { everything: $("teach-everything").checked, ...(limit === "" ? {} : { limit_mm: Number(limit) }) };
+}
+
+// The form says of another number's recipe what it was taught with.
+function follow() {
+  if ($("teach-as").value === followed) return;
+  followed = $("teach-as").value;
+  const there = stored.find((recipe) => recipe.number === Number($("teach-as").value));
+  $("teach-everything").checked = Boolean(there && there.everything);
 }
 
 // The body of a request to teach a number; none if a recipe has the number and is to stay.
@@ -148,6 +158,14 @@ async function teach(number) {
   const wanted = await consent(number);
   if (!wanted) return;
   await ask("POST", `/api/recipes/${number}/teach`, wanted);
+  notice(`teaching recipe ${number} has begun: leave the part where it is`);
+}
+
+// Teaches a number again with what a person has marked in the picture of the part.
+async function teachMarked(number, marking) {
+  await list();
+  const replace = stored.some((recipe) => recipe.number === number);
+  await ask("POST", `/api/recipes/${number}/teach`, { replace, everything: false, marking });
   notice(`teaching recipe ${number} has begun: leave the part where it is`);
 }
 
@@ -203,9 +221,11 @@ export function showRecipes(now, visible) {
     text("teach-percent", `${Math.round(100 * now.teach.fraction)} %`);
     text("teach-words", now.teach.words);
     showRecipes.teaching = now.teach.number;
+    show("part-seen", false);
   } else if (showRecipes.teaching) {
     const done = showRecipes.teaching;
     showRecipes.teaching = 0;
+    showPart(done);
     if (number === done && !now.error) { notice(`recipe ${done} is taught and active`); compare(done).catch((error) => notice(error.message, true)); }
     else notice(`recipe ${done} was not taught: ${now.error ? now.error.words : "see the event log"}`, true);
   }
@@ -216,6 +236,8 @@ export function showRecipes(now, visible) {
 }
 
 export function start() {
+  startPart({ teach: teachMarked });
+  $("teach-as").addEventListener("input", follow);
   $("teach").addEventListener("submit", (event) => {
     event.preventDefault();
     change(() => teach(Number($("teach-as").value)));

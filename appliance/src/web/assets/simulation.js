@@ -8,6 +8,9 @@ const UNITS = { x: "mm", y: "mm", depth_mm: "mm", diameter_mm: "mm", degrees: "Â
 let kinds = [];
 let part = null;
 let asked = "";
+// What the part lies over, and an example of all that can stand there.
+let floor = null, floors = {};
+const STANDING = ["pins", "clamps", "next_mm"];
 let placing = false;
 
 const copy = (value) => JSON.parse(JSON.stringify(value));
@@ -43,15 +46,36 @@ function showPlacement({ shift_mm, tilt_deg, rotation_deg }) {
   [...shift_mm, ...tilt_deg, rotation_deg].forEach((number, at) => { $(`place-${at}`).value = String(number); });
 }
 
+function showFloor() {
+  const [x, y] = floor ? floor.tilt_deg : [0, 0], there = floor || floors;
+  $("floor").checked = Boolean(floor);
+  show("floor-fields", Boolean(floor));
+  for (const [id, value] of [["albedo", there.albedo], ["depth", there.depth_mm], ["tilt-0", x], ["tilt-1", y], ["print", there.print_mm]]) $(`floor-${id}`).value = String(value);
+  for (const name of STANDING) $(`floor-${name}`).checked = Boolean(floor && floor[name] && (name === "next_mm" || floor[name].length));
+}
+
+// The floor as the form says; what stands on it stays as it is where it is ticked, or is the example.
+function laid() {
+  if (!$("floor").checked) return null;
+  const number = (id) => Number($(`floor-${id}`).value);
+  const made = { ...floor, albedo: number("albedo"), depth_mm: number("depth"), tilt_deg: [number("tilt-0"), number("tilt-1")], print_mm: number("print") };
+  for (const name of STANDING) {
+    const there = floor && floor[name] && (name === "next_mm" || floor[name].length) ? floor[name] : floors[name];
+    if ($(`floor-${name}`).checked) made[name] = there; else delete made[name];
+  }
+  return made;
+}
+
 function showPart(answer) {
   show("simulation", answer.simulated);
   if (!answer.simulated) return;
-  ({ kinds, part } = answer);
+  ({ kinds, part, floor, floors } = answer);
   fill($("part-material"), new Option("as the scenario's light", ""), ...answer.materials.map((name) => new Option(words(name), name)));
   $("part-material").value = answer.material || "";
   fill($("part-kind"), ...kinds.map((one) => new Option(words(one.part.kind), one.part.kind)));
   $("part-kind").value = part.kind;
   showPlacement(answer.placement);
+  showFloor();
   showDefects();
 }
 
@@ -79,7 +103,7 @@ async function put() {
   const placement = { shift_mm: [0, 1, 2].map(number), tilt_deg: [3, 4].map(number), rotation_deg: number(5) };
   text("simulation-words", "the light of the part is being computedâ€¦");
   const material = $("part-material").value || null;
-  await place({ part, material, placement }, "the part is in place: the next cycle sees it");
+  await place({ part, material, placement, floor: laid() }, "the part is in place: the next cycle sees it");
   text("simulation-words", "");
 }
 
@@ -96,6 +120,7 @@ export function start() {
     part = copy(kinds.find((one) => one.part.kind === $("part-kind").value).part);
     showDefects();
   });
+  $("floor").addEventListener("change", () => show("floor-fields", $("floor").checked));
   $("pose").addEventListener("change", () => {
     const { poses } = kinds.find((one) => one.part.kind === part.kind);
     if ($("pose").value !== "") showPlacement(poses[Number($("pose").value)]);

@@ -63,6 +63,7 @@ async fn served() -> Served {
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
         calibration: Default::default(),
         last_cycle: Default::default(),
+        seen: Default::default(),
         simulation: Simulation::new(orders.clone()),
         live: Live::new(orders, commission.clone()),
         commission,
