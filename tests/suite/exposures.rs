@@ -210,6 +210,7 @@ fn good_parts_pass_and_dented_ones_fail_with_longer_exposures_also_where_they_li
     let part = |defects: &[Defect]| {
         Part::SheetMetal(SheetMetal {
             defects: defects.to_vec(),
+            ..SheetMetal::default()
         })
     };
     let mut line = Line::new(&scenario(part(&[])), EXPOSURES);

@@ -148,7 +148,10 @@ impl Line {
                 defects,
                 ..Flowerpot::default()
             }),
-            false => Part::SheetMetal(SheetMetal { defects }),
+            false => Part::SheetMetal(SheetMetal {
+                defects,
+                ..Default::default()
+            }),
         };
         self.bed.stage.place(&part, &Placement::default()).unwrap();
     }

@@ -1,6 +1,7 @@
 //! The integration suite: one binary, one module per topic.
 
 mod adapt;
+mod among;
 mod bad_input;
 mod bench;
 mod better_direction;

@@ -2,12 +2,10 @@
 
 use crate::every_part::{Line, way};
 use crate::gauges::frames;
-use crate::placement::{TIMEOUT, bed, naming};
+use crate::placement::{bed, one_click};
 use crate::surroundings::{everywhere, plate};
 use algo::inspect::Placed;
 use appliance::head::seam;
-use appliance::recipe::teach::teach;
-use appliance::system::headway::Headway;
 use sim::parts::Defect;
 use sim::{Ground, Part, Placement, Scenario};
 use tests::random::Random;
@@ -26,10 +24,8 @@ fn line(floor: Option<Ground>) -> Line {
         floor,
         ..Scenario::default()
     });
-    let (head, calibration) = (&mut bed.head, &bed.calibration);
-    let taught = teach(head, calibration, &naming(1.0), TIMEOUT, Headway::silent());
-    let taught = taught.unwrap().with_rims(Headway::silent()).unwrap();
-    Line::of(bed, taught.seal().unwrap().recipe, 0.15, plate())
+    let recipe = one_click(&mut bed).unwrap().recipe;
+    Line::of(bed, recipe, 0.15, plate())
 }
 
 /// How a part is found to lie.

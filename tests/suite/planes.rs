@@ -389,7 +389,10 @@ fn reads_how_far(bends: &[f64], quarters: &[u32]) {
         let off = from_crossing * angle.sin();
         let truth = [off, -off, -(middle.x - crossing) * angle.tan()];
         let defects = vec![Defect::BentFlange { degrees }];
-        let part = Part::SheetMetal(SheetMetal { defects });
+        let part = Part::SheetMetal(SheetMetal {
+            defects,
+            ..Default::default()
+        });
         for &at in quarters {
             let mut lies = placement(&mut random);
             lies.shift_mm = lies.shift_mm.map(|way| way * f64::from(at) / 4.0);

@@ -44,7 +44,10 @@ fn small() -> (Bed, TaughtRecipe) {
 }
 
 fn part(defects: Vec<Defect>) -> Part {
-    Part::SheetMetal(SheetMetal { defects })
+    Part::SheetMetal(SheetMetal {
+        defects,
+        ..Default::default()
+    })
 }
 
 fn inspect(bed: &mut Bed, plan: &Plan) -> Inspection {

@@ -167,6 +167,7 @@ fn repeats_by(
     });
     let part = Part::SheetMetal(SheetMetal {
         defects: dent.into_iter().collect(),
+        ..SheetMetal::default()
     });
     let mut random = Random::new(1);
     let mut gauges = vec![Repeated::default(); file.gauges.len()];

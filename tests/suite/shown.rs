@@ -198,7 +198,10 @@ fn part(pot: bool, defects: Vec<Defect>) -> Part {
             defects,
             ..Flowerpot::default()
         }),
-        false => Part::SheetMetal(SheetMetal { defects }),
+        false => Part::SheetMetal(SheetMetal {
+            defects,
+            ..Default::default()
+        }),
     }
 }
 

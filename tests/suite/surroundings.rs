@@ -3,7 +3,7 @@
 use crate::every_part;
 use crate::gauges::plan;
 use crate::limits::cycle;
-use crate::placement::{Bed, TIMEOUT, bed, naming, taught, taught_asking};
+use crate::placement::{Bed, TIMEOUT, bed, naming, one_click, taught, taught_asking};
 use algo::inspect::FeatureKind;
 use appliance::recipe::FeatureFile;
 use appliance::recipe::golden::Naming;
@@ -352,7 +352,7 @@ fn judged(
         invalid: 0,
     };
     let mut bed = bed(&scenario(part, floor));
-    match taught(&mut bed) {
+    match one_click(&mut bed) {
         Ok(taught) => {
             assert_eq!(
                 taught.manifest.gauges[0].high,
@@ -364,7 +364,11 @@ fn judged(
             let mut random = Random::new(5);
             for _ in 0..placements {
                 let placement = line.placement(&mut random);
-                let verdict = line.judge(&placement).verdict();
+                let judged = line.judge(&placement);
+                let verdict = judged.verdict();
+                if verdict != Verdict::Pass {
+                    println!("{}: {verdict:?}, {:?}", found.scene, judged.reason);
+                }
                 found.fails += usize::from(verdict == Verdict::Fail);
                 found.invalid += usize::from(verdict == Verdict::Invalid);
             }

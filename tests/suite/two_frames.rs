@@ -48,6 +48,7 @@ fn quick() -> Scenario {
 fn bracket(defects: &[Defect]) -> Part {
     Part::SheetMetal(SheetMetal {
         defects: defects.to_vec(),
+        ..SheetMetal::default()
     })
 }
 

@@ -6,25 +6,30 @@ use crate::error::{Exit, Failure, Result};
 use crate::head::placed::Placed;
 use crate::production::backend;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use hal::bounds::{MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, clipped};
-use sim::Material;
+use hal::bounds::{Bound, Fields, MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, clipped};
 use sim::parts::Board;
+use sim::{Ground, Material};
 
 /// The part in front of a simulated head, if not the scenario's.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct SimulatedPart {
     /// Put this stock part in front of the simulated head: sheet_metal, flowerpot, cone, sawtooth,
-    /// sphere, tube, spline, face, handset, plane, board or empty.
+    /// sphere, tube, spline, face, handset, plane, board, empty, plate or joint.
     #[arg(long, value_name = "KIND")]
     part: Option<String>,
-    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm along its normal, or of
-    /// sheet_metal missing_hole:INDEX or bent_flange:DEGREES; more than once for more.
+    /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm along its normal, of sheet_metal and plate
+    /// missing_hole:INDEX, of sheet_metal bent_flange:DEGREES, of plate displaced_hole:INDEX,DX,DY or hole_radius:INDEX,RADIUS;
+    /// more than once for more.
     #[arg(long, value_name = "KIND:NUMBERS")]
     defect: Vec<String>,
     /// What the simulated part is made of: matte, rolled_steel or oiled. If it is left out, the
     /// scenario's light says how a part reflects.
     #[arg(long, value_name = "NAME", value_parser = material())]
     material: Option<Material>,
+    /// Lay the simulated part over a floor that reflects ALBEDO, 0 to 1, so many mm below its lowest point; "none" is black
+    /// space. If it is left out, the floor is the scenario's.
+    #[arg(long, value_name = "ALBEDO,DEPTH", value_parser = floor)]
+    floor: Option<Lies>,
     /// Place the simulated board in this one of the ten poses that are recommended for a
     /// calibration; 10 lies in z = 0.
     #[arg(long, value_name = "NUMBER", value_parser = number(1, Board::POSES.len() as u8), conflicts_with_all = ["shift", "tilt", "rotate"])]
@@ -53,7 +58,7 @@ impl SimulatedPart {
             |words: String| Failure::because(Exit::Usage, "put a part in front of the head", words);
         if head.backend != Backend::Sim {
             return Err(usage(
-                "the configured head is not simulated: leave out --part, --defect, --material, --pose, --shift, --tilt and --rotate".into(),
+                "the configured head is not simulated: leave out --part, --defect, --material, --floor, --pose, --shift, --tilt and --rotate".into(),
             ));
         }
         let scenario = backend::scenario(head.scenario.as_deref())?;
@@ -63,9 +68,11 @@ impl SimulatedPart {
                 part: scenario.part,
                 material: scenario.material,
                 placement: scenario.placement,
+                floor: None,
             },
         };
         placed.material = self.material.or(placed.material);
+        placed.floor = self.floor.clone().map(|lies| lies.0);
         for defect in &self.defect {
             let added = placed.add_defect(defect).and_then(|()| placed.check());
             added.map_err(|words| usage(format!("--defect {}: {words}", clipped(defect))))?;
@@ -81,6 +88,27 @@ impl SimulatedPart {
         placed.check().map_err(usage)?;
         Ok(Some(placed))
     }
+}
+
+/// A floor below a part, or none.
+#[derive(Clone, Debug, PartialEq)]
+struct Lies(Option<Ground>);
+
+fn floor(given: &str) -> Result<Lies, String> {
+    if given == "none" {
+        return Ok(Lies(None));
+    }
+    let pair = given.split_once(',');
+    let number = |text: &str| text.trim().parse::<f64>().ok();
+    let pair = pair.and_then(|(albedo, depth)| number(albedo).zip(number(depth)));
+    let (albedo, depth_mm) = pair.ok_or("write ALBEDO,DEPTH as in 0.35,20, or none")?;
+    let ground = Ground {
+        albedo,
+        depth_mm,
+        ..Ground::default()
+    };
+    Fields.check("floor", &ground)?;
+    Ok(Lies(Some(ground)))
 }
 
 /// A material by its name.

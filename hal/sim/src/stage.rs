@@ -3,6 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use super::ground::Ground;
 use super::material::Material;
 use super::parts::Part;
 use super::placement::Placement;
@@ -27,6 +28,8 @@ pub struct Stage {
     /// Light transports of the last placed parts; the most recent is the last.
     remembered: Arc<Mutex<Vec<Staged>>>,
     gain: Arc<Mutex<f64>>,
+    /// What the next part lies on and among.
+    floor: Arc<Mutex<Option<Ground>>>,
 }
 
 /// A simulated head in front of the scenario's part, and the stage to place others on.
@@ -62,6 +65,7 @@ pub fn head_with_progress(
     let stage = Stage {
         control,
         gain: Arc::new(Mutex::new(scenario.optics.gain)),
+        floor: Arc::new(Mutex::new(scenario.floor.clone())),
         scenario,
         remembered: Arc::new(Mutex::new(vec![staged])),
     };
@@ -91,8 +95,10 @@ impl Stage {
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<(), Error> {
+        let floor = self.floor();
         let known = |staged: &Staged| {
-            staged.part == *part && staged.material == material && staged.placement == *placement
+            let same = staged.part == *part && staged.floor == floor;
+            same && staged.material == material && staged.placement == *placement
         };
         let recalled = {
             let mut remembered = self.remembered();
@@ -128,13 +134,31 @@ impl Stage {
         part.check()
             .and_then(|()| Fields.check("placement", placement))
             .map_err(|problem| Error::unsupported("placing this part", problem))?;
-        Ok(Staged::new(
-            &self.scenario,
-            part,
-            material,
-            placement,
-            progress,
-        ))
+        let scenario = Scenario {
+            floor: self.floor(),
+            ..Scenario::clone(&self.scenario)
+        };
+        Ok(Staged::new(&scenario, part, material, placement, progress))
+    }
+
+    /// Lays this, or nothing, below and beside the parts that are placed from now on.
+    ///
+    /// # Errors
+    /// `Unsupported` if a measure is out of its range.
+    pub fn surround(&self, floor: Option<Ground>) -> Result<(), Error> {
+        let checked = floor
+            .as_ref()
+            .map_or(Ok(()), |floor| Fields.check("floor", floor));
+        checked.map_err(|problem| Error::unsupported("laying this floor", problem))?;
+        *self.floor.lock().unwrap_or_else(PoisonError::into_inner) = floor;
+        Ok(())
+    }
+
+    /// What parts that are placed lie on and among.
+    #[must_use]
+    pub fn floor(&self) -> Option<Ground> {
+        let floor = self.floor.lock().unwrap_or_else(PoisonError::into_inner);
+        floor.clone()
     }
 
     /// Puts a part in place whose light transport is computed; the next exposure sees it.

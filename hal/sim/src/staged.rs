@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::ground::Ground;
 use super::material::Material;
 use super::parts::Part;
 use super::placement::Placement;
@@ -14,6 +15,7 @@ pub struct Staged {
     pub(super) part: Part,
     pub(super) material: Option<Material>,
     pub(super) placement: Placement,
+    pub(super) floor: Option<Ground>,
     pub(super) transport: Arc<Transport>,
 }
 
@@ -30,6 +32,7 @@ impl Staged {
             part: part.clone(),
             material,
             placement: *placement,
+            floor: scenario.floor.clone(),
             transport: Arc::new(transport),
         }
     }

@@ -14,7 +14,6 @@ use tests::random::Random;
 
 /// Measurements in each place.
 const REPEATS: usize = 4;
-const TOLERANCE_MM: f64 = 5.0;
 /// A plate that was taught, with gauges.
 pub(super) struct Line {
     pub(super) setting: Setting,
@@ -34,7 +33,7 @@ impl Line {
         let mut bed = bed(&setting.scenario());
         let part = Part::Plate(setting.plate.clone());
         bed.stage.place(&part, &setting.placement(None)).unwrap();
-        let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
+        let taught = taught_within(&mut bed, setting.tolerance_mm()).unwrap();
         let lies = setting.placement(None);
         let (mut features, datums, mut gauges) =
             gauging(&setting.plate, &bed.calibration.camera, &lies);
@@ -130,6 +129,8 @@ pub(super) struct Judged {
     pub(super) errors: f64,
     pub(super) squares: f64,
     pub(super) within: f64,
+    /// Gauges with errors of more than 2 U.
+    pub(super) far: Vec<String>,
     /// Σ U².
     pub(super) stated: f64,
     pub(super) missing: usize,
@@ -158,6 +159,10 @@ impl Judged {
             let u = found.uncertainty.unwrap();
             self.errors += 1.0;
             self.within += f64::from(u8::from(error.abs() <= u));
+            if error.abs() > 2.0 * u {
+                println!("   {name}: off by {error:.4} of U {u:.4}");
+                self.far.push(name.into());
+            }
             self.squares += error * error;
             self.stated += u * u;
         }

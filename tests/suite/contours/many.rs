@@ -5,6 +5,7 @@ use super::line::{Judged, Line};
 use super::plates::{Setting, Z_MM, plate};
 use super::{all_together, bright, closed_holes_are_absent, defects_fail, judge, thick};
 use crate::placement::{bed, taught_within};
+use crate::surroundings::everywhere;
 use algo::geometry::Vector;
 use appliance::station::Verdict;
 use sim::Part;
@@ -154,6 +155,34 @@ fn five_hundred_good_plates_pass_by_limits_as_taught() {
         let found = plan.inspect(0, &frames, Instant::now());
         if found.verdict() != Verdict::Pass {
             wrong.push((at, lies, found.reason));
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+}
+
+/// The least share of errors within U.
+const WITHIN: f64 = 0.95;
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn slots_and_circles_are_within_their_uncertainty_in_all_surroundings() {
+    let mut wrong = Vec::new();
+    for (name, world) in everywhere() {
+        let setting = Setting {
+            plate: thick(plate()),
+            thickness_mm: Some(1.0),
+            world,
+            some: true,
+            ..Setting::default()
+        };
+        let mut judged = Judged::default();
+        Line::new(&setting).judge(name, 6, &mut judged);
+        let [_, within, _] = judged.figures();
+        // Edges are of another promise.
+        judged.far.retain(|gauge| !gauge.contains("edge"));
+        println!("{name}: {:?} by more than 2 U", judged.far);
+        if within < WITHIN || !judged.far.is_empty() || judged.missing > 0 {
+            wrong.push((name, within, judged.far, judged.missing));
         }
     }
     assert!(wrong.is_empty(), "{wrong:#?}");

@@ -7,12 +7,14 @@ use algo::inspect::{FeatureKind, Measure};
 use appliance::recipe::{DatumFile, FeatureFile, GaugeFile};
 use sim::parts::{Floor, Hole, Plate, Slot};
 use sim::scenario::Noise;
-use sim::{Part, Placement, Scenario};
+use sim::{Ground, Part, Placement, Scenario};
 use tests::random::Random;
 
 /// Largest displacement in each direction, and largest tilt and rotation.
 const SHIFT_MM: f64 = 1.0;
 const TILT_DEG: f64 = 1.0;
+/// No corner of it moves farther.
+const TOLERANCE_MM: f64 = 5.0;
 /// z of the plate's upper side.
 pub(super) const Z_MM: f64 = 8.0;
 /// A region reaches so far beyond its contour, mm.
@@ -211,6 +213,8 @@ pub(super) struct Setting {
     pub(super) some: bool,
     /// Counts; `None` for a quiet camera.
     pub(super) noise: Option<f64>,
+    /// What the plate lies on and among.
+    pub(super) world: Option<Ground>,
 }
 
 impl Default for Setting {
@@ -224,6 +228,7 @@ impl Default for Setting {
             thickness_mm: Some(0.0),
             some: false,
             noise: Some(Noise::PAPER),
+            world: None,
         }
     }
 }
@@ -232,6 +237,7 @@ impl Setting {
     pub(super) fn scenario(&self) -> Scenario {
         let mut scenario = Scenario {
             part: Part::Plate(self.plate.clone()),
+            floor: self.world.clone(),
             ..Scenario::default()
         };
         scenario.noise.noise_counts = self.noise;
@@ -244,6 +250,14 @@ impl Setting {
         scenario
     }
 
+    /// How far the corners of a part may lie from where it was taught, mm: by default among other things.
+    pub(super) fn tolerance_mm(&self) -> f64 {
+        match self.world {
+            Some(_) => 1.0,
+            None => TOLERANCE_MM,
+        }
+    }
+
     /// The placement as taught, displaced at random.
     pub(super) fn placement(&self, random: Option<&mut Random>) -> Placement {
         let mut lies = Placement {
@@ -251,10 +265,19 @@ impl Setting {
             ..Placement::default()
         };
         if let Some(random) = random {
-            let mut between = |reach: f64| reach * (2.0 * random.share() - 1.0);
+            let reach = self.tolerance_mm() / TOLERANCE_MM;
+            let mut between = |most: f64| reach * most * (2.0 * random.share() - 1.0);
             lies.shift_mm = [(); 3].map(|()| between(SHIFT_MM));
             lies.tilt_deg = lies.tilt_deg.map(|tilt| tilt + between(TILT_DEG));
             lies.rotation_deg = between(TILT_DEG);
+            // What its floor touches stays on it.
+            if self
+                .world
+                .as_ref()
+                .is_some_and(|world| world.depth_mm == 0.0)
+            {
+                (lies.shift_mm[2], lies.tilt_deg) = (0.0, [0.0, self.tilt_deg]);
+            }
         }
         lies
     }

@@ -36,7 +36,10 @@ const SIDE: usize = 9;
 /// If the part cannot be simulated or measured.
 pub fn resolution(scene: &Scene, optics: OpticsKind) -> Result<Vec<Resolution>, MeasureError> {
     let with = |defects| Scene {
-        part: Part::SheetMetal(SheetMetal { defects }),
+        part: Part::SheetMetal(SheetMetal {
+            defects,
+            ..Default::default()
+        }),
         noise_counts: 0.0,
         ..scene.clone()
     };

@@ -49,6 +49,7 @@ impl DemoPart {
     pub fn part(&self) -> Part {
         Part::SheetMetal(SheetMetal {
             defects: self.defect.into_iter().collect(),
+            ..SheetMetal::default()
         })
     }
 }

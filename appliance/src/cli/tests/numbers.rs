@@ -27,12 +27,14 @@ enum Takes {
     Date,
     /// A defect of a simulated part.
     Defect,
+    /// A floor below a simulated part.
+    Floor,
     /// A checkerboard.
     Checker,
     /// Text, which has no numeric bounds.
     Words,
 }
-use Takes::{Address, Checker, Date, Defect, List, Number, Words};
+use Takes::{Address, Checker, Date, Defect, Floor, List, Number, Words};
 
 /// Every option and positional argument that takes neither a path nor one word of a list; `*` is
 /// every other command.
@@ -44,6 +46,7 @@ const TABLE: &[(&str, &str, Takes)] = &[
     ("history", "part", Number(0.0, 4_294_967_295.0)),
     ("*", "part", Words),
     ("*", "defect", Defect),
+    ("*", "floor", Floor),
     ("*", "shift", List(3, 1000.0)),
     ("*", "tilt", List(2, 80.0)),
     ("*", "pose", Number(1.0, 10.0)),
@@ -111,6 +114,7 @@ impl Takes {
                 let others = ["missing_hole", "bent_flange"].map(|kind| format!("{kind}:{value}"));
                 dents.chain(others).collect()
             }
+            Floor => beside(&["0.35", "20"]),
             Checker => ["{}x13:10", "9x{}:10", "9x13:{}"]
                 .map(|form| format!("checker:{}", form.replace("{}", value)))
                 .into(),
@@ -125,7 +129,7 @@ impl Takes {
             List(_, most) => vec![format!("from -{most} to {most}")],
             Address => vec!["0 to 65535".into()],
             Date => vec!["write a date".into()],
-            Defect => vec!["write ".into()],
+            Defect | Floor => vec!["write ".into()],
             Checker => vec!["write checker:".into()],
             Words => Vec::new(),
         }
@@ -190,7 +194,7 @@ fn a_boundary_value_of_an_option_is_refused_with_its_bounds_or_lies_within_them(
     }
     println!("{cases} boundary values of options, {taken} of them can be used");
     assert_eq!(known.len(), TABLE.len(), "an option is gone");
-    assert_eq!(cases, 1326);
+    assert_eq!(cases, 1428);
 }
 
 /// Checks the outcome of a case; returns whether its value was accepted.
@@ -232,7 +236,7 @@ fn check(
             assert!(numbers.iter().all(|number| number.abs() <= most), "{case}");
         }
         Address => assert!(matches.get_one::<SocketAddr>(id).is_some(), "{case}"),
-        Defect => {
+        Defect | Floor => {
             let part = SimulatedPart::from_arg_matches(&matches).unwrap();
             if let Err(refused) = part.placed(&HeadConfig::default()) {
                 assert_eq!(refused.exit, Exit::Usage, "{case}");

@@ -1,15 +1,15 @@
 //! The part in front of a simulated head: its kind, its defects and its pose, checked.
 
 use hal::bounds::clipped;
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
-use sim::parts::{Board, Defect};
-use sim::{Material, Part, Placement, Scenario};
+use sim::parts::{Across, Board, Defect, Joint, Plate};
+use sim::{Ground, Material, Part, Placement, Scenario};
 
 /// The most defects of a part: each ray is traced against all of them.
 const MAX_DEFECTS: usize = 16;
 /// Every kind of defect with the names of its numbers in their order, and an example of each.
-const DEFECTS: [(&str, &[(&str, f64)]); 3] = [
+const DEFECTS: [(&str, &[(&str, f64)]); 5] = [
     (
         "dent",
         &[
@@ -20,6 +20,11 @@ const DEFECTS: [(&str, &[(&str, f64)]); 3] = [
         ],
     ),
     ("missing_hole", &[("index", 1.0)]),
+    (
+        "displaced_hole",
+        &[("index", 1.0), ("dx", 1.0), ("dy", 0.0)],
+    ),
+    ("hole_radius", &[("index", 1.0), ("radius", 5.0)]),
     ("bent_flange", &[("degrees", 3.0)]),
 ];
 
@@ -33,6 +38,27 @@ pub struct Placed {
     pub material: Option<Material>,
     /// Where it lies.
     pub placement: Placement,
+    /// What it lies on and among, or that it lies on nothing; `None` leaves that as it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub floor: Option<Option<Ground>>,
+}
+
+/// Every part that can be put in front of a head, good and as designed.
+fn stock() -> impl Iterator<Item = Part> {
+    let joint = |across| {
+        Part::Joint(Joint {
+            across,
+            ..Joint::default()
+        })
+    };
+    let solids = [
+        Part::Plate(Plate {
+            thickness_mm: 1.0,
+            ..Plate::default()
+        }),
+        joint(Across::X),
+    ];
+    Part::stock().into_iter().chain(solids)
 }
 
 /// A part as clients write it: the part itself or the name of a stock part, with its placement or
@@ -44,6 +70,13 @@ struct PlacedFile {
     material: Option<Material>,
     placement: Option<Placement>,
     pose: Option<u8>,
+    #[serde(default, deserialize_with = "given")]
+    floor: Option<Option<Ground>>,
+}
+
+/// A value that is given, also one that says that there is none.
+fn given<'a, T: Deserialize<'a>, D: Deserializer<'a>>(from: D) -> Result<Option<T>, D::Error> {
+    T::deserialize(from).map(Some)
 }
 
 impl TryFrom<PlacedFile> for Placed {
@@ -57,7 +90,7 @@ impl TryFrom<PlacedFile> for Placed {
                 ..Self::default()
             },
         };
-        placed.material = file.material;
+        (placed.material, placed.floor) = (file.material, file.floor);
         match (file.placement, file.pose) {
             (Some(_), Some(_)) => return Err("placement and pose: write one of them".into()),
             (Some(placement), None) => placed.placement = placement,
@@ -74,10 +107,9 @@ impl Placed {
     /// # Errors
     /// If there is no such kind, naming those that there are.
     pub fn stock(kind: &str) -> Result<Self, String> {
-        let mut stock = Part::stock().into_iter();
-        let found = stock.find(|part| self::kind(part) == kind);
+        let found = stock().find(|part| self::kind(part) == kind);
         let part = found.ok_or_else(|| {
-            let kinds: Vec<String> = Part::stock().iter().map(self::kind).collect();
+            let kinds: Vec<String> = stock().map(|part| self::kind(&part)).collect();
             format!("there is no part {kind}: name one of {}", kinds.join(", "))
         })?;
         Ok(Self {
@@ -118,6 +150,7 @@ impl Placed {
         Self {
             part,
             material: self.material,
+            floor: self.floor.clone(),
             ..Self::default()
         }
     }
@@ -182,6 +215,7 @@ impl Placed {
         let scenario = Scenario {
             part: self.part.clone(),
             placement: self.placement,
+            floor: self.floor.clone().flatten(),
             ..Scenario::default()
         };
         scenario.check()
@@ -250,8 +284,7 @@ pub fn kinds() -> Vec<Value> {
         all.filter(|defect| add(&mut part.clone(), defect.clone()).is_ok())
             .collect()
     };
-    let parts = Part::stock().into_iter();
-    parts
+    stock()
         .map(|part| match part {
             Part::Board(_) => json!({ "part": part, "defects": [], "poses": Board::POSES }),
             part => json!({ "part": part, "defects": offers(&part) }),

@@ -76,7 +76,7 @@ fn every_number_is_bounded() {
 #[test]
 fn the_page_is_offered_every_stock_part_with_the_defects_that_it_can_have() {
     let kinds = kinds();
-    assert_eq!(kinds.len(), 12);
+    assert_eq!(kinds.len(), 14);
     for one in &kinds {
         let mut defective: Placed = serde_json::from_value(json!({ "part": one["part"] })).unwrap();
         let defects = one["defects"].as_array().unwrap();
@@ -86,7 +86,8 @@ fn the_page_is_offered_every_stock_part_with_the_defects_that_it_can_have() {
         defective.check().unwrap();
         let expected = match one["part"]["kind"].as_str().unwrap() {
             "sheet_metal" => 3,
-            "board" | "empty" => 0,
+            "plate" => 4,
+            "board" | "empty" | "joint" => 0,
             _ => 1,
         };
         assert_eq!(defects.len(), expected, "{one}");
@@ -166,6 +167,22 @@ fn a_part_keeps_its_material_when_its_defects_are_taken_away_and_has_none_by_its
     for (material, name) in Material::ALL {
         assert_eq!(serde_json::to_value(material).unwrap(), name);
     }
+}
+
+#[test]
+fn a_floor_is_laid_taken_away_or_left_as_it_is() {
+    let floor = |value: Value| serde_json::from_value::<Placed>(value).unwrap().floor;
+    assert_eq!(floor(json!({ "part": "plate" })), None);
+    assert_eq!(floor(json!({ "part": "plate", "floor": null })), Some(None));
+    let laid = floor(json!({ "part": "plate", "floor": { "albedo": 0.1 } }));
+    let grey = Ground {
+        albedo: 0.1,
+        ..Ground::default()
+    };
+    assert_eq!(laid, Some(Some(grey)));
+    let wrong = json!({ "part": "plate", "floor": { "albedo": 2.0 } });
+    let wrong: Placed = serde_json::from_value(wrong).unwrap();
+    assert!(wrong.check().unwrap_err().contains("albedo"));
 }
 
 #[test]

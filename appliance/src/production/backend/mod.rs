@@ -374,6 +374,7 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
     if let Some(placed) = &config.part {
         (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
         scenario.material = placed.material;
+        scenario.floor = placed.floor.clone().unwrap_or(scenario.floor);
     }
     let (mut head, stage) =
         sim::head_with_progress(&scenario, progress).map_err(Exit::Unavailable.failure())?;

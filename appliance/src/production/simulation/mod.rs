@@ -8,7 +8,7 @@
 use crate::head::placed::{Placed, kinds};
 use crate::production::Order;
 use serde_json::{Value, json};
-use sim::{Material, Stage, Staged};
+use sim::{Clamp, Ground, Material, Pin, Stage, Staged};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender, SyncSender};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -16,6 +16,23 @@ use std::time::Duration;
 
 /// Longest wait for the measuring task, which may be in the middle of a cycle.
 const PATIENCE: Duration = Duration::from_secs(3);
+
+/// An example of a floor, and of all that can stand on one.
+fn floors() -> Ground {
+    Ground {
+        pins: vec![Pin {
+            x: -85.0,
+            y: 35.0,
+            ..Pin::default()
+        }],
+        clamps: vec![Clamp {
+            low: [-100.0, -35.0, -5.0],
+            high: [-82.0, 5.0, 20.0],
+        }],
+        next_mm: Some([165.0, 0.0]),
+        ..Ground::default()
+    }
+}
 
 /// Why a part was not put in place, in words with the remedy.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -76,6 +93,8 @@ impl Simulation {
                     "part": part,
                     "material": material,
                     "placement": placement,
+                    "floor": stage.floor(),
+                    "floors": floors(),
                     "kinds": kinds(),
                     "materials": materials,
                 })
@@ -104,9 +123,13 @@ impl Simulation {
             return Err(PutError::Busy(words.into()));
         }
         let _alone = Alone(self.placing.clone());
+        let unlaid = |error: hal::error::Error| PutError::Unfit(error.to_string());
+        if let Some(floor) = &placed.floor {
+            stage.surround(floor.clone()).map_err(unlaid)?;
+        }
         let staged = stage
             .work_out(&placed.part, placed.material, &placed.placement, &|_| ())
-            .map_err(|error| PutError::Unfit(error.to_string()))?;
+            .map_err(unlaid)?;
         let (done, in_place) = mpsc::sync_channel(1);
         let waiting = Arc::new(Mutex::new(Some(staged)));
         let placing = Placing {

@@ -18,6 +18,7 @@ mod sheet;
 mod sheet_metal;
 mod solid;
 mod spline;
+mod turned_over;
 
 use serde::{Deserialize, Serialize};
 
@@ -227,7 +228,13 @@ impl Part {
             Self::Handset(_) => Box::new(Handset::surface()),
             Self::Plane(part) => Box::new(part.clone()),
             Self::Board(part) => Box::new(part.clone()),
-            Self::SheetMetal(part) => Box::new(sheet_metal::Stamping::new(part)),
+            Self::SheetMetal(part) => {
+                let stamping = Box::new(sheet_metal::Stamping::new(part));
+                match part.upside_down {
+                    true => Box::new(turned_over::TurnedOver::new(stamping)),
+                    false => stamping,
+                }
+            }
             Self::Plate(_) | Self::Joint(_) | Self::Empty {} => return None,
         };
         let is_dent = |defect: &Defect| matches!(defect, Defect::Dent { .. });

@@ -23,6 +23,9 @@ bounded! {
         /// Radius to which the upper edges of outline, holes and slots are rounded, mm. A sheet
         /// that is thinner has walls that end as deep.
         pub rim_mm: f64 = 0.0..=20.0,
+        /// Whether it lies upside down: turned over about x.
+        #[serde(skip_serializing_if = "std::ops::Not::not")]
+        pub upside_down: bool,
         /// Round holes.
         pub holes: Vec<Hole> = Fields => vec![
             Hole { x: -60.0, y: 40.0, radius: 6.0 },
@@ -111,7 +114,9 @@ impl Plate {
         self.defects
             .iter()
             .try_for_each(|defect| defect.check_hole(self.holes.len()))?;
-        let drop = self.joggle.map_or(0.0, |joggle| joggle.drop.max(0.0));
+        let drop = self
+            .joggle
+            .map_or(0.0, |joggle| (self.side() * joggle.drop).max(0.0));
         match self.floor.albedo > 0.0 {
             true => within(
                 "part.floor.depth",
@@ -123,6 +128,11 @@ impl Plate {
         }
     }
 
+    /// What becomes of y, and of drops, where it is turned over.
+    fn side(&self) -> f64 {
+        if self.upside_down { -1.0 } else { 1.0 }
+    }
+
     /// The thickness with which it is traced.
     fn sheet(&self) -> f64 {
         self.thickness_mm.max(self.rim_mm)
@@ -130,14 +140,16 @@ impl Plate {
 
     pub(super) fn solid(&self) -> Solid {
         let half = [self.width / 2.0, self.height / 2.0];
+        let side = self.side();
         let holes = self.punched().into_iter().flatten().map(|hole| Opening {
-            from: [hole.x, hole.y],
-            to: [hole.x, hole.y],
+            from: [hole.x, side * hole.y],
+            to: [hole.x, side * hole.y],
             half_width: hole.radius,
         });
+        let turned = |[x, y]: [f64; 2]| [x, side * y];
         let slots = self.slots.iter().map(|slot| Opening {
-            from: slot.from,
-            to: slot.to,
+            from: turned(slot.from),
+            to: turned(slot.to),
             half_width: slot.half_width,
         });
         let dents = self.defects.iter().filter_map(|defect| match *defect {
@@ -164,7 +176,7 @@ impl Plate {
                 .map(|joggle| Fall {
                     from: joggle.x - joggle.run / 2.0,
                     to: joggle.x + joggle.run / 2.0,
-                    drop: joggle.drop,
+                    drop: side * joggle.drop,
                 }),
             dents: dents.collect(),
             thickness: self.sheet(),

@@ -47,6 +47,9 @@ const EDGE_WIDTH: f64 = 1.6;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct SheetMetal {
+    /// Whether it lies upside down.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub upside_down: bool,
     /// Defects; a good part has none.
     pub defects: Vec<Defect>,
 }

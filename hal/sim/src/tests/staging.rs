@@ -16,7 +16,10 @@ fn against_good(stage: &Stage, defects: Vec<Defect>) -> (usize, f32) {
     let good = stage.truth().height;
     stage
         .place(
-            &Part::SheetMetal(SheetMetal { defects }),
+            &Part::SheetMetal(SheetMetal {
+                defects,
+                ..Default::default()
+            }),
             &Placement::default(),
         )
         .unwrap();
