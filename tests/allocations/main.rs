@@ -42,6 +42,7 @@ fn naming() -> Naming {
         exposures: 1,
         everything: false,
         marking: Default::default(),
+        empty: None,
         limit_mm: Some(0.15),
     }
 }

@@ -156,6 +156,28 @@ export async function part({ browser, program, step, folder }) {
       assert.equal(await marks(page, "refused"), 1);
       await page.context().close();
     });
+
+    await step("a fixture as high as the part is left out once the empty station was recorded", async () => {
+      const page = await open({ viewport: DESKTOP });
+      const clamps = [{ low: [-100, -55, -12], high: [-76, 55, 8] }];
+      const lay = (part) => page.evaluate(async (body) => (await fetch("/api/simulation/part", { method: "PUT", headers: { "Content-Type": "application/json" }, body: JSON.stringify(body) })).status, { part, floor: { depth_mm: 20, clamps } });
+      assert.equal(await lay("plate"), 200);
+      await teach(page, 6);
+      const fixture = [35, 128];
+      assert.deepEqual([await isPart(page, PLATE), await isPart(page, fixture)], [true, true]);
+      await page.click("nav a[href='#head']");
+      await page.click("#step-empty summary");
+      await page.click("#empty-place");
+      await page.waitForFunction(() => document.querySelector("#notice").textContent.includes("the part is taken away"));
+      await page.click("#step-empty button:has-text('Record the empty station')");
+      await page.waitForSelector("#step-empty[data-state=done]");
+      assert.match(await page.textContent("#step-empty .said"), /of the picture shows something without a part/);
+      assert.equal(await lay("plate"), 200);
+      await page.click("nav a[href='#recipes']");
+      await teach(page, 7);
+      assert.deepEqual([await isPart(page, PLATE), await isPart(page, fixture)], [true, false]);
+      await page.context().close();
+    });
   } finally {
     await daemon.end("SIGTERM");
     place.remove();

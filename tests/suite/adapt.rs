@@ -256,6 +256,7 @@ fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe
         exposures: 1,
         everything: false,
         marking: Default::default(),
+        empty: None,
         limit_mm: Some(0.15),
     };
     let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent()).expect("a sphere");

@@ -118,6 +118,7 @@ pub(crate) fn naming(placement_tolerance_mm: f64) -> Naming {
         exposures: 1,
         everything: false,
         marking: Default::default(),
+        empty: None,
         limit_mm: Some(0.15),
     }
 }

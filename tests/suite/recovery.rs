@@ -172,6 +172,7 @@ fn a_teach_that_is_ended_does_no_further_step() {
         exposures: 1,
         everything: false,
         marking: Default::default(),
+        empty: None,
         limit_mm: Some(0.15),
     };
     let told = Mutex::new(Vec::new());

@@ -55,6 +55,8 @@ const FLAT: f64 = 0.9;
 const BEHIND: f64 = 0.005;
 /// From a plane that not all sides show, half of what lies in front stands out by this much, mm.
 const FAR_MM: f64 = 5.0;
+/// Without a plane everything stands out by more than any surface does, mm.
+const APART_MM: f64 = 1e4;
 /// A part has at least this share of the picture.
 const LEAST_PART: f64 = 0.02;
 /// A step is over at this distance from the plane's last pixel, pixels: the height there is at least a share of
@@ -138,42 +140,53 @@ impl Surroundings {
 }
 
 /// Finds what surrounds a part in a picture of `pixels` pixels with `width` columns. `point` gives the
-/// point in mm that a pixel sees, `None` where it has no height; `sigma_mm` is the σ of a height. `None` if
-/// no plane is seen beside something that lies in front of it, and nothing was marked.
+/// point in mm that a pixel sees, `None` where it has no height; `sigma_mm` is the σ of a height. `empty` has the
+/// heights of the same pixels without a part, mm, where that was recorded: what has the same height is not of the
+/// part. `None` if no plane is seen beside something that lies in front of it, and neither was marked or recorded.
 ///
 /// # Errors
 /// If nothing stands out where a person has touched the part.
 pub fn surroundings(
-    pixels: usize,
-    width: usize,
+    (pixels, width): (usize, usize),
     sigma_mm: f64,
-    marking: &Marking,
+    (marking, empty): (&Marking, Option<&[f32]>),
     point: impl Fn(usize) -> Option<Vector>,
 ) -> Result<Option<Surroundings>, NothingTouched> {
     let size = [width, pixels / width.max(1)];
     let reach = SIGMAS * sigma_mm + ROUGH_MM;
     let all_round = all_round(&point, size, reach);
     let plane = all_round.or_else(|| flat(&point, size, sigma_mm, reach));
-    let is_marked = !marking.is_empty();
-    if plane.is_none() && !is_marked {
+    let is_told = !marking.is_empty() || empty.is_some();
+    if plane.is_none() && !is_told {
         return Ok(None);
     }
     // Without a plane nothing is behind.
-    let above = |point: Vector| plane.map_or(point.z, |plane| plane.above(point));
-    let above = |at: usize| point(at).map_or(f64::NAN, above) as f32;
+    let above = |point: Vector| plane.map_or(point.z + APART_MM, |plane| plane.above(point));
+    let heights = (0..pixels).map(|at| point(at).map_or(f64::NAN, above) as f32);
+    let heights: Vec<f32> = heights.collect();
+    let before = |at: usize| empty?.get(at).copied().filter(|z| z.is_finite());
+    let above = |at: usize| match before(at).zip(point(at)) {
+        Some((before, point)) => point.z as f32 - before,
+        None => heights[at],
+    };
     let front = Front {
         above: (0..pixels).map(above).collect(),
+        heights: &heights,
         size,
-        reach: plane.map_or(f64::NEG_INFINITY, |_| reach),
+        reach: if empty.is_some() {
+            reach * core::f64::consts::SQRT_2
+        } else {
+            reach
+        },
     };
     let [part, others] = front.part(marking)?;
     let heights = part.iter().zip(&front.above).filter(|(part, _)| **part);
     let mut heights: Vec<f64> = heights.map(|(_, above)| f64::from(*above)).collect();
-    if (heights.len() as f64) < LEAST_PART * pixels as f64 && !is_marked || heights.is_empty() {
+    if (heights.len() as f64) < LEAST_PART * pixels as f64 && !is_told || heights.is_empty() {
         return Ok(None);
     }
     let middle = quantile(&mut heights, 0.5);
-    let stands_out = is_marked || all_round.is_some() || middle >= FAR_MM;
+    let stands_out = is_told || all_round.is_some() || middle >= FAR_MM;
     Ok(stands_out.then(|| Surroundings {
         part,
         step_mm: plane.map(|_| front.step().unwrap_or(middle)),
@@ -189,15 +202,17 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
 }
 
 /// A picture of what lies in front of a plane.
-struct Front {
+struct Front<'a> {
     /// How far each pixel's point lies in front of it, mm; not a number where there is no height.
     above: Vec<f32>,
+    /// The same, also where it lies in front of what was there before: by it pieces are told apart.
+    heights: &'a [f32],
     size: [usize; 2],
     /// The plane's own pixels lie less far in front of it, mm.
     reach: f64,
 }
 
-impl Front {
+impl Front<'_> {
     /// Whether a pixel is not the plane's own.
     fn is_apart(&self, at: usize) -> bool {
         !(f64::from(self.above[at]) <= self.reach)
@@ -211,7 +226,7 @@ impl Front {
         let is_front = |at: usize| apart[at] && !self.above[at].is_nan();
         let jumps = |at: usize| {
             let beside = beside(at, self.size).filter(|next| is_front(*next));
-            let mut off = beside.map(|next| (self.above[next] - self.above[at]).abs());
+            let mut off = beside.map(|next| (self.heights[next] - self.heights[at]).abs());
             off.any(|off| f64::from(off) > JUMP_MM)
         };
         let smooth: Vec<bool> = (0..pixels).map(|at| is_front(at) && !jumps(at)).collect();
@@ -465,7 +480,7 @@ mod tests {
         marking: &Marking,
         height: impl Fn(f64, f64) -> f64,
     ) -> Result<Option<Surroundings>, NothingTouched> {
-        surroundings(WIDTH * ROWS, WIDTH, 0.02, marking, |at| {
+        surroundings((WIDTH * ROWS, WIDTH), 0.02, (marking, None), |at| {
             let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
             let z = height(u, v);
             z.is_finite()
@@ -668,7 +683,8 @@ mod tests {
                 0.15 * (twelve.sum::<f64>() - 6.0)
             })
             .collect();
-        let found = surroundings(WIDTH * ROWS, WIDTH, 0.15, &Marking::default(), |at| {
+        let nothing = (&Marking::default(), None);
+        let found = surroundings((WIDTH * ROWS, WIDTH), 0.15, nothing, |at| {
             let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
             let z = if u > 80.0 {
                 0.0
@@ -679,5 +695,34 @@ mod tests {
         });
         let ground = found.unwrap().unwrap().ground.unwrap();
         assert!((ground[0] + 20.24).abs() < 0.05, "{ground:?}");
+    }
+
+    #[test]
+    fn what_the_empty_station_shows_is_not_the_part_though_it_is_larger_and_touches_it() {
+        // A block as high as the plate, beside it.
+        let is_block = |u: f64, v: f64| within(u, [91.0, 118.0]) && within(v, [5.0, 95.0]);
+        let station = |u: f64, v: f64| if is_block(u, v) { 0.1 } else { -10.0 };
+        let height = |u: f64, v: f64| {
+            let is_plate = within(u, [30.0, 90.0]) && within(v, [25.0, 75.0]);
+            if is_plate { 0.0 } else { station(u, v) }
+        };
+        let at = |at: usize| ((at % WIDTH) as f64, (at / WIDTH) as f64);
+        let empty: Vec<f32> = (0..WIDTH * ROWS)
+            .map(|of| station(at(of).0, at(of).1) as f32)
+            .collect();
+        let found = |empty: Option<&[f32]>| {
+            let told = (&Marking::default(), empty);
+            let found = surroundings((WIDTH * ROWS, WIDTH), 0.02, told, |of| {
+                let (u, v) = at(of);
+                Some(Vector::new(u * PITCH_MM, v * PITCH_MM, height(u, v)))
+            });
+            found.unwrap().unwrap()
+        };
+        let places = [50 * WIDTH + 60, 50 * WIDTH + 105];
+        let [alone, among] =
+            [found(Some(&empty)), found(None)].map(|found| places.map(|at| found.part[at]));
+        assert_eq!((alone, among), ([true, false], [true, true]));
+        let nothing = vec![f32::NAN; WIDTH * ROWS];
+        assert_eq!(found(Some(&nothing)).part, found(None).part);
     }
 }

@@ -7,6 +7,7 @@ use super::part::SimulatedPart;
 use crate::config::Config;
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
+use crate::head::empty::EmptyStation;
 use crate::head::rasters::Illumination;
 use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, Opened};
@@ -25,6 +26,7 @@ use algo::frame::SampleNoise;
 use hal::bounds::text;
 use hal::replay::Recording;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Duration;
 
 /// Make a recipe from a good part.
@@ -249,6 +251,13 @@ impl Teach {
         let on_progress = |share: f64| progress.tell(share, "working out the light of the scene");
         let opened = pool.install(|| backend::open(&options.files.head(config), &on_progress))?;
         opened.calibrated()?;
+        let place = options.files.head(config).calibration;
+        let empty = place.map(|place| EmptyStation::load(&place, &opened.calibration));
+        let empty = empty.transpose().map_err(Exit::Content.because("teach"))?;
+        let naming = &Naming {
+            empty: empty.flatten().map(Arc::new),
+            ..naming.clone()
+        };
         let Opened {
             mut head,
             calibration,

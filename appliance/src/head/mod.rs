@@ -11,6 +11,7 @@ pub mod code;
 pub mod commission;
 pub mod direction;
 pub mod doctor;
+pub mod empty;
 pub mod examine;
 pub mod exposing;
 pub mod geometry;

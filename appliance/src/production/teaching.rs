@@ -3,12 +3,14 @@
 
 use super::telling::Telling;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, recovery};
+use crate::head::empty::EmptyStation;
 use crate::recipe::teach::{TaughtRecipe, TeachError, teach_showing};
 use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, Teaching, error_code};
 use crate::system::headway::Headway;
 use crate::system::memory;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 /// The shares of a teach's time after which the recipe is taught, its gauges are settled, the
 /// geometry is checked, and it is stored.
@@ -88,6 +90,7 @@ impl Worker {
         let mut naming = replace::naming(number, replaced, keep_gauges);
         naming.everything = everything.unwrap_or(naming.everything);
         naming.marking = marking.clone().unwrap_or(naming.marking);
+        naming.empty = self.empty_station();
         naming.limit_mm = limit_um
             .map(|um| f64::from(um) / 1000.0)
             .or(naming.limit_mm);
@@ -123,6 +126,14 @@ impl Worker {
         let packed =
             settled.and_then(|settled| self.computing.on(|| settled.seal_telling(packing)));
         packed.map_err(TeachError::Rig)
+    }
+
+    /// What the station shows without a part, if it was recorded.
+    fn empty_station(&self) -> Option<Arc<EmptyStation>> {
+        let place = self.config.calibration.as_deref()?;
+        let loaded = EmptyStation::load(place, &self.opened.calibration);
+        let loaded = loaded.map_err(|words| self.progress.warn(&words));
+        loaded.ok()?.map(Arc::new)
     }
 
     /// ERROR_CODE and words of a failure; a lost head is remembered.

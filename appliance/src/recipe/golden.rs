@@ -12,6 +12,7 @@ use super::sides::SIDES;
 use super::surroundings;
 use super::{AlignmentKind, FeatureFile, GaugeFile, PatternFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
+use crate::head::empty::EmptyStation;
 use crate::head::rasters::Illumination;
 use crate::system::headway::Headway;
 use algo::adaptive::phase_reach;
@@ -22,6 +23,7 @@ use algo::pattern::Shot;
 use algo::phase::{Decoder, Trust};
 use algo::pipeline::{self, HeightMap, KnownSurface, PhaseMap};
 use std::io::Cursor;
+use std::sync::Arc;
 
 /// The area where deviations are compared is eroded by this many pixels on each side: pixels at
 /// silhouettes mix two surfaces.
@@ -64,6 +66,8 @@ pub struct Naming {
     pub everything: bool,
     /// What a person has marked in the picture.
     pub marking: Marking,
+    /// What is seen without a part, if it was recorded.
+    pub empty: Option<Arc<EmptyStation>>,
     /// The limit of the deviation, ± mm, that good parts must keep; `None` where teaching promises none.
     pub limit_mm: Option<f64>,
 }

@@ -47,6 +47,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>, keep_gauges: bool) -> 
         exposures,
         everything: replaced.is_some_and(|file| file.everything),
         marking: replaced.map_or_else(Marking::default, |file| file.marking.clone()),
+        empty: None,
         limit_mm: match replaced {
             Some(file) if keep_gauges => kept_limit(file),
             Some(file) => Some(file.good_parts.map_or(DEVIATION_MM, |of| of.tolerance_mm)),

@@ -66,7 +66,8 @@ pub fn of(
     let middle = sigmas.len() / 2;
     let sigma = f64::from(*sigmas.select_nth_unstable_by(middle, f32::total_cmp).1);
     let point = |at: usize| triangulator.point(at % width, at / width, heights.height[at]);
-    let found = inspect::surroundings(pixels, width, sigma, &naming.marking, point);
+    let empty = naming.empty.as_ref().map(|empty| &empty.heights[..]);
+    let found = inspect::surroundings((pixels, width), sigma, (&naming.marking, empty), point);
     let found = found.map_err(|missed| TeachError::Scene(missed.to_string()))?;
     let away = window::pixels(triangulator, naming.placement_tolerance_mm);
     Ok(found.map(|found| found.clear_of_others(width, away)))

@@ -55,6 +55,7 @@ impl Bed {
             exposures: 1,
             everything: false,
             marking: Default::default(),
+            empty: None,
             limit_mm: Some(0.15),
         };
         let taught = teach(&mut head, &calibration, &naming, TIMEOUT, Headway::silent()).unwrap();

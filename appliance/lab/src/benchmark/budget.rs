@@ -129,6 +129,7 @@ pub fn budgets(
         exposures: 1,
         everything: false,
         marking: Default::default(),
+        empty: None,
         limit_mm: Some(0.15),
     };
     progress(0.3, &format!("{about}: teaching"));

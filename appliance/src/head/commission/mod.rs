@@ -5,6 +5,7 @@
 //! [`Step::run`] works on the head and on the [`Commissioning`] that is kept; who owns both, and
 //! who asks for steps, is decided elsewhere.
 
+mod empty;
 mod file;
 mod geometry;
 mod laid;
@@ -47,7 +48,7 @@ pub const TIMING: &str = "timing";
 pub const PLANE: &str = "plane";
 
 /// The steps in their order.
-pub static STEPS: [Step; 6] = [
+pub static STEPS: [Step; 7] = [
     Step {
         name: "devices",
         measure: |subject, _| {
@@ -76,6 +77,11 @@ pub static STEPS: [Step; 6] = [
     Step {
         name: PLANE,
         measure: plane::measure,
+    },
+    // May be left out, and be done again.
+    Step {
+        name: "empty",
+        measure: empty::measure,
     },
 ];
 

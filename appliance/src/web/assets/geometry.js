@@ -140,6 +140,7 @@ export function start() {
     ["board-place", () => ({ part: "board", pose: Number($("board-pose").value) }), "the board is in place"],
     ["plate-place", () => ({ part: "plane" }), "the plate is in place"],
     ["part-place", () => ({ part: "sheet_metal" }), "a good part is in place"],
+    ["empty-place", () => ({ part: "empty" }), "the part is taken away"],
   ];
   for (const [id, wanted, words] of putters) {
     $(id).addEventListener("click", () => place(wanted(), words));

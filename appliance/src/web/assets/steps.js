@@ -6,7 +6,9 @@ import { moment } from "./number.js";
 import { exposure } from "./live.js";
 import { teachNext } from "./recipes.js";
 
-const NAMES = ["devices", "aim", "exposure", "timing", "geometry", "plane", "teach"];
+const NAMES = ["devices", "aim", "exposure", "timing", "geometry", "plane", "teach", "empty"];
+// The last one may be left out.
+const NEEDED = NAMES.length - 1;
 const STATES = { open: ["", "to do"], running: ["…", "running"], done: ["✓", "done"], failed: ["✗", "failed"] };
 const state = { next: "", ended: "", states: {} };
 
@@ -64,11 +66,11 @@ function showStep(step, running, busy) {
 // The next step, if there is one: the first that is not done, on a calibrated head only teaching. It is opened when it becomes the next. The
 // step before it stays open with what it has found, the one before that is folded; what somebody opens or closes stays so.
 function advance({ calibrated, steps, problem }) {
-  const next = steps.find((step) => step.state !== "done" && (!calibrated || step.name === "teach"));
+  const next = steps.find((step) => step.name !== "empty" && step.state !== "done" && (!calibrated || step.name === "teach"));
   const name = next ? next.name : "";
   show("bare", !calibrated);
   text("bare-problem", (problem || "").replace(/`/g, ""));
-  text("bare-next", next ? `step ${NAMES.indexOf(name) + 1} of ${NAMES.length}, ${title(name)}` : "");
+  text("bare-next", next ? `step ${NAMES.indexOf(name) + 1} of ${NEEDED}, ${title(name)}` : "");
   if (name === state.next) return;
   if (state.ended && state.ended !== name) $(`step-${state.ended}`).open = false;
   state.ended = state.next;
