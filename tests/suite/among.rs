@@ -256,3 +256,36 @@ fn what_is_wrong_with_parts_in_all_surroundings_is_found() {
     println!("{} of {} not found", missed.passed.len(), missed.of);
     assert!(missed.passed.is_empty(), "{:?}", missed.passed);
 }
+
+#[test]
+fn a_floor_is_seen_where_lines_of_sight_meet_it() {
+    let (depth_mm, tilt_deg) = (20.0, [1.0, -2.0]);
+    let floor = Ground {
+        depth_mm,
+        tilt_deg,
+        ..Ground::default()
+    };
+    let bed = bed(&scenario(&plate(), Some(floor)));
+    let camera = &bed.calibration.camera;
+    let [a, b] = tilt_deg.map(f64::to_radians);
+    // Turned about x, then about y.
+    let normal = Vector::new(a.cos() * b.sin(), -a.sin(), a.cos() * b.cos());
+    // The lower side of the plate is at z = 7.
+    let point = Vector::new(0.0, 0.0, 7.0 - depth_mm);
+    let (width, truth) = (camera.width(), bed.stage.truth());
+    let mut compared = 0;
+    for (at, height) in truth.height.iter().enumerate() {
+        let (u, v) = ((at % width) as f64, (at / width) as f64);
+        let (eye, ray) = (camera.centre(), camera.ray(u, v).unwrap());
+        let met = eye + ray * (normal.dot(point - eye) / normal.dot(ray));
+        // The plate's upper side is at z = 8.
+        let above = eye + ray * ((8.0 - eye.z) / ray.z);
+        let is_beside = |at: Vector| at.x.abs() > 85.0 || at.y.abs() > 65.0;
+        if is_beside(met) && is_beside(above) && height.is_finite() {
+            let off = (f64::from(*height) - met.z).abs();
+            assert!(off < 0.01, "({u}, {v}): {off}");
+            compared += 1;
+        }
+    }
+    assert!(compared > 50_000, "{compared}");
+}

@@ -114,7 +114,7 @@ fn a_bare_head_is_commissioned_over_the_page_and_then_judges_parts_right() {
     assert!(head["problem"].as_str().unwrap().contains("not calibrated"));
     let steps = head["steps"].as_array().unwrap();
     assert!(
-        steps.len() == 7 && steps.iter().all(|step| step["state"] == "open"),
+        steps.len() == 8 && steps.iter().all(|step| step["state"] == "open"),
         "{head}"
     );
     let refusal = technician.browser.get("/api/snapshot")["refusal"]["words"].clone();

@@ -6,6 +6,7 @@ mod feature;
 mod gauge;
 pub mod good;
 mod largest;
+mod marking;
 mod mask;
 mod missed;
 mod normal_shares;
@@ -27,6 +28,7 @@ pub use gauge::{
     Square, Unit, Value, kinds, makes_datum,
 };
 pub use largest::Largest;
+pub use marking::{Marking, NothingTouched};
 pub(crate) use mask::components;
 pub use mask::eroded;
 pub use missed::Missed;
@@ -39,6 +41,6 @@ pub use strips::{
     Lost, MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Place,
     Production, Profile, SeenRim, Signal, Skipped, Strips, Unmeasurable,
 };
-pub use surroundings::{Marking, NothingTouched, Surroundings, surroundings};
+pub use surroundings::{Surroundings, surroundings};
 pub use taught::Taught;
 pub use weight::{Factor, Weight};

@@ -21,6 +21,7 @@
 //! A person may say otherwise ([`Marking`]): which pieces are the part and which are not, and an outline inside which
 //! all pieces are.
 
+use super::marking::{Marking, NothingTouched};
 use super::mask::{components, eroded};
 use super::region::polygon_spans;
 use crate::geometry::Vector;
@@ -77,36 +78,6 @@ const PIECE: f64 = 0.1;
 
 /// A touch means the piece that is nearest to it within so many pixels.
 const TOUCH: isize = 8;
-
-/// What a person says of which pixels are the part, by places (column, row) of the frame. A touch counts more than the
-/// outline.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
-pub struct Marking {
-    /// Corners of a polygon with the whole part inside; none where nothing was marked.
-    pub outline: Vec<[u16; 2]>,
-    /// Places on pieces of the part.
-    pub part: Vec<[u16; 2]>,
-    /// Places on pieces that are not of the part.
-    pub others: Vec<[u16; 2]>,
-}
-
-impl Marking {
-    /// Whether nothing was said.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.outline.is_empty() && self.part.is_empty() && self.others.is_empty()
-    }
-}
-
-/// No piece stands out where a person has touched the part.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "nothing stands out about column {}, row {} from what it lies on: touch the part elsewhere, or draw an outline around it",
-    .0[0], .0[1]
-)]
-pub struct NothingTouched(pub [u16; 2]);
 
 /// What surrounds a part.
 #[derive(Clone, Debug, PartialEq)]

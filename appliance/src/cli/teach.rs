@@ -323,7 +323,7 @@ impl Teach {
         let full = &measured.shots;
         let signal = captures::recorded_signal(&recording, at).map_err(|error| wrong(&error))?;
         let (mut phases, mut heights) = (phases.clone(), surface.map.clone());
-        let found = surroundings::of(&heights, &surface.triangulator, naming);
+        let found = surroundings::of(&heights, &surface.triangulator, naming.told());
         let found = found.map_err(|error| wrong(&error))?;
         if let Some(found) = &found {
             surroundings::leave_out(found, &mut phases, &mut heights);

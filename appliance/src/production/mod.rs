@@ -29,7 +29,6 @@ use crate::production::drift::Watch;
 use crate::production::latest::LastCycleRequests;
 use crate::production::shelf::Shelf;
 use crate::production::simulation::Placing;
-use crate::recipe::part_seen::LastSeen;
 use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::store::Stamp;
 use crate::recipe::{LoadError, Store};
@@ -116,7 +115,7 @@ pub struct Worker {
     /// The part that is put in front of a simulated head once a good one is taught.
     pub waiting: Option<Placed>,
     /// What teaching took for the part.
-    pub seen: LastSeen,
+    pub seen: crate::recipe::part_seen::LastSeen,
     /// Steps of commissioning, and what they have found.
     pub commission: Commission,
     /// Whether the projector has the patterns for live pictures behind those of the recipe.

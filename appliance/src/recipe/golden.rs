@@ -9,7 +9,7 @@ use super::good_parts::DEVIATION_MM;
 use super::models::ModelsFile;
 use super::planner::{self, Choice};
 use super::sides::SIDES;
-use super::surroundings;
+use super::surroundings::{self, Told};
 use super::{AlignmentKind, FeatureFile, GaugeFile, PatternFile, Recipe, RecipeFile};
 use crate::head::calibration::Calibration;
 use crate::head::empty::EmptyStation;
@@ -70,6 +70,18 @@ pub struct Naming {
     pub empty: Option<Arc<EmptyStation>>,
     /// The limit of the deviation, ± mm, that good parts must keep; `None` where teaching promises none.
     pub limit_mm: Option<f64>,
+}
+
+impl Naming {
+    /// What is said of the part's surroundings.
+    pub fn told(&self) -> Told<'_> {
+        Told {
+            everything: self.everything,
+            marking: &self.marking,
+            empty: self.empty.as_deref(),
+            tolerance_mm: self.placement_tolerance_mm,
+        }
+    }
 }
 
 /// A measured golden part.

@@ -1,8 +1,8 @@
 //! Leaves out what a part lies on and what lies beside it, before golden is made.
 
 use super::failure::TeachError;
-use super::golden::Naming;
 use super::plan::window;
+use crate::head::empty::EmptyStation;
 use algo::geometry::Triangulator;
 use algo::inspect::{self, Marking, Surroundings};
 use algo::phase::Trust;
@@ -40,17 +40,29 @@ pub fn check_marking(marking: &Marking) -> Result<(), String> {
     Ok(())
 }
 
-/// The surroundings of a measured part that may be displaced by as much as `naming` says; `None` if nothing but the part
-/// is seen.
+/// What is known of a part's surroundings before it is measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Told<'a> {
+    /// Whether all that is seen is the part.
+    pub everything: bool,
+    /// What a person has marked.
+    pub marking: &'a Marking,
+    /// What is seen without a part, if it was recorded.
+    pub empty: Option<&'a EmptyStation>,
+    /// How far parts may be displaced, mm.
+    pub tolerance_mm: f64,
+}
+
+/// The surroundings of a measured part; `None` if nothing but the part is seen.
 ///
 /// # Errors
 /// If nothing stands out where a person has touched the part.
 pub fn of(
     heights: &HeightMap,
     triangulator: &Triangulator,
-    naming: &Naming,
+    told: Told<'_>,
 ) -> Result<Option<Surroundings>, TeachError> {
-    if naming.everything {
+    if told.everything {
         return Ok(None);
     }
     let (width, pixels) = (heights.width, heights.height.len());
@@ -66,10 +78,10 @@ pub fn of(
     let middle = sigmas.len() / 2;
     let sigma = f64::from(*sigmas.select_nth_unstable_by(middle, f32::total_cmp).1);
     let point = |at: usize| triangulator.point(at % width, at / width, heights.height[at]);
-    let empty = naming.empty.as_ref().map(|empty| &empty.heights[..]);
-    let found = inspect::surroundings((pixels, width), sigma, (&naming.marking, empty), point);
+    let empty = told.empty.map(|empty| &empty.heights[..]);
+    let found = inspect::surroundings((pixels, width), sigma, (told.marking, empty), point);
     let found = found.map_err(|missed| TeachError::Scene(missed.to_string()))?;
-    let away = window::pixels(triangulator, naming.placement_tolerance_mm);
+    let away = window::pixels(triangulator, told.tolerance_mm);
     Ok(found.map(|found| found.clear_of_others(width, away)))
 }
 
@@ -94,15 +106,15 @@ pub fn words(surroundings: &Surroundings) -> String {
         ..
     } = surroundings;
     let share = |of: &[bool]| of.iter().filter(|is| **is).count() as f64 / of.len().max(1) as f64;
-    let stands_out = step_mm.map_or(String::new(), |step| {
-        format!(" and stands out from what it lies on by {step:.2} mm or more")
-    });
     let others = match share(others) * 100.0 {
         percent if percent < 0.05 => String::new(),
         percent => format!("; other things on {percent:.1} % of the picture are left out"),
     };
-    format!(
-        "the part is {:.1} % of the picture{stands_out}{others}",
-        share(part) * 100.0
-    )
+    let percent = share(part) * 100.0;
+    match step_mm {
+        Some(step) => format!(
+            "the part is {percent:.1} % of the picture and stands out from what it lies on by {step:.2} mm or more{others}"
+        ),
+        None => format!("the part is {percent:.1} % of the picture, as it was told{others}"),
+    }
 }

@@ -100,7 +100,8 @@ pub fn teach_showing(
         first = head.measure_lit(&illumination, function, shots, None, &measured)?;
     }
     refuse_empty(&first.phases)?;
-    let found = computing.on(|| surroundings::of(&first.heights, &first.triangulator, naming));
+    let found =
+        computing.on(|| surroundings::of(&first.heights, &first.triangulator, naming.told()));
     let full_scale = first.decoder.full_scale();
     let shown = |part| seen.show(PartSeen::of(&first.phases, full_scale, part));
     let found = found.inspect_err(|_| shown(None))?;
