@@ -12,8 +12,8 @@ use tests::random::Random;
 
 /// Components of a motion that heights of a flat plate leave open: x, y in mm, the turn about z in degrees.
 const OPEN: [usize; 3] = [0, 1, 5];
-/// Largest RMS of their errors.
-const LARGEST_RMS: [f64; 3] = [0.002, 0.002, 0.002];
+/// Largest RMS of their errors that is promised.
+const LARGEST_RMS: [f64; 3] = [0.01, 0.01, 0.01];
 /// So many σ are exceeded by none of a few values.
 const SURE: f64 = 4.0;
 
