@@ -178,19 +178,38 @@ fn strange(path: &Path, (application, version): (i64, i64)) -> HistoryError {
     }
 }
 
+/// What SQLite says where a table or a column is gone.
+const OTHER_TABLES: [&str; 3] = ["no such table", "no such column", "has no column named"];
+
 /// Whether an error says that the file itself is damaged, so that trying again cannot help.
 pub(super) fn means_damage(error: &rusqlite::Error) -> bool {
     let codes = [ErrorCode::DatabaseCorrupt, ErrorCode::NotADatabase];
-    error
-        .sqlite_error_code()
-        .is_some_and(|code| codes.contains(&code))
+    let words = error.to_string();
+    let code = error.sqlite_error_code();
+    code.is_some_and(|code| codes.contains(&code))
+        || OTHER_TABLES.iter().any(|other| words.contains(other))
 }
 
-/// What SQLite's check of the database finds wrong first.
+/// Asks for every column that this program writes.
+fn all_columns(connection: &Connection) -> rusqlite::Result<()> {
+    let tables = [("result", Entry::COLUMNS), ("gauge", GaugeEntry::COLUMNS)];
+    for (table, columns) in tables {
+        let names = columns.iter().filter_map(|column| column.split(' ').next());
+        let names: Vec<&str> = names.collect();
+        connection.prepare(&format!("SELECT {} FROM {table}", names.join(", ")))?;
+    }
+    connection.prepare("SELECT id FROM history")?;
+    connection.prepare("SELECT boot_id, browser_utc_us FROM start")?;
+    Ok(())
+}
+
+/// What SQLite's check of the database finds wrong first, or which table or column is missing.
 pub(super) fn complaint(connection: &Connection) -> Option<String> {
     let check = connection.query_row("PRAGMA quick_check(1)", (), |row| row.get::<_, String>(0));
     match check {
-        Ok(answer) if answer == "ok" => None,
+        Ok(answer) if answer == "ok" => {
+            all_columns(connection).err().map(|error| error.to_string())
+        }
         Ok(complaint) => Some(complaint),
         Err(error) => Some(error.to_string()),
     }

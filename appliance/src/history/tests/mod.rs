@@ -324,6 +324,37 @@ fn a_damaged_database_is_set_aside_with_a_message_and_a_new_one_begun() {
 }
 
 #[test]
+fn a_database_without_a_table_or_a_column_is_set_aside_when_it_is_opened_and_while_it_is_used() {
+    for change in [
+        "ALTER TABLE result DROP COLUMN fitness_permille",
+        "ALTER TABLE gauge RENAME COLUMN sigma TO spread",
+        "DROP TABLE gauge",
+    ] {
+        let state = tempfile::tempdir().unwrap();
+        let path = state.path().join(DATABASE);
+        bounded(state.path(), ENOUGH).store(some(3).iter()).unwrap();
+        let alter = |path| {
+            let other = rusqlite::Connection::open(path).unwrap();
+            other.execute_batch(change).unwrap();
+        };
+        alter(&path);
+        let (mut writer, complaint) = Writer::open(&path, ENOUGH).unwrap();
+        let complaint = complaint.unwrap();
+        assert!(
+            complaint.contains("history.damaged.db"),
+            "{change}: {complaint}"
+        );
+        writer.store(some(2).iter()).unwrap();
+        alter(&path);
+        let error = writer.store(some(1).iter()).unwrap_err();
+        assert!(error.aside.is_some(), "{change}: {error}");
+        writer.begin_anew(&error).unwrap();
+        writer.store(some(2).iter()).unwrap();
+        assert_eq!(seqs(&Reader::of(state.path()), &Filter::default()), [2, 1]);
+    }
+}
+
+#[test]
 fn csv_has_a_line_per_result_and_a_column_per_gauge() {
     let state = tempfile::tempdir().unwrap();
     bounded(state.path(), ENOUGH).store(some(2).iter()).unwrap();
