@@ -42,7 +42,7 @@ impl Fault {
         Self {
             code: error_code::DEADLINE,
             cause: format!("the measuring task was given {} ms to {waiting_for} and did not answer", limit.0 / 1000).into(),
-            remedy: "wait until the heartbeat runs again, then set ERROR_RESET; if it stays still, restart fringed".into(),
+            remedy: "wait until the heartbeat runs again, then reset errors (ERROR_RESET); if it stays still, restart fringed".into(),
             since,
             cleared_by: ClearedBy::SignOfLife,
         }

@@ -63,9 +63,15 @@ pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Result<Accepted> 
     Ok(accepted())
 }
 
-pub(super) async fn reset(site: Site, headers: HeaderMap) -> Accepted {
-    edge(&site, ERROR_RESET, &headers);
-    accepted()
+pub(super) async fn reset(site: Site, headers: HeaderMap) -> Result<Accepted> {
+    let after = edge(&site, ERROR_RESET, &headers);
+    match &after.fault {
+        None => Ok(accepted()),
+        Some(fault) => Err(Problem::busy(format!(
+            "reset errors: the fault stays: {}; {}",
+            fault.cause, fault.remedy
+        ))),
+    }
 }
 
 pub(super) async fn load(site: Site, Path(number): Path<u16>) -> Result<Accepted> {

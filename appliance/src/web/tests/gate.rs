@@ -113,6 +113,25 @@ async fn the_cookie_is_kept_from_scripts_and_other_sites_and_ends_with_the_sessi
 }
 
 #[tokio::test]
+async fn a_reset_that_a_fault_outlasts_says_so_with_the_remedy() {
+    let served = served().await;
+    let cookie = served.sign_in().await;
+    let reset = || served.change("POST", "/api/reset", &cookie, "");
+    served.handle.event(Event::Started {});
+    served.handle.event(Event::Faulted {
+        error_code: 101,
+        cause: "the camera is gone".into(),
+        remedy: "check its cable".into(),
+    });
+    let refused = reset().await;
+    assert_eq!(refused.status, 409, "{refused:?}");
+    let words = "the fault stays: the camera is gone; check its cable";
+    assert!(refused.body.contains(words), "{refused:?}");
+    served.handle.event(Event::Recovered { recipe: None });
+    assert_eq!(reset().await.status, 202);
+}
+
+#[tokio::test]
 async fn wrong_secrets_are_refused_and_then_have_to_wait() {
     let served = served().await;
     for _ in 0..3 {
