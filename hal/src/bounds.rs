@@ -168,7 +168,15 @@ pub fn within<T: PartialOrd + Debug + Copy>(
     Err(format!("{key} is {value:?}: write {low:?} to {high:?}"))
 }
 
-/// Checks that a text has at most `most` characters and no control characters.
+/// Characters that show nothing, or turn the direction of what stands beside them, so that two texts that look alike
+/// differ. Joiners are none: emoji and scripts need them.
+fn is_hidden(letter: char) -> bool {
+    matches!(letter,
+        '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}'
+        | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+}
+
+/// Checks that a text has at most `most` characters, no control characters, and none that show nothing.
 ///
 /// # Errors
 /// A message that names the key.
@@ -183,6 +191,9 @@ pub fn text(key: &str, value: &str, most: usize) -> Result<(), String> {
     match value.chars().any(char::is_control) {
         true => Err(format!(
             "{key} {value:?} has control characters: write it in one line of plain text"
+        )),
+        false if value.chars().any(is_hidden) => Err(format!(
+            "{key} {value:?} has characters that cannot be seen or turn the direction of others: write it without them"
         )),
         false => Ok(()),
     }
@@ -310,5 +321,11 @@ mod tests {
         assert!(short.chars().count() < LONGEST_MESSAGE, "{short}");
         text("name", "a\u{1b}[2J", 64).unwrap_err();
         text("name", "Gehäuse 7", 9).unwrap();
+        // Turned about, of no width, and a woman who works, who is joined.
+        for hidden in ["a\u{202e}b", "a\u{200b}b", "\u{feff}a", "\u{2066}a"] {
+            let words = text("name", hidden, 9).unwrap_err();
+            assert!(words.contains("cannot be seen"), "{words}");
+        }
+        text("name", "\u{1f469}\u{200d}\u{1f3ed}", 9).unwrap();
     }
 }
