@@ -6,7 +6,7 @@ use axum::http::header;
 use axum::response::IntoResponse;
 
 use super::site::Site;
-use crate::station::snapshot::status;
+use crate::station::snapshot::{status, warning};
 use crate::station::{Health, Power, ResultRecord};
 
 const KIND: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
@@ -53,7 +53,14 @@ pub(super) fn text(site: &Site) -> String {
         now.uptime_s,
         "Time since the start.",
     );
+    let name = "fringed_warning";
+    out.family(name, "gauge", "1 for each warning that is on: bits of register 103.");
+    for (bit, warning) in warning::NAMES.iter().enumerate() {
+        let is_on = truth(now.warnings >> bit & 1 != 0);
+        out.sample(name, &[("warning", &*warning.to_lowercase())], is_on);
+    }
     out.health(&now.health);
+    out.wear(&now.health);
     let counts = now.counts;
     out.family(
         "fringed_results",
@@ -128,6 +135,57 @@ impl Text {
         if let Some(drift) = health.drift {
             let meaning = "Distance of projector points from their epipolar lines at the last check, RMS, projector pixels.";
             self.gauge("fringed_drift_pixels", drift.rms_px, meaning);
+        }
+    }
+
+    /// What fills up, gets lost or is started again.
+    fn wear(&mut self, health: &Health) {
+        let (system, pace) = (&health.system, &health.pace);
+        const MIB: u64 = 1 << 20;
+        for (name, mib, meaning) in [
+            (
+                "fringed_free_storage_bytes",
+                system.free_storage_mib,
+                "Room in the state folder.",
+            ),
+            (
+                "fringed_free_memory_bytes",
+                system.free_memory_mib,
+                "Memory that a program could still get.",
+            ),
+        ] {
+            if let Some(mib) = mib {
+                self.gauge(name, (mib * MIB) as f64, meaning);
+            }
+        }
+        for (name, count, meaning) in [
+            (
+                "fringed_starts",
+                system.boots,
+                "Starts with this state folder.",
+            ),
+            (
+                "fringed_unclean_starts",
+                system.unclean_boots,
+                "Starts after a crash, a kill or a loss of power.",
+            ),
+            (
+                "fringed_dropped_frames",
+                pace.dropped,
+                "Frames that the camera did not deliver, since the start.",
+            ),
+            (
+                "fringed_missed_flips",
+                pace.missed_flips,
+                "Refreshes that the projector missed, since the start.",
+            ),
+            (
+                "fringed_storage_errors",
+                health.storage_errors,
+                "Writes that failed, since the start.",
+            ),
+        ] {
+            self.counter(name, count, meaning);
         }
     }
 

@@ -133,7 +133,14 @@ async fn power_and_projector_are_shown_where_they_are_known_and_left_out_of_metr
     served.handle.event(Event::Surveyed(System {
         power: Some(Power::of(0x1_0000, None)),
         kernel: Some([6, 12]),
+        free_storage_mib: Some(3000),
+        boots: 7,
+        unclean_boots: 2,
         ..System::default()
+    }));
+    served.handle.event(Event::Paced(Pace {
+        dropped: 3,
+        ..Pace::default()
     }));
     served.handle.event(Event::Projector(ProjectorHealth {
         temperature_c: Some(41.2),
@@ -155,6 +162,12 @@ async fn power_and_projector_are_shown_where_they_are_known_and_left_out_of_metr
         "fringed_power 16\n",
         "fringed_projector_fault 2\n",
         "fringed_led_current_steps 600\n",
+        "fringed_warning{warning=\"clock_unsynced\"} 1\n",
+        "fringed_warning{warning=\"storage\"} 0\n",
+        "fringed_free_storage_bytes 3145728000\n",
+        "fringed_starts_total 7\n",
+        "fringed_unclean_starts_total 2\n",
+        "fringed_dropped_frames_total 3\n",
     ] {
         assert!(metrics.contains(sample), "{metrics}");
     }
