@@ -24,10 +24,20 @@ impl Marking {
     }
 }
 
-/// No piece stands out where a person has touched the part.
+/// No part is seen where one is said to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "nothing stands out about column {}, row {} from what it lies on: touch the part elsewhere, or draw an outline around it",
-    .0[0], .0[1]
-)]
-pub struct NothingTouched(pub [u16; 2]);
+#[non_exhaustive]
+pub enum NoPart {
+    /// No piece stands out where a person has touched the part: the place (column, row).
+    #[error(
+        "nothing stands out about column {}, row {} from what it lies on: touch the part elsewhere, or draw an outline around it",
+        .0[0], .0[1]
+    )]
+    Touched([u16; 2]),
+    /// Nothing stands out from the empty station, or inside what was marked.
+    #[error(
+        "nothing stands out from the empty station, or inside the outline: put the part in place, mark it anew, or record the \
+         empty station again"
+    )]
+    Nothing,
+}

@@ -28,7 +28,7 @@ pub use gauge::{
     Square, Unit, Value, kinds, makes_datum,
 };
 pub use largest::Largest;
-pub use marking::{Marking, NothingTouched};
+pub use marking::{Marking, NoPart};
 pub(crate) use mask::components;
 pub use mask::eroded;
 pub use missed::Missed;

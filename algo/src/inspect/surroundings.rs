@@ -21,7 +21,7 @@
 //! A person may say otherwise ([`Marking`]): which pieces are the part and which are not, and an outline inside which
 //! all pieces are.
 
-use super::marking::{Marking, NothingTouched};
+use super::marking::{Marking, NoPart};
 use super::mask::{components, eroded};
 use super::region::polygon_spans;
 use crate::geometry::Vector;
@@ -116,13 +116,13 @@ impl Surroundings {
 /// part. `None` if no plane is seen beside something that lies in front of it, and neither was marked or recorded.
 ///
 /// # Errors
-/// If nothing stands out where a person has touched the part.
+/// If nothing stands out where a person has touched the part, or at all.
 pub fn surroundings(
     (pixels, width): (usize, usize),
     sigma_mm: f64,
     (marking, empty): (&Marking, Option<&[f32]>),
     point: impl Fn(usize) -> Option<Vector>,
-) -> Result<Option<Surroundings>, NothingTouched> {
+) -> Result<Option<Surroundings>, NoPart> {
     let size = [width, pixels / width.max(1)];
     let reach = SIGMAS * sigma_mm + ROUGH_MM;
     let all_round = all_round(&point, size, reach);
@@ -153,8 +153,10 @@ pub fn surroundings(
     let [part, others] = front.part(marking)?;
     let heights = part.iter().zip(&front.above).filter(|(part, _)| **part);
     let mut heights: Vec<f64> = heights.map(|(_, above)| f64::from(*above)).collect();
-    if (heights.len() as f64) < LEAST_PART * pixels as f64 && !is_told || heights.is_empty() {
-        return Ok(None);
+    match is_told {
+        true if heights.is_empty() => return Err(NoPart::Nothing),
+        false if (heights.len() as f64) < LEAST_PART * pixels as f64 => return Ok(None),
+        _ => {}
     }
     let middle = quantile(&mut heights, 0.5);
     let stands_out = is_told || all_round.is_some() || middle >= FAR_MM;
@@ -190,7 +192,7 @@ impl Front<'_> {
     }
 
     /// The pixels of the part, and those of other things.
-    fn part(&self, marking: &Marking) -> Result<[Vec<bool>; 2], NothingTouched> {
+    fn part(&self, marking: &Marking) -> Result<[Vec<bool>; 2], NoPart> {
         let (width, pixels) = (self.size[0], self.above.len());
         let apart: Vec<bool> = (0..pixels).map(|at| self.is_apart(at)).collect();
         let apart = eroded(&apart, width, MARGIN);
@@ -217,7 +219,7 @@ impl Front<'_> {
         };
         let [own, not] = [touched(&marking.part), touched(&marking.others)];
         if let Some(missed) = own.iter().position(Option::is_none) {
-            return Err(NothingTouched(marking.part[missed]));
+            return Err(NoPart::Touched(marking.part[missed]));
         }
         let corners = marking.outline.iter();
         let corners: Vec<(f64, f64)> = corners.map(|[u, v]| ((*u).into(), (*v).into())).collect();
@@ -450,7 +452,7 @@ mod tests {
     fn marked(
         marking: &Marking,
         height: impl Fn(f64, f64) -> f64,
-    ) -> Result<Option<Surroundings>, NothingTouched> {
+    ) -> Result<Option<Surroundings>, NoPart> {
         surroundings((WIDTH * ROWS, WIDTH), 0.02, (marking, None), |at| {
             let (u, v) = ((at % WIDTH) as f64, (at / WIDTH) as f64);
             let z = height(u, v);
@@ -626,7 +628,7 @@ mod tests {
             part: vec![[5, 90]],
             ..Marking::default()
         };
-        assert_eq!(marked(&missed, among), Err(NothingTouched([5, 90])));
+        assert_eq!(marked(&missed, among), Err(NoPart::Touched([5, 90])));
     }
 
     #[test]
@@ -695,5 +697,11 @@ mod tests {
         assert_eq!((alone, among), ([true, false], [true, true]));
         let nothing = vec![f32::NAN; WIDTH * ROWS];
         assert_eq!(found(Some(&nothing)).part, found(None).part);
+        let told = (&Marking::default(), Some(&empty[..]));
+        let alone = surroundings((WIDTH * ROWS, WIDTH), 0.02, told, |of| {
+            let (u, v) = at(of);
+            Some(Vector::new(u * PITCH_MM, v * PITCH_MM, station(u, v)))
+        });
+        assert_eq!(alone, Err(NoPart::Nothing));
     }
 }

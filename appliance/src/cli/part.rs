@@ -18,16 +18,16 @@ pub struct SimulatedPart {
     #[arg(long, value_name = "KIND")]
     part: Option<String>,
     /// Give the simulated part a defect: dent:X,Y,DEPTH,DIAMETER in mm along its normal, of sheet_metal and plate
-    /// missing_hole:INDEX, of sheet_metal bent_flange:DEGREES, of plate displaced_hole:INDEX,DX,DY or hole_radius:INDEX,RADIUS;
-    /// more than once for more.
+    /// missing_hole:INDEX, of sheet_metal bent_flange:DEGREES, of plate displaced_hole:INDEX,DX,DY or
+    /// hole_radius:INDEX,RADIUS; more than once for more.
     #[arg(long, value_name = "KIND:NUMBERS")]
     defect: Vec<String>,
     /// What the simulated part is made of: matte, rolled_steel or oiled. If it is left out, the
     /// scenario's light says how a part reflects.
     #[arg(long, value_name = "NAME", value_parser = material())]
     material: Option<Material>,
-    /// Lay the simulated part over a floor that reflects ALBEDO, 0 to 1, so many mm below its lowest point; "none" is black
-    /// space. If it is left out, the floor is the scenario's.
+    /// Lay the simulated part over a floor that reflects ALBEDO, 0 to 1, so many mm below its lowest point; "none" is
+    /// black space. If it is left out, the floor is the scenario's.
     #[arg(long, value_name = "ALBEDO,DEPTH", value_parser = floor)]
     floor: Option<Lies>,
     /// Place the simulated board in this one of the ten poses that are recommended for a

@@ -40,7 +40,8 @@ const LEAST_FOUND: f64 = 0.4;
 
 impl UnsealedRecipe {
     /// The same recipe, in which the openings that teaching has found are circles where they are
-    /// round, and slots where they are that. Two frames cannot find a rim: recipes that begin with them stay as they are.
+    /// round, and slots where they are that. Two frames cannot find a rim: recipes that begin with them stay as they
+    /// are.
     ///
     /// # Errors
     /// In words, if its manifest has no models of a head.
@@ -210,8 +211,8 @@ fn around(diamond: &FeatureFile, beyond: f64) -> Vec<[f64; 2]> {
     (0..CORNERS).map(corner).collect()
 }
 
-/// The box about all pixels of an opening that golden is not compared at, from the middle of its diamond on, and so many
-/// pixels beyond them inside the frame. It has few corners: fingers move them.
+/// The box about all pixels of an opening that golden is not compared at, from the middle of its diamond on, and so
+/// many pixels beyond them inside the frame. It has few corners: fingers move them.
 fn enclosing(diamond: &FeatureFile, valid: &[u8], width: usize, beyond: f64) -> Vec<[f64; 2]> {
     let [u, v] = middle(diamond);
     let (mut low, mut high) = ([u, v], [u, v]);

@@ -54,7 +54,11 @@ pub(super) fn text(site: &Site) -> String {
         "Time since the start.",
     );
     let name = "fringed_warning";
-    out.family(name, "gauge", "1 for each warning that is on: bits of register 103.");
+    out.family(
+        name,
+        "gauge",
+        "1 for each warning that is on: bits of register 103.",
+    );
     for (bit, warning) in warning::NAMES.iter().enumerate() {
         let is_on = truth(now.warnings >> bit & 1 != 0);
         out.sample(name, &[("warning", &*warning.to_lowercase())], is_on);

@@ -55,8 +55,8 @@ impl Plan {
         alone(recipe, |recipe| golden(recipe, head, true, headway))
     }
 
-    /// Whether production can be planned with a recipe, by every one of its sequences. `head` has the models that it was
-    /// taught with. On threads as [`Plan::try_out`].
+    /// Whether production can be planned with a recipe, by every one of its sequences. `head` has the models that it
+    /// was taught with. On threads as [`Plan::try_out`].
     ///
     /// # Errors
     /// As [`Plan::again`].
