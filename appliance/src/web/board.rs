@@ -1,12 +1,12 @@
 //! The board for a calibration as a PDF, so that it can be printed from the phone that sets up the
 //! head.
 
-use axum::extract::Query;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
 use super::problem::{Problem, Result};
+use super::query::Query;
 use crate::head::board::parse;
 use crate::output::board::sheet;
 

@@ -1,7 +1,7 @@
 //! The head: its commissioning step by step, and the live picture.
 
 use axum::body::Body;
-use axum::extract::{Path, Query, Request};
+use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
@@ -11,6 +11,7 @@ use super::body;
 use super::gate::signed_in;
 use super::orders::{Accepted, accepted, not_now};
 use super::problem::{Problem, Result};
+use super::query::{Path, Query};
 use super::site::{Site, alone};
 use crate::head::board;
 use crate::head::calibration::geometry::MAX_POSES;

@@ -1,12 +1,12 @@
 //! Stored results: lists, trends, CSV and the frames that were kept.
 
-use axum::extract::{Path, Query};
 use axum::response::{Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::downloads::{Content, Packed, send, unpacked};
 use super::problem::{Problem, Result};
+use super::query::{Path, Query};
 use super::site::Site;
 use crate::history::{Filter, HistoryError};
 use crate::station::Verdict;

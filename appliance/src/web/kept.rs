@@ -7,7 +7,6 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use axum::extract::{Path, Query};
 use axum::response::Json;
 use serde_json::{Value, json};
 use tokio::task::{JoinError, spawn_blocking};
@@ -15,6 +14,7 @@ use tokio::task::{JoinError, spawn_blocking};
 use super::look::{Level, found, map_of, place_of};
 use super::map::Map;
 use super::problem::{Problem, Result};
+use super::query::{Path, Query};
 use super::site::Site;
 use crate::error::{Exit, Failure};
 use crate::history::kept::Kept;

@@ -1,7 +1,6 @@
 //! Answers that change nothing: snapshot, pictures, registers, log, record of changes, health and
 //! readiness.
 
-use axum::extract::{Path, Query};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
@@ -9,6 +8,7 @@ use serde_json::{Value, json};
 
 use super::map::{Drawn, Map, Plane, map, surface, usual_stride};
 use super::problem::{Problem, Result};
+use super::query::{Path, Query};
 use super::site::Site;
 use super::view;
 use crate::recipe::plan::{Layers, Shown};

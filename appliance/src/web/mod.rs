@@ -32,6 +32,7 @@ mod history;
 mod kept;
 mod metrics;
 mod orders;
+mod query;
 mod recipes;
 mod results;
 mod sessions;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::extract::{Path, Request as Asked};
+use axum::extract::Request as Asked;
 use axum::http::{HeaderMap, StatusCode};
 use axum::response::Json;
 use serde::Deserialize;
@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 use super::body;
 use super::gate;
 use super::problem::{Problem, Result};
+use super::query::Path;
 use super::site::Site;
 use crate::recipe::replace;
 use crate::recipe::surroundings::check_marking;

@@ -2,7 +2,7 @@
 
 use axum::Extension;
 use axum::body::Body;
-use axum::extract::{Path, Query, Request};
+use axum::extract::Request;
 use axum::http::StatusCode;
 use axum::response::{Json, Response};
 use serde_json::{Value, json};
@@ -14,6 +14,7 @@ use super::look::{Level, SURFACE};
 use super::map::{Drawn, Map, Plane, map, surface};
 use super::orders::{self, Reload};
 use super::problem::{Problem, Result};
+use super::query::{Path, Query};
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, Edited};
 use crate::recipe::exchange::Destination;

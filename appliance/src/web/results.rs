@@ -8,7 +8,6 @@
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use axum::extract::Query;
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
@@ -16,6 +15,7 @@ use tokio::sync::oneshot;
 
 use super::downloads::ToClient;
 use super::problem::{Problem, Result};
+use super::query::Query;
 use super::site::Site;
 use crate::history::after::{After, Page};
 use crate::history::{Entry, GaugeEntry};

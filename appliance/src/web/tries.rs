@@ -10,7 +10,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
-use axum::extract::{Path, Request};
+use axum::extract::Request;
 use axum::http::HeaderMap;
 use axum::response::Json;
 use serde::de::Error as _;
@@ -25,6 +25,7 @@ use super::body;
 use super::gate::{signed_in, token};
 use super::kept::{broken, recording};
 use super::problem::{Problem, Result};
+use super::query::Path;
 use super::site::{LastOpened, Site, alone};
 use crate::history::kept::Kept;
 use crate::recipe::ChangeError;

@@ -14,8 +14,7 @@
 //!    ([`feature`](super::feature)), and the square with the largest mean deviation along the normal;
 //!    for the squares, the rows before this one are kept (`recent`);
 //! 5. **gauge** (`fits`, `bend`, `contours`, `findings`, `geometric`, `deviation`, `uncertainty`): after all strips,
-//!    the
-//!    planes of features, the contours in them, readings and their errors from these sums.
+//!    the planes of features, the contours in them, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few
 //! points of each are kept: the motion is found from these, in the order of the rows, and where

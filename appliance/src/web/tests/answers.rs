@@ -174,6 +174,21 @@ async fn power_and_projector_are_shown_where_they_are_known_and_left_out_of_metr
 }
 
 #[tokio::test]
+async fn queries_and_paths_that_cannot_be_read_are_problems_in_json() {
+    let served = served().await;
+    for path in [
+        "/api/picture/height?level=x",
+        "/api/recipes/seven",
+        "/api/history?recipe=70000",
+        "/api/results?after=-1",
+    ] {
+        let answer = served.get(path).await;
+        assert_eq!(answer.status, 400, "{path}: {answer:?}");
+        assert!(answer.json()["error"].is_string(), "{path}: {answer:?}");
+    }
+}
+
+#[tokio::test]
 async fn what_is_not_there_yet_says_what_to_do() {
     let served = served().await;
     for path in [
