@@ -84,6 +84,7 @@ pub(super) fn metrics(head: &Head) -> String {
         ("fringed_buffered_results", 0.0),
         ("fringed_uptime_seconds", uptime_s as f64),
         ("fringed_drift_pixels", drift(head)),
+        ("fringed_free_storage_bytes", 2e10),
     ] {
         family("gauge", name, &[("", value)]);
     }
@@ -103,6 +104,9 @@ pub(super) fn metrics(head: &Head) -> String {
         &[("", f64::from(head.last()))],
     );
     family("counter", "fringed_missed_triggers", &[("", 0.0)]);
+    family("counter", "fringed_unclean_starts", &[("", 0.0)]);
+    let clock = (r#"{warning="clock_unsynced"}"#, 0.0);
+    family("gauge", "fringed_warning", &[clock]);
     if let Some(row) = head.newest().next().map(|seq| row(head, seq)) {
         let seconds = |us: u32| f64::from(us) / 1e6;
         let cycle = [
