@@ -2,12 +2,13 @@
 
 use crate::head::calibrated::CalibratedHead;
 use crate::head::calibration::Calibration;
-use crate::storage::folder::write_whole;
+use crate::storage::folder::{read_whole, write_whole};
 use algo::pattern::{PhaseFunction, Sequence};
 use algo::pipeline::Progress;
 use hal::head::Head;
 use hal::npy;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -21,6 +22,8 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 /// calibration's fingerprint: heights of another calibration are of no use.
 const NAME: [&str; 2] = ["empty-", ".npy"];
 const DIGITS: usize = 16;
+/// Largest file, bytes.
+const MAX_BYTES: u64 = 256 << 20;
 
 /// The heights that are seen without a part.
 #[derive(Clone, Debug, PartialEq)]
@@ -101,12 +104,13 @@ impl EmptyStation {
     /// In words, if there is a file that cannot be used.
     pub fn load(place: &Path, calibration: &Calibration) -> Result<Option<Self>, String> {
         let file = file(place, calibration);
-        let Ok(bytes) = fs::read(&file) else {
-            return Ok(None);
-        };
         let wrong = |words: String| {
             let file = file.display();
             format!("read {file}: {words}: record the empty station again")
+        };
+        let bytes = match read_whole(&file, MAX_BYTES) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            read => read.map_err(|error| wrong(error.to_string()))?,
         };
         let heights = npy::read::<f32>(&bytes).map_err(|error| wrong(error.to_string()))?;
         let (width, rows, _) = calibration.frames();

@@ -6,7 +6,7 @@ use super::incoming::Incoming;
 use super::replace::refuse_taken;
 use super::store::{ChangeError, LoadError, Store, is_sound, manifest_at, write};
 use super::{Recipe, RecipeFile, RecipeId, SequenceKind};
-use crate::storage::folder::{copy_whole, open_file};
+use crate::storage::folder::copy_whole;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
 use std::io;
@@ -100,7 +100,9 @@ impl Store {
 
     fn listed(&self, number: u16) -> Listed {
         let path = self.path(number);
-        let manifest = open_file(&path).map_err(broken).and_then(archive::manifest);
+        let manifest = File::open(&path)
+            .map_err(broken)
+            .and_then(archive::manifest);
         let previous = self.previous(number).exists();
         let bytes = fs::metadata(&path).map_or(0, |found| found.len());
         let unreadable = |problem| Listed {

@@ -3,7 +3,7 @@
 
 use super::{Recipe, RecipeFile, archive};
 use crate::error::{Exit, Result};
-use crate::storage::folder::{open_file, write_whole};
+use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
 use std::fs;
 use std::io;
@@ -287,7 +287,7 @@ impl Store {
 
     /// The stamp of a recipe's newest file; while it stays equal, loading gives the same recipe.
     pub fn stamp(&self, number: u16) -> Option<Stamp> {
-        let file = open_file(&self.path(number)).ok()?;
+        let file = fs::File::open(self.path(number)).ok()?;
         let found = file.metadata().ok()?;
         Some(Stamp {
             number,
@@ -299,7 +299,7 @@ impl Store {
 
     /// The recipe in a file and its manifest, if the file exists.
     pub(super) fn read(path: &Path, number: u16) -> Option<Result<(RecipeFile, Recipe), String>> {
-        let opened = open_file(path).and_then(|file| Ok((file.metadata()?.len(), file)));
+        let opened = fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (size, file) = match opened {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
             Err(error) => return Some(Err(error.to_string())),
@@ -319,7 +319,7 @@ impl Store {
     /// # Errors
     /// In words: there is none, or it cannot be read.
     pub fn manifest(&self, number: u16) -> Result<RecipeFile, String> {
-        let file = open_file(&self.path(number))
+        let file = fs::File::open(self.path(number))
             .map_err(|error| format!("recipe {number}: {error}: teach or import it"))?;
         archive::manifest(file)
     }
@@ -329,7 +329,7 @@ impl Store {
     /// # Errors
     /// Errors of the file system.
     pub fn file(&self, number: u16) -> io::Result<fs::File> {
-        open_file(&self.path(number))
+        fs::File::open(self.path(number))
     }
 
     /// The number of the recipe taught for a part number.
@@ -410,18 +410,18 @@ impl Store {
 
 /// The manifest of a recipe's file, if it can be read.
 pub(super) fn manifest_at(path: &Path) -> Option<RecipeFile> {
-    archive::manifest(open_file(path).ok()?).ok()
+    archive::manifest(fs::File::open(path).ok()?).ok()
 }
 
 /// Whether the content of a recipe's file agrees with its fingerprint.
 pub(super) fn is_sound(path: &Path) -> bool {
-    open_file(path).is_ok_and(|file| archive::is_sound(io::BufReader::new(file)))
+    fs::File::open(path).is_ok_and(|file| archive::is_sound(io::BufReader::new(file)))
 }
 
 /// Whether the content of a recipe's file agrees with the fingerprint that it states, even if it
 /// cannot be used.
 fn is_undamaged(path: &Path) -> bool {
-    open_file(path).is_ok_and(|file| archive::is_undamaged(io::BufReader::new(file)))
+    fs::File::open(path).is_ok_and(|file| archive::is_undamaged(io::BufReader::new(file)))
 }
 
 /// Refuses a stored recipe that cannot judge.

@@ -266,20 +266,6 @@ fn a_recipe_for_a_projector_of_four_billion_columns_is_refused_and_does_not_repl
 }
 
 #[test]
-fn a_pipe_among_recipes_is_named_and_nothing_waits_for_it() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(folder.path()).unwrap();
-    let (kind, mode) = (rustix::fs::FileType::Fifo, rustix::fs::Mode::RWXU);
-    let pipe = folder.path().join("0005.recipe");
-    rustix::fs::mknodat(rustix::fs::CWD, &pipe, kind, mode, 0).unwrap();
-    assert_eq!(store.numbers(), [5]);
-    let words = store.manifest(5).unwrap_err();
-    assert!(words.contains("it is not a file"), "{words}");
-    assert!(store.load_to_edit(5).is_err() && store.stamp(5).is_none());
-    assert!(store.file(5).is_err() && store.list().len() == 1);
-}
-
-#[test]
 fn a_recipe_is_tried_out_on_the_head_before_it_is_taken() {
     let bed = Bed::new();
     let folder = tempfile::tempdir().unwrap();
