@@ -100,6 +100,9 @@ export async function part({ browser, program, step, folder }) {
       const marking = await again(page, 2);
       assert.equal(marking.part.length, 1);
       await shown(page, "marked", [true, true]);
+      // What was marked is still there, so that a second mark does not take the first one back.
+      assert.equal(await marks(page, "is-part"), 1);
+      assert.deepEqual(await again(page, 2), marking);
       await page.fill("#teach-as", "2");
       await page.click("#teach button");
       await page.click("#question-choices button:has-text('with new gauges')");

@@ -5,7 +5,7 @@ use crate::every_part::{Line, stock};
 use crate::gauges::plan;
 use crate::limits::cycle;
 use crate::placement::{TIMEOUT, bed, naming};
-use crate::surroundings::{everywhere, plate};
+use crate::surroundings::{everywhere, plate, scenario};
 use algo::geometry::Vector;
 use algo::inspect::{FeatureKind, Measure, eroded, kinds};
 use algo::units::Height;
@@ -14,7 +14,7 @@ use appliance::recipe::teach::teach;
 use appliance::station::{Inspection, Verdict};
 use appliance::system::headway::Headway;
 use sim::parts::{Defect, SheetMetal};
-use sim::{Clamp, Ground, Part, Placement, Scenario};
+use sim::{Clamp, Ground, Part, Placement};
 use tests::random::Random;
 
 /// The limit of the deviation, ± mm.
@@ -34,15 +34,6 @@ struct Among {
     world: Option<Ground>,
     spots: Vec<Vector>,
     circles: usize,
-}
-
-fn scenario(part: &Part, floor: Option<Ground>) -> Scenario {
-    Scenario {
-        part: part.clone(),
-        floor,
-        sub_rays: 2,
-        ..Scenario::default()
-    }
 }
 
 impl Among {
@@ -179,7 +170,7 @@ fn upside_down(part: &Part) -> Part {
     part
 }
 
-/// Puts so many of each kind of defect on a part in each of its surroundings. `others` are parts that are not it.
+/// Puts so many of each kind of defect on a part in each of these surroundings, and then what is not the part.
 fn defects_fail(worlds: &[&str], kind: &str, part: &Part, each: usize, missed: &mut Missed) {
     let worlds = everywhere()
         .into_iter()

@@ -49,7 +49,7 @@ pub(crate) fn plate() -> Part {
     })
 }
 
-fn scenario(part: &Part, floor: Option<Ground>) -> Scenario {
+pub(crate) fn scenario(part: &Part, floor: Option<Ground>) -> Scenario {
     Scenario {
         part: part.clone(),
         floor,

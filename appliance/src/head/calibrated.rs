@@ -5,7 +5,7 @@ use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::head::scan::{self, Scan};
 use algo::geometry::Triangulator;
-use algo::pattern::{PhaseFunction, Shot};
+use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::Decoder;
 use algo::pipeline::{HeightMap, PhaseMap, Progress};
 use algo::units::AbsolutePhase;
@@ -15,6 +15,28 @@ use std::time::Duration;
 
 /// The share of a measurement's time in which its frames are taken.
 const TAKEN: f64 = 0.7;
+
+/// Pitch of straight fringes, projector pixels, and shifts of each of their levels.
+pub const STRAIGHT_PITCH_PX: f64 = 20.0;
+/// See above.
+pub const STRAIGHT_SHIFTS: usize = 4;
+/// Levels of straight fringes.
+const STRAIGHT_LEVELS: usize = 3;
+
+/// What is projected where nothing is known of what is seen: straight vertical fringes for a projector of so many columns and
+/// rows, and what each frame shows.
+///
+/// # Errors
+/// If the projector is too small.
+pub fn straight_fringes(
+    (columns, rows): (usize, usize),
+) -> Result<(PhaseFunction, Vec<Shot>), MeasureError> {
+    let fringes = columns as f64 / STRAIGHT_PITCH_PX;
+    let function = PhaseFunction::vertical(columns, rows, fringes);
+    let function = function.map_err(MeasureError::impossible)?;
+    let shots = Sequence::geometric(function.range(), STRAIGHT_LEVELS, STRAIGHT_SHIFTS);
+    Ok((function, shots))
+}
 
 /// A head with its calibration, in front of a part.
 pub struct CalibratedHead<'a> {

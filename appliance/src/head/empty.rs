@@ -1,9 +1,8 @@
 //! The station without a part: the heights of what is seen then, by which teaching tells the part from the rest.
 
-use crate::head::calibrated::CalibratedHead;
+use crate::head::calibrated::{CalibratedHead, MeasureError, straight_fringes};
 use crate::head::calibration::Calibration;
 use crate::storage::folder::{read_whole, write_whole};
-use algo::pattern::{PhaseFunction, Sequence};
 use algo::pipeline::Progress;
 use hal::head::Head;
 use hal::npy;
@@ -12,10 +11,6 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Pitch of the fringes, projector pixels, their levels, and the shifts of each.
-const PITCH_PX: f64 = 20.0;
-const LEVELS: usize = 3;
-const SHIFTS: usize = 4;
 /// Longest wait for a frame.
 const TIMEOUT: Duration = Duration::from_secs(5);
 /// Begin and end of the name of its file beside the calibration; between them are the first digits of the
@@ -36,28 +31,24 @@ impl EmptyStation {
     /// Measures it with straight fringes.
     ///
     /// # Errors
-    /// In words, if a device fails.
+    /// As [`CalibratedHead::measure`].
     pub fn measure(
         head: &mut Head,
         calibration: &Calibration,
         progress: Progress<'_>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, MeasureError> {
         let calibration = &calibration.clone().with_rays();
         let (columns, rows) = (
             calibration.projector.width(),
             calibration.projector.height(),
         );
-        let function = PhaseFunction::vertical(columns, rows, columns as f64 / PITCH_PX);
-        let function = function.map_err(|error| error.to_string())?;
-        let shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
-        let timeout = TIMEOUT;
+        let (function, shots) = straight_fringes((columns, rows))?;
         let mut head = CalibratedHead {
             head,
             calibration,
-            timeout,
+            timeout: TIMEOUT,
         };
-        let measured = head.measure(&function, &shots, None, progress);
-        let measured = measured.map_err(|error| error.to_string())?;
+        let measured = head.measure(&function, &shots, None, progress)?;
         let heights = measured.heights.height.iter();
         let mm = heights.map(|height| match height.is_known() {
             true => height.mm() as f32,

@@ -1,24 +1,17 @@
 //! The adaptive pattern of a part, from its preliminary measurement.
 
 use super::failure::TeachError;
-use crate::head::calibrated::Measured;
+use crate::head::calibrated::{Measured, STRAIGHT_PITCH_PX, STRAIGHT_SHIFTS, straight_fringes};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::ContrastFile;
 use crate::head::scan::Scan;
 use algo::adaptive::noise::{self, Light};
 use algo::adaptive::{Blur, Optics, ProjectorMap, Spread};
 use algo::geometry::Triangulator;
-use algo::pattern::{PhaseFunction, Sequence, Shot};
+use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::Trust;
 use algo::pipeline::Progress;
 use algo::units::{AbsolutePhase, Height};
-
-/// Pitch of the preliminary pattern, projector pixels (c·p_P of the paper).
-const PRELIMINARY_PITCH_PX: f64 = 20.0;
-/// Levels of the preliminary sequence.
-const LEVELS: usize = 3;
-/// Shifts of each level.
-pub(super) const SHIFTS: usize = 4;
 
 /// What is projected first, on a part of which nothing is known.
 #[derive(Clone, Debug)]
@@ -43,10 +36,8 @@ impl Preliminary {
     ///
     /// # Errors
     /// If the projector is too small.
-    pub fn new((columns, rows): (usize, usize)) -> Result<Self, TeachError> {
-        let fringes = columns as f64 / PRELIMINARY_PITCH_PX;
-        let function = PhaseFunction::vertical(columns, rows, fringes).map_err(TeachError::rig)?;
-        let shots = Sequence::geometric(function.range(), LEVELS, SHIFTS);
+    pub fn new(raster: (usize, usize)) -> Result<Self, TeachError> {
+        let (function, shots) = straight_fringes(raster)?;
         Ok(Self { function, shots })
     }
 
@@ -69,7 +60,7 @@ impl Preliminary {
         let light = Light::of(
             (&part.phases, &part.decoder),
             &slopes,
-            1.0 / PRELIMINARY_PITCH_PX,
+            1.0 / STRAIGHT_PITCH_PX,
             &blur,
             Some(calibration.noise_counts),
             &|share| progress(0.1 + 0.4 * share),
@@ -100,11 +91,15 @@ impl Preliminary {
         slopes: &[[f64; 2]],
     ) -> Result<Blur, TeachError> {
         let range = self.function.range();
-        let coarse = Scan::new(range, &self.shots[..SHIFTS], &part.frames[..SHIFTS])
-            .map(|coarse| coarse.trusting(part.decoder.least_modulation()))
-            .and_then(|coarse| coarse.phases(None))
-            .map_err(TeachError::Rig)?;
-        let fine = 1.0 / PRELIMINARY_PITCH_PX;
+        let coarse = Scan::new(
+            range,
+            &self.shots[..STRAIGHT_SHIFTS],
+            &part.frames[..STRAIGHT_SHIFTS],
+        )
+        .map(|coarse| coarse.trusting(part.decoder.least_modulation()))
+        .and_then(|coarse| coarse.phases(None))
+        .map_err(TeachError::Rig)?;
+        let fine = 1.0 / STRAIGHT_PITCH_PX;
         let frequencies = [fine, fine * self.shots[0].ratio];
         let resolved = (0..slopes.len()).filter(|&at| part.phases.trust[at] == Trust::Resolved);
         let spreads = resolved.filter_map(|at| {

@@ -1,9 +1,9 @@
 //! The light of a part's patterns when frames are exposed for longer: where the camera would
 //! saturate, there is less of it.
 
-use super::adaptive::{Preliminary, SHIFTS};
+use super::adaptive::Preliminary;
 use super::golden::Naming;
-use crate::head::calibrated::Measured;
+use crate::head::calibrated::{Measured, STRAIGHT_SHIFTS};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use algo::adaptive::ProjectorMap;
@@ -27,7 +27,7 @@ impl Preliminary {
     ) -> Illumination {
         let exposures = naming.exposures;
         // The coarsest level, which blur weakens least.
-        let shifts: [&Frame; SHIFTS] = std::array::from_fn(|shift| &part.frames[shift]);
+        let shifts: [&Frame; STRAIGHT_SHIFTS] = std::array::from_fn(|shift| &part.frames[shift]);
         let format = shifts[0].format();
         let full_scale = f64::from(format.full_scale());
         let most = MOST - NOISE_SIGMAS * calibration.noise_counts / full_scale;

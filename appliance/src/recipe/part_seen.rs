@@ -1,6 +1,6 @@
 //! What teaching took for the part, as the page shows it before anything is judged by it.
 
-use crate::station::Square;
+use crate::station::{Marking, Square};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -14,13 +14,19 @@ pub struct PartSeen {
     pub modulation: Vec<f32>,
     /// 1 where it was taken for the part, else 0.
     pub part: Vec<f32>,
+    /// What was marked in it.
+    pub marking: Marking,
     /// Where good parts would not keep their limit, if that is why it was refused.
     pub place: Option<Square>,
 }
 
 impl PartSeen {
     /// Of what was measured. `part` has the pixels of the part; without it all that has a phase is.
-    pub(super) fn of(phases: &PhaseMap, full_scale: u16, part: Option<&[bool]>) -> Self {
+    pub(super) fn of(
+        (phases, full_scale): (&PhaseMap, u16),
+        part: Option<&[bool]>,
+        marking: &Marking,
+    ) -> Self {
         let counts = |of: &algo::units::Modulation| of.counts(full_scale) as f32;
         let resolved = phases.trust.iter().enumerate();
         let resolved = resolved.map(|(at, trust)| {
@@ -30,6 +36,7 @@ impl PartSeen {
             width: phases.width,
             modulation: phases.modulation.iter().map(counts).collect(),
             part: resolved.map(|is| f32::from(u8::from(is))).collect(),
+            marking: marking.clone(),
             place: None,
         }
     }

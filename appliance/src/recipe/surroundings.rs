@@ -115,6 +115,8 @@ pub fn words(surroundings: &Surroundings) -> String {
         Some(step) => format!(
             "the part is {percent:.1} % of the picture and stands out from what it lies on by {step:.2} mm or more{others}"
         ),
-        None => format!("the part is {percent:.1} % of the picture, as it was told{others}"),
+        None => format!(
+            "the part is {percent:.1} % of the picture, as it was marked or recorded{others}"
+        ),
     }
 }

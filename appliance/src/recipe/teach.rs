@@ -103,7 +103,8 @@ pub fn teach_showing(
     let found =
         computing.on(|| surroundings::of(&first.heights, &first.triangulator, naming.told()));
     let full_scale = first.decoder.full_scale();
-    let shown = |part| seen.show(PartSeen::of(&first.phases, full_scale, part));
+    let measured = (&first.phases, full_scale);
+    let shown = |part| seen.show(PartSeen::of(measured, part, &naming.marking));
     let found = found.inspect_err(|_| shown(None))?;
     shown(found.as_ref().map(|found| &found.part[..]));
     if let Some(found) = &found {

@@ -140,6 +140,7 @@ pub(super) async fn part_seen(site: Site) -> Result<Response> {
         ];
         let mut picture = surface(&planes, of, None);
         picture.description["place"] = json!(seen.place);
+        picture.description["marking"] = json!(seen.marking);
         Ok(picture.into_response())
     })
     .await

@@ -4,6 +4,7 @@ use super::Subject;
 use super::file::Commissioning;
 use super::outcome::Outcome;
 use crate::error::{Exit, Failure, Result};
+use crate::head::calibrated::MeasureError;
 use crate::head::empty::EmptyStation;
 use serde_json::json;
 
@@ -15,7 +16,10 @@ pub(super) fn measure(subject: &mut Subject<'_>, _: &mut Commissioning) -> Resul
     let failed = |words: String| Failure::because(Exit::Content, "record the empty station", words);
     let progress = |share: f64| (subject.progress)(share, "measuring the empty station");
     let empty = EmptyStation::measure(subject.head, subject.calibration, &progress);
-    let empty = empty.map_err(failed)?;
+    let empty = empty.map_err(|error| match error {
+        MeasureError::Device(error) => error.into(),
+        MeasureError::Impossible(words) => failed(words),
+    })?;
     let stored = empty.store(subject.place, subject.calibration);
     stored.map_err(failed)?;
     let seen = 100.0 * empty.seen();
