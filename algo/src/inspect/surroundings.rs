@@ -174,14 +174,15 @@ fn quantile(values: &mut [f64], share: f64) -> f64 {
     *values.select_nth_unstable_by(at, f64::total_cmp).1
 }
 
-/// A picture of what lies in front of a plane.
+/// A picture of what lies in front of a plane, or of the empty station where that is known.
 struct Front<'a> {
     /// How far each pixel's point lies in front of it, mm; not a number where there is no height.
     above: Vec<f32>,
-    /// The same, also where it lies in front of what was there before: by it pieces are told apart.
+    /// How far it lies in front of the plane, whatever is known of the empty station: a step between two of these
+    /// divides pieces.
     heights: &'a [f32],
     size: [usize; 2],
-    /// The plane's own pixels lie less far in front of it, mm.
+    /// What is less far in front is not of the part, mm.
     reach: f64,
 }
 

@@ -6,7 +6,7 @@
 use super::file::{LONGEST_NAME, PatternFile, RecipeFile, SequenceFile};
 use super::gauge::GaugeFile;
 use crate::station::MAX_GAUGES;
-use algo::inspect::MAX_PLACES;
+use algo::inspect::{MAX_PLACES, Marking};
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
     Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, RATIOS, clipped, length, text,
@@ -15,8 +15,24 @@ use hal::bounds::{
 
 /// Sequences that a part can be measured with; teaching makes four.
 const MAX_SEQUENCES: usize = 8;
+/// Corners of an outline, and places of each kind that are touched.
+const MAX_CORNERS: usize = 256;
+const MAX_TOUCHES: usize = 64;
 /// Slots of gauges.
 const MAX_SLOT: u16 = MAX_GAUGES as u16;
+
+/// Checks what a person has marked.
+///
+/// # Errors
+/// In words that name the key, the number and the bounds.
+pub fn check_marking(marking: &Marking) -> Result<(), String> {
+    let corners = marking.outline.len();
+    if corners > 0 {
+        length("marking.outline", corners, 3, MAX_CORNERS)?;
+    }
+    length("marking.part", marking.part.len(), 0, MAX_TOUCHES)?;
+    length("marking.others", marking.others.len(), 0, MAX_TOUCHES)
+}
 
 impl RecipeFile {
     /// Checks each value by itself; [`Recipe::check`](super::Recipe::check) checks that they fit
@@ -51,6 +67,7 @@ impl RecipeFile {
         {
             within("pattern.fringes", fringes, 1e-3, MAX_FRINGES)?;
         }
+        check_marking(&self.marking)?;
         length("sequences", self.sequences.len(), 1, MAX_SEQUENCES)?;
         each(
             "sequences",

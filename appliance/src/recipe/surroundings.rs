@@ -9,37 +9,6 @@ use algo::phase::Trust;
 use algo::pipeline::{HeightMap, PhaseMap};
 use algo::units::{AbsolutePhase, Height, Modulation};
 
-/// Most corners of an outline, and most touches of each kind.
-const MAX_CORNERS: usize = 256;
-const MAX_TOUCHES: usize = 64;
-
-/// Refuses a marking that is no outline, or too long.
-///
-/// # Errors
-/// In words, with the bounds.
-pub fn check_marking(marking: &Marking) -> Result<(), String> {
-    let Marking {
-        outline,
-        part,
-        others,
-    } = marking;
-    if !outline.is_empty() && !(3..=MAX_CORNERS).contains(&outline.len()) {
-        return Err(format!(
-            "marking.outline has {} corners: write 3 to {MAX_CORNERS}, or none",
-            outline.len()
-        ));
-    }
-    for (key, touches) in [("part", part), ("others", others)] {
-        if touches.len() > MAX_TOUCHES {
-            return Err(format!(
-                "marking.{key} has {} places: write at most {MAX_TOUCHES}",
-                touches.len()
-            ));
-        }
-    }
-    Ok(())
-}
-
 /// What is known of a part's surroundings before it is measured.
 #[derive(Clone, Copy, Debug)]
 pub struct Told<'a> {

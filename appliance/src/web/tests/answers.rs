@@ -174,6 +174,28 @@ async fn power_and_projector_are_shown_where_they_are_known_and_left_out_of_metr
 }
 
 #[tokio::test]
+async fn a_marking_that_is_no_outline_or_too_long_is_refused_by_its_key() {
+    let served = served().await;
+    let cookie = served.sign_in().await;
+    let place = serde_json::json!([1, 2]);
+    for (key, count) in [
+        ("outline", 2),
+        ("outline", 257),
+        ("part", 65),
+        ("others", 65),
+    ] {
+        let body = serde_json::json!({ "marking": { key: vec![&place; count] } });
+        let path = "/api/recipes/1/teach";
+        let answer = served
+            .change("POST", path, &cookie, &body.to_string())
+            .await;
+        assert_eq!(answer.status, 422, "{answer:?}");
+        let words = format!("marking.{key} has {count} members");
+        assert!(answer.body.contains(&words), "{answer:?}");
+    }
+}
+
+#[tokio::test]
 async fn queries_and_paths_that_cannot_be_read_are_problems_in_json() {
     let served = served().await;
     for path in [
