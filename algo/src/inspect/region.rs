@@ -76,6 +76,12 @@ impl Region {
         })
     }
 
+    /// Bytes that it takes.
+    pub(super) fn bytes(&self) -> usize {
+        let Spans { all, firsts } = &self.spans;
+        size_of_val(&*self.corners) + size_of_val(&**all) + size_of_val(&**firsts)
+    }
+
     /// Becomes another region with its corners moved by `to`, in a frame of this size (width,
     /// height); it may hold no pixel then.
     pub(super) fn become_moved(

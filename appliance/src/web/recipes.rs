@@ -22,6 +22,10 @@ use crate::recipe::plan::{GoldenView, Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
 use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, Store};
 use crate::station::control::MAX_RECIPE;
+use std::time::{Duration, Instant};
+
+/// A recipe whose planning takes longer is stored with a warning.
+const SLOW: Duration = Duration::from_secs(5);
 
 impl From<LoadError> for Problem {
     fn from(error: LoadError) -> Self {
@@ -216,7 +220,14 @@ fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
             "no calibrated head is open: whether the recipe can be used shows when it is loaded";
         return Ok(Some(words.into()));
     };
-    match Plan::try_out(recipe, &calibration) {
+    let begun = Instant::now();
+    let planned = Plan::try_out(recipe, &calibration);
+    let took = begun.elapsed();
+    match planned {
+        Ok(()) if took > SLOW => Ok(Some(format!(
+            "planning it takes {:.0} s, and so does each load: a PLC that changes recipes waits; fewer or coarser gauges take less",
+            took.as_secs_f64()
+        ))),
         Ok(()) => Ok(None),
         Err(error @ PlanError::Unfit { .. }) => Err(error.to_string()),
         Err(error) => Ok(Some(error.to_string())),

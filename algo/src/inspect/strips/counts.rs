@@ -44,6 +44,11 @@ impl Counts {
         }
     }
 
+    /// Bytes of its cells.
+    pub fn bytes(&self) -> usize {
+        self.cells.iter().map(|cells| size_of_val(&**cells)).sum()
+    }
+
     pub fn clear(&mut self) {
         self.tally = HeightTally::default();
         self.trusts = [0; TRUSTS];

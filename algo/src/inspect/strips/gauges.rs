@@ -67,6 +67,10 @@ pub const MAX_GAUGES: usize = 64;
 /// Features that a recipe may have.
 pub const MAX_FEATURES: usize = 96;
 
+/// Most cells of the gauges of a plan, where gauges that look at the same pixels share them: each
+/// takes some 200 bytes per sequence.
+const MAX_CELLS: usize = 1 << 17;
+
 /// Gauges that cannot be measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unmeasurable {
@@ -115,6 +119,14 @@ pub enum Unmeasurable {
     /// More cells than are kept.
     #[error("{0}")]
     TooFine(TooFine),
+    /// All gauges together have too many cells.
+    #[error(
+        "the gauges divide their regions into {cells} squares or more, at most {MAX_CELLS} are kept: smooth over more pixels, or let gauges share a feature"
+    )]
+    TooManyCells {
+        /// How many there would be, with those of the gauge that is one too many.
+        cells: usize,
+    },
 }
 
 /// The cells of a feature's region, of one side. All gauges that ask for them share them.
@@ -260,14 +272,29 @@ impl Gauges {
                 false => Region::default(),
             });
         let regions: Vec<Region> = regions.collect();
-        let mut patches: Vec<Patch> = Vec::new();
+        let (mut patches, mut cells) = (Vec::<Patch>::new(), 0);
         let mut patch_of = |feature: usize, side: usize| {
-            let known = |patch: &Patch| (patch.feature, patch.side) == (feature, side);
+            let shows = |feature: usize| {
+                let kind = features[feature].kind;
+                (kind == FeatureKind::Surface, kind.is_contour())
+            };
+            // Gauges of features that look at the same pixels share their cells; a plane's are its
+            // own.
+            let known = |patch: &Patch| {
+                let alike = side > 0
+                    && shows(patch.feature) == shows(feature)
+                    && regions[patch.feature] == regions[feature];
+                patch.side == side && (patch.feature == feature || alike)
+            };
             if let Some(patch) = patches.iter().position(known) {
                 return Ok(patch);
             }
             let region = &regions[feature];
             let grid = Grid::over(region, side).map_err(Unmeasurable::TooFine)?;
+            cells += grid.len();
+            if cells > MAX_CELLS {
+                return Err(Unmeasurable::TooManyCells { cells });
+            }
             let mut taught = taught_cells(&grid, region, golden, about);
             if features[feature].kind != FeatureKind::Surface {
                 let highest = features[feature].kind.is_contour();
@@ -334,6 +361,13 @@ impl Gauges {
     pub fn region<'a>(&'a self, pose: &'a PoseField, gauge: usize) -> Option<&'a Region> {
         let feature = *self.list.get(gauge)?.of.first()?;
         Some(pose.region(&self.regions, feature))
+    }
+
+    /// Bytes of cells and regions: nearly all of its memory.
+    pub fn bytes(&self) -> usize {
+        let cells = self.patches.iter().map(|patch| size_of_val(&*patch.taught));
+        let regions = self.regions.iter().map(Region::bytes);
+        cells.chain(regions).sum()
     }
 
     /// The largest side of a square; none if there is no deviation.

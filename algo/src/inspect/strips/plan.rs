@@ -228,6 +228,11 @@ impl Production {
         &self.golden.window
     }
 
+    /// Bytes of the cells and regions of its gauges.
+    pub fn gauge_bytes(&self) -> usize {
+        self.gauges.bytes()
+    }
+
     /// The gauges, in the order of their readings.
     pub fn gauges(&self) -> &[Gauge] {
         &self.gauges.list

@@ -66,6 +66,11 @@ impl PoseField {
         }
     }
 
+    /// Bytes of its regions.
+    pub fn bytes(&self) -> usize {
+        self.regions.iter().map(Region::bytes).sum()
+    }
+
     /// Takes the part with these regions to lie so; as taught if none.
     pub fn set(&mut self, golden: &Golden, regions: &[Region], placed: Option<Placed>) {
         // Parts that are not aligned are taken to lie as taught.

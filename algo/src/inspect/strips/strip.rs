@@ -45,6 +45,16 @@ pub struct Strips {
     pub(super) sections: Vec<SectionFit>,
 }
 
+impl Strips {
+    /// Bytes of the cells of gauges and of the places of their largest deviations: nearly all of
+    /// the memory that grows with the gauges.
+    pub fn bytes(&self) -> usize {
+        let strips = self.strips.iter();
+        let own = strips.map(|strip| strip.counts.bytes() + strip.squares.bytes());
+        own.sum::<usize>() + self.pose.bytes()
+    }
+}
+
 /// Buffers for the cells of one gauge after the other.
 #[derive(Debug, Default)]
 pub struct CellBuffers {

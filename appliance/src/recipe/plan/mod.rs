@@ -213,6 +213,7 @@ impl Plan {
             captures,
             (&features, &gauges),
             size.0,
+            &|share| headway.done(0.4 + 0.15 * share),
         );
         let range = conditions.expansion_range_turns;
         headway.done(0.55);
@@ -270,7 +271,7 @@ impl Plan {
         &self.conditions
     }
 
-    /// Bytes of its maps and of its phase function: nearly all of its memory.
+    /// Bytes of its maps, of its phase function and of its gauges: nearly all of its memory.
     pub fn bytes(&self) -> usize {
         let production = self.production();
         let function = production.triangulator().function();
@@ -280,7 +281,8 @@ impl Plan {
         };
         let runs: usize = self.runs.iter().map(|run| run.bytes).sum();
         let amplitude = self.illumination.amplitude.len();
-        production.cubics().bytes() + samples * size_of::<f64>() + runs + amplitude
+        let gauges = self.strips().bytes();
+        production.cubics().bytes() + samples * size_of::<f64>() + runs + amplitude + gauges
     }
 
     /// Number of sequences; they are tried one after the other until one is good enough.

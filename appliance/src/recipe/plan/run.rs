@@ -7,7 +7,7 @@ use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
-    Feature, Gauge, GoldenSignal, Largest, Levels, PairBuffers, Parts, Production, Taught,
+    Feature, Gauge, GoldenSignal, Largest, Levels, PairBuffers, Parts, Production, Region, Taught,
     Unmeasurable,
 };
 use algo::pattern::{PhaseRange, Shot};
@@ -32,7 +32,7 @@ pub(super) struct Run {
     pub pair: Option<Mutex<PairBuffers>>,
     /// Memory for the levels that are decoded on arrival, allocated by the first cycle.
     pub arrived: Mutex<Option<Arrived>>,
-    /// Bytes of its maps.
+    /// Bytes of its maps and gauges.
     pub bytes: usize,
 }
 
@@ -161,28 +161,39 @@ impl Prepared {
     }
 
     /// The noise of golden, where this is the full sequence, in frames of `width` columns. The
-    /// golden surface is by the sequence `base`.
+    /// golden surface is by the sequence `base`. `tell` gets the share that is done.
     pub fn golden_noise(
         &self,
         base: &Self,
         captures: usize,
         (features, gauges): (&[Feature], &[Gauge]),
         width: usize,
+        tell: &dyn Fn(f64),
     ) -> GoldenNoise {
-        let largest = |gauge: &Gauge| {
+        // Gauges that look at the same pixels have the same.
+        let mut known: Vec<(usize, &Region, Largest)> = Vec::new();
+        let mut largest = |(at, gauge): (usize, &Gauge)| {
+            tell(at as f64 / gauges.len() as f64);
             let side = gauge.measure.facts().basis.square_side();
             let feature = gauge.of.first().and_then(|&at| features.get(at));
-            match side.zip(feature) {
-                Some((side, of)) => Largest::of(&self.taught, width, &of.region, side),
-                None => Largest::default(),
+            let Some((side, of)) = side.zip(feature) else {
+                return Largest::default();
+            };
+            let same =
+                |known: &&(usize, &Region, Largest)| (known.0, known.1) == (side, &of.region);
+            if let Some((.., largest)) = known.iter().find(same) {
+                return *largest;
             }
+            let largest = Largest::of(&self.taught, width, &of.region, side);
+            known.push((side, &of.region, largest));
+            largest
         };
         GoldenNoise {
             captures: captures as f64,
             full: self.phase_noise(),
             base: base.phase_noise(),
             offset: base.offset,
-            largest: gauges.iter().map(largest).collect(),
+            largest: gauges.iter().enumerate().map(&mut largest).collect(),
         }
     }
 
@@ -257,6 +268,7 @@ impl Prepared {
         let production = production.map_err(|error| refusal(error, shared))?;
         let (modulation, tolerance_px) = &shared.picture;
         let production = production.with_picture(modulation, *tolerance_px);
+        let bytes = bytes + production.gauge_bytes();
         let pair = (kind == SequenceKind::TwoFrames).then(|| production.pair_buffers());
         Ok(Run {
             kind,

@@ -52,6 +52,11 @@ impl Squares {
         }
     }
 
+    /// Bytes of its tiles.
+    pub fn bytes(&self) -> usize {
+        self.extremes.iter().map(Extremes::bytes).sum()
+    }
+
     pub fn clear(&mut self) {
         for sums in &mut self.columns {
             sums.fill(0);

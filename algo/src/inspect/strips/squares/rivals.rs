@@ -41,6 +41,11 @@ impl Extremes {
         }
     }
 
+    /// Bytes of its tiles.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&*self.tiles)
+    }
+
     pub fn clear(&mut self) {
         self.tiles.fill(None);
         self.largest = None;
