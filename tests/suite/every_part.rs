@@ -13,7 +13,7 @@ use sim::{Part, Placement, Scenario};
 use tests::random::Random;
 
 /// The placement tolerance of the default configuration, mm.
-const TOLERANCE_MM: f64 = 1.0;
+pub(crate) const TOLERANCE_MM: f64 = 1.0;
 
 /// Every kind of part that can be taught, by its name.
 pub(crate) fn stock() -> Vec<(String, Part)> {

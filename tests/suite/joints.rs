@@ -30,6 +30,8 @@ struct Camera {
     size: (u32, u32),
     /// Whether the radius of the edges is stated: at 0.4 mm per px too little of an edge is seen.
     is_stated: bool,
+    /// How far the stated radius may be off, ± mm.
+    tolerance_mm: Option<f64>,
     /// Largest bias of gap and of flush, µm.
     bias: [f64; 2],
     /// Noise may hide the edge that is turned away in so many of all placements of the long form, and
@@ -40,6 +42,7 @@ struct Camera {
 const COARSE: Camera = Camera {
     size: (512, 512),
     is_stated: true,
+    tolerance_mm: None,
     bias: [120.0, 25.0],
     unseen: PLACEMENTS / 2,
 };
@@ -48,6 +51,7 @@ const COARSE: Camera = Camera {
 const FINE: Camera = Camera {
     size: (1456, 1088),
     is_stated: false,
+    tolerance_mm: None,
     bias: [50.0, 15.0],
     unseen: 2,
 };
@@ -75,7 +79,7 @@ impl Line {
         };
         scenario.noise.noise_counts = Some(Noise::PAPER);
         square_pixels(&mut scenario.rig.camera, camera.size);
-        let is_stated = camera.is_stated;
+        let (is_stated, tolerance_mm) = (camera.is_stated, camera.tolerance_mm);
         let mut bed = bed(&scenario);
         let taught = taught_within(&mut bed, TOLERANCE_MM).unwrap();
         let camera = &bed.calibration.camera;
@@ -95,6 +99,7 @@ impl Line {
             left: Some([2.0, HALF_MM - beside]),
             right: Some([HALF_MM + beside, 2.0 * HALF_MM - 2.0]),
             edge_mm: is_stated.then_some(joint.left_radius),
+            edge_tolerance_mm: tolerance_mm.filter(|_| is_stated),
             ..FeatureFile::new("joint", FeatureKind::Section, Vec::new())
         };
         let gauge =
@@ -256,4 +261,59 @@ fn is_found(placements: usize) {
         }
     }
     assert!(unseen <= placements * 2 / 3, "{unseen} are unseen");
+}
+
+/// Largest U of gap and flush of a stock joint, mm, whose edges are known to 0.02 mm: limits of ± 0.15
+/// mm are four of them apart.
+const STOCK_U_MM: f64 = 0.075;
+
+#[test]
+fn a_stock_joint_is_gauged_in_both_directions_at_the_default_camera() {
+    stock_joints(3);
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn a_stock_joint_is_gauged_in_both_directions_at_many_placements() {
+    stock_joints(25);
+}
+
+fn stock_joints(placements: usize) {
+    let (mut measured, mut within, mut all) = (0.0, 0.0, 0.0);
+    for across in [Across::X, Across::Y] {
+        let joint = Joint {
+            across,
+            ..Joint::default()
+        };
+        let camera = Camera {
+            tolerance_mm: Some(0.02),
+            ..COARSE
+        };
+        let mut line = Line::new(&joint, &camera);
+        let mut random = Random::new(5);
+        for at in 0..placements {
+            let lies = match at {
+                0 => Placement::default(),
+                _ => placement(&mut random),
+            };
+            let found = line.inspect(&joint, &lies);
+            for (gauge, truth) in found.gauges.iter().zip([joint.gap, joint.flush]) {
+                all += 1.0;
+                let Some((value, u)) = gauge.value.zip(gauge.uncertainty) else {
+                    println!("{across:?} {at}: {:?}", gauge.reason);
+                    continue;
+                };
+                println!(
+                    "{across:?} {at}: {} off by {:+.4}, U {u:.4}",
+                    gauge.name,
+                    value - truth
+                );
+                assert!(u <= STOCK_U_MM, "{gauge:?}");
+                measured += 1.0;
+                within += f64::from(u8::from((value - truth).abs() <= u));
+            }
+        }
+    }
+    println!("{measured} of {all} measured, {within} within U");
+    assert!(measured >= 0.8 * all && within >= 0.95 * measured);
 }

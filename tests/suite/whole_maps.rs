@@ -69,6 +69,7 @@ impl<'a> Comparison<'a> {
             expected: None,
             systematic: 0.0,
             compared: 0.0,
+            rims: 0.0,
             square: Some(Square { column, row, side }),
         })
     }
@@ -107,6 +108,7 @@ impl<'a> Comparison<'a> {
             expected: None,
             systematic: 0.0,
             compared: 0.0,
+            rims: 0.0,
             square: None,
         }
     }

@@ -5,6 +5,7 @@ pub mod contour;
 mod feature;
 mod gauge;
 pub mod good;
+mod highlights;
 mod largest;
 mod marking;
 mod mask;
@@ -27,6 +28,7 @@ pub use gauge::{
     Basis, Declared, Domain, Evidence, Facts, Kind, MAX_PLACES, Measure, Parameter, Reading,
     Square, Unit, Value, kinds, makes_datum,
 };
+pub use highlights::Highlights;
 pub use largest::Largest;
 pub use marking::{Marking, NoPart};
 pub(crate) use mask::components;

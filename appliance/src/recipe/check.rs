@@ -17,6 +17,9 @@ use algo::phase::LeastModulation;
 use algo::units::Modulation;
 use std::io::{Cursor, Read, Seek};
 
+/// The radius of a rim that nobody states, mm: U then covers rims rounded by up to 0.3 mm, as those
+/// of punched sheets are, with diameters larger by 0.42 of that (docs/accuracy.md).
+const UNKNOWN_RIM_MM: f64 = 0.35;
 /// Most different sides of squares of one recipe, with 0 where any will do: each takes time in
 /// every cycle.
 const MAX_SIDES: usize = 5;
@@ -309,11 +312,12 @@ fn features(
         let region = feature.pixels((width, height))?;
         let plane = feature.plane.as_ref();
         let plane = plane.and_then(|name| features.iter().position(|of| of.name == *name));
+        let of_plane = || features.get(plane?)?.rim_mm;
         Ok(Feature {
             kind: feature.kind,
             region,
             plane,
-            rim: feature.rim_mm.unwrap_or(0.0),
+            rim: feature.rim_mm.or_else(of_plane).unwrap_or(UNKNOWN_RIM_MM),
             thickness: feature.thickness_mm,
             cut: feature.cut(),
         })

@@ -31,7 +31,8 @@ bounded! {
         /// face in its own region.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub plane: Option<String> = Longest(LONGEST_NAME),
-        /// Of a contour, the radius of its rim, mm.
+        /// Of a contour, the radius of its rim, mm: 0 where it is sharp. Of a plane, that of all
+        /// contours in it that state none. `None` where it is not known.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub rim_mm: Option<f64> = 0.0..=MAX_RIM_MM,
         /// Of a plane, the thickness of its sheet, mm: for the walls of contours in it. 0 where no
@@ -56,6 +57,9 @@ bounded! {
         /// The radius of its edges, if it is stated, mm.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub edge_mm: Option<f64> = 0.0..=MAX_RIM_MM,
+        /// How far that may be off, ± mm; `None` where it is not known.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub edge_tolerance_mm: Option<f64> = 0.0..=MAX_RIM_MM,
     }
 
     /// A datum system (ISO 5459).
@@ -88,6 +92,7 @@ impl FeatureFile {
             left: None,
             right: None,
             edge_mm: None,
+            edge_tolerance_mm: None,
         }
     }
 
@@ -115,6 +120,7 @@ impl FeatureFile {
     fn check_keys(&self) -> Result<(), String> {
         let kind = self.kind;
         let (contour, section) = (kind.is_contour(), kind == FeatureKind::Section);
+        let plane = kind == FeatureKind::Plane;
         let (of_contour, of_section) = ("a line, circle or slot", "a section");
         for (key, is_there, fits, whose) in [
             (
@@ -124,11 +130,16 @@ impl FeatureFile {
                 "any other kind",
             ),
             ("plane", self.plane.is_some(), contour, of_contour),
-            ("rim_mm", self.rim_mm.is_some(), contour, of_contour),
+            (
+                "rim_mm",
+                self.rim_mm.is_some(),
+                contour || plane,
+                "a plane, line, circle or slot",
+            ),
             (
                 "thickness_mm",
                 self.thickness_mm.is_some(),
-                kind == FeatureKind::Plane,
+                plane,
                 "a plane",
             ),
             ("from", self.from.is_some(), section, of_section),
@@ -137,6 +148,12 @@ impl FeatureFile {
             ("left", self.left.is_some(), section, of_section),
             ("right", self.right.is_some(), section, of_section),
             ("edge_mm", self.edge_mm.is_some(), section, of_section),
+            (
+                "edge_tolerance_mm",
+                self.edge_tolerance_mm.is_some(),
+                section && self.edge_mm.is_some(),
+                "a section with an edge_mm",
+            ),
         ] {
             if is_there && !fits {
                 let kind = kind.name();
@@ -207,6 +224,7 @@ impl FeatureFile {
             left: self.left?,
             right: self.right?,
             edge_mm: self.edge_mm,
+            edge_tolerance_mm: self.edge_tolerance_mm,
         })
     }
 }

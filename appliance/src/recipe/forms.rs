@@ -54,19 +54,19 @@ fn feature(kind: FeatureKind) -> Value {
 fn parameters(kind: FeatureKind) -> Vec<Value> {
     match kind {
         FeatureKind::Surface => Vec::new(),
-        FeatureKind::Plane => vec![json!({
-            "name": "thickness_mm", "unit": "mm", "least": 0.0, "most": MAX_THICKNESS_MM, "optional": true,
-            "about": "thickness of its sheet, for the walls of holes in it; 0 where no wall is seen, nothing where it is not known",
-        })],
+        FeatureKind::Plane => vec![
+            json!({
+                "name": "thickness_mm", "unit": "mm", "least": 0.0, "most": MAX_THICKNESS_MM, "optional": true,
+                "about": "thickness of its sheet, for the walls of holes in it; 0 where no wall is seen, nothing where it is not known",
+            }),
+            rim("not known"),
+        ],
         FeatureKind::Line | FeatureKind::Circle | FeatureKind::Slot => vec![
             json!({
                 "name": "plane", "features": [FeatureKind::Plane.name()], "optional": true,
                 "about": "the plane that it lies in; nothing: one is fitted to the face around it",
             }),
-            json!({
-                "name": "rim_mm", "unit": "mm", "least": 0.0, "most": MAX_RIM_MM, "optional": true,
-                "about": "radius of its rim, where that is rounded",
-            }),
+            rim("as its plane's"),
         ],
         FeatureKind::Section => {
             let stretch = |name: &str, about: &str| {
@@ -96,9 +96,22 @@ fn parameters(kind: FeatureKind) -> Vec<Value> {
                     "name": "edge_mm", "unit": "mm", "above": 0.0, "most": MAX_RIM_MM, "optional": true,
                     "about": "radius of both edges, where it is known; nothing: it is measured",
                 }),
+                json!({
+                    "name": "edge_tolerance_mm", "unit": "mm", "least": 0.0, "most": MAX_RIM_MM, "optional": true,
+                    "about": "how far that radius may be off, ±: U of a gap is as large as this; nothing: 5 % of the radius (1 σ)",
+                }),
             ]
         }
     }
+}
+
+/// How rims are rounded; `unstated` says what nothing means.
+fn rim(unstated: &str) -> Value {
+    json!({
+        "name": "rim_mm", "unit": "mm", "least": 0.0, "most": MAX_RIM_MM, "optional": true,
+        "stated": { "nothing": unstated, "zero": "sharp", "number": "rolled up to" },
+        "about": "radius of the rims of openings: U of what is measured at them covers it; where nobody states it, rims of up to 0.3 mm",
+    })
 }
 
 /// The kinds of gauges that take such a feature in one of their places.

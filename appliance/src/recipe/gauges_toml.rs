@@ -94,6 +94,10 @@ impl Gauging {
                 ("left", feature.left.map(|at| json!(at))),
                 ("right", feature.right.map(|at| json!(at))),
                 ("edge_mm", feature.edge_mm.map(|mm| json!(mm))),
+                (
+                    "edge_tolerance_mm",
+                    feature.edge_tolerance_mm.map(|mm| json!(mm)),
+                ),
             ];
             let keys = keys.into_iter();
             write(

@@ -19,9 +19,12 @@ use crate::station::Unit;
 use crate::system::headway::Headway;
 use algo::geometry::Triangulator;
 use algo::inspect::good::{DeviationNoise, LargestDeviation, areas, leaves_open, motion_variance};
-use algo::inspect::{GoldenSurface, Largest, Missed, Taught, Weight, normal_shares};
-use algo::pipeline::KnownSurface;
+use algo::inspect::{GoldenSurface, Highlights, Largest, Missed, Taught, Weight, normal_shares};
+use algo::phase::Trust;
+use algo::pipeline::{KnownSurface, PhaseMap};
+use algo::units::Modulation;
 use hal::bounded;
+use std::f64::consts::SQRT_2;
 use std::ops::RangeInclusive;
 
 /// Limit of the deviation unless another one is asked for, ± mm.
@@ -44,6 +47,14 @@ fn length() -> RangeInclusive<f64> {
 /// Diameter of a dent, over the side of a square whose mean has nine tenths of the dent's depth: of
 /// a depth that falls as cos²(πr/D) the mean over side a is 1 − (π²/6) a²/D².
 pub(super) const DENT: f64 = 4.06;
+
+/// Teaching says that good parts deviate by less than the largest deviation that is expected and so
+/// many of its standard deviations.
+const SCATTERS: f64 = 3.0;
+/// What displaced parts deviate by beside their sharpest creases, as a multiple of what golden's
+/// interpolation misses: golden knows only what its pixels see of a crease (parts in front of the
+/// simulated head: `tests/suite/every_part.rs`).
+pub(super) const BEND: f64 = 2.0;
 
 bounded! {
     /// The deviation of good parts, as predicted when the part was taught.
@@ -91,6 +102,8 @@ pub(super) struct Noise<'a> {
     pub triangulator: &'a Triangulator,
     /// Golden.
     pub surface: KnownSurface,
+    /// Its light.
+    pub phases: &'a PhaseMap,
     /// σ_z² of pixels in production, mm².
     pub production: Vec<f32>,
     /// The variance of golden's noise, as a share of `production`.
@@ -225,7 +238,7 @@ impl Weighed {
 
     /// Gives the part squares as small as noise and golden's interpolation allow, where the image of
     /// a part moves by up to `away` pixels, and sets what good parts are predicted to deviate by in
-    /// them. The second result is what displaced parts deviate by at their sharpest crease, mm.
+    /// them. The second result is what displaced parts deviate by at their sharpest crease or brightest highlight, mm.
     pub fn settle(&mut self, noise: &Noise<'_>, away: usize, headway: Headway<'_>) -> (Sides, f64) {
         let sigmas = self.sigmas(SIDES);
         headway.done(0.3);
@@ -235,12 +248,25 @@ impl Weighed {
         };
         let missed = Missed::new(&noise.surface, &self.shares, &self.weights);
         headway.done(0.5);
-        let bent = |place, side| missed.at(place, side);
+        let seen = (noise.triangulator, &noise.surface);
+        let light = |at: usize| match noise.phases.trust[at] {
+            Trust::Saturated => Modulation::from_bits(u16::MAX),
+            _ => noise.phases.modulation[at],
+        };
+        let highlights = Highlights::new(seen, light, &self.shares, &self.weights);
+        // Golden has an error of its own, which is independent of the part's.
+        let both = |one: f64| one * SQRT_2 / BEND;
+        let lit = |place, side| {
+            highlights
+                .as_ref()
+                .map_or(0.0, |of| both(of.at(place, side)))
+        };
+        let bent = |place, side| missed.at(place, side) + lit(place, side);
         let limit = self.found.limit_mm;
-        let sides = Sides::new((&sigmas, bent), full, limit, (self.width, away));
+        let sides = Sides::new((&sigmas, &bent), full, limit, (self.width, away));
         headway.done(0.8);
-        let bend = sides.bend(&missed, self.places());
-        drop(missed);
+        let bend = sides.most(bent, self.places());
+        drop((missed, highlights));
         self.predict(&sides, SIDES.into_iter().zip(sigmas));
         (sides, bend)
     }
@@ -370,7 +396,8 @@ impl GoodPartsFile {
         ));
         if displaced_mm > 0.0 {
             lines.push(format!(
-                "parts that lie anywhere within the placement tolerance deviate by up to {displaced_mm:.3} ± {displaced_scatter_mm:.3} mm"
+                "good parts that lie anywhere within the placement tolerance deviate by less than {:.3} mm",
+                displaced_mm + SCATTERS * displaced_scatter_mm
             ));
         }
         if weighed > 0.0 {

@@ -4,7 +4,7 @@
 use super::archive::Arrays;
 use super::failure::TeachError;
 use super::golden::GoldenPart;
-use super::good_parts::{DENT, DEVIATION_MM, GoodPartsFile, Noise};
+use super::good_parts::{BEND, DENT, DEVIATION_MM, GoodPartsFile, Noise};
 use super::plan::window;
 use super::proof::{self, COVERAGE_CHANGE, Magnitudes, Proof};
 use super::refusal;
@@ -14,10 +14,8 @@ use crate::system::headway::Headway;
 use algo::inspect::{Basis, Measure, eroded};
 use algo::pipeline::KnownSurface;
 
-/// What displaced parts deviate by beside their sharpest creases, and how far that scatters from
-/// placement to placement, as multiples of what golden's interpolation misses: golden knows only what its pixels
-/// see of a crease (parts in front of the simulated head: `tests/suite/every_part.rs`).
-const BEND: f64 = 2.0;
+/// How far what displaced parts deviate by scatters from placement to placement, as a multiple of what golden
+/// misses of them.
 const BEND_SPREAD: f64 = 0.12;
 
 impl GoldenPart<'_> {
@@ -128,6 +126,7 @@ impl GoldenPart<'_> {
         Noise {
             triangulator: &self.triangulator,
             surface,
+            phases: &self.phases,
             production,
             golden: golden / self.captures as f64,
         }

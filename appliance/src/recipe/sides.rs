@@ -6,8 +6,6 @@
 //! only larger squares keep good parts inside the limits. Both differ from place to place, so the
 //! side does: on a cone squares are large at its tip and its rim alone.
 
-use algo::inspect::Missed;
-
 /// Sides of squares in camera pixels, the smallest first. A single pixel may be a wild one. In the
 /// largest a dent of 8 mm is still seen at half its depth by 0.4 mm per pixel.
 pub(super) const SIDES: [usize; 4] = [3, 5, 7, 9];
@@ -105,8 +103,12 @@ impl Sides {
     }
 
     /// The most that is missed in these squares of the places that are compared, mm.
-    pub fn bend(&self, missed: &Missed, places: impl Iterator<Item = usize>) -> f64 {
-        let most = places.map(|place| missed.at(place, self.at(place)));
+    pub fn most(
+        &self,
+        missed: impl Fn(usize, usize) -> f64,
+        places: impl Iterator<Item = usize>,
+    ) -> f64 {
+        let most = places.map(|place| missed(place, self.at(place)));
         most.fold(0.0, f64::max)
     }
 

@@ -88,6 +88,14 @@ impl Opened {
             trial.warn(&file, &judged, &seen);
             gauges = self::gauges(&judged, &outline);
             trial.take(&seen);
+            let readings = golden.findings.readings.iter();
+            for (gauge, reading) in gauges.iter_mut().zip(readings) {
+                if let Some(reading) = reading.filter(|reading| reading.rims > 0.0) {
+                    let by_master = reading.sigma.unwrap_or(0.0).hypot(reading.compared);
+                    gauge["u_rims"] = (2.0 * reading.rims).into();
+                    gauge["u_master"] = (2.0 * by_master).into();
+                }
+            }
         }
         trial.probe(&file)?;
         trial.look_closer(&file)?;

@@ -38,6 +38,7 @@ impl Line {
         let (mut features, datums, mut gauges) =
             gauging(&setting.plate, &bed.calibration.camera, &lies);
         features[0].thickness_mm = setting.thickness_mm;
+        features[0].rim_mm = setting.rims_stated.then_some(setting.plate.rim_mm);
         for (gauge, truth) in &mut gauges {
             limit(gauge, *truth);
         }

@@ -3,7 +3,10 @@
 
 use super::line::{Judged, Line};
 use super::plates::{Setting, Z_MM, plate};
-use super::{all_together, bright, closed_holes_are_absent, defects_fail, judge, thick};
+use super::{
+    all_together, bright, closed_holes_are_absent, defects_fail, judge,
+    rims_that_nobody_states_are_within_the_uncertainty, thick,
+};
 use crate::placement::{bed, taught_within};
 use crate::surroundings::everywhere;
 use algo::geometry::Vector;
@@ -71,6 +74,14 @@ fn what_is_measured_at_rounded_rims_is_within_its_uncertainty() {
         within += judged.within;
     }
     assert!(within / errors >= 0.95, "{}", within / errors);
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn rims_that_nobody_states_are_within_the_uncertainty_in_fifty_placements() {
+    let unstated = [0.0, 0.1, 0.2, 0.3].map(|rim_mm| (rim_mm, false));
+    let rims = [&[(0.0, true)][..], &unstated].concat();
+    rims_that_nobody_states_are_within_the_uncertainty(50, &rims);
 }
 
 /// How far below the plate a floor lies on which the finest fringes are `count` fringes on, mm.

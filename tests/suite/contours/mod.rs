@@ -4,7 +4,7 @@ mod commands;
 mod hidden;
 mod line;
 mod many;
-mod plates;
+pub(crate) mod plates;
 
 use crate::gauges::frames;
 use appliance::station::Verdict;
@@ -134,6 +134,64 @@ fn holes_slots_and_edges_are_true_and_as_uncertain_as_they_say() {
 #[ignore = "minutes"]
 fn contours_are_true_with_thick_sheets_bright_floors_real_optics_and_tilts() {
     judge(settings());
+}
+
+#[test]
+fn rims_that_nobody_states_are_within_the_uncertainty_in_a_few_placements() {
+    rims_that_nobody_states_are_within_the_uncertainty(
+        FEW_PLACEMENTS,
+        &[(0.0, true), (0.2, false)],
+    );
+}
+
+/// U of a diameter, mm: of sharp rims, and of those that nobody states.
+const SHARP_U_MM: f64 = 0.012;
+const UNKNOWN_U_MM: f64 = 0.2;
+
+/// Plates with sharp and with rolled edges; limits that their true diameters do not keep.
+fn rims_that_nobody_states_are_within_the_uncertainty(placements: usize, rims: &[(f64, bool)]) {
+    for &(rim_mm, rims_stated) in rims {
+        let setting = Setting {
+            plate: Plate { rim_mm, ..plate() },
+            rims_stated,
+            ..Setting::default()
+        };
+        let is_diameter = |name: &str| name.starts_with("diameter");
+        let mut line = Line::with_limits(&setting, |gauge, truth| {
+            if is_diameter(&gauge.name) {
+                (gauge.low, gauge.high) = (Some(truth + 0.005), Some(truth + 2.0));
+            }
+        });
+        let mut judged = Judged::default();
+        line.judge(&format!("rims of {rim_mm} mm"), placements, &mut judged);
+        let [_, within, _] = judged.figures();
+        assert_eq!(judged.missing, 0);
+        assert!(within >= 0.95, "{rim_mm}: {within}");
+        assert!(
+            rims_stated || judged.far.is_empty(),
+            "{rim_mm}: {:?}",
+            judged.far
+        );
+        let (mut random, mut largest) = (Random::new(9), 0.0_f64);
+        for _ in 0..placements {
+            let lies = setting.placement(Some(&mut random));
+            let inspected = line.inspect(setting.plate.clone(), &lies);
+            for gauge in inspected.gauges.iter().filter(|of| is_diameter(&of.name)) {
+                let u = gauge.uncertainty.unwrap();
+                largest = largest.max(u);
+                assert!(
+                    u <= if rims_stated {
+                        SHARP_U_MM
+                    } else {
+                        UNKNOWN_U_MM
+                    },
+                    "{u}"
+                );
+                assert!(!gauge.decision.pass, "{rim_mm}: {gauge:?}");
+            }
+        }
+        println!("U of diameters up to {largest:.4} mm");
+    }
 }
 
 /// Fails if plates in one of these settings are measured with a larger bias than it names, in µm, or

@@ -16,12 +16,12 @@ const TILT_DEG: f64 = 1.0;
 /// No corner of it moves farther.
 const TOLERANCE_MM: f64 = 5.0;
 /// z of the plate's upper side.
-pub(super) const Z_MM: f64 = 8.0;
+pub(crate) const Z_MM: f64 = 8.0;
 /// A region reaches so far beyond its contour, mm.
-pub(super) const AROUND_MM: f64 = 2.5;
+pub(crate) const AROUND_MM: f64 = 2.5;
 
 /// The plate: holes of 3 to 11 mm and a slot.
-pub(super) fn plate() -> Plate {
+pub(crate) fn plate() -> Plate {
     let hole = |x, y, radius| Hole { x, y, radius };
     Plate {
         z: Z_MM,
@@ -45,10 +45,10 @@ pub(super) fn plate() -> Plate {
 }
 
 /// The camera, and how the plate lies.
-pub(super) type View<'a> = (&'a Pinhole, &'a Placement);
+pub(crate) type View<'a> = (&'a Pinhole, &'a Placement);
 
 /// The pixels of a polygon on the plate.
-pub(super) fn polygon((camera, lies): View<'_>, corners: &[[f64; 2]]) -> Vec<[f64; 2]> {
+pub(crate) fn polygon((camera, lies): View<'_>, corners: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let seen = |&[x, y]: &[f64; 2]| {
         let [x, y, z] = lies.to_world([x, y, Z_MM]);
         let at = Vector::new(x, y, z);
@@ -58,7 +58,7 @@ pub(super) fn polygon((camera, lies): View<'_>, corners: &[[f64; 2]]) -> Vec<[f6
     corners.iter().map(seen).collect()
 }
 
-pub(super) fn around(camera: View<'_>, [x, y]: [f64; 2], [a, b]: [f64; 2]) -> Vec<[f64; 2]> {
+pub(crate) fn around(camera: View<'_>, [x, y]: [f64; 2], [a, b]: [f64; 2]) -> Vec<[f64; 2]> {
     let corner = |at: usize| {
         let turn = std::f64::consts::TAU * at as f64 / 16.0;
         [x + a * turn.cos(), y + b * turn.sin()]
@@ -67,7 +67,7 @@ pub(super) fn around(camera: View<'_>, [x, y]: [f64; 2], [a, b]: [f64; 2]) -> Ve
 }
 
 /// Features of a plate, and gauges with their true values.
-pub(super) fn gauging(
+pub(crate) fn gauging(
     plate: &Plate,
     camera: &Pinhole,
     lies: &Placement,
@@ -82,7 +82,6 @@ pub(super) fn gauging(
     )];
     let in_sheet = |of: FeatureFile| FeatureFile {
         plane: Some("sheet".into()),
-        rim_mm: (plate.rim_mm > 0.0).then_some(plate.rim_mm),
         ..of
     };
     let mut all: Vec<(GaugeFile, f64)> = Vec::new();
@@ -198,23 +197,25 @@ pub(super) fn gauging(
 
 /// What plates are measured by.
 #[derive(Clone)]
-pub(super) struct Setting {
-    pub(super) plate: Plate,
+pub(crate) struct Setting {
+    pub(crate) plate: Plate,
     /// Columns and rows of the camera.
-    pub(super) size: (u32, u32),
+    pub(crate) size: (u32, u32),
     /// σ of the blur of camera and projector, px.
-    pub(super) blur: [f64; 2],
+    pub(crate) blur: [f64; 2],
     /// Ambient light over the part's.
-    pub(super) ambient: f64,
+    pub(crate) ambient: f64,
     /// Of the part as taught about y, degrees.
-    pub(super) tilt_deg: f64,
-    pub(super) thickness_mm: Option<f64>,
+    pub(crate) tilt_deg: f64,
+    pub(crate) thickness_mm: Option<f64>,
+    /// Whether the plane says how the rims are.
+    pub(crate) rims_stated: bool,
     /// Whether what golden does not show is left out.
-    pub(super) some: bool,
+    pub(crate) some: bool,
     /// Counts; `None` for a quiet camera.
-    pub(super) noise: Option<f64>,
+    pub(crate) noise: Option<f64>,
     /// What the plate lies on and among.
-    pub(super) world: Option<Ground>,
+    pub(crate) world: Option<Ground>,
 }
 
 impl Default for Setting {
@@ -226,6 +227,7 @@ impl Default for Setting {
             ambient: 0.04,
             tilt_deg: 0.0,
             thickness_mm: Some(0.0),
+            rims_stated: true,
             some: false,
             noise: Some(Noise::PAPER),
             world: None,
@@ -234,7 +236,7 @@ impl Default for Setting {
 }
 
 impl Setting {
-    pub(super) fn scenario(&self) -> Scenario {
+    pub(crate) fn scenario(&self) -> Scenario {
         let mut scenario = Scenario {
             part: Part::Plate(self.plate.clone()),
             floor: self.world.clone(),
@@ -251,7 +253,7 @@ impl Setting {
     }
 
     /// How far the corners of a part may lie from where it was taught, mm: by default among other things.
-    pub(super) fn tolerance_mm(&self) -> f64 {
+    pub(crate) fn tolerance_mm(&self) -> f64 {
         match self.world {
             Some(_) => 1.0,
             None => TOLERANCE_MM,
@@ -259,7 +261,7 @@ impl Setting {
     }
 
     /// The placement as taught, displaced at random.
-    pub(super) fn placement(&self, random: Option<&mut Random>) -> Placement {
+    pub(crate) fn placement(&self, random: Option<&mut Random>) -> Placement {
         let mut lies = Placement {
             tilt_deg: [0.0, self.tilt_deg],
             ..Placement::default()

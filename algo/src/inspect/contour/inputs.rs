@@ -15,7 +15,7 @@ const EDGE_PX: f64 = 0.0025;
 /// What the edge of one piece is off by how it lies among the pixels, px: different in each piece.
 /// Diameters and centres of these holes scatter from placement to placement by 0.0075 px of a piece,
 /// above a bright floor by a quarter more.
-const PIECE_PX: f64 = 0.01;
+pub const PIECE_PX: f64 = 0.01;
 /// The shift of edges, px, where as much light as the material's is not explained. Above floors 1 and
 /// 2 fringes lower, where 2 % are not, centres and radii are off by 2 to 8 µm at 0.41 mm per px.
 const LIGHT_PX: f64 = 0.6;

@@ -40,7 +40,7 @@ mod view;
 pub use crate::math::associate::Point;
 pub use complex::Complex;
 pub use find::{Contour, find};
-pub use inputs::{Input, Source, inputs};
+pub use inputs::{Input, PIECE_PX, Source, inputs};
 pub use verdict::{Outcome, State};
 pub use view::{Fringes, Setup, Spot, View};
 

@@ -87,6 +87,8 @@ pub struct Cut {
     pub right: [f64; 2],
     /// The radius of both edges where it is stated, mm.
     pub edge_mm: Option<f64>,
+    /// How far the stated radius may be off, ± mm, where that is known.
+    pub edge_tolerance_mm: Option<f64>,
 }
 
 impl Feature {

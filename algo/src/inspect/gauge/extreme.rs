@@ -11,11 +11,12 @@ use crate::inspect::feature::{Cell, Rim};
 use alloc::vec::Vec;
 use core::f64::consts::{PI, SQRT_2};
 
-/// Largest less smallest value, one per cell. Its error is made of those of both ends, each the
-/// largest of many noisy values, and of what an error of the motion does to the difference of the
-/// two cells.
+/// Largest less smallest value, one per cell of a grid of so many columns, less what noise alone
+/// adds to both ends: the largest of many noisy values is not the largest true one. Its error is
+/// made of those of both ends, and of what an error of the motion does to the difference of the two
+/// cells.
 pub(super) fn range(
-    cells: &[Cell],
+    (cells, columns): (&[Cell], usize),
     values: &mut [f64],
     sigma: f64,
     placed: Option<&Placed>,
@@ -25,21 +26,46 @@ pub(super) fn range(
     let value = values[high] - values[low];
     let (upper, lower) = (cells[high].taught.jacobian, cells[low].taught.jacobian);
     let motion = motion(&core::array::from_fn(|i| upper[i] - lower[i]), placed);
-    let top = spread_of_largest(values, sigma);
-    for value in values.iter_mut() {
-        *value = -*value;
-    }
-    let bottom = spread_of_largest(values, sigma);
+    let drawn = Drawn::of(values.iter().copied(), sigma);
+    let estimate = |at: usize| drawn.value(values[at], DEFECT);
+    let lost = [high, low].map(|at| lost((cells, columns), estimate, at));
+    let ends = Ends::of(values, sigma, |_| 1.0);
     Some(Found {
-        value,
-        pixels: top * top + bottom * bottom,
+        value: (value - ends.noise).max(0.0),
+        pixels: ends.variance,
         motion,
         lever: 2.0,
+        smoothed: (lost[0] + lost[1]) / libm::sqrt(3.0),
     })
 }
 
-/// Largest less smallest distance of the points of a contour from its shape. Each point is
-/// uncertain by its own noise, of which the RMS is taken for all.
+/// By how much a surface may reach beyond the mean of a cell at an extreme, mm, by the estimates of
+/// the true values of cells. With second
+/// differences d of the cells along rows and columns, the mean is d/24 below the middle on a
+/// parabola, and the extreme of one that lies anywhere in the cell another d/24 on average above
+/// that. At the border of the region it is half a cell farther out.
+fn lost((cells, columns): (&[Cell], usize), value: impl Fn(usize) -> f64, at: usize) -> f64 {
+    let middle = value(at);
+    let row = |at: usize| at / columns.max(1);
+    let beside = |to: Option<usize>, in_row: bool| {
+        let to = to.filter(|&to| !in_row || row(to) == row(cells[at].at))?;
+        let place = cells.binary_search_by_key(&to, |cell| cell.at).ok()?;
+        Some(value(place))
+    };
+    let along = |step: usize, in_row: bool| {
+        let place = cells[at].at;
+        let before = beside(place.checked_sub(step), in_row);
+        match (before, beside(Some(place + step), in_row)) {
+            (Some(a), Some(b)) => libm::fabs(a + b - 2.0 * middle) / 12.0,
+            (Some(only), None) | (None, Some(only)) => libm::fabs(only - middle) / 2.0,
+            (None, None) => 0.0,
+        }
+    };
+    along(1, true) + along(columns.max(1), false)
+}
+
+/// Largest less smallest distance of the points of a contour from its shape, less what noise alone
+/// adds. Each point is uncertain by its own noise, of which the RMS is taken for all.
 pub(super) fn range_of(rim: &Rim) -> Option<OfRim> {
     let count = rim.residuals.len();
     if count < 2 {
@@ -50,18 +76,50 @@ pub(super) fn range_of(rim: &Rim) -> Option<OfRim> {
     let mut values: Vec<f64> = rim.residuals.iter().map(|(off, _)| *off).collect();
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let top = spread_of_largest(&values, sigma);
-    for value in &mut values {
-        *value = -*value;
-    }
-    let bottom = spread_of_largest(&values, sigma);
-    // By noise alone, which has all points at 0.
-    let (mean, _) = largest_of(&[(0.0, count as f64)]);
+    let ends = Ends::of(&mut values, sigma, |at| rim.residuals[at].1 / sigma);
     Some(OfRim {
-        value: largest - smallest,
-        variance: top * top + bottom * bottom,
-        expected: Some(2.0 * mean * sigma),
+        value: (largest - smallest - ends.noise).max(0.0),
+        variance: ends.variance,
     })
+}
+
+/// What noise does to both ends of a range.
+struct Ends {
+    /// What it adds on average.
+    noise: f64,
+    /// The variance of the range.
+    variance: f64,
+}
+
+impl Ends {
+    /// Of these values, which are negated; each has an error of `sigma` times `relative`.
+    fn of(values: &mut [f64], sigma: f64, relative: impl Fn(usize) -> f64) -> Self {
+        if !(sigma > 0.0) {
+            return Self {
+                noise: 0.0,
+                variance: 0.0,
+            };
+        }
+        let drawn = Drawn::of(values.iter().copied(), sigma);
+        let top = noise_of_largest(values, sigma, |at, value| {
+            drawn.value(value, DEFECT * relative(at).max(1.0))
+        });
+        for value in values.iter_mut() {
+            *value = -*value;
+        }
+        let bottom = noise_of_largest(values, sigma, |at, value| {
+            -drawn.value(-value, DEFECT * relative(at).max(1.0))
+        });
+        // Where the scatter of the values is not far from that of noise, it is not known how much of
+        // it the part has: the middle between this much and noise alone is taken.
+        let noise = top.0 + bottom.0;
+        let alone = 2.0 * largest_of(&[(0.0, values.len() as f64)]).0 * sigma;
+        let open = (alone - noise).max(0.0) * (sigma / drawn.scatter.max(sigma)) / 2.0;
+        Self {
+            noise: noise + open,
+            variance: top.1 * top.1 + bottom.1 * bottom.1 + open * open,
+        }
+    }
 }
 
 /// The variance that the motion's error gives a value with this derivative over the motion.
@@ -126,17 +184,15 @@ impl Drawn {
 const BINS_PER_SIGMA: f64 = 4.0;
 const BINS: usize = 40;
 
-/// Standard deviation, over repeated measurements, of the largest of values of which each has an
-/// error of `sigma`, from its distribution F(x) = Π Φ((x − mᵢ)/σ), m the true values ([`Drawn`]).
-fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
-    if !(sigma > 0.0) {
-        return 0.0;
-    }
-    let drawn = Drawn::of(values.iter().copied(), sigma);
-    let drawn = |value: &f64| drawn.value(*value, DEFECT);
-    let top = values.iter().map(drawn).fold(f64::NEG_INFINITY, f64::max);
+/// Mean, above the largest true value, and standard deviation, over repeated measurements, of the
+/// largest of values of which each has an error of `sigma`, from its distribution F(x) = Π Φ((x −
+/// mᵢ)/σ), m the true values, which `drawn` estimates.
+fn noise_of_largest(values: &[f64], sigma: f64, drawn: impl Fn(usize, f64) -> f64) -> (f64, f64) {
+    let all = values.iter().enumerate();
+    let drawn = all.map(|(at, value)| drawn(at, *value));
+    let top = drawn.clone().fold(f64::NEG_INFINITY, f64::max);
     let mut bins = [0.0; BINS];
-    for value in values.iter().map(drawn) {
+    for value in drawn {
         let bin = libm::rint((top - value) / sigma * BINS_PER_SIGMA);
         if bin < BINS as f64 {
             bins[bin as usize] += 1.0;
@@ -146,7 +202,8 @@ fn spread_of_largest(values: &[f64], sigma: f64) -> f64 {
     let bins: heapless::Vec<(f64, f64), BINS> = bins
         .map(|(bin, count)| (bin as f64 / BINS_PER_SIGMA, *count))
         .collect();
-    largest_of(&bins).1 * sigma
+    let (mean, scatter) = largest_of(&bins);
+    (mean * sigma, scatter * sigma)
 }
 
 /// Mean, above the largest true value, and standard deviation of the largest of values with errors

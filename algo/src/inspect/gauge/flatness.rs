@@ -32,6 +32,7 @@ impl Kind for Flatness {
         let slope = 1.0 + plane.along * plane.along + plane.down * plane.down;
         let heights = of.cells().iter().map(|cell| plane.above(cell));
         of.room.extend(heights);
-        range(of.cells(), of.room, of.sigma / libm::sqrt(slope), of.placed)
+        let sigma = of.sigma / libm::sqrt(slope);
+        range((of.cells(), of.columns), of.room, sigma, of.placed)
     }
 }

@@ -20,7 +20,6 @@ impl Kind for Found {
         Some(OfRim {
             value: rim.found,
             variance: 0.0,
-            expected: None,
         })
     }
 

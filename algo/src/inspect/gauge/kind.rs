@@ -278,6 +278,7 @@ impl<'a> Evidence<'a> {
             pixels,
             motion: motion(&g, self.placed),
             lever,
+            smoothed: 0.0,
         }
     }
 }

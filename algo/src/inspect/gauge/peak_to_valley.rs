@@ -25,6 +25,6 @@ impl Kind for PeakToValley {
 
     fn find(&self, of: Evidence<'_>) -> Option<Found> {
         of.room.extend(of.cells().iter().map(|cell| cell.height));
-        range(of.cells(), of.room, of.sigma, of.placed)
+        range((of.cells(), of.columns), of.room, of.sigma, of.placed)
     }
 }

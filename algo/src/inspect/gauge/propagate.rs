@@ -86,6 +86,8 @@ pub struct Propagated {
     pub shared: f64,
     /// Variance by inputs that are others wherever the part lies.
     pub own: f64,
+    /// What of `shared` is by the radii of rims.
+    pub rims: f64,
 }
 
 /// One thing that is otherwise than it was found.
@@ -236,7 +238,7 @@ impl Characteristic<'_> {
             pixels += (0..3).map(|i| g[i] * dot(&covariance[i])).sum::<f64>();
             lever += rows.iter().map(|row| libm::fabs(dot(row))).sum::<f64>();
         }
-        let (mut shared, mut own) = (0.0, 0.0);
+        let (mut shared, mut own, mut rims) = (0.0, 0.0, 0.0);
         let mut is_contour = false;
         for (at, of) in self.all().enumerate() {
             let Sensitive::Contour { id, rim, .. } = *of else {
@@ -265,6 +267,9 @@ impl Characteristic<'_> {
                 match source.is_of_place() {
                     true => own += off * off,
                     false => shared += off * off,
+                }
+                if *source == Source::Rim {
+                    rims += off * off;
                 }
             }
         }
@@ -300,9 +305,11 @@ impl Characteristic<'_> {
                 pixels,
                 motion,
                 lever,
+                smoothed: 0.0,
             },
             shared,
             own,
+            rims,
         })
     }
 }

@@ -20,6 +20,8 @@ pub struct Reading {
     /// The same of what the value differs by from golden's own: what the measurements of both share
     /// is not in it, the noise of golden and the error over the part's displacement are.
     pub compared: f64,
+    /// What of `systematic` is by the radii of rims, 1 σ: they are stated, not measured.
+    pub rims: f64,
     /// Where the value is, of a deviation.
     pub square: Option<Square>,
 }
@@ -47,6 +49,8 @@ pub struct Found {
     /// By how much errors of all heights of 1 mm, each with the sign that does most, change the
     /// value.
     pub lever: f64,
+    /// What smoothing may have taken from the value, 1 σ.
+    pub smoothed: f64,
 }
 
 /// A value of the points of a contour.
@@ -56,6 +60,4 @@ pub struct OfRim {
     pub value: f64,
     /// Variance by the noise of the points; 0 where it is not known.
     pub variance: f64,
-    /// What it is expected to be on a perfect contour with this noise.
-    pub expected: Option<f64>,
 }

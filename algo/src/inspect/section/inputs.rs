@@ -14,7 +14,9 @@ use super::reason::Side;
 use crate::math::derivative::derivative;
 use alloc::vec::Vec;
 
-/// By how much the radius of what is not seen of an edge differs from that of what is seen, of it.
+/// By how much the radius of what is not seen of an edge differs from that of what is seen, of it,
+/// and how far a stated radius is off, of it (1 σ), where nothing is known of that. Neither is
+/// measured.
 const FORM: f64 = 0.05;
 
 /// What is uncertain, the same in every measurement of a part.
@@ -48,8 +50,9 @@ pub struct Knowledge {
     pub height: f64,
     /// σ of lengths by the calibration, of 1.
     pub scale: f64,
-    /// σ of a stated radius, mm.
-    pub radius: f64,
+    /// σ of a stated radius, and of that of what is not seen of its edge, mm; `None` where it is not
+    /// known.
+    pub radius: Option<f64>,
 }
 
 /// A value with its errors.
@@ -83,13 +86,12 @@ impl Section {
                 inputs.push(Input { source, off });
             };
             add(Source::Heights(side), [known.height, 0.0, 0.0, 0.0]);
-            let missing = FORM * edge.parameters[3] * (1.0 - libm::sin(edge.arc));
+            let radius = known.radius.filter(|_| edge.is_stated);
+            let radius = radius.unwrap_or(FORM * edge.parameters[3]);
+            let missing = radius * (1.0 - libm::sin(edge.arc));
             add(Source::Missing(side), [0.0, 0.0, missing, 0.0]);
             if edge.is_stated {
-                add(
-                    Source::Radius(side),
-                    edge.stated.map(|off| off * known.radius),
-                );
+                add(Source::Radius(side), edge.stated.map(|off| off * radius));
             }
         }
         let [left, right] = &self.edges;

@@ -122,6 +122,7 @@ impl ErrorBudget {
             expected: Some(largest.mean).filter(|mean| *mean > 0.0),
             systematic,
             compared: systematic,
+            rims: 0.0,
             square: Some(Square {
                 column: best.column,
                 row: best.row,

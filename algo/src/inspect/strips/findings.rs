@@ -166,6 +166,7 @@ impl Production {
                     expected: None,
                     systematic: 0.0,
                     compared: 0.0,
+                    rims: 0.0,
                     square: None,
                 })
             }
@@ -205,6 +206,7 @@ impl Production {
                     systematic,
                     // A motion is what the part differs by from golden.
                     compared: systematic,
+                    rims: 0.0,
                     square: None,
                 })
             }

@@ -109,7 +109,12 @@ impl Production {
         };
         let placed = pose.placed.as_ref();
         let propagated = value.propagate(placed, budget.calibration.length)?;
-        let Propagated { found, shared, own } = propagated;
+        let Propagated {
+            found,
+            shared,
+            own,
+            rims,
+        } = propagated;
         let of = budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed);
         // Where golden says where a plane's point lies, golden's error is in the value: as much as it would be
         // if the point were found from this part.
@@ -140,6 +145,7 @@ impl Production {
         Some(Reading {
             systematic: with(of.systematic, shared + own),
             compared: with(of.compared, 2.0 * own),
+            rims: libm::sqrt(rims),
             ..of
         })
     }
@@ -175,16 +181,16 @@ impl Production {
             (None, true) => OfRim {
                 value: kind.of_absent()?,
                 variance: 0.0,
-                expected: None,
             },
             (None, false) => return None,
         };
         Some(Reading {
             value: of.value,
             sigma: Some(libm::sqrt(of.variance)),
-            expected: of.expected,
+            expected: None,
             systematic: 0.0,
             compared: 0.0,
+            rims: 0.0,
             square: None,
         })
     }

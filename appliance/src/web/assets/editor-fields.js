@@ -48,6 +48,15 @@ export function nameField(what, one) {
   return labelled("Name", input, `name of ${one.name}`);
 }
 
+// What is not known, zero, or a number: a list of these, and a field for the number.
+function stated(words, called, value, { nothing, zero, number: other }, bounds, set) {
+  const way = value === undefined || value === null ? "" : value > 0 ? "number" : "zero";
+  const turn = (to) => set(to === "number" ? 0.1 : to === "zero" ? 0 : null);
+  const fields = [select(words, called, way, [[nothing, ""], [zero, "zero"], [`${other} …`, "number"]], turn, bounds.about)];
+  if (way === "number") fields.push(number(other, `${other}, ${called}`, value, { ...bounds, optional: false }, (to) => set(to, true)));
+  return fields;
+}
+
 // The field of a parameter of a feature or a gauge: a list of its words, a feature, a number, or two.
 export function parameter(holder, of, key) {
   const { name, about, choices, features, count, optional, unit } = of, words = spoken(name).replace(/ (mm|px|deg)$/, "");
@@ -62,6 +71,7 @@ export function parameter(holder, of, key) {
   const bounds = { about, unit, optional, least: of.least, above: of.above, most: of.most || (pixels ? Math.max(width, height) : undefined), whole: pixels, odd: of.odd };
   // Two coordinates of the picture are drawn.
   if (count && pixels) return [];
+  if (of.stated) return stated(words, called, holder[name], of.stated, bounds, set);
   if (!count) return [number(words, called, holder[name], bounds, (value) => set(value, true))];
   return Array.from({ length: count }, (_, at) => number(`${words} ${at + 1}`, `${words} ${at + 1} of ${holder.name}`, (holder[name] || [])[at], bounds, (value) => {
     alter(`${key} ${name} ${at}`, () => { holder[name] = (holder[name] || [0, 0]).map((other, place) => (place === at ? value : other)); });

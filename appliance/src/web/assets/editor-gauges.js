@@ -62,6 +62,7 @@ function judgement(gauge, place) {
   if (of && of.value !== null) {
     parts.push(make("p", "", make("b", "", quantity(of.value, unit)), ` on golden${of.sigma ? `, σ ${quantity(of.sigma, unit, 1)}` : ""}, `, make("b", "", of.u ? `U ${quantity(of.u, unit, 1)}` : "U not known"), `; limits ${limits(of.low, of.high, unit)}`));
     if (of.too_fine) parts.push(make("p", "bad", `⚠ too fine for this head: the limits are less than 4 U = ${quantity(4 * of.u, unit)} apart`));
+    if (of.u_rims > of.u / 2) parts.push(make("p", "quiet", `${quantity(of.u_rims, unit, 1)} of U is for rims: state at the feature or its plane whether they are sharp. With the value of a master, U is ${quantity(of.u_master, unit, 1)}`));
     const least = (of.u || 0) + NOISE * (of.sigma || 0);
     if (gauge.golden && Math.min(gauge.plus || 0, gauge.minus || 0) < least) parts.push(make("p", "quiet", `with ± ${quantity(least, unit)} or more, noise and the guard band leave good parts room`));
   }

@@ -29,7 +29,7 @@ fn values(
     }
     let section = Section::new(&rendered.capture(seed, 1.0), &request, &joint.optics())?;
     let known = Knowledge {
-        radius: STATED,
+        radius: Some(STATED),
         ..Knowledge::default()
     };
     let inputs = section.inputs(&known);

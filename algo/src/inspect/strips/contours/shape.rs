@@ -1,7 +1,7 @@
 //! The shapes of contours as features have them.
 
 use crate::inspect::contour::shape::{Circle, Line, Shape, Slot};
-use crate::inspect::contour::{Contour, Input, Setup, Source, View, find, inputs};
+use crate::inspect::contour::{Contour, Input, PIECE_PX, Setup, Source, View, find, inputs};
 use crate::inspect::feature::{FeatureKind, Geometry, MAX_PARAMETERS, Parameters, PlaneFrame};
 use alloc::vec::Vec;
 
@@ -148,7 +148,10 @@ fn associated<const N: usize>(
     let used = contour.points.iter().filter(|point| point.weight > 0.0);
     let residuals = used.map(|point| {
         let off = shape.distance(&contour.parameters, point.x, point.y);
-        (off, libm::sqrt(point.variance))
+        (
+            off,
+            libm::hypot(libm::sqrt(point.variance), PIECE_PX * contour.pixel),
+        )
     });
     Associated {
         count: N,

@@ -26,6 +26,8 @@ pub struct Expected {
     pub optics: Optics,
     /// Half its width, mm.
     pub half_mm: f64,
+    /// σ of the stated radius of its edges, mm; `None` where it is not known.
+    pub radius: Option<f64>,
 }
 
 /// The frame of a section, in the frame as taught: s along it and w across, both level, and z.
@@ -95,6 +97,7 @@ fn expected(cut: &Cut, golden: &Golden) -> Option<Expected> {
             light: slope(projector),
         },
         half_mm: cut.width_mm / 2.0,
+        radius: cut.edge_tolerance_mm.map(|mm| mm / libm::sqrt(3.0)),
     })
 }
 

@@ -8,9 +8,6 @@ use crate::inspect::strips::contours::{FoundFeature, Lost};
 use crate::inspect::strips::uncertainty::ErrorBudget;
 use alloc::vec::Vec;
 
-/// What a stated radius may be off, of it (1 σ).
-const RADIUS: f64 = 0.05;
-
 /// What was found of a section.
 #[derive(Clone, Debug, Default)]
 pub struct SectionFit {
@@ -40,11 +37,10 @@ impl SectionFit {
         }
         let found = Section::new(&self.points, &expected.request, &expected.optics);
         let lost = found.as_ref().err().copied();
-        let stated = expected.request.edge_mm[0].unwrap_or(0.0);
         let known = Knowledge {
             height: budget.calibration.height,
             scale: budget.calibration.length,
-            radius: RADIUS * stated,
+            radius: expected.radius,
         };
         self.section = found.ok().map(|section| {
             let inputs = section.inputs(&known);
@@ -86,6 +82,7 @@ impl SectionFit {
             expected: None,
             systematic: value.systematic,
             compared: value.sigma * libm::sqrt(golden),
+            rims: 0.0,
             square: None,
         })
     }
