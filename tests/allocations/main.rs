@@ -158,6 +158,7 @@ fn gauges() -> Vec<GaugeFile> {
 fn publishing() -> allocation_counter::AllocationInfo {
     let settings = Settings {
         next_seq: 1,
+        buffered: Default::default(),
         boot_id: 1,
         teach_allowed: false,
         identity: Arc::new(Identity {

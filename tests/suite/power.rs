@@ -3,10 +3,10 @@
 
 use crate::station_plc::{Daemon, Place, Plc, READY, command, long};
 use crate::written::FRINGED;
-use appliance::history::{self, Bounds, Filter, Numbering, Reader};
+use appliance::history::{self, Bounds, Filter, Numbering, Opened, Reader};
 use appliance::recipe::Store;
 use appliance::recipe::archive;
-use appliance::storage::state::StateFolder;
+use appliance::storage::state::{Counted, StateFolder};
 use appliance::web::access::Access;
 use hal::replay::Recording;
 use std::collections::{BTreeMap, BTreeSet};
@@ -244,8 +244,13 @@ impl Promise {
                 opened.map_err(|error| format!("recording {name}: {error}"))?;
             }
         }
+        // What the power left is a copy here, but was none on the card.
+        let counted = folder.counted().map(|counted| Counted {
+            copied: false,
+            ..counted
+        });
         let numbering = Numbering {
-            counted: folder.counted(),
+            counted,
             counter: folder.counter(),
             serial: folder.serial().map_err(|error| words(&error))?,
             run: 7,
@@ -257,7 +262,13 @@ impl Promise {
             recordings: 1 << 30,
         };
         let opened = history::open(state, numbering, bounds);
-        let (history, task, next, complaint) = opened.map_err(|error| words(&error))?;
+        let Opened {
+            history,
+            task,
+            next_seq: next,
+            complaint,
+            ..
+        } = opened.map_err(|error| words(&error))?;
         if let Some(complaint) = complaint {
             return Err(complaint);
         }

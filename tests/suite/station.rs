@@ -84,7 +84,7 @@ fn a_retried_token_measures_once_and_refused_requests_change_nothing() {
             Err(ExceptionCode::IllegalDataAddress)
         );
     }
-    let reserved = plc.context.write_multiple_registers(0, &[ONLINE | 1 << 8]);
+    let reserved = plc.context.write_multiple_registers(0, &[ONLINE | 1 << 9]);
     assert_eq!(
         plc.runtime.block_on(reserved).unwrap(),
         Err(ExceptionCode::IllegalDataValue)

@@ -12,6 +12,9 @@ const MOST_GAUGES: usize = 64;
 /// The most bytes of a serial, or of the id of a history.
 const MOST_ID: usize = 64;
 
+/// Stands in the store between the id of a history and the number of its life; in no id.
+pub const LIFE: char = '.';
+
 /// The first line of an answer.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize, Serialize)]
 pub struct Header {
@@ -137,7 +140,8 @@ impl Header {
         };
         let (first, last) = (header.first, header.last);
         let ordered = first.is_some() == last.is_some() && first <= last;
-        if !id(&header.serial) || !id(&header.history) || !ordered {
+        let is_whole = !header.history.contains(LIFE);
+        if !id(&header.serial) || !id(&header.history) || !is_whole || !ordered {
             return Err(Wrong::Header(first, last, 0));
         }
         Ok(header)

@@ -2,7 +2,10 @@
 
 use super::columns::columns;
 use crate::station::result::flag;
-use crate::station::{GaugeValue, Placement, ResultRecord, Square, Stages, Verdict};
+use crate::station::{
+    Decision, GaugeValue, Inspection, MAX_GAUGES, Placement, ResultRecord, Square, Stages, Unit,
+    Verdict,
+};
 
 columns! {
     /// One stored result. Lengths in mm, times in µs.
@@ -97,6 +100,60 @@ columns! {
     {
         /// The place in the registers, 1 to 64; the column `place` is one less.
         slot: u16 = gauge.slot;
+    }
+}
+
+impl Entry {
+    /// The result as registers show it. Its recipe's name and what only the page shows are not
+    /// known.
+    pub fn record(&self) -> ResultRecord {
+        let hex = |text: &str| u32::from_str_radix(text, 16).unwrap_or(0);
+        let gauge = |of: &GaugeEntry| GaugeValue {
+            slot: of.slot,
+            name: of.name.as_str().into(),
+            unit: Unit::of_symbol(&of.unit),
+            value: of.value,
+            reason: of.reason.as_deref().map(Into::into),
+            sigma: of.sigma,
+            uncertainty: of.uncertainty,
+            expected: of.expected,
+            square: of.square,
+            low: of.low,
+            high: of.high,
+            decision: Decision::from_bits(of.decision),
+        };
+        let inspection = Inspection {
+            judged: self.verdict,
+            reason: self.reason.as_deref().map(Into::into),
+            error_code: self.error_code,
+            gauges: self.gauges.iter().take(MAX_GAUGES).map(gauge).collect(),
+            valid_points: self.valid_points,
+            coverage_permille: self.coverage_permille,
+            temperature_c: self.temperature_c,
+            height_noise_mm: self.height_noise_mm.unwrap_or(f64::NAN),
+            fitness_permille: self.fitness_permille,
+            flags: self.flags,
+            stages: self.stages.clone(),
+            placement: self.placement,
+            ..Inspection::default()
+        };
+        ResultRecord {
+            seq: self.seq,
+            token: self.token,
+            recipe: self.recipe,
+            recipe_name: "".into(),
+            recipe_crc: hex(&self.fingerprint),
+            part_id: self.part_id,
+            press_stroke: self.press_stroke,
+            verdict: self.verdict,
+            error_code: self.error_code,
+            time_utc_us: self.time_utc_us.unwrap_or(0),
+            uptime_s: self.uptime_s,
+            boot_id: hex(&self.boot_id),
+            exposure_us: self.exposure_us,
+            total_us: self.total_us,
+            inspection: inspection.into(),
+        }
     }
 }
 

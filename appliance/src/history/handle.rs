@@ -52,6 +52,16 @@ impl History {
         }
     }
 
+    /// Remembers what was acknowledged last in BUFFERED mode, `None` outside of it: at once in the
+    /// spool, soon on the card.
+    pub fn buffer(&self, buffered: Option<u32>) {
+        if let Some(spool) = &self.spool {
+            // Where it cannot be written, the card has it soon.
+            let _ = spool.buffer(buffered);
+        }
+        self.seqs.buffer(buffered);
+    }
+
     /// Hands over the frames of a part, made by `part`, if it did not pass; after its result. Where
     /// the frames of another part are still being written, these are not kept, and the history says
     /// so: the line goes on.

@@ -42,7 +42,7 @@ mod tests;
 
 pub use entry::{Entry, Filter, GaugeEntry, difference};
 pub use handle::History;
-pub use open::open;
+pub use open::{Opened, open};
 pub use reader::{Reader, Trend, TrendPoint};
 pub use recordings::{JudgedPart, RECIPE, name_of, seq_of};
 pub use seqs::Numbering;

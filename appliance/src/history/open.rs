@@ -17,18 +17,30 @@ use std::sync::mpsc::sync_channel;
 /// As many numbers are skipped where the counter is lost: those of results that were shown and not
 /// stored.
 const UNKNOWN: u32 = SLOTS + AHEAD;
+/// As many are skipped where the state folder is a copy: more results than a station shows in the
+/// half year that a backup may be old, at one a second.
+const RESTORED: u32 = 1 << 24;
+
+/// An opened history.
+pub struct Opened {
+    /// The way to it.
+    pub history: History,
+    /// Its thread's side.
+    pub task: Task,
+    /// The SEQ of the next result.
+    pub next_seq: u32,
+    /// The SEQ that was acknowledged last in BUFFERED mode; `None` outside of it.
+    pub buffered: Option<u32>,
+    /// What had to be set aside, or is a copy.
+    pub complaint: Option<String>,
+}
 
 /// Opens the history of a state folder, and stores what the run before has shown and the database
-/// lacks. Answers with the way to it, its thread's side, the SEQ of the next result, and what had
-/// to be set aside.
+/// lacks.
 ///
 /// # Errors
 /// If database, folder or counter can neither be opened nor begun.
-pub fn open(
-    state: &Path,
-    numbering: Numbering,
-    bounds: Bounds,
-) -> Result<(History, Task, u32, Option<String>)> {
+pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> Result<Opened> {
     let failed = |what: &str, error: std::io::Error| HistoryError {
         path: state.join(what),
         reason: format!("{error}: free space"),
@@ -44,6 +56,10 @@ pub fn open(
         Err(_) => spool.of_any_run(),
     });
     let counted = numbering.counted.clone().unwrap_or_default();
+    let of_run = found.as_ref().and(spool.as_ref());
+    let buffered = of_run.and_then(Spool::buffered).unwrap_or(counted.buffered);
+    // A copy of which memory does not know how it went on may be as old as it likes.
+    let restored = counted.copied && found.is_none();
     let (last, mut shown) = found.unwrap_or((counted.last, Vec::new()));
     let stored = writer.last_seq()?;
     shown.retain(|entry| stored.is_none_or(|stored| is_after(entry.seq, stored)));
@@ -53,6 +69,7 @@ pub fn open(
     let lost = numbering.counted.clone().err();
     let skipped = match lost {
         Some(_) => UNKNOWN,
+        None if restored => RESTORED,
         None => 0,
     };
     let next = last.wrapping_add(skipped).wrapping_add(1);
@@ -63,12 +80,19 @@ pub fn open(
              with {next}, behind all that the history has"
         )
     });
+    let lost = lost.or_else(|| {
+        restored.then(|| {
+            format!(
+                "the state folder is a copy, as a restored backup is: which results were shown after it was made is not known, so RESULT_SEQ goes on with {next}"
+            )
+        })
+    });
     let waiting = match writer.store(shown.iter()) {
         Ok(()) => Vec::new(),
         // It stays in the spool until it is stored.
         Err(_) => shown,
     };
-    let numbered = numbering.reserve(spool, next);
+    let numbered = numbering.reserve(spool, next, buffered);
     let (seqs, spool) = numbered.map_err(|error| failed("result-seq", error))?;
     let spool = spool.map(Arc::new);
     let (queue, inbox) = sync_channel(MAX_WAITING);
@@ -85,10 +109,11 @@ pub fn open(
     };
     let task = Task::new(history.clone(), inbox, writer, keeping, waiting);
     let complaints = lost.into_iter().chain(complaint);
-    Ok((
+    Ok(Opened {
         history,
         task,
-        next,
-        complaints.reduce(|all, more| all + "\n" + &more),
-    ))
+        next_seq: next,
+        buffered,
+        complaint: complaints.reduce(|all, more| all + "\n" + &more),
+    })
 }

@@ -35,7 +35,8 @@ pub struct Numbering {
 
 impl Numbering {
     /// Reserves the first numbers from `next` on, before anything is measured, and begins this run
-    /// in the spool. The answer has no spool where it cannot be written.
+    /// in the spool, in BUFFERED mode if a SEQ was acknowledged in it. The answer has no spool where
+    /// it cannot be written.
     ///
     /// # Errors
     /// Whatever the file system answers.
@@ -43,10 +44,10 @@ impl Numbering {
         self,
         spool: Option<Spool>,
         next: u32,
+        buffered: Option<u32>,
     ) -> io::Result<(Seqs, Option<Spool>)> {
         let (used, reserved) = (next.wrapping_sub(1), next.wrapping_add(AHEAD - 1));
-        let before = self.counted.map_or(0, |counted| counted.run);
-        let run = self.run;
+        let (before, run) = (self.counted.map_or(0, |counted| counted.run), self.run);
         // Killed before the card names this run, the next start still finds the run before.
         let spool = spool.filter(|spool| {
             let begun = spool.begin([before, run], used).is_ok();
@@ -56,14 +57,22 @@ impl Numbering {
             begun
         });
         let last = reserved;
-        self.counter.store(Counted { last, run })?;
+        let counted = Counted {
+            last,
+            run,
+            buffered,
+            copied: false,
+        };
+        self.counter.store(counted)?;
         if let Some(spool) = &spool {
             // Otherwise the run before is believed as well.
             let _ = spool.begin([run, run], used);
+            let _ = spool.buffer(buffered);
         }
         let numbers = Numbers {
             used,
             reserved,
+            buffered,
             asked: None,
             refused: None,
             exhausted: false,
@@ -94,6 +103,8 @@ struct Numbers {
     used: u32,
     /// The last SEQ that is reserved on the card.
     reserved: u32,
+    /// As [`Counted::buffered`].
+    buffered: Option<u32>,
     /// Since when the card is asked for more, until it answers.
     asked: Option<Instant>,
     /// What the card answered last, if it refused.
@@ -161,13 +172,12 @@ impl Seqs {
     /// Reserves more where they are asked for: it waits for the card. Answers with the last SEQ in
     /// use if the station waited for numbers and there are some.
     fn refill(&self) -> Option<u32> {
-        let last = {
+        let (last, buffered) = {
             let numbers = self.numbers();
             numbers.asked?;
-            numbers.used.wrapping_add(AHEAD)
+            (numbers.used.wrapping_add(AHEAD), numbers.buffered)
         };
-        let run = self.run;
-        let stored = self.counter.store(Counted { last, run });
+        let stored = self.store(last, buffered);
         let mut numbers = self.numbers();
         numbers.asked = None;
         numbers.refused = stored.err().map(|error| error.to_string().into());
@@ -175,9 +185,27 @@ impl Seqs {
             return None;
         }
         numbers.reserved = last;
-        // Many were used while the card was busy.
-        numbers.asked = (numbers.left() <= FEW).then(Instant::now);
+        // Many were used, or one acknowledged, while the card was busy.
+        let more = numbers.left() <= FEW || numbers.buffered != buffered;
+        numbers.asked = more.then(Instant::now);
         std::mem::take(&mut numbers.exhausted).then_some(numbers.used)
+    }
+
+    /// Has the card remember what was acknowledged in BUFFERED mode; it waits for nothing.
+    pub(super) fn buffer(&self, buffered: Option<u32>) {
+        let mut numbers = self.numbers();
+        numbers.buffered = buffered;
+        numbers.asked.get_or_insert_with(Instant::now);
+        self.shared.1.notify_one();
+    }
+
+    fn store(&self, last: u32, buffered: Option<u32>) -> io::Result<()> {
+        self.counter.store(Counted {
+            last,
+            run: self.run,
+            buffered,
+            copied: false,
+        })
     }
 
     /// Ends the thread.
@@ -191,8 +219,8 @@ impl Seqs {
     /// # Errors
     /// Whatever the file system answers.
     pub(super) fn settle(&self, seq: u32) -> io::Result<()> {
-        let run = self.run;
-        self.counter.store(Counted { last: seq, run })
+        let buffered = self.numbers().buffered;
+        self.store(seq, buffered)
     }
 }
 
@@ -212,7 +240,7 @@ mod tests {
             serial: String::new(),
             run: 1,
         };
-        numbering.reserve(None, next).unwrap().0
+        numbering.reserve(None, next, None).unwrap().0
     }
 
     #[test]
@@ -237,7 +265,7 @@ mod tests {
                 serial: serial.clone(),
                 run,
             };
-            let (seqs, spool) = numbering.reserve(Some(spool()), next).unwrap();
+            let (seqs, spool) = numbering.reserve(Some(spool()), next, None).unwrap();
             (seqs, spool.unwrap())
         };
         let show = |spool: &Spool, seq| {

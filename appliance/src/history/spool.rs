@@ -24,6 +24,9 @@ const SLOT: usize = 64 << 10;
 /// Bytes of a number: hexadecimal digits.
 const DIGITS: usize = 8;
 
+/// Where the first slot has what was acknowledged, behind the runs and a SEQ.
+const BUFFERED: u64 = 3 * DIGITS as u64;
+
 /// The spool of one device. One process at a time has it.
 #[derive(Debug)]
 pub struct Spool {
@@ -96,6 +99,22 @@ impl Spool {
         let [before, current] = runs;
         let text = format!("{before:08x}{current:08x}{last:08x}");
         self.file.write_all_at(text.as_bytes(), 0)
+    }
+
+    /// Says what was acknowledged last in BUFFERED mode.
+    ///
+    /// # Errors
+    /// Whatever the system answers.
+    pub fn buffer(&self, buffered: Option<u32>) -> io::Result<()> {
+        let (mode, seq) = (u32::from(buffered.is_some()), buffered.unwrap_or(0));
+        let text = format!("{mode:08x}{seq:08x}");
+        self.file.write_all_at(text.as_bytes(), BUFFERED)
+    }
+
+    /// What [`Self::buffer`] was told last; `None` where it was told nothing.
+    pub fn buffered(&self) -> Option<Option<u32>> {
+        let [mode, seq] = self.numbers(BUFFERED)?;
+        Some((mode != 0).then_some(seq))
     }
 
     /// Puts a result in, in place of the one that came [`SLOTS`] before.

@@ -21,6 +21,7 @@ const PATIENCE: Duration = Duration::from_secs(20);
 pub(super) fn settings() -> Settings {
     Settings {
         next_seq: 41,
+        buffered: Default::default(),
         boot_id: 7,
         teach_allowed: false,
         identity: Arc::new(Identity {

@@ -135,7 +135,7 @@ macro_rules! registers {
 
 registers! {
     control CONTROL 0..=31, true, now: Snapshot {
-        0 CONTROL Bits x 1 = now.control.control, "0 ONLINE request, 1 TRIGGER edge, 2 RESULT_ACK edge, 3 RECIPE_LOAD edge, 4 ERROR_RESET edge, 5 ABORT edge, 6 BUFFERED mode, 7 TEACH edge, 8-15 must be 0";
+        0 CONTROL Bits x 1 = now.control.control, "0 ONLINE request, 1 TRIGGER edge, 2 RESULT_ACK edge, 3 RECIPE_LOAD edge, 4 ERROR_RESET edge, 5 ABORT edge, 6 BUFFERED mode, 7 TEACH edge, 8 end of BUFFERED edge, 9-15 must be 0";
         1 TRIGGER_TOKEN U16 x 1 = now.control.token, "a write of a value other than 0 and LAST_TOKEN triggers; echoed at 116 and 202";
         2 RECIPE_SELECT U16 x 1 = now.control.recipe_select, "1-9999; 0 leave the recipe; 65535 select by PART_NUMBER; a trigger is accepted only if it is the active recipe, or 0";
         3 PLC_HEARTBEAT U16 x 1 = now.control.plc_heartbeat, "any changing value; stale for longer than plc_timeout sets a warning bit";

@@ -19,7 +19,7 @@ use rooms::Rooms;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Result};
 use crate::head::calibration::Current;
-use crate::history::{self, Bounds, History, Numbering};
+use crate::history::{self, Bounds, History, Numbering, Opened, Reader};
 use crate::modbus;
 use crate::production::backend;
 use crate::production::commissioning::Commission;
@@ -28,8 +28,8 @@ use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::production::{Aborts, Order};
 use crate::station::{
-    Effect, Event, Identity, Limits, Micros, RecipeKey, Request, Settings, Station, StationHandle,
-    Teaching,
+    Buffered, Effect, Event, Identity, Limits, MAX_BUFFERED, Micros, RecipeKey, Request, Settings,
+    Station, StationHandle, Teaching,
 };
 use crate::storage::state::{StateFolder, random};
 use crate::system::computing::Computing;
@@ -109,10 +109,17 @@ impl Daemon {
         let (plc, page) = runtime.block_on(listen(config))?;
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
         let (orders, inbox) = mpsc::channel();
-        let (history, task, next_seq, complaint) = open_history(config, &state)?;
+        let Opened {
+            history,
+            task,
+            next_seq,
+            buffered,
+            complaint,
+        } = open_history(config, &state)?;
         if let Some(complaint) = complaint {
             progress.warn(&complaint);
         }
+        let buffered = left_of(&state, buffered, &progress);
         let aborts = Aborts::default();
         let sink = effects(
             orders.clone(),
@@ -120,7 +127,7 @@ impl Daemon {
             history.clone(),
             progress.clone(),
         );
-        let settings = station(config, &state, next_seq)?;
+        let settings = station(config, &state, (next_seq, buffered))?;
         let station = StationHandle::new(settings, Instant::now(), sink);
         let (commission, complaints) = Commission::open(&path);
         for complaint in complaints {
@@ -233,10 +240,29 @@ fn address_of(listener: &TcpListener) -> Result<SocketAddr> {
         .map_err(Exit::Unavailable.because("ask for a socket's port"))
 }
 
-fn open_history(
-    config: &Config,
-    state: &StateFolder,
-) -> Result<(History, history::Task, u32, Option<String>)> {
+/// What the run before has left of BUFFERED mode, in which `acknowledged` was acknowledged last.
+fn left_of(state: &StateFolder, acknowledged: Option<u32>, progress: &Progress) -> Buffered {
+    let behind = |seq| Reader::of(state.path()).after(seq, MAX_BUFFERED)?.page();
+    let entries = match acknowledged.map(behind) {
+        None => Vec::new(),
+        Some(Ok(page)) => page.results,
+        Some(Err(error)) => {
+            progress.warn(&format!(
+                "results that were not acknowledged before the start are not queued: {error}"
+            ));
+            Vec::new()
+        }
+    };
+    Buffered {
+        acknowledged,
+        queue: entries
+            .iter()
+            .map(|entry| Arc::new(entry.record()))
+            .collect(),
+    }
+}
+
+fn open_history(config: &Config, state: &StateFolder) -> Result<Opened> {
     let bounds = Bounds {
         results: u64::from(config.history.results),
         recordings: u64::from(config.history.recordings_mib) << 20,
@@ -251,9 +277,14 @@ fn open_history(
     history::open(state.path(), numbering, bounds).map_err(Exit::CannotCreate.failure())
 }
 
-fn station(config: &Config, state: &StateFolder, next_seq: u32) -> Result<Station> {
+fn station(
+    config: &Config,
+    state: &StateFolder,
+    (next_seq, buffered): (u32, Buffered),
+) -> Result<Station> {
     let settings = Settings {
         next_seq,
+        buffered,
         boot_id: random()?,
         teach_allowed: config.station.teach_allowed,
         identity: Arc::new(Identity {
@@ -295,6 +326,7 @@ fn effects(
             Effect::Alarm(line) => progress.report(Severity::Error, &line),
             Effect::Abort { job } => aborts.abort(job),
             Effect::Publish(result) => history.record(&result),
+            Effect::Buffered(acknowledged) => history.buffer(acknowledged),
         }
         None
     }

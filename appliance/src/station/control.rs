@@ -20,16 +20,20 @@ bits! {
     ERROR_RESET = 4;
     /// CONTROL bit 5 ↑: end the cycle, load or teach in flight.
     ABORT = 5;
-    /// CONTROL bit 6: queue every result until it is acknowledged.
+    /// CONTROL bit 6: queue every result until it is acknowledged, from now on: the mode ends with
+    /// [`UNBUFFERED`] alone.
     BUFFERED = 6;
     /// CONTROL bit 7 ↑: teach the recipe of RECIPE_SELECT.
     TEACH = 7;
+    /// CONTROL bit 8 ↑: end BUFFERED mode.
+    UNBUFFERED = 8;
 }
 
 /// CONTROL bits that must be 0.
-pub const RESERVED: u16 = 0xFF00;
+pub const RESERVED: u16 = 0xFE00;
 /// The bits that act on their rising edge.
-pub const EDGES: u16 = TRIGGER | RESULT_ACK | RECIPE_LOAD | ERROR_RESET | ABORT | TEACH;
+pub const EDGES: u16 =
+    TRIGGER | RESULT_ACK | RECIPE_LOAD | ERROR_RESET | ABORT | TEACH | UNBUFFERED;
 
 /// RECIPE_SELECT: take the recipe whose key is PART_NUMBER.
 pub const BY_PART_NUMBER: u16 = 0xFFFF;
@@ -269,10 +273,10 @@ mod tests {
     #[test]
     fn reserved_bits_and_odd_recipe_numbers_are_refused_with_their_numbers() {
         let bits = ControlWrite {
-            control: Masked::<u16>::all(0x0101),
+            control: Masked::<u16>::all(0x0201),
             ..Default::default()
         };
-        assert_eq!(bits.check(), Err(RefusedWrite::ReservedBits(0x0101)));
+        assert_eq!(bits.check(), Err(RefusedWrite::ReservedBits(0x0201)));
         for (number, fine) in [
             (0, true),
             (1, true),

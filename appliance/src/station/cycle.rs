@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::control;
 use super::error_code;
 use super::event::{Effect, Effects, Job, JobId};
 use super::fault::Failure;
@@ -153,10 +152,7 @@ impl Station {
         push(effects, Effect::PersistSeq(record.seq));
         push(effects, Effect::Publish(record.clone()));
         let seq = record.seq;
-        if !self
-            .results
-            .publish(record, self.plc.holds(control::BUFFERED))
-        {
+        if !self.results.publish(record) {
             let waiting = self.results.queue.len();
             log(
                 effects,

@@ -279,6 +279,8 @@ pub enum Effect {
     PersistSeq(u32),
     /// A result is complete: for the history.
     Publish(Arc<ResultRecord>),
+    /// Remember over a restart which SEQ was acknowledged last in BUFFERED mode, `None` outside of it.
+    Buffered(Option<u32>),
     /// For the log.
     Log(Arc<str>),
     /// For the log: nothing is measured until this has ended.

@@ -76,6 +76,19 @@ impl Decision {
         set.fold(0, |bits, (bit, _)| bits | bit)
     }
 
+    /// The decision with these bits.
+    pub fn from_bits(bits: u16) -> Self {
+        let has = |bit: u16| bits & bit != 0;
+        Self {
+            pass: has(decision::PASS),
+            valid: has(decision::VALID),
+            low: has(decision::LOW),
+            high: has(decision::HIGH),
+            doubtful: has(decision::DOUBTFUL),
+            absent: has(decision::ABSENT),
+        }
+    }
+
     /// The decision for a value. Without a finite value it is not valid, and no other bit is set
     /// but `absent`. A value within its limits, but inside the guard band of one, proves neither
     /// that the part conforms nor that it does not: it is doubtful and no pass.

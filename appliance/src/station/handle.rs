@@ -189,13 +189,13 @@ mod tests {
             });
         let mut edges = ConnectionEdges::default();
         let write = ControlWrite {
-            control: super::super::Masked::<u16>::all(0x0102),
+            control: super::super::Masked::<u16>::all(0x0202),
             ..Default::default()
         };
         let before = handle.snapshot();
         assert_eq!(
             handle.write(&mut edges, write),
-            Err(RefusedWrite::ReservedBits(0x0102))
+            Err(RefusedWrite::ReservedBits(0x0202))
         );
         assert_eq!(
             (edges, handle.snapshot()),

@@ -13,7 +13,7 @@ use super::health::Health;
 use super::plc::Plc;
 use super::recipes::Recipes;
 use super::requests::Requests;
-use super::results::Results;
+use super::results::{Buffered, Results};
 use super::state::State;
 use super::turns::Turns;
 use super::worker::Worker;
@@ -70,6 +70,8 @@ pub struct Identity {
 pub struct Settings {
     /// The SEQ of the next result: one more than the last that was stored.
     pub next_seq: u32,
+    /// What the run before has left of BUFFERED mode.
+    pub buffered: Buffered,
     /// BOOT_ID: random, new with each start.
     pub boot_id: u32,
     /// Whether the PLC may teach.
@@ -118,7 +120,7 @@ impl Station {
             turns: Turns::default(),
             recipes: Recipes::default(),
             worker: Worker::new(now),
-            results: Results::new(settings.next_seq),
+            results: Results::new(settings.next_seq, &settings.buffered),
             failure: None,
             suspended: None,
             condition: Condition::default(),

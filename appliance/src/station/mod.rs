@@ -102,7 +102,7 @@ pub use health::{
 pub use machine::{Identity, Limits, Settings, Station};
 pub use recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};
-pub use results::Counts;
+pub use results::{Buffered, Counts, MAX_BUFFERED};
 pub use snapshot::Snapshot;
 pub use stages::{Stage, StageTime, Stages};
 pub use state::{Cycle, LoadProgress, State, TeachProgress};

@@ -33,6 +33,15 @@ impl Counts {
     }
 }
 
+/// What the run before has left of BUFFERED mode.
+#[derive(Debug, Clone, Default)]
+pub struct Buffered {
+    /// The SEQ that was acknowledged last; `None` if the mode was not in use.
+    pub acknowledged: Option<u32>,
+    /// The results behind it, oldest first.
+    pub queue: Vec<Arc<ResultRecord>>,
+}
+
 /// The results since the start.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Results {
@@ -50,6 +59,8 @@ pub(super) struct Results {
     pub(super) toggle: bool,
     /// EXPOSURE_DONE.
     pub(super) exposure_done: bool,
+    /// The SEQ that was acknowledged last in BUFFERED mode; `None` outside of it.
+    pub(super) buffered: Option<u32>,
     /// Unacknowledged results, oldest first.
     pub(super) queue: heapless::Deque<Arc<ResultRecord>, MAX_BUFFERED>,
     /// BUFFER_OVERFLOW.
@@ -57,12 +68,27 @@ pub(super) struct Results {
 }
 
 impl Results {
-    /// No result yet; the first one is `next_seq`.
-    pub(super) fn new(next_seq: u32) -> Self {
+    /// No result yet; the first one is `next_seq`. In BUFFERED mode the run before has left those
+    /// that were not acknowledged; of more than there is room for the oldest.
+    pub(super) fn new(next_seq: u32, left: &Buffered) -> Self {
+        let mut queue = heapless::Deque::new();
+        for record in left.queue.iter().take(MAX_BUFFERED) {
+            // There is room for all of them.
+            let _ = queue.push_back(record.clone());
+        }
         Self {
             last_seq: next_seq.wrapping_sub(1),
+            buffered: left.acknowledged,
+            queue,
             ..Self::default()
         }
+    }
+
+    /// Begins BUFFERED mode; answers whether that is new.
+    pub(super) fn buffer(&mut self) -> bool {
+        let begins = self.buffered.is_none();
+        self.buffered = self.buffered.or(Some(self.last_seq));
+        begins
     }
 
     /// A trigger was accepted.
@@ -83,8 +109,8 @@ impl Results {
     }
 
     /// Shows a result as one unit. Answers whether it was queued where it had to be.
-    pub(super) fn publish(&mut self, record: Arc<ResultRecord>, buffered: bool) -> bool {
-        let queued = !buffered || self.queue.push_back(record.clone()).is_ok();
+    pub(super) fn publish(&mut self, record: Arc<ResultRecord>) -> bool {
+        let queued = self.buffered.is_none() || self.queue.push_back(record.clone()).is_ok();
         self.overflow_latch |= !queued;
         self.counts.add(record.verdict, 1);
         self.latest = Some(record);
@@ -94,10 +120,14 @@ impl Results {
         queued
     }
 
-    /// RESULT_ACK.
-    pub(super) fn acknowledge(&mut self) {
+    /// RESULT_ACK. Answers whether BUFFERED mode has to remember it.
+    pub(super) fn acknowledge(&mut self) -> bool {
         self.valid = false;
-        self.queue.pop_front();
+        let taken = self.queue.pop_front();
+        if let Some((taken, acknowledged)) = taken.as_ref().zip(self.buffered.as_mut()) {
+            *acknowledged = taken.seq;
+        }
+        taken.is_some() && self.buffered.is_some()
     }
 
     /// The storage has this number. Only the last one counts: its storing covers those before it.
@@ -122,13 +152,14 @@ mod tests {
 
     #[test]
     fn a_full_queue_still_shows_the_result_and_latches_the_overflow() {
-        let mut results = Results::new(1);
+        let mut results = Results::new(1, &Buffered::default());
+        assert!(results.buffer() && !results.buffer());
         for seq in 1..=MAX_BUFFERED + 1 {
             let record = ResultRecord {
                 seq: results.next_seq(),
                 ..ResultRecord::default()
             };
-            let queued = results.publish(Arc::new(record), true);
+            let queued = results.publish(Arc::new(record));
             assert_eq!(queued, seq <= MAX_BUFFERED);
         }
         assert!(results.overflow_latch && results.valid);
@@ -139,7 +170,7 @@ mod tests {
 
     #[test]
     fn only_the_last_number_settles_the_storage() {
-        let mut results = Results::new(u32::MAX);
+        let mut results = Results::new(u32::MAX, &Buffered::default());
         assert_eq!((results.next_seq(), results.next_seq()), (u32::MAX, 0));
         results.not_stored();
         results.stored(u32::MAX);

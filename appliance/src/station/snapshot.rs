@@ -203,7 +203,12 @@ impl Station {
             error_code,
             error,
             fault,
-            control: self.plc.registers,
+            control: ControlRegisters {
+                // The mode that holds, whoever wrote without it.
+                control: self.plc.registers.control
+                    | self.results.buffered.map_or(0, |_| control::BUFFERED),
+                ..self.plc.registers
+            },
             recipe: self.recipes.active.clone(),
             requested_recipe: self.recipes.requested,
             recipe_result: self.recipes.result,

@@ -27,8 +27,15 @@ impl Station {
         if matches!(self.state, State::Ready | State::Offline) {
             self.state = self.rest();
         }
+        let mut buffering = self.plc.holds(control::BUFFERED) && self.results.buffer();
+        if rose(control::UNBUFFERED) {
+            buffering |= self.results.buffered.take().is_some();
+        }
         if rose(control::RESULT_ACK) {
-            self.results.acknowledge();
+            buffering |= self.results.acknowledge();
+        }
+        if buffering {
+            push(effects, Effect::Buffered(self.results.buffered));
         }
         if rose(control::RECIPE_LOAD) {
             self.plc_load(effects);

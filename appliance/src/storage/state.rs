@@ -5,6 +5,7 @@ use crate::storage::folder::{read_whole, write_whole};
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// The folder that outlives a restart. One daemon at a time holds it.
 #[derive(Debug)]
@@ -100,7 +101,8 @@ impl StateFolder {
             Err(error) => return Err(wrong(error.to_string())),
         };
         let text = String::from_utf8_lossy(&bytes);
-        Counted::read(&text).ok_or_else(|| {
+        let made = File::open(&file).map_or(0, |file| made(&file));
+        Counted::read(&text, made).ok_or_else(|| {
             let begin: String = text.trim().chars().take(40).collect();
             wrong(format!("{begin:?} is no number"))
         })
@@ -139,23 +141,47 @@ pub struct Counted {
     pub last: u32,
     /// Random per start; 0 where a person wrote the number.
     pub run: u32,
+    /// The SEQ that was acknowledged last in BUFFERED mode; `None` outside of it.
+    pub buffered: Option<u32>,
+    /// Whether the file is a copy, as a restored backup is: it was made at another time than it
+    /// says. A file system that does not know when a file was made copies unseen.
+    pub copied: bool,
 }
 
 impl Counted {
-    /// Reads the content of the counter's file.
-    pub fn read(text: &str) -> Option<Self> {
+    /// Reads the content of the counter's file, which was made at `made` ([`made`]).
+    pub fn read(text: &str, made: u64) -> Option<Self> {
         let mut words = text.split_whitespace();
         let last = words.next()?.parse().ok()?;
-        let run = words.next().map(|word| u32::from_str_radix(word, 16).ok());
-        let run = run.unwrap_or(Some(0))?;
-        words.next().is_none().then_some(Self { last, run })
+        let hex = |word: &str| u64::from_str_radix(word, 16).ok();
+        let run = words.next().map(|word| hex(word)?.try_into().ok());
+        let said = words.next().map(hex).unwrap_or(Some(0))?;
+        let buffered = match words.next() {
+            None | Some("-") => None,
+            Some(seq) => Some(seq.parse().ok()?),
+        };
+        words.next().is_none().then_some(Self {
+            last,
+            run: run.unwrap_or(Some(0))?,
+            buffered,
+            copied: said != 0 && made != 0 && said != made,
+        })
     }
 
-    /// The content of the counter's file. Its length is always the same, so that overwriting it
-    /// needs no room.
-    pub fn text(self) -> String {
-        format!("{:010} {:08x}\n", self.last, self.run)
+    /// The content of a counter's file that was made at `made`. Its length is always the same, so
+    /// that overwriting it needs no room.
+    pub fn text(self, made: u64) -> String {
+        let buffered = self.buffered.map_or("-".into(), |seq| seq.to_string());
+        let Self { last, run, .. } = self;
+        format!("{last:010} {run:08x} {made:016x} {buffered:>10}\n")
     }
+}
+
+/// When a file was made, ns since 1970; 0 where its file system does not know.
+fn made(file: &File) -> u64 {
+    let created = file.metadata().and_then(|file| file.created()).ok();
+    let since = created.and_then(|at| at.duration_since(SystemTime::UNIX_EPOCH).ok());
+    since.map_or(0, |since| since.as_nanos() as u64)
 }
 
 /// Stores which SEQs may be in use before their results are shown, so that none is used twice.
@@ -177,15 +203,17 @@ impl Counter {
     /// # Errors
     /// Whatever the file system answers.
     pub fn store(&self, counted: Counted) -> std::io::Result<()> {
-        let text = counted.text();
-        match OpenOptions::new().write(true).open(&self.file) {
-            Ok(mut file) if file.metadata()?.len() == text.len() as u64 => {
-                file.write_all(text.as_bytes())?;
-                file.sync_data()
-            }
+        let open = || OpenOptions::new().write(true).open(&self.file);
+        let mut file = match open() {
+            Ok(file) if file.metadata()?.len() == counted.text(0).len() as u64 => file,
             // The first time, or a file that a person wrote.
-            _ => write_whole(&self.file, text.as_bytes()),
-        }
+            _ => {
+                write_whole(&self.file, counted.text(0).as_bytes())?;
+                open()?
+            }
+        };
+        file.write_all(counted.text(made(&file)).as_bytes())?;
+        file.sync_data()
     }
 }
 
@@ -206,13 +234,44 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let first = StateFolder::open(folder.path()).unwrap();
         assert_eq!(first.counted().unwrap(), Counted::default());
-        let counted = Counted { last: 41, run: 7 };
+        let counted = Counted {
+            last: 41,
+            run: 7,
+            buffered: Some(40),
+            copied: false,
+        };
         first.counter().store(counted).unwrap();
         let serial = first.serial().unwrap();
         drop(first);
         let second = StateFolder::open(folder.path()).unwrap();
         assert_eq!(second.counted().unwrap(), counted);
         assert_eq!(second.serial().unwrap(), serial);
+    }
+
+    #[test]
+    fn a_copy_of_the_counter_is_known_as_one_and_a_folder_that_was_renamed_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let state = StateFolder::open(&at("first")).unwrap();
+        let counted = Counted {
+            last: 9,
+            run: 3,
+            ..Counted::default()
+        };
+        state.counter().store(counted).unwrap();
+        drop(state);
+        fs::rename(at("first"), at("moved")).unwrap();
+        let moved = StateFolder::open(&at("moved")).unwrap();
+        assert_eq!(moved.counted().unwrap(), counted);
+        fs::create_dir(at("copied")).unwrap();
+        fs::copy(at("moved").join(COUNTER), at("copied").join(COUNTER)).unwrap();
+        let copied = StateFolder::open(&at("copied")).unwrap();
+        let found = copied.counted().unwrap();
+        let is_known = made(&File::open(at("copied").join(COUNTER)).unwrap()) != 0;
+        assert_eq!((found.last, found.copied), (9, is_known));
+        // From then on it is its own.
+        copied.counter().store(found).unwrap();
+        assert!(!copied.counted().unwrap().copied);
     }
 
     #[test]
@@ -228,12 +287,16 @@ mod tests {
     fn a_damaged_counter_is_not_guessed() {
         let folder = tempfile::tempdir().unwrap();
         let state = StateFolder::open(folder.path()).unwrap();
-        for damaged in ["4x", "", "4 y", "4 5 6", "-4", "4294967296"] {
+        for damaged in ["4x", "", "4 y", "4 5 6 7 8", "-4", "4294967296"] {
             fs::write(folder.path().join(COUNTER), damaged).unwrap();
             let refused = state.counted().unwrap_err();
             assert!(refused.contains("result-seq"), "{damaged}");
         }
         fs::write(folder.path().join(COUNTER), "4\n").unwrap();
-        assert_eq!(state.counted().unwrap(), Counted { last: 4, run: 0 });
+        let by_hand = Counted {
+            last: 4,
+            ..Counted::default()
+        };
+        assert_eq!(state.counted().unwrap(), by_hand);
     }
 }

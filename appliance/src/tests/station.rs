@@ -96,6 +96,7 @@ fn a_panic_while_a_recipe_is_loaded_becomes_error_402_of_a_station_that_loads_an
     };
     let settings = Settings {
         next_seq: 1,
+        buffered: Default::default(),
         boot_id: 1,
         teach_allowed: false,
         identity: Arc::new(identity),

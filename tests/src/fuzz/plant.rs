@@ -33,6 +33,7 @@ pub fn settings() -> Settings {
     };
     Settings {
         next_seq: 1000,
+        buffered: Default::default(),
         boot_id: 1,
         teach_allowed: true,
         identity: Arc::new(identity),

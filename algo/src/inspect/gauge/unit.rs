@@ -46,6 +46,13 @@ impl Unit {
         [-most, most]
     }
 
+    /// The unit with this symbol; of a bare number and a share, which have none, the share.
+    pub fn of_symbol(symbol: &str) -> Self {
+        let units = [Self::Length, Self::Angle, Self::Volume];
+        let found = units.into_iter().find(|unit| unit.symbol() == symbol);
+        found.unwrap_or(Self::Share)
+    }
+
     /// The unit's symbol.
     pub fn symbol(self) -> &'static str {
         match self {

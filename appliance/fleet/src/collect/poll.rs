@@ -3,7 +3,7 @@
 use super::lines::Lines;
 use super::tally::Tally;
 use super::trouble::Trouble;
-use crate::answer::{Header, Row, Wrong};
+use crate::answer::{Header, LIFE, Row, Wrong};
 use crate::config::{Config, HeadConfig};
 use crate::http::{Client, shortened};
 use crate::log::{self, Severity};
@@ -138,34 +138,30 @@ impl Poll {
         } else if self.state.serial != header.serial {
             return Err(Wrong::Serial(header.serial, self.state.serial.clone()).into());
         }
-        if self.state.history != header.history {
-            self.state.history.clone_from(&header.history);
-            self.state.seq = self.plant.end(&header.serial, &header.history);
+        if base(&self.state.history) != header.history {
+            self.state.history = self.plant.newest_life(&header.serial, &header.history);
+            self.state.seq = self.plant.end(&header.serial, &self.state.history);
             if self.state.seq != after {
                 // The answer is about what is behind a SEQ of another history.
                 self.client.close();
                 return Ok(Asked::More);
             }
         }
-        if header.last.is_some_and(|last| last < after) {
-            return Err(Wrong::Header(header.first, header.last, after).into());
+        if let Some(last) = header.last
+            && last < after
+        {
+            self.live_again(last).await;
+            return Ok(Asked::More);
         }
         if let Some(first) = header.first
             && first > after.saturating_add(1)
         {
-            let (serial, history) = (header.serial.clone(), header.history.clone());
             let (first, last) = (after + 1, first - 1);
             self.say(
                 Severity::Warning,
                 format_args!("results {first} to {last} were deleted before they were fetched"),
             );
-            self.batch.gaps.push(Gap {
-                serial,
-                history,
-                first,
-                last,
-            });
-            self.state.seq = last;
+            self.skip(first, last);
         }
         let before = self.state.clone();
         let received = self.rows(&mut lines, &header).await;
@@ -181,6 +177,40 @@ impl Poll {
         })
     }
 
+    /// Numbers of a history went back to `last`, as those of an image of a card that was restored do:
+    /// what follows is stored as results of another life of it, beside those of the one before.
+    /// What the head has now up to `last` may be the same as before, and is skipped.
+    async fn live_again(&mut self, last: u32) {
+        let (before, after) = (self.state.history.clone(), self.state.seq);
+        self.state.history = next_life(&before);
+        self.say(
+            Severity::Warning,
+            format_args!(
+                "SEQ went back from {after} to {last}: an older copy of its storage was restored; results behind {last} are stored as those of history {}, and the first {last} of it are not fetched again",
+                self.state.history
+            ),
+        );
+        self.skip(1, last);
+        self.client.close();
+        self.hand_on().await;
+    }
+
+    /// Records that results are not fetched.
+    fn skip(&mut self, first: u32, last: u32) {
+        let HeadState {
+            serial, history, ..
+        } = self.state.clone();
+        if first <= last {
+            self.batch.gaps.push(Gap {
+                serial,
+                history,
+                first,
+                last,
+            });
+        }
+        self.state.seq = last;
+    }
+
     /// Takes the results of an answer.
     async fn rows(&mut self, lines: &mut Lines, header: &Header) -> Result<u32, Trouble> {
         let mut count = 0;
@@ -188,7 +218,8 @@ impl Poll {
             if count == LIMIT {
                 return Err(Wrong::More(LIMIT).into());
             }
-            let row = Row::read(line, header, self.state.seq)?;
+            let mut row = Row::read(line, header, self.state.seq)?;
+            row.history.clone_from(&self.state.history);
             let at_unix_ms = now_ms();
             self.state.seq = row.seq;
             self.state.last_result_unix_ms = row.at_unix_ms.or(Some(at_unix_ms));
@@ -277,7 +308,35 @@ impl Poll {
     }
 }
 
+/// The id of a history as its head has it.
+fn base(history: &str) -> &str {
+    history.split(LIFE).next().unwrap_or(history)
+}
+
+/// The number of a life of a history.
+fn life(history: &str) -> u32 {
+    let number = history
+        .split_once(LIFE)
+        .and_then(|(_, life)| life.parse().ok());
+    number.unwrap_or(1)
+}
+
+/// What the next life of a history is called.
+fn next_life(history: &str) -> String {
+    format!("{}{LIFE}{}", base(history), life(history).saturating_add(1))
+}
+
 impl Plant {
+    /// The life of a history that was fetched last when the collector began.
+    fn newest_life(&self, serial: &str, history: &str) -> String {
+        let own = self
+            .ends
+            .keys()
+            .filter(|(of, id)| of == serial && base(id) == history);
+        let newest = own.map(|(_, id)| id).max_by_key(|id| life(id));
+        newest.map_or(history.to_owned(), String::clone)
+    }
+
     /// Notes where a serial answers.
     fn place(&self, serial: &str, url: &str) -> Result<(), Wrong> {
         let mut places = self.places.lock().unwrap_or_else(PoisonError::into_inner);

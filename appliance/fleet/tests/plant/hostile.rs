@@ -117,6 +117,47 @@ fn a_hostile_head_is_named_and_the_others_are_collected_on() {
     }
 }
 
+/// A head that once claims the last of all numbers, and whose storage is an older copy from then on.
+fn restored(path: &str, _: usize) -> Pieces {
+    let head = |last: u32, rows: &str| {
+        let header = HEADER.replace("\"last\":9", &format!("\"last\":{last}"));
+        text(&format!("{HEAD}{header}\n{rows}"))
+    };
+    if path.contains("after=0&") {
+        return head(u32::MAX, &line("EVIL", u32::MAX, "1"));
+    }
+    match path.contains("after=3&") {
+        true => head(5, &(line("EVIL", 4, "1") + &line("EVIL", 5, "1"))),
+        false if path.contains("after=4294967295&") => head(3, ""),
+        false => head(5, ""),
+    }
+}
+
+#[test]
+fn numbers_that_went_back_begin_another_life_of_a_history_and_what_is_skipped_is_recorded() {
+    let impostor = Impostor::new(restored, false);
+    let url = format!("http://localhost:{}/one", impostor.port);
+    let place = Place::new(&[&url], "");
+    for _ in 0..2 {
+        // A second collector goes on where the first ended.
+        let collector = place.collect(&place.store(), &[]);
+        wait("both lives", || counted(&place) == [("EVIL".into(), 3)]);
+        assert_eq!(collector.terminate(), Some(0));
+        let seqs = "SELECT history || ' ' || seq, 0 FROM result ORDER BY history, seq";
+        let found = numbers(&place, seqs).into_iter().map(|(name, _)| name);
+        assert!(
+            found.eq(["h 4294967295", "h.2 4", "h.2 5"]),
+            "{}",
+            place.log()
+        );
+        let gaps = numbers(&place, "SELECT history || ' ' || first, last FROM gap");
+        assert_eq!(gaps, [("h.2 1".into(), 3)]);
+    }
+    let log = place.log();
+    let named = log.matches("SEQ went back from 4294967295 to 3").count();
+    assert_eq!(named, 1, "{log}");
+}
+
 #[test]
 fn a_connection_to_another_host_is_refused_and_one_to_the_right_one_is_not() {
     let impostor = Impostor::new(answers, true);

@@ -425,6 +425,7 @@ pub(super) type Log = Arc<Mutex<Vec<String>>>;
 pub(super) fn station() -> (StationHandle, Log) {
     let settings = Settings {
         next_seq: 1,
+        buffered: Default::default(),
         boot_id: 1,
         teach_allowed: false,
         identity: Arc::new(Identity {
@@ -479,7 +480,81 @@ pub(super) fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Opti
         serial: state.serial().unwrap(),
         run,
     };
-    open(state.path(), numbering, bounds).unwrap()
+    let opened = open(state.path(), numbering, bounds).unwrap();
+    let Opened {
+        history,
+        task,
+        next_seq,
+        complaint,
+        ..
+    } = opened;
+    (history, task, next_seq, complaint)
+}
+
+#[test]
+fn a_copy_of_a_state_folder_goes_on_far_behind_and_the_folder_itself_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let state = StateFolder::open(&at("first")).unwrap();
+    let begin = |state: &StateFolder, run| {
+        let (history, task, next, complaint) = opened(state, run);
+        history.stop(next.wrapping_sub(1));
+        task.run(&station().0);
+        (next, complaint)
+    };
+    assert_eq!(begin(&state, 1), (1, None));
+    assert_eq!(begin(&state, 2), (1, None));
+    std::fs::create_dir(at("copy")).unwrap();
+    for name in [DATABASE, "result-seq", "serial"] {
+        std::fs::copy(at("first").join(name), at("copy").join(name)).unwrap();
+    }
+    assert_eq!(begin(&state, 3), (1, None));
+    let copy = StateFolder::open(&at("copy")).unwrap();
+    if copy.counted().unwrap().copied {
+        let (next, complaint) = begin(&copy, 4);
+        assert_eq!(next, (1 << 24) + 1);
+        assert!(complaint.unwrap().contains("is a copy"));
+        assert_eq!(begin(&copy, 5), ((1 << 24) + 1, None));
+    } else {
+        println!("skipped: this file system does not say when files are made");
+    }
+}
+
+#[test]
+fn what_is_acknowledged_is_remembered_over_a_kill() {
+    let folder = tempfile::tempdir().unwrap();
+    let state = StateFolder::open(folder.path()).unwrap();
+    let (history, ..) = opened(&state, 1);
+    for seq in 1..=5 {
+        history.take(seq).unwrap();
+        history.record(&record(seq));
+    }
+    history.buffer(Some(0));
+    history.buffer(Some(2));
+    // Killed: nothing is settled.
+    drop(history);
+    let bounds = Bounds {
+        results: ENOUGH,
+        recordings: 0,
+    };
+    let numbering = Numbering {
+        counted: state.counted(),
+        counter: state.counter(),
+        serial: state.serial().unwrap(),
+        run: 2,
+    };
+    let again = open(state.path(), numbering, bounds).unwrap();
+    assert_eq!((again.next_seq, again.buffered), (6, Some(2)));
+    let page = Reader::of(state.path())
+        .after(2, 32)
+        .unwrap()
+        .page()
+        .unwrap();
+    let seqs: Vec<u32> = page.results.iter().map(|entry| entry.seq).collect();
+    assert_eq!(seqs, [3, 4, 5]);
+    for entry in page.results {
+        assert_eq!(Entry::of(&entry.record()), entry);
+    }
 }
 
 #[test]

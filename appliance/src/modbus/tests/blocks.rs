@@ -121,7 +121,7 @@ async fn coils_and_discrete_inputs_mirror_control_and_status() {
         .unwrap();
     assert_eq!(plant.handle.snapshot().control.control, 5);
     assert_eq!(
-        plc.write_single_coil(8, true).await.unwrap(),
+        plc.write_single_coil(9, true).await.unwrap(),
         Err(Exception::IllegalDataValue)
     );
     assert_eq!(

@@ -41,7 +41,7 @@ async fn what_cannot_be_is_an_exception_and_the_connection_lives_on() {
         plc.write_multiple_registers(31, &[0, 0]).await.unwrap(),
         Err(Exception::IllegalDataAddress)
     );
-    for (address, word) in [(0, 0x0101), (0, 0x8001), (2, 10_000), (24, 1)] {
+    for (address, word) in [(0, 0x0201), (0, 0x8001), (2, 10_000), (24, 1)] {
         assert_eq!(
             plc.write_single_register(address, word).await.unwrap(),
             Err(Exception::IllegalDataValue),

@@ -37,6 +37,7 @@ fn settings() -> Settings {
     };
     Settings {
         next_seq: 1000,
+        buffered: Default::default(),
         boot_id: 0xB007_1D00,
         teach_allowed: false,
         identity: Arc::new(identity),

@@ -33,6 +33,7 @@ pub(super) fn settings() -> Settings {
     };
     Settings {
         next_seq: 41,
+        buffered: Default::default(),
         boot_id: 7,
         teach_allowed: false,
         identity: Arc::new(identity),

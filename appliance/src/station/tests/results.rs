@@ -131,6 +131,44 @@ fn buffered_results_are_popped_by_acknowledge_and_overflow_latches() {
 }
 
 #[test]
+fn buffered_mode_outlives_writes_without_its_bit_and_a_restart_and_ends_with_bit_8() {
+    let mut bench = Bench::ready();
+    bench.control(control::ONLINE | control::BUFFERED);
+    // An older program acknowledges, and writes CONTROL as it always did.
+    bench.token(1);
+    bench.finish();
+    bench.pulse(control::RESULT_ACK);
+    bench.control(control::ONLINE);
+    for token in 2..=4 {
+        bench.token(token);
+        bench.finish();
+    }
+    let snapshot = bench.station.snapshot();
+    assert_eq!(snapshot.buffered, 3);
+    assert_ne!(snapshot.control.control & control::BUFFERED, 0);
+    let oldest = snapshot.oldest.clone().unwrap();
+    // What the history says after a restart.
+    let left = Buffered {
+        acknowledged: Some(oldest.seq - 1),
+        queue: vec![oldest.clone()],
+    };
+    let mut again = Bench::ready_with(Settings {
+        buffered: left,
+        ..settings()
+    });
+    let snapshot = again.station.snapshot();
+    assert_eq!((snapshot.buffered, snapshot.oldest), (1, Some(oldest)));
+    assert_eq!(again.pulse(control::RESULT_ACK).buffered, 0);
+    again.token(9);
+    assert_eq!(again.finish().buffered, 1);
+    again.pulse(control::UNBUFFERED);
+    again.token(10);
+    let ended = again.finish();
+    assert_eq!(ended.buffered, 1, "what waits is still acknowledged");
+    assert_eq!(ended.control.control & control::BUFFERED, 0);
+}
+
+#[test]
 fn without_buffered_mode_nothing_is_queued() {
     let mut bench = Bench::ready();
     bench.token(1);

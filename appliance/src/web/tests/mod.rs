@@ -46,6 +46,7 @@ async fn served() -> Served {
     };
     let settings = Settings {
         next_seq: 5,
+        buffered: Default::default(),
         boot_id: 1,
         teach_allowed: false,
         identity: Arc::new(identity),
