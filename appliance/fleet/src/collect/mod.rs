@@ -104,7 +104,7 @@ impl Collect {
         let writing = writer::write(&mut store, incoming, &plant.tally);
         tokio::pin!(writing);
         tokio::select! {
-            () = &mut writing => {}
+            written = &mut writing => return written,
             () = plant.tally.tell(self.json) => {}
             () = &mut stop => {
                 asking.abort_all();

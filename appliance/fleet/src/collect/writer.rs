@@ -2,6 +2,7 @@
 
 use super::poll::PIECE;
 use super::tally::Tally;
+use crate::error::{Exit, Failure};
 use crate::log::{self, Severity};
 use crate::store::{Batch, Complaint, Store};
 use std::sync::atomic::Ordering::Relaxed;
@@ -18,7 +19,14 @@ const GATHERING: Duration = Duration::from_millis(500);
 const PAUSES: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(10)];
 
 /// Writes until all tasks that fetch have ended and everything is written.
-pub(super) async fn write(store: &mut Store, mut incoming: Receiver<Batch>, tally: &Tally) {
+///
+/// # Errors
+/// If the store is another one now: what it lacks is only fetched by a collector that begins.
+pub(super) async fn write(
+    store: &mut Store,
+    mut incoming: Receiver<Batch>,
+    tally: &Tally,
+) -> Result<(), Failure> {
     while let Some(mut batch) = incoming.recv().await {
         let until = Instant::now() + GATHERING;
         while batch.rows.len() + PIECE <= MOST
@@ -28,9 +36,13 @@ pub(super) async fn write(store: &mut Store, mut incoming: Receiver<Batch>, tall
             batch.gaps.extend(more.gaps);
             batch.heads.extend(more.heads);
         }
+        if let Some(words) = store.gone() {
+            return Exit::Unavailable.fail(words);
+        }
         until_it_works("write results", async || store.write(&batch).await).await;
         tally.rows.fetch_add(batch.rows.len() as u64, Relaxed);
     }
+    Ok(())
 }
 
 /// Repeats an attempt on the store until it succeeds. The log has the first failure, and the end.

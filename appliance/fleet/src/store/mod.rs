@@ -165,6 +165,9 @@ impl Store {
     /// If it is no URL of a store.
     pub fn of(url: &str, tls: Option<Arc<ClientConfig>>) -> Result<Self> {
         if let Some(file) = url.strip_prefix("sqlite:") {
+            if file.is_empty() {
+                return Exit::Usage.fail("--store sqlite: names no file: write sqlite:plant.db");
+            }
             return Ok(Self::Sqlite(Sqlite::of(file)));
         }
         let wrong = |words| Failure::new(Exit::Usage, format!("--store {url}: {words}"));
@@ -180,6 +183,14 @@ impl Store {
         match self {
             Self::Sqlite(store) => store.prepare(),
             Self::ClickHouse(store) => store.prepare().await,
+        }
+    }
+
+    /// Why it is not the store any more that was opened.
+    pub fn gone(&self) -> Option<Complaint> {
+        match self {
+            Self::Sqlite(store) => store.gone(),
+            Self::ClickHouse(_) => None,
         }
     }
 

@@ -9,6 +9,7 @@ use super::{Batch, Complaint};
 use rusqlite::types::Value as Sql;
 use rusqlite::{Connection, Transaction, params_from_iter};
 use serde_json::{Value, json};
+use std::os::unix::fs::MetadataExt as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -19,6 +20,8 @@ const BUSY: Duration = Duration::from_secs(5);
 pub struct Sqlite {
     path: PathBuf,
     open: Option<Connection>,
+    /// Which file is open: device and number.
+    file: Option<(u64, u64)>,
 }
 
 impl Sqlite {
@@ -27,6 +30,7 @@ impl Sqlite {
         Self {
             path: Path::new(path).to_path_buf(),
             open: None,
+            file: None,
         }
     }
 
@@ -40,7 +44,24 @@ impl Sqlite {
             Ok(connection)
         });
         self.open = Some(made.map_err(|error| self.complaint(&error))?);
+        self.file = self.found();
         Ok(())
+    }
+
+    /// The file that has its name now.
+    fn found(&self) -> Option<(u64, u64)> {
+        let about = self.path.metadata().ok()?;
+        Some((about.dev(), about.ino()))
+    }
+
+    /// Why nothing must be written any more: the file was deleted or replaced while it was open.
+    pub(super) fn gone(&self) -> Option<Complaint> {
+        (self.open.is_some() && self.found() != self.file).then(|| {
+            format!(
+                "{} was deleted or replaced while it was open: start the collector again, which makes it anew and fetches what the heads still have",
+                self.path.display()
+            )
+        })
     }
 
     pub(super) fn write(&mut self, batch: &Batch) -> Result<(), Complaint> {

@@ -107,7 +107,7 @@ fn a_schema_makes_the_tables_and_views_that_it_names() {
         .unwrap();
     let names = "SELECT group_concat(name, ' ') FROM (SELECT name FROM sqlite_schema WHERE sql IS NOT NULL ORDER BY name)";
     let names: String = connection.query_row(names, (), |row| row.get(0)).unwrap();
-    let expected = "gap gap_once gauge_day gauge_hour gauge_once head head_once result result_at result_once yield_day yield_hour";
+    let expected = "gap gap_once gauge_day gauge_hour gauge_once head head_once result result_at result_head result_once yield_day yield_hour";
     assert_eq!(names, expected);
     let cluster = String::from_utf8(ended(&["schema", "--store", "cluster"]).stdout).unwrap();
     assert!(cluster.contains("Distributed(plant, plant, result_local, cityHash64(serial))"));

@@ -153,3 +153,21 @@ fn views_have_what_the_values_come_to() {
     let stored = stored.map(|line| serde_json::from_str::<serde_json::Value>(&line).unwrap());
     assert_eq!(stored.collect::<Vec<_>>(), rows);
 }
+
+#[test]
+fn a_collector_ends_whose_store_is_deleted_and_the_next_one_fills_it_again() {
+    let plant = plant(2);
+    let place = Place::new(&[&plant.heads()], "");
+    let collector = place.collect(&place.store(), &[]);
+    wait("some results", || !counted(&place).is_empty());
+    for name in ["plant.db", "plant.db-wal", "plant.db-shm"] {
+        let _ = std::fs::remove_file(place.path(name));
+    }
+    wait("the words", || {
+        place.log().contains("was deleted or replaced")
+    });
+    assert_eq!(collector.ended(), Some(69));
+    let collector = place.collect(&place.store(), &[]);
+    wait("all results", || is_complete(&place, 2));
+    assert_eq!(collector.terminate(), Some(0));
+}

@@ -26,6 +26,7 @@ CREATE TABLE IF NOT EXISTS result (
     PRIMARY KEY (serial, history, seq)
 );
 CREATE INDEX IF NOT EXISTS result_at ON result (at);
+CREATE INDEX IF NOT EXISTS result_head ON result (serial, at, verdict);
 
 -- Results that a head deleted before anybody fetched them: first to last SEQ.
 CREATE TABLE IF NOT EXISTS gap (
