@@ -48,7 +48,7 @@ fn flatness(dent: &Option<Defect>) -> f64 {
 
 #[test]
 fn form_gauges_contain_the_truth_of_perfect_and_of_bent_plates_in_a_few_placements() {
-    form_gauges_contain_the_truth(3);
+    form_gauges_contain_the_truth(2);
 }
 
 #[test]
@@ -85,6 +85,7 @@ fn form_gauges_contain_the_truth(placements: usize) {
     let mut file = taught.manifest.clone();
     file.features.extend([
         FeatureFile::surface("face", polygon(view, &face)),
+        FeatureFile::new("plane", FeatureKind::Plane, polygon(view, &face)),
         FeatureFile::new("edge", FeatureKind::Line, polygon(view, &edge)),
         FeatureFile::new(
             "hole",
@@ -93,9 +94,14 @@ fn form_gauges_contain_the_truth(placements: usize) {
         ),
     ]);
     let smoothing_px = SMOOTHING_PX;
-    let gauges: [(&str, &str, Measure); 4] = [
+    let gauges: [(&str, &str, Measure); 5] = [
         ("flatness", "face", Flatness { smoothing_px }.into()),
         ("fine flatness", "face", Flatness { smoothing_px: 5 }.into()),
+        (
+            "flatness of the plane",
+            "plane",
+            Flatness { smoothing_px }.into(),
+        ),
         ("straightness", "edge", Straightness {}.into()),
         ("roundness", "hole", Roundness {}.into()),
     ];
@@ -122,9 +128,9 @@ fn form_gauges_contain_the_truth(placements: usize) {
     ];
     let (mut worst, mut all) = (0.0_f64, [0.0; 2]);
     for defect in bent {
-        let (mut random, mut sums) = (Random::new(3), [[0.0; 4]; 4]);
+        let (mut random, mut sums) = (Random::new(3), [[0.0; 4]; 5]);
         let flat = flatness(&defect);
-        let truths = [flat, flat, 0.0, 0.0];
+        let truths = [flat, flat, flat, 0.0, 0.0];
         for at in 0..placements {
             let lies = setting.placement((at > 0).then_some(&mut random));
             let plate = Plate {
@@ -158,6 +164,6 @@ fn form_gauges_contain_the_truth(placements: usize) {
     }
     println!("U of a flat face up to {worst:.4} mm");
     assert!(worst <= FLAT_U_MM, "{worst}");
-    assert!(all[0] >= SEEN * 16.0 * placements as f64, "{all:?}");
+    assert!(all[0] >= SEEN * 20.0 * placements as f64, "{all:?}");
     assert!(all[1] >= WITHIN * all[0], "{all:?}");
 }

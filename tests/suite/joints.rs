@@ -269,7 +269,7 @@ const STOCK_U_MM: f64 = 0.075;
 
 #[test]
 fn a_stock_joint_is_gauged_in_both_directions_at_the_default_camera() {
-    stock_joints(3);
+    stock_joints(2);
 }
 
 #[test]

@@ -169,6 +169,11 @@ pub(super) async fn teach(
             "recipe {number}: numbers are 1 to {MAX_RECIPE}"
         )));
     }
+    if site.simulation.is_placing() {
+        return Err(Problem::busy(
+            "teach: another part is being put in front of the simulated head: try again when it is there",
+        ));
+    }
     // Without a head the station says why below.
     let unknown = site.commission.head().and_then(|head| head.problem);
     if let Some(problem) = unknown {

@@ -17,6 +17,7 @@ kind! {
 impl Kind for Flatness {
     fn facts(&self) -> Facts {
         Facts {
+            takes: FACE,
             never_negative: true,
             ..Facts::new(
                 Unit::Length,

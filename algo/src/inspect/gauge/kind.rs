@@ -73,6 +73,8 @@ pub type Takes = &'static [&'static [FeatureKind]];
 
 /// One surface.
 pub(super) const SURFACE: Takes = &[&[Surface]];
+/// A surface, or the face of a plane.
+pub(super) const FACE: Takes = &[&[Surface, Plane]];
 /// A surface, and a second one.
 pub(super) const SURFACES: Takes = &[&[Surface], &[Surface]];
 /// A round hole.

@@ -24,7 +24,7 @@ export async function ask(method, path, body) {
 }
 
 // The table of what gauges can measure; the kind of a gauge; and its unit with the limits that it can have, which a word may decide.
-export function loadKinds() { return ask("GET", "/api/kinds"); }
+export function loadKinds() { return ask("GET", "api/kinds"); }
 export function kindOf({ kinds }, gauge) { return kinds.find((one) => one.kind === gauge.kind); }
 // The corners of a feature in the picture; of a section its ends.
 export function cornersOf({ region, from, to }) { return region || [from, to]; }

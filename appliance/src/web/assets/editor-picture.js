@@ -34,7 +34,7 @@ export async function showLayer(layer = view.layer) {
   const { number, camera } = state.recipe;
   for (const id of ["editor-regions", "editor-found"]) $(id).setAttribute("viewBox", `0 0 ${camera.width} ${camera.height}`);
   try {
-    const loaded = await map(`/api/recipes/${number}/picture/${layer}`);
+    const loaded = await map(`api/recipes/${number}/picture/${layer}`);
     if (turn !== view.asked) return;
     view.mm = loaded.about.pixel_mm;
     paint($("editor-map"), loaded, layer);

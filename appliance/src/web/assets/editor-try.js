@@ -12,7 +12,7 @@ let timer = 0, turn = 0, onParts = 0, hooks = null;
 
 // The list as a request has it.
 export const body = (more) => Object.assign({ fingerprint: state.recipe.fingerprint }, state.list, more);
-const send = (more) => ask("POST", `/api/recipes/${state.recipe.number}/try`, body(more));
+const send = (more) => ask("POST", `api/recipes/${state.recipe.number}/try`, body(more));
 
 function say(error) {
   show("editor-sign", error.status === 401);
@@ -106,7 +106,7 @@ export async function tryParts() {
   onParts += 1;
   fill($("parts"), make("p", "quiet", "measuring the last parts by this list …"));
   try {
-    const { results } = await ask("GET", `/api/history?recipe=${number}&limit=200`);
+    const { results } = await ask("GET", `api/history?recipe=${number}&limit=200`);
     const kept = results.filter(({ recording }) => recording).map(({ seq }) => seq).slice(0, PARTS);
     const last = await send({ on: "last" });
     const others = kept.filter((seq) => !last.parts.some((part) => part.seq === seq));

@@ -21,7 +21,7 @@ async function leave() {
 export async function edit(number) {
   if (!await leave()) return;
   let recipe, kinds;
-  try { [recipe, kinds] = await Promise.all([ask("GET", `/api/recipes/${number}`), loadKinds()]); } catch (error) { notice(error.message, true); return; }
+  try { [recipe, kinds] = await Promise.all([ask("GET", `api/recipes/${number}`), loadKinds()]); } catch (error) { notice(error.message, true); return; }
   forget();
   begin(recipe, kinds);
   text("editor-number", String(number));
@@ -123,13 +123,13 @@ function go(what, at) {
 
 async function put(sent) {
   const { recipe } = state;
-  try { return await ask("PUT", `/api/recipes/${recipe.number}`, sent); } catch (error) {
+  try { return await ask("PUT", `api/recipes/${recipe.number}`, sent); } catch (error) {
     if (error.status !== 409) throw error;
     // Somebody else has stored another version: nothing is lost, and nothing is replaced unasked.
     const words = `${error.message}. What you typed is still here. Their version can be brought back with Undo in the list of recipes.`;
     if (!await choose("Somebody else has changed this recipe", words, [["Store mine in its place", true]])) return null;
-    recipe.fingerprint = (await ask("GET", `/api/recipes/${recipe.number}`)).fingerprint;
-    return ask("PUT", `/api/recipes/${recipe.number}`, Object.assign({}, sent, { fingerprint: recipe.fingerprint }));
+    recipe.fingerprint = (await ask("GET", `api/recipes/${recipe.number}`)).fingerprint;
+    return ask("PUT", `api/recipes/${recipe.number}`, Object.assign({}, sent, { fingerprint: recipe.fingerprint }));
   }
 }
 

@@ -47,7 +47,7 @@ function row(gauge) {
 async function load(result) {
   trends = new Map();
   try {
-    const stored = await ask("GET", "/api/trends");
+    const stored = await ask("GET", "api/trends");
     for (const gauge of stored.gauges) {
       trends.set(gauge.name, gauge.points.map((point) => ({ seq: point.seq, value: point.value, pass: decided(point).pass })));
     }

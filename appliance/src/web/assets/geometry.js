@@ -22,7 +22,7 @@ const boardAsTyped = () => `checker:${$("board-columns").value}x${$("board-rows"
 
 async function send(body) {
   await change(async () => {
-    await ask("POST", "/api/head/steps/geometry", body);
+    await ask("POST", "api/head/steps/geometry", body);
     state.edited = false;
   });
   window.dispatchEvent(new Event("head"));
@@ -45,7 +45,7 @@ async function showPose() {
   state.shown = wanted;
   if (!pose) return;
   $("pose-picture").setAttribute("aria-label", `the board in pose ${pose.number}, with the corners that were found: ${pose.corners} of ${pose.of}`);
-  try { await showPicture("pose-picture", "pose-words", `/api/head/poses/${pose.number}/picture`); } catch (error) {
+  try { await showPicture("pose-picture", "pose-words", `api/head/poses/${pose.number}/picture`); } catch (error) {
     text("pose-words", error.message);
     show("pose-words", true);
   }
@@ -86,7 +86,7 @@ function showBoard(board) {
   $("board-columns").value = columns;
   $("board-rows").value = rows;
   $("board-square").value = square;
-  $("board-print").href = `/api/head/board.pdf?board=${board}`;
+  $("board-print").href = `api/head/board.pdf?board=${board}`;
 }
 
 const SCALES = { unchecked: "not checked", length: "checked by the length", baseline: "as before" };
@@ -131,7 +131,7 @@ export function showGeometry(geometry, busy) {
 export function start() {
   $("board").addEventListener("input", () => {
     state.edited = true;
-    $("board-print").href = `/api/head/board.pdf?board=${boardAsTyped()}`;
+    $("board-print").href = `api/head/board.pdf?board=${boardAsTyped()}`;
   });
   $("board").addEventListener("submit", (event) => event.preventDefault());
   $("pose-take").addEventListener("click", take);

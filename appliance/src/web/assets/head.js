@@ -34,7 +34,7 @@ function showDrift(drift) {
 
 async function refresh() {
   let head;
-  try { head = await ask("GET", "/api/head"); } catch (error) { head = { open: false, problem: error.message }; }
+  try { head = await ask("GET", "api/head"); } catch (error) { head = { open: false, problem: error.message }; }
   show("setup", head.open);
   if (!head.open) {
     show("bare", true);
@@ -64,7 +64,7 @@ export function openHead(open) {
 
 // A first visit to a head that is not calibrated starts with its set-up.
 async function lead() {
-  const { open, calibrated } = await ask("GET", "/api/head");
+  const { open, calibrated } = await ask("GET", "api/head");
   if (open && !calibrated && !location.hash) location.replace("#head");
 }
 

@@ -36,7 +36,7 @@ function row(entry) {
   const frames = make("td");
   if (entry.recording) {
     const link = make("a", "", "ZIP");
-    link.href = `/api/history/${entry.seq}/recording.zip`;
+    link.href = `api/history/${entry.seq}/recording.zip`;
     link.setAttribute("download", "");
     link.setAttribute("aria-label", `ZIP: frames of no. ${entry.seq}`);
     frames.append(link);
@@ -52,11 +52,11 @@ function row(entry) {
 
 async function load(more) {
   const wanted = filter();
-  $("history-csv").href = `/api/history.csv?${wanted}`;
+  $("history-csv").href = `api/history.csv?${wanted}`;
   wanted.set("limit", PAGE);
   if (more && oldest !== null) wanted.set("before_seq", oldest);
   try {
-    const { results, counts, undated } = await ask("GET", `/api/history?${wanted}`);
+    const { results, counts, undated } = await ask("GET", `api/history?${wanted}`);
     const rows = results.map(row);
     if (more) $("history-rows").append(...rows); else fill($("history-rows"), ...rows);
     if (results.length) oldest = results[results.length - 1].seq;

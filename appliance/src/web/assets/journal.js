@@ -77,7 +77,7 @@ function condition(now) {
 
 async function refresh() {
   try {
-    const [log, changes] = await Promise.all([ask("GET", "/api/log"), ask("GET", "/api/changes")]);
+    const [log, changes] = await Promise.all([ask("GET", "api/log"), ask("GET", "api/changes")]);
     fill($("log-lines"), ...log.lines.map((entry) => line(moment(entry, boot), entry.words, "", about(entry))));
     if (!log.lines.length) fill($("log-lines"), line("", "nothing happened yet"));
     fill($("change-lines"), ...changes.changes.map((entry) =>

@@ -71,8 +71,8 @@ async function picture() {
   let found;
   try {
     // The contours are asked for once for all of its pictures.
-    state.found = state.found || ask("GET", `/api/history/${state.seq}/features`).then(({ features }) => features, () => []);
-    [loaded, found] = await Promise.all([map(`/api/history/${state.seq}/picture/${state.layer}`), state.found]);
+    state.found = state.found || ask("GET", `api/history/${state.seq}/features`).then(({ features }) => features, () => []);
+    [loaded, found] = await Promise.all([map(`api/history/${state.seq}/picture/${state.layer}`), state.found]);
   } catch (error) {
     if (turn === state.asked) empty(error.message);
     return;
@@ -83,7 +83,7 @@ async function picture() {
   over($("kept-ring"), loaded.about, ...marks(found, loaded.about.width * loaded.about.stride / 200), ...rings(loaded.about, state.failed));
   text("kept-shown", loaded.about.words);
   show("kept-words", false);
-  view.show({ path: `/api/history/${state.seq}/picture/surface?seq=${state.seq}`, seq: state.seq, points });
+  view.show({ path: `api/history/${state.seq}/picture/surface?seq=${state.seq}`, seq: state.seq, points });
 }
 
 // Shows the result of a SEQ.
@@ -92,7 +92,7 @@ export async function openKept(seq, boot) {
   state.found = null;
   state.asked += 1;
   let found;
-  try { found = await ask("GET", `/api/history/${seq}`); } catch (error) {
+  try { found = await ask("GET", `api/history/${seq}`); } catch (error) {
     text("history-counts", error.message);
     return;
   }
@@ -107,7 +107,7 @@ export async function openKept(seq, boot) {
   fill($("kept-gauges"), ...result.gauges.map(gauge));
   fill($("kept-facts"), ...facts(found, boot));
   show("kept-pictures", !no_frames);
-  $("kept-frames").href = `/api/history/${seq}/recording.zip`;
+  $("kept-frames").href = `api/history/${seq}/recording.zip`;
   text("no-frames", no_frames ? `No pictures: ${no_frames}.` : "");
   show("kept", true);
   $("kept").focus({ preventScroll: true });

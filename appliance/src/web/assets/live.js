@@ -121,8 +121,8 @@ export async function showPicture(canvas, words, path) {
 }
 
 async function next(turn) {
-  await showPicture("live-picture", "live-words", `/api/head/live?show=${$("live-show").value}`);
-  const figures = await ask("GET", "/api/head/live/figures");
+  await showPicture("live-picture", "live-words", `api/head/live?show=${$("live-show").value}`);
+  const figures = await ask("GET", "api/head/live/figures");
   if (turn !== state.turn) return;
   $("live-picture").dataset.number = figures.number;
   drawHistogram(figures);
@@ -167,7 +167,7 @@ function expose(keep) {
   const wanted = exposure(keep);
   if (!wanted) return;
   change(async () => {
-    await ask("POST", "/api/head/steps/exposure", wanted);
+    await ask("POST", "api/head/steps/exposure", wanted);
     state.edited = false;
     notice(keep ? "exposure and gain are kept" : "exposure and gain are tried");
   });

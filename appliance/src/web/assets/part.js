@@ -88,7 +88,7 @@ function keys(event) {
 // Shows what was taken for the part that was taught last, as this number.
 export async function showPart(number) {
   let seen;
-  try { seen = await words("/api/teach/part"); } catch (error) { show("part-seen", false); return; }
+  try { seen = await words("api/teach/part"); } catch (error) { show("part-seen", false); return; }
   const { width, height, stride, marking, place } = seen.about, planes = planesOf(seen);
   Object.assign(view, { number, stride, columns: width, size: [width * stride, height * stride], part: planes[1], marking, outlining: false, at: null, place: place && [place.column, place.row] });
   svg().setAttribute("viewBox", `0 0 ${view.size[0]} ${view.size[1]}`);

@@ -107,14 +107,14 @@ async function load() {
   if (!result || !result.valid_points) { empty(result ? "no height was measured" : "no picture yet"); return; }
   const layer = state.layer;
   let loaded;
-  try { [loaded] = await Promise.all([map(`/api/picture/${layer}?seq=${result.seq}`), loadRecipe(result)]); } catch (error) {
+  try { [loaded] = await Promise.all([map(`api/picture/${layer}?seq=${result.seq}`), loadRecipe(result)]); } catch (error) {
     if (turn === state.asked) empty(error.message);
     return;
   }
   if (turn !== state.asked) return;
   let deviation = null;
   if (deviating().length) {
-    try { deviation = layer === "deviation" ? loaded : await map(`/api/picture/deviation?seq=${result.seq}`); } catch (none) { /* No ring then. */ }
+    try { deviation = layer === "deviation" ? loaded : await map(`api/picture/deviation?seq=${result.seq}`); } catch (none) { /* No ring then. */ }
     if (turn !== state.asked) return;
   }
   state.found = await contours(result);
@@ -127,7 +127,7 @@ async function load() {
   text("shown", loaded.about.words);
   drawScale($("scale"), state.map.about, state.layer);
   drawOutlines();
-  view.show({ path: `/api/picture/surface?seq=${result.seq}`, seq: result.seq, points: result.valid_points });
+  view.show({ path: `api/picture/surface?seq=${result.seq}`, seq: result.seq, points: result.valid_points });
 }
 
 // What was found of the contours of a result's recipe; nothing if it has none, or its frames are gone.
@@ -135,7 +135,7 @@ async function contours(result) {
   const { kinds, recipe } = state;
   if (!recipe || !recipe.features.some(({ kind }) => kinds.features.find((one) => one.kind === kind).around_mm)) return [];
   try {
-    const found = await ask("GET", "/api/last/features");
+    const found = await ask("GET", "api/last/features");
     return found && found.seq === result.seq ? found.features : [];
   } catch (none) { return []; }
 }
@@ -163,9 +163,9 @@ async function loadRecipe(result) {
   let recipe;
   try {
     // It may have been deleted or replaced since.
-    const { recipes } = await ask("GET", "/api/recipes");
+    const { recipes } = await ask("GET", "api/recipes");
     if (!recipes.some((one) => one.number === result.recipe && !one.error && one.fingerprint.startsWith(result.fingerprint))) return;
-    recipe = await ask("GET", `/api/recipes/${result.recipe}`);
+    recipe = await ask("GET", `api/recipes/${result.recipe}`);
     state.kinds = await loadKinds();
   } catch (none) { return; }
   // Meanwhile there may be a result of another recipe.

@@ -25,14 +25,14 @@ function row(recipe) {
     words.colSpan = 6;
     return make("tr", "", make("td", "", String(recipe.number)), words, make("td", "actions", remover(recipe)));
   }
-  const use = button("Load", "", () => change(() => ask("POST", `/api/recipes/${recipe.number}/load`), `recipe ${recipe.number} is being loaded`));
+  const use = button("Load", "", () => change(() => ask("POST", `api/recipes/${recipe.number}/load`), `recipe ${recipe.number} is being loaded`));
   use.setAttribute("aria-label", `Load recipe ${recipe.number}`);
   const alter = button("Edit", "", () => edit(recipe.number));
   alter.setAttribute("aria-label", `Edit recipe ${recipe.number}`);
   const gain = button("Before / after", "", () => compare(recipe.number));
   gain.setAttribute("aria-label", `Before / after: what teaching recipe ${recipe.number} gained`);
   const take = make("a", "", "Export");
-  take.href = `/api/recipes/${recipe.number}/file`;
+  take.href = `api/recipes/${recipe.number}/file`;
   take.setAttribute("download", "");
   take.setAttribute("aria-label", `Export recipe ${recipe.number}`);
   const own = recipe.number === active;
@@ -55,7 +55,7 @@ function remover(recipe) {
     return change(async () => {
       const words = `It is ${content(recipe)}. It can be brought back from this list.`;
       if (!await choose(`Delete recipe ${recipe.number}?`, words, [["Delete", true]])) return;
-      await ask("DELETE", `/api/recipes/${recipe.number}`);
+      await ask("DELETE", `api/recipes/${recipe.number}`);
       notice(`recipe ${recipe.number} is deleted`);
       list();
     });
@@ -67,7 +67,7 @@ function remover(recipe) {
 // A line below a recipe, or in place of a deleted one, that restores the previous version.
 function undoer(number, before, words) {
   const undo = button(words, "plain", () => change(async () => {
-    const now = await ask("POST", `/api/recipes/${number}/undo`);
+    const now = await ask("POST", `api/recipes/${number}/undo`);
     // The PLC reads the first 32 bits of the fingerprint.
     const crc = `RECIPE_CRC32 is 0x${now.fingerprint.slice(0, 8).toUpperCase()}`;
     if (now.active && !now.loading) notice(`recipe ${number} is undone, but the station still uses the version that was undone: load recipe ${number}`, true);
@@ -97,7 +97,7 @@ function gone(recipe) {
 // Shows the list of recipes; answers with the lowest number that is free, null if there is none.
 export async function list() {
   try {
-    const { recipes, deleted, free } = await ask("GET", "/api/recipes");
+    const { recipes, deleted, free } = await ask("GET", "api/recipes");
     stored = recipes;
     const none = make("td", "quiet", "there is no recipe yet: teach or import one");
     none.colSpan = 8;
@@ -122,10 +122,10 @@ async function destination(number) {
 
 // Stores a recipe file; asks if its number is taken.
 async function take(file) {
-  try { return await ask("POST", "/api/recipes", file); } catch (error) {
+  try { return await ask("POST", "api/recipes", file); } catch (error) {
     if (!error.taken) throw error;
     const to = await destination(error.taken);
-    return to && ask("POST", `/api/recipes${to}`, file);
+    return to && ask("POST", `api/recipes${to}`, file);
   }
 }
 
@@ -157,7 +157,7 @@ async function consent(number) {
 async function teach(number) {
   const wanted = await consent(number);
   if (!wanted) return;
-  await ask("POST", `/api/recipes/${number}/teach`, wanted);
+  await ask("POST", `api/recipes/${number}/teach`, wanted);
   notice(`teaching recipe ${number} has begun: leave the part where it is`);
 }
 
@@ -165,13 +165,13 @@ async function teach(number) {
 async function teachMarked(number, marking) {
   await list();
   const replace = stored.some((recipe) => recipe.number === number);
-  await ask("POST", `/api/recipes/${number}/teach`, { replace, everything: false, marking });
+  await ask("POST", `api/recipes/${number}/teach`, { replace, everything: false, marking });
   notice(`teaching recipe ${number} has begun: leave the part where it is`);
 }
 
 // Teaches the part as the first number that is free.
 export async function teachNext() {
-  const { free } = await ask("GET", "/api/recipes");
+  const { free } = await ask("GET", "api/recipes");
   if (free === null) throw new Error("every recipe number is taken: delete a recipe, or teach one anew under Recipes");
   await teach(free);
 }
@@ -190,7 +190,7 @@ function held(good) {
 
 // Shows the comparison that teaching stored: straight fringes with the part's adaptive pattern, at the same number of frames.
 export async function compare(number) {
-  const recipe = await ask("GET", `/api/recipes/${number}`);
+  const recipe = await ask("GET", `api/recipes/${number}`);
   const { comparison } = recipe;
   text("comparison-name", `recipe ${recipe.number} · ${recipe.name}`);
   show("comparison", true);

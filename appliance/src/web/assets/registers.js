@@ -38,7 +38,7 @@ function build(registers, wanted) {
 
 async function refresh(fresh) {
   let registers;
-  try { ({ registers } = await ask("GET", "/api/registers")); } catch (error) { notice(error.message, true); return; }
+  try { ({ registers } = await ask("GET", "api/registers")); } catch (error) { notice(error.message, true); return; }
   if (fresh || !rows.size) build(registers, $("register-filter").value.trim().toLowerCase());
   for (const register of registers) {
     const cell = rows.get(register.address);

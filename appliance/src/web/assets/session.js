@@ -16,7 +16,7 @@ function mark(yes) {
 }
 
 export async function refresh() {
-  try { mark((await ask("GET", "/api/session")).signed_in); } catch (gone) { mark(false); }
+  try { mark((await ask("GET", "api/session")).signed_in); } catch (gone) { mark(false); }
 }
 
 export function notice(words, bad = false) {
@@ -58,14 +58,14 @@ export function start() {
   refresh();
   $("sign").addEventListener("click", async () => {
     if (!signedIn) { open(null); return; }
-    try { await ask("DELETE", "/api/session"); } finally { await refresh(); }
+    try { await ask("DELETE", "api/session"); } finally { await refresh(); }
   });
   $("sign-cancel").addEventListener("click", () => show("sign-in", false));
   $("sign-in").addEventListener("submit", async (event) => {
     event.preventDefault();
     try {
       // The device uses the time if its own clock is not synchronised.
-      const { time } = await ask("POST", "/api/session", { secret: $("secret").value, time_ms: Date.now() });
+      const { time } = await ask("POST", "api/session", { secret: $("secret").value, time_ms: Date.now() });
       if (time === "refused") notice("the clock of this computer is wrong: set it, then sign in again to date results", true);
       if (time === "taken") window.dispatchEvent(new Event("dated"));
       mark(true);

@@ -3,7 +3,7 @@ import { $, button, fill, make, show, text } from "./element.js";
 import { ask } from "./api.js";
 import { change, notice } from "./session.js";
 
-const PLACE = "/api/simulation/part";
+const PLACE = "api/simulation/part";
 const UNITS = { x: "mm", y: "mm", depth_mm: "mm", diameter_mm: "mm", degrees: "°" };
 let kinds = [];
 let part = null;

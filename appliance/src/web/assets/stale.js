@@ -51,7 +51,7 @@ function push() {
 
 let shown = () => {};
 function open() {
-  state.source = new EventSource("/events");
+  state.source = new EventSource("events");
   state.source.addEventListener("snapshot", (event) => {
     const snapshot = JSON.parse(event.data);
     const at = now();

@@ -13,7 +13,7 @@ const STATES = { open: ["", "to do"], running: ["…", "running"], done: ["✓",
 const state = { next: "", ended: "", states: {} };
 
 const title = (name) => $(`step-${name}`).querySelector("h3").textContent;
-const order = (name, body) => ask("POST", `/api/head/steps/${name}`, body);
+const order = (name, body) => ask("POST", `api/head/steps/${name}`, body);
 
 // The check length that is typed; none if there is none.
 function solving() {
@@ -101,7 +101,7 @@ function furnish(name, at) {
   const end = make("button", "end", "Stop this step");
   end.type = "button";
   end.hidden = true;
-  end.addEventListener("click", () => change(() => ask("DELETE", `/api/head/steps/${name}`)));
+  end.addEventListener("click", () => change(() => ask("DELETE", `api/head/steps/${name}`)));
   for (const part of [make("ul", "said"), make("p", "remedy"), bar, make("p", "now quiet"), end]) place.insertBefore(part, act);
   place.append(make("span", "at quiet"));
 }
