@@ -149,7 +149,8 @@ pub struct Counted {
 }
 
 impl Counted {
-    /// Reads the content of the counter's file, which was made at `made` ([`made`]).
+    /// Reads the content of the counter's file, which was made at `made`: ns since 1970,
+    /// 0 where that is not known.
     pub fn read(text: &str, made: u64) -> Option<Self> {
         let mut words = text.split_whitespace();
         let last = words.next()?.parse().ok()?;

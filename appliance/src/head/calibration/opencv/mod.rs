@@ -107,6 +107,8 @@ pub fn from_two(
     };
     // A camera without a pose is the world that the projector's is in.
     let (camera_lens, own_pose) = one(camera, &CAMERA, sizes.camera, false)?;
+    // One that is the world's origin says no more.
+    let own_pose = own_pose.filter(|pose| *pose != OWN);
     let (projector_lens, pose) = one(projector, &PROJECTOR, sizes.projector, true)?;
     let pose = pose.unwrap_or(OWN);
     let world = World::of(own_pose, declared).map_err(|error| failed(camera, &error))?;

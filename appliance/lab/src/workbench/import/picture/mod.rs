@@ -124,6 +124,8 @@ impl Picture {
         if reader.info().is_animated() {
             return Err("it is animated: save each of its pictures as a file".into());
         }
+        let exif = reader.info().exif_metadata.as_deref();
+        upright(exif.and_then(orientation))?;
         let (colour, depth) = reader.output_color_type();
         let length = reader.output_buffer_size().ok_or("it is too large")?;
         let mut raw = vec![0; length];
@@ -170,6 +172,7 @@ impl Picture {
             .set_max_height(side);
         let mut decoder = JpegDecoder::new_with_options(Cursor::new(bytes), options);
         let samples = decoder.decode().map_err(broken)?;
+        upright(decoder.exif().and_then(|exif| orientation(exif)))?;
         let (width, height) = decoder
             .dimensions()
             .ok_or("it has no size: save it again")?;
@@ -192,6 +195,8 @@ impl Picture {
             .ok_or("it has no such page")?;
         decoder.seek_to_image(directory).map_err(broken)?;
         let size = bounded(decoder.dimensions().map_err(broken)?)?;
+        let turned = decoder.find_tag_unsigned(Tag::Orientation);
+        upright(turned.map_err(broken)?)?;
         let colour = decoder.colortype().map_err(broken)?;
         let channels = match colour {
             tiff::ColorType::Gray(_) => 1,
@@ -242,6 +247,43 @@ impl Picture {
             }
         };
         pixels.map(|pixel| pixel[at]).collect()
+    }
+}
+
+/// The orientation that EXIF data state, a TIFF directory (JEITA CP-3451, tag 0x0112).
+fn orientation(exif: &[u8]) -> Option<u16> {
+    const ORIENTATION: u16 = 0x0112;
+    let exif = exif.strip_prefix(b"Exif\0\0").unwrap_or(exif);
+    let little = match exif.get(..2)? {
+        b"II" => true,
+        b"MM" => false,
+        _ => return None,
+    };
+    let short = |at: usize| {
+        let two: [u8; 2] = exif.get(at..at.checked_add(2)?)?.try_into().ok()?;
+        Some(match little {
+            true => u16::from_le_bytes(two),
+            false => u16::from_be_bytes(two),
+        })
+    };
+    let [low, high] = match little {
+        true => [4, 6],
+        false => [6, 4],
+    };
+    let directory = usize::from(short(low)?) | usize::from(short(high)?) << 16;
+    let entries = (0..short(directory)?).map(|entry| directory + 2 + 12 * usize::from(entry));
+    let mut entries = entries.filter(|&at| short(at) == Some(ORIENTATION));
+    short(entries.next()? + 8)
+}
+
+/// Refuses a picture that is to be turned before it is looked at.
+fn upright(orientation: Option<u16>) -> Result<(), String> {
+    match orientation {
+        None | Some(0 | 1) => Ok(()),
+        Some(turned) => Err(format!(
+            "its orientation is {turned}, so viewers turn or mirror it, and it is not known which way its models were made: save it with its \
+             pixels as they are meant and orientation 1"
+        )),
     }
 }
 

@@ -173,3 +173,38 @@ fn no_damage_to_a_picture_makes_reading_it_panic() {
     }
     assert!(refused > 2000, "{refused}");
 }
+
+#[test]
+fn a_picture_that_is_to_be_turned_is_refused_in_every_format_that_can_say_so() {
+    let little = *b"II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0";
+    let big = *b"MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0";
+    let prefixed = [&b"Exif\0\0"[..], &little].concat();
+    for exif in [&little[..], &big, &prefixed] {
+        assert_eq!(orientation(exif), Some(6), "{exif:?}");
+        for length in 0..exif.len() {
+            // Whatever is cut off.
+            let _ = orientation(&exif[..length]);
+        }
+    }
+    let mut upside_down = Cursor::new(Vec::new());
+    let mut encoder = tiff::encoder::TiffEncoder::new(&mut upside_down).unwrap();
+    let mut image = encoder
+        .new_image::<tiff::encoder::colortype::Gray8>(SIZE.0, SIZE.1)
+        .unwrap();
+    image.encoder().write_tag(Tag::Orientation, 3_u16).unwrap();
+    image.write_data(&[0; 15]).unwrap();
+    let read = Picture::tiff(Cursor::new(upside_down.into_inner()), 0);
+    assert!(read.err().unwrap().contains("its orientation is 3"));
+    let mut turned = Vec::new();
+    let mut info = png::Info::with_size(SIZE.0, SIZE.1);
+    info.color_type = png::ColorType::Grayscale;
+    info.bit_depth = png::BitDepth::Eight;
+    info.exif_metadata = Some(little.to_vec().into());
+    let encoder = png::Encoder::with_info(&mut turned, info).unwrap();
+    let mut writer = encoder.write_header().unwrap();
+    writer.write_image_data(&[0; 15]).unwrap();
+    writer.finish().unwrap();
+    if let Err(words) = Picture::png(&turned) {
+        assert!(words.contains("its orientation is 6"), "{words}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Models as other programs than OpenCV write them: other names, nested nodes, lists of rows, no
 //! plate, few digits.
 
-use super::super::{Declared, Unit, from_one};
+use super::super::{Declared, Unit, from_one, from_two};
 use super::{SIZES, written};
 
 /// What Python programs write of K, distortion, R and T of a projector at (−100, 0, 0) of its
@@ -82,6 +82,37 @@ fn models_without_a_plate_are_read_under_the_names_of_other_programs_and_stand_w
         error.contains("M4 has rows of different lengths"),
         "{error}"
     );
+}
+
+#[test]
+fn a_camera_that_is_the_origin_states_no_plane() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = |name: &str, pose: &str| {
+        let path = folder.path().join(name);
+        let text = format!(
+            "K: [[900, 0, 300], [0, 900, 200], [0, 0, 1]]\ndist: [[0, 0, 0, 0, 0]]\n{pose}"
+        );
+        std::fs::write(&path, text).unwrap();
+        path
+    };
+    let turned = "R: [[0.96, 0, 0.28], [0, 1, 0], [-0.28, 0, 0.96]]\nT: [[-100], [0], [12.5]]\n";
+    let origin = "R: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\nT: [[0], [0], [0]]\n";
+    let projector = one("projector.yaml", turned);
+    let read = |pose: &str, plane_at| {
+        let declared = Declared {
+            unit: Some(Unit::Mm),
+            plane_at,
+            z_away: false,
+        };
+        from_two(&one("camera.yaml", pose), &projector, SIZES, declared)
+    };
+    let found = read(origin, Some(400.0)).unwrap();
+    assert!(found.has_plane);
+    assert_eq!(found, read("", Some(400.0)).unwrap());
+    assert!(!read(origin, None).unwrap().has_plane);
+    let elsewhere = origin.replace("[0]]", "[500]]");
+    let refused = read(&elsewhere, Some(400.0)).unwrap_err();
+    assert!(refused.contains("leave out --plane-at"), "{refused}");
 }
 
 #[test]
