@@ -179,7 +179,7 @@ def exceptions(plc):
     refused(read(40, count=1), 2, "an address outside every block")
     refused(read(100, count=33), 2, "a range that crosses a block's end")
     refused(write(200, [1]), 2, "a write to a read-only register")
-    refused(write(0, [ONLINE | 1 << 8]), 3, "a reserved bit")
+    refused(write(0, [ONLINE | 1 << 9]), 3, "a reserved bit")
     refused(write(1, [6001, 10_000]), 3, "a recipe number out of range")
     after = plc.status()
     expect((after.triggers, after.last_token) == (before.triggers, before.last_token),

@@ -3,12 +3,16 @@
 use std::fs::File;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use axum::body::{Body, Bytes};
 use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde_json::{Value, json};
-use tokio::sync::mpsc;
+use tokio::sync::mpsc::{self, error::TrySendError};
+use tokio_stream::StreamExt as _;
 use tokio_stream::wrappers::ReceiverStream;
 use zip::ZipWriter;
 use zip::result::ZipError;
@@ -130,27 +134,48 @@ impl Packed {
     }
 }
 
-/// Sends bytes to a client, no faster than it receives them.
+/// Sends bytes to a client, no faster than it receives them; one that does not take a chunk within
+/// [`SLOW`] is given up, so that it holds its place no longer.
 pub(super) struct ToClient {
     sender: mpsc::Sender<Result<Bytes, io::Error>>,
     chunk: Vec<u8>,
+    /// Whether all of the answer was sent.
+    whole: Arc<AtomicBool>,
+    /// Longest wait for the client to take a chunk.
+    slow: Duration,
 }
+
+/// Longest wait for a client to take a chunk: a link of 2 kB a second does.
+const SLOW: Duration = Duration::from_secs(30);
+/// How often it is looked whether it has.
+const LOOK: Duration = Duration::from_millis(2);
 
 impl ToClient {
     /// It, and the body of the answer that sends what is written to it.
     pub(super) fn new() -> (Self, Body) {
         let (sender, receiver) = mpsc::channel(1);
-        let chunk = Vec::new();
-        let body = Body::from_stream(ReceiverStream::new(receiver));
-        (Self { sender, chunk }, body)
+        let whole = Arc::new(AtomicBool::new(false));
+        let sent = whole.clone();
+        let broken = move || {
+            let broken = !sent.load(Ordering::Acquire);
+            broken.then(|| Err(io::ErrorKind::BrokenPipe.into()))
+        };
+        let end = tokio_stream::iter(std::iter::once_with(broken).flatten());
+        let body = Body::from_stream(ReceiverStream::new(receiver).chain(end));
+        let to = Self {
+            sender,
+            chunk: Vec::new(),
+            whole,
+            slow: SLOW,
+        };
+        (to, body)
     }
 
     /// Ends the answer. Where writing failed it breaks off, so the client knows that it is not
     /// whole.
     pub(super) fn end(mut self, written: io::Result<()>) {
-        if let Err(error) = written.and_then(|()| self.flush()) {
-            let _ = self.sender.blocking_send(Err(error));
-        }
+        let sent = written.and_then(|()| self.flush()).is_ok();
+        self.whole.store(sent, Ordering::Release);
     }
 }
 
@@ -164,10 +189,20 @@ impl io::Write for ToClient {
     }
 
     fn flush(&mut self) -> io::Result<()> {
-        let chunk = Bytes::from(std::mem::take(&mut self.chunk));
-        let sent = self.sender.blocking_send(Ok(chunk));
-        // The client is gone.
-        sent.map_err(|_| io::ErrorKind::BrokenPipe.into())
+        let mut chunk = Ok(Bytes::from(std::mem::take(&mut self.chunk)));
+        let begun = Instant::now();
+        loop {
+            chunk = match self.sender.try_send(chunk) {
+                Ok(()) => return Ok(()),
+                // The client is gone.
+                Err(TrySendError::Closed(_)) => return Err(io::ErrorKind::BrokenPipe.into()),
+                Err(TrySendError::Full(_)) if begun.elapsed() > self.slow => {
+                    return Err(io::ErrorKind::TimedOut.into());
+                }
+                Err(TrySendError::Full(chunk)) => chunk,
+            };
+            std::thread::sleep(LOOK);
+        }
     }
 }
 
@@ -296,4 +331,34 @@ fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {
             .chain(calibration.map(|text| ("calibration.json", text))),
         0,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[tokio::test]
+    async fn a_client_that_takes_nothing_is_given_up_and_what_it_has_does_not_look_whole() {
+        let answer = |taken: bool| async move {
+            let (mut to, body) = ToClient::new();
+            to.slow = Duration::from_millis(20);
+            let sending = std::thread::spawn(move || {
+                let sent = to.write_all(b"one").and_then(|()| to.flush());
+                let sent = sent.and_then(|()| to.write_all(b"two"));
+                let kept = sent.and_then(|()| to.flush());
+                let why = kept.as_ref().err().map(io::Error::kind);
+                to.end(kept);
+                why
+            });
+            if taken {
+                let whole = axum::body::to_bytes(body, 100).await.unwrap();
+                return (sending.join().unwrap(), Some(whole));
+            }
+            let why = sending.join().unwrap();
+            (why, axum::body::to_bytes(body, 100).await.ok())
+        };
+        let (why, whole) = answer(true).await;
+        assert_eq!((why, whole.as_deref()), (None, Some(&b"onetwo"[..])));
+        assert_eq!(answer(false).await, (Some(io::ErrorKind::TimedOut), None));
+    }
 }
