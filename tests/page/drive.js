@@ -374,7 +374,7 @@ try {
   await forms({ browser, page, url: daemon.url, step });
 
   await step("files can be taken along", async () => {
-    for (const [selector, name] of [["a[href='/api/last/cloud.ply']", /\.ply$/], ["a[href='/api/last/gauges.csv']", /\.csv$/]]) {
+    for (const [selector, name] of [["a[href='api/last/cloud.ply']", /\.ply$/], ["a[href='api/last/gauges.csv']", /\.csv$/]]) {
       const [download] = await Promise.all([page.waitForEvent("download"), page.click(selector)]);
       assert.match(download.suggestedFilename(), name);
     }
