@@ -138,9 +138,12 @@ fn numbers_that_went_back_begin_another_life_of_a_history_and_what_is_skipped_is
     let impostor = Impostor::new(restored, false);
     let url = format!("http://localhost:{}/one", impostor.port);
     let place = Place::new(&[&url], "");
-    for _ in 0..2 {
+    for times in 1..=2 {
         // A second collector goes on where the first ended.
         let collector = place.collect(&place.store(), &[]);
+        wait("a collector", || {
+            place.log().matches("1 heads are asked").count() == times
+        });
         wait("both lives", || counted(&place) == [("EVIL".into(), 3)]);
         assert_eq!(collector.terminate(), Some(0));
         let seqs = "SELECT history || ' ' || seq, 0 FROM result ORDER BY history, seq";
