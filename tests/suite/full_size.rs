@@ -87,6 +87,7 @@ fn long_list(recipe: &Value) -> Value {
     for (at, name) in names.iter().enumerate() {
         let mut hole = holes[at % holes.len()].clone();
         hole["name"] = json!(name);
+        hole["rim_mm"] = json!(0.0);
         edit["features"].as_array_mut().unwrap().push(hole);
     }
     let gauges = edit["gauges"].as_array_mut().unwrap();

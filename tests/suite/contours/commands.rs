@@ -97,7 +97,9 @@ plus = 0.05
 minus = 0.05
 "#;
     let file = at(&place, "gauges.toml");
-    fs::write(&file, text + more).unwrap();
+    // Where nobody says that the rims are sharp, limits of 0.05 mm are too close.
+    let sharp = text.replace("kind = \"circle\"", "kind = \"circle\"\nrim_mm = 0.0");
+    fs::write(&file, sharp + more).unwrap();
     program()
         .run(&["recipe", "gauges", &recipe, "--set", &file])
         .succeeded();
