@@ -35,7 +35,7 @@ pub(super) fn range(
         pixels: ends.variance,
         motion,
         lever: 2.0,
-        smoothed: (lost[0] + lost[1]) / libm::sqrt(3.0),
+        unknown: libm::hypot((lost[0] + lost[1]) / libm::sqrt(3.0), ends.open),
     })
 }
 
@@ -80,6 +80,7 @@ pub(super) fn range_of(rim: &Rim) -> Option<OfRim> {
     Some(OfRim {
         value: (largest - smallest - ends.noise).max(0.0),
         variance: ends.variance,
+        unknown: ends.open,
     })
 }
 
@@ -89,6 +90,8 @@ struct Ends {
     noise: f64,
     /// The variance of the range.
     variance: f64,
+    /// How far the former is not known, 1 σ.
+    open: f64,
 }
 
 impl Ends {
@@ -98,6 +101,7 @@ impl Ends {
             return Self {
                 noise: 0.0,
                 variance: 0.0,
+                open: 0.0,
             };
         }
         let drawn = Drawn::of(values.iter().copied(), sigma);
@@ -112,12 +116,24 @@ impl Ends {
         });
         // Where the scatter of the values is not far from that of noise, it is not known how much of
         // it the part has: the middle between this much and noise alone is taken.
+        // An end that is a defect's is known.
         let noise = top.0 + bottom.0;
-        let alone = 2.0 * largest_of(&[(0.0, values.len() as f64)]).0 * sigma;
-        let open = (alone - noise).max(0.0) * (sigma / drawn.scatter.max(sigma)) / 2.0;
+        let alone = largest_of(&[(0.0, values.len() as f64)]).0 * sigma;
+        let all = values.iter().copied();
+        let low = all.clone().fold(f64::INFINITY, f64::min);
+        let high = all.fold(f64::NEG_INFINITY, f64::max);
+        let left = |end: f64, of: f64| match drawn.is_off(-end, DEFECT) {
+            true => 0.0,
+            false => (alone - of).max(0.0),
+        };
+        // The values are negated: their lowest is the highest.
+        let both = left(low, top.0) + left(high, bottom.0);
+        let open = both * (sigma / drawn.scatter.max(sigma)) / 2.0;
         Self {
             noise: noise + open,
-            variance: top.1 * top.1 + bottom.1 * bottom.1 + open * open,
+            // Half of it is another one in each measurement.
+            variance: top.1 * top.1 + bottom.1 * bottom.1 + open * open / 2.0,
+            open: open / libm::sqrt(2.0),
         }
     }
 }

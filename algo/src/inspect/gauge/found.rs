@@ -20,6 +20,7 @@ impl Kind for Found {
         Some(OfRim {
             value: rim.found,
             variance: 0.0,
+            unknown: 0.0,
         })
     }
 

@@ -280,7 +280,7 @@ impl<'a> Evidence<'a> {
             pixels,
             motion: motion(&g, self.placed),
             lever,
-            smoothed: 0.0,
+            unknown: 0.0,
         }
     }
 }

@@ -78,7 +78,7 @@ impl Kind for OutOfTolerance {
             pixels: variance / (count * count),
             motion: motion(&g, of.placed),
             lever,
-            smoothed: 0.0,
+            unknown: 0.0,
         })
     }
 }

@@ -305,7 +305,7 @@ impl Characteristic<'_> {
                 pixels,
                 motion,
                 lever,
-                smoothed: 0.0,
+                unknown: 0.0,
             },
             shared,
             own,

@@ -49,8 +49,9 @@ pub struct Found {
     /// By how much errors of all heights of 1 mm, each with the sign that does most, change the
     /// value.
     pub lever: f64,
-    /// What smoothing may have taken from the value, 1 σ.
-    pub smoothed: f64,
+    /// What is not known of the value and the same in every measurement, 1 σ: what smoothing has
+    /// taken, and what noise has added to an extreme.
+    pub unknown: f64,
 }
 
 /// A value of the points of a contour.
@@ -60,4 +61,6 @@ pub struct OfRim {
     pub value: f64,
     /// Variance by the noise of the points; 0 where it is not known.
     pub variance: f64,
+    /// As [`Found::unknown`].
+    pub unknown: f64,
 }

@@ -51,7 +51,7 @@ impl Kind for RmsDeviation {
             pixels: own / (slope * slope),
             motion: motion(&g, of.placed) / (slope * slope),
             lever: 1.0,
-            smoothed: 0.0,
+            unknown: 0.0,
         })
     }
 }

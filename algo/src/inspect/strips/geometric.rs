@@ -181,6 +181,7 @@ impl Production {
             (None, true) => OfRim {
                 value: kind.of_absent()?,
                 variance: 0.0,
+                unknown: 0.0,
             },
             (None, false) => return None,
         };
@@ -188,7 +189,7 @@ impl Production {
             value: of.value,
             sigma: Some(libm::sqrt(of.variance)),
             expected: None,
-            systematic: 0.0,
+            systematic: of.unknown,
             compared: 0.0,
             rims: 0.0,
             square: None,

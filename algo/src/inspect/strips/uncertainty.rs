@@ -78,14 +78,14 @@ impl ErrorBudget {
             pixels,
             motion,
             lever,
-            smoothed: lost,
+            unknown,
         } = found;
         // Golden's pixels are independent of each other.
         let moved = motion / self.spot_variance();
         let systematic = |golden: f64, wrong: f64| {
             let golden = golden * self.golden_variance(noisier);
             let wrong = libm::hypot(wrong, self.rippled());
-            libm::sqrt(golden + wrong * wrong * lever * lever + lost * lost)
+            libm::sqrt(golden + wrong * wrong * lever * lever + unknown * unknown)
         };
         let compared = systematic(pixels / smoothed + moved, self.displaced(placed));
         Reading {
