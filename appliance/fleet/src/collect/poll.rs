@@ -75,6 +75,8 @@ impl Poll {
             state.serial = serial;
             state.history.clear();
         }
+        // Of what it was when the state was written there may be a newer life.
+        state.history = plant.newest_life(&state.serial, base(&state.history));
         state.seq = plant.end(&state.serial, &state.history);
         if !state.serial.is_empty() && plant.place(&state.serial, &state.url).is_err() {
             // Two heads have it: this one is named when it answers.
