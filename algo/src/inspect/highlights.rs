@@ -4,20 +4,20 @@
 //! # Idea
 //! A pixel measures the mean phase of what it sees, weighted by light. Where a rounded edge mirrors
 //! the projector, a line far brighter than the rest lies anywhere in the pixel, and the pixel has the
-//! phase of that place. Golden has this error, and the part another one where the line lies
-//! then: where it goes is not known, so both are taken to be the largest.
+//! phase of that place. Golden has this error, and a part another one, where the line lies then.
+//! Where it lies is not known, so the largest error is worked out.
 //!
 //! # Equations
 //! With modulations B of the pixel and B₂ of the brighter one of those two pixels before and behind
-//! it, the line has the share f = 1 − B₂/B of the light. It lies up to half a pixel off the middle,
-//! and crosses pixels along a square: d = 0.4 px on average at most, of what was simulated.
-//! With the phases Φ of its neighbours, at the same heights,
+//! it, the line has the share f = 1 − B₂/B of the light. It lies up to half a pixel off the middle of
+//! a pixel, and less on average over a square that it crosses at an angle: d = 0.4 px. With the
+//! phases Φ of the neighbours, each at its own height,
 //!
 //! ```text
 //! E = f d · |Φ₊₁ − Φ₋₁|/2 / |∂Φ/∂z|
 //! ```
 //!
-//! along rows or columns, whichever is larger. A mean over the square about a pixel has Σ E over the
+//! along rows or columns, whichever is larger. The mean over the square about a pixel has Σ E over the
 //! number of its compared pixels.
 //!
 //! # Shapes and units
@@ -27,7 +27,6 @@
 //! Of displaced handsets of rolled and oiled steel, whose rounded edges shine, none deviates by more
 //! than teaching says with √2 E (`tests/suite/promised.rs`).
 
-use super::gauge::MIN_SUPPORT;
 use super::table::IntegralTable;
 use super::weight::Weight;
 use crate::geometry::Triangulator;
@@ -45,7 +44,6 @@ const STEP_MM: f64 = 0.05;
 /// What highlights do to golden.
 #[derive(Clone, Debug)]
 pub struct Highlights {
-    width: usize,
     /// Of the pixels: how many are compared, and E.
     sums: IntegralTable<2>,
 }
@@ -97,17 +95,12 @@ impl Highlights {
         errors
             .iter()
             .any(|error| *error > 0.0)
-            .then_some(Self { width, sums })
+            .then_some(Self { sums })
     }
 
     /// The mean over the square of `side` pixels about a pixel, mm; 0 where less than half of it is
     /// compared.
     pub fn at(&self, place: usize, side: usize) -> f64 {
-        let (row, column) = (place / self.width, place % self.width);
-        let [count, sum] = self.sums.square(row, column, side);
-        match count < MIN_SUPPORT * (side * side) as f64 {
-            true => 0.0,
-            false => sum / count,
-        }
+        self.sums.means(place, side).map_or(0.0, |[_, error]| error)
     }
 }

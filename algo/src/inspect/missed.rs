@@ -22,7 +22,6 @@
 //! (`a_cylinder_is_missed_by_its_sagitta`). Parts in front of the simulated head are compared with
 //! it in `tests/suite/every_part.rs`.
 
-use super::gauge::MIN_SUPPORT;
 use super::table::IntegralTable;
 use super::weight::Weight;
 use crate::pipeline::KnownSurface;
@@ -30,7 +29,6 @@ use crate::pipeline::KnownSurface;
 /// Golden with what is missed of it.
 #[derive(Clone, Debug)]
 pub struct Missed {
-    width: usize,
     /// Of the compared pixels: their number, and what is missed along and down.
     sums: IntegralTable<3>,
 }
@@ -58,19 +56,17 @@ impl Missed {
                 .compared()
                 .then_some([1.0, share * along, share * down])
         });
-        Self { width, sums }
+        Self { sums }
     }
 
     /// The largest mean over the square of `side` pixels about a pixel, mm; 0 where less than half
     /// of it is compared.
     pub fn at(&self, place: usize, side: usize) -> f64 {
-        let (row, column) = (place / self.width, place % self.width);
-        let [count, along, down] = self.sums.square(row, column, side);
-        if count < MIN_SUPPORT * (side * side) as f64 {
-            return 0.0;
-        }
-        let [along, down, both] = [along, down, along + down].map(|sum| libm::fabs(sum / count));
-        along.max(down).max(both)
+        let means = self.sums.means(place, side);
+        means.map_or(0.0, |[_, along, down]| {
+            let all = [along, down, along + down].map(libm::fabs);
+            all.into_iter().fold(0.0, f64::max)
+        })
     }
 }
 

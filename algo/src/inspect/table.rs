@@ -1,5 +1,6 @@
 //! An integral table: sums over any square of a map in constant time (F. C. Crow, 1984).
 
+use super::gauge::MIN_SUPPORT;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -52,5 +53,12 @@ impl<const N: usize> IntegralTable<N> {
             *sum = *sum + others.0[i] - others.1[i] - others.2[i];
         }
         sums
+    }
+
+    /// The same of the pixel at `place`, over their first value, the number of its compared pixels;
+    /// `None` where less than half of the square is compared.
+    pub fn means(&self, place: usize, side: usize) -> Option<[f64; N]> {
+        let sums = self.square(place / self.width, place % self.width, side);
+        (sums[0] >= MIN_SUPPORT * (side * side) as f64).then(|| sums.map(|sum| sum / sums[0]))
     }
 }

@@ -104,10 +104,9 @@ pub enum Wrong {
     /// It is JSON of the right form, with a value of this key that no head has.
     #[error("{0} of result {1} cannot be")]
     Value(&'static str, u32),
-    /// The first and the last of the header contradict each other or the question for results behind
-    /// the third.
-    #[error("its header cannot be: first {0:?}, last {1:?}, asked for results behind {2}")]
-    Header(Option<u32>, Option<u32>, u32),
+    /// The first and the last of the header contradict each other, or an id is none.
+    #[error("its header cannot be: first {0:?}, last {1:?}")]
+    Header(Option<u32>, Option<u32>),
     /// A head with this serial answers in place of the one with the second.
     #[error(
         "wrong serial: {0:?} answers, {1:?} did before: if the head was replaced, write serial = {0:?} for it in fleet.toml"
@@ -142,7 +141,7 @@ impl Header {
         let ordered = first.is_some() == last.is_some() && first <= last;
         let is_whole = !header.history.contains(LIFE);
         if !id(&header.serial) || !id(&header.history) || !is_whole || !ordered {
-            return Err(Wrong::Header(first, last, 0));
+            return Err(Wrong::Header(first, last));
         }
         Ok(header)
     }

@@ -58,7 +58,7 @@ pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> Result<Opened
     let counted = numbering.counted.clone().unwrap_or_default();
     let of_run = found.as_ref().and(spool.as_ref());
     let buffered = of_run.and_then(Spool::buffered).unwrap_or(counted.buffered);
-    // A copy of which memory does not know how it went on may be as old as it likes.
+    // Where shared memory does not say how a copied folder went on, nothing bounds its age.
     let restored = counted.copied && found.is_none();
     let (last, mut shown) = found.unwrap_or((counted.last, Vec::new()));
     let stored = writer.last_seq()?;

@@ -56,19 +56,6 @@ impl Numbering {
             }
             begun
         });
-        let last = reserved;
-        let counted = Counted {
-            last,
-            run,
-            buffered,
-            copied: false,
-        };
-        self.counter.store(counted)?;
-        if let Some(spool) = &spool {
-            // Otherwise the run before is believed as well.
-            let _ = spool.begin([run, run], used);
-            let _ = spool.buffer(buffered);
-        }
         let numbers = Numbers {
             used,
             reserved,
@@ -83,6 +70,12 @@ impl Numbering {
             run,
             shared: Arc::new((Mutex::new(numbers), Condvar::new())),
         };
+        seqs.store(reserved, buffered)?;
+        if let Some(spool) = &spool {
+            // Otherwise the run before is believed as well.
+            let _ = spool.begin([run, run], used);
+            let _ = spool.buffer(buffered);
+        }
         Ok((seqs, spool))
     }
 }

@@ -14,7 +14,7 @@ use super::regauge::Unsettled;
 use super::store::LoadedRecipe;
 use super::{FeatureFile, GaugeFile, Part, Recipe, RecipeFile, Wrong};
 use crate::head::calibration::Calibration;
-use crate::station::{GaugeValue, Inspection, MAX_GAUGES};
+use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, MAX_GAUGES};
 use crate::system::headway::Headway;
 use algo::inspect::{FeatureKind, Measure, kinds};
 use hal::bounds::clipped;
@@ -92,8 +92,8 @@ impl Opened {
             for (gauge, reading) in gauges.iter_mut().zip(readings) {
                 if let Some(reading) = reading.filter(|reading| reading.rims > 0.0) {
                     let by_master = reading.sigma.unwrap_or(0.0).hypot(reading.compared);
-                    gauge["u_rims"] = (2.0 * reading.rims).into();
-                    gauge["u_master"] = (2.0 * by_master).into();
+                    gauge["u_rims"] = (COVERAGE_FACTOR * reading.rims).into();
+                    gauge["u_master"] = (COVERAGE_FACTOR * by_master).into();
                 }
             }
         }

@@ -17,7 +17,7 @@ use core::f64::consts::{PI, SQRT_2};
 /// cells.
 pub(super) fn range(
     (cells, columns): (&[Cell], usize),
-    values: &mut [f64],
+    values: &[f64],
     sigma: f64,
     placed: Option<&Placed>,
 ) -> Option<Found> {
@@ -27,23 +27,24 @@ pub(super) fn range(
     let (upper, lower) = (cells[high].taught.jacobian, cells[low].taught.jacobian);
     let motion = motion(&core::array::from_fn(|i| upper[i] - lower[i]), placed);
     let drawn = Drawn::of(values.iter().copied(), sigma);
-    let estimate = |at: usize| drawn.value(values[at], DEFECT);
-    let lost = [high, low].map(|at| lost((cells, columns), estimate, at));
-    let ends = Ends::of(values, sigma, |_| 1.0);
+    let lost = [high, low].map(|at| {
+        let estimate = |at: usize| drawn.value(values[at], DEFECT);
+        lost((cells, columns), estimate, at)
+    });
+    let noise = Noise::of(values, &drawn, sigma, |_| 1.0);
     Some(Found {
-        value: (value - ends.noise).max(0.0),
-        pixels: ends.variance,
+        value: (value - noise.mean).max(0.0),
+        pixels: noise.variance,
         motion,
         lever: 2.0,
-        unknown: libm::hypot((lost[0] + lost[1]) / libm::sqrt(3.0), ends.open),
+        unknown: libm::hypot((lost[0] + lost[1]) / libm::sqrt(3.0), noise.unknown),
     })
 }
 
-/// By how much a surface may reach beyond the mean of a cell at an extreme, mm, by the estimates of
-/// the true values of cells. With second
-/// differences d of the cells along rows and columns, the mean is d/24 below the middle on a
-/// parabola, and the extreme of one that lies anywhere in the cell another d/24 on average above
-/// that. At the border of the region it is half a cell farther out.
+/// By how much a surface may reach beyond the mean of a cell at an extreme, mm; `value` estimates the
+/// true value of a cell. On a parabola with the second difference d along rows or columns, the mean
+/// of a cell lies d/24 below its middle, and the vertex, anywhere in the cell, another d/24 above
+/// the middle on average. At the border of the region the surface goes on for half a cell.
 fn lost((cells, columns): (&[Cell], usize), value: impl Fn(usize) -> f64, at: usize) -> f64 {
     let middle = value(at);
     let row = |at: usize| at / columns.max(1);
@@ -73,67 +74,65 @@ pub(super) fn range_of(rim: &Rim) -> Option<OfRim> {
     }
     let squares = rim.residuals.iter().map(|(_, sigma)| sigma * sigma);
     let sigma = libm::sqrt(squares.sum::<f64>() / count as f64);
-    let mut values: Vec<f64> = rim.residuals.iter().map(|(off, _)| *off).collect();
+    let values: Vec<f64> = rim.residuals.iter().map(|(off, _)| *off).collect();
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let ends = Ends::of(&mut values, sigma, |at| rim.residuals[at].1 / sigma);
+    let drawn = Drawn::of(values.iter().copied(), sigma);
+    let relative = |at: usize| rim.residuals[at].1 / sigma;
+    let noise = Noise::of(&values, &drawn, sigma, relative);
     Some(OfRim {
-        value: (largest - smallest - ends.noise).max(0.0),
-        variance: ends.variance,
-        unknown: ends.open,
+        value: (largest - smallest - noise.mean).max(0.0),
+        variance: noise.variance,
+        unknown: noise.unknown,
     })
 }
 
-/// What noise does to both ends of a range.
-struct Ends {
+/// What noise does to a range.
+struct Noise {
     /// What it adds on average.
-    noise: f64,
-    /// The variance of the range.
+    mean: f64,
+    /// The variance over repeated measurements.
     variance: f64,
-    /// How far the former is not known, 1 σ.
-    open: f64,
+    /// How far `mean` is not known, and the same in every measurement, 1 σ.
+    unknown: f64,
 }
 
-impl Ends {
-    /// Of these values, which are negated; each has an error of `sigma` times `relative`.
-    fn of(values: &mut [f64], sigma: f64, relative: impl Fn(usize) -> f64) -> Self {
+impl Noise {
+    /// In the range of values with errors of `sigma` times `relative`, whose true values `drawn`
+    /// estimates.
+    ///
+    /// Where they scatter hardly more than their errors, it is not known how much of the scatter is
+    /// the part's. The mean is then between what the estimates say and what noise alone adds, and
+    /// half of the variance of that differs from measurement to measurement.
+    fn of(values: &[f64], drawn: &Drawn, sigma: f64, relative: impl Fn(usize) -> f64) -> Self {
         if !(sigma > 0.0) {
             return Self {
-                noise: 0.0,
+                mean: 0.0,
                 variance: 0.0,
-                open: 0.0,
+                unknown: 0.0,
             };
         }
-        let drawn = Drawn::of(values.iter().copied(), sigma);
-        let top = noise_of_largest(values, sigma, |at, value| {
-            drawn.value(value, DEFECT * relative(at).max(1.0))
-        });
-        for value in values.iter_mut() {
-            *value = -*value;
+        let defect = |at: usize| DEFECT * relative(at).max(1.0);
+        let alone = largest_of(&[(0.0, values.len() as f64)]).0;
+        let likely = sigma / drawn.scatter.max(sigma);
+        let (mut mean, mut variance, mut open) = (0.0, 0.0, 0.0);
+        for sign in [1.0, -1.0] {
+            let all = values.iter().enumerate();
+            let estimate = |(at, value): (usize, &f64)| sign * drawn.value(*value, defect(at));
+            let (added, scatter) = noise_of_largest(all.clone().map(estimate), sigma);
+            let by = |a: &(usize, &f64), b: &(usize, &f64)| (sign * a.1).total_cmp(&(sign * b.1));
+            // The end that a defect makes is known.
+            let is_open = |(at, value): (usize, &f64)| !drawn.is_off(*value, defect(at));
+            if all.max_by(by).is_some_and(is_open) {
+                open += (alone - added).max(0.0) * likely / 2.0;
+            }
+            mean += added;
+            variance += scatter * scatter;
         }
-        let bottom = noise_of_largest(values, sigma, |at, value| {
-            -drawn.value(-value, DEFECT * relative(at).max(1.0))
-        });
-        // Where the scatter of the values is not far from that of noise, it is not known how much of
-        // it the part has: the middle between this much and noise alone is taken.
-        // An end that is a defect's is known.
-        let noise = top.0 + bottom.0;
-        let alone = largest_of(&[(0.0, values.len() as f64)]).0 * sigma;
-        let all = values.iter().copied();
-        let low = all.clone().fold(f64::INFINITY, f64::min);
-        let high = all.fold(f64::NEG_INFINITY, f64::max);
-        let left = |end: f64, of: f64| match drawn.is_off(-end, DEFECT) {
-            true => 0.0,
-            false => (alone - of).max(0.0),
-        };
-        // The values are negated: their lowest is the highest.
-        let both = left(low, top.0) + left(high, bottom.0);
-        let open = both * (sigma / drawn.scatter.max(sigma)) / 2.0;
         Self {
-            noise: noise + open,
-            // Half of it is another one in each measurement.
-            variance: top.1 * top.1 + bottom.1 * bottom.1 + open * open / 2.0,
-            open: open / libm::sqrt(2.0),
+            mean: (mean + open) * sigma,
+            variance: (variance + open * open / 2.0) * sigma * sigma,
+            unknown: open * sigma / SQRT_2,
         }
     }
 }
@@ -200,15 +199,13 @@ impl Drawn {
 const BINS_PER_SIGMA: f64 = 4.0;
 const BINS: usize = 40;
 
-/// Mean, above the largest true value, and standard deviation, over repeated measurements, of the
-/// largest of values of which each has an error of `sigma`, from its distribution F(x) = Π Φ((x −
-/// mᵢ)/σ), m the true values, which `drawn` estimates.
-fn noise_of_largest(values: &[f64], sigma: f64, drawn: impl Fn(usize, f64) -> f64) -> (f64, f64) {
-    let all = values.iter().enumerate();
-    let drawn = all.map(|(at, value)| drawn(at, *value));
-    let top = drawn.clone().fold(f64::NEG_INFINITY, f64::max);
+/// Mean, above the largest of the `true_values`, and standard deviation, over repeated measurements, of
+/// the largest of values of which each has an error of `sigma`, in σ, from its distribution F(x) =
+/// Π Φ((x − mᵢ)/σ).
+fn noise_of_largest(true_values: impl Iterator<Item = f64> + Clone, sigma: f64) -> (f64, f64) {
+    let top = true_values.clone().fold(f64::NEG_INFINITY, f64::max);
     let mut bins = [0.0; BINS];
-    for value in drawn {
+    for value in true_values {
         let bin = libm::rint((top - value) / sigma * BINS_PER_SIGMA);
         if bin < BINS as f64 {
             bins[bin as usize] += 1.0;
@@ -218,8 +215,7 @@ fn noise_of_largest(values: &[f64], sigma: f64, drawn: impl Fn(usize, f64) -> f6
     let bins: heapless::Vec<(f64, f64), BINS> = bins
         .map(|(bin, count)| (bin as f64 / BINS_PER_SIGMA, *count))
         .collect();
-    let (mean, scatter) = largest_of(&bins);
-    (mean * sigma, scatter * sigma)
+    largest_of(&bins)
 }
 
 /// Mean, above the largest true value, and standard deviation of the largest of values with errors

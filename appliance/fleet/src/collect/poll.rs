@@ -183,8 +183,8 @@ impl Poll {
     /// what follows is stored as results of another life of it, beside those of the one before.
     /// What the head has now up to `last` may be the same as before, and is skipped.
     async fn live_again(&mut self, last: u32) {
-        let (before, after) = (self.state.history.clone(), self.state.seq);
-        self.state.history = next_life(&before);
+        let after = self.state.seq;
+        self.state.history = next_life(&self.state.history);
         self.say(
             Severity::Warning,
             format_args!(
@@ -199,13 +199,10 @@ impl Poll {
 
     /// Records that results are not fetched.
     fn skip(&mut self, first: u32, last: u32) {
-        let HeadState {
-            serial, history, ..
-        } = self.state.clone();
         if first <= last {
             self.batch.gaps.push(Gap {
-                serial,
-                history,
+                serial: self.state.serial.clone(),
+                history: self.state.history.clone(),
                 first,
                 last,
             });

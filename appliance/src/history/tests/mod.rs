@@ -469,7 +469,7 @@ pub(super) fn wait(what: &str, done: impl Fn() -> bool) {
 }
 
 /// Opens the history of a state folder that keeps no recordings, for a run.
-pub(super) fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Option<String>) {
+fn begun(state: &StateFolder, run: u32) -> Opened {
     let bounds = Bounds {
         results: ENOUGH,
         recordings: 0,
@@ -480,14 +480,18 @@ pub(super) fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Opti
         serial: state.serial().unwrap(),
         run,
     };
-    let opened = open(state.path(), numbering, bounds).unwrap();
+    open(state.path(), numbering, bounds).unwrap()
+}
+
+/// The same, without what was acknowledged.
+pub(super) fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Option<String>) {
     let Opened {
         history,
         task,
         next_seq,
         complaint,
         ..
-    } = opened;
+    } = begun(state, run);
     (history, task, next_seq, complaint)
 }
 
@@ -533,17 +537,7 @@ fn what_is_acknowledged_is_remembered_over_a_kill() {
     history.buffer(Some(2));
     // Killed: nothing is settled.
     drop(history);
-    let bounds = Bounds {
-        results: ENOUGH,
-        recordings: 0,
-    };
-    let numbering = Numbering {
-        counted: state.counted(),
-        counter: state.counter(),
-        serial: state.serial().unwrap(),
-        run: 2,
-    };
-    let again = open(state.path(), numbering, bounds).unwrap();
+    let again = begun(&state, 2);
     assert_eq!((again.next_seq, again.buffered), (6, Some(2)));
     let page = Reader::of(state.path())
         .after(2, 32)
