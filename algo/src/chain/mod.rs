@@ -13,7 +13,7 @@ mod gray;
 mod plan;
 mod unwrap;
 
-pub use alone::SIGMA_CELLS;
+pub use alone::{CodePhases, SIGMA_CELLS};
 pub use edges::{EXPECTED_TURNS, Edges};
 pub use gray::{CodeError, CodePictures, Coding, GrayCode, MAX_CODE_BITS, Seen};
 pub use plan::{Cells, Chain, ChainError, MAX_MAGNIFICATION};

@@ -2,7 +2,7 @@
 //! any.
 
 use super::seam;
-use algo::chain::{Cells, CodePictures, Coding, GrayCode};
+use algo::chain::{Cells, CodePhases, CodePictures, Coding, GrayCode};
 use algo::frame::FrameView;
 use algo::phase::LeastModulation;
 use algo::pipeline::PhaseMap;
@@ -148,6 +148,14 @@ impl<'a> CodeAlone<'a> {
     /// # Errors
     /// In words: its pictures form no code.
     pub fn phases(&self, least: LeastModulation) -> Result<PhaseMap, String> {
+        self.read(least).map(|phases| phases.map)
+    }
+
+    /// As [`Self::phases`], with the bits that each was found without.
+    ///
+    /// # Errors
+    /// In words: its pictures form no code.
+    pub fn read(&self, least: LeastModulation) -> Result<CodePhases, String> {
         let phases = self
             .pictures
             .phases(&self.cells, self.vertical, least, self.full_scale);

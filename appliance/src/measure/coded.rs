@@ -5,7 +5,7 @@ use crate::head::code::CodeAlone;
 use crate::head::direction::Sensitivity;
 use crate::head::seam;
 use crate::output::cloud::Surface;
-use algo::chain::SIGMA_CELLS;
+use algo::chain::{CodePhases, SIGMA_CELLS};
 use algo::pipeline::{PhaseMap, triangulate_with};
 use algo::units::{AbsolutePhase, WrappedPhase};
 use hal::replay::Recording;
@@ -18,14 +18,18 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
     let least = least_modulation(recording);
     let mut stages = Stages::default();
     let mut codes = Vec::new();
-    let mut phases: Vec<PhaseMap> = stages.time("phase", || {
+    let read = stages.time("phase", || {
         for pattern in 0..recording.patterns.len() {
             let code = CodeAlone::of(recording, pattern)?;
             codes.push(code.ok_or("it has neither fringes nor a Gray code: record one of both")?);
         }
-        let phases = codes.iter().map(|code| code.phases(least));
-        phases.collect::<Result<_, String>>()
+        let phases = codes.iter().map(|code| code.read(least));
+        phases.collect::<Result<Vec<_>, String>>()
     })?;
+    let (mut phases, missing): (Vec<PhaseMap>, Vec<Vec<u8>>) = read
+        .into_iter()
+        .map(|CodePhases { map, missing }| (map, missing))
+        .unzip();
     let devices = Geometry::of(recording, None)?;
     let raster = &recording.projector;
     let (columns, rows) = (raster.width as usize, raster.height as usize);
@@ -45,14 +49,13 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
     let geometry = geometries.swap_remove(primary);
     let sigma = SIGMA_CELLS * code.cells.width;
     let heights = stages.time("height", || {
-        geometry.map(|triangulator| Surface {
-            map: triangulate_with(
-                &triangulator,
-                &mut phases[primary],
-                |_| Some(sigma),
-                &|_| (),
-            ),
-            triangulator,
+        geometry.map(|triangulator| {
+            let known = |_| Some(sigma);
+            let mut map = triangulate_with(&triangulator, &mut phases[primary], known, &|_| ());
+            for (sigma, missing) in map.sigma.iter_mut().zip(&missing[primary]) {
+                *sigma *= (1_u32 << missing) as f32;
+            }
+            Surface { map, triangulator }
         })
     });
     let report = Report::new(

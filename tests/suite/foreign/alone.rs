@@ -112,6 +112,52 @@ fn a_gray_code_alone_gives_column_and_row_within_half_a_cell_and_better_between_
     );
 }
 
+/// A picture of a code of cells of one pixel under a lens that blurs over a projector pixel and a
+/// half.
+fn blurred(scene: &mut Scene, bits: u32, vertical: bool) {
+    const SIGMA: f64 = 1.5;
+    for bit in (0..bits).rev() {
+        for inverse in [false, true] {
+            let lit = |at: f64| {
+                let cell = at.round() as u32;
+                let set = (cell ^ cell >> 1) >> bit & 1 == 1;
+                if set == inverse { 0.0 } else { 1.0 }
+            };
+            scene.show(|xi, eta| {
+                let at = if vertical { xi } else { eta };
+                let taps = (-30..=30).map(|tap| 0.2 * f64::from(tap));
+                let (mut sum, mut weights) = (0.0, 0.0);
+                for aside in taps {
+                    let weight = (-aside * aside / (2.0 * SIGMA * SIGMA)).exp();
+                    sum += weight * lit(at + aside);
+                    weights += weight;
+                }
+                sum / weights
+            });
+        }
+    }
+}
+
+#[test]
+fn a_gray_code_whose_finest_bits_are_washed_out_is_read_by_the_others() {
+    let mut scene = Scene::new();
+    blurred(&mut scene, 9, true);
+    blurred(&mut scene, 8, false);
+    scene.show(|_, _| 1.0);
+    scene.show(|_, _| 0.0);
+    assert_eq!(notes(&scene.import(&OPTIONS).succeeded()), [""; 0]);
+    let out = scene.measure();
+    for (name, along) in [("column.npy", 0), ("row.npy", 1)] {
+        let (mean, most, count) = off(&out.join(name), along);
+        // The camera's pixels are two and a half cells apart, so that it sees few borders, and half
+        // a cell of the eight finest bits is a pixel.
+        assert!(
+            mean < 0.4 && most < 1.6 && count > WIDTH * HEIGHT * 99 / 100,
+            "{name}: {mean} {most} {count}"
+        );
+    }
+}
+
 #[test]
 fn a_gray_code_alone_that_was_projected_otherwise_than_described_is_named_and_read_as_named() {
     let plain = Code {
