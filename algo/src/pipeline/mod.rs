@@ -22,7 +22,7 @@ pub use epipolar::Epipolar;
 pub use measure::{
     HeightMap, PhaseMap, Window, arrive, arrive_rest, decode, triangulate, triangulate_with,
 };
-pub use noise::{sample_noise, signal_by_modulation};
+pub use noise::{off_sine, sample_noise, signal_by_modulation};
 pub use plate::{Plate, PlateError};
 pub use rows::{Done, Progress, for_each_row};
 pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};

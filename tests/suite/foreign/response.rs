@@ -54,6 +54,37 @@ fn a_response_that_is_not_linear_is_named_and_not_the_order_of_the_pictures() {
     );
 }
 
+/// A projector of gamma 2: 4 shifts and more cancel its second harmonic in the phase.
+#[test]
+fn harmonics_of_the_response_are_no_noise_and_are_named_with_their_size() {
+    for steps in [4, 12] {
+        let mut scene = Scene::new();
+        for fringes in [1.0, 8.0, 64.0] {
+            for k in 0..steps {
+                scene.show(|xi, _| {
+                    let turns = fringes * xi / f64::from(PROJECTOR.0) + k as f64 / steps as f64;
+                    (0.5 + 0.5 * (TAU * turns).sin()).powi(2)
+                });
+            }
+        }
+        let count = steps.to_string();
+        let options = ["--fringes", "1,8,64", "--steps", &count, "--json"];
+        let words = notes(&scene.import(&options).succeeded());
+        // An amplitude of 190/8 counts of the second harmonic, and noise, of a modulation of 95.
+        let named = ["off a sine by 16.", "off a sine by 17."];
+        let is_named = named.iter().any(|size| words[0].contains(size));
+        assert!(words.len() == 1 && is_named, "{words:?}");
+        let report = files::report(&scene.measure());
+        // ± 2 counts, and rounding to whole ones.
+        let expected = (4.0_f64 / 3.0 + 1.0 / 12.0).sqrt();
+        let found = report["noise_counts"].as_f64().unwrap();
+        assert!(
+            (0.9..1.15).contains(&(found / expected)),
+            "{steps}: {found}"
+        );
+    }
+}
+
 /// Pictures of 1 and 8 fringes, 4 shifts, whose middle reflects more than the camera can see, in
 /// samples of 16 or 8 bits; the first column of the middle and the first one behind it.
 fn overexposed(wide: bool) -> (Scene, [usize; 2]) {

@@ -31,8 +31,8 @@ const JUMPS: f64 = 0.5;
 const JUMP: f64 = 0.4;
 /// Share of the neighbours along which a phase falls that is named.
 const FALLING: f64 = 0.8;
-/// Noise of a sample, as a share of the modulation, above which frames are no sine.
-const NOISE: f64 = 0.2;
+/// How far samples may be off the best sine, as a share of the modulation.
+const OFF_SINE: f64 = 0.15;
 /// Share of the pixels that must be modulated.
 const LIT: f64 = 0.01;
 /// Share of the modulated pixels that may be at full scale.
@@ -154,16 +154,16 @@ fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(Strin
         ));
     }
     let scan = &channel.scan;
-    let noise = pipeline::sample_noise(&scan.sequence, &scan.frames, &finest.trust);
+    let off = pipeline::off_sine(&scan.sequence, &scan.frames, &finest.trust);
     let full_scale = scan.decoder.full_scale();
     let counts = finest.modulation.iter();
     let sum: f64 = counts.map(|modulation| modulation.counts(full_scale)).sum();
     let mean = sum / resolved.max(1) as f64;
-    if let Some(noise) = noise.filter(|noise| *noise > NOISE * mean) {
+    if let Some(off) = off.filter(|off| *off > OFF_SINE * mean) {
         note(format!(
-            "the frames are off a sine by {noise:.1} counts, {:.0} % of the modulation: check the order of the pictures and \
+            "the frames are off a sine by {off:.1} counts RMS, {:.0} % of the modulation: check the order of the pictures and \
              --steps, and that the projector's response is linear",
-            100.0 * noise / mean
+            100.0 * off / mean
         ));
     }
 }
