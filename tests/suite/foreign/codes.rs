@@ -2,6 +2,7 @@
 //! otherwise.
 
 use super::scene::{HEIGHT, PROJECTOR, Scene, WIDTH, check_phase, lit_by, notes};
+use std::f64::consts::TAU;
 use std::fs;
 use tests::files;
 
@@ -127,6 +128,60 @@ fn a_code_that_was_projected_otherwise_than_described_is_named_and_read_as_named
     is_right(&scene(8.0, 0.0, fringe), &whole, 50.0);
 }
 
+/// Code and fringes of the columns, then those of the rows.
+#[test]
+fn codes_and_fringes_that_are_projected_direction_by_direction_are_read() {
+    let mut scene = Scene::new();
+    for vertical in [true, false] {
+        for bit in (0..4).rev() {
+            scene.show(|xi, eta| {
+                let at = if vertical { xi } else { eta };
+                let cell = ((at.round() + 0.5) / HALF.cell).floor() as u32;
+                f64::from((cell ^ cell >> 1) >> bit & 1)
+            });
+        }
+        for k in 0..4 {
+            // Periods of two cells.
+            scene.show(|xi, eta| {
+                let at = if vertical { xi } else { eta };
+                0.5 + 0.5 * (TAU * (at / (2.0 * HALF.cell) + f64::from(k) / 4.0)).cos()
+            });
+        }
+    }
+    let run = |order| {
+        let described = [
+            "--pitch",
+            "50",
+            "--convention",
+            "cos",
+            "--gray",
+            "4",
+            "--gray-cell",
+            "25",
+            "--direction",
+            "both",
+            "--json",
+            "--order",
+            order,
+        ];
+        scene.import(&described)
+    };
+    let refused = run("gray,sine,gray,sine,sine");
+    assert_eq!(refused.code, 64, "{}", refused.stderr);
+    assert!(
+        refused.stderr.contains("once for each direction"),
+        "{}",
+        refused.stderr
+    );
+    assert_eq!(notes(&run("gray,sine,gray,sine").succeeded()), [""; 0]);
+    let out = scene.measure();
+    for (name, along) in [("phase-0.npy", 0), ("phase-1.npy", 1)] {
+        let place = |u, v| [lit_by(u, v).0, lit_by(u, v).1][along];
+        let count = check_phase(&out.join(name), 50.0, place, 0.6);
+        assert!(count > WIDTH * HEIGHT * 95 / 100, "{name}: {count}");
+    }
+}
+
 #[test]
 fn other_fringes_than_described_beside_a_code_are_named() {
     let twice = scene(16.0, 0.0, HALF);
@@ -178,7 +233,7 @@ fn codes_of_columns_and_of_rows_have_cells_of_their_own() {
     for k in 0..4 {
         scene.show(|_, eta| {
             let turns = 8.0 * eta / f64::from(PROJECTOR.1) + f64::from(k) / 4.0;
-            0.5 + 0.5 * (std::f64::consts::TAU * turns).cos()
+            0.5 + 0.5 * (TAU * turns).cos()
         });
     }
     for (cell, vertical) in [(25.0, true), (15.0, false)] {

@@ -121,7 +121,8 @@ pub struct Description {
     pub direction: Direction,
     /// The Gray codes, if there are any.
     pub gray: Option<Gray>,
-    /// The order of projection.
+    /// The order of projection. Fringes and codes that are named once for each direction are
+    /// projected direction by direction.
     pub order: Vec<Section>,
     /// A phase function instead of straight fringes, row-major, in turns: then only the ratios of
     /// `fringes` count.
@@ -228,14 +229,16 @@ impl Layout {
     /// # Errors
     /// In words that name the option: numbers of steps, bits or cells that do not fit the levels.
     pub fn of(description: &Description) -> Result<Self, String> {
-        description.check_order()?;
         let (columns, rows) = description.projector;
         let directions: &[bool] = match &description.function {
             Some(_) => &[true],
             None => description.direction.vertical(),
         };
+        description.check_order(directions.len())?;
         let (mut patterns, mut codes) = (Vec::new(), Vec::new());
-        let (mut sines, mut bits) = (Vec::new(), Vec::new());
+        // Of each direction.
+        let mut sines = vec![Vec::new(); directions.len()];
+        let mut bits = sines.clone();
         for (pattern, &vertical) in directions.iter().enumerate() {
             let length = if vertical { columns } else { rows };
             let fringes = description.fringes.over(vertical, length);
@@ -262,7 +265,7 @@ impl Layout {
                 (None, false) => PatternSpec::Horizontal { fringes: finest },
             });
             for (ratio, shift) in description.levels(&fringes, finest, vertical)? {
-                sines.push(Shown::Sine {
+                sines[pattern].push(Shown::Sine {
                     pattern,
                     ratio,
                     shift,
@@ -279,7 +282,7 @@ impl Layout {
                     } else {
                         &[false]
                     };
-                    bits.extend(inverses.iter().map(|&inverse| Shown::Bit {
+                    bits[pattern].extend(inverses.iter().map(|&inverse| Shown::Bit {
                         pattern,
                         bit,
                         inverse,
@@ -288,14 +291,24 @@ impl Layout {
                 codes.push(code);
             }
         }
-        let shown = description.order.iter().flat_map(|section| match section {
-            Section::Sine => sines.clone(),
-            Section::Gray => bits.clone(),
-            Section::White => vec![Shown::White],
-            Section::Black => vec![Shown::Black],
-        });
+        let mut shown = Vec::new();
+        for (at, section) in description.order.iter().enumerate() {
+            let of_directions = match section {
+                Section::Sine => &sines,
+                Section::Gray => &bits,
+                Section::White | Section::Black => {
+                    let white = *section == Section::White;
+                    shown.push(if white { Shown::White } else { Shown::Black });
+                    continue;
+                }
+            };
+            match description.projected(*section) {
+                1 => shown.extend(of_directions.concat()),
+                _ => shown.extend(&of_directions[count(&description.order[..at], *section)]),
+            }
+        }
         Ok(Self {
-            shown: shown.collect(),
+            shown,
             patterns,
             codes,
         })
@@ -310,28 +323,32 @@ impl Layout {
 }
 
 impl Description {
+    /// How often a section is named in the order of projection.
+    fn projected(&self, section: Section) -> usize {
+        count(&self.order, section)
+    }
+
     /// Checks that each section is projected as often as it must be, and that a code alone has
     /// something to be compared with.
-    fn check_order(&self) -> Result<(), String> {
-        let once = |section| {
-            let count = self.order.iter().filter(|other| **other == section);
-            count.count()
+    fn check_order(&self, directions: usize) -> Result<(), String> {
+        let sine = self.fringes != Fringes::None;
+        let fits = |section, there: bool| match there {
+            true => [1, directions].contains(&self.projected(section)),
+            false => self.projected(section) == 0,
         };
-        let gray = usize::from(self.gray.is_some());
-        let sine = usize::from(self.fringes != Fringes::None);
-        if once(Section::Sine) != sine
-            || once(Section::Gray) != gray
-            || once(Section::White).max(once(Section::Black)) > 1
+        let [white, black] = [Section::White, Section::Black].map(|one| self.projected(one));
+        if !fits(Section::Sine, sine)
+            || !fits(Section::Gray, self.gray.is_some())
+            || white.max(black) > 1
         {
             return Err(
-                "--order must name sine once if there are --fringes or --pitch and else not, gray once if there is --gray and else \
-                 not, white and black at most once"
+                "--order must name sine if there are --fringes or --pitch and else not, gray if there is --gray and else not, each \
+                 once, or once for each direction; white and black at most once"
                     .into(),
             );
         }
-        let against = self.gray.as_ref().is_some_and(|gray| gray.inverse)
-            || once(Section::White) + once(Section::Black) == 2;
-        if sine == 0 && !against {
+        let against = self.gray.as_ref().is_some_and(|gray| gray.inverse) || white + black == 2;
+        if !sine && !against {
             return Err(
                 "a Gray code alone has nothing to compare its pictures with: give --gray-inverse, or white and black in --order"
                     .into(),
@@ -419,6 +436,11 @@ impl Gray {
             )),
         }
     }
+}
+
+/// How often a section is among these.
+fn count(sections: &[Section], section: Section) -> usize {
+    sections.iter().filter(|other| **other == section).count()
 }
 
 /// The element for vertical or horizontal fringes of a list that has one for both, or one for each.
