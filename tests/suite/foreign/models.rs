@@ -210,6 +210,33 @@ fn models_that_contradict_fringes_of_both_directions_are_named_with_what_would_f
         -(0..3).map(|k| r(k, row) * t(k)).sum::<f64>()
     });
     named(&inverse, "R and T are from the projector to the camera");
+    let mut transposed = right.clone();
+    change(&mut transposed["rotation"], |row, column, _| r(column, row));
+    let mut centre = right.clone();
+    change(&mut centre["translation"], |row, _, _| {
+        -(0..3).map(|k| r(k, row) * t(k)).sum::<f64>()
+    });
+    for (models, words) in [
+        (transposed, "R is transposed: exchange its rows and columns"),
+        (
+            centre,
+            "T is the place of the projector's centre: give −R T",
+        ),
+    ] {
+        let mut without_plate = models.clone();
+        for name in ["plate_R", "plate_T"] {
+            without_plate.as_object_mut().unwrap().remove(name);
+        }
+        for (models, more) in [
+            (&models, &[][..]),
+            (&without_plate, &[]),
+            (&without_plate, &["--plane-at", "600"]),
+        ] {
+            let run = imports.run(models, more);
+            let said = format!("{}{}", run.stdout, run.stderr);
+            assert!(said.contains(words), "{words}: {said}");
+        }
+    }
     for (device, words) in [
         ("cam_int", "the camera's model is of half"),
         ("proj_int", "the projector's model is of half"),

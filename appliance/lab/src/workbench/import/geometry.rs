@@ -35,13 +35,47 @@ pub(super) fn add(recording: &mut Recording, models: Models, folder: &Path) -> R
     let mut notes = models.notes;
     recording.camera_model = Some(models.camera);
     recording.projector.model = Some(models.projector);
-    if !models.has_plane {
-        notes.push(plane::fit(recording).map_err(wrong)?);
-    }
-    works(recording).map_err(wrong)?;
+    let contradiction = epipolar(recording).map_err(wrong)?;
+    let before = recording.clone();
+    notes.extend(placed(recording, models.has_plane).map_err(|error| {
+        // What is wrong with the models is said rather than what follows from it.
+        wrong(
+            contradiction
+                .clone()
+                .unwrap_or_else(|| match working(before, models.has_plane) {
+                    Some(words) => format!("{error}: {words}"),
+                    None => error,
+                }),
+        )
+    })?);
     notes.extend(aside(recording));
-    notes.extend(epipolar(recording).map_err(wrong)?);
+    notes.extend(contradiction);
     Ok(notes)
+}
+
+/// Gives the models the plane z = 0 unless they have it, and checks that `measure` can use them.
+fn placed(recording: &mut Recording, has_plane: bool) -> Result<Option<String>, String> {
+    let note = if has_plane {
+        None
+    } else {
+        Some(plane::fit(recording)?)
+    };
+    works(recording)?;
+    Ok(note)
+}
+
+/// Another reading of models that cannot be used, with which they can.
+fn working(mut recording: Recording, has_plane: bool) -> Option<String> {
+    let camera = recording.camera_model.clone()?;
+    let projector = recording.projector.model.clone()?;
+    let readings = readings(&(camera, projector)).into_iter();
+    let mut works = readings.filter(|(_, (camera, projector))| {
+        recording.camera_model = Some(camera.clone());
+        recording.projector.model = Some(projector.clone());
+        placed(&mut recording, has_plane).is_ok()
+            && epipolar(&recording).is_ok_and(|wrong| wrong.is_none())
+    });
+    works.next().map(|(words, _)| words)
 }
 
 /// Checks that `measure` can use the models.
@@ -190,11 +224,25 @@ fn distance(
 /// The models as they would be if they had been written down in another way, with the words that
 /// say how to mend that.
 fn readings((camera, projector): &Pair) -> Vec<(String, Pair)> {
+    let (r, t) = between(camera, projector);
+    let transposed: Rotation = std::array::from_fn(|at| r[at % 3 * 3 + at / 3]);
+    let away = |r: &Rotation| turned(r, t).map(|length| -length);
+    let pair = |r: Rotation, t| (camera.clone(), led(camera, projector, &r, t));
     let mut readings = vec![(
         "R and T are from the projector to the camera: give the inverse, R transposed and −Rᵀ T"
             .to_owned(),
-        (camera.clone(), inverse(camera, projector)),
+        pair(transposed, away(&transposed)),
     )];
+    readings.extend([
+        (
+            "R is transposed: exchange its rows and columns".to_owned(),
+            pair(transposed, t),
+        ),
+        (
+            "T is the place of the projector's centre: give −R T".to_owned(),
+            pair(r, away(&r)),
+        ),
+    ]);
     for (factor, words) in [(2.0, "half"), (0.5, "twice")] {
         for (device, pair) in [
             ("camera", (scaled(camera, factor), projector.clone())),
@@ -224,31 +272,35 @@ fn readings((camera, projector): &Pair) -> Vec<(String, Pair)> {
     readings
 }
 
-/// The projector, if the pose between the devices is the inverse of what it should be.
-fn inverse(camera: &DeviceModel, projector: &DeviceModel) -> DeviceModel {
+type Rotation = [f64; 9];
+
+/// R and T that lead from the camera to the projector: R = P Cᵀ and T = t_p − R t_c.
+fn between(camera: &DeviceModel, projector: &DeviceModel) -> (Rotation, [f64; 3]) {
     let (c, p) = (&camera.rotation, &projector.rotation);
-    // R = P Cᵀ and T = t_p − R t_c lead from the camera to the projector.
-    let between: [f64; 9] = std::array::from_fn(|at| {
+    let r: Rotation = std::array::from_fn(|at| {
         let (row, column) = (at / 3 * 3, at % 3 * 3);
         (0..3).map(|k| p[row + k] * c[column + k]).sum()
     });
-    let shift: [f64; 3] = std::array::from_fn(|row| {
-        let moved: f64 = (0..3)
-            .map(|k| between[3 * row + k] * camera.translation_mm[k])
-            .sum();
-        projector.translation_mm[row] - moved
-    });
-    // Rᵀ C and Rᵀ (t_c − T).
-    let transposed = |row: usize, of: &dyn Fn(usize) -> f64| -> f64 {
-        (0..3).map(|k| between[3 * k + row] * of(k)).sum()
-    };
+    let turned = turned(&r, camera.translation_mm);
+    let t = std::array::from_fn(|row| projector.translation_mm[row] - turned[row]);
+    (r, t)
+}
+
+/// The projector to which R and T lead from the camera.
+fn led(camera: &DeviceModel, projector: &DeviceModel, r: &Rotation, t: [f64; 3]) -> DeviceModel {
+    let c = &camera.rotation;
+    let moved = turned(r, camera.translation_mm);
     DeviceModel {
-        rotation: std::array::from_fn(|at| transposed(at / 3, &|k| c[3 * k + at % 3])),
-        translation_mm: std::array::from_fn(|row| {
-            transposed(row, &|k| camera.translation_mm[k] - shift[k])
+        rotation: std::array::from_fn(|at| {
+            (0..3).map(|k| r[at / 3 * 3 + k] * c[3 * k + at % 3]).sum()
         }),
+        translation_mm: std::array::from_fn(|row| moved[row] + t[row]),
         ..projector.clone()
     }
+}
+
+fn turned(r: &Rotation, x: [f64; 3]) -> [f64; 3] {
+    std::array::from_fn(|row| (0..3).map(|k| r[3 * row + k] * x[k]).sum())
 }
 
 /// The model for pictures with `factor` times the pixels each way.
