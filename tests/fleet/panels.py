@@ -117,7 +117,42 @@ def results_board(folder, fleet):
         for row, other in zip(rows, expected):
             if len(row) != len(other) or not all(map(same, row, other)):
                 broken(f"{title}: {row}, by the CSV {other}")
+    # Without a collector nothing is known of the heads.
+    later = dict(panels_of("results.json"))["Heads that answer"].replace("now()", "(now() + 300)")
+    if store.sql(sql_of(later, begin, end, CHOSEN), database="plant")[0][0] != 0:
+        broken("heads answer that no collector has written for five minutes")
+    check_reads(store)
+    config.write_text(f"keep_days = 400\n{config.read_text()}")
+    Collector(folder, fleet, name="forgetful", config=config)
+    old = "SELECT (SELECT count() FROM plant.result WHERE at < now() - 86400 * 500) + (SELECT count() FROM plant.result_at WHERE at < now() - 86400 * 500)"
+    wait_for("old results are deleted", 30, lambda: store.sql(old)[0][0] == 0)
     print(f"{len(titles)} panels of results.json show what the CSV of {len(heads)} heads says")
+
+
+def check_reads(store):
+    """The example queries of docs/fleet.md read little: an hour of a million results, and one of them."""
+    columns = "serial, history, seq, at, received_unix_ms, verdict, gauges.slot, gauges.name, gauges.value"
+    values = (
+        "concat('SIM9', toString(number % 1000)), 'a', toUInt32(intDiv(number, 1000) + 1), toDateTime(1700000000 + intDiv(number, 1000) * 86),"
+        " 1, 'PASS', [1], ['width'], [1.5]"
+    )
+    for part in range(10):
+        store.run(
+            f"INSERT INTO result ({columns}) SELECT {values} FROM system.numbers WHERE number >= {part * 100_000} LIMIT 100000", database="plant"
+        )
+    store.run("OPTIMIZE TABLE result", database="plant")
+    queries = re.findall(r"```sql\n-- (.*?)\n(.*?)```", (DOCS.parent / "fleet.md").read_text(), re.DOTALL)
+    marks = {"FROM_TIME": "1700036000", "TO_TIME": "1700039600", "SERIAL": "SIM9500", "HISTORY": "a", "SEQ": "500"}
+    parts = store.sql("SELECT count() FROM system.parts WHERE active AND database = 'plant' AND table = 'result'")[0][0]
+    most = {"results of an hour": 2 * 42_000 + 8192 * parts, "one result": 4 * 8192}
+    for title, sql in queries:
+        for mark, value in marks.items():
+            sql = sql.replace(mark, value)
+        rows, read = store.asked(sql.strip().rstrip(";"), "plant")
+        if title in most and (not rows or read > most.pop(title)):
+            broken(f"{title}: {len(rows)} rows found, {read} read of {parts} parts")
+    if most:
+        broken(f"docs/fleet.md has no query for {list(most)}")
 
 
 def check_silent(store, sql, begin, end, heads, gone, every):

@@ -173,6 +173,12 @@ class ClickHouse(Process):
         except urllib.error.HTTPError as error:
             raise SystemExit(f"{self.name}: {query}\n{error.read().decode(errors='replace')}") from error
 
+    def asked(self, query, database):
+        """The rows of the answer, and how many rows the server read for it."""
+        with urllib.request.urlopen(f"{self.url}/?database={database}", f"{query} FORMAT JSONCompact".encode(), 60) as answer:
+            found = json.load(answer)
+        return found["data"], found["statistics"]["rows_read"]
+
     def run(self, statement, timeout=60, database="default"):
         """A statement without an answer."""
         request = urllib.request.Request(f"{self.url}/?database={database}", statement.encode())

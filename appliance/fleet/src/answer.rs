@@ -105,7 +105,7 @@ pub enum Wrong {
     #[error("{0} of result {1} cannot be")]
     Value(&'static str, u32),
     /// The first and the last of the header contradict each other, or an id is none.
-    #[error("its header cannot be: first {0:?}, last {1:?}")]
+    #[error("its header cannot be: first {}, last {}", number(*.0), number(*.1))]
     Header(Option<u32>, Option<u32>),
     /// A head with this serial answers in place of the one with the second.
     #[error(
@@ -119,11 +119,16 @@ pub enum Wrong {
     #[error("SEQ falls from {0} to {1}")]
     Falls(u32, u32),
     /// A result that is newer than the newest.
-    #[error("it sends result {0}, behind the last of its header, {1:?}")]
+    #[error("it sends result {0}, behind the last of its header, {last}", last = number(*.1))]
     Behind(u32, Option<u32>),
     /// More than was asked for.
     #[error("it sends more than the {0} results that were asked for")]
     More(u32),
+}
+
+/// A number of a result, in words where there is none.
+fn number(seq: Option<u32>) -> String {
+    seq.map_or("none".to_owned(), |seq| seq.to_string())
 }
 
 impl Header {

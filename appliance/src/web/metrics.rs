@@ -1,6 +1,7 @@
 //! `/metrics`: counters and values of the station, as OpenMetrics text.
 
 use std::fmt::Write as _;
+use std::sync::atomic::Ordering::Relaxed;
 
 use axum::http::header;
 use axum::response::IntoResponse;
@@ -52,6 +53,12 @@ pub(super) fn text(site: &Site) -> String {
         "fringed_uptime_seconds",
         now.uptime_s,
         "Time since the start.",
+    );
+    let asked_s = site.collected_at_s.load(Relaxed);
+    out.gauge(
+        "fringed_results_unasked_seconds",
+        now.uptime_s.saturating_sub(asked_s),
+        "Time since a program asked for results, or since the start.",
     );
     let name = "fringed_warning";
     out.family(

@@ -6,6 +6,7 @@
 //! its connection is closed, and no more than a few may ask at a time.
 
 use std::io::{self, Write};
+use std::sync::atomic::Ordering::Relaxed;
 use std::time::{Duration, Instant};
 
 use axum::http::header;
@@ -94,7 +95,9 @@ pub(super) async fn after(site: Site, Query(wanted): Query<Wanted>) -> Result<Re
         // Held until the client has received everything or is gone.
         let _permit = permit;
         priority::stand_back();
-        let serial = &*site.station.snapshot().identity.serial;
+        let now = site.station.snapshot();
+        site.collected_at_s.store(now.uptime_s, Relaxed);
+        let serial = &*now.identity.serial;
         let limit = wanted.limit.unwrap_or(MOST).min(MOST);
         let walk = site.history.after(wanted.after, limit);
         match walk.and_then(|mut walk| walk.page().map(|page| (walk, page))) {

@@ -4,6 +4,7 @@ use std::convert::Infallible;
 use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::AtomicU32;
 
 use axum::extract::FromRequestParts;
 use axum::http::request::Parts as RequestParts;
@@ -103,6 +104,8 @@ pub struct Site {
     pub(super) files: Arc<Semaphore>,
     /// Permits to collect results.
     pub(super) collecting: Arc<Semaphore>,
+    /// The uptime at which a program asked for results last, s; 0 if none did.
+    pub(super) collected_at_s: Arc<AtomicU32>,
     /// The maps of a kept part that were computed last; locked while something else is computed of
     /// one.
     pub(super) kept: Arc<Mutex<LastKept>>,
@@ -139,6 +142,7 @@ impl Site {
             arriving: Arc::new(Semaphore::new(MAX_ARRIVING)),
             files: Arc::new(Semaphore::new(MAX_FILES)),
             collecting: Arc::new(Semaphore::new(MAX_COLLECTING)),
+            collected_at_s: Arc::default(),
             kept: Arc::default(),
             opened: Arc::default(),
             tries: Tries::default(),

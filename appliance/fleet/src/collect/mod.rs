@@ -101,7 +101,7 @@ impl Collect {
             asking.spawn(poll.run(offset));
         }
         drop(out);
-        let writing = writer::write(&mut store, incoming, &plant.tally);
+        let writing = writer::write(&mut store, incoming, &plant.tally, plant.config.keep);
         tokio::pin!(writing);
         tokio::select! {
             written = &mut writing => return written,

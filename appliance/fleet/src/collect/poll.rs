@@ -57,6 +57,8 @@ pub(super) struct Poll {
     batch: Batch,
     state: HeadState,
     state_asked: Option<Instant>,
+    /// The trouble that the log has last: what a collector before said is said again.
+    said: String,
 }
 
 impl Poll {
@@ -89,6 +91,7 @@ impl Poll {
             batch: Batch::default(),
             state,
             state_asked: None,
+            said: String::new(),
         }
     }
 
@@ -244,6 +247,7 @@ impl Poll {
         if changed && !self.state.error.is_empty() {
             self.say(Severity::Info, "it answers again");
         }
+        self.said.clear();
         let pause = self.plant.config.state;
         let due = self
             .state_asked
@@ -274,12 +278,13 @@ impl Poll {
     async fn failed(&mut self, trouble: &Trouble, pause: Duration) {
         self.plant.tally.note(&self.state.url, Some(false));
         let words = trouble.to_string();
-        if self.state.error != words {
+        if self.said != words {
             let pause_s = pause.as_secs();
             self.say(
                 Severity::Warning,
                 format_args!("{words}; it is asked again in {pause_s} s"),
             );
+            self.said.clone_from(&words);
         }
         self.write_state(words).await;
     }

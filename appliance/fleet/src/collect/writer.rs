@@ -4,6 +4,7 @@ use super::poll::PIECE;
 use super::tally::Tally;
 use crate::error::{Exit, Failure};
 use crate::log::{self, Severity};
+use crate::now_ms;
 use crate::store::{Batch, Complaint, Store};
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
@@ -18,7 +19,11 @@ const GATHERING: Duration = Duration::from_millis(500);
 /// Pause before a store that does not work is tried again, at first and at most.
 const PAUSES: [Duration; 2] = [Duration::from_millis(500), Duration::from_secs(10)];
 
-/// Writes until all tasks that fetch have ended and everything is written.
+/// Pause between two looks for results that are older than is kept.
+const FORGETTING: Duration = Duration::from_secs(60);
+
+/// Writes until all tasks that fetch have ended and everything is written; what is older than
+/// `keep` is deleted.
 ///
 /// # Errors
 /// If the store is another one now: what it lacks is only fetched by a collector that begins.
@@ -26,7 +31,9 @@ pub(super) async fn write(
     store: &mut Store,
     mut incoming: Receiver<Batch>,
     tally: &Tally,
+    keep: Option<Duration>,
 ) -> Result<(), Failure> {
+    let mut forgot: Option<Instant> = None;
     while let Some(mut batch) = incoming.recv().await {
         let until = Instant::now() + GATHERING;
         while batch.rows.len() + PIECE <= MOST
@@ -41,6 +48,12 @@ pub(super) async fn write(
         }
         until_it_works("write results", async || store.write(&batch).await).await;
         tally.rows.fetch_add(batch.rows.len() as u64, Relaxed);
+        let due = forgot.is_none_or(|forgot| forgot.elapsed() >= FORGETTING);
+        if let Some(keep) = keep.filter(|_| due) {
+            let before = (now_ms() / 1000).saturating_sub(keep.as_secs());
+            until_it_works("delete old results", async || store.forget(before).await).await;
+            forgot = Some(Instant::now());
+        }
     }
     Ok(())
 }

@@ -28,6 +28,7 @@ struct Written {
     store: Option<String>,
     poll_s: Option<f64>,
     state_s: Option<f64>,
+    keep_days: Option<u32>,
     ca: Option<PathBuf>,
     #[serde(default)]
     heads: Vec<WrittenHeads>,
@@ -62,6 +63,8 @@ pub struct Config {
     pub poll: Duration,
     /// Pause between two questions for the state.
     pub state: Duration,
+    /// How long results are kept, if not for ever.
+    pub keep: Option<Duration>,
     /// Whom connections trust, with https.
     pub tls: Option<Arc<ClientConfig>>,
     /// The heads, each address once.
@@ -119,6 +122,12 @@ fn checked(written: Written, store: Option<String>) -> Result<Config> {
     };
     let poll = seconds("poll_s", written.poll_s.unwrap_or(1.0), 0.1)?;
     let state = seconds("state_s", written.state_s.unwrap_or(10.0), 1.0)?;
+    let keep = match written.keep_days {
+        Some(days) if !(1..=36_500).contains(&days) => {
+            return Exit::Configuration.fail(format!("keep_days = {days}: write 1 to 36500"));
+        }
+        days => days.map(|days| Duration::from_secs(86_400 * u64::from(days))),
+    };
     let mut heads = Vec::new();
     let mut known = BTreeSet::new();
     for row in written.heads {
@@ -148,6 +157,7 @@ fn checked(written: Written, store: Option<String>) -> Result<Config> {
         store,
         poll,
         state,
+        keep,
         tls: written.ca.as_deref().map(trusting).transpose()?,
         heads,
     })

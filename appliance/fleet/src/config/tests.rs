@@ -46,6 +46,7 @@ fn a_wrong_configuration_is_refused_by_its_key() {
     for (text, named) in [
         ("poll_s = 0.01", "poll_s"),
         ("state_s = nan", "state_s"),
+        ("keep_days = 0", "keep_days"),
         ("pol_s = 1", "pol_s"),
         ("[[heads]]\nurl = \"ftp://a\"", "ftp://a"),
         (&*format!("{head}serial = \"x\""), "serial"),

@@ -85,6 +85,7 @@ pub(super) fn metrics(head: &Head) -> String {
         ("fringed_uptime_seconds", uptime_s as f64),
         ("fringed_drift_pixels", drift(head)),
         ("fringed_free_storage_bytes", 2e10),
+        ("fringed_results_unasked_seconds", 0.0),
     ] {
         family("gauge", name, &[("", value)]);
     }

@@ -10,6 +10,7 @@ use crate::answer::{Gauge, Row};
 use crate::http::{Client, HttpError, Url};
 use hyper::body::Bytes;
 use rustls::ClientConfig;
+use serde::Deserialize;
 use serde::ser::{Serialize, SerializeMap as _, Serializer};
 use std::sync::Arc;
 use std::time::Duration;
@@ -70,6 +71,14 @@ impl ClickHouse {
         for statement in statements(&schema(Kind::ClickHouse)) {
             self.post(self.of_database(), statement.into()).await?;
         }
+        // A store of a version before has results of which this table knows nothing.
+        let known = self
+            .lines("SELECT 1 AS known FROM result_at LIMIT 1")
+            .await?;
+        if known.is_empty() {
+            let fill = "INSERT INTO result_at SELECT serial, history, seq, at FROM result";
+            self.post(self.of_database(), fill.into()).await?;
+        }
         Ok(())
     }
 
@@ -79,6 +88,28 @@ impl ClickHouse {
         self.insert("result", batch.rows.iter().map(Columns))
             .await?;
         self.insert("head", batch.heads.iter()).await
+    }
+
+    /// Drops the months that ended before a time, s since 1970 UTC. A server of a cluster has none of
+    /// the tables' rows in this database: its months are dropped by hand.
+    pub(super) async fn forget(&mut self, before: u64) -> Result<(), Complaint> {
+        #[derive(Deserialize)]
+        struct Month {
+            table: String,
+            partition: String,
+        }
+        let sql = format!(
+            "SELECT DISTINCT table, partition FROM system.parts WHERE active AND database = '{}' \
+             AND table IN ('result', 'result_at') AND toUInt32OrZero(partition) < toYYYYMM(toDateTime({before}))",
+            self.database
+        );
+        for line in self.lines(&sql).await?.lines() {
+            let month = serde_json::from_str(line).map_err(|error| error.to_string())?;
+            let Month { table, partition } = month;
+            let drop = format!("ALTER TABLE {table} DROP PARTITION {partition}");
+            self.post(self.of_database(), drop.into()).await?;
+        }
+        Ok(())
     }
 
     /// The answer to a query, a line of JSON per row.
@@ -206,12 +237,12 @@ mod tests {
                 gauges: vec![Gauge::default()],
                 ..Row::default()
             },
-            at_unix_ms: 5999,
+            at_unix_ms: 5_999_999,
         };
         let row = serde_json::to_value(Columns(&received)).unwrap();
         assert_eq!(
             (&row["at"], &row["placement"]),
-            (&5.into(), &serde_json::json!([]))
+            (&3600.into(), &serde_json::json!([]))
         );
         let table = schema(Kind::ClickHouse);
         let table = &table[table.find('(').unwrap()..table.find("ENGINE").unwrap()];

@@ -16,6 +16,8 @@ use serde::{Deserialize, Serialize};
 use sqlite::Sqlite;
 use std::sync::Arc;
 
+const HOUR_S: u64 = 3600;
+
 /// A row of a head, and when it was received.
 #[derive(Clone, Debug)]
 pub struct Received {
@@ -26,9 +28,13 @@ pub struct Received {
 }
 
 impl Received {
-    /// When it was triggered, s since 1970 UTC; where the head does not know, when it was received.
+    /// When it was triggered, s since 1970 UTC; where the head does not know, the hour in which it was
+    /// received: the time is part of a row's key, and a row that is written again is the same.
     fn at(&self) -> u64 {
-        self.row.at_unix_ms.unwrap_or(self.at_unix_ms) / 1000
+        match self.row.at_unix_ms {
+            Some(ms) => ms / 1000,
+            None => self.at_unix_ms / 1000 / HOUR_S * HOUR_S,
+        }
     }
 }
 
@@ -202,6 +208,18 @@ impl Store {
         match self {
             Self::Sqlite(store) => store.write(batch),
             Self::ClickHouse(store) => store.write(batch).await,
+        }
+    }
+
+    /// Deletes results from before a time, s since 1970 UTC: in a file some of them each time, on a
+    /// server whole months.
+    ///
+    /// # Errors
+    /// In words.
+    pub async fn forget(&mut self, before: u64) -> Result<(), Complaint> {
+        match self {
+            Self::Sqlite(store) => store.forget(before),
+            Self::ClickHouse(store) => store.forget(before).await,
         }
     }
 

@@ -14,10 +14,11 @@ pub enum Kind {
     Sqlite,
 }
 
-/// The tables of ClickHouse: the column that decides which of two rows is the newer, and what rows
-/// are shared out by.
-const TABLES: [(&str, &str, &str); 3] = [
+/// The tables of ClickHouse: the column that decides which of two rows is the newer, if one does,
+/// and what rows are shared out by.
+const TABLES: [(&str, &str, &str); 4] = [
     ("result", "received_unix_ms", "serial"),
+    ("result_at", "", "serial"),
     ("gap", "last", "serial"),
     ("head", "updated_unix_ms", "url"),
 ];
@@ -54,13 +55,16 @@ pub fn schema(kind: Kind) -> String {
 fn of_servers(cluster: bool) -> String {
     let mut tables = include_str!("sql/clickhouse/tables.sql").to_owned();
     for (name, version, key) in TABLES {
-        let engine = match cluster {
-            true => format!(
-                "ReplicatedReplacingMergeTree('/clickhouse/tables/{{shard}}/{name}', '{{replica}}', {version})"
-            ),
-            false => format!("ReplacingMergeTree({version})"),
+        let place = format!("'/clickhouse/tables/{{shard}}/{name}', '{{replica}}'");
+        let engine = match (cluster, version) {
+            (true, "") => format!("ReplicatedReplacingMergeTree({place})"),
+            (true, _) => format!("ReplicatedReplacingMergeTree({place}, {version})"),
+            (false, _) => format!("ReplacingMergeTree({version})"),
         };
-        tables = tables.replace(&format!("${name}"), &engine);
+        tables = tables.replace(
+            &format!("ENGINE = ${name} "),
+            &format!("ENGINE = {engine} "),
+        );
         if cluster {
             tables += &format!(
                 "\nCREATE TABLE IF NOT EXISTS {name} AS {name}_local\n    \

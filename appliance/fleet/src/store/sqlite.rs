@@ -72,6 +72,15 @@ impl Sqlite {
         written.map_err(|error| self.complaint(&error))
     }
 
+    /// Deletes some of the results from before a time, s since 1970 UTC: all of a year at once would
+    /// keep collectors and readers waiting.
+    pub(super) fn forget(&mut self, before: u64) -> Result<(), Complaint> {
+        const OLD: &str =
+            "DELETE FROM result WHERE rowid IN (SELECT rowid FROM result WHERE at < ? LIMIT 10000)";
+        let deleted = self.connection()?.execute(OLD, [before as i64]);
+        deleted.map(drop).map_err(|error| self.complaint(&error))
+    }
+
     /// The first column of every row.
     pub(super) fn lines(&mut self, sql: &str) -> Result<String, Complaint> {
         let lines = self.connection().map(|connection| {
@@ -143,5 +152,39 @@ fn cell(value: &Value) -> Sql {
             (None, real) => real.map_or(Sql::Null, Sql::Real),
         },
         other => Sql::Text(other.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Received;
+    use super::*;
+    use crate::answer::Row;
+
+    #[test]
+    fn results_from_before_a_time_are_deleted_and_no_others() {
+        let folder = std::env::temp_dir().join(format!("fringed-fleet-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let mut store = Sqlite::of(folder.join("plant.db").to_str().unwrap());
+        let rows = (1..=4).map(|seq| Received {
+            row: Row {
+                seq,
+                at_unix_ms: (seq < 4).then_some(u64::from(seq) * 10_000_000),
+                ..Row::default()
+            },
+            at_unix_ms: 39_999_000,
+        });
+        let batch = Batch {
+            rows: rows.collect(),
+            ..Batch::default()
+        };
+        store.write(&batch).unwrap();
+        store.forget(20_000).unwrap();
+        // One whose head has no time has that of the hour in which it was received.
+        let left = store
+            .lines("SELECT json_array(seq, at) FROM result ORDER BY seq")
+            .unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(left, "[2,20000]\n[3,30000]\n[4,39600]");
     }
 }

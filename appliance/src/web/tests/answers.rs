@@ -168,6 +168,7 @@ async fn power_and_projector_are_shown_where_they_are_known_and_left_out_of_metr
         "fringed_starts_total 7\n",
         "fringed_unclean_starts_total 2\n",
         "fringed_dropped_frames_total 3\n",
+        "fringed_results_unasked_seconds ",
     ] {
         assert!(metrics.contains(sample), "{metrics}");
     }

@@ -1,1 +1,1 @@
-SELECT serial, history, max(seq) AS seq FROM result GROUP BY serial, history
+SELECT serial, history, max(seq) AS seq FROM result_at GROUP BY serial, history

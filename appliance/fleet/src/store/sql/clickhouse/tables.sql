@@ -3,7 +3,7 @@ CREATE TABLE IF NOT EXISTS result$local (
     serial String,
     history String,
     seq UInt32,
-    -- When it was triggered; where the head does not know, when it was received. UTC.
+    -- When it was triggered, UTC; where the head does not know, the hour in which it was received.
     at DateTime,
     at_unix_ms Nullable(UInt64),
     clock String,
@@ -32,7 +32,18 @@ CREATE TABLE IF NOT EXISTS result$local (
         decision UInt16,
         reason Nullable(String)
     )
-) ENGINE = $result PARTITION BY toYYYYMM(at) ORDER BY (serial, history, seq);
+) ENGINE = $result PARTITION BY toYYYYMM(at) ORDER BY (at, serial, history, seq);
+
+-- When each result was triggered: rows of `result` lie in the order of time, and this finds one of a head.
+CREATE TABLE IF NOT EXISTS result_at$local (
+    serial String,
+    history String,
+    seq UInt32,
+    at DateTime
+) ENGINE = $result_at PARTITION BY toYYYYMM(at) ORDER BY (serial, history, seq);
+
+CREATE MATERIALIZED VIEW IF NOT EXISTS result_at_of TO result_at$local
+AS SELECT serial, history, seq, at FROM result$local;
 
 -- Results that a head deleted before anybody fetched them: first to last SEQ.
 CREATE TABLE IF NOT EXISTS gap$local (

@@ -7,7 +7,7 @@ CREATE VIEW IF NOT EXISTS head_once AS SELECT * FROM head FINAL;
 
 -- Each gauge of each result, once.
 CREATE VIEW IF NOT EXISTS gauge_once AS SELECT
-    serial, history, seq, at, recipe, fingerprint, verdict,
+    serial, history, seq, at, recipe, fingerprint, part_id, press_stroke, verdict,
     gauges.slot AS slot, gauges.name AS name, gauges.unit AS unit, gauges.value AS value, gauges.sigma AS sigma, gauges.u AS u,
     gauges.low AS low, gauges.high AS high, gauges.decision AS decision, gauges.reason AS reason
 FROM result FINAL ARRAY JOIN gauges;

@@ -3,7 +3,7 @@ CREATE TABLE IF NOT EXISTS result (
     serial TEXT NOT NULL,
     history TEXT NOT NULL,
     seq INTEGER NOT NULL,
-    -- When it was triggered, s since 1970 UTC; where the head does not know, when it was received.
+    -- When it was triggered, s since 1970 UTC; where the head does not know, the hour in which it was received.
     at INTEGER NOT NULL,
     at_unix_ms INTEGER,
     clock TEXT NOT NULL,

@@ -5,7 +5,7 @@ CREATE VIEW IF NOT EXISTS head_once AS SELECT * FROM head;
 
 -- Each gauge of each result, once.
 CREATE VIEW IF NOT EXISTS gauge_once AS SELECT
-    serial, history, seq, at, recipe, fingerprint, verdict,
+    serial, history, seq, at, recipe, fingerprint, part_id, press_stroke, verdict,
     json_extract(one.value, '$.slot') AS slot, json_extract(one.value, '$.name') AS name, json_extract(one.value, '$.unit') AS unit,
     json_extract(one.value, '$.value') AS value, json_extract(one.value, '$.sigma') AS sigma, json_extract(one.value, '$.u') AS u,
     json_extract(one.value, '$.low') AS low, json_extract(one.value, '$.high') AS high,
