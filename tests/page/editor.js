@@ -281,6 +281,27 @@ export async function editor({ browser, program, step, folder, running = null })
       await page.keyboard.press("Control+z");
     });
 
+    await step("holes are measured by one click, and a table gives the nominal values", async () => {
+      const before = await list(page), diameters = async () => JSON.parse(await list(page)).gauges.filter(({ kind }) => kind === "diameter");
+      const had = (await diameters()).length;
+      await page.click("#gauge-holes button");
+      await tried(page);
+      const all = await diameters();
+      assert.ok(all.length > had && !await page.locator("#gauge-holes button").count(), `${had} and ${all.length}`);
+      for (const { name, value } of (await found(page)).gauges.filter((one) => all.some(({ name }) => name === one.name))) assert.ok(value > 0, name);
+      await page.click("summary:has-text('Take over nominal values')");
+      const [first] = all, value = (await found(page)).gauges.find(({ name }) => name === first.name).value;
+      await page.fill("#editor-table", `${first.name.toUpperCase()}\t${value.toFixed(2).replace(".", ",")}\t+0.3/-0.2\nno such gauge; 1; 2\n${all[1].name}; x; 1`);
+      await page.click("#editor-take");
+      const words = await page.textContent("#editor-taken");
+      assert.match(words, /^Gauges with new limits: 1\..*no gauge is called no such gauge.*has no nominal value/);
+      const { nominal, plus, minus, golden } = (await diameters()).find(({ name }) => name === first.name);
+      assert.deepEqual([nominal, plus, minus, golden], [Number(value.toFixed(2)), 0.3, 0.2, undefined]);
+      await tried(page);
+      if (folder) await page.screenshot({ path: `${folder}/edit-many-desktop-light.png` });
+      while (await list(page) !== before) await page.click("#editor-undo");
+    });
+
     await step("the last parts are judged by the list before it is stored", async () => {
       await page.evaluate(() => fetch("/api/trigger", { method: "POST" }));
       await page.waitForFunction(() => /PASS|FAIL|INVALID/.test(document.querySelector("#word").textContent));

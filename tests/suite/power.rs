@@ -260,6 +260,7 @@ impl Promise {
         let bounds = Bounds {
             results: 1000,
             recordings: 1 << 30,
+            good_every: 0,
         };
         let opened = history::open(state, numbering, bounds);
         let Opened {

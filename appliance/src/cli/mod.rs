@@ -1,10 +1,12 @@
 //! The command line.
 
-/// Prints a line of the result. A pipe that the reader has closed is not an error.
+/// Prints a line of the result, which may have text of a file: nothing of it commands a terminal. A
+/// pipe that the reader has closed is not an error.
 macro_rules! say {
     ($($argument:tt)*) => {{
         use std::io::Write as _;
-        let _ = writeln!(std::io::stdout(), $($argument)*);
+        let text = format!($($argument)*);
+        let _ = writeln!(std::io::stdout(), "{}", crate::system::prefix::plain(&text));
     }};
 }
 

@@ -65,8 +65,10 @@ bounded! {
     pub struct HistoryConfig: Default {
         /// The most results.
         pub results: u32 = 1..=MAX_RESULTS => 100_000,
-        /// The most MiB of recordings of failed parts; 0 = none are kept.
+        /// The most MiB of recordings of parts; 0 = none are kept.
         pub recordings_mib: u32 => 1024,
+        /// Of so many parts that pass the frames of the first are kept; 0 = of none.
+        pub good_every: u32 => 1000,
     }
 
     /// The station.

@@ -24,6 +24,9 @@ pub struct History {
     pub(super) spool: Option<Arc<Spool>>,
     pub(super) seqs: Seqs,
     pub(super) keeper: Keeper,
+    /// Parts that passed since the start.
+    pub(super) good: Arc<AtomicU32>,
+    pub(super) good_every: u32,
 }
 
 impl History {
@@ -62,16 +65,28 @@ impl History {
         self.seqs.buffer(buffered);
     }
 
-    /// Hands over the frames of a part, made by `part`, if it did not pass; after its result. Where
-    /// the frames of another part are still being written, these are not kept, and the history says
-    /// so: the line goes on.
+    /// Hands over the frames of a part, made by `part`, if it did not pass, or is one of many that
+    /// did; after its result. Where the frames of another part are still being written, these are
+    /// not kept, and the history says so of one that did not pass: the line goes on.
     pub fn keep(&self, record: &ResultRecord, part: impl FnOnce() -> JudgedPart) {
-        let failed = matches!(record.verdict, Verdict::Fail | Verdict::Invalid);
-        if failed && let Err(why) = self.keeper.keep(part) {
+        let failed = match record.verdict {
+            Verdict::Fail | Verdict::Invalid => true,
+            Verdict::Pass if self.is_sample() => false,
+            _ => return,
+        };
+        if let Err(why) = self.keeper.keep(part)
+            && failed
+        {
             let (seq, kept) = (record.seq, Err(why));
             // A queue that is full has lost results as well, and says so.
             let _ = self.queue.try_send(Message::Frames { seq, kept });
         }
+    }
+
+    /// Whether a part that passed is one whose frames are kept.
+    fn is_sample(&self) -> bool {
+        let before = self.good.fetch_add(1, Ordering::Relaxed);
+        self.good_every > 0 && before.is_multiple_of(self.good_every)
     }
 
     /// Stores when this start of the daemon, BOOT_ID, was by the clock of a signed-in user's

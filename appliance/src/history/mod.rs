@@ -1,4 +1,4 @@
-//! The history: every result in an SQLite database, and the frames of failed parts as recordings.
+//! The history: every result in an SQLite database, and the frames of failed parts, and of some good ones, as recordings.
 //!
 //! Threads of its own write ([`Task`]); the station and the measuring task hand over through a
 //! bounded queue ([`History`]) and never wait. The page and the command line read with a
@@ -60,8 +60,10 @@ pub const RECORDINGS: &str = "recordings";
 pub struct Bounds {
     /// The most results.
     pub results: u64,
-    /// The most bytes of recordings of failed parts; 0 = none are kept.
+    /// The most bytes of recordings of parts; 0 = none are kept.
     pub recordings: u64,
+    /// Of so many parts that pass the frames of the first are kept; 0 = of none.
+    pub good_every: u32,
 }
 
 /// A history that could not be read or written: what was attempted with what, and the remedy.

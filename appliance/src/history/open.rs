@@ -106,6 +106,8 @@ pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> Result<Opened
         spool,
         seqs,
         keeper,
+        good: Arc::default(),
+        good_every: bounds.good_every,
     };
     let task = Task::new(history.clone(), inbox, writer, keeping, waiting);
     let complaints = lost.into_iter().chain(complaint);

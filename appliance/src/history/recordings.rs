@@ -1,5 +1,5 @@
-//! The recordings of parts that did not pass (FAIL or INVALID): a folder with a quota, from which
-//! the oldest are removed.
+//! The recordings of parts that did not pass (FAIL or INVALID), and of some that did: a folder with a
+//! quota, from which the oldest are removed.
 //!
 //! Each recording holds the recipe that judged the part, so that the part can be judged again after
 //! the recipe was edited or deleted. The recipe is a hard link to the store's file, which the store
@@ -23,7 +23,7 @@ use std::{fs, io};
 /// The recipe's name in a recording's folder.
 pub const RECIPE: &str = "recipe.recipe";
 
-/// A part with its result and what it was judged by; the history keeps those that did not pass.
+/// A part with its result and what it was judged by.
 #[derive(Clone, Debug)]
 pub struct JudgedPart {
     /// The result.
@@ -141,7 +141,7 @@ impl Recordings {
         self.kept.iter().map(|kept| kept.name.as_str())
     }
 
-    /// Writes the frames of a part that did not pass; answers with the recording's name.
+    /// Writes the frames of a part; answers with the recording's name.
     ///
     /// # Errors
     /// [`RecorderError`]; nothing of it is left then.

@@ -29,8 +29,14 @@ impl GaugeFile {
     /// Works out its limits, where they come from something that is known.
     pub(super) fn set_limits(&mut self) {
         if let Some((tolerance, middle)) = self.tolerance.zip(self.middle()) {
-            [self.low, self.high] = tolerance.limits(middle);
+            let [low, high] = tolerance.limits(middle);
+            [self.low, self.high] = [low.filter(|low| self.can_miss(*low)), high];
         }
+    }
+
+    /// Whether a value can lie below a limit: one that is never negative is never below 0.
+    pub(super) fn can_miss(&self, low: f64) -> bool {
+        low >= 0.0 || !self.measures.facts().never_negative
     }
 
     /// Takes over what golden reads; its limits follow.
@@ -39,5 +45,29 @@ impl GaugeFile {
             self.golden_value = golden.map(|reading| reading.value);
             self.set_limits();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use algo::inspect::kinds::{Flatness, MeanHeight};
+
+    #[test]
+    fn a_value_that_is_never_negative_gets_no_limit_below_0() {
+        let limits = |measures: algo::inspect::Measure| {
+            let mut gauge = GaugeFile::new(1, "gauge", measures, &["face"]);
+            gauge.tolerance = Some(Tolerance {
+                about: About::Golden,
+                plus: Some(0.1),
+                minus: Some(0.1),
+            });
+            gauge.golden_value = Some(0.02);
+            gauge.set_limits();
+            [gauge.low, gauge.high].map(|limit| limit.map(|limit| (limit * 100.0).round()))
+        };
+        let flatness = Flatness { smoothing_px: 9 };
+        assert_eq!(limits(flatness.into()), [None, Some(12.0)]);
+        assert_eq!(limits(MeanHeight {}.into()), [Some(-8.0), Some(12.0)]);
     }
 }

@@ -42,7 +42,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>, keep_gauges: bool) -> 
         number,
         part_number,
         name,
-        taught_at_unix_s: crate::system::clock::utc_us().unwrap_or(0) / 1_000_000,
+        taught_at_unix_s: crate::system::clock::utc_or_told_s().unwrap_or(0),
         placement_tolerance_mm,
         exposures,
         everything: replaced.is_some_and(|file| file.everything),

@@ -266,6 +266,7 @@ fn open_history(config: &Config, state: &StateFolder) -> Result<Opened> {
     let bounds = Bounds {
         results: u64::from(config.history.results),
         recordings: u64::from(config.history.recordings_mib) << 20,
+        good_every: config.history.good_every,
     };
     let numbering = Numbering {
         counted: state.counted(),

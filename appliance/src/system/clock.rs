@@ -1,6 +1,8 @@
 //! The system clock, and whether it is synchronised.
 
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::sync::{Mutex, PoisonError};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
 /// The beginning of the year 10000, µs since 1970 UTC: dates in HTTP (RFC 9110), SQLite and most
 /// programs that read CSV have four digits for the year. Linux itself sets no clock past 2232.
 const YEAR_10000_US: u64 = 253_402_300_800_000_000;
@@ -13,6 +15,23 @@ const YEAR_2100_MS: u64 = 4_102_444_800_000;
 /// the year 10000 on: a wrong time is worse than none.
 pub fn utc_us() -> Option<u64> {
     in_calendars(system_us()).filter(|_| synchronised())
+}
+
+/// What a browser's clock said, and when.
+static TOLD: Mutex<Option<(Instant, u64)>> = Mutex::new(None);
+
+/// Takes over the time of a signed-in user's browser, µs since 1970 UTC.
+pub fn tell(utc_us: u64) {
+    *TOLD.lock().unwrap_or_else(PoisonError::into_inner) = Some((Instant::now(), utc_us));
+}
+
+/// The time in s since 1970 UTC by a synchronised clock, else by what a browser said last.
+pub fn utc_or_told_s() -> Option<u64> {
+    let told = || {
+        let (when, us) = (*TOLD.lock().unwrap_or_else(PoisonError::into_inner))?;
+        Some(us + when.elapsed().as_micros() as u64)
+    };
+    Some(utc_us().or_else(told)? / 1_000_000)
 }
 
 /// Whether the system clock shows a time for which there is no date in HTTP: before 1970, or from

@@ -11,7 +11,7 @@ pub mod journal;
 pub mod logbook;
 pub mod memory;
 pub mod notify;
-mod prefix;
+pub(crate) mod prefix;
 pub mod priority;
 pub mod progress;
 pub mod socket;

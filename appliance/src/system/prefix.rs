@@ -1,6 +1,7 @@
 //! What stands in front of a line on stderr: the program's name for people, a priority for a
 //! journal, which adds name and time itself.
 
+use std::borrow::Cow;
 use std::sync::OnceLock;
 
 /// How much a line matters, as syslog numbers it.
@@ -14,6 +15,23 @@ pub enum Severity {
     Notice = 5,
     /// Normal operation.
     Info = 6,
+}
+
+/// Text with its control characters but tabs and ends of lines written out: those of a file's name or a
+/// message are no commands to a terminal.
+pub(crate) fn plain(text: &str) -> Cow<'_, str> {
+    let is_command = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    if !text.contains(is_command) {
+        return text.into();
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match is_command(c) {
+            true => shown.extend(c.escape_default()),
+            false => shown.push(c),
+        }
+    }
+    shown.into()
 }
 
 /// Lines in the daemon's name, as they are written.
@@ -33,6 +51,7 @@ fn is_read_by_a_journal() -> bool {
 
 /// The lines with their prefix.
 fn form(program: &str, journal: bool, severity: Severity, words: &str) -> String {
+    let words = plain(words);
     let lines = words.lines().map(|line| match journal {
         true => format!("<{}>{line}\n", severity as u8),
         false => format!("{program}: {line}\n"),
@@ -75,5 +94,12 @@ mod tests {
         for other in ["8:16", "9:15", "", "8", "8:", ":15", "8:15:1", "x:y"] {
             assert!(!is_named(other, 8, 15), "{other}");
         }
+    }
+
+    #[test]
+    fn control_characters_are_written_out() {
+        assert_eq!(plain("name\tand\nline"), "name\tand\nline");
+        let lines = form("fringed", false, Severity::Error, "no \u{1b}[31mfile\u{7}");
+        assert_eq!(lines, "fringed: no \\u{1b}[31mfile\\u{7}\n");
     }
 }

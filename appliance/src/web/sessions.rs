@@ -92,6 +92,7 @@ fn date(site: &Site, ms: u64, received: Micros) -> &'static str {
     let Some(us) = clock::of_browser(ms) else {
         return "refused";
     };
+    clock::tell(us);
     match (site.date)(us.saturating_sub(received.0)) {
         true => "taken",
         false => "not stored",

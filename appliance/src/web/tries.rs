@@ -227,6 +227,10 @@ fn last(
         return (None, Err(words.into()));
     };
     let measured = || {
+        let number = part.record.recipe;
+        if number != open.id().0 {
+            return Err(format!("it was measured by recipe {number}"));
+        }
         let recipe = open.recipe(tried)?;
         let shots: Vec<_> = part.plan.shots(part.sequence).map(Some).collect();
         let plan = Plan::new(

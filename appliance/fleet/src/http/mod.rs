@@ -205,8 +205,36 @@ impl Client {
         let name = ServerName::try_from(self.url.host.clone());
         let name = name.map_err(|error| failed(io::Error::other(error)))?;
         let stream = TlsConnector::from(tls).connect(name, stream).await;
-        speak(stream.map_err(failed)?).await
+        speak(stream.map_err(|error| HttpError::Connect(of_tls(&error)))?).await
     }
+}
+
+/// Why an encrypted connection cannot be made, with the remedy where there is one.
+fn of_tls(error: &io::Error) -> String {
+    use rustls::CertificateError::{
+        Expired, ExpiredContext, NotValidForName, NotValidForNameContext, NotValidYet,
+        NotValidYetContext, UnknownIssuer,
+    };
+    let inner = error.get_ref().and_then(|inner| inner.downcast_ref());
+    let words = match inner {
+        Some(rustls::Error::InvalidCertificate(why)) => match why {
+            UnknownIssuer => {
+                "its certificate is signed by none of the authorities of `ca`: add the file of the one that signed it"
+            }
+            NotValidForName | NotValidForNameContext { .. } => {
+                "its certificate is for another name: write that name in the address, or give it a certificate for this one"
+            }
+            Expired | ExpiredContext { .. } | NotValidYet | NotValidYetContext { .. } => {
+                "its certificate is not valid today: renew it, or set the clock"
+            }
+            _ => return error.to_string(),
+        },
+        Some(rustls::Error::InvalidMessage(_)) => {
+            "it does not speak https: write http:// in its address"
+        }
+        _ => return error.to_string(),
+    };
+    words.to_owned()
 }
 
 async fn speak(

@@ -473,6 +473,7 @@ fn begun(state: &StateFolder, run: u32) -> Opened {
     let bounds = Bounds {
         results: ENOUGH,
         recordings: 0,
+        good_every: 0,
     };
     let numbering = Numbering {
         counted: state.counted(),

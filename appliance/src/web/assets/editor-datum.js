@@ -65,7 +65,13 @@ function drawAxes(of) {
   const [left, top, right, low] = all.length ? [0, 1, 2, 3].map((side) => Math[side < 2 ? "min" : "max"](...all.map((point) => point[side % 2]))) : [0, 0, width, height];
   const reach = Math.max(right - left, low - top) / 4, size = reach / 5;
   svg.setAttribute("viewBox", `${left - reach} ${top - reach} ${right - left + 2 * reach} ${low - top + 2 * reach}`);
-  const label = ([u, v], words, kind) => draw("text", { x: u, y: v, "font-size": 1.6 * size, class: kind }, words);
+  const taken = [];
+  // Below what is there already.
+  const label = ([u, v], words, kind) => {
+    while (taken.some((other) => Math.abs(other[0] - u) < 1.4 * size && Math.abs(other[1] - v) < 1.6 * size)) v += 1.6 * size;
+    taken.push([u, v]);
+    return draw("text", { x: u, y: v, "font-size": 1.6 * size, class: kind }, words);
+  };
   of.forEach((name, at) => {
     const { corners, at: middle } = placed(name);
     parts.push(draw("polygon", { points: corners.map((point) => point.join(",")).join(" "), class: "region", "vector-effect": "non-scaling-stroke" }));

@@ -109,10 +109,9 @@ export function proposal(kind, of, own) {
   return others.some((gauge) => gauge.name === name) || !of.length ? free(name.slice(0, LONGEST - 4), others) : name;
 }
 
-// A new gauge of a kind on the chosen features, with its parameters as another of the kind has them.
-export function addGauge(kind, limits) {
+// Puts a new gauge of a kind on features among the others, with its parameters as another of the kind has them.
+function put(kind, of, limits) {
   const { gauges, datums } = state.list;
-  const of = fitting(kind).map(({ name }) => name);
   const like = gauges.find((gauge) => gauge.kind === kind.kind) || {};
   const gauge = Object.assign({ slot: freeSlot(), name: proposal(kind.kind, of), kind: kind.kind, of }, limits);
   if (kind.datum && datums.length) gauge.datum = datums[datums.length - 1].name;
@@ -120,8 +119,20 @@ export function addGauge(kind, limits) {
   let at = gauges.findIndex(({ slot }) => slot > gauge.slot);
   if (at < 0) at = gauges.length;
   state.open = `gauges ${at}`;
-  alter("", () => gauges.splice(at, 0, gauge));
+  gauges.splice(at, 0, gauge);
 }
+
+// A new gauge of a kind on the chosen features.
+export const addGauge = (kind, limits) => alter("", () => put(kind, fitting(kind).map(({ name }) => name), limits));
+
+// Holes that are found and whose diameter nothing measures, as many as there is room for.
+export function unmeasured() {
+  const { features, gauges } = state.list;
+  const holes = features.filter(({ kind, name }) => kind === "circle" && !gauges.some((gauge) => gauge.kind === "diameter" && gauge.of.includes(name)));
+  return holes.slice(0, state.kinds.bounds.gauges - gauges.length);
+}
+// Gauges of their diameters, as one step.
+export const addDiameters = (limits) => alter("", () => unmeasured().forEach(({ name }) => put(kindOf(state.kinds, { kind: "diameter" }), [name], limits)));
 
 // Functions that set every place where a feature or a datum system is named.
 export function naming(what, one) {

@@ -1,11 +1,12 @@
 // The lists of the editor: each feature, datum system and gauge is a row that opens as a form.
 import { $, button, fill, make, text } from "./element.js";
 import { choose } from "./question.js";
-import { addGauge, featureKind, fitting, foundOf, hanging, remove, spoken, state } from "./editor-list.js";
+import { addDiameters, addGauge, featureKind, fitting, foundOf, hanging, remove, spoken, state, unmeasured } from "./editor-list.js";
 import { nameField, parameter } from "./editor-fields.js";
 import { gaugeForm, gaugeWords, usualLimits } from "./editor-gauges.js";
 import { profile } from "./found.js";
 import { signed } from "./number.js";
+import { kindOf } from "./api.js";
 
 const LISTS = { features: "editor-features", datums: "editor-datums", gauges: "editor-gauges" };
 // Functions that show what a try has found in the rows and in the open form.
@@ -121,6 +122,8 @@ function drawOffers() {
     add.disabled = full;
     return add;
   }), ...(fit.length ? [] : [make("span", "quiet", "no gauge takes these together")]));
+  const holes = unmeasured().length, add = button(`Measure ${holes === 1 ? "the diameter of a hole" : `the diameters of ${holes} holes`}`, "", () => addDiameters(usualLimits(kindOf(state.kinds, { kind: "diameter" }))));
+  fill($("gauge-holes"), ...(holes ? [add] : []));
 }
 
 // Draws the lists anew; the focus stays in its row, or at its place in the open form.

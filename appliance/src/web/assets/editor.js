@@ -8,6 +8,7 @@ import { around } from "./editor-shapes.js";
 import { corner, drawShapes, markChosen, showLayer, showMarks, start as startPicture, tool, useTool } from "./editor-picture.js";
 import { drawRows, markRows, showFound, start as startRows } from "./editor-rows.js";
 import { openDatum, start as startDatum } from "./editor-datum.js";
+import { start as startTable } from "./editor-table.js";
 import { body, forget, start as startTry, tryNow, tryParts, trySoon } from "./editor-try.js";
 
 // Fields of the recipe itself, with the key of each.
@@ -25,7 +26,8 @@ export async function edit(number) {
   forget();
   begin(recipe, kinds);
   text("editor-number", String(number));
-  text("editor-words", "");
+  for (const id of ["editor-words", "editor-taken"]) text(id, "");
+  $("editor-table").value = "";
   show("editor", true);
   // Its size is known before the picture is.
   Object.assign($("editor-map"), { width: recipe.camera.width, height: recipe.camera.height });
@@ -64,6 +66,7 @@ function showSteps() {
 function changed(whole) {
   if (whole) drawAll();
   else { markChosen(); showFound(); showSteps(); }
+  text("editor-words", "");
   trySoon();
 }
 
@@ -175,6 +178,7 @@ export function start() {
   } });
   startRows({ opened: () => { markChosen(); drawRows(); }, chosen: () => { markChosen(); markRows(); }, corner: corners, datum: openDatum });
   startDatum();
+  startTable();
   startTry({ found: () => { showMarks(state.found.features); showFound(); }, go });
   for (const [id, key] of NAMES) {
     $(id).addEventListener("input", () => { if ($(id).checkValidity()) alter(id, () => { state.list[key] = key === "guard_k" ? Number($(id).value) : $(id).value; }); });

@@ -33,7 +33,7 @@ function bar(gauge) {
 }
 
 function row(gauge) {
-  const value = make("td", "", make("span", "value", gauge.value === null ? gauge.reason || "not measured" : quantity(gauge.value, gauge.unit)));
+  const value = make("td", "", gauge.value === null ? make("span", "value why", gauge.reason || "not measured") : make("span", "value", quantity(gauge.value, gauge.unit)));
   const lines = gauge.value !== null ? uncertainty(gauge) : [];
   value.append(...(lines.length ? lines : [make("small", "room", "\u00a0")]));
   const range = make("td", "limits", bar(gauge), make("small", "", limits(gauge.lowest, gauge.highest, gauge.unit)));

@@ -80,6 +80,7 @@ assets! {
         "editor-rows.js"
         "editor-gauges.js"
         "editor-datum.js"
+        "editor-table.js"
         "editor-try.js"
         "found.js"
         "kept.js"

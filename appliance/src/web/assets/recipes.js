@@ -35,11 +35,24 @@ function row(recipe) {
   take.href = `api/recipes/${recipe.number}/file`;
   take.setAttribute("download", "");
   take.setAttribute("aria-label", `Export recipe ${recipe.number}`);
+  const twin = button("Copy", "", () => change(() => copy(recipe.number)));
+  twin.setAttribute("aria-label", `Copy recipe ${recipe.number}`);
   const own = recipe.number === active;
   const line = make("tr", own ? "active" : "", make("td", "", String(recipe.number)), make("td", "", recipe.name + (own ? " (active)" : "") + (recipe.judges_nothing ? " (judges nothing)" : "")),
     make("td", "", recipe.part_number), make("td", "", make("code", "", recipe.fingerprint.slice(0, 8))), make("td", "", String(recipe.frames)),
-    make("td", "", String(recipe.gauges)), make("td", "", day(recipe.taught_at_unix_s)), make("td", "actions", use, alter, gain, take, remover(recipe)));
+    make("td", "", String(recipe.gauges)), make("td", "", day(recipe.taught_at_unix_s)), make("td", "actions", use, alter, gain, twin, take, remover(recipe)));
   return line;
+}
+
+// Stores a recipe once more under the first number that is free, for a variant of the part.
+async function copy(number) {
+  const free = await list();
+  if (free === null) throw new Error("every recipe number is taken: delete a recipe first");
+  const answer = await fetch(`api/recipes/${number}/file`);
+  if (!answer.ok) throw new Error(`recipe ${number} cannot be read`);
+  const made = await ask("POST", `api/recipes?number=${free}`, await answer.blob());
+  notice(`recipe ${made.number} is a copy of recipe ${number}${made.note ? `: ${made.note}` : ""}`);
+  list();
 }
 
 // "bracket with 2 features and 4 gauges"

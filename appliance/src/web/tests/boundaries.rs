@@ -100,6 +100,7 @@ async fn a_boundary_value_in_any_address_or_body_is_answered_and_never_breaks_th
     let bounds = Bounds {
         results: 10,
         recordings: 0,
+        good_every: 0,
     };
     let _history = crate::history::open(state.path(), numbering, bounds).unwrap();
     let description: Value = serde_json::from_str(look::OPENAPI).unwrap();
