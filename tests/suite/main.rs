@@ -2,6 +2,7 @@
 
 mod adapt;
 mod among;
+mod any_list;
 mod bad_input;
 mod bench;
 mod better_direction;

@@ -1,5 +1,6 @@
 //! Holes, slots and edges of plates of the simulated head, against the truth, over many placements.
 
+mod closed;
 mod commands;
 mod hidden;
 mod line;

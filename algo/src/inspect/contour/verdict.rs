@@ -88,6 +88,9 @@ impl Outcome {
                 Self::Continues => Self::Continues,
                 _ => Self::Shadowed,
             }
+        } else if fit.background > CONTINUES && Self::edgeless(problem) == Self::Continues {
+            // A wall that is nowhere else to be seen may fit what noise leaves of a face.
+            Self::Continues
         } else {
             Self::Accepted
         }

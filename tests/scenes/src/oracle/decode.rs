@@ -60,8 +60,9 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
 }
 
 /// σ of one sample in counts: the recording's, else estimated from the residuals of N ≥ 4 shifts
-/// after fitting offset, modulation and phase (N − 3 degrees of freedom), over all pixels that are
-/// resolved by `reason`.
+/// after fitting offset, modulation and phase of each pixel (N − 3 degrees of freedom), and in each
+/// run of pixels the harmonics 2 to N − 2 that a response adds to all of them alike, over all pixels
+/// that are resolved by `reason`.
 pub fn sample_noise(recording: &Recording, at: usize, reason: &[Reason]) -> Option<f64> {
     if recording.noise_counts.is_some() {
         return recording.noise_counts;
@@ -72,18 +73,81 @@ pub fn sample_noise(recording: &Recording, at: usize, reason: &[Reason]) -> Opti
         if shifts < 4.0 {
             continue;
         }
-        for pixel in (0..reason.len()).filter(|&pixel| reason[pixel] == Reason::Resolved) {
-            let samples = samples(recording, &level, pixel);
-            let offset = samples.iter().sum::<f64>() / shifts;
-            let fit = demodulate(&samples, &level.shifts);
-            for (sample, shift) in samples.iter().zip(&level.shifts) {
-                let sine = (std::f64::consts::TAU * (fit.turns + shift)).sin();
-                squares += (sample - offset - fit.modulation * sine).powi(2);
-            }
-            freedom += shifts - 3.0;
+        let width = recording.width as usize;
+        for run in (0..reason.len() / width).flat_map(|row| {
+            let pixels = row * width..(row + 1) * width;
+            pixels
+                .step_by(RUN)
+                .map(move |from| from..(from + RUN).min((row + 1) * width))
+        }) {
+            let resolved = run.filter(|&pixel| reason[pixel] == Reason::Resolved);
+            let resolved: Vec<_> = resolved
+                .map(|pixel| samples(recording, &level, pixel))
+                .collect();
+            let left = left_of_run(&resolved, &level.shifts);
+            squares += left.0;
+            freedom += left.1;
         }
     }
     (freedom > 0.0).then(|| (squares / freedom).sqrt())
+}
+
+/// Pixels of a row that a response adds the same harmonics to. Part of the definition.
+const RUN: usize = 64;
+/// A harmonic whose square is less than this share of its own beside the others is none of its own.
+/// Part of the definition.
+const ALIKE: f64 = 1e-6;
+
+/// The sum of squares that sines with harmonics leave of some pixels, and its degrees of freedom.
+fn left_of_run(pixels: &[Vec<f64>], shifts: &[f64]) -> (f64, f64) {
+    let fits: Vec<_> = pixels.iter().map(|of| demodulate(of, shifts)).collect();
+    let turns = |order: f64, function: fn(f64) -> f64| {
+        let samples = fits.iter().flat_map(|fit| {
+            let at = move |shift: &f64| std::f64::consts::TAU * order * (fit.turns + shift);
+            shifts
+                .iter()
+                .map(move |shift| fit.modulation * function(at(shift)))
+        });
+        samples.collect::<Vec<f64>>()
+    };
+    let sines = turns(1.0, f64::sin);
+    let means = pixels.iter().flat_map(|of| {
+        let mean = of.iter().sum::<f64>() / shifts.len() as f64;
+        of.iter().map(move |sample| sample - mean)
+    });
+    let mut left: Vec<f64> = means
+        .zip(&sines)
+        .map(|(sample, sine)| sample - sine)
+        .collect();
+    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for order in 2..shifts.len() - 1 {
+        for function in [f64::cos as fn(f64) -> f64, f64::sin] {
+            let mut column = turns(order as f64, function);
+            let own = dot(&column, &column);
+            // Twice, as rounding asks for.
+            for known in basis.iter().chain(&basis) {
+                let along = dot(known, &column);
+                column
+                    .iter_mut()
+                    .zip(known)
+                    .for_each(|(x, known)| *x -= along * known);
+            }
+            let size = dot(&column, &column);
+            if size > ALIKE * own {
+                column.iter_mut().for_each(|x| *x /= size.sqrt());
+                basis.push(column);
+            }
+        }
+    }
+    for known in &basis {
+        let along = dot(known, &left);
+        left.iter_mut()
+            .zip(known)
+            .for_each(|(x, known)| *x -= along * known);
+    }
+    let free = pixels.len() as f64 * (shifts.len() as f64 - 3.0) - basis.len() as f64;
+    (dot(&left, &left), free.max(0.0))
 }
 
 /// The samples of a pixel in the frames of a level, in the order of the level's shifts.
