@@ -1,11 +1,14 @@
 //! A stranger's way: the shipped program with default settings, each stock part put in front of the
 //! simulated head over the API, taught with one click, and triggered by a PLC.
 
+use crate::contours::plates;
 use crate::every_part::stock;
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, SMALL_HEAD};
 use serde_json::{Value, json};
+use sim::parts::Plate;
 use sim::{Part, Placement};
+use tests::random::Random;
 
 const PASS: u16 = 1;
 
@@ -113,6 +116,54 @@ fn the_limit_that_is_asked_for_is_the_recipe_s_and_stays_with_the_number() {
         assert!(answer.to_string().contains("limit_mm"), "{answer}");
     }
     assert!(station.passes().is_ok());
+}
+
+/// Plates with rims that nobody states, taught with one click and triggered in so many places.
+fn plates_with_rims_pass(rims_mm: &[f64], placements: usize, scenario: &str) {
+    let mut station = Station::new(scenario);
+    let mut random = Random::new(3);
+    let (mut count, mut refused) = (0, Vec::new());
+    for (number, &rim_mm) in (2..).zip(rims_mm) {
+        let part = Part::Plate(Plate {
+            rim_mm,
+            thickness_mm: 1.5,
+            ..plates::plate()
+        });
+        station.put(&part, &Placement::default());
+        station.teach(number);
+        for _ in 0..placements {
+            let mut share = || 2.0 * random.share() - 1.0;
+            // No corner moves by more than the tolerance of 1 mm.
+            let lies = Placement {
+                shift_mm: [share(), share(), share()].map(|share| 0.4 * share),
+                tilt_deg: [share(), share()].map(|share| 0.12 * share),
+                rotation_deg: 0.12 * share(),
+            };
+            station.put(&part, &lies);
+            count += 1;
+            if let Err(words) = station.passes() {
+                refused.push(format!("rims of {rim_mm} mm: {words}"));
+            }
+        }
+    }
+    println!(
+        "{} of {count} good plates with rims PASS",
+        count - refused.len()
+    );
+    assert!(refused.is_empty(), "{}", refused.join("\n"));
+    drop(station.daemon);
+}
+
+#[test]
+fn plates_with_rims_pass_that_are_taught_with_one_click() {
+    let small = "sub_rays = 2\n[rig.camera]\nwidth = 256\nheight = 256\n";
+    plates_with_rims_pass(&[0.2], 3, small);
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn fifty_plates_of_every_rim_pass_that_are_taught_with_one_click() {
+    plates_with_rims_pass(&[0.0, 0.1, 0.2, 0.3], 50, "");
 }
 
 #[test]

@@ -254,6 +254,7 @@ impl Promise {
             counter: folder.counter(),
             serial: folder.serial().map_err(|error| words(&error))?,
             run: 7,
+            utc_s: None,
         };
         forget(&numbering.serial);
         let serial = numbering.serial.clone();

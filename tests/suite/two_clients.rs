@@ -10,6 +10,7 @@ use std::time::Instant;
 use tests::until::PATIENCE;
 
 const ROUNDS: usize = 20;
+const MANY_ROUNDS: usize = 100;
 const DONE: u16 = 200;
 const CONFLICT: u16 = 409;
 
@@ -34,11 +35,22 @@ fn rename(browser: &mut Browser, base: &str, name: &str) -> (u16, Value) {
 
 #[test]
 fn of_two_edits_with_one_base_one_is_stored_and_the_other_is_told() {
+    two_edits(ROUNDS);
+}
+
+#[test]
+#[ignore = "takes a minute: `.ci/run full`"]
+fn of_two_edits_at_once_none_is_lost_in_a_hundred_rounds() {
+    two_edits(MANY_ROUNDS);
+    an_edit_and_an_import(MANY_ROUNDS);
+}
+
+fn two_edits(rounds: usize) {
     let place = Place::taught();
     let daemon = Daemon::start(&place);
     let [mut first, mut second] = two(&daemon);
     let together = Barrier::new(2);
-    for round in 0..ROUNDS {
+    for round in 0..rounds {
         let base = fingerprint(&mut first);
         let change = |browser: &mut Browser, who: &str| {
             let name = format!("{who} {round}");
@@ -65,6 +77,10 @@ fn of_two_edits_with_one_base_one_is_stored_and_the_other_is_told() {
 
 #[test]
 fn an_edit_does_not_undo_an_import_that_came_while_it_was_made() {
+    an_edit_and_an_import(ROUNDS / 2);
+}
+
+fn an_edit_and_an_import(rounds: usize) {
     let place = Place::taught();
     let daemon = Daemon::start(&place);
     let [mut editor, mut importer] = two(&daemon);
@@ -73,7 +89,7 @@ fn an_edit_does_not_undo_an_import_that_came_while_it_was_made() {
     let name = editor.get("/api/recipes/1")["name"].clone();
     let together = Barrier::new(2);
     let mut conflicts = 0;
-    for round in 0..ROUNDS / 2 {
+    for round in 0..rounds {
         let base = fingerprint(&mut editor);
         assert_eq!(rename(&mut editor, &base, "before").0, DONE);
         let base = fingerprint(&mut editor);
@@ -93,7 +109,7 @@ fn an_edit_does_not_undo_an_import_that_came_while_it_was_made() {
         // replace an import.
         assert_eq!(editor.get("/api/recipes/1")["name"], name, "round {round}");
     }
-    println!("{conflicts} of {} edits came too late", ROUNDS / 2);
+    println!("{conflicts} of {rounds} edits came too late");
 }
 
 /// Triggers until `ended`, asking for the status so many times in between; returns how many were

@@ -17,9 +17,16 @@ use std::sync::mpsc::sync_channel;
 /// As many numbers are skipped where the counter is lost: those of results that were shown and not
 /// stored.
 const UNKNOWN: u32 = SLOTS + AHEAD;
-/// As many are skipped where the state folder is a copy: more results than a station shows in the
-/// half year that a backup may be old, at one a second.
+/// As many are skipped at least where the state folder is a copy and the time is not known: more
+/// results than a station shows in the half year that a backup may be old, at one a second.
 const RESTORED: u32 = 1 << 24;
+/// Up to so many more, at random: a backup may be restored twice.
+const APART: u32 = 1 << 27;
+/// Numbers per second of time that a copy goes on with where the time is known: more than a station
+/// shows results, and enough for seventeen years.
+const PER_SECOND: u64 = 8;
+/// The beginning of 2026, s since 1970 UTC.
+const YEAR_2026_S: u64 = 1_767_225_600;
 
 /// An opened history.
 pub struct Opened {
@@ -33,6 +40,12 @@ pub struct Opened {
     pub buffered: Option<u32>,
     /// What had to be set aside, or is a copy.
     pub complaint: Option<String>,
+}
+
+/// The number that a copy goes on with at a time: behind those of every copy that began before.
+fn by_time(utc_s: u64) -> Option<u32> {
+    let since = utc_s.checked_sub(YEAR_2026_S)?;
+    u32::try_from(since.checked_mul(PER_SECOND)?).ok()
 }
 
 /// Opens the history of a state folder, and stores what the run before has shown and the database
@@ -69,10 +82,12 @@ pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> Result<Opened
     let lost = numbering.counted.clone().err();
     let skipped = match lost {
         Some(_) => UNKNOWN,
-        None if restored => RESTORED,
+        None if restored => RESTORED + numbering.run % APART,
         None => 0,
     };
-    let next = last.wrapping_add(skipped).wrapping_add(1);
+    let by_time = numbering.utc_s.filter(|_| restored).and_then(by_time);
+    let by_time = by_time.filter(|&next| is_after(next, last));
+    let next = by_time.unwrap_or(last.wrapping_add(skipped).wrapping_add(1));
     let lost = lost.map(|problem| {
         numbering.counter.put_aside();
         format!(

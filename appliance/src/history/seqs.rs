@@ -31,6 +31,8 @@ pub struct Numbering {
     pub serial: String,
     /// This start of the daemon: random, not 0.
     pub run: u32,
+    /// The time in s since 1970 UTC, if it is known.
+    pub utc_s: Option<u64>,
 }
 
 impl Numbering {
@@ -232,6 +234,7 @@ mod tests {
             counter: state.counter(),
             serial: String::new(),
             run: 1,
+            utc_s: None,
         };
         numbering.reserve(None, next, None).unwrap().0
     }
@@ -257,6 +260,7 @@ mod tests {
                 counter: state.counter(),
                 serial: serial.clone(),
                 run,
+                utc_s: None,
             };
             let (seqs, spool) = numbering.reserve(Some(spool()), next, None).unwrap();
             (seqs, spool.unwrap())

@@ -36,7 +36,7 @@ use crate::system::computing::Computing;
 use crate::system::journal::{self, Severity};
 use crate::system::progress::Progress;
 use crate::system::stop_signal::StopSignal;
-use crate::system::{runtime, socket, stderr};
+use crate::system::{clock, runtime, socket, stderr};
 use crate::web::access::{Access, NewSecret};
 use sim::Stage;
 use std::net::SocketAddr;
@@ -274,6 +274,7 @@ fn open_history(config: &Config, state: &StateFolder) -> Result<Opened> {
         serial: state.serial()?,
         // Run 0 means that none was recorded.
         run: random()?.max(1),
+        utc_s: clock::utc_us().map(|us| us / 1_000_000),
     };
     history::open(state.path(), numbering, bounds).map_err(Exit::CannotCreate.failure())
 }

@@ -9,7 +9,9 @@ use crate::station::{
     Stages, Station, StationHandle, Verdict,
 };
 use crate::storage::state::StateFolder;
-use std::path::Path;
+use rand_xoshiro::SplitMix64;
+use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -470,6 +472,10 @@ pub(super) fn wait(what: &str, done: impl Fn() -> bool) {
 
 /// Opens the history of a state folder that keeps no recordings, for a run.
 fn begun(state: &StateFolder, run: u32) -> Opened {
+    begun_at(state, run, None)
+}
+
+fn begun_at(state: &StateFolder, run: u32, utc_s: Option<u64>) -> Opened {
     let bounds = Bounds {
         results: ENOUGH,
         recordings: 0,
@@ -480,6 +486,7 @@ fn begun(state: &StateFolder, run: u32) -> Opened {
         counter: state.counter(),
         serial: state.serial().unwrap(),
         run,
+        utc_s,
     };
     open(state.path(), numbering, bounds).unwrap()
 }
@@ -517,11 +524,100 @@ fn a_copy_of_a_state_folder_goes_on_far_behind_and_the_folder_itself_does_not() 
     let copy = StateFolder::open(&at("copy")).unwrap();
     if copy.counted().unwrap().copied {
         let (next, complaint) = begin(&copy, 4);
-        assert_eq!(next, (1 << 24) + 1);
+        // At random behind it: here by the run.
+        assert_eq!(next, (1 << 24) + 4 + 1);
         assert!(complaint.unwrap().contains("is a copy"));
-        assert_eq!(begin(&copy, 5), ((1 << 24) + 1, None));
+        assert_eq!(begin(&copy, 5), ((1 << 24) + 4 + 1, None));
     } else {
         println!("skipped: this file system does not say when files are made");
+    }
+}
+
+/// Kills, stops and backups that come back, in any order: no result is shown under a number of its
+/// history that another had, and none is lost but those that the backup did not have.
+#[test]
+fn a_hundred_kills_and_restores_use_no_number_twice() {
+    for is_time_known in [false, true] {
+        kills_and_restores(is_time_known);
+    }
+}
+
+fn kills_and_restores(is_time_known: bool) {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let mut random = SplitMix64::seed_from_u64(5);
+    let mut below = |count: u64| random.next_u64() % count;
+    let mut path = at("0");
+    let mut shown = std::collections::BTreeSet::new();
+    let mut backup: Option<PathBuf> = None;
+    let [mut restores, mut kills] = [0; 2];
+    for round in 1..=100 {
+        let state = StateFolder::open(&path).unwrap();
+        // Ten seconds later each time.
+        let utc_s = is_time_known.then_some(1_790_000_000 + 10 * round);
+        let opened = begun_at(&state, below(1 << 32).max(1) as u32, utc_s);
+        let (history, task, next) = (opened.history, opened.task, opened.next_seq);
+        let id = Reader::of(&path).id().unwrap();
+        let last = next + below(5) as u32;
+        for seq in next..last {
+            history.take(seq).unwrap();
+            history.record(&record(seq));
+            assert!(
+                shown.insert((id.clone(), seq)),
+                "round {round}: {id} {seq} is used twice"
+            );
+        }
+        if below(2) == 0 {
+            // Killed: nothing is settled.
+            kills += 1;
+            drop((history, task));
+        } else {
+            history.stop(last.wrapping_sub(1));
+            task.run(&station().0);
+            let all = seqs(&Reader::of(&path), &Filter::default());
+            assert!((next..last).all(|seq| all.contains(&seq)), "round {round}");
+        }
+        drop(state);
+        match below(6) {
+            0 => {
+                let copy = at(&format!("backup {round}"));
+                copied(&path, &copy);
+                backup = Some(copy);
+            }
+            1 => {
+                if let Some(backup) = &backup {
+                    // As tar and rsync do: the files are made anew.
+                    let next = at(&round.to_string());
+                    copied(backup, &next);
+                    path = next;
+                    let again = StateFolder::open(&path).unwrap();
+                    if again
+                        .counted()
+                        .is_ok_and(|counted| counted.last > 0 && !counted.copied)
+                    {
+                        println!("skipped: this file system does not say when files are made");
+                        return;
+                    }
+                    restores += 1;
+                }
+            }
+            _ => {}
+        }
+    }
+    println!(
+        "{} results, {kills} kills, {restores} restores",
+        shown.len()
+    );
+    assert!(restores > 5 && kills > 20);
+}
+
+fn copied(from: &Path, to: &Path) {
+    std::fs::create_dir(to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let entry = entry.unwrap();
+        if entry.file_type().unwrap().is_file() {
+            std::fs::copy(entry.path(), to.join(entry.file_name())).unwrap();
+        }
     }
 }
 

@@ -96,6 +96,7 @@ async fn a_boundary_value_in_any_address_or_body_is_answered_and_never_breaks_th
         counter: state.counter(),
         serial: "S".into(),
         run: 1,
+        utc_s: None,
     };
     let bounds = Bounds {
         results: 10,
