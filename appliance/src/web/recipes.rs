@@ -251,8 +251,10 @@ pub(super) async fn import(
     }
     let upload = body::file(&site, request.into_body()).await?;
     let stored = site.change(move |site| {
-        let recipe = upload.file.recipe().map_err(Problem::unfit)?;
+        let mut recipe = upload.file.recipe().map_err(Problem::unfit)?;
         let id = recipe.id.clone();
+        // What is said of it is said of the number that it gets.
+        recipe.id.number = to.number.unwrap_or(id.number);
         let tried = tried(site, recipe).map_err(Problem::unfit)?;
         let replace = "add ?replace=true to replace it";
         let imported = site.recipes.take(upload.file, id, to, replace)?;
