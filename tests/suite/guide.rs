@@ -123,10 +123,10 @@ fn options(help: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// The exit codes in the README.
+/// The exit codes in the guide for operators.
 fn exit_codes() -> BTreeSet<u8> {
-    let readme = fs::read_to_string(root().join("README.md")).unwrap();
-    let (_, codes) = readme.split_once("\n## Exit codes\n").unwrap();
+    let guide = fs::read_to_string(root().join("docs/operations.md")).unwrap();
+    let (_, codes) = guide.split_once("\n## Exit codes\n").unwrap();
     let codes = codes.split("\n## ").next().unwrap();
     let rows = codes.lines().filter_map(|line| line.strip_prefix("| "));
     rows.filter_map(|row| row.split(' ').next()?.parse().ok())
