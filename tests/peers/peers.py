@@ -1,10 +1,10 @@
 """Times other implementations of the same computation on the same frames: float C, fringes, OpenCV, NumPy.
 
-    peers.py FRAMES BENCHMARKS [--docs FILE]
+    peers.py FRAMES BENCHMARKS
 
 FRAMES is the folder that `fringed-lab bench --frames` writes, BENCHMARKS the folder that `fringed-lab bench --out` writes: times are
 given in multiples of the fastest of its decoders of whole sets, and its kernels are in the same table. The table is printed and
-written to BENCHMARKS as peers.json and peers.md. With --docs, everything after the marker line of FILE is replaced by both tables.
+written to BENCHMARKS as peers.json and peers.md.
 
 Processor time of the process on one thread, medians of nine, frame sets rotating through more than 200 MB.
 """
@@ -33,7 +33,6 @@ ROTATION_BYTES = 210_000_000
 LEAST_MODULATION = 16
 MAX_RESIDUAL = 0.40
 RIGHT = 0.05  # turns; seven sigma of the noise in the frames
-MARKER = "<!-- Behind this line: written by tests/peers/run.sh -->"
 
 
 # What the loop of float.c is vectorised with, and with which instructions.
@@ -198,7 +197,6 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("frames", type=pathlib.Path)
     parser.add_argument("benchmarks", type=pathlib.Path)
-    parser.add_argument("--docs", type=pathlib.Path)
     arguments = parser.parse_args()
     results = json.loads((arguments.benchmarks / "benchmarks.json").read_text())
     floor = results["kernel"]["floor_ns_per_px"]
@@ -220,12 +218,6 @@ def main():
     print(peers)
     (arguments.benchmarks / "peers.json").write_text(json.dumps(rows, indent=2) + "\n")
     (arguments.benchmarks / "peers.md").write_text(peers)
-    if arguments.docs:
-        before, marker, _ = arguments.docs.read_text().partition(MARKER)
-        if not marker:
-            parser.error(f"{arguments.docs} has no line {MARKER}")
-        tables = (arguments.benchmarks / "benchmarks.md").read_text()
-        arguments.docs.write_text(f"{before}{MARKER}\n\n{tables}\n{peers}")
 
 
 if __name__ == "__main__":

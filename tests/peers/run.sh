@@ -2,12 +2,12 @@
 # Times other decoders and ours, in a virtual environment of its own.
 #
 #     tests/peers/run.sh target/dist/fringed-lab               kernels and peers, printed
-#     tests/peers/run.sh target/dist/fringed-lab docs          the whole benchmark; rewrites docs/benchmarks*
+#     tests/peers/run.sh target/dist/fringed-lab DIR           the whole benchmark, to a folder
 #
 # Needs python3 with venv, a C compiler, and the network for the first run.
 set -euo pipefail
 lab=$1
-docs=${2:-}
+out=${2:-}
 here=$(dirname "${BASH_SOURCE[0]}")
 environment=${CARGO_TARGET_DIR:-target}/peers
 frames=$(mktemp -d)
@@ -16,9 +16,9 @@ trap 'rm -rf "$frames"' EXIT
 if [[ ! -x $environment/bin/python ]]; then python3 -m venv "$environment"; fi
 "$environment/bin/python" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt"
 "$lab" bench --quiet --frames "$frames"
-if [[ -n $docs ]]; then
-    "$lab" bench --quiet --out "$docs/benchmarks"
-    "$environment/bin/python" "$here/peers.py" "$frames" "$docs/benchmarks" --docs "$docs/benchmarks.md"
+if [[ -n $out ]]; then
+    "$lab" bench --quiet --out "$out"
+    "$environment/bin/python" "$here/peers.py" "$frames" "$out"
 else
     "$lab" bench kernel --quiet --out "$frames"
     "$environment/bin/python" "$here/peers.py" "$frames" "$frames"
