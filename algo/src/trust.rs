@@ -1,4 +1,8 @@
 //! Whether a pixel is resolved, and if not, the first reason.
+//!
+//! A pixel is too dark below the [`LeastModulation`] of its decoder: 4.3 σ of a sample and at least
+//! 4 counts of 255, or 16 where σ is not known. It is `Dark` if the coarsest level is, else of
+//! `LowModulation`.
 
 /// σ of a sample over the least modulation that is trusted. It decides how rare wrong fringe orders
 /// are: uniform noise of ±2.5 % of full scale (Peng & Gupta 2008), σ = 3.68 of 255 counts, gives 16

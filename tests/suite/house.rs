@@ -396,37 +396,3 @@ fn documentation_has_examples_only_where_cargo_test_runs_them() {
         }
     }
 }
-
-#[test]
-fn every_file_that_the_architecture_names_is_there() {
-    let text = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
-    let bases = ["", "appliance/src", "algo/src", "hal/src"].map(|base| root().join(base));
-    let quoted = text.split('`').skip(1).step_by(2);
-    let file = |quoted: &&str| {
-        let named = [".rs", ".js", ".md", ".toml"]
-            .iter()
-            .any(|end| quoted.ends_with(end));
-        named || (quoted.contains('/') && !quoted.contains(['{', ' ', ':', '\n']))
-    };
-    let named: Vec<_> = quoted.filter(file).collect();
-    assert!(named.len() > 40, "{named:?}");
-    for file in named {
-        // A file in the folder of the previous one needs only its name.
-        let by_name = || {
-            let all = [
-                "algo/src",
-                "hal/src",
-                "appliance/src",
-                "appliance/fleet/src",
-                "appliance/lab/src",
-            ];
-            all.iter().flat_map(|folder| sources(folder)).any(|source| {
-                Path::new(&source.name)
-                    .file_name()
-                    .is_some_and(|name| name == file)
-            })
-        };
-        let found = bases.iter().any(|base| base.join(file).exists()) || by_name();
-        assert!(found, "ARCHITECTURE.md names {file}, which is not there");
-    }
-}

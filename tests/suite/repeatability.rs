@@ -1,5 +1,10 @@
 //! Repeatability of every kind of gauge, and errors of heights, compared with their own
 //! predictions, over many placements of a part.
+//!
+//! These fail if σ of a gauge is wrong by a factor of 2. Of a pixel's height it is
+//! `the_error_is_what_sigma_predicts_in_every_form_that_gives_heights` and `twin.rs`; of a sample
+//! `the_noise_of_a_sample_is_found_from_the_frames_alone`; of models from a board the 50 heads of
+//! `simulated_board.rs`, in the full run.
 
 use super::gauges::{all_kinds, features, frames, gauge, plan};
 use super::placement::{Bed, TIMEOUT, bed, taught_within};

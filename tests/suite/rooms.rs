@@ -1,5 +1,9 @@
 //! The rooms (groups of modules) of the daemon: which may import which.
 //!
+//! A second protocol beside Modbus would be a room of its own on its line, see what `SEEN` lists
+//! (the snapshot by `StationHandle::subscribe`, requests by `event` and `write`), and neither
+//! recipes, history nor the measuring thread.
+//!
 //! Checks every path in the code, also inside macros: `crate::a::B`, `crate::{a, b::C}`,
 //! `super::super::a`. The root of the crate re-exports nothing, so every such path names its room.
 

@@ -1,5 +1,8 @@
 //! Calibration of the geometry: from pictures and phases of a checkerboard in several poses to the
 //! models of camera and projector.
+//!
+//! `look` judges one pose (corners: `candidates`, `grid`, `corner`; projector points: `nodes`),
+//! `solve` all of them (`initial`, `adjust`), `predict` gives σ.
 
 mod adjust;
 mod arrows;

@@ -1,4 +1,8 @@
 //! One camera frame as borrowed samples.
+//!
+//! `FrameView::row` is where a frame's stride is dropped: everything that decodes gets slices of
+//! whole rows without padding. What reads samples without it (`head/examine/pictures.rs`,
+//! `head/means.rs`, `head/live/picture.rs`, the recorder) leaves the padding out by itself.
 
 /// A sample that a camera delivers: `u8` for 8 bits, `u16` for 9 to 16.
 pub trait Sample: Copy + Send + Sync {

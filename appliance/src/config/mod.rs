@@ -1,4 +1,6 @@
 //! The configuration: one TOML file, every key optional.
+//!
+//! A key is described in `keys.md`, from which docs/configuration.md is checked.
 
 mod devices;
 mod exposing;

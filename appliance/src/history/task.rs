@@ -1,5 +1,8 @@
 //! The history's thread: takes results from a bounded queue and stores them. Each commit waits for
 //! the card; results that come meanwhile go into the next one together.
+//!
+//! While the card hangs, 512 results wait for the database; later ones are lost to the history and
+//! counted. Cycles go on with the numbers that are reserved, then fault 603 until the card answers.
 
 use super::Result;
 use super::entry::Entry;

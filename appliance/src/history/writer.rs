@@ -1,4 +1,6 @@
 //! Writes results into the database, bounds their number, and links recordings to them.
+//!
+//! A history of another version is renamed, and a new one begun.
 
 use super::entry::Entry;
 use super::reader::rows;

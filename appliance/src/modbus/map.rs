@@ -1,4 +1,7 @@
 //! The register map, version 1.4: one table, append-only, from which everything else is derived.
+//!
+//! A register's scaling is in its row: the expression converts, the text names the step; for gauges
+//! it is `Unit::steps` in `algo`. Saturation and "not known" are in `encode`.
 
 use super::encode::{
     MAGIC, TEXT, UNKNOWN_U16, Words, bits, floats, known, last_slot, mask, measured, saturated_u16,

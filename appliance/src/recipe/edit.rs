@@ -1,4 +1,7 @@
 //! Edits a taught recipe: names, features, datum systems, gauges, guard band and least coverage.
+//!
+//! Of two clients that change one recipe the second is refused: an edit names the fingerprint that
+//! it changes (`ChangeError::Outdated`).
 
 use super::file::LONGEST_NAME;
 use super::golden::UnsealedRecipe;

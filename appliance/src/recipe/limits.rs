@@ -1,5 +1,7 @@
 //! Sets the squares and the limits of the gauges that teaching proposes, by what good parts are
 //! predicted to read and by what golden reads at other places.
+//!
+//! `proof` tries them on golden, on displaced parts and on the part itself.
 
 use super::archive::Arrays;
 use super::failure::TeachError;

@@ -1,4 +1,6 @@
 //! Chooses the cheapest sequence whose noise and safe mask are good enough for a part's gauges.
+//!
+//! A longer sequence in the same cycle is chosen by `step_up` in `plan/judge.rs`.
 
 use super::GaugeFile;
 use super::file::{SequenceFile, SequenceKind, UnseenFile};

@@ -1,5 +1,8 @@
 //! The stored recipes of a station: a folder with a file `NNNN.recipe` for each, and its previous
 //! generation.
+//!
+//! No recipe is ever half stored: a temporary name, sync, rename, sync of the folder. The generation
+//! before stays.
 
 use super::{Recipe, RecipeFile, archive};
 use crate::error::{Exit, Result};

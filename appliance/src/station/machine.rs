@@ -1,5 +1,7 @@
 //! What the station remembers between two events, its settings, and the few changes that several
 //! events share.
+//!
+//! A measuring task that is silent for longer than its [`Limits`] is stuck: fault 801.
 
 use std::sync::Arc;
 

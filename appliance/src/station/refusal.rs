@@ -1,4 +1,6 @@
 //! Why a trigger is rejected: the number for the PLC, and the words for people.
+//!
+//! Of several clients that trigger without a pause, `turns` says whose turn it is.
 
 use super::control::{self, BY_PART_NUMBER};
 use super::machine::Station;

@@ -1,4 +1,9 @@
 //! Why a sequence ended without all its frames, as an error with the counts and the remedy.
+//!
+//! A camera that times out between two frames: the attempt is overdue, and its pattern is shown
+//! again before later ones, up to `MAX_ATTEMPTS` times or until the deadline. Then the error is
+//! `Timeout` if the camera fell silent, the projector never flipped, time ran out, or pulses of the
+//! trigger spoiled most frames, and `Protocol` if frames came that fit no pattern.
 
 use std::time::Duration;
 

@@ -1,4 +1,7 @@
 //! Maps of the whole frame, for people, written on request.
+//!
+//! The map of the deviation shows what the gauge got: `square_means` averages over the gauge's
+//! squares.
 
 /// Maps that an inspection writes, each as long as a frame, row-major, NaN where there is no value.
 #[derive(Debug, Default)]

@@ -1,4 +1,8 @@
 //! From findings to a verdict, or to the reason why a longer sequence should be tried.
+//!
+//! FAIL is a measured part outside its limits, or one that lacks what a gauge measures. INVALID is a
+//! part that cannot be judged (`not_judged` has the reasons), a value in a guard band, and a gauge
+//! that has no value and is not absent.
 
 use crate::recipe::demands::GaugeLimits as Limits;
 use crate::recipe::light::{Cause, Light};

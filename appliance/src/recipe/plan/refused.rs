@@ -1,4 +1,10 @@
 //! Why a recipe cannot be run on a head.
+//!
+//! What makes a recipe unfit (RECIPE_RESULT 5, its bytes being whole): another version of the
+//! format, a value out of its bounds, manifest and arrays that do not fit each other, limits that no
+//! part can keep or miss (`judging`), a part number that two recipes have, a plan that fails,
+//! patterns that the projector refuses. Another calibration, camera, projector, exposure or gain is
+//! RECIPE_RESULT 3. Damaged bytes are told in `store`.
 
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;

@@ -1,4 +1,8 @@
 //! Makes a recording of other people's pictures (`fringed-lab import`), and says what looks wrong.
+//!
+//! `folder` and `picture` read the pictures, `samples` brings samples to their bits, `plane` places
+//! models without a plate, `geometry` compares models with the fringes, `check`, `code` and `alone`
+//! find what looks wrong.
 
 mod alone;
 mod check;
