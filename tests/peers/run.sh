@@ -19,6 +19,7 @@ if [[ ! -x $environment/bin/python ]]; then python3 -m venv "$environment"; fi
 if [[ -n $out ]]; then
     "$lab" bench --quiet --out "$out"
     "$environment/bin/python" "$here/peers.py" "$frames" "$out"
+    "$environment/bin/python" "$here/plots.py" "$out"
 else
     "$lab" bench kernel --quiet --out "$frames"
     "$environment/bin/python" "$here/peers.py" "$frames" "$frames"

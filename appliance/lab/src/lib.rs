@@ -5,5 +5,4 @@ pub mod accuracy;
 pub mod benchmark;
 pub mod cli;
 pub mod experiment;
-mod plot;
 pub mod workbench;

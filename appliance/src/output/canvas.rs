@@ -44,16 +44,6 @@ impl<const N: usize> Canvas<N> {
         }
     }
 
-    /// Copies another picture so that its upper left corner is at (x, y).
-    pub fn put(&mut self, other: &Self, x: usize, y: usize) {
-        for row in 0..other.height {
-            for column in 0..other.width {
-                let colour = other.pixels[row * other.width + column];
-                self.set(x + column, y + row, colour);
-            }
-        }
-    }
-
     /// Writes a line of Latin text with its upper left corner at (x, y).
     pub fn text(&mut self, text: &str, x: usize, y: usize) {
         self.text_in(text, x, y, [INK; N]);

@@ -6,7 +6,6 @@ mod counter;
 mod decoding;
 mod effort;
 mod export;
-mod figure;
 mod floor;
 mod frames;
 mod gauges;

@@ -16,7 +16,7 @@ pub struct Bench {
     /// Small frames and one round: whether everything works, not how fast it is.
     #[arg(long)]
     quick: bool,
-    /// Folder for tables, CSV and plot; made if it does not exist.
+    /// Folder for tables and CSV; made if it does not exist.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: Option<PathBuf>,
     /// Write the twelve frames that the kernels are timed on to this folder, for other programs to
@@ -69,9 +69,6 @@ impl Bench {
             folder.write("benchmarks.md", tables.as_bytes())?;
             if let Some(csv) = report.csv() {
                 folder.write("accuracy.csv", csv.as_bytes())?;
-            }
-            for (name, bytes) in report.figures() {
-                folder.write(&name, &bytes)?;
             }
         }
         self.output.answer(&json, || tables)

@@ -1,7 +1,8 @@
-//! `fringed-lab experiment --out DIR`: the paper's experiments as tables, plots and pictures.
+//! `fringed-lab experiment --out DIR`: the paper's experiments as tables, arrays and pictures.
+//! `tests/peers/plots.py` draws them.
 
 use super::adapt::Form;
-use crate::experiment::{Campaign, OpticsKind, PARTS, Results, RunRow, Scene, csv, figures, means};
+use crate::experiment::{Campaign, OpticsKind, PARTS, Results, RunRow, Scene, csv, means};
 use appliance::cli::{Output, Threads, names, numbers};
 use appliance::error::{Exit, Failure, Result};
 use appliance::storage::folder::OutputFolder;
@@ -23,7 +24,7 @@ pub struct Experiment {
     /// shifts, or a sine.
     #[arg(long, value_enum, default_value_t = Form::Bright)]
     waveform: Form,
-    /// Folder for tables, plots and pictures; made if it does not exist.
+    /// Folder for tables, arrays and pictures; made if it does not exist.
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: PathBuf,
     #[command(flatten)]
@@ -52,7 +53,7 @@ impl Experiment {
         progress.clear();
         let results = results.map_err(Exit::Software.because("run the experiments"))?;
         let means = means(&results.rows);
-        write(&folder, &campaign, &results, &means)?;
+        write(&folder, &results)?;
         let text = || {
             let tables = tables(&campaign, &means);
             format!("{}\nwritten to {}", tables.trim_end(), self.out.display())
@@ -82,20 +83,10 @@ impl Experiment {
     }
 }
 
-fn write(
-    folder: &OutputFolder,
-    campaign: &Campaign,
-    results: &Results,
-    means: &[RunRow],
-) -> Result<()> {
+fn write(folder: &OutputFolder, results: &Results) -> Result<()> {
     folder.write("experiments.csv", csv(&results.rows).as_bytes())?;
-    for scene in &campaign.scenes {
-        for (name, svg) in figures(scene, means) {
-            folder.write(&name, svg.as_bytes())?;
-        }
-    }
-    for (name, png) in &results.pictures {
-        folder.write(name, png)?;
+    for (name, content) in &results.shown {
+        folder.write(name, content)?;
     }
     Ok(())
 }

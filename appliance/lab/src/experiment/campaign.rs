@@ -1,11 +1,15 @@
 //! All runs of the chosen parts: parts × optics × seeds × methods.
 
-use super::gallery::{self, View};
 use super::methods::{SHOWN_ADAPTIVE, SHOWN_FIXED};
-use super::runner::Runner;
+use super::runner::{Run, Runner};
 use super::scenes::{OpticsKind, Scene};
 use super::table::{self, RunRow};
+use algo::pattern::{Encoder, Shot};
+use algo::phase::Trust;
 use appliance::head::calibrated::MeasureError;
+use appliance::output::canvas::grey_png;
+use hal::frame::Samples;
+use hal::npy;
 
 /// What is to be run.
 #[derive(Clone, Debug)]
@@ -25,8 +29,8 @@ pub struct Campaign {
 pub struct Results {
     /// One row per run.
     pub rows: Vec<RunRow>,
-    /// File names and PNGs of the pictures.
-    pub pictures: Vec<(String, Vec<u8>)>,
+    /// File names and contents of what some methods showed, saw and measured.
+    pub shown: Vec<(String, Vec<u8>)>,
 }
 
 impl Campaign {
@@ -49,7 +53,6 @@ impl Campaign {
             let done = results.rows.len() as f64;
             progress(done / total, &format!("{about}: light of the scene"));
             let mut runner = Runner::new(scene, optics)?;
-            let mut views = Vec::new();
             for seed in 1..=self.seeds {
                 for method in scene.methods(self.sines) {
                     let done = results.rows.len() as f64;
@@ -59,14 +62,55 @@ impl Campaign {
                     let row = RunRow::new(scene, optics, method, seed, run.values);
                     results.rows.push(row);
                     if seed == 1 && [SHOWN_FIXED, SHOWN_ADAPTIVE].contains(&method) {
-                        views.push(View::of(method, &run));
+                        let name = format!("{}-{}-{}", scene.name, optics.word(), method.name());
+                        results.shown.extend(shown(&name, &run));
                     }
                 }
             }
-            let name = format!("{}-{}.png", scene.name, optics.word());
-            results.pictures.push((name, gallery::png(&views)));
         }
         table::set_ratios(&mut results.rows);
         Ok(results)
     }
+}
+
+/// The finest pattern and its frame as pictures, and the measured heights in mm as an array of the
+/// frame's size, NaN where a pixel is not resolved.
+fn shown(name: &str, run: &Run) -> [(String, Vec<u8>); 3] {
+    let raster = Encoder::new(None, &[]).raster(&run.function, Shot::sine(1.0, 0.0));
+    let frame = &run.measured.frames[run.finest];
+    let format = frame.format();
+    let bytes: Vec<u8> = match frame.samples() {
+        Samples::Eight(samples) => samples.to_vec(),
+        Samples::Sixteen(samples) => {
+            let shift = format.bit_depth.saturating_sub(8);
+            samples.iter().map(|s| (s >> shift) as u8).collect()
+        }
+    };
+    let rows = bytes.chunks(format.stride);
+    let seen: Vec<u8> = rows
+        .flat_map(|row| &row[..format.width as usize])
+        .copied()
+        .collect();
+    let measured = &run.measured;
+    let heights = measured.heights.height.iter().zip(&measured.phases.trust);
+    let heights: Vec<f32> = heights
+        .map(|(height, trust)| match trust {
+            Trust::Resolved => height.mm() as f32,
+            _ => f32::NAN,
+        })
+        .collect();
+    [
+        (
+            format!("{name}-pattern.png"),
+            grey_png(raster.width, &raster.pixels),
+        ),
+        (
+            format!("{name}-frame.png"),
+            grey_png(format.width as usize, &seen),
+        ),
+        (
+            format!("{name}-height.npy"),
+            npy::write(measured.heights.width, &heights),
+        ),
+    ]
 }

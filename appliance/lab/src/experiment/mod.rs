@@ -3,17 +3,13 @@
 
 mod campaign;
 mod cylinder;
-mod figures;
-mod gallery;
 mod judge;
 mod methods;
 mod runner;
 mod scenes;
-mod shade;
 mod table;
 
 pub use campaign::{Campaign, Results};
-pub use figures::figures;
 pub use methods::{BetterSequence, Method};
 pub use runner::{Run, Runner};
 pub use scenes::{Judged, OpticsKind, PARTS, Scene};
