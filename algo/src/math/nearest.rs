@@ -1,6 +1,9 @@
 //! Rounding singles below 2²² to the nearest whole number, ties to even, by two additions: the same
 //! on every machine.
 
+/// Magnitudes below this are rounded.
+pub(crate) const BELOW: u32 = 1 << 22;
+
 /// 1.5 · 2²³: added to a single below 2²², it leaves the nearest whole number in the low bits.
 const ROUNDER: f32 = 12_582_912.0;
 

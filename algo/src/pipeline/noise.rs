@@ -18,7 +18,7 @@ use core::f64::consts::TAU;
 /// **Harmonics.** A response that is not linear makes harmonics of the fringes, which N shifts
 /// cancel in the phase, but not in these places: harmonic h, of r_h times the modulation, adds
 /// r_h |X_1| e^(ihφ) to the place h mod N. φ and |X_1| are known in each pixel, and r_h changes
-/// slowly, so in each run of [`RUN`] pixels of a row the two harmonics p and N − p of each place
+/// slowly, so in each run of 64 pixels of a row the two harmonics p and N − p of each place
 /// are fitted by least squares and taken off, each with its degrees of freedom, and so is what the
 /// noise of φ and |X_1| adds.
 ///

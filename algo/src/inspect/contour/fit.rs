@@ -158,6 +158,17 @@ impl<V: View> Problem<'_, V> {
         Some(best)
     }
 
+    /// What the cost would be if the material went on over all pixels.
+    pub fn face_cost(&self) -> f64 {
+        let (mut sum, mut power, mut count) = (Complex::default(), 0.0, 0.0);
+        for pixel in self.pixels.iter().filter(|of| libm::fabs(of.d) <= BAND) {
+            sum += pixel.light;
+            power += pixel.light.square();
+            count += 1.0;
+        }
+        (power - sum.square() / count) / self.signals.variance
+    }
+
     /// The fit with the edge at `edge`.
     fn at(&self, edge: f64, buffer: &mut Vec<Seen>) -> Option<Fit> {
         buffer.clear();

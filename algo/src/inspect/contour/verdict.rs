@@ -15,6 +15,9 @@ const SIGMA: f64 = 0.25;
 const OFF: f64 = 0.125;
 /// The share of the taught modulation that a material which goes on has on both sides.
 const CONTINUES: f64 = 0.8;
+/// By so much an edge beside a background as bright as the material must explain its pixels better
+/// than a face that goes on, in χ²: noise alone has as much once in 10⁵.
+const CLEAR: f64 = 25.0;
 /// A background of less light, of the material's, is dark.
 const LIT: f64 = 0.1;
 /// A narrower shadow does not matter, px: it moves the edge by half of this, less than the model of
@@ -77,6 +80,9 @@ impl Outcome {
             Self::edgeless(problem)
         } else if !(fit.material >= problem.signals.setup.least && fit.off <= OFF) {
             Self::Dark
+        } else if fit.background > CONTINUES && problem.face_cost() <= fit.cost + CLEAR {
+            // What a face without an edge explains as well is no edge.
+            Self::edgeless(problem)
         } else if fit.cost > CHI_SQUARE * (fit.freedom + rough * rough * fit.strength) {
             Self::Disturbed
         } else if problem.signals.setup.floor.is_none()
@@ -88,9 +94,6 @@ impl Outcome {
                 Self::Continues => Self::Continues,
                 _ => Self::Shadowed,
             }
-        } else if fit.background > CONTINUES && Self::edgeless(problem) == Self::Continues {
-            // A wall that is nowhere else to be seen may fit what noise leaves of a face.
-            Self::Continues
         } else {
             Self::Accepted
         }

@@ -87,15 +87,11 @@ impl TaughtCoordinates {
                 }
                 pose.row(backend, (v, rows), &columns, &mut self.blocks);
                 let (map, row) = (with.map(), offset_row(v, heights, &self.blocks));
-                let mut overflow = false;
                 let out = Deviations {
                     height: &mut self.deviation,
                     normal: recent.row_mut(v).0,
                 };
-                align_row(backend, map, row, columns.clone(), out, &mut overflow);
-                if overflow {
-                    recent.overflow = Some(v);
-                }
+                align_row(backend, map, row, columns.clone(), out);
             }
             None => {
                 let normal = &mut recent.row_mut(v).0[columns.clone()];

@@ -8,7 +8,6 @@ use super::decode::PhasePlan;
 use super::golden::{Golden, base_nm};
 use super::near::NodeRow;
 use super::recent::RecentRows;
-use super::squares::narrow::MAX_NARROW_NM;
 use crate::frame::SampleNoise;
 use crate::phase::Trust;
 use crate::pipeline::{
@@ -151,9 +150,6 @@ impl HeightRow {
             // One above the value for "no offset".
             let base = base_nm(golden.cubics.surface().height[place]);
             let nm = height.saturating_sub(base).max(NO_OFFSET + 1);
-            if nm.unsigned_abs() > MAX_NARROW_NM {
-                recent.overflow = Some(v);
-            }
             offset[u] = nm;
             tally.measured += 1;
             if compared {

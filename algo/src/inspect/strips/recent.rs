@@ -18,9 +18,6 @@ pub struct RecentRows {
     extent: Vec<Range<usize>>,
     /// A row in which no pixel is compared.
     empty: Vec<i32>,
-    /// The last row with a deviation that is too large for sums in 32 bits
-    /// ([`super::squares::narrow`]).
-    pub overflow: Option<usize>,
 }
 
 impl RecentRows {
@@ -33,7 +30,6 @@ impl RecentRows {
             deviation: vec![NO_OFFSET; width * rows],
             extent: vec![0..0; rows],
             empty: vec![NO_OFFSET; width],
-            overflow: None,
         }
     }
 

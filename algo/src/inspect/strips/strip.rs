@@ -105,7 +105,6 @@ impl Strip {
         input: Input<'_>,
         mut maps: Maps<'_>,
     ) {
-        self.recent.overflow = None;
         self.counts.clear();
         self.squares.clear();
         self.sections.clear();

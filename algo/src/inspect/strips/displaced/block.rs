@@ -43,12 +43,11 @@ impl<'a> Block<'a> {
 }
 
 impl Block<'_> {
-    /// Writes its deviations, pixel by pixel. The answer is whether some deviation is large.
-    pub fn align(&self, golden: GoldenMap<'_>, out: &mut Deviations<'_>) -> bool {
+    /// Writes its deviations, pixel by pixel.
+    pub fn align(&self, golden: GoldenMap<'_>, out: &mut Deviations<'_>) {
         let from = self.from.pixels();
         let width = golden.width;
         let rows = golden.height.len() / width;
-        let mut large = false;
         out.leave_open();
         let out = out.height.iter_mut().zip(out.normal.iter_mut());
         for (i, (height_nm, normal_nm)) in out.enumerate() {
@@ -74,14 +73,12 @@ impl Block<'_> {
             let (upper, lower) = (&golden.height[place..], &golden.height[place + width..]);
             let corners = [upper[0].nm(), upper[1].nm(), lower[0].nm(), lower[1].nm()];
             let nm = deviation_of((z, rise), (along - left, down - top), corners);
-            large |= !is_small(nm);
             let along_normal = scaled(nm, golden.factor[place].units());
             (*height_nm, *normal_nm) = match is_small(nm) {
                 true => (whole(nm), whole(along_normal)),
                 false => (large_whole(nm), large_whole(along_normal)),
             };
         }
-        large
     }
 
     /// Its taught coordinates.

@@ -47,17 +47,14 @@ back_end_entry! {
     )
 }
 
-/// Aligns columns of a row: writes their deviations from golden at the taught coordinates, and
-/// whether one is too large for sums in 32 bits ([`super::squares::narrow`]).
+/// Aligns columns of a row: writes their deviations from golden at the taught coordinates.
 pub fn align_row(
     backend: Backend,
     golden: GoldenMap<'_>,
     row: OffsetRow<'_>,
     columns: Range<usize>,
     mut out: Deviations<'_>,
-    overflow: &mut bool,
 ) {
-    *overflow = false;
     let mut start = columns.start;
     while start < columns.end {
         if start.is_multiple_of(BLOCK) {
@@ -76,7 +73,7 @@ pub fn align_row(
                 let mut done = false;
                 align_next(backend, golden, &block, &mut here, &mut done);
                 if !done {
-                    *overflow |= block.align(golden, &mut here);
+                    block.align(golden, &mut here);
                 }
             }
             None => here.leave_open(),

@@ -1,7 +1,7 @@
 //! A pixel: the height that it sees, and its deviation from golden between four heights.
 
-use crate::inspect::strips::squares::narrow::MAX_NARROW_NM;
 use crate::inspect::weight::Factor;
+use crate::math::nearest::BELOW;
 use crate::pipeline::SQUARE;
 use crate::units::Height;
 
@@ -33,10 +33,10 @@ pub fn scaled(nm: f32, units: i32) -> f32 {
     nm * (units as f32 * Factor::UNIT as f32)
 }
 
-/// Whether the magnitude of a deviation in nm is below [`MAX_NARROW_NM`].
+/// Whether a deviation in nm is so small that [`whole`](crate::math::nearest::whole) rounds it.
 #[inline(always)]
 pub fn is_small(nm: f32) -> bool {
-    (nm > -(MAX_NARROW_NM as f32)) & (nm < MAX_NARROW_NM as f32)
+    (nm > -(BELOW as f32)) & (nm < BELOW as f32)
 }
 
 /// Shifts [`SQUARE`] to the sign of 32 bits.

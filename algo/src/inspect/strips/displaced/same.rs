@@ -3,8 +3,7 @@
 use super::linear::{BLOCK, Linear, Whole};
 use super::pixel::{deviation_of, height, mask, pick, scaled, square};
 use super::row::{Deviations, GoldenMap, OffsetRow};
-use crate::inspect::strips::squares::narrow::MAX_NARROW_NM;
-use crate::math::nearest::whole;
+use crate::math::nearest::{BELOW, whole};
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};
 use core::ops::Range;
@@ -92,7 +91,7 @@ fn same<V: Lanes>(
             farthest = farthest.max(order(along).max(order(down)) & measured.cast_unsigned());
             largest = largest.max(order(nm.abs()) & known.cast_unsigned());
         }
-        if farthest >= order(1.0) || largest >= order(MAX_NARROW_NM as f32) {
+        if farthest >= order(1.0) || largest >= order(BELOW as f32) {
             break;
         }
         blocks_done += 1;

@@ -53,21 +53,9 @@ pub struct SquareRow<'a> {
 }
 
 impl SquareRow<'_> {
-    /// Searches the squares around the compared pixels of a span for the largest mean. Of equal
-    /// ones the last counts.
-    pub fn search(&self, largest: &mut Option<Extreme>, span: Range<usize>) {
-        let least = least_support(self.side);
-        let mut floor = floor_of(*largest, least);
-        for square in self.squares(span) {
-            if square.sum.abs() >= floor && self.is_compared(&square) {
-                Self::raise(largest, square, least);
-                floor = floor_of(*largest, least);
-            }
-        }
-    }
-
-    /// As [`Self::search`], and for the largest sum.
-    pub fn search_both(&self, [largest, strongest]: [&mut Option<Extreme>; 2], span: Range<usize>) {
+    /// Searches the squares around the compared pixels of a span for the largest mean, of equal ones
+    /// the last, and for the largest sum.
+    pub fn search(&self, [largest, strongest]: [&mut Option<Extreme>; 2], span: Range<usize>) {
         let least = least_support(self.side);
         let mut floor = floor_of(*largest, least);
         let mut most = strength(*strongest) + 1;
@@ -89,7 +77,7 @@ impl SquareRow<'_> {
     }
 
     /// Takes the square around a column as the strongest, if it has enough deviations.
-    pub fn strengthen(&self, strongest: &mut Option<Extreme>, column: usize) {
+    fn strengthen(&self, strongest: &mut Option<Extreme>, column: usize) {
         let columns = &self.sums[column..=column + self.side / 2 * 2];
         let square = self.unpack(columns.iter().sum(), column);
         if square.count >= least_support(self.side) {
@@ -141,7 +129,7 @@ pub fn strength(square: Option<Extreme>) -> i64 {
 }
 
 /// A sum of at least `least` deviations whose magnitude is below this does not reach the best mean.
-pub fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
+fn floor_of(best: Option<Extreme>, least: i64) -> i64 {
     // Rounded down, so that a sum of just that mean still reaches it.
     best.map_or(0, |best| best.sum.abs() * least / best.count)
 }

@@ -1,12 +1,10 @@
 //! Stage 4, accumulate: the square of largest mean weighted deviation about the pixels of each row.
 //!
 //! Sums down the columns slide from row to row: the row that enters the squares is added, the one
-//! that leaves them is taken out. Sums over squares follow from these along the row: in 32 bits
-//! where all deviations are small ([`narrow`]), to find the few places where the largest may be,
-//! and exactly there ([`extreme`]). What deviates elsewhere is kept, too ([`rivals`]).
+//! that leaves them is taken out. Sums over squares follow from these along the row ([`extreme`]). What
+//! deviates elsewhere is kept, too ([`rivals`]).
 
 pub(super) mod extreme;
-pub(super) mod narrow;
 pub(super) mod rivals;
 
 use super::coordinates::Comparison;
@@ -19,7 +17,6 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::ops::Range;
 use extreme::{COUNT_BIT, SquareRow};
-use narrow::NarrowSums;
 use rivals::Extremes;
 
 /// The squares of a strip.
@@ -27,7 +24,6 @@ use rivals::Extremes;
 pub struct Squares {
     /// For each side the packed sums down the columns, with half a side of padding at both ends.
     columns: Vec<Vec<i64>>,
-    narrow: NarrowSums,
     /// The deviations of a row about whose pixels squares have the side that is looked at; of plans
     /// with several sides.
     centres: Vec<i32>,
@@ -38,7 +34,6 @@ pub struct Squares {
 impl Squares {
     /// Of a strip's own rows of `width` pixels.
     pub fn new(gauges: &Gauges, width: usize, rows: &Range<usize>) -> Self {
-        let padding = gauges.largest_side().map_or(0, |side| side / 2 * 2);
         let sides = gauges.sides.iter();
         let padded = sides.map(|of| vec![0; width + of.side / 2 * 2]);
         let squares = gauges.squares.iter();
@@ -46,7 +41,6 @@ impl Squares {
         let extremes = squares.map(|squares| Extremes::new(squares.side, rows, width));
         Self {
             columns: padded.collect(),
-            narrow: NarrowSums::new(width + padding),
             centres: vec![NO_OFFSET; if partly { width } else { 0 }],
             extremes: extremes.collect(),
         }
@@ -82,7 +76,6 @@ impl Squares {
         } = with;
         let Self {
             columns,
-            narrow: narrow_sums,
             centres,
             extremes,
         } = self;
@@ -107,11 +100,6 @@ impl Squares {
             let Some(middle) = middle.filter(|_| !seen.is_empty()) else {
                 continue;
             };
-            let overflows = recent.overflow.is_some_and(|row| row + 2 * half >= v);
-            let narrow = !overflows && NarrowSums::hold(side);
-            if narrow {
-                narrow_sums.add(backend, sums, side, seen.clone());
-            }
             let squares = gauges.squares.iter().zip(&mut *extremes);
             for (squares, extremes) in squares.filter(|(squares, _)| squares.side == side) {
                 let mut row = SquareRow {
@@ -132,10 +120,7 @@ impl Squares {
                 let region = gauges.region(pose, squares.gauge);
                 for (_, span) in region.map_or(&[][..], |region| region.row(middle)) {
                     let span = common(span, &seen);
-                    extremes.update(middle, &span, |found, span| match narrow {
-                        true => narrow_sums.search(backend, &row, span, found),
-                        false => row.search_both(found, span),
-                    });
+                    extremes.update(middle, &span, |found, span| row.search(found, span));
                 }
             }
         }
