@@ -1,7 +1,8 @@
-//! Rounding to whole numbers, neighbours in a frame, derivatives, and least squares for a few
-//! unknowns.
+//! Complex numbers, rounding to whole numbers, neighbours in a frame, derivatives, and least
+//! squares for a few unknowns.
 
 pub mod associate;
+pub mod complex;
 pub(crate) mod derivative;
 pub(crate) mod nearest;
 pub mod solve;

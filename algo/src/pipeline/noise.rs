@@ -2,6 +2,7 @@
 
 use super::{PhaseMap, map_rows};
 use crate::frame::{FrameView, Samples};
+use crate::math::complex::Complex;
 use crate::pattern::{Level, Sequence};
 use crate::phase::Trust;
 use alloc::vec::Vec;
@@ -161,9 +162,9 @@ struct Transform {
     /// Places of the frames in the sequence.
     frames: Vec<usize>,
     /// Cosine and sine of the fundamental for each frame.
-    first: Vec<(f64, f64)>,
+    first: Vec<Complex>,
     /// Each place, with cosine and sine for each frame.
-    places: Vec<(usize, Vec<(f64, f64)>)>,
+    places: Vec<(usize, Vec<Complex>)>,
 }
 
 /// Sums over the pixels of a run for one place: X is what is seen there, a and b what harmonics p
@@ -178,26 +179,14 @@ struct Normal {
     bx: Complex,
 }
 
-type Complex = (f64, f64);
-
-/// x y*.
-fn dot(x: Complex, y: Complex) -> Complex {
-    (x.0 * y.0 + x.1 * y.1, x.1 * y.0 - x.0 * y.1)
-}
-
-fn square(x: Complex) -> f64 {
-    x.0 * x.0 + x.1 * x.1
-}
-
 impl Normal {
     fn add(&mut self, x: Complex, a: Complex, b: Complex) {
-        let plus = |sum: &mut Complex, term: Complex| *sum = (sum.0 + term.0, sum.1 + term.1);
-        self.xx += square(x);
-        self.aa += square(a);
-        self.bb += square(b);
-        plus(&mut self.ab, dot(a, b));
-        plus(&mut self.ax, dot(a, x));
-        plus(&mut self.bx, dot(b, x));
+        self.xx += x.square();
+        self.aa += a.square();
+        self.bb += b.square();
+        self.ab += a * b.conj();
+        self.ax += a * x.conj();
+        self.bx += b * x.conj();
     }
 
     /// Fits the harmonics `place` and `shifts` − `place`.
@@ -205,13 +194,13 @@ impl Normal {
         // By how much noise of |X_1| and φ turns and stretches harmonic h of a share of 1.
         let stirred = |order: usize| (1.0 + (order * order) as f64) / 2.0;
         let one = if self.aa > 0.0 {
-            square(self.ax) / self.aa
+            self.ax.square() / self.aa
         } else {
             0.0
         };
         let real = if 2 * place == shifts { 0.5 } else { 1.0 };
         let of_one = real * stirred(place) * one / self.aa.max(1.0);
-        let determinant = self.aa * self.bb - square(self.ab);
+        let determinant = self.aa * self.bb - self.ab.square();
         let apart = determinant / (self.aa * self.bb);
         if !(apart > ALIKE) {
             return Fitted {
@@ -220,14 +209,13 @@ impl Normal {
                 stirred: of_one,
             };
         }
-        let crossed = dot(dot(self.ax, self.bx), self.ab).0;
-        let explained = self.bb * square(self.ax) + self.aa * square(self.bx) - 2.0 * crossed;
+        let crossed = (self.ax * self.bx.conj()).dot(self.ab);
+        let explained = self.bb * self.ax.square() + self.aa * self.bx.square() - 2.0 * crossed;
         // a b* x and a* b x, the coefficients' numerators beside those of each alone.
-        let across = dot(self.bx, (self.ab.0, -self.ab.1));
-        let along = dot(self.ax, self.ab);
-        let minus = |scale: f64, x: Complex, y: Complex| (scale * x.0 - y.0, scale * x.1 - y.1);
-        let of_a = square(minus(self.bb, self.ax, across));
-        let of_b = square(minus(self.aa, self.bx, along));
+        let across = self.bx * self.ab;
+        let along = self.ax * self.ab.conj();
+        let of_a = (self.ax * self.bb - across).square();
+        let of_b = (self.bx * self.aa - along).square();
         let of_both = stirred(place) * of_a + stirred(shifts - place) * of_b;
         Fitted {
             left: self.xx - explained / determinant,
@@ -264,7 +252,7 @@ impl Transform {
         let taps = |place: usize| {
             let taps = (0..shifts).map(|k| {
                 let angle = TAU * place as f64 * (level.start + k as f64 / shifts as f64);
-                (libm::cos(angle), libm::sin(angle))
+                Complex::new(libm::cos(angle), libm::sin(angle))
             });
             taps.collect::<Vec<_>>()
         };
@@ -282,30 +270,28 @@ impl Transform {
         let shifts = self.frames.len();
         let mut sums = alloc::vec![Normal::default(); self.places.len()];
         // What each harmonic of a share of 1 shows, from order 0.
-        let mut harmonics = alloc::vec![(0.0, 0.0); shifts - 1];
+        let mut harmonics = alloc::vec![Complex::default(); shifts - 1];
         for &u in pixels {
             // X of a place whose shifts begin at 0: I_k e^(−2πi pk/N) with the angle of the frame.
-            let seen = |taps: &[(f64, f64)]| {
+            let seen = |taps: &[Complex]| {
                 let pairs = self.frames.iter().zip(taps);
-                pairs.fold((0.0, 0.0), |sum, (&frame, (cos, sin))| {
-                    let count = f64::from(count(&rows[frame], u));
-                    (sum.0 + count * cos, sum.1 - count * sin)
+                pairs.fold(Complex::default(), |sum, (&frame, &tap)| {
+                    sum + tap.conj() * f64::from(count(&rows[frame], u))
                 })
             };
             let fundamental = seen(&self.first);
-            let size = libm::sqrt(square(fundamental));
+            let size = fundamental.length();
             let turn = match size > 0.0 {
-                true => (fundamental.0 / size, fundamental.1 / size),
-                false => (0.0, 0.0),
+                true => fundamental * (1.0 / size),
+                false => Complex::default(),
             };
-            harmonics[0] = (size, 0.0);
+            harmonics[0] = Complex::new(size, 0.0);
             for order in 1..shifts - 1 {
-                let (re, im) = harmonics[order - 1];
-                harmonics[order] = (re * turn.0 - im * turn.1, re * turn.1 + im * turn.0);
+                harmonics[order] = harmonics[order - 1] * turn;
             }
             for (sum, (place, taps)) in sums.iter_mut().zip(&self.places) {
                 let (own, mirrored) = (harmonics[*place], harmonics[shifts - place]);
-                sum.add(seen(taps), own, (mirrored.0, -mirrored.1));
+                sum.add(seen(taps), own, mirrored.conj());
             }
         }
         let mut found = Residuals::default();

@@ -1,7 +1,7 @@
 //! A contour from pixels: pieces about where it is expected, their edges, the shape through them,
 //! and again about that, until nothing moves.
 
-use super::complex::Complex;
+use super::Complex;
 use super::edge::Edge;
 use super::fit::{Fit, Problem, Seen, damp};
 use super::piece::{BAND, LENGTH, MARGIN, Pieces, pixel_size};

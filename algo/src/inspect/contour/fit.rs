@@ -30,8 +30,8 @@
 //! # Shapes and units
 //! e and distances in px of the picture along d. w in counts.
 
+use super::Complex;
 use super::beyond::Wall;
-use super::complex::Complex;
 use super::edge::{Edge, Profile};
 use super::piece::{BAND, Piece, Pixel};
 use super::sample::Signals;

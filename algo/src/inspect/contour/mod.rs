@@ -24,7 +24,6 @@
 //! mm in the plane's frame, px in the picture, turns, counts.
 
 mod beyond;
-mod complex;
 mod edge;
 mod find;
 mod fit;
@@ -38,7 +37,7 @@ mod verdict;
 mod view;
 
 pub use crate::math::associate::Point;
-pub use complex::Complex;
+pub use crate::math::complex::Complex;
 pub use find::{Contour, find};
 pub use inputs::{Input, PIECE_PX, Source, inputs};
 pub use verdict::{Outcome, State};

@@ -1,7 +1,7 @@
 //! A contour in pieces of about two pixels, each with the pixels across it.
 
+use super::Complex;
 use super::beyond::{Gradient, Wall, border, shadow};
-use super::complex::Complex;
 use super::sample::Signals;
 use super::shape::{Foot, Shape};
 use super::view::{Setup, Spot, View};

@@ -3,7 +3,7 @@
 //! Rows of the picture cross the ring in runs, which are read at once, each frame's samples in their
 //! order in memory. Between runs the distance from the contour tells how far the next one is.
 
-use super::complex::Complex;
+use super::Complex;
 use super::piece::{BAND, MARGIN, Piece, Pieces, Pixel};
 use super::sample::Signals;
 use super::shape::Shape;

@@ -6,7 +6,7 @@
 //! are added once per pixel, with weights N r over their sum: N is for the noise, r for coarse
 //! fringes, in which a floor hardly differs from the sheet.
 
-use super::complex::Complex;
+use super::Complex;
 use super::view::{Fringes, Setup, Spot, View};
 use alloc::vec::Vec;
 

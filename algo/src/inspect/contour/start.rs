@@ -5,7 +5,7 @@
 //! both means leave are least; material is in phase with the plane. Pixels beside the split that see
 //! both tell by their share where in between the edge lies. The shape goes through these edges.
 
-use super::complex::Complex;
+use super::Complex;
 use super::sample::Signals;
 use super::shape::Shape;
 use super::view::View;

@@ -1,6 +1,6 @@
 //! What became of a piece of a contour, and of all of them.
 
-use super::complex::Complex;
+use super::Complex;
 use super::fit::{CHI_SQUARE, Fit, Problem};
 use super::piece::BAND;
 use super::view::View;

@@ -1,6 +1,6 @@
 //! What contours need of the caller: how the camera sees a plane, and what the plane's light is.
 
-use super::complex::Complex;
+use super::Complex;
 use crate::geometry::Vector;
 use alloc::vec::Vec;
 
