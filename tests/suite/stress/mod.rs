@@ -3,7 +3,7 @@
 //! - [`stack`]: frames of any samples, decoded in every way; [`bounds`]: the largest difference
 //!   from the textbook; [`random`]: seeded stacks of every form; [`rig`]: rigs for triangulation;
 //!   [`twins`]: a rig that is compared with the textbook.
-//! - Each other module tests one kind of limit; the bounds are in `algo`'s README.
+//! - Each other module tests one kind of limit; [`bounds`] has what each rounding adds.
 
 mod arctangent;
 mod bounds;

@@ -32,7 +32,7 @@
 //! others, and at coarser levels, it branches to the form of their number in every block.
 //!
 //! **Accuracy.** ε / r_K turn of the textbook in f64, with ε from the arctangent and the rounding
-//! of samples (algo/README.md):
+//! of samples (`tests/suite/stress/bounds.rs`):
 //! `any_shifts_depth_ratios_size_and_stride_decode_as_the_textbook_says`; no wrong fringe order:
 //! `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`; the same bits on every back-end:
 //! `every_back_end_gives_the_same_bits`.

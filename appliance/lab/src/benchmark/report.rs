@@ -1,4 +1,19 @@
 //! The results as one JSON object, as CSV, and as tables for people.
+//!
+//! | key of the object | meaning |
+//! |---|---|
+//! | `machine` | where: processor, cores, architecture, clock, latency of memory, speed of a copy |
+//! | `kernel.floor_ns_per_px`, `.floor_range` | a loop that only reads 12 frames of 8 bits and writes one map of 32 bits, 1456 × 1088 |
+//! | `kernel.<variant>.ns_per_px`, `.least_ns_per_px` | processor time of a set, per pixel of one frame: median, least |
+//! | `….hot_ns_per_px`, `.ns_per_row` | of eight rows again and again; of a row beside its pixels |
+//! | `….instructions_per_px` | absent where the processor's counters cannot be read |
+//! | `….x_floor`, `.x_floor_range` | in floors of the same round: median, least and most |
+//! | `….right` | share of pixels within 0.05 turn, or rejected where it is dark |
+//! | `accuracy[]` | what decoded which sequence, its time, and error, unresolved and gross pixels: means over the parts |
+//! | `budget.<columns>x<rows>.<frames>` | of a cycle: `exposure_ms`, `stages`, `verdict_ms`, `total_ms`; `one_thread_ms`, `kernel_ms`, `x_kernel` of processor time |
+//! | `….production_`, `….aligned_`, `….moved_golden_N` | frames to readings of a part that lies as taught, with its motion taken back, of a part that was moved |
+//!
+//! A variant is the implementation and the workload, which [`super::workload`] names.
 
 use super::budget::{Budget, Lies};
 use super::gauges::Gauges;
@@ -10,8 +25,6 @@ use serde_json::{Map, json};
 use std::fmt::Write as _;
 
 /// What was measured; `None` where it was not asked for.
-///
-/// Its JSON is one object, whose keys are documented in the README of `algo`.
 #[derive(Debug, Serialize)]
 pub struct Report {
     /// The machine.
