@@ -3,7 +3,7 @@
 //! Two layouts are read. Either each device has a file of its own with its pose in the world
 //! (X_device = R·X_world + t); or one file has both, with R and T from the camera to the projector
 //! as `stereoCalibrate` gives them, and perhaps the pose of the plate that lies in the reference
-//! plane as `solvePnP` gives it. docs/calibration.md lists the names.
+//! plane as `solvePnP` gives it. docs/setup.md lists the names.
 
 mod matrix;
 mod names;
