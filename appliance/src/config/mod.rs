@@ -1,12 +1,12 @@
 //! The configuration: one TOML file, every key optional.
 //!
-//! A key is described in `keys.md`, from which docs/configuration.md is checked.
+//! A key is described in docs/configuration.md, whose table the program contains.
 
 mod devices;
 mod exposing;
 mod keys;
 
-pub use keys::{Key, TABLE, keys};
+pub use keys::{Key, keys};
 
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::place::IN_STATE;
