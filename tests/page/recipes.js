@@ -95,15 +95,16 @@ export async function recipes({ page, step, verdict, trigger }) {
   });
 
   await step("a copy of a recipe is another one, with the same gauges", async () => {
-    const before = await recipe(1), count = () => document.querySelectorAll("#recipe-rows tr:not(.before)").length;
+    const before = await recipe(1);
+    const count = (wanted) => page.waitForFunction((wanted) => document.querySelectorAll("#recipe-rows tr:not(.before)").length === wanted, wanted);
     await rows.first().locator("button:has-text('Copy')").click();
     await notice("recipe 2 is a copy of recipe 1");
-    await page.waitForFunction(`(${count})() === 2`);
+    await count(2);
     const copy = await recipe(2);
     assert.deepEqual(copy.gauges, before.gauges);
     await rows.last().locator("button:has-text('Delete')").click();
     await page.click("#question-choices button:has-text('Delete')");
-    await page.waitForFunction(`(${count})() === 1`);
+    await count(1);
   });
 
   await step("a recipe is deleted after a question, not while it is active, and comes back", async () => {

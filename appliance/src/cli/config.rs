@@ -1,7 +1,7 @@
 //! `fringed config check [FILE]` and `fringed config keys`.
 
 use super::options::{Json, Output};
-use crate::config::{Backend, Config, TABLE, keys};
+use crate::config::{Backend, Config, keys, table};
 use crate::error::{Exit, Result};
 use crate::head::calibration::place::Place;
 use crate::production::backend;
@@ -38,7 +38,7 @@ impl ConfigCommand {
                 Ok(())
             }
             Self::Keys { .. } => {
-                say!("{}", TABLE.trim_end());
+                say!("{}", table().collect::<Vec<_>>().join("\n"));
                 Ok(())
             }
             Self::Check { file, output } => {

@@ -20,9 +20,14 @@ pub struct Key {
     pub meaning: &'static str,
 }
 
-/// Every key: the rows of the table in docs/configuration.md.
+/// The lines of the table of all keys, in Markdown.
+pub fn table() -> impl Iterator<Item = &'static str> {
+    DOCUMENT.lines().filter(|line| line.starts_with('|'))
+}
+
+/// Every key: the rows of [`table`].
 pub fn keys() -> impl Iterator<Item = Key> {
-    DOCUMENT.lines().filter_map(|row| {
+    table().filter_map(|row| {
         let row = row.strip_prefix("| `")?.strip_suffix(" |")?;
         let (name, row) = row.split_once("` | ")?;
         let mut cells = row.split(" | ");

@@ -6,7 +6,7 @@ mod devices;
 mod exposing;
 mod keys;
 
-pub use keys::{Key, keys};
+pub use keys::{Key, keys, table};
 
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::place::IN_STATE;
