@@ -1,7 +1,6 @@
 //! A contour from pixels: pieces about where it is expected, their edges, the shape through them,
 //! and again about that, until nothing moves.
 
-use super::Complex;
 use super::edge::Edge;
 use super::fit::{Fit, Problem, Seen, damp};
 use super::piece::{BAND, LENGTH, MARGIN, Pieces, pixel_size};
@@ -12,6 +11,7 @@ use super::start::start;
 use super::verdict::{Outcome, State, state};
 use super::view::{Setup, View};
 use crate::math::associate::{Point, associate, response};
+use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 

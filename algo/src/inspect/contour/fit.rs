@@ -30,12 +30,12 @@
 //! # Shapes and units
 //! e and distances in px of the picture along d. w in counts.
 
-use super::Complex;
 use super::beyond::Wall;
 use super::edge::{Edge, Profile};
 use super::piece::{BAND, Piece, Pixel};
 use super::sample::Signals;
 use super::view::{Fringes, View};
+use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 

@@ -1,10 +1,10 @@
 //! A contour in pieces of about two pixels, each with the pixels across it.
 
-use super::Complex;
 use super::beyond::{Gradient, Wall, border, shadow};
 use super::sample::Signals;
 use super::shape::{Foot, Shape};
 use super::view::{Setup, Spot, View};
+use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::ops::Range;
 

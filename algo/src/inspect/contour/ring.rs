@@ -3,11 +3,11 @@
 //! Rows of the picture cross the ring in runs, which are read at once, each frame's samples in their
 //! order in memory. Between runs the distance from the contour tells how far the next one is.
 
-use super::Complex;
 use super::piece::{BAND, MARGIN, Piece, Pieces, Pixel};
 use super::sample::Signals;
 use super::shape::Shape;
 use super::view::{Spot, View};
+use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::ops::Range;
 

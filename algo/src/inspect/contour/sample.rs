@@ -6,8 +6,8 @@
 //! are added once per pixel, with weights N r over their sum: N is for the noise, r for coarse
 //! fringes, in which a floor hardly differs from the sheet.
 
-use super::Complex;
 use super::view::{Fringes, Setup, Spot, View};
+use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
 /// A view with what is known of its light.

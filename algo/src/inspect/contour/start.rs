@@ -5,11 +5,11 @@
 //! both means leave are least; material is in phase with the plane. Pixels beside the split that see
 //! both tell by their share where in between the edge lies. The shape goes through these edges.
 
-use super::Complex;
 use super::sample::Signals;
 use super::shape::Shape;
 use super::view::View;
 use crate::math::associate::{Point, associate};
+use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
 /// Distance of normals, px, and how many there are at most.

@@ -1,9 +1,9 @@
 //! What became of a piece of a contour, and of all of them.
 
-use super::Complex;
 use super::fit::{CHI_SQUARE, Fit, Problem};
 use super::piece::BAND;
 use super::view::View;
+use crate::math::complex::Complex;
 
 /// Fewest pixels of a piece.
 const PIXELS: usize = 8;

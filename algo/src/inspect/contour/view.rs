@@ -1,7 +1,7 @@
 //! What contours need of the caller: how the camera sees a plane, and what the plane's light is.
 
-use super::Complex;
 use crate::geometry::Vector;
+use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
 /// What a pixel's line of sight meets on the plane.
