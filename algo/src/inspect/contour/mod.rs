@@ -37,7 +37,6 @@ mod verdict;
 mod view;
 
 pub use crate::math::associate::Point;
-pub use crate::math::complex::Complex;
 pub use find::{Contour, find};
 pub use inputs::{Input, PIECE_PX, Source, inputs};
 pub use verdict::{Outcome, State};

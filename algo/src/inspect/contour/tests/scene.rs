@@ -5,7 +5,8 @@
 //! numbers and the interface.
 
 use crate::geometry::Vector;
-use crate::inspect::contour::{Complex, Fringes, Setup, Spot, View};
+use crate::inspect::contour::{Fringes, Setup, Spot, View};
+use crate::math::complex::Complex;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::vec::Vec;

@@ -2,9 +2,10 @@
 
 use super::light::{GoldenSignal, Levels, Signal};
 use crate::geometry::{Triangulator, Vector};
-use crate::inspect::contour::{Complex, Spot, View};
+use crate::inspect::contour::{Spot, View};
 use crate::inspect::feature::PlaneFrame;
 use crate::inspect::strips::near::{Near, NodeRow};
+use crate::math::complex::Complex;
 
 /// The plane of a face as it lies now.
 #[derive(Clone, Debug)]

@@ -1,7 +1,7 @@
 //! The demodulated light of pixels: from the frames of a part, or from golden's signal.
 
 use crate::frame::{FrameView, Samples};
-use crate::inspect::contour::Complex;
+use crate::math::complex::Complex;
 use crate::pattern::Sequence;
 use alloc::sync::Arc;
 use alloc::vec::Vec;

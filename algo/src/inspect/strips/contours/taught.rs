@@ -5,12 +5,13 @@ use super::light::{GoldenSignal, Levels, Signal};
 use super::outline::{Start, ground_below, start};
 use super::shape::Outline;
 use crate::geometry::Vector;
-use crate::inspect::contour::{Complex, Fringes, Setup, Spot, State, View};
+use crate::inspect::contour::{Fringes, Setup, Spot, State, View};
 use crate::inspect::feature::{Feature, FeatureKind, PlaneFrame};
 use crate::inspect::strips::fits::Fit;
 use crate::inspect::strips::gauges::Unmeasurable;
 use crate::inspect::strips::golden::Golden;
 use crate::inspect::strips::near::Near;
+use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
 /// How far from its expected place a contour is looked for, mm.
