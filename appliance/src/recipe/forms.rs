@@ -46,8 +46,13 @@ fn feature(kind: FeatureKind) -> Value {
     json!({
         "kind": kind.name(), "about": about, "shapes": shapes,
         "around_mm": kind.is_contour().then_some(AROUND_MM),
-        "parameters": parameters(kind), "gauges": gauges(kind),
+        "parameters": parameters(kind), "gauges": gauges(kind), "size": size(kind),
     })
+}
+
+/// The kind of gauge that measures a feature whose size is one number.
+fn size(kind: FeatureKind) -> Option<&'static str> {
+    matches!(kind, FeatureKind::Circle).then_some("diameter")
 }
 
 /// The keys of a feature beside its name, kind and region.

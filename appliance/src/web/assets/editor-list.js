@@ -125,14 +125,19 @@ function put(kind, of, limits) {
 // A new gauge of a kind on the chosen features.
 export const addGauge = (kind, limits) => alter("", () => put(kind, fitting(kind).map(({ name }) => name), limits));
 
-// Holes that are found and whose diameter nothing measures, as many as there is room for.
+// Features whose size nothing measures, as many as there is room for.
 export function unmeasured() {
   const { features, gauges } = state.list;
-  const holes = features.filter(({ kind, name }) => kind === "circle" && !gauges.some((gauge) => gauge.kind === "diameter" && gauge.of.includes(name)));
-  return holes.slice(0, state.kinds.bounds.gauges - gauges.length);
+  const sized = features.filter((one) => {
+    const { size } = featureKind(one);
+    return size && !gauges.some((gauge) => gauge.kind === size && gauge.of.includes(one.name));
+  });
+  return sized.slice(0, state.kinds.bounds.gauges - gauges.length);
 }
-// Gauges of their diameters, as one step.
-export const addDiameters = (limits) => alter("", () => unmeasured().forEach(({ name }) => put(kindOf(state.kinds, { kind: "diameter" }), [name], limits)));
+// The kind of gauge that measures the size of a feature.
+export const sizeKind = (feature) => kindOf(state.kinds, { kind: featureKind(feature).size });
+// Gauges of their sizes, as one step.
+export const addSizes = (usualLimits) => alter("", () => unmeasured().forEach((feature) => put(sizeKind(feature), [feature.name], usualLimits(sizeKind(feature)))));
 
 // Functions that set every place where a feature or a datum system is named.
 export function naming(what, one) {

@@ -1,7 +1,7 @@
 // The lists of the editor: each feature, datum system and gauge is a row that opens as a form.
 import { $, button, fill, make, text } from "./element.js";
 import { choose } from "./question.js";
-import { addDiameters, addGauge, featureKind, fitting, foundOf, hanging, remove, spoken, state, unmeasured } from "./editor-list.js";
+import { addGauge, addSizes, featureKind, fitting, foundOf, hanging, remove, sizeKind, spoken, state, unmeasured } from "./editor-list.js";
 import { nameField, parameter } from "./editor-fields.js";
 import { gaugeForm, gaugeWords, usualLimits } from "./editor-gauges.js";
 import { profile } from "./found.js";
@@ -122,8 +122,8 @@ function drawOffers() {
     add.disabled = full;
     return add;
   }), ...(fit.length ? [] : [make("span", "quiet", "no gauge takes these together")]));
-  const holes = unmeasured().length, add = button(`Measure ${holes === 1 ? "the diameter of a hole" : `the diameters of ${holes} holes`}`, "", () => addDiameters(usualLimits(kindOf(state.kinds, { kind: "diameter" }))));
-  fill($("gauge-holes"), ...(holes ? [add] : []));
+  const sized = unmeasured(), which = sized.length === 1 ? `of ${sized[0].name}` : `of ${sized.length} features`;
+  fill($("gauge-holes"), ...(sized.length ? [button(`Measure the ${spoken(sizeKind(sized[0]).kind)} ${which}`, "", () => addSizes(usualLimits))] : []));
 }
 
 // Draws the lists anew; the focus stays in its row, or at its place in the open form.
