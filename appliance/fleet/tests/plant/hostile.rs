@@ -174,7 +174,7 @@ fn a_connection_to_another_host_is_refused_and_one_to_the_right_one_is_not() {
     wait("the wrong host", || {
         let log = place.log();
         let mut lines = log.lines().filter(|line| line.contains(&wrong));
-        lines.any(|line| line.contains("not valid for name"))
+        lines.any(|line| line.contains("its certificate is for another name"))
     });
     let reached = numbers(&place, "SELECT url, reachable FROM head ORDER BY reachable");
     assert_eq!(reached.last().unwrap(), &(right, 1));
