@@ -368,6 +368,22 @@ mod tests {
         }
     }
 
+    /// Each picture beside its inverse.
+    fn against_inverses(
+        pictures: &[[Vec<u8>; 2]],
+        (width, height): (usize, usize),
+    ) -> CodePictures<'_> {
+        let frame =
+            |samples| FrameView::new(Samples::Eight(samples), width, height, width).unwrap();
+        CodePictures {
+            bits: pictures.iter().map(|[own, _]| frame(own)).collect(),
+            against: pictures
+                .iter()
+                .map(|[_, inverse]| vec![frame(inverse)])
+                .collect(),
+        }
+    }
+
     #[test]
     fn a_code_alone_gives_the_coordinate_within_a_tenth_of_a_cell_where_both_borders_are_seen() {
         let directions = CODINGS.map(|coding| [true, false].map(|vertical| (coding, vertical)));
@@ -381,16 +397,7 @@ mod tests {
             };
             let pictures = pictures(coding, vertical);
             let (width, height) = size(vertical);
-            let frame =
-                |samples| FrameView::new(Samples::Eight(samples), width, height, width).unwrap();
-            let code = CodePictures {
-                bits: pictures.iter().map(|[own, _]| frame(own)).collect(),
-                against: pictures
-                    .iter()
-                    .map(|[_, inverse]| vec![frame(inverse)])
-                    .collect(),
-            };
-            let map = code
+            let map = against_inverses(&pictures, (width, height))
                 .phases(&cells, vertical, LeastModulation::default(), 255)
                 .unwrap()
                 .map;
@@ -466,15 +473,7 @@ mod tests {
             let pictures: Vec<[Vec<u8>; 2]> = (0..BITS)
                 .map(|bit| [picture(bit, false), picture(bit, true)])
                 .collect();
-            let frame = |samples| FrameView::new(Samples::Eight(samples), WIDTH, 1, WIDTH).unwrap();
-            let code = CodePictures {
-                bits: pictures.iter().map(|[own, _]| frame(own)).collect(),
-                against: pictures
-                    .iter()
-                    .map(|[_, inverse]| vec![frame(inverse)])
-                    .collect(),
-            };
-            let CodePhases { map, missing } = code
+            let CodePhases { map, missing } = against_inverses(&pictures, (WIDTH, 1))
                 .phases(&cells, true, LeastModulation::default(), 255)
                 .unwrap();
             let (mut most, mut resolved) = (0.0, 0);
