@@ -6,7 +6,6 @@ import { nameField, parameter } from "./editor-fields.js";
 import { gaugeForm, gaugeWords, usualLimits } from "./editor-gauges.js";
 import { profile } from "./found.js";
 import { signed } from "./number.js";
-import { kindOf } from "./api.js";
 
 const LISTS = { features: "editor-features", datums: "editor-datums", gauges: "editor-gauges" };
 // Functions that show what a try has found in the rows and in the open form.
