@@ -1,10 +1,9 @@
 //! Complex numbers, rounding to whole numbers, neighbours in a frame, derivatives, and least
 //! squares for a few unknowns.
 
-pub mod associate;
 pub mod complex;
-pub(crate) mod derivative;
 pub(crate) mod nearest;
+pub(crate) mod propagate;
 pub mod solve;
 
 use core::ops::Range;

@@ -3,7 +3,7 @@
 
 use algo::inspect::contour::Outcome;
 use algo::inspect::section::{self, flush, gap};
-use algo::inspect::{Drawn, Geometry, Place, Profile};
+use algo::inspect::{Drawn, FeatureKind, Geometry, Place, Profile};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -61,15 +61,25 @@ pub(super) fn fit(
 ) -> Value {
     let outline: Vec<Place> = outline.iter().copied().map(px).collect();
     let mut fit = json!({ "outline": outline, "closed": closed, "centre": centre.map(px) });
-    match geometry {
-        Some(Geometry::Circle { radius, .. }) => fit["radius_mm"] = radius.into(),
-        Some(Geometry::Line { .. }) => fit["ends_mm"] = json!(ends),
-        Some(Geometry::Plane { point, normal }) => {
+    let Some(Geometry {
+        kind,
+        point,
+        normal,
+        sizes,
+        ..
+    }) = geometry
+    else {
+        return fit;
+    };
+    match (kind, sizes) {
+        (FeatureKind::Plane, _) => {
             let [x, y, z] = [normal.x, normal.y, normal.z];
             fit["equation"] = json!([x, y, z, normal.dot(point)]);
             fit["tilt_deg"] = z.clamp(-1.0, 1.0).acos().to_degrees().into();
         }
-        Some(Geometry::Slot { .. }) | None => {}
+        (_, [Some(diameter), None]) => fit["radius_mm"] = (diameter / 2.0).into(),
+        (_, [None, None]) => fit["ends_mm"] = json!(ends),
+        _ => {}
     }
     fit
 }

@@ -181,14 +181,14 @@ impl Outlined {
             let outline = outline.filter(|_| self.kind.is_contour());
             let outline = outline.unwrap_or_else(moved);
             let closed = !matches!(self.kind, FeatureKind::Line | FeatureKind::Section);
-            let centre = geometry.and_then(|of| drawing.place(of.point()));
+            let centre = geometry.and_then(|of| drawing.place(of.point));
             let ends = drawn.as_ref().and_then(|drawn| drawn.ends);
             let ends = ends.map(|ends| ends.map(list));
             drawn::fit(geometry, (&outline, closed), (centre, ends))
         };
         let profile = drawn.as_ref().and_then(|drawn| drawn.profile.as_ref());
         let own = self.kind.is_contour().then_some("own");
-        let direction = |of: Geometry| list(of.direction().unwrap_or(of.normal()));
+        let direction = |of: Geometry| list(of.direction.unwrap_or(of.normal));
         Some(Seen {
             name: &self.name,
             kind: self.kind.name(),
@@ -197,9 +197,9 @@ impl Outlined {
             remedy,
             found: found.map(|found| found.found),
             blur_px: found.and_then(|found| found.rim).map(|rim| rim.blur_px),
-            centre: geometry.map(|of| list(of.point())),
+            centre: geometry.map(|of| list(of.point)),
             direction: geometry.map(direction),
-            size: geometry.map_or(Vec::new(), |of| of.sizes().into_iter().flatten().collect()),
+            size: geometry.map_or(Vec::new(), |of| of.sizes.into_iter().flatten().collect()),
             plane: self.plane.as_deref().or(own),
             fit: (state == State::Found).then(fit),
             profile: profile.map(drawn::profile),

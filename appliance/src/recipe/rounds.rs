@@ -299,7 +299,10 @@ fn are_found(findings: &Findings) -> impl Iterator<Item = bool> {
         } = feature.rim?;
         let reading = reading.as_ref()?;
         Some(match feature.geometry? {
-            Geometry::Slot { length, width, .. } => {
+            Geometry {
+                sizes: [Some(length), Some(width)],
+                ..
+            } => {
                 let is_long = length >= LONG * width;
                 is_long && feature.found >= GOLDEN_SLOT && off_mm <= SLOT_PX * pixel_mm
             }

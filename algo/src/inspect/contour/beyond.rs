@@ -13,7 +13,7 @@
 //! (n·l)/(n_z·l) times as much as the face, n its normal, l the direction to the light.
 
 use super::sample::Signals;
-use super::shape::{Foot, Shape};
+use super::shape::{Foot, Parameters, Shape};
 use super::view::{Setup, View};
 use crate::geometry::Vector;
 
@@ -112,8 +112,8 @@ pub fn shadow(setup: &Setup, (x, y): (f64, f64), into: (f64, f64)) -> f64 {
 
 /// The signed distance, mm, of what borders the background beside the contour, as seen at (x, y) of
 /// the plane, and the place on the plane whose distance that is; `None` if there is nothing.
-pub fn border<const N: usize>(
-    (shape, p): (&impl Shape<N>, &[f64; N]),
+pub fn border(
+    (shape, p): (&dyn Shape, &Parameters),
     setup: &Setup,
     thickness: f64,
     (x, y): (f64, f64),

@@ -1,16 +1,16 @@
 //! A contour from pixels: pieces about where it is expected, their edges, the shape through them,
 //! and again about that, until nothing moves.
 
+use super::associate::{Point, associate, response};
 use super::edge::Edge;
 use super::fit::{Fit, Problem, Seen, damp};
 use super::piece::{BAND, LENGTH, MARGIN, Pieces, pixel_size};
 use super::ring::Ring;
 use super::sample::Signals;
-use super::shape::Shape;
+use super::shape::{Covariance, Parameters, Shape};
 use super::start::start;
 use super::verdict::{Outcome, State, state};
 use super::view::{Setup, View};
-use crate::math::associate::{Point, associate, response};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
@@ -44,18 +44,21 @@ const FACE: [f64; 2] = [1.0, 4.0];
 /// A thickness, in widths of the band as seen head-on, that no wall of a sheet exceeds in the
 /// picture unless it fills it.
 const THICK: f64 = 3.0;
+/// Rounds in which such a wall moves the edges of all pieces: the first moves them, and the second
+/// with the blur that belongs to them.
+const THICK_ROUNDS: usize = 2;
 
 /// A contour as it was found.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Contour<const N: usize> {
+pub struct Contour {
     /// What became of it.
     pub state: State,
     /// The share of its pieces with an edge.
     pub found: f64,
     /// Its parameters; where it is not found, those that were expected or came nearest.
-    pub parameters: [f64; N],
+    pub parameters: Parameters,
     /// Their covariance by the noise of samples.
-    pub covariance: [[f64; N]; N],
+    pub covariance: Covariance,
     /// σ of the camera's blur at its rim, px.
     pub blur: f64,
     /// RMS of the light at its rim that neither noise nor the model explains, of the material's,
@@ -72,24 +75,19 @@ pub struct Contour<const N: usize> {
     pub face: (f64, f64),
     /// Half of the change of the parameters between no wall and a thick one, where the thickness is
     /// not known.
-    pub wall: Option<[f64; N]>,
+    pub wall: Option<Parameters>,
 }
 
 /// Finds a contour near its expected parameters.
 ///
 /// Where the sheet's thickness is not known, the parameters are the mean of what no wall and a
 /// thick one would make them.
-pub fn find<const N: usize>(
-    shape: &impl Shape<N>,
-    expected: &[f64; N],
-    view: &impl View,
-    setup: &Setup,
-) -> Contour<N> {
+pub fn find(shape: &dyn Shape, expected: &Parameters, view: &impl View, setup: &Setup) -> Contour {
     let mut contour = Contour {
         state: State::Unseen,
         found: 0.0,
         parameters: *expected,
-        covariance: [[0.0; N]; N],
+        covariance: Covariance::default(),
         blur: FIRST_BLUR,
         unexplained: 0.0,
         pixel: 0.0,
@@ -115,32 +113,42 @@ pub fn find<const N: usize>(
             ratios: Vec::new(),
         },
     };
-    let about = (shape, expected);
-    if let Some(start) = start(about, &search.signals, pixel, &mut search.room.ratios) {
-        contour.parameters = start;
-    }
+    let start = start(
+        (shape, expected),
+        &search.signals,
+        pixel,
+        &mut search.room.ratios,
+    );
+    contour.parameters = start.parameters.unwrap_or(*expected);
     search.run(&mut contour, setup.thickness.unwrap_or(0.0));
+    search.judge(&mut contour, start.continues);
     if setup.thickness.is_none() && contour.state == State::Found {
-        let mut thick = contour.clone();
-        search.run(&mut thick, THICK * BAND * pixel);
-        if thick.state == State::Found {
-            let mut half = [0.0; N];
-            let ends = contour.parameters.iter_mut().zip(thick.parameters);
-            for (half, (p, thick)) in half.iter_mut().zip(ends) {
-                *half = (thick - *p) / 2.0;
-                *p += *half;
-            }
-            contour.wall = Some(half);
-        }
+        contour.wall = search.wall(&contour);
+    }
+    for (p, half) in contour
+        .parameters
+        .iter_mut()
+        .zip(contour.wall.unwrap_or_default())
+    {
+        *p += half;
     }
     contour
 }
 
 /// A search for a contour.
-struct Search<'a, S, V> {
-    shape: &'a S,
+struct Search<'a, V> {
+    shape: &'a dyn Shape,
     signals: Signals<'a, V>,
     room: Room,
+}
+
+/// What a round changes, px.
+#[derive(Clone, Copy, Debug)]
+struct Change {
+    /// How far the place of the contour moves that moves farthest.
+    moved: f64,
+    /// By how much the blur changes.
+    sharper: f64,
 }
 
 /// How the blur would have to change, from all pieces.
@@ -150,76 +158,91 @@ struct Sharpness {
     right: f64,
 }
 
-impl<S, V: View> Search<'_, S, V> {
-    /// Goes on from where a contour is until nothing moves, with few pieces and then with all.
-    fn run<const N: usize>(&mut self, contour: &mut Contour<N>, thickness: f64)
-    where
-        S: Shape<N>,
-    {
+impl<V: View> Search<'_, V> {
+    /// Goes on from where a contour is until nothing moves: with one of some pieces, then with all.
+    fn run(&mut self, contour: &mut Contour, thickness: f64) {
         let pieces = self.shape.length(&contour.parameters) / (LENGTH * contour.pixel);
         // Casts cut off, and keep to the range of their type.
-        let few = (pieces as usize / LEAST).clamp(1, FEW);
-        let near = self.approach(contour, thickness, ROUGH[0], few, STILL);
-        if few > 1 && near {
-            self.approach(contour, thickness, ROUGH[1], 1, LAST);
-        } else if few > 1 {
-            self.approach(contour, thickness, ROUGH[0], 1, STILL);
-        }
-        self.judge(contour);
-    }
-
-    /// Goes on with one of `some` pieces, until no place moves by `still` px. Whether the pieces
-    /// determine the contour.
-    fn approach<const N: usize>(
-        &mut self,
-        contour: &mut Contour<N>,
-        thickness: f64,
-        mut rough: f64,
-        some: usize,
-        still: f64,
-    ) -> bool
-    where
-        S: Shape<N>,
-    {
-        let shape = self.shape;
-        for _ in 0..ROUNDS {
-            let before = (contour.parameters, contour.blur);
-            let room = &mut self.room;
-            let of = (shape, &contour.parameters);
-            if !(room.moved < MARGIN) {
-                room.pieces.divide(of, &self.signals, contour.pixel);
-                room.ring.gather(of, &self.signals, &mut room.pieces);
-                room.moved = 0.0;
+        let mut some = (pieces as usize / LEAST).clamp(1, FEW);
+        let (mut rough, mut still) = (ROUGH[0], STILL);
+        for round in 0..2 * ROUNDS {
+            if round == ROUNDS {
+                some = 1;
             }
-            room.pieces.place(of, self.signals.setup, thickness, some);
-            self.look(contour, rough, some);
-            let room = &mut self.room;
-            let points = &mut contour.points;
-            let found = associate(shape, &mut contour.parameters, points, &mut room.ratios);
-            let Some(covariance) = found else {
-                contour.parameters = before.0;
-                return false;
+            let Some(change) = self.round(contour, thickness, rough, some) else {
+                if some == 1 {
+                    break;
+                }
+                // Too few of them have an edge.
+                (some, rough) = (1, ROUGH[0]);
+                continue;
             };
-            contour.covariance = covariance;
-            let mut moved = 0.0_f64;
-            for piece in room.pieces.all.iter().step_by(some) {
-                let d = shape.distance(&contour.parameters, piece.foot.x, piece.foot.y);
-                moved = moved.max(libm::fabs(d) / contour.pixel);
+            let is_still = change.moved < still && change.sharper < SHARP;
+            if rough == ROUGH[1] && is_still {
+                if some == 1 {
+                    break;
+                }
+                (some, still) = (1, LAST);
             }
-            room.moved += moved;
-            let sharper = libm::fabs(contour.blur - before.1);
-            if rough == ROUGH[1] && moved < still && sharper < SHARP {
-                break;
-            }
-            if moved < NEAR && sharper < SHARPER {
+            if change.moved < NEAR && change.sharper < SHARPER {
                 rough = ROUGH[1];
             }
         }
-        true
+    }
+
+    /// Half of how a thick wall would change the parameters of a contour that was found as without
+    /// one; `None` if its pieces would not determine it.
+    fn wall(&mut self, contour: &Contour) -> Option<Parameters> {
+        let mut thick = contour.clone();
+        let thickness = THICK * BAND * contour.pixel;
+        for _ in 0..THICK_ROUNDS {
+            self.round(&mut thick, thickness, ROUGH[1], 1)?;
+        }
+        self.judge(&mut thick, 0.0);
+        let half = |i: usize| (thick.parameters[i] - contour.parameters[i]) / 2.0;
+        (thick.state == State::Found).then(|| core::array::from_fn(half))
+    }
+
+    /// Moves a contour to the edges of one of `some` pieces; `None` if these do not determine it.
+    fn round(
+        &mut self,
+        contour: &mut Contour,
+        thickness: f64,
+        rough: f64,
+        some: usize,
+    ) -> Option<Change> {
+        let (shape, before) = (self.shape, (contour.parameters, contour.blur));
+        let room = &mut self.room;
+        let of = (shape, &contour.parameters);
+        if !(room.moved < MARGIN) {
+            room.pieces.divide(of, &self.signals, contour.pixel);
+            room.ring.gather(of, &self.signals, &mut room.pieces);
+            room.moved = 0.0;
+        }
+        room.pieces.place(of, self.signals.setup, thickness, some);
+        self.look(contour, rough, some);
+        let room = &mut self.room;
+        let points = &mut contour.points;
+        let found = associate(shape, &mut contour.parameters, points, &mut room.ratios);
+        let Some(covariance) = found else {
+            contour.parameters = before.0;
+            return None;
+        };
+        contour.covariance = covariance;
+        let mut moved = 0.0_f64;
+        for piece in room.pieces.all.iter().step_by(some) {
+            let d = shape.distance(&contour.parameters, piece.foot.x, piece.foot.y);
+            moved = moved.max(libm::fabs(d) / contour.pixel);
+        }
+        room.moved += moved;
+        Some(Change {
+            moved,
+            sharper: libm::fabs(contour.blur - before.1),
+        })
     }
 
     /// Fits the edges of one of `some` pieces, makes points of them, and adapts the blur.
-    fn look<const N: usize>(&mut self, contour: &mut Contour<N>, rough: f64, some: usize) {
+    fn look(&mut self, contour: &mut Contour, rough: f64, some: usize) {
         contour.points.clear();
         contour.outcomes.clear();
         let (mut sharpness, mut face) = (Sharpness::default(), [0.0; 2]);
@@ -262,33 +285,24 @@ impl<S, V: View> Search<'_, S, V> {
         contour.face = (face[0] / face[1], 1.0 / libm::sqrt(face[1]));
     }
 
-    /// Says what became of the contour.
-    fn judge<const N: usize>(&self, contour: &mut Contour<N>)
-    where
-        S: Shape<N>,
-    {
+    /// Says what became of the contour, where the material goes on along this share of its normals.
+    fn judge(&self, contour: &mut Contour, continues: f64) {
         let mut points = contour.points.iter();
         for outcome in &mut contour.outcomes {
             if *outcome == Outcome::Accepted && points.next().is_none_or(|p| p.weight == 0.0) {
                 *outcome = Outcome::Outlier;
             }
         }
-        let (is_closed, gap) = (self.shape.is_closed(), self.shape.largest_gap());
-        (contour.state, contour.found) = state(&contour.outcomes, is_closed, gap);
+        (contour.state, contour.found) = state(&contour.outcomes, self.shape, continues);
     }
 }
 
-impl<const N: usize> Contour<N> {
+impl Contour {
     /// By how much the parameters change if every point of the rim lies farther towards the
     /// material by `shift` mm.
-    pub fn response(&self, shape: &impl Shape<N>, shift: impl Fn(&Point) -> f64) -> [f64; N] {
-        response(
-            shape,
-            &self.parameters,
-            &self.covariance,
-            &self.points,
-            shift,
-        )
+    pub fn response(&self, shape: &dyn Shape, shift: impl Fn(&Point) -> f64) -> Parameters {
+        let found = (&self.parameters, &self.covariance);
+        response(shape, found, &self.points, shift)
     }
 }
 

@@ -1,11 +1,11 @@
 //! Inputs of a contour's uncertainty beside noise: by how much its parameters are off for one
 //! standard uncertainty of each.
 
+use super::associate::Point;
 use super::beyond::{Wall, slope};
 use super::find::Contour;
-use super::shape::Shape;
+use super::shape::{Parameters, Shape};
 use super::view::Setup;
-use crate::math::associate::Point;
 use alloc::vec::Vec;
 
 /// A shift of every edge towards its material, px: by the model of the edge. Diameters of rendered
@@ -48,22 +48,17 @@ impl Source {
 
 /// An input of the uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Input<const N: usize> {
+pub struct Input {
     /// What is uncertain.
     pub source: Source,
     /// By how much each parameter is off for one standard uncertainty.
-    pub off: [f64; N],
+    pub off: Parameters,
 }
 
 /// The inputs of a contour that was found, whose rim has this radius, mm. What is uncertain of the
 /// plane and of all lengths is not among them: it is the same for planes and contours
 /// (`gauge/propagate.rs`).
-pub fn inputs<const N: usize>(
-    shape: &impl Shape<N>,
-    contour: &Contour<N>,
-    setup: &Setup,
-    rim: f64,
-) -> Vec<Input<N>> {
+pub fn inputs(shape: &dyn Shape, contour: &Contour, setup: &Setup, rim: f64) -> Vec<Input> {
     let p = &contour.parameters;
     let into = |point: &Point| {
         let along = shape.along(p, point.x, point.y).unwrap_or(0.0);
@@ -89,10 +84,10 @@ pub fn inputs<const N: usize>(
         let aside = |point: &Point| rim * dot(lean(point), into(point)) / libm::sqrt(3.0);
         inputs.push(of(Source::Rim, &aside));
     }
-    for i in 0..N {
+    for i in 0..shape.count() {
         let rate = |point: &Point| shape.derivative(p, point.x, point.y)[i];
         let squares = contour.points.iter().map(|point| rate(point) * rate(point));
-        let mut off = [0.0; N];
+        let mut off = Parameters::default();
         // Of light that is not explained all pieces of a side may be off alike.
         let light = LIGHT_PX * contour.unexplained;
         let of_all = PIECE_PX * PIECE_PX + light * light * contour.points.len() as f64;

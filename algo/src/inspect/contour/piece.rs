@@ -2,7 +2,7 @@
 
 use super::beyond::{Gradient, Wall, border, shadow};
 use super::sample::Signals;
-use super::shape::{Foot, Shape};
+use super::shape::{Foot, Parameters, Shape};
 use super::view::{Setup, Spot, View};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
@@ -96,9 +96,9 @@ fn frame(view: &impl View, (u, v): (f64, f64)) -> Option<[(f64, f64, f64); 2]> {
 impl Pieces {
     /// Divides a contour into pieces, whose pixels are gathered elsewhere. What the camera does not
     /// see of it has pieces without a middle.
-    pub fn divide<const N: usize>(
+    pub fn divide(
         &mut self,
-        (shape, p): (&impl Shape<N>, &[f64; N]),
+        (shape, p): (&dyn Shape, &Parameters),
         signals: &Signals<'_, impl View>,
         pixel: f64,
     ) {
@@ -135,9 +135,9 @@ impl Pieces {
 
     /// Moves one of `some` pieces to a contour that has hardly moved, and works out the distances of
     /// its pixels.
-    pub fn place<const N: usize>(
+    pub fn place(
         &mut self,
-        of: (&impl Shape<N>, &[f64; N]),
+        of: (&dyn Shape, &Parameters),
         setup: &Setup,
         thickness: f64,
         some: usize,
@@ -179,9 +179,9 @@ impl Piece {
 }
 
 impl Pixel {
-    fn place<const N: usize>(
+    fn place(
         &mut self,
-        (shape, p): (&impl Shape<N>, &[f64; N]),
+        (shape, p): (&dyn Shape, &Parameters),
         (setup, thickness): (&Setup, f64),
         piece: &Piece,
     ) {

@@ -5,7 +5,7 @@
 
 use super::piece::{BAND, MARGIN, Piece, Pieces, Pixel};
 use super::sample::Signals;
-use super::shape::Shape;
+use super::shape::{Parameters, Shape};
 use super::view::{Spot, View};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
@@ -28,9 +28,9 @@ pub struct Ring {
 impl Ring {
     /// Gathers the pixels within the band of each piece that look at places nearest to it, piece by
     /// piece.
-    pub fn gather<const N: usize>(
+    pub fn gather(
         &mut self,
-        (shape, p): (&impl Shape<N>, &[f64; N]),
+        (shape, p): (&dyn Shape, &Parameters),
         signals: &Signals<'_, impl View>,
         Pieces {
             all: pieces,
@@ -79,9 +79,9 @@ impl Ring {
     }
 
     /// Takes the light of the run that ends before a pixel.
-    fn take<const N: usize>(
+    fn take(
         &mut self,
-        (shape, p): (&impl Shape<N>, &[f64; N]),
+        (shape, p): (&dyn Shape, &Parameters),
         signals: &Signals<'_, impl View>,
         (end, v): (usize, usize),
         pieces: &[Piece],

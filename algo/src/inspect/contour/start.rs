@@ -5,10 +5,11 @@
 //! both means leave are least; material is in phase with the plane. Pixels beside the split that see
 //! both tell by their share where in between the edge lies. The shape goes through these edges.
 
+use super::associate::{Point, associate};
 use super::sample::Signals;
-use super::shape::Shape;
+use super::shape::{Parameters, Shape};
+use super::verdict::CONTINUES;
 use super::view::View;
-use crate::math::associate::{Point, associate};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
@@ -27,21 +28,31 @@ const SIGMA: f64 = 0.25;
 /// The least share of normals with an edge on the shape.
 const AGREED: f64 = 0.4;
 
+/// Where a contour begins.
+#[derive(Clone, Copy, Debug)]
+pub struct Start {
+    /// The parameters near the expected ones that go through the edges; `None` if too few agree.
+    pub parameters: Option<Parameters>,
+    /// The share of normals along which there is material only.
+    pub continues: f64,
+}
+
 /// A pixel on a normal: its distance from the contour as expected, px, and its light.
 type OnNormal = (f64, Complex);
 
-/// The parameters near the expected ones that go through the edges; `None` if too few agree.
-pub fn start<const N: usize>(
-    (shape, expected): (&impl Shape<N>, &[f64; N]),
+/// Looks for the edges on the normals of a contour as expected.
+pub fn start(
+    (shape, expected): (&dyn Shape, &Parameters),
     signals: &Signals<'_, impl View>,
     pixel: f64,
     ratios: &mut Vec<f64>,
-) -> Option<[f64; N]> {
+) -> Start {
     let length = shape.length(expected);
     let reach = signals.setup.reach / pixel;
     // Casts cut off, and keep to the range of their type.
     let count = (length / pixel / APART).clamp(8.0, MOST) as usize;
-    let (mut points, mut line) = (Vec::new(), Vec::new());
+    let material = CONTINUES * signals.mean(|level| level.taught);
+    let (mut points, mut line, mut continues) = (Vec::new(), Vec::new(), 0.0);
     for number in 0..count {
         let foot = shape.foot(expected, length * (number as f64 + 0.5) / count as f64);
         let at = |px: f64| {
@@ -53,7 +64,11 @@ pub fn start<const N: usize>(
         let Some(places) = at(0.0).zip(at(1.0)) else {
             continue;
         };
-        read(places, d, reach + BEYOND, signals, &mut line);
+        // Beyond the centre of curvature lies the other side.
+        let centre = 1.0 / (foot.curvature.max(f64::MIN_POSITIVE) * pixel);
+        let outside = reach + BEYOND;
+        let along = [outside.min(centre), outside];
+        read(places, d, along, signals, &mut line);
         if let Some(edge) = split(&line, signals) {
             let off = edge * pixel;
             points.push(Point {
@@ -62,16 +77,28 @@ pub fn start<const N: usize>(
                 variance: SIGMA * SIGMA * pixel * pixel,
                 weight: 1.0,
             });
+        } else if is_material(&line, material) {
+            continues += 1.0 / count as f64;
         }
     }
     let mut p = *expected;
-    associate(shape, &mut p, &mut points, ratios)?;
+    let found = associate(shape, &mut p, &mut points, ratios);
     let far = (reach + 1.0) * pixel;
     let agree = |point: &&Point| {
         let moved = shape.distance(expected, point.x, point.y);
         point.weight > 0.5 && libm::fabs(moved) < far
     };
-    (points.iter().filter(agree).count() as f64 >= AGREED * count as f64).then_some(p)
+    let agreed = points.iter().filter(agree).count() as f64 >= AGREED * count as f64;
+    Start {
+        parameters: (found.is_some() && agreed).then_some(p),
+        continues,
+    }
+}
+
+/// Whether all pixels of a normal together have the light of the material.
+fn is_material(line: &[OnNormal], least: f64) -> bool {
+    let sum = line.iter().fold(Complex::default(), |sum, of| sum + of.1);
+    line.len() > 2 * LEAST && sum.re >= least * line.len() as f64
 }
 
 /// A place of the picture, px.
@@ -81,7 +108,7 @@ type Place = (f64, f64);
 fn read(
     ((u, v), to): (Place, Place),
     d: impl Fn(f64, f64) -> f64,
-    reach: f64,
+    [inside, outside]: [f64; 2],
     signals: &Signals<'_, impl View>,
     line: &mut Vec<OnNormal>,
 ) {
@@ -91,8 +118,7 @@ fn read(
     let length = libm::sqrt(way.0 * way.0 + way.1 * way.1);
     let step = (way.0 / length, way.1 / length);
     // Casts cut off, and keep to the range of their type: places left of or above the frame are -0.
-    let reach = reach as i32;
-    for at in -reach..=reach {
+    for at in -(inside as i32)..=outside as i32 {
         let (u, v) = (u + step.0 * f64::from(at), v + step.1 * f64::from(at));
         if !(u > -0.5 && v > -0.5) {
             continue;

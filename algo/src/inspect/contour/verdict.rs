@@ -2,6 +2,7 @@
 
 use super::fit::{CHI_SQUARE, Fit, Problem};
 use super::piece::BAND;
+use super::shape::Shape;
 use super::view::View;
 use crate::math::complex::Complex;
 
@@ -14,7 +15,7 @@ const SIGMA: f64 = 0.25;
 /// Largest angle of the material's light from that of the plane, turns.
 const OFF: f64 = 0.125;
 /// The share of the taught modulation that a material which goes on has on both sides.
-const CONTINUES: f64 = 0.8;
+pub const CONTINUES: f64 = 0.8;
 /// By so much an edge beside a background as bright as the material must explain its pixels better
 /// than a face that goes on, in χ²: noise alone has as much once in 10⁵.
 const CLEAR: f64 = 25.0;
@@ -60,7 +61,7 @@ pub enum Outcome {
 pub enum State {
     /// It has a place and a size.
     Found,
-    /// The material goes on where it should be, of a closed contour.
+    /// The material goes on where it should be.
     Absent,
     /// Too little of it is seen, or an edge is elsewhere.
     Unseen,
@@ -140,9 +141,10 @@ fn is_absent(share: impl Fn(Outcome) -> f64) -> bool {
     continues >= ABSENT_OF_ALL && continues >= ABSENT * (1.0 - hidden)
 }
 
-/// The state of a contour by its pieces, and the share of pieces with an edge. Nothing longer than
-/// `gap` of it may be missing in one stretch.
-pub fn state(outcomes: &[Outcome], is_closed: bool, gap: f64) -> (State, f64) {
+/// The state of a contour by its pieces, and the share of pieces with an edge. The material goes on
+/// along this share of the contour's normals as far as it is looked for.
+pub fn state(outcomes: &[Outcome], shape: &dyn Shape, continues: f64) -> (State, f64) {
+    let is_closed = shape.is_closed();
     let count = outcomes.len().max(1) as f64;
     let share = |of: Outcome| outcomes.iter().filter(|&&is| is == of).count() as f64 / count;
     let found = share(Outcome::Accepted);
@@ -157,10 +159,11 @@ pub fn state(outcomes: &[Outcome], is_closed: bool, gap: f64) -> (State, f64) {
         };
         longest = longest.max(missing);
     }
-    let state = if found >= FOUND && longest as f64 <= gap * count {
+    let state = if found >= FOUND && longest as f64 <= shape.largest_gap() * count {
         State::Found
-    } else if is_closed && is_absent(share) && found <= EDGES {
-        // Where the material goes on beyond an edge the part has it elsewhere.
+    } else if (is_closed || continues >= ABSENT) && is_absent(share) && found <= EDGES {
+        // Where the material goes on beyond an edge the part has it elsewhere, unless it goes on as
+        // far as the edge may lie.
         State::Absent
     } else {
         State::Unseen

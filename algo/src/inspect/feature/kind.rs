@@ -1,58 +1,100 @@
 //! The kinds of features, and a feature of a part.
 
+use crate::inspect::contour::shape::{ContourKind, circle, line, slot};
 use crate::inspect::region::Region;
 
-/// What is found in the region of a feature.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
-pub enum FeatureKind {
-    /// Heights and deviations from golden, without a shape.
-    Surface,
-    /// The plane that fits best, by least squares.
-    Plane,
-    /// A straight edge of a face.
-    Line,
-    /// A round hole in a face.
-    Circle,
-    /// A slot with round ends in a face.
-    Slot,
-    /// A cut across a joint of two sheets.
-    Section,
+/// Declares the kinds: each with its name in recipes, and contours with what their file says of
+/// them.
+macro_rules! kinds {
+    (
+        surfaces { $($(#[$surface_doc:meta])* $surface:ident $surface_name:literal,)* }
+        edges { $($(#[$edge_doc:meta])* $edge:ident $edge_name:literal = $edge_row:path,)* }
+        openings { $($(#[$opening_doc:meta])* $opening:ident $opening_name:literal = $opening_row:path,)* }
+        joints { $($(#[$joint_doc:meta])* $joint:ident $joint_name:literal,)* }
+    ) => {
+        /// What is found in the region of a feature.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        pub enum FeatureKind {
+            $($(#[$surface_doc])* #[cfg_attr(feature = "serde", serde(rename = $surface_name))] $surface,)*
+            $($(#[$edge_doc])* #[cfg_attr(feature = "serde", serde(rename = $edge_name))] $edge,)*
+            $($(#[$opening_doc])* #[cfg_attr(feature = "serde", serde(rename = $opening_name))] $opening,)*
+            $($(#[$joint_doc])* #[cfg_attr(feature = "serde", serde(rename = $joint_name))] $joint,)*
+        }
+
+        impl FeatureKind {
+            const COUNT: usize = [
+                $($surface_name,)* $($edge_name,)* $($opening_name,)* $($joint_name,)*
+            ].len();
+            /// All kinds.
+            pub const ALL: [Self; Self::COUNT] = [
+                $(Self::$surface,)* $(Self::$edge,)* $(Self::$opening,)* $(Self::$joint,)*
+            ];
+            /// Holes in a face: closed contours, with a centre.
+            pub const OPENINGS: &[Self] = &[$(Self::$opening,)*];
+            /// Contours of a face: where the face ends, in its plane.
+            pub const CONTOURS: &[Self] = &[$(Self::$opening,)* $(Self::$edge,)*];
+            /// Kinds with a height.
+            pub const PLANE_OR_OPENING: &[Self] = &[Self::Plane, $(Self::$opening,)*];
+            /// Kinds with a geometry.
+            pub const GEOMETRIC: &[Self] = &[Self::Plane, $(Self::$opening,)* $(Self::$edge,)*];
+
+            /// Its name, as recipes have it.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$surface => $surface_name,)*
+                    $(Self::$edge => $edge_name,)*
+                    $(Self::$opening => $opening_name,)*
+                    $(Self::$joint => $joint_name,)*
+                }
+            }
+
+            /// What is known of a kind of contour; `None` of others.
+            pub fn contour(self) -> Option<&'static ContourKind> {
+                match self {
+                    $(Self::$edge => Some(&$edge_row),)*
+                    $(Self::$opening => Some(&$opening_row),)*
+                    _ => None,
+                }
+            }
+        }
+    };
+}
+
+kinds! {
+    surfaces {
+        /// Heights and deviations from golden, without a shape.
+        Surface "surface",
+        /// The plane that fits best, by least squares.
+        Plane "plane",
+    }
+    edges {
+        /// A straight edge of a face.
+        Line "line" = line::KIND,
+    }
+    openings {
+        /// A round hole in a face.
+        Circle "circle" = circle::KIND,
+        /// A slot with round ends in a face.
+        Slot "slot" = slot::KIND,
+    }
+    joints {
+        /// A cut across a joint of two sheets.
+        Section "section",
+    }
 }
 
 impl FeatureKind {
-    /// All kinds.
-    pub const ALL: [Self; 6] = [
-        Self::Surface,
-        Self::Plane,
-        Self::Line,
-        Self::Circle,
-        Self::Slot,
-        Self::Section,
-    ];
-
     /// Whether it is the contour of a face: where the face ends, in its plane.
     pub fn is_contour(self) -> bool {
-        matches!(self, Self::Line | Self::Circle | Self::Slot)
+        self.contour().is_some()
     }
 
-    /// Its name, as recipes have it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Surface => "surface",
-            Self::Plane => "plane",
-            Self::Line => "line",
-            Self::Circle => "circle",
-            Self::Slot => "slot",
-            Self::Section => "section",
-        }
+    /// Whether it is a hole in a face.
+    pub fn is_opening(self) -> bool {
+        Self::OPENINGS.contains(&self)
     }
 }
-
 /// A feature of a part: what is found where.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Feature {

@@ -23,7 +23,7 @@ pub use grid::{Grid, TooFine};
 pub use kind::{Cut, Feature, FeatureKind};
 pub use level::{Plane, mean, weight};
 pub use plane::{FittedPlane, Middle};
-pub use rim::{MAX_PARAMETERS, Parameters, PlaneFrame, Rim};
+pub use rim::{PlaneFrame, Rim};
 pub use taught::{TaughtCell, taught_cells};
 
 #[cfg(test)]

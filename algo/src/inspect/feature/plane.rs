@@ -147,10 +147,10 @@ impl FittedPlane {
     /// The geometry of the plane with these parameters.
     pub fn geometry(&self, [c, a, b]: [f64; 3]) -> Geometry {
         let length = libm::sqrt(1.0 + a * a + b * b);
-        Geometry::Plane {
-            point: Vector::new(self.middle.x, self.middle.y, c),
-            normal: Vector::new(-a, -b, 1.0) * (self.side / length),
-        }
+        Geometry::plane(
+            Vector::new(self.middle.x, self.middle.y, c),
+            Vector::new(-a, -b, 1.0) * (self.side / length),
+        )
     }
 
     /// The parameters of the plane after a motion of the part; its middle stays where it is.

@@ -9,13 +9,9 @@ use super::geometry::Geometry;
 use super::kind::FeatureKind;
 use super::plane::FittedPlane;
 use crate::geometry::Vector;
-use crate::inspect::contour::Source;
+use crate::inspect::contour::Input;
+use crate::inspect::contour::shape::{Covariance, Dimensions, Marks, Outline, Parameters, Shape};
 use alloc::vec::Vec;
-
-/// Most parameters of a shape.
-pub const MAX_PARAMETERS: usize = 5;
-/// Most marks of a rim.
-const MAX_MARKS: usize = 4;
 
 /// A frame in a plane: right-handed, z to the side that the camera is on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,6 +47,30 @@ impl PlaneFrame {
         self.origin + self.x * x + self.y * y
     }
 
+    /// The geometry of a contour with these parameters, whose marks are moved by `place` into a
+    /// plane with this normal.
+    pub fn geometry(
+        &self,
+        (kind, shape, p): (FeatureKind, &dyn Shape, &Parameters),
+        normal: Vector,
+        place: impl Fn(Vector) -> Vector,
+    ) -> Geometry {
+        let marks = shape.marks(p);
+        let marks = marks.iter().map(|&(x, y)| place(self.point(x, y)));
+        let Dimensions {
+            middle,
+            direction,
+            sizes,
+        } = shape.dimensions(&marks.collect::<Marks<Vector>>());
+        Geometry {
+            kind,
+            point: middle,
+            normal,
+            direction,
+            sizes,
+        }
+    }
+
     /// A point of space in this frame.
     pub fn coordinates(&self, point: Vector) -> Vector {
         let from = point - self.origin;
@@ -58,29 +78,21 @@ impl PlaneFrame {
     }
 }
 
-/// The parameters of a contour, in the order of its shape (`contour/shape`);
-/// those behind its own are 0.
-pub type Parameters = [f64; MAX_PARAMETERS];
-
 /// A contour that was found.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Rim {
-    /// [`FeatureKind::Line`], [`Circle`](FeatureKind::Circle) or [`Slot`](FeatureKind::Slot).
+    /// What it is the contour of.
     pub kind: FeatureKind,
     /// The frame of its parameters, in the frame as taught.
     pub frame: PlaneFrame,
     /// The camera's centre, in the frame as taught.
     pub eye: Vector,
-    /// Of a line: where its ends were expected, in its frame.
-    pub ends: [(f64, f64); 2],
-    /// The parameters of its shape.
-    pub parameters: Parameters,
-    /// How many there are.
-    pub count: usize,
-    /// Their covariance by noise.
-    pub covariance: [Parameters; MAX_PARAMETERS],
+    /// Its shape with its parameters.
+    pub outline: Outline,
+    /// The covariance of these by noise.
+    pub covariance: Covariance,
     /// By how much the parameters are off for one standard uncertainty of each input.
-    pub inputs: Vec<(Source, Parameters)>,
+    pub inputs: Vec<Input>,
     /// The share of its rim that is seen.
     pub found: f64,
     /// Of each point of the rim its distance from the shape and the σ of that by noise, mm.
@@ -88,42 +100,6 @@ pub struct Rim {
 }
 
 impl Rim {
-    /// Points of the rim with these parameters.
-    fn marks(&self, p: &Parameters) -> heapless::Vec<Vector, MAX_MARKS> {
-        let marks: heapless::Vec<(f64, f64), MAX_MARKS> = match self.kind {
-            FeatureKind::Line => {
-                let [from, to] = self.ends;
-                let (x, y) = (to.0 - from.0, to.1 - from.1);
-                let (middle, half) = ((from.0 + x / 2.0, from.1 + y / 2.0), (x / 2.0, y / 2.0));
-                let length = 2.0 * libm::hypot(half.0, half.1);
-                let off = (-y / length * p[0], x / length * p[0]);
-                let (sin, cos) = (libm::sin(p[1]), libm::cos(p[1]));
-                let half = (half.0 * cos - half.1 * sin, half.0 * sin + half.1 * cos);
-                [-1.0, 1.0]
-                    .map(|side| {
-                        (
-                            middle.0 + off.0 + side * half.0,
-                            middle.1 + off.1 + side * half.1,
-                        )
-                    })
-                    .into_iter()
-                    .collect()
-            }
-            _ => {
-                let ([long, short], angle) = match self.kind {
-                    FeatureKind::Slot => ([p[2] + p[3], p[3]], p[4]),
-                    _ => ([p[2]; 2], 0.0),
-                };
-                let (sin, cos) = (libm::sin(angle), libm::cos(angle));
-                [(-long, 0.0), (long, 0.0), (0.0, -short), (0.0, short)]
-                    .map(|(x, y)| (p[0] + x * cos - y * sin, p[1] + x * sin + y * cos))
-                    .into_iter()
-                    .collect()
-            }
-        };
-        marks.iter().map(|&(x, y)| self.frame.point(x, y)).collect()
-    }
-
     /// Its geometry with these parameters in a plane with this normal, where each of its marks is
     /// moved by `place`.
     pub fn geometry(
@@ -132,43 +108,20 @@ impl Rim {
         normal: Vector,
         place: impl Fn(Vector) -> Vector,
     ) -> Geometry {
-        let mut marks = self.marks(p);
-        for mark in &mut marks {
-            *mark = place(*mark);
-        }
-        let way = marks[1] - marks[0];
-        let direction = way * (1.0 / way.length());
-        let middle = marks[0] + way * 0.5;
-        if marks.len() == 2 {
-            return Geometry::Line {
-                middle,
-                direction,
-                normal,
-            };
-        }
-        let across = marks[3] - marks[2];
-        let centre = (middle + marks[2] + across * 0.5) * 0.5;
-        match self.kind {
-            FeatureKind::Slot => Geometry::Slot {
-                centre,
-                direction,
-                normal,
-                length: way.length(),
-                width: across.length(),
-            },
-            _ => Geometry::Circle {
-                centre,
-                normal,
-                radius: (way.length() + across.length()) / 4.0,
-            },
-        }
+        let contour = (self.kind, &*self.outline.shape, p);
+        self.frame.geometry(contour, normal, place)
+    }
+
+    /// Its geometry as it was found.
+    pub fn as_found(&self) -> Geometry {
+        self.geometry(&self.outline.parameters, self.frame.normal(), |at| at)
     }
 
     /// Where the line of sight through a point of its plane meets another plane.
     pub fn seen_on(&self, point: Vector, plane: &FittedPlane, parameters: [f64; 3]) -> Vector {
         let of = plane.geometry(parameters);
         let ray = point - self.eye;
-        let (below, fall) = (of.normal().dot(of.point() - self.eye), of.normal().dot(ray));
+        let (below, fall) = (of.normal.dot(of.point - self.eye), of.normal.dot(ray));
         self.eye + ray * (below / fall)
     }
 }

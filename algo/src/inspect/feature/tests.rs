@@ -66,7 +66,7 @@ fn a_plane_is_found_exactly_from_points_on_rays() {
         );
         let middle = now[0] + now[1] * 7.0;
         assert!((c - middle).abs() < 1e-9, "{c} {middle}");
-        let normal = plane.geometry(plane.parameters).normal();
+        let normal = plane.geometry(plane.parameters).normal;
         let seen = normal.dot(Vector::new(0.364, 0.0, 1.0));
         assert!(
             seen > 0.0 && (normal.length() - 1.0).abs() < 1e-12,
@@ -88,7 +88,7 @@ fn the_middle_stays_where_it_is_whatever_pixels_are_missing() {
         .filter(|cell| cell.taught.x > -3.0)
         .collect();
     let plane = FittedPlane::of(&some, Middle::of(&taught), 1e-4, &mut Vec::new()).unwrap();
-    let point = plane.geometry(plane.parameters).point();
+    let point = plane.geometry(plane.parameters).point;
     assert!(point.length() < 1e-9, "{point:?}");
 }
 

@@ -20,22 +20,12 @@ impl Kind for Angle {
 
     /// By sine and cosine: the arc cosine alone is inexact near 0.
     fn value(&self, of: &[Geometry]) -> Option<f64> {
-        let (one, other) = match of {
-            [
-                Geometry::Plane { normal: one, .. },
-                Geometry::Plane { normal: other, .. },
-            ] => (one, other),
-            [one, other] => match (one, other) {
-                (
-                    Geometry::Line { direction: one, .. },
-                    Geometry::Line {
-                        direction: other, ..
-                    },
-                ) => (one, other),
-                _ => return None,
-            },
+        let [from, to] = of else { return None };
+        let (one, other) = match (from.kind, to.kind) {
+            (Plane, Plane) => (from.normal, to.normal),
+            (Line, Line) => (from.direction?, to.direction?),
             _ => return None,
         };
-        Some(libm::atan2(one.cross(*other).length(), one.dot(*other)).to_degrees())
+        Some(libm::atan2(one.cross(other).length(), one.dot(other)).to_degrees())
     }
 }

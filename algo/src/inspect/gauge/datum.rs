@@ -22,29 +22,31 @@ impl DatumFrame {
     ///
     /// What the features leave open stays as taught. `None` where they make no frame.
     pub fn of(features: &[Geometry]) -> Option<Self> {
-        let (&Geometry::Plane { point, normal }, rest) = features.split_first()? else {
+        let (plane, rest) = features.split_first()?;
+        if plane.kind != FeatureKind::Plane {
             return None;
-        };
+        }
+        let Geometry { point, normal, .. } = *plane;
         let along = |way: Vector| unit(way - normal * normal.dot(way));
         let ahead = || along(Vector::new(1.0, 0.0, 0.0));
         let taught = Vector::default();
         let (on_axis, x) = match *rest {
             [] => (taught, ahead()?),
-            [one] => match (one.centre(), one.direction()) {
+            [one] => match (one.centre(), one.direction) {
                 (Some(from), _) => (from, ahead()?),
                 (None, direction) => {
-                    let (from, x) = (one.point(), along(direction?)?);
+                    let (from, x) = (one.point, along(direction?)?);
                     (from + x * x.dot(taught - from), x)
                 }
             },
             [one, two] => match (one.centre(), two.centre()) {
                 (Some(from), Some(to)) => (from, along(to - from)?),
-                (Some(from), None) => (from, along(two.direction()?)?),
+                (Some(from), None) => (from, along(two.direction?)?),
                 (None, to) => {
-                    let (from, x) = (one.point(), along(one.direction()?)?);
+                    let (from, x) = (one.point, along(one.direction?)?);
                     let way = match to {
                         Some(to) => x.dot(to - from),
-                        None => crossing((from, x), (two.point(), along(two.direction()?)?))?,
+                        None => crossing((from, x), (two.point, along(two.direction?)?))?,
                     };
                     (from + x * way, x)
                 }
@@ -97,32 +99,28 @@ mod tests {
     const UP: Vector = Vector::new(0.0, 0.0, 1.0);
 
     fn plane(z: f64) -> Geometry {
-        Geometry::Plane {
-            point: Vector::new(50.0, -20.0, z),
-            normal: UP,
-        }
+        Geometry::plane(Vector::new(50.0, -20.0, z), UP)
     }
 
     fn hole(x: f64, y: f64) -> Geometry {
-        Geometry::Circle {
-            centre: Vector::new(x, y, 5.0),
-            normal: UP,
-            radius: 3.0,
+        Geometry {
+            kind: FeatureKind::Circle,
+            ..Geometry::plane(Vector::new(x, y, 5.0), UP)
         }
     }
 
     fn line(x: f64, y: f64, degrees: f64) -> Geometry {
         let turn = degrees.to_radians();
-        Geometry::Line {
-            middle: Vector::new(x, y, 5.0),
-            direction: Vector::new(libm::cos(turn), libm::sin(turn), 0.0),
-            normal: UP,
+        Geometry {
+            kind: FeatureKind::Line,
+            direction: Some(Vector::new(libm::cos(turn), libm::sin(turn), 0.0)),
+            ..Geometry::plane(Vector::new(x, y, 5.0), UP)
         }
     }
 
     fn at(frame: &[Geometry], x: f64, y: f64) -> [f64; 3] {
         let frame = DatumFrame::of(frame).unwrap();
-        let Vector { x, y, z } = frame.coordinates(&hole(x, y)).point();
+        let Vector { x, y, z } = frame.coordinates(&hole(x, y)).point;
         [x, y, z]
     }
 

@@ -18,6 +18,6 @@ impl Kind for Diameter {
     }
 
     fn value(&self, of: &[Geometry]) -> Option<f64> {
-        of.first()?.sizes()[0]
+        of.first()?.sizes[0]
     }
 }

@@ -1,6 +1,7 @@
 //! The distance of two features.
 
 use super::kind::*;
+use crate::geometry::Vector;
 
 kind! {
     /// The distance of two features, mm. Holes and slots: of their centres. Two planes: of the
@@ -20,25 +21,19 @@ impl Kind for Distance {
     }
 
     fn value(&self, of: &[Geometry]) -> Option<f64> {
-        use Geometry::{Circle, Line, Plane, Slot};
         let [from, to] = of else { return None };
-        let way = to.point() - from.point();
-        Some(match (from, to) {
-            (Plane { normal, .. }, Plane { .. }) => libm::fabs(normal.dot(way)),
-            (Circle { .. } | Slot { .. }, Circle { .. } | Slot { .. }) => way.length(),
-            (
-                Line {
-                    direction, normal, ..
-                },
-                Circle { .. } | Slot { .. } | Line { .. },
-            )
-            | (
-                Circle { .. } | Slot { .. },
-                Line {
-                    direction, normal, ..
-                },
-            ) => libm::fabs(normal.cross(*direction).dot(way)),
-            _ => return None,
+        let way = to.point - from.point;
+        Some(match (from.kind, to.kind) {
+            (Plane, Plane) => libm::fabs(from.normal.dot(way)),
+            (Plane, _) | (_, Plane) => return None,
+            (Line, _) => across(from, way)?,
+            (_, Line) => across(to, way)?,
+            _ => way.length(),
         })
     }
+}
+
+/// How far a way leads across a line, in its plane.
+fn across(line: &Geometry, way: Vector) -> Option<f64> {
+    Some(libm::fabs(line.normal.cross(line.direction?).dot(way)))
 }

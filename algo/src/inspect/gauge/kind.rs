@@ -8,7 +8,7 @@
 use super::component::Component;
 use super::extreme::motion;
 use crate::inspect::align::Placed;
-use crate::inspect::feature::FeatureKind;
+
 use crate::inspect::section;
 
 pub(super) use super::extreme::range_of;
@@ -18,7 +18,7 @@ pub(super) use super::unit::Unit;
 pub(super) use crate::inspect::feature::FeatureKind::{
     Circle, Line, Plane, Section, Slot, Surface,
 };
-pub(super) use crate::inspect::feature::{Cell, Geometry, Rim};
+pub(super) use crate::inspect::feature::{Cell, FeatureKind, Geometry, Rim};
 pub(super) use alloc::vec::Vec;
 
 /// Most features of a gauge.
@@ -89,13 +89,13 @@ pub(super) const SLOT: Takes = &[&[Slot]];
 /// A straight edge.
 pub(super) const LINE: Takes = &[&[Line]];
 /// A hole or slot.
-pub(super) const OPENING: Takes = &[&[Circle, Slot]];
+pub(super) const OPENING: Takes = &[FeatureKind::OPENINGS];
 /// A contour of any shape.
-pub(super) const CONTOUR: Takes = &[&[Circle, Slot, Line]];
+pub(super) const CONTOUR: Takes = &[FeatureKind::CONTOURS];
 /// A section.
 pub(super) const SECTION: Takes = &[&[Section]];
 /// Two features with a geometry, of which some pairs fit ([`Kind::value`]).
-pub(super) const FEATURES: Takes = &[&[Plane, Circle, Slot, Line], &[Plane, Circle, Slot, Line]];
+pub(super) const FEATURES: Takes = &[FeatureKind::GEOMETRIC; 2];
 
 /// What a gauge says of itself.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -17,6 +17,6 @@ impl Kind for Length {
     }
 
     fn value(&self, of: &[Geometry]) -> Option<f64> {
-        of.first()?.sizes()[0]
+        of.first()?.sizes[0]
     }
 }

@@ -1,14 +1,9 @@
 //! The error of a value that is a function of the geometry of features, by numeric propagation.
 //!
 //! # Equations
-//! With q what the value f depends on, block by block, and C the covariance of a block,
-//!
-//! ```text
-//! σ² = Σ gᵀ C g        gᵢ = [f(qᵢ + uᵢ) − f(qᵢ − uᵢ)] / 2uᵢ        uᵢ = √Cᵢᵢ
-//! ```
-//!
-//! (JCGM 100:2008, 5.1.3 note 2, with 5.2.2 for covariances). The blocks are the parameters of each
-//! plane by the noise of its pixels, those of each contour in its plane, and the six components of
+//! Those of [`propagate`](crate::math::propagate), block by block, with q what the value depends on
+//! and C the covariance of a block: the parameters of each plane by the noise of its pixels, those
+//! of each contour in its plane, and the six components of
 //! the part's motion. A plane that two contours lie in moves both of them, and the motion all
 //! features together: what does not change when the part is moved as a whole, like the distance of
 //! two holes, has no error by the motion. As for [`Evidence::linear`](super::Evidence::linear) the
@@ -29,10 +24,11 @@ use super::kind::{Kind, MAX_PLACES};
 use super::reading::Found;
 use super::region;
 use crate::geometry::Vector;
-use crate::inspect::align::{Motion, Placed, form};
-use crate::inspect::contour::Source;
-use crate::inspect::feature::{FittedPlane, Geometry, Parameters, Rim};
-use crate::math::derivative::derivative;
+use crate::inspect::align::{Motion, Placed};
+use crate::inspect::contour::shape::Parameters;
+use crate::inspect::contour::{Input, Source};
+use crate::inspect::feature::{FittedPlane, Geometry, Rim};
+use crate::math::propagate::{Dependence, derivative};
 
 /// A plane, and how it depends on what was measured.
 #[derive(Clone, Copy, Debug)]
@@ -129,7 +125,7 @@ impl Sensitive<'_> {
                 _ => plane.geometry(plane.parameters),
             },
             Self::Contour { id, rim, plane } => {
-                let p = &rim.parameters;
+                let p = &rim.outline.parameters;
                 let normal = rim.frame.normal();
                 let still = |at: Vector| at;
                 let off = |offs: &Parameters, by: f64| {
@@ -142,7 +138,7 @@ impl Sensitive<'_> {
                 match change {
                     Change::Plane(which, parameters) if *which == plane.id => {
                         let of = plane.plane;
-                        rim.geometry(p, of.geometry(*parameters).normal(), |at| {
+                        rim.geometry(p, of.geometry(*parameters).normal, |at| {
                             rim.seen_on(at, of, *parameters)
                         })
                     }
@@ -151,10 +147,10 @@ impl Sensitive<'_> {
                         unit[*at] = 1.0;
                         off(&unit, *step)
                     }
-                    Change::Input(which, at, by) if which == id => off(&rim.inputs[*at].1, *by),
+                    Change::Input(which, at, by) if which == id => off(&rim.inputs[*at].off, *by),
                     Change::Edges(by) => {
-                        let own = rim.inputs.iter().find(|(own, _)| *own == Source::Edge);
-                        off(&own.map_or(Parameters::default(), |(_, off)| *off), *by)
+                        let own = rim.inputs.iter().find(|own| own.source == Source::Edge);
+                        off(&own.map_or(Parameters::default(), |own| own.off), *by)
                     }
                     Change::Moved(motion) => {
                         let turned =
@@ -226,16 +222,14 @@ impl Characteristic<'_> {
             if before().any(|other| other.plane().id == id) {
                 continue;
             }
-            let covariance = &plane.covariance;
-            let g: [f64; 3] = core::array::from_fn(|i| {
-                slope(libm::sqrt(covariance[i][i]), &|by| {
-                    let mut parameters = plane.parameters;
-                    parameters[i] += by;
-                    Change::Plane(id, parameters)
-                })
+            let by_noise = Dependence::new(found, &plane.covariance, |i, by| {
+                let mut parameters = plane.parameters;
+                parameters[i] += by;
+                self.value(&Change::Plane(id, parameters))
             });
+            let g = by_noise.gradient;
             let dot = |row: &[f64; 3]| g[0] * row[0] + g[1] * row[1] + g[2] * row[2];
-            pixels += (0..3).map(|i| g[i] * dot(&covariance[i])).sum::<f64>();
+            pixels += by_noise.variance;
             lever += rows.iter().map(|row| libm::fabs(dot(row))).sum::<f64>();
         }
         let (mut shared, mut own, mut rims) = (0.0, 0.0, 0.0);
@@ -249,16 +243,9 @@ impl Characteristic<'_> {
             if self.all().take(at).any(is_same) {
                 continue;
             }
-            let covariance = &rim.covariance;
-            let mut g = Parameters::default();
-            for (i, g) in g.iter_mut().enumerate().take(rim.count) {
-                *g = slope(libm::sqrt(covariance[i][i]), &|by| {
-                    Change::Parameter(id, i, by)
-                });
-            }
-            let row = |i: usize| (0..rim.count).map(|j| covariance[i][j] * g[j]).sum::<f64>();
-            pixels += (0..rim.count).map(|i| g[i] * row(i)).sum::<f64>();
-            for (input, (source, _)) in rim.inputs.iter().enumerate() {
+            let parameter = |i: usize, by: f64| self.value(&Change::Parameter(id, i, by));
+            pixels += Dependence::new(found, &rim.covariance, parameter).variance;
+            for (input, Input { source, .. }) in rim.inputs.iter().enumerate() {
                 // That of all contours at once follows.
                 if *source == Source::Edge {
                     continue;
@@ -280,15 +267,12 @@ impl Characteristic<'_> {
         }
         let mut motion = 0.0;
         if let Some(placed) = placed {
-            let g = core::array::from_fn(|i| {
-                let sigma = libm::sqrt(placed.covariance[i][i].max(0.0));
-                slope(sigma, &|by| {
-                    let mut way = [0.0; 6];
-                    way[i] = by;
-                    Change::Moved(moved(placed, &way))
-                })
-            });
-            motion = form(&g, &placed.covariance, &g).max(0.0);
+            let moved_along = |i: usize, by: f64| {
+                let mut way = [0.0; 6];
+                way[i] = by;
+                self.value(&Change::Moved(moved(placed, &way)))
+            };
+            motion = Dependence::new(found, &placed.covariance, moved_along).variance;
             let mut open = placed.free.iter();
             let depends = |direction: &[f64; 6]| {
                 let along = |by: f64| Change::Moved(moved(placed, &direction.map(|way| way * by)));

@@ -17,7 +17,7 @@
 //! `the_point_of_a_bent_flange_stays_where_its_region_lies`.
 
 use crate::geometry::Vector;
-use crate::inspect::feature::Geometry;
+use crate::inspect::feature::{FeatureKind, Geometry};
 
 /// Least sine of the angle at which two planes cross, and least share of z in a normal.
 const LEAST_SINE: f64 = 0.2;
@@ -25,41 +25,37 @@ const LEAST_SINE: f64 = 0.2;
 /// The same plane with its point where its region lies beside a reference plane; `taught` are both as taught.
 pub fn beside(plane: Geometry, reference: Geometry, taught: [Geometry; 2]) -> Geometry {
     let slid = || {
-        let Geometry::Plane { point, normal } = plane else {
-            return None;
-        };
         let (now, way) = from_crossing(plane, reference)?;
         let (before, _) = from_crossing(taught[0], taught[1])?;
-        let point = point + way * (before - now);
-        Some(Geometry::Plane { point, normal })
+        let point = plane.point + way * (before - now);
+        Some(Geometry { point, ..plane })
     };
     slid().unwrap_or(plane)
 }
 
 /// The same plane with its point above the x and y that it has as taught.
 pub fn above(plane: Geometry, taught: Geometry) -> Geometry {
-    match plane {
-        Geometry::Plane { point, normal } if libm::fabs(normal.z) >= LEAST_SINE => {
-            let Vector { x, y, .. } = taught.point();
-            let down = normal.x * (x - point.x) + normal.y * (y - point.y);
-            let point = Vector::new(x, y, point.z - down / normal.z);
-            Geometry::Plane { point, normal }
-        }
-        other => other,
+    let Geometry { point, normal, .. } = plane;
+    if plane.kind != FeatureKind::Plane || libm::fabs(normal.z) < LEAST_SINE {
+        return plane;
     }
+    let Vector { x, y, .. } = taught.point;
+    let down = normal.x * (x - point.x) + normal.y * (y - point.y);
+    let point = Vector::new(x, y, point.z - down / normal.z);
+    Geometry { point, ..plane }
 }
 
 /// How far a plane's point lies from the line in which it crosses another one, mm, and the way there.
 fn from_crossing(plane: Geometry, other: Geometry) -> Option<(f64, Vector)> {
-    let (Geometry::Plane { point, normal }, Geometry::Plane { .. }) = (plane, other) else {
+    if [plane.kind, other.kind] != [FeatureKind::Plane; 2] {
         return None;
-    };
-    let up = other.normal();
+    }
+    let (Geometry { point, normal, .. }, up) = (plane, other.normal);
     let steepest = up - normal * normal.dot(up);
     let sine = steepest.length();
     (sine >= LEAST_SINE).then(|| {
         let way = steepest * (1.0 / sine);
-        (up.dot(point - other.point()) / up.dot(way), way)
+        (up.dot(point - other.point) / up.dot(way), way)
     })
 }
 
@@ -70,10 +66,7 @@ mod tests {
     /// A plane through (x, 5, z) that rises by so many degrees towards +x.
     fn plane(x: f64, z: f64, degrees: f64) -> Geometry {
         let (sin, cos) = degrees.to_radians().sin_cos();
-        Geometry::Plane {
-            point: Vector::new(x, 5.0, z),
-            normal: Vector::new(-sin, 0.0, cos),
-        }
+        Geometry::plane(Vector::new(x, 5.0, z), Vector::new(-sin, 0.0, cos))
     }
 
     #[test]
@@ -84,7 +77,7 @@ mod tests {
         let (sin, cos) = 50.0_f64.to_radians().sin_cos();
         let (length, off) = (10.0 * 2.0_f64.sqrt(), 0.3);
         let seen = plane(off + (length + 1.7) * cos, 2.0 + (length + 1.7) * sin, 50.0);
-        let point = beside(seen, base, [taught, base]).point();
+        let point = beside(seen, base, [taught, base]).point;
         assert!((point.x - (off + length * cos)).abs() < 1e-9, "{point:?}");
         assert!((point.z - (2.0 + length * sin)).abs() < 1e-9, "{point:?}");
         // Nearly parallel planes say nothing.
@@ -94,7 +87,7 @@ mod tests {
 
     #[test]
     fn in_a_datum_system_the_point_has_x_and_y_as_taught() {
-        let point = above(plane(10.3, 12.0, 45.0), plane(10.0, 0.0, 40.0)).point();
+        let point = above(plane(10.3, 12.0, 45.0), plane(10.0, 0.0, 40.0)).point;
         assert!(
             (point.x - 10.0).abs() < 1e-12 && (point.z - 11.7).abs() < 1e-9,
             "{point:?}"

@@ -17,6 +17,6 @@ impl Kind for Width {
     }
 
     fn value(&self, of: &[Geometry]) -> Option<f64> {
-        of.first()?.sizes()[1]
+        of.first()?.sizes[1]
     }
 }

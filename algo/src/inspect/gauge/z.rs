@@ -11,13 +11,13 @@ kind! {
 impl Kind for Z {
     fn facts(&self) -> Facts {
         Facts {
-            takes: &[&[Plane, Circle, Slot]],
+            takes: &[FeatureKind::PLANE_OR_OPENING],
             datum: true,
             ..Facts::new(Unit::Length, Basis::Geometry, "")
         }
     }
 
     fn value(&self, of: &[Geometry]) -> Option<f64> {
-        of.first().map(|of| of.point().z)
+        of.first().map(|of| of.point.z)
     }
 }

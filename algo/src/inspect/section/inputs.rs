@@ -1,17 +1,15 @@
 //! The uncertainty of a value of a section, by numeric propagation.
 //!
 //! # Equations
-//! With q the eight parameters of both sides, C their covariance by noise and f the value,
-//! σ² = gᵀ C g, gᵢ = [f(qᵢ + uᵢ) − f(qᵢ − uᵢ)] / 2uᵢ, uᵢ = √Cᵢᵢ (JCGM 100:2008, 5.1.3 note 2, with
-//! 5.2.2 for covariances). An input that is the same in every measurement states by how much each
-//! parameter is off for its standard uncertainty; it adds the square of f's change between − and +
-//! half of that.
+//! Those of [`propagate`](crate::math::propagate), with q the eight parameters of both sides and C
+//! their covariance by noise. An input that is the same in every measurement states by how much each
+//! parameter is off for its standard uncertainty.
 
 use super::edge::Edge;
 use super::find::Section;
 use super::geometry::Geometry;
 use super::reason::Side;
-use crate::math::derivative::derivative;
+use crate::math::propagate::{Dependence, derivative};
 use alloc::vec::Vec;
 
 /// By how much the radius of what is not seen of an edge differs from that of what is seen, of it,
@@ -115,27 +113,17 @@ impl Section {
         let value = at(&[0.0; 8], 0.0);
         let mut variance = 0.0;
         for (side, edge) in self.edges.iter().enumerate() {
-            let g: [f64; 4] = core::array::from_fn(|i| {
-                derivative(value, libm::sqrt(edge.covariance[i][i].max(0.0)), |step| {
-                    let mut off = [0.0; 8];
-                    off[4 * side + i] = 1.0;
-                    at(&off, step)
-                })
-            });
-            for (row, own) in edge.covariance.iter().zip(g) {
-                variance += row
-                    .iter()
-                    .zip(g)
-                    .map(|(c, other)| own * c * other)
-                    .sum::<f64>();
-            }
+            let changed = |i: usize, by: f64| {
+                let mut off = [0.0; 8];
+                off[4 * side + i] = 1.0;
+                at(&off, by)
+            };
+            variance += Dependence::new(value, &edge.covariance, changed).variance;
         }
-        let systematic = inputs.iter().map(|Input { off, .. }| {
-            let change = at(off, 0.5) - at(off, -0.5);
-            change * change
-        });
-        let systematic = libm::sqrt(systematic.sum::<f64>());
-        let sigma = libm::sqrt(variance.max(0.0));
+        let inputs = inputs.iter();
+        let changes = inputs.map(|input| derivative(value, 1.0, |by| at(&input.off, by)));
+        let systematic = libm::sqrt(changes.map(|change| change * change).sum::<f64>());
+        let sigma = libm::sqrt(variance);
         let is_finite = [value, sigma, systematic].iter().all(|x| x.is_finite());
         is_finite.then_some(Value {
             value,

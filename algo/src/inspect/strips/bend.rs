@@ -52,7 +52,7 @@ impl SeenPlane {
     /// `None` where the camera does not see it.
     pub fn new(golden: &Golden, plane: &FittedPlane) -> Option<Self> {
         let geometry = plane.geometry(plane.parameters);
-        let (middle, normal) = (geometry.point(), geometry.normal());
+        let (middle, normal) = (geometry.point, geometry.normal);
         let seen = golden.triangulator.camera().project(middle)?;
         let (u, v) = (seen.0 as usize, seen.1 as usize);
         // How far the plane lies above the middle's height on the ray of a pixel.

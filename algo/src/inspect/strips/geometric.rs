@@ -1,13 +1,15 @@
 //! Stage 5, gauge: contours of features, and the readings of gauges of geometry.
 
-use super::contours::{ContourFit, FoundFeature, Shift, Signal};
+use super::contours::{ContourFit, FoundFeature, REACH_MM, Signal};
 use super::fits::Fit;
 use super::gauges::{Gauge, MAX_FEATURES};
 use super::plan::Production;
 use super::pose::PoseField;
 use super::strip::Strips;
 use super::uncertainty::Made;
+use crate::inspect::align::Placed;
 use crate::inspect::contour::State;
+use crate::inspect::contour::shape::Outline;
 use crate::inspect::feature::Geometry;
 use crate::inspect::gauge::{
     Characteristic, MAX_DATUMS, MAX_PLACES, OfRim, Propagated, Reading, Sensitive,
@@ -52,23 +54,19 @@ impl Production {
         } = strips;
         let (fits, placed) = (&fits[..], pose.placed.as_ref());
         let work: Vec<_> = found.iter_mut().zip(&contours.all).collect();
+        let reach_mm = self.contour_reach_mm(placed);
         for_each(work, |_, (found, expected)| {
             let plane = &fits[expected.plane];
-            found.find((contours, expected), &self.golden, plane, placed, light);
+            let expected = (contours, expected);
+            found.find(expected, &self.golden, plane, (placed, reach_mm), light);
         });
-        let shifts = fits.iter().enumerate();
-        let shifts: Vec<_> = shifts
-            .map(|plane| Shift::of(contours, found, plane))
-            .collect();
-        let lost = found.iter_mut().zip(&contours.all);
-        let work: Vec<_> = lost.filter(|(found, _)| found.is_lost()).collect();
-        for_each(work, |_, (found, expected)| {
-            let plane = &fits[expected.plane];
-            let moved = |shift: Shift| shift.apply(expected, &contours.frame(expected, plane)?);
-            if let Some(expected) = shifts[expected.plane].and_then(moved) {
-                found.find((contours, &expected), &self.golden, plane, placed, light);
-            }
-        });
+    }
+
+    /// How far from its place on a part that lies so a contour may be, mm: a part is known to lie
+    /// within the placement tolerance where nothing tells more.
+    pub(super) fn contour_reach_mm(&self, placed: Option<&Placed>) -> f64 {
+        let is_open = placed.is_some_and(|placed| !placed.free.is_empty());
+        REACH_MM + if is_open { self.tolerance_mm } else { 0.0 }
     }
 
     /// Finds the joints of sections in the points of all strips, one per task.
@@ -158,7 +156,9 @@ impl Production {
             let contour = contours.and_then(|all| {
                 let expected = all.all.iter().find(|expected| expected.feature == *at)?;
                 let frame = all.frame(expected, &self.planes[expected.plane])?;
-                Some(expected.outline.geometry(&frame))
+                let Outline { shape, parameters } = &expected.outline;
+                let contour = (expected.kind, &**shape, parameters);
+                Some(frame.geometry(contour, frame.normal(), |mark| mark))
             });
             let plane = || {
                 self.planes

@@ -53,6 +53,8 @@ pub struct Parts {
     pub noise_counts: f64,
     /// Whether the part's motion is found and taken back.
     pub aligned: bool,
+    /// How far a part may lie from its place as taught, mm.
+    pub tolerance_mm: f64,
     /// σ of golden's heights, as a multiple of the taught σ, which is that of one measurement with
     /// this decoder.
     pub golden_noise: f64,
@@ -93,6 +95,8 @@ pub struct Production {
     pub(super) anchors: Anchors,
     pub(super) sections: Sections,
     pub(super) budget: ErrorBudget,
+    /// How far a part may lie from its place as taught, mm.
+    pub(super) tolerance_mm: f64,
 }
 
 impl Production {
@@ -115,6 +119,7 @@ impl Production {
             noise,
             noise_counts,
             aligned,
+            tolerance_mm,
             golden_noise,
             largest,
             displaced,
@@ -177,6 +182,7 @@ impl Production {
         let sections = sections.map_err(|feature| Unmeasurable::NoSection { feature })?;
         Ok(Self {
             sections,
+            tolerance_mm,
             planes,
             contours,
             anchors,

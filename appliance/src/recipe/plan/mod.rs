@@ -224,6 +224,7 @@ impl Plan {
         let shared = Shared {
             conditions: &conditions,
             aligned: demands.aligned,
+            tolerance_mm: demands.tolerance_mm,
             triangulator: Arc::new(triangulator),
             cubics: Arc::new(cubics),
             features,

@@ -40,6 +40,8 @@ pub(super) struct Run {
 pub(super) struct Shared<'a> {
     pub conditions: &'a Conditions,
     pub aligned: bool,
+    /// The placement tolerance, mm.
+    pub tolerance_mm: f64,
     pub triangulator: Arc<Triangulator>,
     pub cubics: Arc<HeightCubics>,
     pub features: Vec<Feature>,
@@ -256,6 +258,7 @@ impl Prepared {
             noise: shared.conditions.noise.by([0.0, 1.0 / brighter]),
             noise_counts: shared.noise_counts,
             aligned: shared.aligned,
+            tolerance_mm: shared.tolerance_mm,
             golden_noise,
             largest: largest.map(|largest| largest.times(over_full)).collect(),
             displaced: shared.gauges.iter().map(displaced).collect(),

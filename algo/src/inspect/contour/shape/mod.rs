@@ -1,14 +1,15 @@
-//! Shapes of contours, each a file with its signed distance.
+//! Shapes of contours: each a file with its signed distance, its places, its dimensions, and where
+//! it begins on golden, and a row among the kinds of features (`feature/kind.rs`).
 
-mod circle;
-mod distance;
-mod line;
-mod slot;
+pub mod circle;
+pub mod line;
+mod outline;
+pub mod slot;
 
-pub use circle::Circle;
-pub use distance::{Foot, Shape};
-pub use line::Line;
-pub use slot::Slot;
+pub use outline::{
+    ContourKind, Covariance, Dimensions, Foot, MAX_PARAMETERS, Marks, Outline, Parameters, Place,
+    Shape, Trace,
+};
 
 #[cfg(test)]
 mod tests;

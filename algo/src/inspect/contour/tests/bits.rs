@@ -2,13 +2,16 @@
 
 use super::placed::sheet;
 use super::scene::{Noise, Rendered, Scene};
-use crate::inspect::contour::shape::{Circle, Shape, Slot};
+use crate::inspect::contour::shape::Outline;
+use crate::inspect::contour::shape::circle::Circle;
+use crate::inspect::contour::shape::slot::Slot;
 use crate::inspect::contour::{State, find, inputs};
 
 /// FNV-1a over the bits of everything that a reading is made of, of a contour in a tilted sheet of
 /// unknown thickness over a lit floor.
-fn bits<const N: usize>(shape: &(impl Shape<N> + Sync), is: [f64; N]) -> u64 {
-    let opening = |x: f64, y: f64| shape.distance(&is, x, y);
+fn bits(is: &Outline) -> u64 {
+    let (shape, p) = (&*is.shape, &is.parameters);
+    let opening = |x: f64, y: f64| shape.distance(p, x, y);
     let scene = Scene {
         opening: &opening,
         thickness: 1.0,
@@ -22,7 +25,7 @@ fn bits<const N: usize>(shape: &(impl Shape<N> + Sync), is: [f64; N]) -> u64 {
     let rendered = Rendered::new(scene, 6.0, 1);
     let mut setup = rendered.setup();
     setup.thickness = None;
-    let contour = find(shape, &is, &rendered.capture(1), &setup);
+    let contour = find(shape, p, &rendered.capture(1), &setup);
     assert_eq!(contour.state, State::Found);
     let found = contour.parameters.into_iter();
     let covariance = contour.covariance.into_iter().flatten();
@@ -43,12 +46,12 @@ fn bits<const N: usize>(shape: &(impl Shape<N> + Sync), is: [f64; N]) -> u64 {
 #[test]
 fn every_machine_finds_the_same_bits() {
     let found = [
-        bits(&Circle, [0.2, -0.1, 6.0]),
-        bits(&Slot, [0.2, -0.1, 5.0, 3.0, 0.5]),
+        bits(&Outline::new(Circle, &[0.2, -0.1, 6.0])),
+        bits(&Outline::new(Slot, &[0.2, -0.1, 5.0, 3.0, 0.5])),
     ];
     assert_eq!(
         found,
-        [0x3430_1347_91cc_c8ed, 0xf63b_f28b_840e_3953],
+        [0xf9db_24b6_ed9f_7568, 0xb6a2_1034_03ad_d26a],
         "{found:#x?}"
     );
 }

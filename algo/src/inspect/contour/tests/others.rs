@@ -2,9 +2,10 @@
 
 use super::placed::sheet;
 use super::scene::{Chance, Noise, Rendered, Scene};
-use crate::inspect::contour::shape::{Line, Slot};
+use crate::inspect::contour::shape::line::Line;
+use crate::inspect::contour::shape::slot::Slot;
+use crate::inspect::contour::shape::{Parameters, Shape};
 use crate::inspect::contour::{State, find};
-use crate::math::associate::Distance;
 
 const PLACEMENTS: u64 = 4;
 /// Of every parameter in mm, and of angles over half a length.
@@ -52,14 +53,14 @@ fn a_straight_edge_has_its_place_and_direction_and_material_on_its_left() {
             let mut chance = Chance::new(seed);
             let (sin, cos) = (libm::sin(angle), libm::cos(angle));
             let ends = [(-10.0 * cos, -10.0 * sin), (10.0 * cos, 10.0 * sin)];
-            let line = Line::of(&ends).unwrap();
-            let is = [chance.within(0.3), chance.within(0.01)];
+            let line = Line::between(ends[0], ends[1]).unwrap();
+            let is = [chance.within(0.3), chance.within(0.01), 0.0, 0.0, 0.0];
             let opening = move |px: f64, py: f64| line.distance(&is, px, py);
             let mut scene = placed(&sheet(0.41), &mut chance);
             (scene.noise, scene.opening) = (noise, &opening);
             let rendered = Rendered::new(scene, 6.0, seed);
             let capture = rendered.capture(seed);
-            let contour = find(&line, &[0.0; 2], &capture, &rendered.setup());
+            let contour = find(&line, &Parameters::default(), &capture, &rendered.setup());
             let p = contour.parameters;
             let off = [(p[0] - is[0]) * 1e3, (p[1] - is[1]) * 10e3];
             let sigma = libm::sqrt(contour.covariance[0][0]) * 1e3;

@@ -2,7 +2,9 @@
 
 use super::placed::{LEVELS, NOTHING, sheet};
 use super::scene::{Chance, Noise, Rendered, Scene};
-use crate::inspect::contour::shape::Circle;
+use crate::inspect::contour::shape::Parameters;
+use crate::inspect::contour::shape::circle::Circle;
+use crate::inspect::contour::shape::line::Line;
 use crate::inspect::contour::{Contour, Outcome, Setup, State, find, inputs};
 
 const SINGLE: &[f64] = &[1.0];
@@ -10,7 +12,7 @@ const SINGLE: &[f64] = &[1.0];
 const PLACEMENTS: u64 = 5;
 
 /// What is found where a hole of this radius is expected near the middle, and its true parameters.
-fn look(scene: &Scene<'_>, r: f64, seed: u64, is_open: bool) -> (Contour<3>, [f64; 3], [f64; 3]) {
+fn look(scene: &Scene<'_>, r: f64, seed: u64, is_open: bool) -> (Contour, [f64; 3], [f64; 3]) {
     look_with(scene, r, seed, is_open, |_| {})
 }
 
@@ -20,7 +22,7 @@ fn look_with(
     seed: u64,
     is_open: bool,
     change: impl Fn(&mut Setup),
-) -> (Contour<3>, [f64; 3], [f64; 3]) {
+) -> (Contour, [f64; 3], [f64; 3]) {
     let mut chance = Chance::new(seed);
     let (x, y) = (chance.within(1.0), chance.within(1.0));
     let hole = move |px: f64, py: f64| libm::hypot(px - x, py - y) - r;
@@ -32,7 +34,13 @@ fn look_with(
     let rendered = Rendered::new(scene, reach, seed);
     let mut setup = rendered.setup();
     change(&mut setup);
-    let expected = [x + chance.within(0.25), y + chance.within(0.25), r];
+    let expected = [
+        x + chance.within(0.25),
+        y + chance.within(0.25),
+        r,
+        0.0,
+        0.0,
+    ];
     let contour = find(&Circle, &expected, &rendered.capture(seed), &setup);
     let inputs = inputs(&Circle, &contour, &setup, 0.0);
     let u = [0, 1, 2].map(|i| {
@@ -44,7 +52,7 @@ fn look_with(
 
 /// Fails where a parameter is off by more than its uncertainty and a half: one in 20 may be off by
 /// more than U, and one in 350 by more than this.
-fn check(contour: &Contour<3>, is: [f64; 3], u: [f64; 3]) {
+fn check(contour: &Contour, is: [f64; 3], u: [f64; 3]) {
     for (i, (p, is)) in contour.parameters.iter().zip(is).enumerate() {
         let off = libm::fabs(p - is);
         assert!(off <= 1.5 * u[i], "{i}: off {off} mm, U {u:?}, {contour:?}");
@@ -126,7 +134,12 @@ fn a_hole_outside_of_the_frame_is_unseen() {
     let rendered = Rendered::new(scene, 40.0, 1);
     let setup = rendered.setup();
     for (x, y) in [(40.0, 0.0), (0.0, -40.0), (14.0, 0.0)] {
-        let contour = find(&Circle, &[x, y, 3.0], &rendered.capture(1), &setup);
+        let contour = find(
+            &Circle,
+            &[x, y, 3.0, 0.0, 0.0],
+            &rendered.capture(1),
+            &setup,
+        );
         assert_eq!(contour.state, State::Unseen, "{contour:?}");
     }
 }
@@ -155,7 +168,7 @@ fn a_lit_floor_a_whole_number_of_fringes_lower_is_never_taken_for_material() {
 #[test]
 fn a_shift_of_every_edge_cancels_in_the_centre_and_counts_twice_in_the_diameter() {
     let (contour, ..) = look(&quiet(0.41, LEVELS), 5.0, 3, true);
-    let [x, y, r] = contour.response(&Circle, |_| 0.01);
+    let [x, y, r, ..] = contour.response(&Circle, |_| 0.01);
     assert!(x.abs() < 5e-4 && y.abs() < 5e-4 && (r - 0.01).abs() < 1e-4);
     assert!(contour.outcomes.iter().all(|of| *of != Outcome::Continues));
 }
@@ -199,4 +212,60 @@ fn beside_a_floor_of_unknown_depth_edges_with_a_shadow_are_left_out() {
         }
     }
     std::println!("unknown floor: found {found} of 12");
+}
+
+/// A straight edge that is expected through the middle, with the part on its left.
+fn edge() -> Line {
+    Line::between((-8.0, 0.0), (8.0, 0.0)).unwrap()
+}
+
+#[test]
+fn where_the_material_goes_on_as_far_as_an_edge_may_lie_it_is_absent() {
+    for floor in [None, Some((18.0, 1.0))] {
+        for seed in 0..PLACEMENTS {
+            let mut chance = Chance::new(seed);
+            // None at all, and one that lies farther off than it may.
+            let below = -6.0 - chance.within(1.0);
+            for opening in [NOTHING, &move |_: f64, y: f64| y - below] {
+                let mut scene = quiet(0.41, LEVELS);
+                (scene.opening, scene.floor) = (opening, floor);
+                let rendered = Rendered::new(scene, f64::MAX, seed);
+                let mut setup = rendered.setup();
+                setup.reach = 1.5;
+                let capture = rendered.capture(seed);
+                let contour = find(&edge(), &Parameters::default(), &capture, &setup);
+                assert_eq!(contour.state, State::Absent, "{contour:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn contours_are_found_as_far_off_as_they_may_lie() {
+    for floor in [None, Some((18.0, 1.0))] {
+        for reach in [0.5, 1.5, 2.5] {
+            for seed in 0..PLACEMENTS {
+                let mut chance = Chance::new(seed);
+                let off = reach * if seed % 2 == 0 { 0.95 } else { -0.95 };
+                let (x, y) = (chance.within(1.0), chance.within(1.0));
+                let hole = move |px: f64, py: f64| libm::hypot(px - x - off, py - y) - 3.0;
+                let line = move |_: f64, y: f64| y - off;
+                let mut scene = quiet(0.41, LEVELS);
+                (scene.opening, scene.floor) = (&hole, floor);
+                let rendered = Rendered::new(scene.clone(), f64::MAX, seed);
+                let mut setup = rendered.setup();
+                setup.reach = reach;
+                let (expected, capture) = ([x, y, 3.0, 0.0, 0.0], rendered.capture(seed));
+                let contour = find(&Circle, &expected, &capture, &setup);
+                assert_eq!(contour.state, State::Found, "{off} {contour:?}");
+                assert!((contour.parameters[0] - x - off).abs() < 0.012);
+                scene.opening = &line;
+                let rendered = Rendered::new(scene, f64::MAX, seed);
+                let capture = rendered.capture(seed);
+                let contour = find(&edge(), &Parameters::default(), &capture, &setup);
+                assert_eq!(contour.state, State::Found, "{off} {contour:?}");
+                assert!((contour.parameters[0] - off).abs() < 0.012);
+            }
+        }
+    }
 }

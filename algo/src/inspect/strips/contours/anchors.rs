@@ -2,7 +2,6 @@
 
 use super::taught::{Contours, Expected};
 use crate::geometry::Vector;
-use crate::inspect::feature::FeatureKind;
 use crate::inspect::strips::fits::Fit;
 use crate::inspect::strips::gauges::Gauge;
 use alloc::vec::Vec;
@@ -25,7 +24,7 @@ pub fn anchors(contours: &Contours, planes: &[Fit], gauges: &[Gauge]) -> Anchors
     let place = |(at, expected): (usize, &Expected)| {
         let frame = contours.frame(expected, planes.get(expected.plane)?)?;
         let (x, y) = expected.outline.middle();
-        let serves = expected.kind() != FeatureKind::Line && !is_placed(expected.feature);
+        let serves = expected.kind.is_opening() && !is_placed(expected.feature);
         serves.then(|| (at, frame.point(x, y)))
     };
     let places: Vec<(usize, Vector)> = contours.all.iter().enumerate().filter_map(place).collect();

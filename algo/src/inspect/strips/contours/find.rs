@@ -2,12 +2,12 @@
 
 use super::face::Face;
 use super::light::Signal;
-use super::shape::{Associated, Outline};
-use super::taught::{Contours, Expected, REACH_MM};
+use super::taught::{Contours, Expected};
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed};
-use crate::inspect::contour::{Outcome, Point, State};
-use crate::inspect::feature::{FeatureKind, Geometry, PlaneFrame, Rim};
+use crate::inspect::contour::shape::Outline;
+use crate::inspect::contour::{Contour, Outcome, PIECE_PX, Point, Setup, State, find, inputs};
+use crate::inspect::feature::{Geometry, PlaneFrame, Rim};
 use crate::inspect::gauge::Sensitive;
 use crate::inspect::section::Unseen;
 use crate::inspect::strips::fits::Fit;
@@ -118,17 +118,9 @@ impl ContourFit {
         own.is_some() && own == features.first().copied()
     }
 
-    /// The circle or slot that was found, in the frame of its plane.
-    pub fn closed(&self) -> Option<&Outline> {
-        self.rim.as_ref()?;
-        let outline = &self.pieces.as_ref()?.outline;
-        (outline.kind() != FeatureKind::Line).then_some(outline)
-    }
-
-    /// Whether another place to look may change what became of it.
-    pub fn is_lost(&self) -> bool {
-        let of = self.of.as_ref();
-        self.is_absent() || of.is_some_and(|of| of.lost == Some(Lost::Rim))
+    /// The opening that was found.
+    pub fn opening(&self) -> Option<&Rim> {
+        self.rim.as_ref().filter(|rim| rim.kind.is_opening())
     }
 
     /// Whether it is surely not there.
@@ -145,13 +137,13 @@ impl ContourFit {
         })
     }
 
-    /// Finds it on a part that lies so, as taught if `None`.
+    /// Finds it on a part that lies so, as taught if `None`, within `reach_mm` of its place there.
     pub fn find(
         &mut self,
         (contours, expected): (&Contours, &Expected),
         golden: &Golden,
         plane: &Fit,
-        placed: Option<&Placed>,
+        (placed, reach_mm): (Option<&Placed>, f64),
         light: Signal<'_>,
     ) {
         let mut of = FoundFeature {
@@ -177,42 +169,44 @@ impl ContourFit {
                 near: Near::default(),
             };
             if let Some(pixel) = face.spot_size(0.0, 0.0) {
-                face.look_about(expected.outline.places(), AROUND_PX + REACH_MM / pixel);
+                face.look_about(expected.outline.places(), AROUND_PX + reach_mm / pixel);
             }
-            let setup = contours.setup(expected, &face, golden);
-            if let Some(setup) = setup {
-                let mut found = expected.outline.find(&face, &setup, expected.rim);
-                self.pieces = Some(Pieces {
-                    frame: taught,
-                    outline: expected.outline.with(&found.contour.parameters),
-                    outcomes: core::mem::take(&mut found.contour.outcomes),
-                    points: core::mem::take(&mut found.contour.points),
-                });
-                of.state = found.contour.state;
-                of.found = found.contour.found;
+            if let Some(setup) = contours.setup(expected, &face, golden, reach_mm) {
+                let outline = &expected.outline;
+                let mut contour = find(&*outline.shape, &outline.parameters, &face, &setup);
+                of.state = contour.state;
+                of.found = contour.found;
                 of.lost = (of.state == State::Unseen).then_some(Lost::Rim);
-                let (off, sigma) = found.contour.face;
+                let (off, sigma) = contour.face;
                 let above = -off / setup.turns_per_mm;
-                if of.state == State::Found {
-                    of.rim = Some(SeenRim {
-                        blur_px: found.contour.blur,
-                        pixel_mm: found.contour.pixel,
-                        off_mm: rms(found.residuals.iter().map(|(off, _)| *off)),
-                    });
-                    if libm::fabs(off) > FACE_SIGMA * sigma && libm::fabs(above) > FACE_MM {
-                        of.state = State::Unseen;
-                        of.lost = Some(Lost::Face(above));
-                    }
-                }
+                let is_off = libm::fabs(off) > FACE_SIGMA * sigma && libm::fabs(above) > FACE_MM;
+                let outline = outline.with(&contour.parameters);
                 if of.state == State::Found {
                     let eye = golden.triangulator.camera().centre();
                     let eye = motion.map_or(eye, |motion| motion.undo(eye));
-                    self.rim = Some(rim(expected, taught, eye, found));
+                    let rim = rim((expected, &outline), (taught, eye), &contour, &setup);
+                    of.rim = Some(SeenRim {
+                        blur_px: contour.blur,
+                        pixel_mm: contour.pixel,
+                        off_mm: rms(rim.residuals.iter().map(|(off, _)| *off)),
+                    });
+                    if is_off {
+                        of.state = State::Unseen;
+                        of.lost = Some(Lost::Face(above));
+                    } else {
+                        self.rim = Some(rim);
+                    }
                 }
+                self.pieces = Some(Pieces {
+                    frame: taught,
+                    outline,
+                    outcomes: core::mem::take(&mut contour.outcomes),
+                    points: core::mem::take(&mut contour.points),
+                });
             }
         }
         let rim = self.rim.as_ref();
-        of.geometry = rim.map(|rim| rim.geometry(&rim.parameters, rim.frame.normal(), |at| at));
+        of.geometry = rim.map(Rim::as_found);
         self.of = Some(of);
     }
 }
@@ -223,24 +217,28 @@ fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     libm::sqrt(values.map(|value| value * value).sum::<f64>() / count)
 }
 
-fn rim(expected: &Expected, frame: PlaneFrame, eye: Vector, found: Associated) -> Rim {
-    let Associated {
-        contour,
-        count,
-        inputs,
-        residuals,
-    } = found;
+fn rim(
+    (expected, outline): (&Expected, &Outline),
+    (frame, eye): (PlaneFrame, Vector),
+    contour: &Contour,
+    setup: &Setup,
+) -> Rim {
+    let (shape, p) = (&*outline.shape, &outline.parameters);
+    let used = contour.points.iter().filter(|point| point.weight > 0.0);
+    let piece = PIECE_PX * contour.pixel;
+    let residuals = used.map(|point| {
+        let off = shape.distance(p, point.x, point.y);
+        (off, libm::hypot(libm::sqrt(point.variance), piece))
+    });
     Rim {
-        kind: expected.kind(),
+        kind: expected.kind,
         frame,
         eye,
-        ends: expected.outline.ends(),
-        parameters: contour.parameters,
-        count,
+        outline: outline.clone(),
         covariance: contour.covariance,
-        inputs,
+        inputs: inputs(shape, contour, setup, expected.rim),
         found: contour.found,
-        residuals,
+        residuals: residuals.collect(),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! What [`contour`](crate::inspect::contour) needs of a part is filled in here: where a contour is
 //! expected is known from golden (`taught`, which begins with the outline of the opening in golden's
-//! heights, `outline`), how the camera sees its plane follows from the models and from how the part
+//! heights, `trace`), how the camera sees its plane follows from the models and from how the part
 //! lies (`face`), and the demodulated light comes from the frames (`light`). `find` joins them.
 //!
 //! Each contour is found by one thread, so the bits do not depend on the number of threads.
@@ -11,13 +11,10 @@ mod anchors;
 mod face;
 mod find;
 mod light;
-mod outline;
-mod shape;
-mod shift;
 mod taught;
+mod trace;
 
 pub use anchors::{Anchors, LEAST, MOST, anchors};
 pub use find::{ContourFit, FoundFeature, Lost, SeenRim, moved};
 pub use light::{GoldenSignal, Levels, Signal};
-pub use shift::Shift;
-pub use taught::{Contours, Expected, Known};
+pub use taught::{Contours, Expected, Known, REACH_MM};

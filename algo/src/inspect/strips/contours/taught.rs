@@ -2,10 +2,10 @@
 
 use super::face::Face;
 use super::light::{GoldenSignal, Levels, Signal};
-use super::outline::{Start, ground_below, start};
-use super::shape::Outline;
+use super::trace::{Traced, ground_below, trace};
 use crate::geometry::Vector;
-use crate::inspect::contour::{Fringes, Setup, Spot, State, View};
+use crate::inspect::contour::shape::Outline;
+use crate::inspect::contour::{Fringes, Setup, Spot, State, View, find};
 use crate::inspect::feature::{Feature, FeatureKind, PlaneFrame};
 use crate::inspect::strips::fits::Fit;
 use crate::inspect::strips::gauges::Unmeasurable;
@@ -14,7 +14,7 @@ use crate::inspect::strips::near::Near;
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
-/// How far from its expected place a contour is looked for, mm.
+/// How far a contour may lie from its place on a part whose motion is known, mm.
 pub const REACH_MM: f64 = 0.5;
 /// The same on golden, where only its outline is known, px and mm.
 const FIRST_REACH_PX: f64 = 3.0;
@@ -39,6 +39,8 @@ pub struct Contours {
 pub struct Expected {
     /// Which feature.
     pub feature: usize,
+    /// What it is.
+    pub kind: FeatureKind,
     /// Which of the planes that are fitted has its face.
     pub plane: usize,
     /// Its shape, in the frame of its plane.
@@ -106,7 +108,7 @@ impl Contours {
 
     fn taught(&self, of: &Feature, plane: &Fit, golden: &Golden) -> Option<Expected> {
         let geometry = plane.geometry()?;
-        let (normal, point) = (geometry.normal(), geometry.point());
+        let (normal, point) = (geometry.normal, geometry.point);
         // About the region's middle first, then about the contour's.
         let view = |origin: Vector| Face {
             triangulator: &golden.triangulator,
@@ -117,21 +119,20 @@ impl Contours {
             light: Signal::Golden,
             near: Near::default(),
         };
-        let about = start(of.kind, &of.region, golden, &view(point))?;
-        let [from, to] = about.outline.ends();
-        let origin = view(point)
-            .frame
-            .point((from.0 + to.0) / 2.0, (from.1 + to.1) / 2.0);
+        let about = view(point);
+        let (x, y) = trace(of.kind, &of.region, golden, &about)?.outline.middle();
+        let origin = about.frame.point(x, y);
         let face = view(origin);
-        let Start {
+        let Traced {
             outline,
             face: places,
             floor,
-        } = start(of.kind, &of.region, golden, &face)?;
+        } = trace(of.kind, &of.region, golden, &face)?;
         let modulation = self.modulation(&face, &places)?;
         let range = golden.triangulator.range();
         let mut expected = Expected {
             feature: 0,
+            kind: of.kind,
             plane: 0,
             outline,
             origin: (origin.x, origin.y),
@@ -144,14 +145,15 @@ impl Contours {
                 .is_some_and(|(floor, ground)| libm::fabs(floor - ground) < NEAR_MM),
             deepest: (origin.z - range.low).max(0.0),
         };
-        let mut setup = self.setup(&expected, &face, golden)?;
         let pixel = face.spot_size(0.0, 0.0)?;
-        setup.reach = FIRST_REACH_MM.max(FIRST_REACH_PX * pixel);
-        let found = expected.outline.find(&face, &setup, 0.0);
-        if found.contour.state != State::Found && !self.signal.lenient {
+        let reach_mm = FIRST_REACH_MM.max(FIRST_REACH_PX * pixel);
+        let setup = self.setup(&expected, &face, golden, reach_mm)?;
+        let Outline { shape, parameters } = &expected.outline;
+        let found = find(&**shape, parameters, &face, &setup);
+        if found.state != State::Found && !self.signal.lenient {
             return None;
         }
-        expected.outline = expected.outline.with(&found.contour.parameters);
+        expected.outline = expected.outline.with(&found.parameters);
         Some(expected)
     }
 
@@ -173,7 +175,7 @@ impl Contours {
     /// The frame of a contour's plane, whose parameters were measured, in the frame as taught.
     pub fn frame(&self, of: &Expected, plane: &Fit) -> Option<PlaneFrame> {
         let geometry = plane.geometry()?;
-        let (normal, point) = (geometry.normal(), geometry.point());
+        let (normal, point) = (geometry.normal, geometry.point);
         let (x, y) = of.origin;
         let below = normal.x * (x - point.x) + normal.y * (y - point.y);
         let origin = Vector::new(x, y, point.z - below / normal.z);
@@ -181,7 +183,13 @@ impl Contours {
     }
 
     /// What is known of light, material and camera where a contour's plane lies as in `face`.
-    pub fn setup(&self, of: &Expected, face: &Face<'_>, golden: &Golden) -> Option<Setup> {
+    pub fn setup(
+        &self,
+        of: &Expected,
+        face: &Face<'_>,
+        golden: &Golden,
+        reach_mm: f64,
+    ) -> Option<Setup> {
         let device = |centre: Vector| face.frame.coordinates(centre);
         let own: Vec<(f64, usize)> = self.levels.fringes().collect();
         let (levels, noise): (Vec<(f64, usize)>, f64) = match face.light {
@@ -216,22 +224,7 @@ impl Contours {
                 false => of.floor,
             },
             deepest: of.deepest,
-            reach: REACH_MM,
+            reach: reach_mm,
         })
-    }
-}
-
-impl Expected {
-    /// The same where its outline is this one.
-    pub fn with(&self, outline: Outline) -> Self {
-        Self {
-            outline,
-            ..self.clone()
-        }
-    }
-
-    /// What it is.
-    pub fn kind(&self) -> FeatureKind {
-        self.outline.kind()
     }
 }

@@ -23,7 +23,9 @@
 use crate::geometry::Vector;
 use crate::inspect::align::{Fitting, Matrix6, Placed};
 use crate::inspect::feature::PlaneFrame;
-use crate::inspect::strips::contours::{ContourFit, Expected, LEAST, MOST, Signal, moved};
+use crate::inspect::strips::contours::{
+    ContourFit, Expected, LEAST, MOST, REACH_MM, Signal, moved,
+};
 use crate::inspect::strips::plan::Production;
 use crate::inspect::strips::strip::Strips;
 use crate::math::solve::solve_symmetric;
@@ -34,8 +36,6 @@ use alloc::vec::Vec;
 const AGREE_MM: f64 = 0.1;
 /// After a farther way contours are looked for again, mm.
 const NEAR_MM: f64 = 0.1;
-/// Searches at most.
-const SEARCHES: usize = 2;
 /// A larger error along an open direction determines nothing, mm (1 σ).
 const LARGEST_SIGMA_MM: f64 = 0.05;
 
@@ -72,16 +72,18 @@ impl Production {
         }
         let fitting = alignment.fitting(self.golden.surface());
         let mut placed = placed.clone();
-        for _ in 0..SEARCHES {
+        // A part lies anywhere within the tolerance first, and then nearly where its openings are.
+        for reach_mm in [self.contour_reach_mm(Some(&placed)), REACH_MM] {
             let work: Vec<_> = strips.anchors.iter_mut().zip(&self.anchors).collect();
             for_each(work, |_, (found, &at)| {
                 let expected = &contours.all[at];
                 let plane = &self.planes[expected.plane];
+                let expected = (contours, expected);
                 found.find(
-                    (contours, expected),
+                    expected,
                     &self.golden,
                     plane,
-                    Some(&placed),
+                    (Some(&placed), reach_mm),
                     light,
                 );
             });
@@ -129,8 +131,8 @@ impl Centre {
         frame: &PlaneFrame,
         (fitting, placed): (&Fitting<'_>, &Placed),
     ) -> Option<Self> {
-        let (outline, rim) = (found.closed()?, found.rim.as_ref()?);
-        let (from, to) = (expected.outline.middle(), outline.middle());
+        let rim = found.opening()?;
+        let (from, to) = (expected.outline.middle(), rim.outline.middle());
         let at = frame.point(to.0, to.1) - placed.motion.shift;
         let ways: heapless::Vec<Vector, 6> = placed
             .free
@@ -142,8 +144,8 @@ impl Centre {
             for (share, way) in row.iter_mut().zip(&ways) {
                 *share = way.dot(axis);
             }
-            let inputs = rim.inputs.iter().filter(|(source, _)| source.is_of_place());
-            let inputs = inputs.map(|(_, off)| off[i] * off[i]);
+            let inputs = rim.inputs.iter().filter(|of| of.source.is_of_place());
+            let inputs = inputs.map(|of| of.off[i] * of.off[i]);
             (row, off, rim.covariance[i][i] + inputs.sum::<f64>())
         };
         Some(Self {

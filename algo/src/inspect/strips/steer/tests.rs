@@ -254,6 +254,7 @@ impl Head {
             noise: SampleNoise::constant(NOISE),
             noise_counts: NOISE,
             aligned: true,
+            tolerance_mm: 3.0,
             golden_noise: 0.3,
             largest: vec![Largest::default()],
             displaced: vec![None],

@@ -5,7 +5,8 @@
 //! scaled by the median of |d|/σ where points scatter by more than their noise. Covariance C =
 //! (JᵀWJ)⁻¹, W weights over variances.
 
-use super::solve::{Normal, solve_symmetric};
+use super::shape::{Covariance, MAX_PARAMETERS, Parameters, Shape};
+use crate::math::solve::solve_symmetric;
 use alloc::vec::Vec;
 
 /// Tukey's c: 95 % efficient on normal errors.
@@ -26,34 +27,50 @@ pub struct Point {
     pub weight: f64,
 }
 
-/// Step of the numeric derivatives, mm and rad: distances are smooth near a shape, so that the error
-/// of the second order is below 1e-9.
-const STEP: f64 = 1e-5;
+/// The unknowns of normal equations, packed for a shape's own parameters.
+struct NormalEquations {
+    count: usize,
+    matrix: [f64; MAX_PARAMETERS * MAX_PARAMETERS],
+    right: Parameters,
+}
 
-/// What points can lie on: a shape with N parameters p in mm and rad. One solver serves all.
-pub trait Distance<const N: usize> {
-    /// The signed distance d(x, y; p) of a point in mm: of a contour, positive on the material.
-    fn distance(&self, p: &[f64; N], x: f64, y: f64) -> f64;
+impl NormalEquations {
+    fn new(count: usize) -> Self {
+        Self {
+            count,
+            matrix: [0.0; MAX_PARAMETERS * MAX_PARAMETERS],
+            right: Parameters::default(),
+        }
+    }
 
-    /// How the distance changes with each parameter.
-    fn derivative(&self, p: &[f64; N], x: f64, y: f64) -> [f64; N] {
-        core::array::from_fn(|i| {
-            let (mut less, mut more) = (*p, *p);
-            less[i] -= STEP;
-            more[i] += STEP;
-            (self.distance(&more, x, y) - self.distance(&less, x, y)) / (2.0 * STEP)
-        })
+    /// Adds an observation rate · x = value.
+    fn add(&mut self, rate: &Parameters, value: f64, weight: f64) {
+        let n = self.count;
+        for i in 0..n {
+            for j in 0..n {
+                self.matrix[i * n + j] += rate[i] * rate[j] * weight;
+            }
+            self.right[i] += rate[i] * value * weight;
+        }
+    }
+
+    /// The solution for a right side; `None` where the observations do not determine it.
+    fn solve(&self, mut right: Parameters) -> Option<Parameters> {
+        let n = self.count;
+        let mut matrix = self.matrix;
+        solve_symmetric(&mut matrix[..n * n], &mut right[..n])?;
+        Some(right)
     }
 }
 
 /// Moves p to where the points' distances are least, and sets their weights. The covariance of p;
 /// `None` if the points do not determine it.
-pub fn associate<const N: usize>(
-    shape: &impl Distance<N>,
-    p: &mut [f64; N],
+pub fn associate(
+    shape: &dyn Shape,
+    p: &mut Parameters,
     points: &mut [Point],
     ratios: &mut Vec<f64>,
-) -> Option<[[f64; N]; N]> {
+) -> Option<Covariance> {
     for _ in 0..20 {
         ratios.clear();
         ratios.extend(points.iter().map(|point| {
@@ -66,18 +83,16 @@ pub fn associate<const N: usize>(
             let (_, &mut median, _) = ratios.select_nth_unstable_by(middle, f64::total_cmp);
             scale = scale.max(median / MEDIAN);
         }
-        let mut normal = Normal::default();
+        let mut normal = NormalEquations::new(shape.count());
         for point in points.iter_mut() {
-            let sigma = libm::sqrt(point.variance);
             let d = shape.distance(p, point.x, point.y);
-            let outside = d / (sigma * scale * TUKEY);
+            let outside = d / (libm::sqrt(point.variance) * scale * TUKEY);
             let inside = (1.0 - outside * outside).max(0.0);
             point.weight = inside * inside;
-            let root = libm::sqrt(point.weight) / sigma;
             let rate = shape.derivative(p, point.x, point.y);
-            normal.add(&rate.map(|rate| rate * root), -d * root);
+            normal.add(&rate, -d, point.weight / point.variance);
         }
-        let step = normal.solve()?;
+        let step = normal.solve(normal.right)?;
         let mut largest = 0.0_f64;
         for (p, step) in p.iter_mut().zip(step) {
             *p += step;
@@ -87,47 +102,28 @@ pub fn associate<const N: usize>(
             break;
         }
     }
-    inverse(&information(shape, p, points))
-}
-
-/// JᵀWJ at p.
-fn information<const N: usize>(
-    shape: &impl Distance<N>,
-    p: &[f64; N],
-    points: &[Point],
-) -> [[f64; N]; N] {
-    let mut sums = [[0.0; N]; N];
-    for point in points {
+    // JᵀWJ at p, and its inverse.
+    let mut information = NormalEquations::new(shape.count());
+    for point in points.iter() {
         let rate = shape.derivative(p, point.x, point.y);
-        for (row, one) in sums.iter_mut().zip(rate) {
-            for (sum, other) in row.iter_mut().zip(rate) {
-                *sum += one * other * point.weight / point.variance;
-            }
-        }
+        information.add(&rate, 0.0, point.weight / point.variance);
     }
-    sums
-}
-
-/// The inverse of a symmetric positive definite matrix.
-fn inverse<const N: usize>(matrix: &[[f64; N]; N]) -> Option<[[f64; N]; N]> {
-    let mut inverse = [[0.0; N]; N];
-    for (i, column) in inverse.iter_mut().enumerate() {
-        let mut copy = *matrix;
+    let mut inverse = Covariance::default();
+    for (i, column) in inverse.iter_mut().enumerate().take(shape.count()) {
         column[i] = 1.0;
-        solve_symmetric(copy.as_flattened_mut(), column)?;
+        *column = information.solve(*column)?;
     }
     Some(inverse)
 }
 
 /// By how much p changes if every point lies farther along d by `shift` mm.
-pub fn response<const N: usize>(
-    shape: &impl Distance<N>,
-    p: &[f64; N],
-    covariance: &[[f64; N]; N],
+pub fn response(
+    shape: &dyn Shape,
+    (p, covariance): (&Parameters, &Covariance),
     points: &[Point],
     shift: impl Fn(&Point) -> f64,
-) -> [f64; N] {
-    let mut right = [0.0; N];
+) -> Parameters {
+    let mut right = Parameters::default();
     for point in points {
         let rate = shape.derivative(p, point.x, point.y);
         for (sum, rate) in right.iter_mut().zip(rate) {

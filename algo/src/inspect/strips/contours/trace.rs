@@ -5,10 +5,9 @@
 //! certain.
 
 use super::face::Face;
-use super::shape::Outline;
 use crate::geometry::Vector;
 use crate::inspect::contour::View;
-use crate::inspect::contour::shape::{Circle, Line, Slot};
+use crate::inspect::contour::shape::{Outline, Place, Trace};
 use crate::inspect::feature::{FeatureKind, PlaneFrame};
 use crate::inspect::region::Region;
 use crate::inspect::strips::golden::Golden;
@@ -26,8 +25,8 @@ const LEAST_PIXELS: usize = 9;
 const FLOOR_SHARE: f64 = 0.2;
 
 /// What golden's heights say of a contour.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Start {
+#[derive(Clone, Debug)]
+pub struct Traced {
     pub outline: Outline,
     /// Places of the frame that see the face.
     pub face: Vec<usize>,
@@ -46,12 +45,12 @@ struct Pixels {
 }
 
 /// Finds a contour of this kind in a region of golden; `None` if there is none.
-pub fn start(
+pub fn trace(
     kind: FeatureKind,
     region: &Region,
     golden: &Golden,
     face: &Face<'_>,
-) -> Option<Start> {
+) -> Option<Traced> {
     let pixels = Pixels::of(region, golden, face);
     let spot = |at: usize| {
         let (u, v) = pixels.place(at);
@@ -61,32 +60,27 @@ pub fn start(
     let (here, (u, v)) = (spot(middle)?, pixels.place(middle));
     let beside = face.spot(u as f64 + 1.0, v as f64)?;
     let pixel = libm::hypot(beside.x - here.0, beside.y - here.1);
-    let eroded = ERODED_PX * pixel;
-    let opening = match kind {
-        FeatureKind::Line => (0..pixels.above.len())
-            .filter(|&at| pixels.is_open(at))
-            .collect(),
-        _ => pixels.opening()?,
+    let all = 0..pixels.above.len();
+    let opening = match kind.is_opening() {
+        true => pixels.opening()?,
+        false => all.clone().filter(|&at| pixels.is_open(at)).collect(),
     };
     if opening.len() < LEAST_PIXELS {
         return None;
     }
-    let outline = match kind {
-        FeatureKind::Line => Outline::Line(pixels.line(spot, eroded)?, [0.0; 2]),
-        kind => {
-            let corners = hull(opening.iter().filter_map(|&at| spot(at)).collect());
-            match kind {
-                FeatureKind::Slot => {
-                    let [x, y, half, radius, angle] = Slot::of(&corners)?;
-                    Outline::Slot([x, y, half, shrunk(radius, eroded), angle])
-                }
-                _ => {
-                    let [x, y, radius] = Circle::of(&corners)?;
-                    Outline::Circle([x, y, shrunk(radius, eroded)])
-                }
+    let on_face = all.filter(|&at| pixels.is_face(at));
+    let trace = Trace {
+        places: match kind.is_opening() {
+            true => hull(opening.iter().copied().filter_map(spot).collect()),
+            false => {
+                let edge = on_face.clone().filter(|&at| pixels.is_edge(at));
+                edge.filter_map(spot).collect()
             }
-        }
+        },
+        face: mean(on_face.clone().filter_map(spot))?,
+        eroded: ERODED_PX * pixel,
     };
+    let outline = (kind.contour()?.begin)(&trace)?;
     let depths = opening.iter().filter_map(|&at| pixels.above[at]);
     let mut depths: Vec<f64> = depths.filter(|above| *above < -NEAR_MM).collect();
     depths.sort_unstable_by(f64::total_cmp);
@@ -96,8 +90,7 @@ pub fn start(
         || count >= LEAST_PIXELS && depths[count * 3 / 4] - depths[count / 4] < NEAR_MM;
     let ground = || ground_below(golden, &face.frame).filter(|depth| *depth > NEAR_MM);
     let width = golden.size().0;
-    let on_face = (0..pixels.above.len()).filter(|&at| pixels.is_face(at));
-    Some(Start {
+    Some(Traced {
         outline,
         face: on_face
             .map(|at| pixels.place(at))
@@ -111,11 +104,6 @@ pub fn start(
 pub fn ground_below(golden: &Golden, frame: &PlaneFrame) -> Option<f64> {
     let ground = golden.ground.as_ref()?.at(frame.origin);
     Some(frame.normal().dot(frame.origin - ground))
-}
-
-/// A radius without the pixels whose heights are not certain.
-fn shrunk(radius: f64, eroded: f64) -> f64 {
-    (radius - eroded).max(radius / 4.0)
 }
 
 impl Pixels {
@@ -200,59 +188,23 @@ impl Pixels {
         largest
     }
 
-    /// The straight edge between the face and what is none.
-    fn line(&self, spot: impl Fn(usize) -> Option<(f64, f64)>, eroded: f64) -> Option<Line> {
-        let is_edge = |&at: &usize| {
-            let open = |beside: &Option<usize>| beside.is_some_and(|beside| self.is_open(beside));
-            self.is_face(at) && self.beside(at).iter().any(open)
-        };
-        let all = 0..self.above.len();
-        let mut edge: Vec<(f64, f64)> = all.clone().filter(is_edge).filter_map(&spot).collect();
-        let face = mean(all.filter(|&at| self.is_face(at)).filter_map(&spot))?;
-        let mut of = straight(&edge)?;
-        // What lies off by more than twice the mean is not of this edge.
-        let away = |of: &((f64, f64), (f64, f64)), at: &(f64, f64)| {
-            let ((x, y), (along, up)) = *of;
-            libm::fabs((at.1 - y) * along - (at.0 - x) * up)
-        };
-        let scatter = edge.iter().map(|at| away(&of, at)).sum::<f64>() / edge.len() as f64;
-        edge.retain(|at| away(&of, at) <= 2.0 * scatter + 1e-9);
-        of = straight(&edge)?;
-        let ((x, y), (mut along, mut up)) = of;
-        if (face.1 - y) * along - (face.0 - x) * up < 0.0 {
-            (along, up) = (-along, -up);
-        }
-        let ways = edge.iter().map(|at| (at.0 - x) * along + (at.1 - y) * up);
-        let from = ways.clone().fold(f64::INFINITY, f64::min);
-        let to = ways.fold(f64::NEG_INFINITY, f64::max);
-        // Off the face, which lies on the left.
-        let (x, y) = (x + up * eroded, y - along * eroded);
-        Line::of(&[from, to].map(|way| (x + way * along, y + way * up)))
+    /// Whether a pixel of the face lies beside what is none.
+    fn is_edge(&self, at: usize) -> bool {
+        let open = |beside: &Option<usize>| beside.is_some_and(|beside| self.is_open(beside));
+        self.beside(at).iter().any(open)
     }
 }
 
-fn mean(of: impl Iterator<Item = (f64, f64)>) -> Option<(f64, f64)> {
+fn mean(places: impl Iterator<Item = Place>) -> Option<Place> {
     let (mut x, mut y, mut count) = (0.0, 0.0, 0.0);
-    for at in of {
+    for at in places {
         (x, y, count) = (x + at.0, y + at.1, count + 1.0);
     }
     (count > 0.0).then(|| (x / count, y / count))
 }
 
-/// A point and the direction of the line through points that is nearest to them.
-fn straight(of: &[(f64, f64)]) -> Option<((f64, f64), (f64, f64))> {
-    let middle = mean(of.iter().copied())?;
-    let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
-    for at in of {
-        let (x, y) = (at.0 - middle.0, at.1 - middle.1);
-        (xx, xy, yy) = (xx + x * x, xy + x * y, yy + y * y);
-    }
-    let angle = 0.5 * libm::atan2(2.0 * xy, xx - yy);
-    (xx + yy > 0.0).then(|| (middle, (libm::cos(angle), libm::sin(angle))))
-}
-
 /// The convex hull of points, counterclockwise (A. M. Andrew, Inf. Process. Lett. 9, 1979).
-fn hull(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+fn hull(mut points: Vec<Place>) -> Vec<Place> {
     points.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let turns_left = |a: (f64, f64), b: (f64, f64), c: (f64, f64)| {
         (b.0 - a.0) * (c.1 - a.1) > (b.1 - a.1) * (c.0 - a.0)
