@@ -232,15 +232,37 @@ fn imports_inside_algo_only_go_backwards_along_the_flow() {
         &["calibration", "chain", "inspect"],
         &["adaptive"],
     ];
+    only_backwards(rule, "algo/src", "crate", &order);
+}
+
+#[test]
+fn the_stages_of_an_inspection_import_only_what_lies_before_them() {
+    let rule = "algo/src/inspect/strips has a folder for each stage, in their order: golden ← measure \
+                ← align ← pair ← accumulate ← readings ← production.";
+    let order = [
+        &["golden"][..],
+        &["measure"],
+        &["align"],
+        &["pair"],
+        &["accumulate"],
+        &["readings"],
+        &["production"],
+    ];
+    let strips = "crate::inspect::strips";
+    only_backwards(rule, "algo/src/inspect/strips", strips, &order);
+}
+
+/// Fails where a module below `folder`, whose path in the code is `path`, names one of a later line.
+fn only_backwards(rule: &str, folder: &str, path: &str, order: &[&[&str]]) {
     for (at, here) in order.iter().enumerate() {
         let later: Vec<String> = order[at + 1..]
             .concat()
             .iter()
-            .map(|module| format!("crate::{module}"))
+            .map(|module| format!("{path}::{module}"))
             .collect();
         for module in *here {
             let later: Vec<&str> = later.iter().map(String::as_str).collect();
-            forbid(rule, &format!("algo/src/{module}"), &later);
+            forbid(rule, &format!("{folder}/{module}"), &later);
         }
     }
 }

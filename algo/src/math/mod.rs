@@ -12,3 +12,20 @@ use core::ops::Range;
 pub(crate) fn around(at: usize, reach: usize, end: usize) -> Range<usize> {
     at.saturating_sub(reach)..(at + reach + 1).min(end)
 }
+
+/// The intersection of two; it may be empty.
+#[inline]
+pub(crate) fn common(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    let start = a.start.max(b.start);
+    start..a.end.min(b.end).max(start)
+}
+
+/// From the first to the last of either.
+#[inline]
+pub(crate) fn hull(a: Range<usize>, b: Range<usize>) -> Range<usize> {
+    match (a.is_empty(), b.is_empty()) {
+        (true, _) => b,
+        (_, true) => a,
+        _ => a.start.min(b.start)..a.end.max(b.end),
+    }
+}

@@ -2,7 +2,7 @@
 //!
 //! σ of a value follows from that of its pixels and of the motion: here for values that are linear
 //! in heights, in `propagate.rs` for functions of planes, in `extreme.rs`, `rms_deviation.rs` and
-//! `out_of_tolerance.rs` for theirs. The systematic part of U is in `strips/uncertainty.rs`, guard
+//! `out_of_tolerance.rs` for theirs. The systematic part of U is in `strips/readings/uncertainty.rs`, guard
 //! bands in the daemon's `station/gauge.rs`.
 
 use super::component::Component;

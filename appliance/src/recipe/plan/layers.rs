@@ -10,7 +10,7 @@ use crate::output::cloud::{Axes, ply};
 use crate::recipe::Recipe;
 use crate::station::Square;
 use algo::geometry::{HeightRange, Triangulator};
-use algo::inspect::{Findings, Maps};
+use algo::inspect::{Drawing, Findings, Maps};
 use algo::pipeline;
 use algo::units::{Height, Modulation};
 use hal::frame::Frame;
@@ -143,7 +143,8 @@ impl Plan {
         );
         let shown = self.shown(&found.ok()?.0);
         let production = &self.runs.get(sequence)?.production;
-        let deviation_mm = production.square_means(&strips, &deviation_mm, shown.side);
+        let deviation_mm =
+            Drawing::new(production, &strips).square_means(&deviation_mm, shown.side);
         drop(strips);
         let full_scale = production.decoder().full_scale();
         let modulation = self.modulation(sequence, frames)?;

@@ -13,9 +13,11 @@
 //! `expected_phases_are_those_of_double_precision`.
 
 use super::window::ExpectedRow;
-use crate::inspect::strips::displaced::{BLOCK, BlockNumbers, Linear, Whole, floor, is_near};
-use crate::inspect::strips::golden::Golden;
-use crate::inspect::strips::pose::PoseField;
+use crate::inspect::strips::align::displaced::{
+    BLOCK, BlockNumbers, Linear, Whole, floor, is_near,
+};
+use crate::inspect::strips::align::pose::PoseField;
+use crate::inspect::strips::golden::part::Golden;
 use crate::math::nearest::whole;
 use crate::pipeline::{COMPARED, CubicRow};
 use crate::simd::{Backend, Lanes, back_end_entry};
@@ -260,7 +262,7 @@ fn expect_pixels<V: Lanes>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::inspect::strips::displaced::{Node, between};
+    use crate::inspect::strips::align::displaced::{Node, between};
     use crate::pipeline::SQUARE;
     use std::vec;
     use std::vec::Vec;

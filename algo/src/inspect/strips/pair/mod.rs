@@ -12,17 +12,16 @@
 //!
 //! Neighbouring phases share pixels. Their σ is therefore that of the two samples of the pixel
 //! alone, which is right for means over areas that are large against the window; means over smaller
-//! squares are less noisy (`shared`).
+//! squares are less noisy (`noise`).
 
-mod expected;
-mod place;
-pub(super) mod shared;
+pub mod expected;
+pub mod noise;
+mod phases;
 mod solve;
 mod sums;
-mod terms;
 mod window;
 
-pub use place::{PairBuffers, PairPlaced};
+pub use phases::PairBuffers;
 
 #[cfg(test)]
 mod tests;

@@ -4,8 +4,7 @@
 //! Those of `window.rs`. Where the determinant is [`LEAST_DETERMINED`] of its largest value,
 //! rounding changes δ by 10⁻⁶ rad.
 
-use super::sums::{BLOCK, SUMS, sum_up};
-use super::terms::{FAINT, PIXELS};
+use super::sums::{BLOCK, FAINT, PIXELS, SUMS, sum_up};
 use crate::math::nearest::whole;
 use crate::phase::{LeastModulation, Trust};
 use crate::simd::{Lanes, back_end_entry};

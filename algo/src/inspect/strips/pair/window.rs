@@ -30,8 +30,7 @@
 //! `the_phase_of_a_pair_has_next_to_no_periodic_error`.
 
 use super::solve::{Solved, Solver, solve_block};
-use super::sums::{BLOCK, Columns};
-use super::terms::{FAINT, REACH, SIDE, Terms, refill};
+use super::sums::{BLOCK, Columns, FAINT, REACH, SIDE, Terms, refill};
 use crate::frame::{FrameView, Sample, Samples};
 use crate::phase::{LeastModulation, PhaseRow};
 use crate::simd::{Backend, Lanes, back_end_entry};
@@ -106,7 +105,7 @@ impl Windows {
     /// Fits the windows around the pixels of some rows, the first of which is row `top`. `expect`
     /// tells what a row is expected to show; it is asked for these rows and for those that their
     /// windows reach into, from the top row down.
-    pub(super) fn fit(
+    pub fn fit(
         &self,
         frames: [FrameView<'_>; 2],
         top: usize,

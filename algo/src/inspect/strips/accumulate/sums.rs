@@ -1,0 +1,37 @@
+//! What the rows of a strip add up to.
+
+use super::counts::Counts;
+use super::gauges::Gauges;
+use super::sections::SectionPoints;
+use super::squares::Squares;
+use core::ops::Range;
+
+/// The sums over the rows of a strip: all that readings are worked out from.
+#[derive(Debug)]
+pub struct Sums {
+    pub counts: Counts,
+    pub squares: Squares,
+    pub sections: SectionPoints,
+}
+
+impl Sums {
+    /// Of a strip of these rows of `width` pixels.
+    pub fn new(gauges: &Gauges, width: usize, rows: &Range<usize>) -> Self {
+        Self {
+            counts: Counts::new(gauges),
+            squares: Squares::new(gauges, width, rows),
+            sections: SectionPoints::new(gauges),
+        }
+    }
+
+    /// Bytes of its cells and tiles: nearly all of its memory.
+    pub fn bytes(&self) -> usize {
+        self.counts.bytes() + self.squares.bytes()
+    }
+
+    pub fn clear(&mut self) {
+        self.counts.clear();
+        self.squares.clear();
+        self.sections.clear();
+    }
+}

@@ -1,0 +1,5 @@
+//! Stage 3: the part's motion is taken back.
+
+pub mod coordinates;
+pub mod displaced;
+pub mod pose;
