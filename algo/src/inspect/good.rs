@@ -225,12 +225,12 @@ fn carry<'a>(values: impl Iterator<Item = &'a mut f32>) {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LargestDeviation {
     /// The squares of each side.
-    fields: Vec<Field>,
+    fields: Vec<DeviationField>,
 }
 
 /// The squares of one side.
 #[derive(Clone, Debug, PartialEq)]
-struct Field {
+struct DeviationField {
     side: f64,
     /// How many squares have a σ in each bin ([`sigma_of`]), by the number of axes along which they
     /// are the end of a run.
@@ -281,7 +281,7 @@ impl LargestDeviation {
             bins[ends.into_iter().filter(|end| *end).count()][bin as usize] += 1;
         }
         let side = side.max(1) as f64;
-        let fields = vec![Field { side, bins }];
+        let fields = vec![DeviationField { side, bins }];
         Self { fields }
     }
 
@@ -293,7 +293,7 @@ impl LargestDeviation {
     /// Λ(x): the mean number of clumps of squares that deviate by more than `limit` mm, above 0.
     fn clumps(&self, limit: f64) -> f64 {
         let mut clumps = 0.0;
-        for Field { side, bins } in &self.fields {
+        for DeviationField { side, bins } in &self.fields {
             for (ends, bins) in bins.iter().enumerate() {
                 let bins = bins.iter().enumerate();
                 for (bin, &count) in bins.filter(|(_, count)| **count > 0) {

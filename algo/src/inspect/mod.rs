@@ -39,8 +39,8 @@ pub use openings::{Opening, openings};
 pub use region::{Region, RegionError, polygon_spans};
 pub use ripple::ripple;
 pub use strips::{
-    CalibrationError, Drawing, Drawn, Findings, FoundFeature, Gauge, GoldenSignal, Input, Levels,
-    Lost, MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Place,
+    CalibrationUncertainty, Drawing, Drawn, Findings, FoundFeature, Gauge, GoldenSignal, Input,
+    Levels, Lost, MAX_FEATURES, MAX_GAUGES, Maps, Missing, PairBuffers, PairPlaced, Parts, Place,
     Production, Profile, SeenRim, Signal, Skipped, Strips, Unmeasurable,
 };
 pub use surroundings::{Surroundings, surroundings};

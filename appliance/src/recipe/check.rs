@@ -11,7 +11,7 @@ use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
-use algo::inspect::{CalibrationError, Feature, Gauge};
+use algo::inspect::{CalibrationUncertainty, Feature, Gauge};
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::LeastModulation;
 use algo::units::Modulation;
@@ -89,7 +89,7 @@ pub struct Conditions {
     /// The least modulation that is trusted.
     pub least_modulation: LeastModulation,
     /// σ by the uncertainty of the calibration; 0 where it is not known.
-    pub calibration: CalibrationError,
+    pub calibration: CalibrationUncertainty,
     /// |ΔΦ| in turns up to which the expansion of the height holds.
     pub expansion_range_turns: f64,
     /// How far behind golden's heights the surroundings begin, mm; `None` if there are none.
@@ -387,12 +387,13 @@ impl From<&RecipeFile> for Conditions {
             golden_captures: file.golden_captures,
             golden_offset_counts: file.golden_offset_counts,
             least_modulation: LeastModulation::new(file.least_modulation).unwrap_or_default(),
-            calibration: file
-                .calibration_sigma
-                .map_or_else(CalibrationError::default, |sigma| CalibrationError {
+            calibration: file.calibration_sigma.map_or_else(
+                CalibrationUncertainty::default,
+                |sigma| CalibrationUncertainty {
                     height: sigma.height_mm,
                     length: sigma.length_mm / LENGTH,
-                }),
+                },
+            ),
             expansion_range_turns: file.expansion_range_turns,
             surroundings_mm: file.surroundings_mm,
             ground_mm: file.ground_mm,

@@ -33,7 +33,7 @@ use crate::simd::Backend;
 
 /// A measured point.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
+pub struct HeightSample {
     /// Where it is, mm.
     pub point: Vector,
     /// Error of its height, mm (1 σ).
@@ -129,7 +129,7 @@ struct Descended {
 }
 
 /// A solution of the linear problem.
-struct Solved {
+struct SolvedMotion {
     further: [f64; 6],
     directions: Directions,
     /// σ of the residuals, mm.
@@ -144,7 +144,7 @@ impl Fitting<'_> {
     /// Where many points disagree, a bent part may have been taken for a moved one: a second
     /// descent with Tukey's weights alone stays near the part as taught, and the motion with which
     /// more points agree is taken.
-    pub fn fit(&self, samples: &[Sample], buffers: &mut FitBuffers) -> Option<Placed> {
+    pub fn fit(&self, samples: &[HeightSample], buffers: &mut FitBuffers) -> Option<Placed> {
         let moved = self.descend(WeightFunction::Huber, samples, buffers)?;
         if moved.placed.outliers <= SUSPICIOUS {
             return Some(moved.placed);
@@ -168,7 +168,7 @@ impl Fitting<'_> {
     fn descend(
         &self,
         mut weights: WeightFunction,
-        samples: &[Sample],
+        samples: &[HeightSample],
         buffers: &mut FitBuffers,
     ) -> Option<Descended> {
         let mut motion = self.from.unwrap_or(Motion::none(self.plan.centre));
@@ -209,7 +209,7 @@ impl Fitting<'_> {
         Motion::new(self.plan.centre, motion.shift + shift, motion.turn + turn)
     }
 
-    fn placed(&self, motion: Motion, solved: &Solved, equations: &mut Equations) -> Placed {
+    fn placed(&self, motion: Motion, solved: &SolvedMotion, equations: &mut Equations) -> Placed {
         let spread = equations.covariance(self.backend, &solved.further, solved.scale);
         let covariance = solved.directions.covariance(&spread);
         let (reach, reach_sigma) = self.reach(&motion, solved.directions.free(), &covariance);
@@ -299,7 +299,7 @@ impl Fitting<'_> {
     /// planned.
     fn linearise(
         &self,
-        samples: &[Sample],
+        samples: &[HeightSample],
         motion: &Motion,
         still: bool,
         equations: &mut Equations,
@@ -312,7 +312,7 @@ impl Fitting<'_> {
         }
     }
 
-    fn equation(&self, sample: &Sample, motion: &Motion, still: bool) -> Option<Equation> {
+    fn equation(&self, sample: &HeightSample, motion: &Motion, still: bool) -> Option<Equation> {
         if let (true, Some((at, above))) = (still, sample.over) {
             let spot = self.plan.spots.get(at)?;
             return Some(self.of_facet(sample, &spot.facet, spot.point, above));
@@ -324,7 +324,13 @@ impl Fitting<'_> {
         Some(self.of_facet(sample, &facet, point, above))
     }
 
-    fn of_facet(&self, sample: &Sample, facet: &Facet, point: Vector, above: f64) -> Equation {
+    fn of_facet(
+        &self,
+        sample: &HeightSample,
+        facet: &Facet,
+        point: Vector,
+        above: f64,
+    ) -> Equation {
         let variance = sample.sigma * sample.sigma;
         Equation {
             residual: above,
@@ -337,7 +343,12 @@ impl Fitting<'_> {
     }
 
     /// Solves the linear problem by reweighting, from a first guess.
-    fn solve(&self, weights: WeightFunction, guess: [f64; 6], equations: &mut Equations) -> Solved {
+    fn solve(
+        &self,
+        weights: WeightFunction,
+        guess: [f64; 6],
+        equations: &mut Equations,
+    ) -> SolvedMotion {
         let predicted = equations.predicted();
         let mut further = guess;
         let mut left = REWEIGHTINGS;
@@ -354,7 +365,7 @@ impl Fitting<'_> {
             further = next;
             left -= 1;
             if left == 0 || libm::sqrt(change) < SMALL_CHANGE_MM {
-                return Solved {
+                return SolvedMotion {
                     further,
                     directions,
                     scale,

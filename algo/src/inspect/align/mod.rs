@@ -14,7 +14,7 @@ mod weight;
 
 pub use coarse::Coarse;
 pub use directions::{Matrix6, form};
-pub use fit::{FitBuffers, Fitting, Placed, Sample};
+pub use fit::{FitBuffers, Fitting, HeightSample, Placed};
 pub use motion::Motion;
 pub use picture::{Found, Picture};
 pub use spots::{Alignment, Spot};

@@ -79,21 +79,21 @@ const STEP_RAD: f64 = 1e-4;
 pub struct Picture {
     centre: Vector,
     /// From coarse to fine.
-    scales: Vec<Scale>,
+    scales: Vec<PictureScale>,
 }
 
 #[derive(Clone, Debug)]
-struct Scale {
+struct PictureScale {
     /// Fine pixels per coarse one.
     pixels: usize,
     /// The largest brightness.
     brightest: f64,
-    points: Vec<Point>,
+    points: Vec<PicturePoint>,
 }
 
 /// A point of the template.
 #[derive(Clone, Copy, Debug)]
-struct Point {
+struct PicturePoint {
     at: Vector,
     /// What the picture there depends on: ∇T · ∂π/∂p, T and 1.
     terms: [f64; UNKNOWNS],
@@ -149,7 +149,7 @@ impl Picture {
             half.become_half(&picture);
             picture = half;
             pixels *= 2;
-            let scale = Scale::new(triangulator, surface, (&picture, pixels), centre);
+            let scale = PictureScale::new(triangulator, surface, (&picture, pixels), centre);
             if scale.points.len() < LEAST_POINTS {
                 break;
             }
@@ -267,7 +267,7 @@ impl Picture {
     }
 }
 
-impl Scale {
+impl PictureScale {
     fn new(
         triangulator: &Triangulator,
         surface: &KnownSurface,
@@ -316,7 +316,7 @@ impl Scale {
             }
             terms[MOTIONS] = f64::from(picture.brightness[at]);
             terms[MOTIONS + 1] = 1.0;
-            Some(Point { at: point, terms })
+            Some(PicturePoint { at: point, terms })
         };
         Self {
             pixels,
@@ -327,7 +327,7 @@ impl Scale {
 
     /// Whether edges change the picture where the part is moved along a direction of 1 mm.
     fn has_edges(&self, triangulator: &Triangulator, direction: &Direction) -> bool {
-        let change = |point: &Point| {
+        let change = |point: &PicturePoint| {
             let terms = point.terms.iter().zip(direction);
             terms.map(|(term, way)| term * way).sum::<f64>()
         };

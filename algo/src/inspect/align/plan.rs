@@ -1,6 +1,6 @@
 //! The plan of an alignment: as many points as the shape needs, and what they determine.
 
-use super::fit::{FitBuffers, Fitting, Placed, Sample};
+use super::fit::{FitBuffers, Fitting, HeightSample, Placed};
 use super::spots::{Alignment, Spot};
 use super::surface::GoldenSurface;
 use crate::geometry::Vector;
@@ -86,7 +86,7 @@ impl Alignment {
     /// How a part that lies as taught is found to lie, with the noise of golden; none if the
     /// surface has too few points.
     pub fn still(&self, golden: GoldenSurface<'_>) -> Option<Placed> {
-        let still = |(at, spot): (usize, &Spot)| Sample {
+        let still = |(at, spot): (usize, &Spot)| HeightSample {
             point: spot.point,
             sigma: spot.facet.sigma,
             over: Some((at, 0.0)),

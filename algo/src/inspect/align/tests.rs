@@ -80,14 +80,14 @@ impl Made {
     }
 
     /// Points of the surface, moved.
-    fn moved(&self, motion: &Motion) -> Vec<Sample> {
+    fn moved(&self, motion: &Motion) -> Vec<HeightSample> {
         let places = (20..SIDE - 20).step_by(4);
         let places = places.flat_map(|v| (20..SIDE - 20).step_by(4).map(move |u| (u, v)));
         places
             .map(|(u, v)| {
                 let height = self.surface.height[v * SIDE + u];
                 let point = self.triangulator.point(u, v, height).unwrap();
-                Sample {
+                HeightSample {
                     point: motion.apply(point),
                     sigma: SIGMA_MM,
                     over: None,

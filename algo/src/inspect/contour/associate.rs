@@ -16,7 +16,7 @@ const MEDIAN: f64 = 0.674_489_750_196_081_7;
 
 /// A point that was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Point {
+pub struct EdgePoint {
     /// x, mm.
     pub x: f64,
     /// y, mm.
@@ -68,7 +68,7 @@ impl NormalEquations {
 pub fn associate(
     shape: &dyn Shape,
     p: &mut Parameters,
-    points: &mut [Point],
+    points: &mut [EdgePoint],
     ratios: &mut Vec<f64>,
 ) -> Option<Covariance> {
     for _ in 0..20 {
@@ -120,8 +120,8 @@ pub fn associate(
 pub fn response(
     shape: &dyn Shape,
     (p, covariance): (&Parameters, &Covariance),
-    points: &[Point],
-    shift: impl Fn(&Point) -> f64,
+    points: &[EdgePoint],
+    shift: impl Fn(&EdgePoint) -> f64,
 ) -> Parameters {
     let mut right = Parameters::default();
     for point in points {

@@ -14,7 +14,7 @@
 
 use super::sample::Signals;
 use super::shape::{Foot, Parameters, Shape};
-use super::view::{Setup, View};
+use super::view::{PlaneView, Setup};
 use crate::geometry::Vector;
 
 /// The wall of a sheet as one piece of its rim shows it.
@@ -48,7 +48,7 @@ impl Wall {
 
 /// By how much the phase of a floor that is seen at a place of the plane is larger than the plane's
 /// there, turns of ratio 1; `None` if its depth is not known or nothing tells.
-fn floor_phase(view: &impl View, setup: &Setup, (x, y): (f64, f64)) -> Option<f64> {
+fn floor_phase(view: &impl PlaneView, setup: &Setup, (x, y): (f64, f64)) -> Option<f64> {
     let floor = setup.floor?;
     let (right, up) = slope(setup.camera, x, y);
     // Where the light that reaches the floor passes the plane.
@@ -74,7 +74,7 @@ impl Gradient {
     /// Within `band` mm from a piece that reaches `half` mm to each side; `None` where it is not
     /// known.
     pub fn of_floor(
-        signals: &Signals<'_, impl View>,
+        signals: &Signals<'_, impl PlaneView>,
         foot: &Foot,
         [band, half]: [f64; 2],
     ) -> Option<Self> {

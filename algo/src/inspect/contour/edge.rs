@@ -102,7 +102,7 @@ pub struct Edge {
 
 /// What a pixel sees at one distance from an edge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Profile {
+pub struct EdgeProfile {
     /// F: which share of its light comes from the material.
     pub share: f64,
     /// M: the share times how far beyond the centre, along d, it comes from on average, px.
@@ -159,12 +159,12 @@ impl Edge {
     }
 
     /// What a pixel at distance `d` px sees.
-    pub fn at(&self, d: f64) -> Profile {
+    pub fn at(&self, d: f64) -> EdgeProfile {
         if libm::fabs(d) >= self.reach() {
             let share = if d > 0.0 { 1.0 } else { 0.0 };
-            return Profile {
+            return EdgeProfile {
                 share,
-                ..Profile::default()
+                ..EdgeProfile::default()
             };
         }
         if self.sigma < SHARP {
@@ -176,7 +176,7 @@ impl Edge {
         let [share, slope, bend, moment, spread] = self
             .series
             .map(|[a, b, c, d, e]| density * (a + y * (b + y * (c + y * (d + y * e)))));
-        Profile {
+        EdgeProfile {
             share: below(z, density) - z * share,
             moment: self.whole * moment,
             spread: -self.whole * self.whole * z * spread,
@@ -186,7 +186,7 @@ impl Edge {
     }
 
     /// The same by the closed form.
-    fn sharp(&self, d: f64) -> Profile {
+    fn sharp(&self, d: f64) -> EdgeProfile {
         let ([a, b], sigma) = (self.half, self.sigma);
         let mut sums = [0.0; 5];
         for (at, sign) in [
@@ -205,7 +205,7 @@ impl Edge {
         let share = share * square * scale;
         let first = first * square * sigma * scale;
         let second = second * square * square * scale;
-        Profile {
+        EdgeProfile {
             share,
             moment: first - d * share,
             spread: (d * d - self.variance()) * share - 2.0 * (d * first - second),
@@ -241,7 +241,7 @@ fn integrals(z: f64) -> [f64; 5] {
     ]
 }
 
-impl Profile {
+impl EdgeProfile {
     /// Share, moment and spread.
     pub fn parts(&self) -> [f64; 3] {
         [self.share, self.moment, self.spread]
@@ -349,8 +349,8 @@ mod tests {
         for (sigma, d) in [(0.3, 0.2), (0.6, -0.8), (1.5, 1.3)] {
             let edge = Edge::new(normal, sigma);
             let at = edge.at(d);
-            let parts = |p: Profile| [p.share, p.moment, p.spread];
-            let rate = |one: Profile, other: Profile| {
+            let parts = |p: EdgeProfile| [p.share, p.moment, p.spread];
+            let rate = |one: EdgeProfile, other: EdgeProfile| {
                 let (one, other) = (parts(one), parts(other));
                 [0, 1, 2].map(|i| (one[i] - other[i]) / (2.0 * STEP))
             };

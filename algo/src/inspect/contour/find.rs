@@ -1,16 +1,16 @@
 //! A contour from pixels: pieces about where it is expected, their edges, the shape through them,
 //! and again about that, until nothing moves.
 
-use super::associate::{Point, associate, response};
+use super::associate::{EdgePoint, associate, response};
 use super::edge::Edge;
-use super::fit::{Fit, Problem, Seen, damp};
+use super::fit::{EdgeFit, Problem, SeenPixel, damp};
 use super::piece::{BAND, LENGTH, MARGIN, Pieces, pixel_size};
 use super::ring::Ring;
 use super::sample::Signals;
 use super::shape::{Covariance, Parameters, Shape};
 use super::start::start;
 use super::verdict::{Outcome, State, state};
-use super::view::{Setup, View};
+use super::view::{PlaneView, Setup};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
@@ -67,7 +67,7 @@ pub struct Contour {
     /// mm per px.
     pub pixel: f64,
     /// Points of its rim.
-    pub points: Vec<Point>,
+    pub points: Vec<EdgePoint>,
     /// What became of its pieces, in their order along it.
     pub outcomes: Vec<Outcome>,
     /// By how much the phase of the material next to the rim is off the plane's, turns of ratio 1,
@@ -82,7 +82,12 @@ pub struct Contour {
 ///
 /// Where the sheet's thickness is not known, the parameters are the mean of what no wall and a
 /// thick one would make them.
-pub fn find(shape: &dyn Shape, expected: &Parameters, view: &impl View, setup: &Setup) -> Contour {
+pub fn find(
+    shape: &dyn Shape,
+    expected: &Parameters,
+    view: &impl PlaneView,
+    setup: &Setup,
+) -> Contour {
     let mut contour = Contour {
         state: State::Unseen,
         found: 0.0,
@@ -101,7 +106,7 @@ pub fn find(shape: &dyn Shape, expected: &Parameters, view: &impl View, setup: &
         return contour;
     };
     contour.pixel = pixel;
-    let mut search = Search {
+    let mut search = ContourSearch {
         shape,
         signals: Signals::new(view, setup),
         room: Room {
@@ -136,7 +141,7 @@ pub fn find(shape: &dyn Shape, expected: &Parameters, view: &impl View, setup: &
 }
 
 /// A search for a contour.
-struct Search<'a, V> {
+struct ContourSearch<'a, V> {
     shape: &'a dyn Shape,
     signals: Signals<'a, V>,
     room: Room,
@@ -144,7 +149,7 @@ struct Search<'a, V> {
 
 /// What a round changes, px.
 #[derive(Clone, Copy, Debug)]
-struct Change {
+struct Movement {
     /// How far the place of the contour moves that moves farthest.
     moved: f64,
     /// By how much the blur changes.
@@ -158,7 +163,7 @@ struct Sharpness {
     right: f64,
 }
 
-impl<V: View> Search<'_, V> {
+impl<V: PlaneView> ContourSearch<'_, V> {
     /// Goes on from where a contour is until nothing moves: with one of some pieces, then with all.
     fn run(&mut self, contour: &mut Contour, thickness: f64) {
         let pieces = self.shape.length(&contour.parameters) / (LENGTH * contour.pixel);
@@ -210,7 +215,7 @@ impl<V: View> Search<'_, V> {
         thickness: f64,
         rough: f64,
         some: usize,
-    ) -> Option<Change> {
+    ) -> Option<Movement> {
         let (shape, before) = (self.shape, (contour.parameters, contour.blur));
         let room = &mut self.room;
         let of = (shape, &contour.parameters);
@@ -235,7 +240,7 @@ impl<V: View> Search<'_, V> {
             moved = moved.max(libm::fabs(d) / contour.pixel);
         }
         room.moved += moved;
-        Some(Change {
+        Some(Movement {
             moved,
             sharper: libm::fabs(contour.blur - before.1),
         })
@@ -300,7 +305,7 @@ impl<V: View> Search<'_, V> {
 impl Contour {
     /// By how much the parameters change if every point of the rim lies farther towards the
     /// material by `shift` mm.
-    pub fn response(&self, shape: &dyn Shape, shift: impl Fn(&Point) -> f64) -> Parameters {
+    pub fn response(&self, shape: &dyn Shape, shift: impl Fn(&EdgePoint) -> f64) -> Parameters {
         let found = (&self.parameters, &self.covariance);
         response(shape, found, &self.points, shift)
     }
@@ -312,13 +317,13 @@ struct Room {
     ring: Ring,
     /// How far the contour has moved since its pieces' pixels were gathered, px.
     moved: f64,
-    seen: Vec<Seen>,
+    seen: Vec<SeenPixel>,
     damped: Vec<f64>,
     ratios: Vec<f64>,
 }
 
 impl Sharpness {
-    fn add(&mut self, fit: &Fit) {
+    fn add(&mut self, fit: &EdgeFit) {
         let [ee, es, ss] = fit.matrix;
         self.matrix += ss - es * es / ee;
         self.right += fit.right[1] - es / ee * fit.right[0];
@@ -335,12 +340,12 @@ impl Sharpness {
 
 /// The edge of a piece as a point of the plane. Blur moves what is seen of a curved edge towards
 /// its centre of curvature by κσ²/2, dark or bright.
-fn point(problem: &Problem<'_, impl View>, fit: &Fit) -> Point {
+fn point(problem: &Problem<'_, impl PlaneView>, fit: &EdgeFit) -> EdgePoint {
     let piece = problem.piece;
     let (foot, scale) = (piece.foot, piece.scale);
     let variance = problem.edge.variance();
     let off = fit.edge * scale + foot.curvature * variance * scale * scale / 2.0;
-    Point {
+    EdgePoint {
         x: foot.x + off * foot.normal.0,
         y: foot.y + off * foot.normal.1,
         variance: fit.variance() * scale * scale,
@@ -350,7 +355,7 @@ fn point(problem: &Problem<'_, impl View>, fit: &Fit) -> Point {
 
 /// Adds what the phase of the material next to the rim is off the plane's: the sum with weights
 /// one over the variance, and the weights.
-fn add_face(problem: &Problem<'_, impl View>, fit: &Fit, sums: &mut [f64; 2]) {
+fn add_face(problem: &Problem<'_, impl PlaneView>, fit: &EdgeFit, sums: &mut [f64; 2]) {
     let (mut light, mut count) = (Complex::default(), 0.0);
     for pixel in problem.pixels {
         if (FACE[0]..FACE[1]).contains(&(pixel.d - fit.edge)) {

@@ -31,10 +31,10 @@
 //! e and distances in px of the picture along d. w in counts.
 
 use super::beyond::Wall;
-use super::edge::{Edge, Profile};
+use super::edge::{Edge, EdgeProfile};
 use super::piece::{BAND, Piece, Pixel};
 use super::sample::Signals;
-use super::view::{Fringes, View};
+use super::view::{Fringes, PlaneView};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
@@ -56,7 +56,7 @@ const ODD: f64 = 0.05;
 /// What one pixel sees at one place of the edge, and how that changes with e and with σ: each of
 /// material and of background.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct SeenPixel {
     whole: [Complex; 2],
     along: [Complex; 2],
     wider: [f64; 2],
@@ -65,7 +65,7 @@ pub struct Seen {
 
 /// The fit at one place of the edge.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Fit {
+pub struct EdgeFit {
     /// e, px.
     pub edge: f64,
     /// Σ of squared residuals over their variance.
@@ -86,7 +86,7 @@ pub struct Fit {
     pub off: f64,
 }
 
-impl Fit {
+impl EdgeFit {
     /// Variance of e, px².
     pub fn variance(&self) -> f64 {
         1.0 / self.matrix[0]
@@ -118,9 +118,9 @@ pub fn damp(piece: &Piece, edge: &Edge, levels: &[Fringes], damped: &mut Vec<f64
     damped.extend(levels.map(|level| libm::exp(level.ratio * level.ratio * damping)));
 }
 
-impl<V: View> Problem<'_, V> {
+impl<V: PlaneView> Problem<'_, V> {
     /// The best place of the edge; `None` if nothing determines it.
-    pub fn solve(&self, seen: &mut Vec<Seen>) -> Option<Fit> {
+    pub fn solve(&self, seen: &mut Vec<SeenPixel>) -> Option<EdgeFit> {
         let mut best = self.at(0.0, seen)?;
         // A narrow shadow is deeper than the edge beside it, so that the least squares are several.
         if best.cost > CHI_SQUARE * (best.freedom + ODD * ODD * best.strength) {
@@ -170,11 +170,11 @@ impl<V: View> Problem<'_, V> {
     }
 
     /// The fit with the edge at `edge`.
-    fn at(&self, edge: f64, buffer: &mut Vec<Seen>) -> Option<Fit> {
+    fn at(&self, edge: f64, buffer: &mut Vec<SeenPixel>) -> Option<EdgeFit> {
         buffer.clear();
         let reach = self.edge.reach();
         let wall = self.piece.wall.map_or(0.0, |wall| wall.width);
-        let (mut equations, mut power, mut count) = (Equations::default(), 0.0, 0.0);
+        let (mut equations, mut power, mut count) = (BrightnessEquations::default(), 0.0, 0.0);
         let rated = self.rated(edge);
         for pixel in self.pixels {
             if libm::fabs(pixel.d) > BAND {
@@ -222,7 +222,7 @@ impl<V: View> Problem<'_, V> {
         let [e, s] = taken.map(|right| equations.solve(right, scale));
         let product = |x: [Complex; 2], y: [Complex; 2]| x[0].dot(y[0]) + x[1].dot(y[1]);
         let weight = 1.0 / self.signals.variance;
-        Some(Fit {
+        Some(EdgeFit {
             edge,
             cost: weight * rest,
             // Of two complex brightnesses and a place.
@@ -267,7 +267,7 @@ impl<V: View> Problem<'_, V> {
 
     /// What a pixel at this distance from the edge, and at this one from another border of the
     /// background, sees.
-    fn seen(&self, pixel: &Pixel, d: f64, border: f64, rated: Option<Complex>) -> Seen {
+    fn seen(&self, pixel: &Pixel, d: f64, border: f64, rated: Option<Complex>) -> SeenPixel {
         let real = |re: f64| Complex::new(re, 0.0);
         let light = |[share, moment, spread]: [f64; 3], gradient: f64| {
             let k = TAU * self.signals.ratio * gradient;
@@ -298,7 +298,7 @@ impl<V: View> Problem<'_, V> {
             Some(_) => real(1.0 - less.re),
             None => real(1.0) - less,
         };
-        let mut seen = Seen {
+        let mut seen = SeenPixel {
             whole: [material, background],
             along: [along, follow * -1.0],
             wider: [wider, -widens],
@@ -311,7 +311,7 @@ impl<V: View> Problem<'_, V> {
     }
 
     /// Adds the light of the wall.
-    fn add_wall(&self, wall: &Wall, d: f64, near: Profile, seen: &mut Seen) {
+    fn add_wall(&self, wall: &Wall, d: f64, near: EdgeProfile, seen: &mut SeenPixel) {
         let per_px = TAU * wall.turns / wall.width;
         let k = self.signals.ratio * (TAU * self.piece.gradient - per_px);
         let angle = -per_px / TAU * d;
@@ -336,7 +336,7 @@ impl<V: View> Problem<'_, V> {
 
 /// Normal equations of two complex unknowns, the brightness of material and of background.
 #[derive(Clone, Copy, Debug, Default)]
-struct Equations {
+struct BrightnessEquations {
     mm: f64,
     nn: f64,
     /// Σ m̄ n.
@@ -345,8 +345,8 @@ struct Equations {
     right: [Complex; 2],
 }
 
-impl Equations {
-    fn add(&mut self, seen: &Seen) {
+impl BrightnessEquations {
+    fn add(&mut self, seen: &SeenPixel) {
         let [m, n] = seen.whole;
         self.mm += m.square();
         self.nn += n.square();

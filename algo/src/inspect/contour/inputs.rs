@@ -1,7 +1,7 @@
 //! Inputs of a contour's uncertainty beside noise: by how much its parameters are off for one
 //! standard uncertainty of each.
 
-use super::associate::Point;
+use super::associate::EdgePoint;
 use super::beyond::{Wall, slope};
 use super::find::Contour;
 use super::shape::{Parameters, Shape};
@@ -28,7 +28,7 @@ const FAR_SIDE: f64 = 0.2;
 
 /// What is uncertain.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+pub enum ContourSource {
     /// Every edge of the part lies towards its material.
     Edge,
     /// The radius of the rim.
@@ -39,7 +39,7 @@ pub enum Source {
     Wall,
 }
 
-impl Source {
+impl ContourSource {
     /// Whether it is another one wherever the part lies.
     pub fn is_of_place(self) -> bool {
         matches!(self, Self::Pixels | Self::Wall)
@@ -48,9 +48,9 @@ impl Source {
 
 /// An input of the uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Input {
+pub struct ContourInput {
     /// What is uncertain.
-    pub source: Source,
+    pub source: ContourSource,
     /// By how much each parameter is off for one standard uncertainty.
     pub off: Parameters,
 }
@@ -58,22 +58,22 @@ pub struct Input {
 /// The inputs of a contour that was found, whose rim has this radius, mm. What is uncertain of the
 /// plane and of all lengths is not among them: it is the same for planes and contours
 /// (`gauge/propagate.rs`).
-pub fn inputs(shape: &dyn Shape, contour: &Contour, setup: &Setup, rim: f64) -> Vec<Input> {
+pub fn inputs(shape: &dyn Shape, contour: &Contour, setup: &Setup, rim: f64) -> Vec<ContourInput> {
     let p = &contour.parameters;
-    let into = |point: &Point| {
+    let into = |point: &EdgePoint| {
         let along = shape.along(p, point.x, point.y).unwrap_or(0.0);
         shape.foot(p, along).normal
     };
     let dot = |a: (f64, f64), b: (f64, f64)| a.0 * b.0 + a.1 * b.1;
-    let lean = |point: &Point| slope(setup.camera, point.x, point.y);
-    let of = |source, shift: &dyn Fn(&Point) -> f64| Input {
+    let lean = |point: &EdgePoint| slope(setup.camera, point.x, point.y);
+    let of = |source, shift: &dyn Fn(&EdgePoint) -> f64| ContourInput {
         source,
         off: contour.response(shape, shift),
     };
     let mut inputs = Vec::new();
     let pixel = contour.pixel;
-    inputs.push(of(Source::Edge, &|_| EDGE_PX * pixel));
-    inputs.push(of(Source::Rim, &|point| {
+    inputs.push(of(ContourSource::Edge, &|_| EDGE_PX * pixel));
+    inputs.push(of(ContourSource::Rim, &|point| {
         // α is how far the line of sight leans over the material.
         let lean = dot(lean(point), into(point)).max(0.0);
         let near = 1.0 + lean - libm::sqrt(1.0 + lean * lean);
@@ -81,31 +81,31 @@ pub fn inputs(shape: &dyn Shape, contour: &Contour, setup: &Setup, rim: f64) -> 
     }));
     if rim > 0.0 {
         // The side that leans towards the camera is seen farther around than the other.
-        let aside = |point: &Point| rim * dot(lean(point), into(point)) / libm::sqrt(3.0);
-        inputs.push(of(Source::Rim, &aside));
+        let aside = |point: &EdgePoint| rim * dot(lean(point), into(point)) / libm::sqrt(3.0);
+        inputs.push(of(ContourSource::Rim, &aside));
     }
     for i in 0..shape.count() {
-        let rate = |point: &Point| shape.derivative(p, point.x, point.y)[i];
+        let rate = |point: &EdgePoint| shape.derivative(p, point.x, point.y)[i];
         let squares = contour.points.iter().map(|point| rate(point) * rate(point));
         let mut off = Parameters::default();
         // Of light that is not explained all pieces of a side may be off alike.
         let light = LIGHT_PX * contour.unexplained;
         let of_all = PIECE_PX * PIECE_PX + light * light * contour.points.len() as f64;
         off[i] = pixel * libm::sqrt(of_all / squares.sum::<f64>());
-        inputs.push(Input {
-            source: Source::Pixels,
+        inputs.push(ContourInput {
+            source: ContourSource::Pixels,
             off,
         });
     }
     // Where it is not known whether there is a wall there may be one.
     let thickness = setup.thickness.unwrap_or(1.0);
-    inputs.push(of(Source::Wall, &|point| {
+    inputs.push(of(ContourSource::Wall, &|point| {
         let wall = Wall::at(setup, thickness, (point.x, point.y), into(point));
         WALL_PX * contour.pixel * wall.map_or(0.0, |wall| wall.brightness)
     }));
     if let Some(off) = contour.wall {
-        inputs.push(Input {
-            source: Source::Wall,
+        inputs.push(ContourInput {
+            source: ContourSource::Wall,
             off,
         });
     }

@@ -37,11 +37,11 @@ mod start;
 mod verdict;
 mod view;
 
-pub use associate::Point;
+pub use associate::EdgePoint;
 pub use find::{Contour, find};
-pub use inputs::{Input, PIECE_PX, Source, inputs};
+pub use inputs::{ContourInput, ContourSource, PIECE_PX, inputs};
 pub use verdict::{Outcome, State};
-pub use view::{Fringes, Setup, Spot, View};
+pub use view::{Fringes, PlaneSpot, PlaneView, Setup};
 
 #[cfg(test)]
 mod tests;

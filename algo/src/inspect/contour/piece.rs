@@ -3,7 +3,7 @@
 use super::beyond::{Gradient, Wall, border, shadow};
 use super::sample::Signals;
 use super::shape::{Foot, Parameters, Shape};
-use super::view::{Setup, Spot, View};
+use super::view::{PlaneSpot, PlaneView, Setup};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -21,7 +21,7 @@ pub struct Pixel {
     /// Column and row.
     pub at: (usize, usize),
     /// Where it looks.
-    pub spot: Spot,
+    pub spot: PlaneSpot,
     /// w, the sum of levels.
     pub light: Complex,
     /// The same with each level times its share of the mean ratio.
@@ -79,13 +79,13 @@ pub struct Pieces {
 }
 
 /// mm per px in the picture at a place of the plane: the lengths of the sides of a pixel.
-pub fn pixel_size(view: &impl View, (x, y): (f64, f64)) -> Option<f64> {
+pub fn pixel_size(view: &impl PlaneView, (x, y): (f64, f64)) -> Option<f64> {
     let [a, b] = frame(view, view.pixel(x, y)?)?.map(|(x, y, _)| (x, y));
     Some(libm::sqrt(libm::fabs(a.0 * b.1 - a.1 * b.0)))
 }
 
 /// How x, y and the plane's phase change with u and with v.
-fn frame(view: &impl View, (u, v): (f64, f64)) -> Option<[(f64, f64, f64); 2]> {
+fn frame(view: &impl PlaneView, (u, v): (f64, f64)) -> Option<[(f64, f64, f64); 2]> {
     let change = |du: f64, dv: f64| {
         let (less, more) = (view.spot(u - du, v - dv)?, view.spot(u + du, v + dv)?);
         Some((more.x - less.x, more.y - less.y, more.phase - less.phase))
@@ -99,7 +99,7 @@ impl Pieces {
     pub fn divide(
         &mut self,
         (shape, p): (&dyn Shape, &Parameters),
-        signals: &Signals<'_, impl View>,
+        signals: &Signals<'_, impl PlaneView>,
         pixel: f64,
     ) {
         let length = shape.length(p);
@@ -159,7 +159,7 @@ impl Pieces {
 
 impl Piece {
     /// Works out how it lies in the picture, and where its middle does; `None` if it is not seen.
-    fn orient(&mut self, signals: &Signals<'_, impl View>) -> Option<(f64, f64)> {
+    fn orient(&mut self, signals: &Signals<'_, impl PlaneView>) -> Option<(f64, f64)> {
         let Foot { x, y, normal, .. } = self.foot;
         let middle = signals.view.pixel(x, y)?;
         let [along_u, along_v] = frame(signals.view, middle)?;

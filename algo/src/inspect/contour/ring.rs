@@ -6,7 +6,7 @@
 use super::piece::{BAND, MARGIN, Piece, Pieces, Pixel};
 use super::sample::Signals;
 use super::shape::{Parameters, Shape};
-use super::view::{Spot, View};
+use super::view::{PlaneSpot, PlaneView};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -18,7 +18,7 @@ const LARGER: f64 = 1.25;
 #[derive(Clone, Debug, Default)]
 pub struct Ring {
     /// What the pixels of a run look at, and how far from the contour, mm.
-    run: Vec<(Spot, f64)>,
+    run: Vec<(PlaneSpot, f64)>,
     /// The light of a run.
     light: Vec<Complex>,
     /// Pixels row by row, each with the number of its piece.
@@ -31,7 +31,7 @@ impl Ring {
     pub fn gather(
         &mut self,
         (shape, p): (&dyn Shape, &Parameters),
-        signals: &Signals<'_, impl View>,
+        signals: &Signals<'_, impl PlaneView>,
         Pieces {
             all: pieces,
             pixels,
@@ -82,7 +82,7 @@ impl Ring {
     fn take(
         &mut self,
         (shape, p): (&dyn Shape, &Parameters),
-        signals: &Signals<'_, impl View>,
+        signals: &Signals<'_, impl PlaneView>,
         (end, v): (usize, usize),
         pieces: &[Piece],
     ) {

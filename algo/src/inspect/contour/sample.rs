@@ -6,7 +6,7 @@
 //! are added once per pixel, with weights N r over their sum: N is for the noise, r for coarse
 //! fringes, in which a floor hardly differs from the sheet.
 
-use super::view::{Fringes, Setup, Spot, View};
+use super::view::{Fringes, PlaneSpot, PlaneView, Setup};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
@@ -28,7 +28,7 @@ pub struct Signals<'a, V> {
     pub variance: f64,
 }
 
-impl<'a, V: View> Signals<'a, V> {
+impl<'a, V: PlaneView> Signals<'a, V> {
     /// Of this view.
     pub fn new(view: &'a V, setup: &'a Setup) -> Self {
         let weight = |of: &Fringes| of.shifts as f64 * of.ratio;
@@ -77,7 +77,7 @@ impl<'a, V: View> Signals<'a, V> {
     pub fn light(
         &self,
         levels: impl Iterator<Item = Complex>,
-        spot: &Spot,
+        spot: &PlaneSpot,
     ) -> Option<[Complex; 2]> {
         let mut sums = [Complex::default(); 2];
         for ((of, weight), signal) in self.setup.levels.iter().zip(&self.weights).zip(levels) {
@@ -89,18 +89,18 @@ impl<'a, V: View> Signals<'a, V> {
     }
 
     /// The same of a pixel.
-    pub fn light_at(&self, at: (usize, usize), spot: &Spot) -> Option<[Complex; 2]> {
+    pub fn light_at(&self, at: (usize, usize), spot: &PlaneSpot) -> Option<[Complex; 2]> {
         let signal = |level| self.view.signal(at, level).unwrap_or(Complex::UNKNOWN);
         self.light((0..self.weights.len()).map(signal), spot)
     }
 
     /// w of one level of such a pixel.
-    pub fn level(&self, at: (usize, usize), spot: &Spot, level: usize) -> Option<Complex> {
+    pub fn level(&self, at: (usize, usize), spot: &PlaneSpot, level: usize) -> Option<Complex> {
         Some(self.view.signal(at, level)? * back(&self.setup.levels[level], spot))
     }
 }
 
 /// e^{−2πi r Φ̂}.
-fn back(of: &Fringes, spot: &Spot) -> Complex {
+fn back(of: &Fringes, spot: &PlaneSpot) -> Complex {
     Complex::turned(-of.ratio * spot.phase)
 }

@@ -5,11 +5,11 @@
 //! both means leave are least; material is in phase with the plane. Pixels beside the split that see
 //! both tell by their share where in between the edge lies. The shape goes through these edges.
 
-use super::associate::{Point, associate};
+use super::associate::{EdgePoint, associate};
 use super::sample::Signals;
 use super::shape::{Parameters, Shape};
 use super::verdict::CONTINUES;
-use super::view::View;
+use super::view::PlaneView;
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
@@ -43,7 +43,7 @@ type OnNormal = (f64, Complex);
 /// Looks for the edges on the normals of a contour as expected.
 pub fn start(
     (shape, expected): (&dyn Shape, &Parameters),
-    signals: &Signals<'_, impl View>,
+    signals: &Signals<'_, impl PlaneView>,
     pixel: f64,
     ratios: &mut Vec<f64>,
 ) -> Start {
@@ -71,7 +71,7 @@ pub fn start(
         read(places, d, along, signals, &mut line);
         if let Some(edge) = split(&line, signals) {
             let off = edge * pixel;
-            points.push(Point {
+            points.push(EdgePoint {
                 x: foot.x + off * foot.normal.0,
                 y: foot.y + off * foot.normal.1,
                 variance: SIGMA * SIGMA * pixel * pixel,
@@ -84,7 +84,7 @@ pub fn start(
     let mut p = *expected;
     let found = associate(shape, &mut p, &mut points, ratios);
     let far = (reach + 1.0) * pixel;
-    let agree = |point: &&Point| {
+    let agree = |point: &&EdgePoint| {
         let moved = shape.distance(expected, point.x, point.y);
         point.weight > 0.5 && libm::fabs(moved) < far
     };
@@ -102,14 +102,14 @@ fn is_material(line: &[OnNormal], least: f64) -> bool {
 }
 
 /// A place of the picture, px.
-type Place = (f64, f64);
+type PixelPlace = (f64, f64);
 
 /// Reads the pixels along a normal, which passes through two places of the picture.
 fn read(
-    ((u, v), to): (Place, Place),
+    ((u, v), to): (PixelPlace, PixelPlace),
     d: impl Fn(f64, f64) -> f64,
     [inside, outside]: [f64; 2],
-    signals: &Signals<'_, impl View>,
+    signals: &Signals<'_, impl PlaneView>,
     line: &mut Vec<OnNormal>,
 ) {
     line.clear();
@@ -136,7 +136,7 @@ fn read(
 }
 
 /// Where background ends and material begins, px; `None` if nothing tells.
-fn split(line: &[OnNormal], signals: &Signals<'_, impl View>) -> Option<f64> {
+fn split(line: &[OnNormal], signals: &Signals<'_, impl PlaneView>) -> Option<f64> {
     let total = line.iter().fold(Complex::default(), |sum, of| sum + of.1);
     let all = line.len() as f64;
     let (mut below, mut best) = (Complex::default(), (0.0, 0, Complex::default()));

@@ -1,9 +1,9 @@
 //! What became of a piece of a contour, and of all of them.
 
-use super::fit::{CHI_SQUARE, Fit, Problem};
+use super::fit::{CHI_SQUARE, EdgeFit, Problem};
 use super::piece::BAND;
 use super::shape::Shape;
-use super::view::View;
+use super::view::PlaneView;
 use crate::math::complex::Complex;
 
 /// Fewest pixels of a piece.
@@ -69,7 +69,7 @@ pub enum State {
 
 impl Outcome {
     /// Of a piece whose light may be off the model by a share `rough` of the material's.
-    pub fn of(problem: &Problem<'_, impl View>, fit: Option<&Fit>, rough: f64) -> Self {
+    pub fn of(problem: &Problem<'_, impl PlaneView>, fit: Option<&EdgeFit>, rough: f64) -> Self {
         if problem.pixels.len() < PIXELS {
             return Self::Unseen;
         }
@@ -101,7 +101,7 @@ impl Outcome {
     }
 
     /// Whether the material goes on: its light is on both sides as it was taught, in every level.
-    fn edgeless(problem: &Problem<'_, impl View>) -> Self {
+    fn edgeless(problem: &Problem<'_, impl PlaneView>) -> Self {
         let (signals, setup) = (problem.signals, problem.signals.setup);
         for (level, fringes) in setup.levels.iter().enumerate() {
             let (mut sums, mut counts) = ([Complex::default(); 2], [0.0; 2]);

@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 /// What a pixel's line of sight meets on the plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
+pub struct PlaneSpot {
     /// Coordinate in the plane's frame, mm.
     pub x: f64,
     /// The other one, mm.
@@ -17,17 +17,17 @@ pub struct Spot {
 
 /// A camera that looks at a plane. The plane's frame is right-handed and its z axis points to the
 /// side that the camera is on.
-pub trait View {
+pub trait PlaneView {
     /// Columns and rows of the frame.
     fn size(&self) -> (usize, usize);
 
     /// What the line of sight through (u, v) meets, between pixels too; `None` if it does not meet
     /// the plane, or nothing is projected there.
-    fn spot(&self, u: f64, v: f64) -> Option<Spot>;
+    fn spot(&self, u: f64, v: f64) -> Option<PlaneSpot>;
 
     /// What the lines of sight of a row meet, each asked for by its column: [`Self::spot`], where a
     /// view knows more of a row than of a place.
-    fn row(&self, v: f64) -> impl Fn(f64) -> Option<Spot> {
+    fn row(&self, v: f64) -> impl Fn(f64) -> Option<PlaneSpot> {
         move |u| self.spot(u, v)
     }
 
@@ -67,7 +67,7 @@ pub struct Setup {
     /// By how much the phase of ratio 1 is larger, on a pixel's line of sight, for every mm below
     /// the plane, turns.
     pub turns_per_mm: f64,
-    /// The levels, in the order in which [`View::signal`] has them.
+    /// The levels, in the order in which [`PlaneView::signal`] has them.
     pub levels: Vec<Fringes>,
     /// σ of one sample, counts.
     pub noise: f64,

@@ -23,7 +23,7 @@ pub fn mean(cells: &[Cell], out: &mut Vec<f64>) -> Option<f64> {
 /// The least-squares plane z = z₀ + p·(x − x₀) + q·(y − y₀) of cells; a cell's weight is the number
 /// of its pixels as taught.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Plane {
+pub struct LevelPlane {
     pub centre: [f64; 3],
     pub along: f64,
     pub down: f64,
@@ -31,7 +31,7 @@ pub struct Plane {
     pub squares: [f64; 3],
 }
 
-impl Plane {
+impl LevelPlane {
     /// `None` where the cells lie on a line.
     pub fn of(cells: &[Cell]) -> Option<Self> {
         let pixels: f64 = cells.iter().map(weight).sum();

@@ -21,7 +21,7 @@ pub use face::keep_face;
 pub use geometry::Geometry;
 pub use grid::{Grid, TooFine};
 pub use kind::{Cut, Feature, FeatureKind};
-pub use level::{Plane, mean, weight};
+pub use level::{LevelPlane, mean, weight};
 pub use plane::{FittedPlane, Middle};
 pub use rim::{PlaneFrame, Rim};
 pub use taught::{TaughtCell, taught_cells};

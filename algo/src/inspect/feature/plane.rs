@@ -32,7 +32,7 @@
 
 use super::cells::Cell;
 use super::geometry::Geometry;
-use super::level::{Plane, weight};
+use super::level::{LevelPlane, weight};
 use super::taught::TaughtCell;
 use crate::geometry::Vector;
 use crate::inspect::align::Motion;
@@ -94,7 +94,7 @@ impl FittedPlane {
         rows: &mut Vec<[f64; 3]>,
     ) -> Option<Self> {
         rows.clear();
-        let start = Plane::of(cells)?;
+        let start = LevelPlane::of(cells)?;
         let (dx, dy) = (middle.x - start.centre[0], middle.y - start.centre[1]);
         let height = start.centre[2] + start.along * dx + start.down * dy;
         let mut parameters = [height, start.along, start.down];

@@ -9,7 +9,7 @@ use super::geometry::Geometry;
 use super::kind::FeatureKind;
 use super::plane::FittedPlane;
 use crate::geometry::Vector;
-use crate::inspect::contour::Input;
+use crate::inspect::contour::ContourInput;
 use crate::inspect::contour::shape::{Covariance, Dimensions, Marks, Outline, Parameters, Shape};
 use alloc::vec::Vec;
 
@@ -92,7 +92,7 @@ pub struct Rim {
     /// The covariance of these by noise.
     pub covariance: Covariance,
     /// By how much the parameters are off for one standard uncertainty of each input.
-    pub inputs: Vec<Input>,
+    pub inputs: Vec<ContourInput>,
     /// The share of its rim that is seen.
     pub found: f64,
     /// Of each point of the rim its distance from the shape and the σ of that by noise, mm.

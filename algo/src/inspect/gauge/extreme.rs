@@ -5,7 +5,7 @@
 //! side². The models need the cells' values only; `tests/suite/repeatability.rs` compares them with
 //! the scatter of repeated measurements.
 
-use super::reading::{Found, OfRim};
+use super::reading::{FoundValue, OfRim};
 use crate::inspect::align::{Placed, form};
 use crate::inspect::feature::{Cell, Rim};
 use alloc::vec::Vec;
@@ -20,19 +20,19 @@ pub(super) fn range(
     values: &[f64],
     sigma: f64,
     placed: Option<&Placed>,
-) -> Option<Found> {
+) -> Option<FoundValue> {
     let by = |a: &usize, b: &usize| values[*a].total_cmp(&values[*b]);
     let (high, low) = ((0..values.len()).max_by(by)?, (0..values.len()).min_by(by)?);
     let value = values[high] - values[low];
     let (upper, lower) = (cells[high].taught.jacobian, cells[low].taught.jacobian);
     let motion = motion(&core::array::from_fn(|i| upper[i] - lower[i]), placed);
-    let drawn = Drawn::of(values.iter().copied(), sigma);
+    let drawn = ExtremeOfNoise::of(values.iter().copied(), sigma);
     let lost = [high, low].map(|at| {
         let estimate = |at: usize| drawn.value(values[at], DEFECT);
         lost((cells, columns), estimate, at)
     });
     let noise = Noise::of(values, &drawn, sigma, |_| 1.0);
-    Some(Found {
+    Some(FoundValue {
         value: (value - noise.mean).max(0.0),
         pixels: noise.variance,
         motion,
@@ -77,7 +77,7 @@ pub(super) fn range_of(rim: &Rim) -> Option<OfRim> {
     let values: Vec<f64> = rim.residuals.iter().map(|(off, _)| *off).collect();
     let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let smallest = values.iter().copied().fold(f64::INFINITY, f64::min);
-    let drawn = Drawn::of(values.iter().copied(), sigma);
+    let drawn = ExtremeOfNoise::of(values.iter().copied(), sigma);
     let relative = |at: usize| rim.residuals[at].1 / sigma;
     let noise = Noise::of(&values, &drawn, sigma, relative);
     Some(OfRim {
@@ -104,7 +104,12 @@ impl Noise {
     /// Where they scatter hardly more than their errors, it is not known how much of the scatter is
     /// the part's. The mean is then between what the estimates say and what noise alone adds, and
     /// half of the variance of that differs from measurement to measurement.
-    fn of(values: &[f64], drawn: &Drawn, sigma: f64, relative: impl Fn(usize) -> f64) -> Self {
+    fn of(
+        values: &[f64],
+        drawn: &ExtremeOfNoise,
+        sigma: f64,
+        relative: impl Fn(usize) -> f64,
+    ) -> Self {
         if !(sigma > 0.0) {
             return Self {
                 mean: 0.0,
@@ -153,13 +158,13 @@ const DEFECT: f64 = 5.0;
 /// Estimates of true values: the measured ones, moved towards their mean until their scatter is
 /// less by σ², so that the scatter that the errors make does not count twice. The values of a
 /// defect stay where they are.
-pub(super) struct Drawn {
+pub(super) struct ExtremeOfNoise {
     mean: f64,
     scatter: f64,
     share: f64,
 }
 
-impl Drawn {
+impl ExtremeOfNoise {
     /// The estimates for values of which each has an error of `sigma`.
     pub fn of(values: impl Iterator<Item = f64> + Clone, sigma: f64) -> Self {
         let (mut mean, mut scatter) = (0.0, f64::INFINITY);

@@ -2,7 +2,7 @@
 
 use super::extreme::range;
 use super::kind::*;
-use crate::inspect::feature::Plane;
+use crate::inspect::feature::LevelPlane;
 
 kind! {
     /// The distance between the two planes parallel to the least-squares plane that enclose all
@@ -28,8 +28,8 @@ impl Kind for Flatness {
     }
 
     /// The plane's own error is small against a cell's and left out.
-    fn find(&self, of: Evidence<'_>) -> Option<Found> {
-        let plane = Plane::of(of.cells())?;
+    fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {
+        let plane = LevelPlane::of(of.cells())?;
         let slope = 1.0 + plane.along * plane.along + plane.down * plane.down;
         let heights = of.cells().iter().map(|cell| plane.above(cell));
         of.room.extend(heights);

@@ -16,7 +16,7 @@ impl Kind for Flush {
         }
     }
 
-    fn of_section(&self, of: &section::Geometry) -> Option<f64> {
+    fn of_section(&self, of: &section::Joint) -> Option<f64> {
         Some(section::flush(of))
     }
 }

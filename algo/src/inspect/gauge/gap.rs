@@ -17,7 +17,7 @@ impl Kind for Gap {
         }
     }
 
-    fn of_section(&self, of: &section::Geometry) -> Option<f64> {
+    fn of_section(&self, of: &section::Joint) -> Option<f64> {
         Some(section::gap(of))
     }
 }

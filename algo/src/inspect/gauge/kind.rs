@@ -13,7 +13,7 @@ use crate::inspect::section;
 
 pub(super) use super::extreme::range_of;
 pub(super) use super::parameter::{Domain, Parameter, Value, words};
-pub(super) use super::reading::{Found, OfRim};
+pub(super) use super::reading::{FoundValue, OfRim};
 pub(super) use super::unit::Unit;
 pub(super) use crate::inspect::feature::FeatureKind::{
     Circle, Line, Plane, Section, Slot, Surface,
@@ -169,7 +169,7 @@ pub trait Kind: Declared {
     }
 
     /// The value of a gauge of a section; `None` for other gauges.
-    fn of_section(&self, _: &section::Geometry) -> Option<f64> {
+    fn of_section(&self, _: &section::Joint) -> Option<f64> {
         None
     }
 
@@ -180,7 +180,7 @@ pub trait Kind: Declared {
 
     /// The value of a gauge that is worked out from cells; `None` where there was nothing to
     /// measure.
-    fn find(&self, _: Evidence<'_>) -> Option<Found> {
+    fn find(&self, _: Evidence<'_>) -> Option<FoundValue> {
         None
     }
 }
@@ -270,7 +270,7 @@ impl<'a> Evidence<'a> {
     /// variance of the height of one pixel, g = Σ wᵢ jᵢ is the derivative of the value over the
     /// motion, j a cell's Jacobian, and C the motion's covariance. The two terms are taken as
     /// independent: the pixels that the motion is found from are one in some dozens of the gauge's.
-    pub fn linear(&self, value: f64) -> Found {
+    pub fn linear(&self, value: f64) -> FoundValue {
         let (mut pixels, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
         for (at, (w, cell)) in self.room.iter().zip(self.all).enumerate() {
             let variance = self.variances[usize::from(at >= self.count)];
@@ -280,7 +280,7 @@ impl<'a> Evidence<'a> {
                 *g += w * j;
             }
         }
-        Found {
+        FoundValue {
             value,
             pixels,
             motion: motion(&g, self.placed),

@@ -13,7 +13,7 @@ impl Kind for MeanHeight {
         Facts::new(Unit::Length, Basis::Region, "")
     }
 
-    fn find(&self, of: Evidence<'_>) -> Option<Found> {
+    fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {
         let value = mean(of.cells(), of.room)?;
         Some(of.linear(value))
     }

@@ -46,7 +46,7 @@ pub use parameter::{Domain, Parameter, Value};
 pub(super) use propagate::{Characteristic, MAX_DATUMS, Propagated, Sensitive, SensitivePlane};
 pub(super) use reading::MIN_SUPPORT;
 pub(super) use reading::OfRim;
-pub use reading::{Found, Reading, Square};
+pub use reading::{FoundValue, Reading, Square};
 pub use unit::Unit;
 
 use crate::inspect::feature::{FeatureKind, Geometry};

@@ -1,6 +1,6 @@
 //! The share of a region that deviates from golden by more than a tolerance.
 
-use super::extreme::{Drawn, below, density, motion};
+use super::extreme::{ExtremeOfNoise, below, density, motion};
 use super::kind::*;
 
 /// Cells further than this many σ from the tolerance lie on the same side of it in every
@@ -36,9 +36,9 @@ impl Kind for OutOfTolerance {
     /// Share of the cells that deviate by more than `tolerance` mm. A cell of true deviation m lies
     /// outside with p = Q((T − m)/σ) + Q((T + m)/σ), Q the upper tail of the normal distribution,
     /// so σ² = Σ p(1 − p) / n² + gᵀ C g: the error of the motion moves all cells together, g = Σ p′
-    /// j / n. True deviations are estimated by `Drawn`; the cells of the rim of a defect, whose
+    /// j / n. True deviations are estimated by `ExtremeOfNoise`; the cells of the rim of a defect, whose
     /// true deviations scatter more than those of the rest, by an estimate of their own.
-    fn find(&self, of: Evidence<'_>) -> Option<Found> {
+    fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {
         let (cells, sigma, tolerance) = (of.cells(), of.sigma, self.tolerance_mm);
         let (columns, room) = (of.columns, of.room);
         if cells.is_empty() {
@@ -47,7 +47,7 @@ impl Kind for OutOfTolerance {
         let count = cells.len() as f64;
         let sizes = cells.iter().map(|cell| libm::fabs(cell.deviation));
         let outside = sizes.filter(|size| *size > tolerance).count() as f64;
-        let drawn = Drawn::of(cells.iter().map(|cell| cell.deviation), sigma);
+        let drawn = ExtremeOfNoise::of(cells.iter().map(|cell| cell.deviation), sigma);
         mark_beside(
             (cells, columns),
             |cell| drawn.is_off(cell.deviation, RIM),
@@ -55,7 +55,7 @@ impl Kind for OutOfTolerance {
         );
         let rim = cells.iter().zip(&*room);
         let rim = rim.filter(|(cell, mark)| **mark > 0.0 && !drawn.is_off(cell.deviation, RIM));
-        let rim = Drawn::of(rim.map(|(cell, _)| cell.deviation), sigma);
+        let rim = ExtremeOfNoise::of(rim.map(|(cell, _)| cell.deviation), sigma);
         let (mut variance, mut lever, mut g) = (0.0, 0.0, [0.0; 6]);
         for (cell, mark) in cells.iter().zip(&*room) {
             let m = match drawn.is_off(cell.deviation, RIM) || *mark == 0.0 {
@@ -73,7 +73,7 @@ impl Kind for OutOfTolerance {
                 }
             }
         }
-        Some(Found {
+        Some(FoundValue {
             value: outside / count,
             pixels: variance / (count * count),
             motion: motion(&g, of.placed),

@@ -23,7 +23,7 @@ impl Kind for PeakToValley {
         }
     }
 
-    fn find(&self, of: Evidence<'_>) -> Option<Found> {
+    fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {
         of.room.extend(of.cells().iter().map(|cell| cell.height));
         range((of.cells(), of.columns), of.room, of.sigma, of.placed)
     }

@@ -12,7 +12,7 @@
 //! Along directions that the part's shape leaves open the motion has no covariance. A value of a
 //! contour that depends on them is none.
 //!
-//! What else is uncertain of contours ([`Source`]) is propagated likewise, each input by itself;
+//! What else is uncertain of contours ([`ContourSource`]) is propagated likewise, each input by itself;
 //! a shift of all edges towards their material changes all contours at once.
 //!
 //! # Accuracy
@@ -21,12 +21,12 @@
 
 use super::datum::DatumFrame;
 use super::kind::{Kind, MAX_PLACES};
-use super::reading::Found;
+use super::reading::FoundValue;
 use super::region;
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed};
 use crate::inspect::contour::shape::Parameters;
-use crate::inspect::contour::{Input, Source};
+use crate::inspect::contour::{ContourInput, ContourSource};
 use crate::inspect::feature::{FittedPlane, Geometry, Rim};
 use crate::math::propagate::{Dependence, derivative};
 
@@ -77,7 +77,7 @@ pub const MAX_DATUMS: usize = 3;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Propagated {
     /// The value and its error by noise.
-    pub found: Found,
+    pub found: FoundValue,
     /// Variance by inputs that are the same when the part is measured again elsewhere.
     pub shared: f64,
     /// Variance by inputs that are others wherever the part lies.
@@ -95,7 +95,7 @@ enum Change {
     /// A parameter of a contour is larger.
     Parameter(usize, usize, f64),
     /// An input of a contour, by its place in the list, is off by so many standard uncertainties.
-    Input(usize, usize, f64),
+    ContourInput(usize, usize, f64),
     /// All edges of the part lie so many standard uncertainties towards their material.
     Edges(f64),
     /// The part lies so.
@@ -147,9 +147,14 @@ impl Sensitive<'_> {
                         unit[*at] = 1.0;
                         off(&unit, *step)
                     }
-                    Change::Input(which, at, by) if which == id => off(&rim.inputs[*at].off, *by),
+                    Change::ContourInput(which, at, by) if which == id => {
+                        off(&rim.inputs[*at].off, *by)
+                    }
                     Change::Edges(by) => {
-                        let own = rim.inputs.iter().find(|own| own.source == Source::Edge);
+                        let own = rim
+                            .inputs
+                            .iter()
+                            .find(|own| own.source == ContourSource::Edge);
                         off(&own.map_or(Parameters::default(), |own| own.off), *by)
                     }
                     Change::Moved(motion) => {
@@ -245,17 +250,17 @@ impl Characteristic<'_> {
             }
             let parameter = |i: usize, by: f64| self.value(&Change::Parameter(id, i, by));
             pixels += Dependence::new(found, &rim.covariance, parameter).variance;
-            for (input, Input { source, .. }) in rim.inputs.iter().enumerate() {
+            for (input, ContourInput { source, .. }) in rim.inputs.iter().enumerate() {
                 // That of all contours at once follows.
-                if *source == Source::Edge {
+                if *source == ContourSource::Edge {
                     continue;
                 }
-                let off = slope(1.0, &|by| Change::Input(id, input, by));
+                let off = slope(1.0, &|by| Change::ContourInput(id, input, by));
                 match source.is_of_place() {
                     true => own += off * off,
                     false => shared += off * off,
                 }
-                if *source == Source::Rim {
+                if *source == ContourSource::Rim {
                     rims += off * off;
                 }
             }
@@ -284,7 +289,7 @@ impl Characteristic<'_> {
         }
         let finite = [found, pixels, motion, lever, shared, own];
         finite.iter().all(|x| x.is_finite()).then_some(Propagated {
-            found: Found {
+            found: FoundValue {
                 value: found,
                 pixels,
                 motion,

@@ -30,7 +30,7 @@ impl Kind for Radius {
         }
     }
 
-    fn of_section(&self, of: &section::Geometry) -> Option<f64> {
+    fn of_section(&self, of: &section::Joint) -> Option<f64> {
         Some(section::radius(
             of,
             match self.side {

@@ -39,7 +39,7 @@ pub struct Square {
 
 /// A value with the parts of its error.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Found {
+pub struct FoundValue {
     /// The value.
     pub value: f64,
     /// Variance by the noise of its pixels.
@@ -61,6 +61,6 @@ pub struct OfRim {
     pub value: f64,
     /// Variance by the noise of the points; 0 where it is not known.
     pub variance: f64,
-    /// As [`Found::unknown`].
+    /// As [`FoundValue::unknown`].
     pub unknown: f64,
 }

@@ -27,7 +27,7 @@ impl Kind for RmsDeviation {
     /// Root of the mean square of the deviations, mm. Var(mean d²) = (4σ² Σd² − 2nσ⁴) / n² + gᵀ C
     /// g: the scatter of d² about fixed true deviations, whose squares are estimated by d² − σ²,
     /// and the error of the motion, g = Σ 2dᵢ jᵢ / n.
-    fn find(&self, of: Evidence<'_>) -> Option<Found> {
+    fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {
         let (cells, sigma) = (of.cells(), of.sigma);
         if cells.is_empty() {
             return None;
@@ -46,7 +46,7 @@ impl Kind for RmsDeviation {
         let own = (4.0 * variance * squares - least).max(least) / (count * count);
         let value = libm::sqrt(squares / count);
         let slope = 2.0 * value.max(sigma).max(f64::MIN_POSITIVE);
-        Some(Found {
+        Some(FoundValue {
             value,
             pixels: own / (slope * slope),
             motion: motion(&g, of.placed) / (slope * slope),

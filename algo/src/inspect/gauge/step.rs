@@ -16,7 +16,7 @@ impl Kind for Step {
         }
     }
 
-    fn find(&self, of: Evidence<'_>) -> Option<Found> {
+    fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {
         let value = mean(of.cells(), of.room)? - mean(of.from(), of.room)?;
         for weight in &mut of.room[of.count..] {
             *weight = -*weight;

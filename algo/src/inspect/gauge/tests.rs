@@ -1,6 +1,6 @@
 //! Every gauge on made cells, with exact answers.
 
-use super::Found;
+use super::FoundValue;
 use super::kinds::*;
 use super::*;
 use crate::geometry::Vector;
@@ -45,7 +45,7 @@ fn seen(sums: &[Sum], taught: &[TaughtCell], least: Option<i64>) -> Vec<Cell> {
     out
 }
 
-fn sigma(found: Found) -> f64 {
+fn sigma(found: FoundValue) -> f64 {
     libm::sqrt(found.pixels + found.motion)
 }
 
@@ -55,7 +55,7 @@ fn find_in(
     regions: [&[Cell]; 2],
     (sigma, pixel): (f64, f64),
     placed: Option<&Placed>,
-) -> Option<Found> {
+) -> Option<FoundValue> {
     kind.find(Evidence {
         all: &regions.concat(),
         count: regions[0].len(),
@@ -67,7 +67,7 @@ fn find_in(
     })
 }
 
-fn find(kind: &dyn Kind, cells: &[Cell], sigma: f64) -> Option<Found> {
+fn find(kind: &dyn Kind, cells: &[Cell], sigma: f64) -> Option<FoundValue> {
     find_in(kind, [cells, &[]], (sigma, 0.1), None)
 }
 
@@ -254,7 +254,7 @@ fn sensitive<'a>(both: &'a [(FittedPlane, Vec<[f64; 3]>)]) -> Vec<Sensitive<'a>>
 }
 
 /// The value of a kind with its errors.
-fn propagate(kind: &dyn Kind, of: &[Sensitive<'_>], placed: Option<&Placed>) -> Option<Found> {
+fn propagate(kind: &dyn Kind, of: &[Sensitive<'_>], placed: Option<&Placed>) -> Option<FoundValue> {
     let value = Characteristic {
         kind,
         of,

@@ -1,7 +1,7 @@
 //! The angle of a region.
 
 use super::kind::*;
-use crate::inspect::feature::{Plane, weight};
+use crate::inspect::feature::{LevelPlane, weight};
 
 words! {
     /// An axis of the world.
@@ -27,8 +27,8 @@ impl Kind for Tilt {
         Facts::new(Unit::Angle, Basis::Region, "about {about}")
     }
 
-    fn find(&self, of: Evidence<'_>) -> Option<Found> {
-        let plane = Plane::of(of.cells())?;
+    fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {
+        let plane = LevelPlane::of(of.cells())?;
         let [xx, xy, yy] = plane.squares;
         let determinant = xx * yy - xy * xy;
         // Turned about +x, what lies at +y rises; turned about +y, what lies at +x sinks.

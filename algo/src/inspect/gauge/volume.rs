@@ -16,7 +16,7 @@ impl Kind for Volume {
     }
 
     /// Each cell's area in x and y as taught times its height.
-    fn find(&self, of: Evidence<'_>) -> Option<Found> {
+    fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {
         let cells = of.cells();
         let each = |cell: &Cell| cell.taught.area * (cell.height - self.above_mm);
         of.room.extend(cells.iter().map(|cell| cell.taught.area));

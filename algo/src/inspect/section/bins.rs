@@ -3,7 +3,7 @@
 //! A bin has half the width of what a pixel averages, so its mean lies on the surface to a few
 //! hundredths of what blur does. Its cost does not depend on how many points fill it.
 
-use super::line::Line;
+use super::line::StretchLine;
 use super::request::Optics;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -81,7 +81,7 @@ impl Bins {
 
     /// The means of one side, from its stretch on: `sign` is 1 on the left, −1 on the right, x =
     /// sign · s.
-    pub fn side(&self, line: &Line, sign: f64) -> Vec<Bin> {
+    pub fn side(&self, line: &StretchLine, sign: f64) -> Vec<Bin> {
         let mean = |&[weight, s, z]: &[f64; 3]| {
             let variance = 1.0 / weight;
             let (x, y) = line.own(sign * (self.from + s * variance), z * variance);

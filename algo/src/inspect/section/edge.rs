@@ -8,9 +8,9 @@
 //! ∂p/∂L = −Σ ρ_i ∂d_i/∂L = G      C_p = Σ ρ_i ρ_iᵀ σ_i² + G C_L Gᵀ      C_pL = G C_L
 //! ```
 
-use super::fit::{Fit, Row};
-use super::line::Line;
-use super::view::View;
+use super::fit::{CircleFit, FitRow};
+use super::line::StretchLine;
+use super::view::SideView;
 use crate::math::solve::Normal;
 
 /// The share of what blur does by which it is uncertain, along the whole edge: the camera's blur is
@@ -23,7 +23,7 @@ const COUNTS: f64 = 0.1;
 
 /// A side: its line, and the circle of its edge.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Edge {
+pub struct RoundEdge {
     /// c, a, t, r: height of the line at the middle of its stretch, mm; its slope towards the
     /// joint; the tangent point, mm along the line from that middle; the radius, mm.
     pub parameters: [f64; 4],
@@ -41,16 +41,21 @@ pub struct Edge {
     pub stated: [f64; 4],
 }
 
-impl Edge {
+impl RoundEdge {
     /// σ of the radius by noise and blur, mm.
     pub fn radius_sigma(&self) -> f64 {
         libm::sqrt(self.covariance[3][3] + self.blurred[3] * self.blurred[3])
     }
 
     /// Of a fit; `None` if it has no finite covariance.
-    pub fn new(line: &Line, view: &View, fit: &Fit, is_stated: bool) -> Option<Self> {
+    pub fn new(
+        line: &StretchLine,
+        view: &SideView,
+        fit: &CircleFit,
+        is_stated: bool,
+    ) -> Option<Self> {
         // How a row's residual changes with t and the r that is fitted.
-        let free = |row: &Row| [row.rates.t, if is_stated { 0.0 } else { row.rates.r }];
+        let free = |row: &FitRow| [row.rates.t, if is_stated { 0.0 } else { row.rates.r }];
         let mut normal = Normal::<2>::default();
         for row in &fit.rows {
             let root = libm::sqrt(row.weight / row.seen.variance);
@@ -69,7 +74,7 @@ impl Edge {
         let (h, a) = (line.stretch(), line.slope);
         for row in &fit.rows {
             let (
-                Row {
+                FitRow {
                     bin, seen, rates, ..
                 },
                 free,

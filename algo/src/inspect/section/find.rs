@@ -2,18 +2,18 @@
 //! circle of each side; a second leaves out those that are off both circles, for the edges.
 
 use super::bins::Bins;
-use super::edge::Edge;
-use super::geometry::Geometry;
+use super::edge::RoundEdge;
+use super::geometry::Joint;
 use super::line::Moments;
 use super::reason::{Side, Unseen, Why};
-use super::request::{Optics, Point, Request};
+use super::request::{Optics, Request, SectionPoint};
 use super::rough::Rough;
 
 /// A section as it was found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Section {
     /// The left side and the right one.
-    pub edges: [Edge; 2],
+    pub edges: [RoundEdge; 2],
 }
 
 impl Section {
@@ -25,7 +25,11 @@ impl Section {
     ///
     /// # Errors
     /// Which side is not seen, and why.
-    pub fn new(points: &[Point], request: &Request, optics: &Optics) -> Result<Self, Unseen> {
+    pub fn new(
+        points: &[SectionPoint],
+        request: &Request,
+        optics: &Optics,
+    ) -> Result<Self, Unseen> {
         let sides = [
             (Side::Left, request.left, 1.0, request.edge_mm[0]),
             (Side::Right, request.right, -1.0, request.edge_mm[1]),
@@ -51,7 +55,7 @@ impl Section {
         };
         let rough = [rough(sides[0], moments[0])?, rough(sides[1], moments[1])?];
         bins.clear();
-        for &Point { s, z, variance } in points {
+        for &SectionPoint { s, z, variance } in points {
             let is_between = left[1] < s && s < right[0] && is_point(z, variance);
             if is_between && rough.iter().any(|side| side.is_near(s, z, variance)) {
                 bins.add(s, z, 1.0 / variance);
@@ -69,9 +73,9 @@ impl Section {
     }
 
     /// The geometry of the section with these parameters.
-    pub fn geometry(&self, parameters: &[f64; 8]) -> Geometry {
+    pub fn geometry(&self, parameters: &[f64; 8]) -> Joint {
         let [left, right] = &self.edges;
-        Geometry::new(parameters, [left.middle, -right.middle])
+        Joint::new(parameters, [left.middle, -right.middle])
     }
 }
 
@@ -82,11 +86,11 @@ fn is_point(z: f64, variance: f64) -> bool {
 
 /// The sums of both stretches, and the points between them. Seen from its own side, towards the
 /// joint, a point of the right one is at x = −s.
-fn sorted(points: &[Point], request: &Request, optics: &Optics) -> ([Moments; 2], Bins) {
+fn sorted(points: &[SectionPoint], request: &Request, optics: &Optics) -> ([Moments; 2], Bins) {
     let (left, right) = (request.left, request.right);
     let mut moments = [Moments::new(left), Moments::new([-right[1], -right[0]])];
     let mut bins = Bins::new(left[1], right[0], optics);
-    for &Point { s, z, variance } in points {
+    for &SectionPoint { s, z, variance } in points {
         if !is_point(z, variance) {
             continue;
         }

@@ -7,7 +7,7 @@
 use super::bins::Bin;
 use super::profile::Rates;
 use super::search::{RADII, median};
-use super::view::{Seen, View};
+use super::view::{SeenBin, SideView};
 use crate::math::solve::Normal;
 use alloc::vec::Vec;
 
@@ -24,11 +24,11 @@ const CHANGE: f64 = 0.5;
 
 /// What a bin says about the circle.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct FitRow {
     /// The bin.
     pub bin: Bin,
     /// How it sees the circle.
-    pub seen: Seen,
+    pub seen: SeenBin,
     /// How its residual changes.
     pub rates: Rates,
     /// Tukey's weight, 0 to 1.
@@ -37,15 +37,15 @@ pub struct Row {
 
 /// A circle and what it was fitted to.
 #[derive(Clone, Debug, Default)]
-pub struct Fit {
+pub struct CircleFit {
     /// t, r.
     pub p: [f64; 2],
     /// Its bins, as they see it.
-    pub rows: Vec<Row>,
+    pub rows: Vec<FitRow>,
     ratios: Vec<f64>,
 }
 
-impl Fit {
+impl CircleFit {
     /// From this circle.
     pub fn new(p: [f64; 2]) -> Self {
         Self {
@@ -58,7 +58,7 @@ impl Fit {
     /// radius is kept. `None` where the bins do not determine it.
     pub fn solve(
         &mut self,
-        view: &View,
+        view: &SideView,
         bins: &[Bin],
         is_stated: bool,
         rounds: usize,
@@ -91,21 +91,21 @@ impl Fit {
     }
 
     /// How the bins see the circle where it is, and their weights.
-    fn look(&mut self, view: &View, bins: &[Bin]) {
+    fn look(&mut self, view: &SideView, bins: &[Bin]) {
         let (p, profile) = (self.p, &view.profile);
         self.rows.clear();
         self.rows.extend(bins.iter().filter_map(|&bin| {
             let seen = view.seen(p, &bin)?;
             let rates = profile.rates(seen.ray.inside, p[1], seen.seen);
             let weight = 1.0;
-            Some(Row {
+            Some(FitRow {
                 bin,
                 seen,
                 rates,
                 weight,
             })
         }));
-        let ratio = |row: &Row| libm::fabs(row.seen.way) / libm::sqrt(row.seen.variance);
+        let ratio = |row: &FitRow| libm::fabs(row.seen.way) / libm::sqrt(row.seen.variance);
         self.ratios.clear();
         self.ratios.extend(self.rows.iter().map(ratio));
         let scale = match median(&mut self.ratios) {

@@ -24,7 +24,7 @@ pub struct Round {
 
 /// Both sides of a section, as they are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Geometry {
+pub struct Joint {
     /// The left side.
     pub left: Round,
     /// The right side.
@@ -46,7 +46,7 @@ fn moved(from: Pair, along: Pair, way: f64) -> Pair {
     (from.0 + along.0 * way, from.1 + along.1 * way)
 }
 
-impl Geometry {
+impl Joint {
     /// Of the parameters c, a, t, r of both sides, and where the middles of their stretches are,
     /// mm along the section.
     pub fn new(parameters: &[f64; 8], middles: [f64; 2]) -> Self {
@@ -79,21 +79,21 @@ fn round([c, a, t, r]: [f64; 4], middle: f64, sign: f64) -> Round {
 
 /// The distance of the extreme points of both circles along the mean direction of the lines, mm;
 /// less than 0 where the sides overlap.
-pub fn gap(geometry: &Geometry) -> f64 {
+pub fn gap(geometry: &Joint) -> f64 {
     let (from, to) = (geometry.left.extreme, geometry.right.extreme);
     dot((to.0 - from.0, to.1 - from.1), geometry.along)
 }
 
 /// The distance of the right tangent point from the left line, mm: more than 0 where the right side
 /// is higher.
-pub fn flush(geometry: &Geometry) -> f64 {
+pub fn flush(geometry: &Joint) -> f64 {
     let (from, to) = (geometry.left.point, geometry.right.tangent);
     let (s, z) = geometry.left.direction;
     dot((to.0 - from.0, to.1 - from.1), (-z, s))
 }
 
 /// The radius of a side's edge, mm.
-pub fn radius(geometry: &Geometry, side: Side) -> f64 {
+pub fn radius(geometry: &Joint, side: Side) -> f64 {
     match side {
         Side::Left => geometry.left.radius,
         Side::Right => geometry.right.radius,

@@ -5,9 +5,9 @@
 //! their covariance by noise. An input that is the same in every measurement states by how much each
 //! parameter is off for its standard uncertainty.
 
-use super::edge::Edge;
+use super::edge::RoundEdge;
 use super::find::Section;
-use super::geometry::Geometry;
+use super::geometry::Joint;
 use super::reason::Side;
 use crate::math::propagate::{Dependence, derivative};
 use alloc::vec::Vec;
@@ -19,7 +19,7 @@ const FORM: f64 = 0.05;
 
 /// What is uncertain, the same in every measurement of a part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Source {
+pub enum JointSource {
     /// The heights of a side, by the calibration.
     Heights(Side),
     /// The scale of lengths, by the calibration.
@@ -34,9 +34,9 @@ pub enum Source {
 
 /// An input of the uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Input {
+pub struct JointInput {
     /// What is uncertain.
-    pub source: Source,
+    pub source: JointSource,
     /// By how much each parameter is off for one standard uncertainty.
     pub off: [f64; 8],
 }
@@ -55,7 +55,7 @@ pub struct Knowledge {
 
 /// A value with its errors.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Value {
+pub struct JointValue {
     /// The value.
     pub value: f64,
     /// By noise, 1 σ: over repeats of the same part.
@@ -64,7 +64,7 @@ pub struct Value {
     pub systematic: f64,
 }
 
-impl Value {
+impl JointValue {
     /// U = 2 √(σ² + systematic²).
     pub fn uncertainty(&self) -> f64 {
         2.0 * libm::sqrt(self.sigma * self.sigma + self.systematic * self.systematic)
@@ -73,7 +73,7 @@ impl Value {
 
 impl Section {
     /// The inputs of the uncertainty of its values beside noise.
-    pub fn inputs(&self, known: &Knowledge) -> Vec<Input> {
+    pub fn inputs(&self, known: &Knowledge) -> Vec<JointInput> {
         let mut inputs = Vec::new();
         for (side, edge) in [Side::Left, Side::Right].into_iter().zip(&self.edges) {
             let mut add = |source, own: [f64; 4]| {
@@ -81,31 +81,34 @@ impl Section {
                     Side::Left => joint(own, [0.0; 4]),
                     Side::Right => joint([0.0; 4], own),
                 };
-                inputs.push(Input { source, off });
+                inputs.push(JointInput { source, off });
             };
-            add(Source::Heights(side), [known.height, 0.0, 0.0, 0.0]);
+            add(JointSource::Heights(side), [known.height, 0.0, 0.0, 0.0]);
             let radius = known.radius.filter(|_| edge.is_stated);
             let radius = radius.unwrap_or(FORM * edge.parameters[3]);
             let missing = radius * (1.0 - libm::sin(edge.arc));
-            add(Source::Missing(side), [0.0, 0.0, missing, 0.0]);
+            add(JointSource::Missing(side), [0.0, 0.0, missing, 0.0]);
             if edge.is_stated {
-                add(Source::Radius(side), edge.stated.map(|off| off * radius));
+                add(
+                    JointSource::Radius(side),
+                    edge.stated.map(|off| off * radius),
+                );
             }
         }
         let [left, right] = &self.edges;
-        inputs.push(Input {
-            source: Source::Lengths,
+        inputs.push(JointInput {
+            source: JointSource::Lengths,
             off: joint(scaled(left, known.scale), scaled(right, known.scale)),
         });
-        inputs.push(Input {
-            source: Source::Blur,
+        inputs.push(JointInput {
+            source: JointSource::Blur,
             off: joint(left.blurred, right.blurred),
         });
         inputs
     }
 
     /// A value of its geometry with its errors; `None` where it is not finite.
-    pub fn value(&self, f: impl Fn(&Geometry) -> f64, inputs: &[Input]) -> Option<Value> {
+    pub fn value(&self, f: impl Fn(&Joint) -> f64, inputs: &[JointInput]) -> Option<JointValue> {
         let here = self.parameters();
         let at = |off: &[f64; 8], times: f64| {
             f(&self.geometry(&core::array::from_fn(|i| here[i] + times * off[i])))
@@ -125,7 +128,7 @@ impl Section {
         let systematic = libm::sqrt(changes.map(|change| change * change).sum::<f64>());
         let sigma = libm::sqrt(variance);
         let is_finite = [value, sigma, systematic].iter().all(|x| x.is_finite());
-        is_finite.then_some(Value {
+        is_finite.then_some(JointValue {
             value,
             sigma,
             systematic,
@@ -139,7 +142,7 @@ fn joint(left: [f64; 4], right: [f64; 4]) -> [f64; 8] {
 }
 
 /// By how much the parameters of a side are off if all lengths are by a share.
-fn scaled(edge: &Edge, share: f64) -> [f64; 4] {
+fn scaled(edge: &RoundEdge, share: f64) -> [f64; 4] {
     let [c, a, t, r] = edge.parameters;
     let middle = edge.middle;
     // The middle of the stretch stays where it is and the line is moved under it.

@@ -88,7 +88,7 @@ impl Moments {
     }
 
     /// The line of the points.
-    pub fn line(&self) -> Result<Line, Why> {
+    pub fn line(&self) -> Result<StretchLine, Why> {
         if self.count < POINTS {
             return Err(Why::FewPoints {
                 has: self.count,
@@ -111,7 +111,7 @@ impl Moments {
         if !(off <= FLAT && (c + self.level).is_finite() && a.is_finite()) {
             return Err(Why::NotFlat { off, most: FLAT });
         }
-        Ok(Line {
+        Ok(StretchLine {
             middle: self.middle,
             height: c + self.level,
             slope: a,
@@ -124,7 +124,7 @@ impl Moments {
 /// A line z = height + slope (x − middle), and its frame: along it towards the joint, and the depth
 /// below it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
+pub struct StretchLine {
     /// m, the middle of its stretch, mm.
     pub middle: f64,
     /// c, mm.
@@ -137,7 +137,7 @@ pub struct Line {
     pub covariance: [[f64; 2]; 2],
 }
 
-impl Line {
+impl StretchLine {
     /// The length of (1, a).
     pub fn stretch(&self) -> f64 {
         libm::sqrt(1.0 + self.slope * self.slope)

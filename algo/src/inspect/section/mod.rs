@@ -42,12 +42,12 @@ mod rough;
 mod search;
 mod view;
 
-pub use edge::Edge;
+pub use edge::RoundEdge;
 pub use find::Section;
-pub use geometry::{Geometry, Pair, Round, flush, gap, radius};
-pub use inputs::{Input, Knowledge, Source, Value};
+pub use geometry::{Joint, Pair, Round, flush, gap, radius};
+pub use inputs::{JointInput, JointSource, JointValue, Knowledge};
 pub use reason::{Side, Unseen, Why};
-pub use request::{Optics, Point, Request};
+pub use request::{Optics, Request, SectionPoint};
 
 #[cfg(test)]
 mod tests;

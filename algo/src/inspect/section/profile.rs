@@ -46,16 +46,16 @@ const NODES: [(f64, f64); 8] = [
 const STEP: f64 = 1e-6;
 
 /// A direction or place in the frame of a line: along, up.
-type Pair = (f64, f64);
+type InLine = (f64, f64);
 
 /// A line and a circle tangent to it, as a camera and a projector in some directions see them.
 #[derive(Clone, Copy, Debug)]
-pub struct Profile {
+pub struct SideProfile {
     /// u, of length 1.
-    sight: Pair,
+    sight: InLine,
     /// l, of length 1: along the line and up; across u and along it.
-    light: Pair,
-    turned: Pair,
+    light: InLine,
+    turned: InLine,
     /// Half the width of what a pixel averages, mm.
     reach: f64,
 }
@@ -80,9 +80,9 @@ pub struct Rates {
     pub lift: f64,
 }
 
-impl Profile {
+impl SideProfile {
     /// With unit vectors to camera and projector, and σ of what a pixel averages, mm.
-    pub fn new(sight: Pair, light: Pair, blur: f64) -> Self {
+    pub fn new(sight: InLine, light: InLine, blur: f64) -> Self {
         Self {
             sight,
             light,

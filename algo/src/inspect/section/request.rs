@@ -2,7 +2,7 @@
 
 /// A point of a section, in the section's plane.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Point {
+pub struct SectionPoint {
     /// How far along the section, mm.
     pub s: f64,
     /// Height, mm.

@@ -6,14 +6,14 @@
 //! (`fit`); the same of bins without the points that are off that circle.
 
 use super::bins::{Bin, Bins};
-use super::edge::Edge;
-use super::fit::{BINS, Fit};
-use super::line::Line;
-use super::profile::Profile;
+use super::edge::RoundEdge;
+use super::fit::{BINS, CircleFit};
+use super::line::StretchLine;
+use super::profile::SideProfile;
 use super::reason::Why;
 use super::request::Optics;
 use super::search::search;
-use super::view::View;
+use super::view::SideView;
 
 /// The arc that determines a radius, °.
 const ARC: f64 = 30.0;
@@ -36,11 +36,11 @@ const ROUNDS: [usize; 2] = [4, 12];
 /// A side whose circle is known well enough to tell which points are off it.
 #[derive(Clone, Copy, Debug)]
 pub struct Rough {
-    line: Line,
+    line: StretchLine,
     /// 1 on the left, −1 on the right.
     sign: f64,
     stated: Option<f64>,
-    view: View,
+    view: SideView,
     p: [f64; 2],
 }
 
@@ -48,7 +48,7 @@ impl Rough {
     /// Of the points of both sides in bins.
     pub fn new(
         bins: &Bins,
-        line: Line,
+        line: StretchLine,
         sign: f64,
         end: f64,
         optics: &Optics,
@@ -68,9 +68,13 @@ impl Rough {
             let length = libm::sqrt(along * along + depth * depth);
             (along / length, -depth / length)
         });
-        let view = View::new(Profile::new(sight, light, optics.blur), optics.blur, lit);
+        let view = SideView::new(
+            SideProfile::new(sight, light, optics.blur),
+            optics.blur,
+            lit,
+        );
         let start = search(&view, arc, stated).ok_or(Why::NotRound)?;
-        let mut fit = Fit::new(start);
+        let mut fit = CircleFit::new(start);
         fit.solve(&view, arc, stated.is_some(), ROUNDS[0])
             .ok_or(Why::NotRound)?;
         Ok(Self {
@@ -100,17 +104,17 @@ impl Rough {
     }
 
     /// The edge, of bins of the points that are near.
-    pub fn edge(&self, bins: &Bins) -> Result<Edge, Why> {
+    pub fn edge(&self, bins: &Bins) -> Result<RoundEdge, Why> {
         let all = bins.side(&self.line, self.sign);
         let is_stated = self.stated.is_some();
-        let mut fit = Fit::new(self.p);
+        let mut fit = CircleFit::new(self.p);
         let found = fit.solve(
             &self.view,
             leaving(&all, self.view.blur),
             is_stated,
             ROUNDS[1],
         );
-        let edge = found.and_then(|()| Edge::new(&self.line, &self.view, &fit, is_stated));
+        let edge = found.and_then(|()| RoundEdge::new(&self.line, &self.view, &fit, is_stated));
         let edge = edge.ok_or(Why::NotRound)?;
         let needs = if is_stated { STATED_ARC } else { ARC };
         let (r, sigma) = (edge.parameters[3], edge.radius_sigma());

@@ -10,7 +10,7 @@
 //! that double find it, halving steps its bottom.
 
 use super::bins::Bin;
-use super::view::View;
+use super::view::SideView;
 use alloc::vec::Vec;
 
 /// Radii that are looked for, mm.
@@ -26,7 +26,7 @@ const OFF: f64 = 16.0;
 
 /// The circle (t, r) on which most bins lie, of the stated radius or of any; `None` if no bin places
 /// one.
-pub fn search(view: &View, bins: &[Bin], stated: Option<f64>) -> Option<[f64; 2]> {
+pub fn search(view: &SideView, bins: &[Bin], stated: Option<f64>) -> Option<[f64; 2]> {
     let mut places = Vec::with_capacity(bins.len());
     let mut best: Option<(f64, [f64; 2])> = None;
     let mut attempt = |r: f64, best: &mut Option<(f64, [f64; 2])>| {
@@ -56,7 +56,7 @@ pub fn search(view: &View, bins: &[Bin], stated: Option<f64>) -> Option<[f64; 2]
 }
 
 /// The circle of a radius, placed by bins without what blur does to them.
-fn placed(view: &View, bins: &[Bin], r: f64, places: &mut Vec<f64>) -> Option<[f64; 2]> {
+fn placed(view: &SideView, bins: &[Bin], r: f64, places: &mut Vec<f64>) -> Option<[f64; 2]> {
     let place = |y: f64, x: f64| {
         let is_placing = (0.0..PLACES * r).contains(&y);
         is_placing.then(|| x - libm::sqrt((2.0 * r - y) * y))
@@ -78,7 +78,7 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-fn cost(view: &View, bins: &[Bin], p: [f64; 2]) -> f64 {
+fn cost(view: &SideView, bins: &[Bin], p: [f64; 2]) -> f64 {
     let costs = bins.iter().map(|bin| match view.seen(p, bin) {
         None => view.passed(p, bin, OFF),
         Some(seen) => {

@@ -6,7 +6,7 @@
 //! pixel makes, less if no heights follow behind the edge, so that the floor is dark.
 
 use super::bins::Bin;
-use super::profile::{Profile, Ray};
+use super::profile::{Ray, SideProfile};
 
 /// The share of what blur does that the profile's form leaves uncertain, bin by bin.
 const BLUR: f64 = 0.15;
@@ -19,9 +19,9 @@ const PASSES: f64 = 2.0;
 
 /// How a side is seen.
 #[derive(Clone, Copy, Debug)]
-pub struct View {
+pub struct SideView {
     /// Its profile.
-    pub profile: Profile,
+    pub profile: SideProfile,
     /// σ of what a pixel averages, mm.
     pub blur: f64,
     /// What a pixel of nothing but floor adds to a height, mm.
@@ -30,7 +30,7 @@ pub struct View {
 
 /// A bin that sees the circle.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct SeenBin {
     /// Its ray.
     pub ray: Ray,
     /// B, mm.
@@ -43,21 +43,21 @@ pub struct Seen {
     pub variance: f64,
 }
 
-impl View {
+impl SideView {
     /// Of a side with a lit or a dark floor behind it.
-    pub fn new(profile: Profile, blur: f64, lit: bool) -> Self {
+    pub fn new(profile: SideProfile, blur: f64, lit: bool) -> Self {
         let mix = if lit { MIX } else { DARK };
         Self { profile, blur, mix }
     }
 
     /// How a bin sees the circle p = (t, r); `None` where its ray passes.
     #[inline]
-    pub fn seen(&self, p: [f64; 2], bin: &Bin) -> Option<Seen> {
+    pub fn seen(&self, p: [f64; 2], bin: &Bin) -> Option<SeenBin> {
         let ray = self.profile.ray(p, bin.x, bin.y);
         let surface = self.profile.surface(ray.inside, p[1])?;
         let seen = self.profile.seen(ray.inside, p[1]);
         let (off, leak) = (surface - seen, self.leak(ray.inside));
-        Some(Seen {
+        Some(SeenBin {
             ray,
             seen,
             way: ray.way - seen,

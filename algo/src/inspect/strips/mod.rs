@@ -54,4 +54,4 @@ pub use production::plan::{Parts, Production};
 pub use production::strip::{Maps, Strips};
 pub use readings::contours::{FoundFeature, GoldenSignal, Levels, Lost, SeenRim, Signal};
 pub use readings::findings::{Findings, Missing, Skipped};
-pub use readings::uncertainty::CalibrationError;
+pub use readings::uncertainty::CalibrationUncertainty;

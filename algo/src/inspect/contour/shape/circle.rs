@@ -1,7 +1,8 @@
 //! A round hole.
 
 use super::outline::{
-    ContourKind, Dimensions, Foot, Marks, Outline, Parameters, Place, Shape, axes_of, axis_marks,
+    ContourKind, Dimensions, Foot, Marks, Outline, Parameters, PlanePlace, Shape, axes_of,
+    axis_marks,
 };
 use crate::geometry::Vector;
 use crate::math::solve::Normal;
@@ -23,7 +24,7 @@ pub const KIND: ContourKind = ContourKind {
 
 /// The least-squares circle of an outline's corners (I. Kåsa, IEEE Trans. Instrum. Meas. 25,
 /// 1976: x² + y² = 2ax + 2by + c is linear); `None` if they do not determine one.
-fn through(outline: &[Place]) -> Option<[f64; 3]> {
+fn through(outline: &[PlanePlace]) -> Option<[f64; 3]> {
     // About their mean, so that nothing cancels.
     let count = outline.len() as f64;
     let sum = outline
@@ -79,11 +80,11 @@ impl Shape for Circle {
         190.0 / 360.0
     }
 
-    fn middle(&self, p: &Parameters) -> Place {
+    fn middle(&self, p: &Parameters) -> PlanePlace {
         (p[0], p[1])
     }
 
-    fn marks(&self, p: &Parameters) -> Marks<Place> {
+    fn marks(&self, p: &Parameters) -> Marks<PlanePlace> {
         axis_marks(self.middle(p), [p[2]; 2], 0.0)
     }
 

@@ -1,7 +1,7 @@
 //! A straight edge.
 
 use super::outline::{
-    ContourKind, Dimensions, Foot, Marks, Outline, Parameters, Place, Shape, Trace,
+    ContourKind, Dimensions, Foot, Marks, Outline, Parameters, PlanePlace, Shape, Trace,
 };
 use crate::geometry::Vector;
 use alloc::vec::Vec;
@@ -12,9 +12,9 @@ use alloc::vec::Vec;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Line {
     /// Where its middle was expected, mm.
-    middle: Place,
+    middle: PlanePlace,
     /// Its expected direction, a unit vector.
-    direction: Place,
+    direction: PlanePlace,
     /// Its length, mm.
     length: f64,
 }
@@ -28,7 +28,7 @@ pub const KIND: ContourKind = ContourKind {
 
 impl Line {
     /// The edge from one place to another, as taught; `None` if they are one.
-    pub fn between(from: Place, to: Place) -> Option<Self> {
+    pub fn between(from: PlanePlace, to: PlanePlace) -> Option<Self> {
         let way = (to.0 - from.0, to.1 - from.1);
         let length = libm::sqrt(way.0 * way.0 + way.1 * way.1);
         (length > 0.0).then(|| Self {
@@ -39,7 +39,7 @@ impl Line {
     }
 
     /// Its direction, a unit vector.
-    fn direction(&self, p: &Parameters) -> Place {
+    fn direction(&self, p: &Parameters) -> PlanePlace {
         let (sin, cos) = (libm::sin(p[1]), libm::cos(p[1]));
         let (x, y) = self.direction;
         (x * cos - y * sin, x * sin + y * cos)
@@ -51,7 +51,7 @@ fn beside(trace: &Trace) -> Option<Line> {
     let mut edge = trace.places.clone();
     // What lies off by more than twice the mean is not of this edge.
     let (x, y, along, up) = straight(&edge)?;
-    let away = |at: &Place| libm::fabs((at.1 - y) * along - (at.0 - x) * up);
+    let away = |at: &PlanePlace| libm::fabs((at.1 - y) * along - (at.0 - x) * up);
     let scatter = edge.iter().map(away).sum::<f64>() / edge.len() as f64;
     edge.retain(|at| away(at) <= 2.0 * scatter + 1e-9);
     let (x, y, mut along, mut up) = straight(&edge)?;
@@ -72,7 +72,7 @@ fn beside(trace: &Trace) -> Option<Line> {
 }
 
 /// The line through places that is nearest to them: a point and its direction.
-fn straight(places: &[Place]) -> Option<(f64, f64, f64, f64)> {
+fn straight(places: &[PlanePlace]) -> Option<(f64, f64, f64, f64)> {
     let count = places.len() as f64;
     let sum = places
         .iter()
@@ -123,13 +123,13 @@ impl Shape for Line {
         false
     }
 
-    fn middle(&self, p: &Parameters) -> Place {
+    fn middle(&self, p: &Parameters) -> PlanePlace {
         let (x, y) = self.direction;
         (self.middle.0 - y * p[0], self.middle.1 + x * p[0])
     }
 
     /// Its ends.
-    fn marks(&self, p: &Parameters) -> Marks<Place> {
+    fn marks(&self, p: &Parameters) -> Marks<PlanePlace> {
         let ends = [0.0, self.length].map(|along| self.foot(p, along));
         ends.map(|end| (end.x, end.y)).into_iter().collect()
     }

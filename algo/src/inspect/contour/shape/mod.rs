@@ -7,8 +7,8 @@ mod outline;
 pub mod slot;
 
 pub use outline::{
-    ContourKind, Covariance, Dimensions, Foot, MAX_PARAMETERS, Marks, Outline, Parameters, Place,
-    Shape, Trace,
+    ContourKind, Covariance, Dimensions, Foot, MAX_PARAMETERS, Marks, Outline, Parameters,
+    PlanePlace, Shape, Trace,
 };
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ pub type Parameters = [f64; MAX_PARAMETERS];
 /// A symmetric matrix over them.
 pub type Covariance = [Parameters; MAX_PARAMETERS];
 /// A place in the plane of a contour, mm.
-pub type Place = (f64, f64);
+pub type PlanePlace = (f64, f64);
 
 /// Most marks of a shape.
 const MAX_MARKS: usize = 4;
@@ -86,10 +86,10 @@ pub trait Shape: Debug + Send + Sync {
     }
 
     /// Its centre or middle, mm.
-    fn middle(&self, p: &Parameters) -> Place;
+    fn middle(&self, p: &Parameters) -> PlanePlace;
 
     /// Points of it that tell its dimensions, mm.
-    fn marks(&self, p: &Parameters) -> Marks<Place>;
+    fn marks(&self, p: &Parameters) -> Marks<PlanePlace>;
 
     /// What its marks, in space, say of it.
     fn dimensions(&self, marks: &[Vector]) -> Dimensions;
@@ -109,9 +109,9 @@ pub struct Outline {
 pub struct Trace {
     /// Of an opening the corners of its convex hull, counterclockwise; of an edge the places of the
     /// face that lie beside what is none. mm.
-    pub places: Vec<Place>,
+    pub places: Vec<PlanePlace>,
     /// The middle of the face, mm.
-    pub face: Place,
+    pub face: PlanePlace,
     /// By how much the face is seen to end too early, mm: heights next to an edge are not certain.
     pub eroded: f64,
 }
@@ -145,19 +145,19 @@ impl Outline {
     }
 
     /// Its centre or middle, mm.
-    pub fn middle(&self) -> Place {
+    pub fn middle(&self) -> PlanePlace {
         self.shape.middle(&self.parameters)
     }
 
     /// The place at a share of its length, mm.
-    pub fn at(&self, share: f64) -> Place {
+    pub fn at(&self, share: f64) -> PlanePlace {
         let length = self.shape.length(&self.parameters);
         let foot = self.shape.foot(&self.parameters, share * length);
         (foot.x, foot.y)
     }
 
     /// Places along it, from its beginning to its end, mm.
-    pub fn places(&self) -> impl Iterator<Item = Place> {
+    pub fn places(&self) -> impl Iterator<Item = PlanePlace> {
         const COUNT: u32 = 32;
         (0..=COUNT).map(|at| self.at(f64::from(at) / f64::from(COUNT)))
     }
@@ -171,7 +171,7 @@ impl Trace {
 }
 
 /// The four points of a shape on its axes, half as long and half as wide as it, mm.
-pub fn axis_marks((x, y): Place, [long, short]: [f64; 2], angle: f64) -> Marks<Place> {
+pub fn axis_marks((x, y): PlanePlace, [long, short]: [f64; 2], angle: f64) -> Marks<PlanePlace> {
     let (sin, cos) = (libm::sin(angle), libm::cos(angle));
     [(-long, 0.0), (long, 0.0), (0.0, -short), (0.0, short)]
         .map(|(along, across)| {

@@ -1,7 +1,8 @@
 //! A slot with round ends.
 
 use super::outline::{
-    ContourKind, Dimensions, Foot, Marks, Outline, Parameters, Place, Shape, axes_of, axis_marks,
+    ContourKind, Dimensions, Foot, Marks, Outline, Parameters, PlanePlace, Shape, axes_of,
+    axis_marks,
 };
 use crate::geometry::Vector;
 use core::f64::consts::PI;
@@ -24,7 +25,7 @@ pub const KIND: ContourKind = ContourKind {
 
 /// The slot about an outline's corners: along the direction in which they reach farthest.
 /// `None` if they enclose nothing.
-fn about(outline: &[Place]) -> Option<Parameters> {
+fn about(outline: &[PlanePlace]) -> Option<Parameters> {
     let mut farthest = (0.0, (1.0, 0.0));
     for (i, a) in outline.iter().enumerate() {
         for b in &outline[..i] {
@@ -160,11 +161,11 @@ impl Shape for Slot {
         }
     }
 
-    fn middle(&self, p: &Parameters) -> Place {
+    fn middle(&self, p: &Parameters) -> PlanePlace {
         (p[0], p[1])
     }
 
-    fn marks(&self, p: &Parameters) -> Marks<Place> {
+    fn marks(&self, p: &Parameters) -> Marks<PlanePlace> {
         axis_marks(self.middle(p), [p[2] + p[3], p[3]], p[4])
     }
 

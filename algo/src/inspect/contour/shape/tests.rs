@@ -1,10 +1,10 @@
 //! What every shape promises: its distance and its places agree.
 
-use super::outline::{Outline, Place};
+use super::outline::{Outline, PlanePlace};
 use std::vec::Vec;
 
 /// Places of an outline, all equally far apart.
-pub fn corners(outline: &Outline, count: u32) -> Vec<Place> {
+pub fn corners(outline: &Outline, count: u32) -> Vec<PlanePlace> {
     (0..count)
         .map(|i| outline.at(f64::from(i) / f64::from(count)))
         .collect()

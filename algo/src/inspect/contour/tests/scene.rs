@@ -5,7 +5,7 @@
 //! numbers and the interface.
 
 use crate::geometry::Vector;
-use crate::inspect::contour::{Fringes, Setup, Spot, View};
+use crate::inspect::contour::{Fringes, PlaneSpot, PlaneView, Setup};
 use crate::math::complex::Complex;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -343,10 +343,10 @@ impl<'a> Rendered<'a> {
         }
     }
 
-    fn spot(&self, u: f64, v: f64) -> Option<Spot> {
+    fn spot(&self, u: f64, v: f64) -> Option<PlaneSpot> {
         let ray = self.camera.ray(u - self.middle(), v - self.middle());
         let at = self.camera.centre + ray * (-self.camera.centre.z / ray.z);
-        Some(Spot {
+        Some(PlaneSpot {
             x: at.x,
             y: at.y,
             phase: self.phase(at),
@@ -354,13 +354,13 @@ impl<'a> Rendered<'a> {
     }
 }
 
-impl View for Capture<'_> {
+impl PlaneView for Capture<'_> {
     fn size(&self) -> (usize, usize) {
         let size = self.rendered.scene.size;
         (size, size)
     }
 
-    fn spot(&self, u: f64, v: f64) -> Option<Spot> {
+    fn spot(&self, u: f64, v: f64) -> Option<PlaneSpot> {
         self.rendered.spot(u, v)
     }
 

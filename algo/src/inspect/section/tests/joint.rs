@@ -3,7 +3,7 @@
 //! Rays are traced on a lattice much finer than pixels; what they send is blurred and integrated as
 //! light, never as heights. It shares no code with what it judges.
 
-use crate::inspect::section::{Optics, Point, Request};
+use crate::inspect::section::{Optics, Request, SectionPoint};
 use core::f64::consts::{PI, TAU};
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
@@ -315,7 +315,7 @@ pub struct Rendered {
 
 impl Rendered {
     /// The points of a capture; `noise` times the camera's.
-    pub fn capture(&self, seed: u64, noise: f64) -> Vec<Point> {
+    pub fn capture(&self, seed: u64, noise: f64) -> Vec<SectionPoint> {
         let joint = &self.joint;
         let mut chance = Chance::new(seed);
         let columns = (2.0 * HALF / joint.pixel) as usize;
@@ -340,7 +340,7 @@ impl Rendered {
                 let z = im.atan2(re) / TAU * TURN;
                 let z = z + ((light.height - z) / TURN).round() * TURN;
                 let sigma = NOISE * TURN / (2.0 * PI * modulation);
-                points.push(Point {
+                points.push(SectionPoint {
                     s: w / up + joint.sight * z,
                     z,
                     variance: sigma * sigma,

@@ -1,7 +1,9 @@
 //! Errors and their uncertainty.
 
 use super::joint::{Chance, Joint, truth};
-use crate::inspect::section::{Knowledge, Section, Side, Unseen, Value, Why, flush, gap, radius};
+use crate::inspect::section::{
+    JointValue, Knowledge, Section, Side, Unseen, Why, flush, gap, radius,
+};
 use std::vec::Vec;
 
 /// Nothing, or depth and light of a floor below.
@@ -20,7 +22,7 @@ fn values(
     rendered: &super::joint::Rendered,
     seed: u64,
     stated: bool,
-) -> Result<[Value; 4], Unseen> {
+) -> Result<[JointValue; 4], Unseen> {
     let mut request = joint.request();
     if stated {
         let (left, right) = Chance::new(seed + 7).normal();
@@ -142,7 +144,8 @@ fn the_scatter_of_repeats_is_what_sigma_says() {
         let n = repeats.len() as f64;
         for i in 0..4 {
             let mean = repeats.iter().map(|values| values[i].value).sum::<f64>() / n;
-            let square = |values: &[Value; 4]| ((values[i].value - mean) / values[i].sigma).powi(2);
+            let square =
+                |values: &[JointValue; 4]| ((values[i].value - mean) / values[i].sigma).powi(2);
             squares[i] += repeats.iter().map(square).sum::<f64>();
         }
         count += n - 1.0;

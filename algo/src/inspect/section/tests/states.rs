@@ -1,18 +1,18 @@
 //! What is found, and why a section has no value.
 
 use super::joint::{Chance, Joint};
-use crate::inspect::section::{Point, Section, Side, Unseen, Why};
+use crate::inspect::section::{Section, SectionPoint, Side, Unseen, Why};
 use std::format;
 use std::vec::Vec;
 
-fn joint() -> (Joint, Vec<Point>) {
+fn joint() -> (Joint, Vec<SectionPoint>) {
     let mut joint = Joint::draw(0.145, &mut Chance::new(2));
     (joint.radii, joint.rises) = ([1.5; 2], [0.0; 2]);
     let points = joint.rendered().capture(1, 1.0);
     (joint, points)
 }
 
-fn find(joint: &Joint, points: &[Point]) -> Result<Section, Unseen> {
+fn find(joint: &Joint, points: &[SectionPoint]) -> Result<Section, Unseen> {
     Section::new(points, &joint.request(), &joint.optics())
 }
 
@@ -125,7 +125,7 @@ fn a_sheet_that_goes_on_has_no_edge() {
     let (joint, points) = joint();
     let flat: Vec<_> = points
         .into_iter()
-        .map(|point| Point {
+        .map(|point| SectionPoint {
             z: 0.01 * point.variance,
             ..point
         })
@@ -141,22 +141,22 @@ fn the_order_of_points_hardly_matters_and_absurd_ones_do_not_count() {
     points.reverse();
     let absurd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY];
     for bad in absurd {
-        points.push(Point {
+        points.push(SectionPoint {
             s: bad,
             z: 0.0,
             variance: 1.0,
         });
-        points.push(Point {
+        points.push(SectionPoint {
             s: -10.0,
             z: bad,
             variance: 1.0,
         });
-        points.push(Point {
+        points.push(SectionPoint {
             s: -10.0,
             z: 0.0,
             variance: bad,
         });
-        points.push(Point {
+        points.push(SectionPoint {
             s: 0.0,
             z: bad,
             variance: -1.0,

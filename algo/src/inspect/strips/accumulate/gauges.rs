@@ -154,13 +154,13 @@ pub struct SquaresOf {
 
 /// A side of squares, and where there are some of this side: the box around their middles.
 #[derive(Clone, Debug)]
-pub struct Side {
+pub struct SquareSide {
     pub side: usize,
     pub rows: Range<usize>,
     pub columns: Range<usize>,
 }
 
-impl Side {
+impl SquareSide {
     /// The rows or columns that squares about the middles reach, of a frame with any.
     pub fn reached(&self, middles: &Range<usize>) -> Range<usize> {
         let half = self.side / 2;
@@ -195,7 +195,7 @@ pub struct Gauges {
     /// The squares of all gauges of deviation, gauge by gauge.
     pub squares: Vec<SquaresOf>,
     /// The sides of these squares, each once.
-    pub sides: Vec<Side>,
+    pub sides: Vec<SquareSide>,
     /// What the uncertainty of a coverage follows from.
     pub threshold: Threshold,
 }
@@ -239,9 +239,11 @@ impl Gauges {
                     side,
                     partly,
                 });
-                let known = sides.iter().position(|known: &Side| known.side == side);
+                let known = sides
+                    .iter()
+                    .position(|known: &SquareSide| known.side == side);
                 let known = known.unwrap_or_else(|| {
-                    sides.push(Side {
+                    sides.push(SquareSide {
                         side,
                         rows: 0..0,
                         columns: 0..0,

@@ -8,7 +8,7 @@ use crate::geometry::Vector;
 use crate::inspect::align::Motion;
 use crate::inspect::feature::{Cut, Feature};
 use crate::inspect::region::Region;
-use crate::inspect::section::{Optics, Point, Request};
+use crate::inspect::section::{Optics, Request, SectionPoint};
 use crate::inspect::strips::align::pose::PoseField;
 use crate::inspect::strips::golden::near::{Near, NodeRow};
 use crate::inspect::strips::golden::part::{Golden, base_nm};
@@ -183,7 +183,7 @@ impl SectionSight {
 /// Points of each section, with a buffer.
 #[derive(Clone, Debug, Default)]
 pub struct SectionPoints {
-    pub all: Vec<Vec<Point>>,
+    pub all: Vec<Vec<SectionPoint>>,
     row: NodeRow<6>,
 }
 
@@ -233,7 +233,7 @@ impl SectionPoints {
                     let slope = golden.slope((u, v), decoded.phase[u]);
                     let sigma = phase.sigma_nm(decoded.modulation[u], slope) * 1e-6;
                     let variance = sigma * sigma;
-                    points.push(Point { s, z, variance });
+                    points.push(SectionPoint { s, z, variance });
                 }
             }
         }

@@ -8,13 +8,13 @@ use core::ops::Range;
 
 /// The sums over the rows of a strip: all that readings are worked out from.
 #[derive(Debug)]
-pub struct Sums {
+pub struct StripSums {
     pub counts: Counts,
     pub squares: Squares,
     pub sections: SectionPoints,
 }
 
-impl Sums {
+impl StripSums {
     /// Of a strip of these rows of `width` pixels.
     pub fn new(gauges: &Gauges, width: usize, rows: &Range<usize>) -> Self {
         Self {

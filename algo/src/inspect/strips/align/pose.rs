@@ -22,7 +22,7 @@ pub const SPACING: usize = 64;
 
 /// The points that a node's pixel sees below, at and above the middle height; NaN where it sees
 /// nothing.
-type Sight = [Vector; 3];
+type NodeSight = [Vector; 3];
 
 /// How the part of a cycle lies, and what that does to every pixel.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ pub struct PoseField {
     regions: Vec<Region>,
     crossed: Vec<CrossedEdge>,
     /// Of the nodes, row-major.
-    sights: Vec<Sight>,
+    sights: Vec<NodeSight>,
     /// The displacements of the blocks along the rows of nodes, row-major.
     blocks: Vec<BlockNumbers>,
     /// Blocks of a row.
@@ -142,7 +142,7 @@ pub fn blocks_of_row(width: usize) -> Vec<BlockNumbers> {
 }
 
 /// What the node at pixel (u, v) sees.
-fn sight(golden: &Golden, (u, v): (usize, usize)) -> Sight {
+fn sight(golden: &Golden, (u, v): (usize, usize)) -> NodeSight {
     let (middle, half) = golden.levels;
     let nothing = Vector::new(f64::NAN, f64::NAN, f64::NAN);
     [middle - half, middle, middle + half].map(|z| golden.seen(u, v, z).unwrap_or(nothing))
@@ -153,7 +153,7 @@ fn sight(golden: &Golden, (u, v): (usize, usize)) -> Sight {
 fn displace<'a>(
     golden: &Golden,
     motion: &Motion,
-    nodes: impl Iterator<Item = (usize, &'a Sight)>,
+    nodes: impl Iterator<Item = (usize, &'a NodeSight)>,
     v: usize,
     blocks: &mut [BlockNumbers],
 ) {
@@ -171,7 +171,7 @@ fn displace<'a>(
 }
 
 /// The displacement by a motion of what the node at pixel (u, v) sees.
-fn node(golden: &Golden, motion: &Motion, (u, v): (usize, usize), sight: &Sight) -> Node {
+fn node(golden: &Golden, motion: &Motion, (u, v): (usize, usize), sight: &NodeSight) -> Node {
     let at = |point: Vector| displacement(golden, motion, (u, v), point);
     let ([low, middle, high], half) = (sight.map(at), golden.levels.1);
     [

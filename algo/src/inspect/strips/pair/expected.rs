@@ -47,7 +47,7 @@ pub struct GoldenHeights<'a> {
 
 /// A block of pixels along a row.
 #[derive(Clone, Copy)]
-pub struct Pixels<'a> {
+pub struct BlockPixels<'a> {
     numbers: &'a BlockNumbers,
     from: Whole,
     /// The first one.
@@ -106,7 +106,7 @@ impl Expectation<'_> {
             let Some(from) = Whole::of(numbers) else {
                 continue;
             };
-            let pixels = Pixels {
+            let pixels = BlockPixels {
                 numbers,
                 from,
                 u: start,
@@ -138,7 +138,7 @@ back_end_entry! {
     /// they are where nothing is known of it.
     fn expect_block [] = expect_pixels(
         golden: GoldenHeights<'_>,
-        pixels: Pixels<'_>,
+        pixels: BlockPixels<'_>,
         phase: &mut [AbsolutePhase],
         compared: &mut [bool],
         sought: &mut Sought,
@@ -149,7 +149,7 @@ back_end_entry! {
 fn expect_pixels<V: Lanes>(
     _: V,
     golden: GoldenHeights<'_>,
-    pixels: Pixels<'_>,
+    pixels: BlockPixels<'_>,
     phase: &mut [AbsolutePhase],
     compared: &mut [bool],
     sought: &mut Sought,
@@ -369,7 +369,7 @@ mod tests {
             for (v, start) in (0..ROWS).flat_map(|v| [(v, 0), (v, 32), (v, 64)]) {
                 let length = BLOCK.min(WIDTH - start);
                 let row = v * WIDTH + start..v * WIDTH + start + length;
-                let pixels = Pixels {
+                let pixels = BlockPixels {
                     numbers: &numbers,
                     from: Whole::of(&numbers).unwrap(),
                     u: start,

@@ -29,13 +29,13 @@ pub struct Solver {
 
 /// The results of a block.
 #[derive(Debug)]
-pub struct Solved {
+pub struct SolvedBlock {
     pub phase: [AbsolutePhase; BLOCK],
     pub modulation: [Modulation; BLOCK],
     pub trust: [Trust; BLOCK],
 }
 
-impl Default for Solved {
+impl Default for SolvedBlock {
     fn default() -> Self {
         Self {
             phase: [AbsolutePhase::UNKNOWN; BLOCK],
@@ -67,7 +67,7 @@ back_end_entry! {
         columns: [&[i32]; SUMS],
         expected: (&[AbsolutePhase], &[bool]),
         light: &[f32],
-        out: &mut Solved,
+        out: &mut SolvedBlock,
     )
 }
 
@@ -78,7 +78,7 @@ fn solve<V: Lanes>(
     columns: [&[i32]; SUMS],
     (phase, compared): (&[AbsolutePhase], &[bool]),
     light: &[f32],
-    out: &mut Solved,
+    out: &mut SolvedBlock,
 ) {
     let mut sums = [[0; BLOCK]; SUMS];
     for i in 0..SUMS {

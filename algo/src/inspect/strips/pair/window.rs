@@ -29,7 +29,7 @@
 //! `the_noise_of_a_fitted_phase_is_that_of_theory`,
 //! `the_phase_of_a_pair_has_next_to_no_periodic_error`.
 
-use super::solve::{Solved, Solver, solve_block};
+use super::solve::{SolvedBlock, Solver, solve_block};
 use super::sums::{BLOCK, Columns, FAINT, REACH, SIDE, Terms, refill};
 use crate::frame::{FrameView, Sample, Samples};
 use crate::phase::{LeastModulation, PhaseRow};
@@ -197,7 +197,7 @@ impl Windows {
     /// From the sums of the columns to the phases of a row.
     fn row(&self, terms: &Terms, columns: &Columns, out: &mut PhaseRow<'_>) {
         let width = out.phase.len();
-        let mut solved = Solved::default();
+        let mut solved = SolvedBlock::default();
         for start in (0..width).step_by(BLOCK) {
             let (pixels, end) = (start..start + BLOCK, (start + BLOCK).min(width));
             solve_block(

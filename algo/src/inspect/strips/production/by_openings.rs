@@ -15,7 +15,7 @@
 //! ```
 //!
 //! σ² is the variance of the centre by noise and by what is uncertain of its contour anew wherever it lies; the rest
-//! ([`Source`](crate::inspect::contour::Source)) is golden's, too, and no part of r.
+//! ([`ContourSource`](crate::inspect::contour::ContourSource)) is golden's, too, and no part of r.
 //!
 //! # Accuracy
 //! `a_flat_plate_is_placed_by_its_holes_in_all_surroundings`: 1.6 µm and 0.0016° over black and grey, 2.1 µm over white.
@@ -29,7 +29,7 @@ use crate::inspect::strips::accumulate::gauges::Gauge;
 use crate::inspect::strips::readings::contours::{
     ContourFit, Contours, ExpectedContour, REACH_MM, Signal, moved,
 };
-use crate::inspect::strips::readings::planes::Fit;
+use crate::inspect::strips::readings::planes::PlaneFit;
 use crate::math::solve::solve_symmetric;
 use crate::pipeline::for_each;
 use alloc::vec::Vec;
@@ -44,7 +44,7 @@ pub type Anchors = heapless::Vec<usize, MOST>;
 
 /// The contours that a part is placed by: as far apart as there are. A contour whose own place is measured in the
 /// frame as taught is none of them.
-pub fn anchors(contours: &Contours, planes: &[Fit], gauges: &[Gauge]) -> Anchors {
+pub fn anchors(contours: &Contours, planes: &[PlaneFit], gauges: &[Gauge]) -> Anchors {
     let is_placed = |feature: usize| {
         let mut gauges = gauges.iter().filter(|gauge| gauge.datum.is_empty());
         gauges.any(|gauge| gauge.measure.facts().datum && gauge.of.contains(&feature))
@@ -94,7 +94,7 @@ struct Centre {
 
 /// The motion along the open directions.
 #[derive(Clone, Copy, Debug)]
-struct Solution {
+struct OpenMotion {
     shares: Shares,
     covariance: Matrix6,
 }
@@ -211,7 +211,7 @@ impl Centre {
 }
 
 /// The motion along so many open directions by which centres agree, all of them or, of [`MOST`], all but one.
-fn agreed(centres: &[Centre], open: usize) -> Option<Solution> {
+fn agreed(centres: &[Centre], open: usize) -> Option<OpenMotion> {
     let without = |out: Option<usize>| {
         let kept = || {
             centres
@@ -239,7 +239,7 @@ fn agreed(centres: &[Centre], open: usize) -> Option<Solution> {
 }
 
 /// Least squares; `None` where the centres determine too little.
-fn solve<'a>(centres: impl Iterator<Item = &'a Centre> + Clone, open: usize) -> Option<Solution> {
+fn solve<'a>(centres: impl Iterator<Item = &'a Centre> + Clone, open: usize) -> Option<OpenMotion> {
     let (mut matrix, mut right) = (Matrix6::default(), Shares::default());
     let rows = centres.flat_map(|centre| centre.axes);
     for (row, off, variance) in rows.clone() {
@@ -270,13 +270,13 @@ fn solve<'a>(centres: impl Iterator<Item = &'a Centre> + Clone, open: usize) -> 
         packed(&mut column[..open])?;
     }
     let is_sharp = |i: usize| covariance[i][i] <= LARGEST_SIGMA_MM * LARGEST_SIGMA_MM;
-    (0..open).all(is_sharp).then_some(Solution {
+    (0..open).all(is_sharp).then_some(OpenMotion {
         shares: right,
         covariance,
     })
 }
 
-impl Solution {
+impl OpenMotion {
     /// The covariance of a motion along these open directions.
     fn over(&self, free: &[Shares]) -> Matrix6 {
         let mut sum = Matrix6::default();

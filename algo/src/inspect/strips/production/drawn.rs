@@ -8,7 +8,7 @@ use super::plan::Production;
 use super::strip::Strips;
 use crate::geometry::Vector;
 use crate::inspect::contour::Outcome;
-use crate::inspect::section::{self, Point};
+use crate::inspect::section::{self, SectionPoint};
 use crate::inspect::strips::accumulate::squares::extreme::least_support;
 use crate::inspect::table::IntegralTable;
 use alloc::vec;
@@ -46,7 +46,7 @@ pub struct Profile {
     /// Some of its points.
     pub points: Vec<[f64; 2]>,
     /// Both sides; `None` where the joint was not found.
-    pub joint: Option<section::Geometry>,
+    pub joint: Option<section::Joint>,
 }
 
 impl<'a> Drawing<'a> {
@@ -73,7 +73,7 @@ impl<'a> Drawing<'a> {
                 ends: None,
                 pieces: Vec::new(),
                 profile: Some(Profile {
-                    points: points.map(|&Point { s, z, .. }| [s, z]).collect(),
+                    points: points.map(|&SectionPoint { s, z, .. }| [s, z]).collect(),
                     joint: section.geometry(),
                 }),
             });

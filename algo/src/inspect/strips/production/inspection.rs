@@ -9,7 +9,7 @@ use crate::frame::FrameView;
 use crate::inspect::align::{Alignment, FitBuffers, Found, Motion, Placed};
 use crate::inspect::strips::accumulate::sections::SectionSight;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
-use crate::inspect::strips::accumulate::sums::Sums;
+use crate::inspect::strips::accumulate::sums::StripSums;
 use crate::inspect::strips::align::pose::PoseField;
 use crate::inspect::strips::measure::decode::Input;
 use crate::inspect::strips::pair::PairBuffers;
@@ -43,7 +43,7 @@ impl Production {
         Strips {
             strips: tops.clone().map(|rows| Strip::new(self, rows)).collect(),
             sums: tops
-                .map(|rows| Sums::new(&self.gauges, width, &rows))
+                .map(|rows| StripSums::new(&self.gauges, width, &rows))
                 .collect(),
             rows,
             pose: PoseField::new(&self.golden, &self.gauges.regions, self.alignment.is_some()),
@@ -268,7 +268,7 @@ impl Production {
         if maps.is_empty() {
             for_each(
                 work.collect(),
-                |_, (strip, sums): (&mut Strip, &mut Sums)| {
+                |_, (strip, sums): (&mut Strip, &mut StripSums)| {
                     strip.inspect(self, part, input, sums, Maps::default());
                 },
             );

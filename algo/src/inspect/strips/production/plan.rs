@@ -15,8 +15,8 @@ use crate::inspect::strips::golden::part::Golden;
 use crate::inspect::strips::measure::decode::PhasePlan;
 use crate::inspect::strips::readings::contours::{Contours, GoldenSignal, Known, Levels};
 use crate::inspect::strips::readings::evaluation::{Evaluation, ReadingPlan};
-use crate::inspect::strips::readings::planes::Fit;
-use crate::inspect::strips::readings::uncertainty::{CalibrationError, ErrorBudget};
+use crate::inspect::strips::readings::planes::PlaneFit;
+use crate::inspect::strips::readings::uncertainty::{CalibrationUncertainty, ErrorBudget};
 use crate::inspect::taught::Taught;
 use crate::phase::Decoder;
 use crate::pipeline::{HeightCubics, VARIANCE_UNIT_NM};
@@ -67,7 +67,7 @@ pub struct Parts {
     /// is not known.
     pub displaced: Vec<Option<Largest>>,
     /// The error of the head's calibration.
-    pub calibration: CalibrationError,
+    pub calibration: CalibrationUncertainty,
     /// RMS of the periodic error of a mean height by this sequence, mm.
     pub ripple: f64,
     /// Heights that lie so many mm behind golden's, or farther, are those of the part's surroundings;
@@ -149,9 +149,9 @@ impl Production {
         )?;
         let planes = gauges.planes.iter().map(|&at| {
             let patch = &gauges.patches[at];
-            Fit::new(at, patch, &golden, features[patch.feature].thickness)
+            PlaneFit::new(at, patch, &golden, features[patch.feature].thickness)
         });
-        let planes: Vec<Fit> = planes.collect();
+        let planes: Vec<PlaneFit> = planes.collect();
         let full_scale = decoder.full_scale();
         let contours = match gauges.contours.first() {
             None => None,

@@ -2,10 +2,10 @@
 //! the maps that people ask for.
 
 use super::plan::Production;
-use crate::inspect::align::{Alignment, Coarse, FitBuffers, Sample};
+use crate::inspect::align::{Alignment, Coarse, FitBuffers, HeightSample};
 use crate::inspect::strips::accumulate::sections::SectionSight;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
-use crate::inspect::strips::accumulate::sums::Sums;
+use crate::inspect::strips::accumulate::sums::StripSums;
 use crate::inspect::strips::align::coordinates::{Comparison, TaughtCoordinates};
 use crate::inspect::strips::align::pose::PoseField;
 use crate::inspect::strips::measure::decode::Input;
@@ -25,12 +25,12 @@ use core::ops::Range;
 pub struct Strips {
     pub(super) strips: Vec<Strip>,
     /// What the rows of each add up to.
-    pub(super) sums: Vec<Sums>,
+    pub(super) sums: Vec<StripSums>,
     /// Rows of each strip; the last may have fewer.
     pub(super) rows: usize,
     pub(super) pose: PoseField,
     /// Points of all strips that the part's motion is found from.
-    pub(super) samples: Vec<Sample>,
+    pub(super) samples: Vec<HeightSample>,
     pub(super) fitting: FitBuffers,
     /// The picture without fringes, from fine to coarse.
     pub(super) pictures: Vec<Coarse>,
@@ -45,7 +45,7 @@ impl Strips {
     /// Bytes of the cells of gauges and of the places of their largest deviations: nearly all of
     /// the memory that grows with the gauges.
     pub fn bytes(&self) -> usize {
-        self.sums.iter().map(Sums::bytes).sum::<usize>() + self.pose.bytes()
+        self.sums.iter().map(StripSums::bytes).sum::<usize>() + self.pose.bytes()
     }
 }
 
@@ -89,7 +89,7 @@ pub struct Strip {
     coordinates: TaughtCoordinates,
     recent: RecentRows,
     /// Points that the part's motion is found from.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<HeightSample>,
 }
 
 impl Strip {
@@ -113,7 +113,7 @@ impl Strip {
         plan: &Production,
         (pose, sights): (&PoseField, &[SectionSight]),
         input: Input<'_>,
-        sums: &mut Sums,
+        sums: &mut StripSums,
         mut maps: Maps<'_>,
     ) {
         sums.clear();
@@ -186,7 +186,7 @@ impl Strip {
                     let slope = plan.golden.slope((spot.u, v), self.decoded.phase[spot.u]);
                     let modulation = self.decoded.modulation[spot.u];
                     let above = f64::from(offset) * 1e-6;
-                    self.samples.push(Sample {
+                    self.samples.push(HeightSample {
                         point: plan.golden.triangulator.higher(spot.point, above),
                         sigma: plan.phase.sigma_nm(modulation, slope) * share,
                         over: Some((at, above)),

@@ -5,7 +5,7 @@ use crate::geometry::{Pinhole, PinholeModel, Reference, Triangulator, Vector};
 use crate::inspect::align::{Motion, Placed};
 use crate::inspect::feature::{Feature, FeatureKind};
 use crate::inspect::gauge::Measure;
-use crate::inspect::strips::{CalibrationError, Gauge, Input, Parts, Production};
+use crate::inspect::strips::{CalibrationUncertainty, Gauge, Input, Parts, Production};
 use crate::inspect::{Largest, Region, Taught, Weight};
 use crate::pattern::{PhaseFunction, Sequence, Shot};
 use crate::phase::Decoder;
@@ -258,7 +258,7 @@ impl Head {
             golden_noise: 0.3,
             largest: vec![Largest::default()],
             displaced: vec![None],
-            calibration: CalibrationError::default(),
+            calibration: CalibrationUncertainty::default(),
             ripple: 0.0,
             surroundings: None,
             ground: None,

@@ -4,7 +4,7 @@ use super::contours::{ContourFit, Contours, FoundFeature, REACH_MM, Signal};
 use super::deviation::SquareNoise;
 use super::findings::{Findings, Skipped};
 use super::joints::SectionFit;
-use super::planes::Fit;
+use super::planes::PlaneFit;
 use super::reading::{add_up, pixel_variance, pixels};
 use super::uncertainty::ErrorBudget;
 use crate::inspect::align::Placed;
@@ -15,7 +15,7 @@ use crate::inspect::strips::accumulate::counts::TRUSTS;
 use crate::inspect::strips::accumulate::gauges::{Gauges, MAX_FEATURES, MAX_GAUGES};
 use crate::inspect::strips::accumulate::sections::Sections;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
-use crate::inspect::strips::accumulate::sums::Sums;
+use crate::inspect::strips::accumulate::sums::StripSums;
 use crate::inspect::strips::align::pose::PoseField;
 use crate::inspect::strips::golden::part::Golden;
 use crate::phase::Trust;
@@ -27,7 +27,7 @@ use alloc::vec::Vec;
 #[derive(Debug)]
 pub struct ReadingPlan {
     /// The planes of features as taught.
-    pub planes: Vec<Fit>,
+    pub planes: Vec<PlaneFit>,
     /// `None` if no gauge is of one.
     pub contours: Option<Contours>,
     pub budget: ErrorBudget,
@@ -49,7 +49,7 @@ pub struct Evaluation<'a> {
 pub struct PartFeatures {
     pub cells: CellBuffers,
     /// One per plane that a gauge needs.
-    pub fits: Vec<Fit>,
+    pub fits: Vec<PlaneFit>,
     /// One per contour that a gauge needs.
     pub contours: Vec<ContourFit>,
     /// One per section that a gauge needs.
@@ -95,7 +95,7 @@ impl Evaluation<'_> {
         &self,
         light: Signal<'_>,
         pose: &PoseField,
-        sums: &mut [Sums],
+        sums: &mut [StripSums],
         noise_of: NoiseOf<'_>,
         found: &mut PartFeatures,
     ) -> Findings {
@@ -157,9 +157,9 @@ impl Evaluation<'_> {
     }
 
     /// Fits the planes of features, one per task.
-    fn fit(&self, sums: &[Sums], pose: &PoseField, noisier: f64, fits: &mut [Fit]) {
+    fn fit(&self, sums: &[StripSums], pose: &PoseField, noisier: f64, fits: &mut [PlaneFit]) {
         let placed = pose.placed.as_ref();
-        for_each_item(fits, |fit: &mut Fit| {
+        for_each_item(fits, |fit: &mut PlaneFit| {
             let patch = &self.gauges.patches[fit.patch];
             add_up(sums, fit.patch, patch.grid.len(), &mut fit.sums);
             let side = pixels(&patch.taught).isqrt() as usize;
@@ -191,7 +191,7 @@ impl Evaluation<'_> {
     }
 
     /// Finds the joints of sections in the points of all strips, one per task.
-    fn find_joints(&self, sums: &[Sums], found: &mut PartFeatures) {
+    fn find_joints(&self, sums: &[StripSums], found: &mut PartFeatures) {
         let work: Vec<_> = found.joints.iter_mut().zip(&self.sections.all).collect();
         for_each(work, |at, (found, expected)| {
             let points = sums.iter().map(|strip| &strip.sections.all[at][..]);
@@ -201,7 +201,7 @@ impl Evaluation<'_> {
 
     /// The planes and contours that gauges need.
     fn features(&self, found: &PartFeatures) -> heapless::Vec<FoundFeature, MAX_FEATURES> {
-        let own = |fit: &&Fit| !found.contours.iter().any(|of| of.is_of(&[fit.feature]));
+        let own = |fit: &&PlaneFit| !found.contours.iter().any(|of| of.is_of(&[fit.feature]));
         let planes = found.fits.iter().filter(own).map(|fit| {
             let geometry = fit.geometry();
             FoundFeature {

@@ -4,7 +4,7 @@ use super::contours::{FoundFeature, Lost};
 use super::uncertainty::ErrorBudget;
 use crate::inspect::contour::State;
 use crate::inspect::gauge::{Kind, Reading};
-use crate::inspect::section::{Geometry, Input, Knowledge, Point, Section};
+use crate::inspect::section::{Joint, JointInput, Knowledge, Section, SectionPoint};
 use crate::inspect::strips::accumulate::sections::ExpectedSection;
 use alloc::vec::Vec;
 
@@ -13,8 +13,8 @@ use alloc::vec::Vec;
 pub struct SectionFit {
     /// `None` before the first part.
     pub of: Option<FoundFeature>,
-    section: Option<(Section, Vec<Input>)>,
-    points: Vec<Point>,
+    section: Option<(Section, Vec<JointInput>)>,
+    points: Vec<SectionPoint>,
 }
 
 impl SectionFit {
@@ -28,7 +28,7 @@ impl SectionFit {
     pub fn find<'a>(
         &mut self,
         expected: &ExpectedSection,
-        strips: impl Iterator<Item = &'a [Point]>,
+        strips: impl Iterator<Item = &'a [SectionPoint]>,
         budget: &ErrorBudget,
     ) {
         self.points.clear();
@@ -60,12 +60,12 @@ impl SectionFit {
     }
 
     /// The points that it was looked for in.
-    pub fn points(&self) -> &[Point] {
+    pub fn points(&self) -> &[SectionPoint] {
         &self.points
     }
 
     /// Its geometry; `None` if it is not found.
-    pub fn geometry(&self) -> Option<Geometry> {
+    pub fn geometry(&self) -> Option<Joint> {
         let (section, _) = self.section.as_ref()?;
         Some(section.geometry(&section.parameters()))
     }

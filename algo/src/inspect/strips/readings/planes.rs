@@ -31,7 +31,7 @@ use alloc::vec::Vec;
 
 /// The fit of a plane, with its buffers.
 #[derive(Clone, Debug)]
-pub struct Fit {
+pub struct PlaneFit {
     /// Which patch has its cells.
     pub patch: usize,
     /// Which feature it is.
@@ -49,7 +49,7 @@ pub struct Fit {
     plane: Option<FittedPlane>,
 }
 
-impl Fit {
+impl PlaneFit {
     /// To the cells of this patch.
     pub fn new(at: usize, patch: &Patch, golden: &Golden, thickness: Option<f64>) -> Self {
         let as_taught = patch.taught.iter().map(|cell| Sum {

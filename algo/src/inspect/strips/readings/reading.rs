@@ -3,7 +3,7 @@
 use super::contours::{ContourFit, FoundFeature};
 use super::evaluation::{CellBuffers, Evaluation, NoiseOf, PartFeatures};
 use super::findings::Missing;
-use super::planes::Fit;
+use super::planes::PlaneFit;
 use super::uncertainty::Made;
 use crate::inspect::contour::State;
 use crate::inspect::contour::shape::Outline;
@@ -16,7 +16,7 @@ use crate::inspect::strips::accumulate::coverage;
 use crate::inspect::strips::accumulate::gauges::Gauge;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
 use crate::inspect::strips::accumulate::squares::rivals::rivals;
-use crate::inspect::strips::accumulate::sums::Sums;
+use crate::inspect::strips::accumulate::sums::StripSums;
 use crate::inspect::strips::align::pose::PoseField;
 use alloc::vec::Vec;
 
@@ -27,7 +27,7 @@ impl Evaluation<'_> {
         gauge: usize,
         noisier: f64,
         pose: &PoseField,
-        sums: &mut [Sums],
+        sums: &mut [StripSums],
         noise_of: NoiseOf<'_>,
         found: &mut PartFeatures,
     ) -> Option<Reading> {
@@ -111,7 +111,7 @@ impl Evaluation<'_> {
         gauge: usize,
         noisier: f64,
         pose: &PoseField,
-        sums: &[Sums],
+        sums: &[StripSums],
         buffers: &mut CellBuffers,
     ) -> Option<Reading> {
         let measure = &self.gauges.list[gauge].measure;
@@ -176,7 +176,7 @@ impl Evaluation<'_> {
         gauge: usize,
         noisier: f64,
         pose: &PoseField,
-        (fits, contours): (&[Fit], &[ContourFit]),
+        (fits, contours): (&[PlaneFit], &[ContourFit]),
     ) -> Option<Reading> {
         let budget = &self.plan.budget;
         let Gauge { of, datum, measure } = &self.gauges.list[gauge];
@@ -288,7 +288,7 @@ impl Evaluation<'_> {
     }
 
     /// Why a gauge has no value, where these features were found.
-    pub fn missing(&self, gauge: usize, features: &[FoundFeature], sums: &[Sums]) -> Missing {
+    pub fn missing(&self, gauge: usize, features: &[FoundFeature], sums: &[StripSums]) -> Missing {
         let of = &self.gauges.list[gauge];
         let own = &self.gauges.patches_of[gauge];
         if !own.is_empty() {
@@ -319,7 +319,7 @@ impl Evaluation<'_> {
     }
 
     /// Appends the cells of a patch.
-    fn gather(&self, at: usize, side: usize, strips: &[Sums], buffers: &mut CellBuffers) {
+    fn gather(&self, at: usize, side: usize, strips: &[StripSums], buffers: &mut CellBuffers) {
         let patch = &self.gauges.patches[at];
         let CellBuffers {
             sums, cells: out, ..
@@ -333,7 +333,7 @@ impl Evaluation<'_> {
 /// What values of these features depend on; `None` where one was not found.
 fn sensitive<'a, const N: usize>(
     features: &[usize],
-    fits: &'a [Fit],
+    fits: &'a [PlaneFit],
     contours: &'a [ContourFit],
 ) -> Option<heapless::Vec<Sensitive<'a>, N>> {
     let sensitive = |at: &usize| {
@@ -347,7 +347,7 @@ fn sensitive<'a, const N: usize>(
 }
 
 /// The sums of all strips over the cells of a patch.
-pub fn add_up(strips: &[Sums], patch: usize, cells: usize, sums: &mut Vec<Sum>) {
+pub fn add_up(strips: &[StripSums], patch: usize, cells: usize, sums: &mut Vec<Sum>) {
     sums.clear();
     sums.resize(cells, Sum::default());
     for strip in strips {

@@ -17,14 +17,14 @@
 //!   everywhere.
 
 use crate::inspect::align::Placed;
-use crate::inspect::gauge::{Found, Reading};
+use crate::inspect::gauge::{FoundValue, Reading};
 use crate::inspect::largest::Largest;
 use crate::inspect::strips::pair::noise::{correlated, smoothed};
 use alloc::vec::Vec;
 
 /// σ by the error of the calibration; 0 where it is not known.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct CalibrationError {
+pub struct CalibrationUncertainty {
     /// Of a height, mm.
     pub height: f64,
     /// Of a length, relative.
@@ -54,7 +54,7 @@ pub struct ErrorBudget {
     pub displaced: Vec<Option<Largest>>,
     /// What a pixel in the middle of the frame sees, mm.
     pub pixel_mm: f64,
-    pub calibration: CalibrationError,
+    pub calibration: CalibrationUncertainty,
     /// RMS of the periodic error of a mean height, mm.
     pub ripple: f64,
     /// Whether neighbouring phases share pixels: those of a pair.
@@ -68,12 +68,12 @@ impl ErrorBudget {
     /// by `smoothed`.
     pub fn reading_of(
         &self,
-        found: Found,
+        found: FoundValue,
         made: Made,
         (noisier, smoothed): (f64, f64),
         placed: Option<&Placed>,
     ) -> Reading {
-        let Found {
+        let FoundValue {
             value,
             pixels,
             motion,

@@ -2,7 +2,7 @@
 
 use super::light::{GoldenSignal, Levels, Signal};
 use crate::geometry::{Triangulator, Vector};
-use crate::inspect::contour::{Spot, View};
+use crate::inspect::contour::{PlaneSpot, PlaneView};
 use crate::inspect::feature::PlaneFrame;
 use crate::inspect::strips::golden::near::{Near, NodeRow};
 use crate::math::complex::Complex;
@@ -71,25 +71,25 @@ impl Face<'_> {
     }
 }
 
-impl View for Face<'_> {
+impl PlaneView for Face<'_> {
     fn size(&self) -> (usize, usize) {
         self.size
     }
 
     #[inline]
-    fn spot(&self, u: f64, v: f64) -> Option<Spot> {
+    fn spot(&self, u: f64, v: f64) -> Option<PlaneSpot> {
         let near = self.near.at(u, v);
         near.or_else(|| self.exact(u, v))
-            .map(|[x, y, phase]| Spot { x, y, phase })
+            .map(|[x, y, phase]| PlaneSpot { x, y, phase })
     }
 
-    fn row(&self, v: f64) -> impl Fn(f64) -> Option<Spot> {
+    fn row(&self, v: f64) -> impl Fn(f64) -> Option<PlaneSpot> {
         let mut row = NodeRow::new();
         self.near.take_row(v, &mut row);
         move |u| {
             let near = self.near.in_row(&row, u);
             let [x, y, phase] = near.or_else(|| self.exact(u, v))?;
-            Some(Spot { x, y, phase })
+            Some(PlaneSpot { x, y, phase })
         }
     }
 

@@ -6,13 +6,13 @@ use super::taught::{Contours, ExpectedContour};
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed};
 use crate::inspect::contour::shape::Outline;
-use crate::inspect::contour::{Contour, Outcome, PIECE_PX, Point, Setup, State, find, inputs};
+use crate::inspect::contour::{Contour, EdgePoint, Outcome, PIECE_PX, Setup, State, find, inputs};
 use crate::inspect::feature::{Geometry, PlaneFrame, Rim};
 use crate::inspect::gauge::Sensitive;
 use crate::inspect::section::Unseen;
 use crate::inspect::strips::golden::near::Near;
 use crate::inspect::strips::golden::part::Golden;
-use crate::inspect::strips::readings::planes::Fit;
+use crate::inspect::strips::readings::planes::PlaneFit;
 use alloc::vec::Vec;
 
 /// The face does not reach the rim if the phase next to it is off the plane's by more than this
@@ -72,22 +72,22 @@ pub struct ContourFit {
     /// `None` if it is not found.
     pub rim: Option<Rim>,
     /// Its pieces; `None` if it was not looked for, because its plane was not found.
-    pub pieces: Option<Pieces>,
+    pub pieces: Option<FoundPieces>,
     /// Which of the planes it lies in.
     plane: usize,
 }
 
 /// The pieces that a contour was looked for in.
 #[derive(Clone, Debug)]
-pub struct Pieces {
+pub struct FoundPieces {
     /// The frame of its plane, in the frame as taught.
     frame: PlaneFrame,
     outline: Outline,
     outcomes: Vec<Outcome>,
-    points: Vec<Point>,
+    points: Vec<EdgePoint>,
 }
 
-impl Pieces {
+impl FoundPieces {
     /// Places along the contour, in the frame as taught.
     pub fn outline(&self) -> impl Iterator<Item = Vector> {
         let places = self.outline.places();
@@ -129,7 +129,7 @@ impl ContourFit {
     }
 
     /// The contour as values depend on it; `None` if it is not found.
-    pub fn sensitive<'a>(&'a self, planes: &'a [Fit]) -> Option<Sensitive<'a>> {
+    pub fn sensitive<'a>(&'a self, planes: &'a [PlaneFit]) -> Option<Sensitive<'a>> {
         Some(Sensitive::Contour {
             id: self.of.as_ref()?.feature,
             rim: self.rim.as_ref()?,
@@ -142,7 +142,7 @@ impl ContourFit {
         &mut self,
         (contours, expected): (&Contours, &ExpectedContour),
         golden: &Golden,
-        plane: &Fit,
+        plane: &PlaneFit,
         (placed, reach_mm): (Option<&Placed>, f64),
         light: Signal<'_>,
     ) {
@@ -197,7 +197,7 @@ impl ContourFit {
                         self.rim = Some(rim);
                     }
                 }
-                self.pieces = Some(Pieces {
+                self.pieces = Some(FoundPieces {
                     frame: taught,
                     outline,
                     outcomes: core::mem::take(&mut contour.outcomes),

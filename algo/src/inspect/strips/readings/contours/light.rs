@@ -53,13 +53,13 @@ impl GoldenSignal {
 /// How the levels of a sequence are demodulated.
 #[derive(Clone, Debug)]
 pub struct Levels {
-    all: Vec<Demodulation>,
+    all: Vec<LevelDemodulation>,
     full_scale: f64,
 }
 
 /// A level: its ratio, and the place and the weights of each of its frames.
 #[derive(Clone, Debug)]
-struct Demodulation {
+struct LevelDemodulation {
     ratio: f64,
     frames: Vec<(usize, Complex)>,
 }
@@ -77,7 +77,7 @@ impl Levels {
                 );
                 (usize::from(frame), weight)
             });
-            Demodulation {
+            LevelDemodulation {
                 ratio: level.ratio,
                 frames: frames.collect(),
             }

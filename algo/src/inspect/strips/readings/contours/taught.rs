@@ -5,12 +5,12 @@ use super::light::{GoldenSignal, Levels, Signal};
 use super::trace::{Traced, ground_below, trace};
 use crate::geometry::Vector;
 use crate::inspect::contour::shape::Outline;
-use crate::inspect::contour::{Fringes, Setup, Spot, State, View, find};
+use crate::inspect::contour::{Fringes, PlaneSpot, PlaneView, Setup, State, find};
 use crate::inspect::feature::{Feature, FeatureKind, PlaneFrame};
 use crate::inspect::strips::accumulate::gauges::Unmeasurable;
 use crate::inspect::strips::golden::near::Near;
 use crate::inspect::strips::golden::part::Golden;
-use crate::inspect::strips::readings::planes::Fit;
+use crate::inspect::strips::readings::planes::PlaneFit;
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 
@@ -74,7 +74,7 @@ impl Contours {
     /// If golden has no such contour in a feature's region, or its sequence has no quadrature.
     pub fn new(
         wanted: impl Iterator<Item = (usize, usize)>,
-        (features, planes): (&[Feature], &[Fit]),
+        (features, planes): (&[Feature], &[PlaneFit]),
         golden: &Golden,
         known: Known,
     ) -> Result<Self, Unmeasurable> {
@@ -106,7 +106,7 @@ impl Contours {
         Ok(contours)
     }
 
-    fn taught(&self, of: &Feature, plane: &Fit, golden: &Golden) -> Option<ExpectedContour> {
+    fn taught(&self, of: &Feature, plane: &PlaneFit, golden: &Golden) -> Option<ExpectedContour> {
         let geometry = plane.geometry()?;
         let (normal, point) = (geometry.normal, geometry.point);
         // About the region's middle first, then about the contour's.
@@ -163,7 +163,7 @@ impl Contours {
         let width = face.size().0;
         let light = places.iter().filter_map(|&place| {
             let (u, v) = (place % width, place / width);
-            let Spot { phase, .. } = face.spot(u as f64, v as f64)?;
+            let PlaneSpot { phase, .. } = face.spot(u as f64, v as f64)?;
             let back = Complex::turned(-self.signal.ratio * phase);
             Some((face.signal((u, v), 0)? * back).re)
         });
@@ -173,7 +173,7 @@ impl Contours {
     }
 
     /// The frame of a contour's plane, whose parameters were measured, in the frame as taught.
-    pub fn frame(&self, of: &ExpectedContour, plane: &Fit) -> Option<PlaneFrame> {
+    pub fn frame(&self, of: &ExpectedContour, plane: &PlaneFit) -> Option<PlaneFrame> {
         let geometry = plane.geometry()?;
         let (normal, point) = (geometry.normal, geometry.point);
         let (x, y) = of.origin;

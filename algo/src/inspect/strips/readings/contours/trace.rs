@@ -6,8 +6,8 @@
 
 use super::face::Face;
 use crate::geometry::Vector;
-use crate::inspect::contour::View;
-use crate::inspect::contour::shape::{Outline, Place, Trace};
+use crate::inspect::contour::PlaneView;
+use crate::inspect::contour::shape::{Outline, PlanePlace, Trace};
 use crate::inspect::feature::{FeatureKind, PlaneFrame};
 use crate::inspect::region::Region;
 use crate::inspect::strips::golden::part::Golden;
@@ -35,7 +35,7 @@ pub struct Traced {
 }
 
 /// The pixels of a region over the box around it.
-struct Pixels {
+struct RegionPixels {
     left: usize,
     top: usize,
     width: usize,
@@ -51,7 +51,7 @@ pub fn trace(
     golden: &Golden,
     face: &Face<'_>,
 ) -> Option<Traced> {
-    let pixels = Pixels::of(region, golden, face);
+    let pixels = RegionPixels::of(region, golden, face);
     let spot = |at: usize| {
         let (u, v) = pixels.place(at);
         face.spot(u as f64, v as f64).map(|spot| (spot.x, spot.y))
@@ -106,7 +106,7 @@ pub fn ground_below(golden: &Golden, frame: &PlaneFrame) -> Option<f64> {
     Some(frame.normal().dot(frame.origin - ground))
 }
 
-impl Pixels {
+impl RegionPixels {
     fn of(region: &Region, golden: &Golden, face: &Face<'_>) -> Self {
         let spans = region.spans();
         let left = spans.iter().map(|(_, span)| span.start).min().unwrap_or(0);
@@ -195,7 +195,7 @@ impl Pixels {
     }
 }
 
-fn mean(places: impl Iterator<Item = Place>) -> Option<Place> {
+fn mean(places: impl Iterator<Item = PlanePlace>) -> Option<PlanePlace> {
     let (mut x, mut y, mut count) = (0.0, 0.0, 0.0);
     for at in places {
         (x, y, count) = (x + at.0, y + at.1, count + 1.0);
@@ -204,7 +204,7 @@ fn mean(places: impl Iterator<Item = Place>) -> Option<Place> {
 }
 
 /// The convex hull of points, counterclockwise (A. M. Andrew, Inf. Process. Lett. 9, 1979).
-fn hull(mut points: Vec<Place>) -> Vec<Place> {
+fn hull(mut points: Vec<PlanePlace>) -> Vec<PlanePlace> {
     points.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let turns_left = |a: (f64, f64), b: (f64, f64), c: (f64, f64)| {
         (b.0 - a.0) * (c.1 - a.1) > (b.1 - a.1) * (c.0 - a.0)
