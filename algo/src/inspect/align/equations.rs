@@ -1,17 +1,16 @@
 //! The equations of the points in the linear problem, and their weighted sums.
 //!
 //! # Shapes and units
-//! Lengths in mm. Points are kept and summed four at a time, in their order: a sum is that of four
-//! sums over every fourth point, the same for all back-ends.
+//! Lengths in mm. A sum is that of four sums over every fourth point, which do not wait for each
+//! other.
 
 use super::directions::Matrix6;
 use super::weight::WeightFunction;
 use crate::geometry::Vector;
-use crate::simd::{Backend, Lanes, back_end_entry};
 use alloc::vec::Vec;
 
 /// The equation of a point in the linear problem.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Equation {
     /// The residual at the motion about which the problem is linear, mm.
     pub residual: f64,
@@ -28,29 +27,23 @@ pub(super) struct Equation {
     pub both: f64,
 }
 
-/// A value of each of four points.
-pub(super) type Four = [f64; 4];
-
-/// The equations of four points; 0 where there are fewer.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct FourEquations {
-    residual: Four,
-    jacobian: [Four; 6],
-    lever: [Four; 3],
-    /// Variance of the x and y of the facet's lift.
-    lift_variance: Four,
-    variance: Four,
+impl Equation {
+    /// The residual after a further motion, mm.
+    fn after(&self, further: &[f64; 6]) -> f64 {
+        let ([a, b, c, d, e, f], x) = (&self.jacobian, further);
+        let shift = a * x[0] + b * x[1] + c * x[2];
+        let turn = d * x[3] + e * x[4] + f * x[5];
+        self.residual - (shift + turn)
+    }
 }
 
 /// The equations of all points; buffers that the next problem uses again.
 #[derive(Debug, Default)]
 pub(super) struct Equations {
-    all: Vec<FourEquations>,
-    points: usize,
-    both: f64,
+    all: Vec<Equation>,
     /// Residuals after a further motion.
-    after: Vec<Four>,
-    weights: Vec<Four>,
+    after: Vec<f64>,
+    weights: Vec<f64>,
     sizes: Vec<f64>,
 }
 
@@ -60,109 +53,106 @@ const MEDIAN_TO_SIGMA: f64 = 1.4826;
 impl Equations {
     pub fn clear(&mut self) {
         self.all.clear();
-        (self.points, self.both) = (0, 0.0);
     }
 
-    pub fn push(&mut self, equation: &Equation) {
-        let at = self.points % 4;
-        if at == 0 {
-            self.all.push(FourEquations::default());
-        }
-        let Some(four) = self.all.last_mut() else {
-            return;
-        };
-        let Vector { x, y, z } = equation.lever;
-        four.residual[at] = equation.residual;
-        for (four, value) in four.jacobian.iter_mut().zip(equation.jacobian) {
-            four[at] = value;
-        }
-        for (four, value) in four.lever.iter_mut().zip([x, y, z]) {
-            four[at] = value;
-        }
-        four.lift_variance[at] = equation.lift_variance;
-        four.variance[at] = equation.variance;
-        self.both += equation.both;
-        self.points += 1;
+    pub fn push(&mut self, equation: Equation) {
+        self.all.push(equation);
     }
 
     pub fn len(&self) -> usize {
-        self.points
+        self.all.len()
     }
 
     /// How many residuals are smaller than a size.
     pub fn agreeing(&self, limit: f64) -> usize {
-        let residuals = self.all.iter().flat_map(|four| four.residual);
-        let small = residuals.take(self.points).filter(|r| r.abs() < limit);
-        small.count()
+        let residuals = self.all.iter().map(|of| of.residual);
+        residuals.filter(|residual| residual.abs() < limit).count()
     }
 
     /// The error of a residual that the points' errors predict, RMS.
     pub fn predicted(&self) -> f64 {
-        libm::sqrt(self.both / self.points as f64)
+        let both: f64 = self.all.iter().map(|of| of.both).sum();
+        libm::sqrt(both / self.len() as f64)
     }
 
     /// Weighs the points by their residuals after a further motion. Returns σ of the residuals:
     /// that which follows from their median, at least `least`.
-    pub fn weigh(
-        &mut self,
-        backend: Backend,
-        function: WeightFunction,
-        further: &[f64; 6],
-        least: f64,
-    ) -> f64 {
-        self.find_residuals(backend, further);
-        let middle = self.points / 2;
-        let mut below = 0;
-        let after = &self.after.as_flattened()[..self.points];
-        count_below(backend, after, least / MEDIAN_TO_SIGMA, &mut below);
-        let scale = if below > middle {
+    pub fn weigh(&mut self, function: WeightFunction, further: &[f64; 6], least: f64) -> f64 {
+        self.find_residuals(further);
+        self.sizes.clear();
+        self.sizes.extend(self.after.iter().map(|r| r.abs()));
+        let middle = self.len() / 2;
+        let below = self.sizes.iter().filter(|r| **r <= least / MEDIAN_TO_SIGMA);
+        let scale = if below.count() > middle {
             least
         } else {
-            self.sizes.clear();
-            self.sizes.extend(after.iter().map(|r| r.abs()));
             let (_, median, _) = self.sizes.select_nth_unstable_by(middle, f64::total_cmp);
             (MEDIAN_TO_SIGMA * *median).max(least)
         };
-        self.find_weights(backend, function, scale);
+        self.find_weights(function, scale);
         scale
     }
 
-    fn find_residuals(&mut self, backend: Backend, further: &[f64; 6]) {
-        self.after.resize(self.all.len(), Four::default());
-        residuals_after(backend, &self.all, further, &mut self.after);
+    fn find_residuals(&mut self, further: &[f64; 6]) {
+        self.after.clear();
+        self.after
+            .extend(self.all.iter().map(|of| of.after(further)));
     }
 
-    fn find_weights(&mut self, backend: Backend, function: WeightFunction, scale: f64) {
-        self.weights.resize(self.all.len(), Four::default());
-        let after = self.after.as_flattened();
-        let weights = self.weights.as_flattened_mut();
-        weigh_residuals(backend, function, after, scale, weights);
-        weights[self.points..].fill(0.0);
+    fn find_weights(&mut self, function: WeightFunction, scale: f64) {
+        let weight = match function {
+            WeightFunction::Huber => WeightFunction::huber,
+            WeightFunction::Tukey => WeightFunction::tukey,
+        };
+        self.weights.clear();
+        self.weights
+            .extend(self.after.iter().map(|residual| weight(residual / scale)));
     }
 
     /// The sums with the weights found last.
-    pub fn sums(&self, backend: Backend) -> Sums {
-        let mut sums = [Four::default(); SUMS];
-        add_products(backend, &self.all, &self.weights, &mut sums);
+    pub fn sums(&self) -> Sums {
+        let mut sums = [[0.0; 4]; SUMS];
+        for (at, (of, weight)) in self.all.iter().zip(&self.weights).enumerate() {
+            let mut place = 0;
+            let mut add = |value: f64| {
+                sums[place][at % 4] += value;
+                place += 1;
+            };
+            let r = &of.jacobian;
+            let weighted = r.map(|r| weight * r);
+            for i in 0..6 {
+                for other in &r[i..] {
+                    add(weighted[i] * other);
+                }
+            }
+            for weighted in weighted {
+                add(weighted * of.residual);
+            }
+            let Vector { x, y, z } = of.lever;
+            let n = weight * of.lift_variance;
+            let (nx, ny, nz) = (n * x, n * y, n * z);
+            for value in [n, nx, ny, nz, nz * z, nx * z, ny * z, nx * x] {
+                add(value);
+            }
+            sums[SUMS - 1][at % 4] += ny * y;
+        }
         Sums(sums.map(|[a, b, c, d]| (a + b) + (c + d)))
     }
 
     /// Points with a weight above 0.
     pub fn inside(&self) -> usize {
-        let weights = self.weights.as_flattened().iter();
-        weights.filter(|weight| **weight > 0.0).count()
+        self.weights.iter().filter(|weight| **weight > 0.0).count()
     }
 
     /// Covariance of the right-hand side, mm², with Tukey's weights after a further motion; `scale`
     /// is σ of the residuals.
-    pub fn covariance(&mut self, backend: Backend, further: &[f64; 6], scale: f64) -> Matrix6 {
-        self.find_residuals(backend, further);
-        self.find_weights(backend, WeightFunction::Tukey, scale);
-        let variances = self.all.iter().flat_map(|four| four.variance);
-        for (weight, variance) in self.weights.as_flattened_mut().iter_mut().zip(variances) {
-            *weight = *weight * *weight * variance;
+    pub fn covariance(&mut self, further: &[f64; 6], scale: f64) -> Matrix6 {
+        self.find_residuals(further);
+        self.find_weights(WeightFunction::Tukey, scale);
+        for (weight, of) in self.weights.iter_mut().zip(&self.all) {
+            *weight = *weight * *weight * of.variance;
         }
-        self.sums(backend).matrix()
+        self.sums().matrix()
     }
 }
 
@@ -214,132 +204,6 @@ fn mirrored(upper: Matrix6) -> Matrix6 {
     core::array::from_fn(|i| core::array::from_fn(|j| upper[i.min(j)][i.max(j)]))
 }
 
-back_end_entry! {
-    /// The residuals after a further motion.
-    fn residuals_after [] = take_off(
-        equations: &[FourEquations],
-        further: &[f64; 6],
-        after: &mut [Four],
-    )
-}
-
-#[inline(always)]
-fn take_off<V: Lanes>(_: V, equations: &[FourEquations], further: &[f64; 6], after: &mut [Four]) {
-    for (after, four) in after.iter_mut().zip(equations) {
-        let [a, b, c, d, e, f] = &four.jacobian;
-        for i in 0..4 {
-            let shift = a[i] * further[0] + b[i] * further[1] + c[i] * further[2];
-            let turn = d[i] * further[3] + e[i] * further[4] + f[i] * further[5];
-            after[i] = four.residual[i] - (shift + turn);
-        }
-    }
-}
-
-back_end_entry! {
-    /// Counts the residuals of at most a size.
-    fn count_below [] = count_small(residuals: &[f64], most: f64, count: &mut usize)
-}
-
-#[inline(always)]
-fn count_small<V: Lanes>(_: V, residuals: &[f64], most: f64, count: &mut usize) {
-    *count = 0;
-    for residual in residuals {
-        *count += usize::from(residual.abs() <= most);
-    }
-}
-
-back_end_entry! {
-    /// The weights of residuals whose σ is `scale`.
-    fn weigh_residuals [] = apply_weights(
-        function: WeightFunction,
-        residuals: &[f64],
-        scale: f64,
-        weights: &mut [f64],
-    )
-}
-
-#[inline(always)]
-fn apply_weights<V: Lanes>(
-    _: V,
-    function: WeightFunction,
-    residuals: &[f64],
-    scale: f64,
-    weights: &mut [f64],
-) {
-    match function {
-        WeightFunction::Huber => {
-            for (weight, residual) in weights.iter_mut().zip(residuals) {
-                *weight = WeightFunction::huber(residual / scale);
-            }
-        }
-        WeightFunction::Tukey => {
-            for (weight, residual) in weights.iter_mut().zip(residuals) {
-                *weight = WeightFunction::tukey(residual / scale);
-            }
-        }
-    }
-}
-
-back_end_entry! {
-    /// The weighted sums over every fourth point.
-    fn add_products [] = sum_products(
-        equations: &[FourEquations],
-        weights: &[Four],
-        sums: &mut [Four; SUMS],
-    )
-}
-
-#[inline(always)]
-fn sum_products<V: Lanes>(
-    _: V,
-    equations: &[FourEquations],
-    weights: &[Four],
-    sums: &mut [Four; SUMS],
-) {
-    for (four, weight) in equations.iter().zip(weights) {
-        let r = &four.jacobian;
-        let mut at = 0;
-        for i in 0..6 {
-            let weighted = product(weight, &r[i]);
-            for other in &r[i..] {
-                add_product(&mut sums[at], &weighted, other);
-                at += 1;
-            }
-            add_product(&mut sums[SQUARES + i], &weighted, &four.residual);
-        }
-        let [x, y, z] = &four.lever;
-        let n = product(weight, &four.lift_variance);
-        let (nx, ny, nz) = (product(&n, x), product(&n, y), product(&n, z));
-        let lifts = &mut sums[SQUARES + 6..];
-        add_product(&mut lifts[0], &n, &[1.0; 4]);
-        add_product(&mut lifts[1], &nx, &[1.0; 4]);
-        add_product(&mut lifts[2], &ny, &[1.0; 4]);
-        add_product(&mut lifts[3], &nz, &[1.0; 4]);
-        add_product(&mut lifts[4], &nz, z);
-        add_product(&mut lifts[5], &nx, z);
-        add_product(&mut lifts[6], &ny, z);
-        add_product(&mut lifts[7], &nx, x);
-        add_product(&mut lifts[7], &ny, y);
-    }
-}
-
-#[inline(always)]
-fn product(a: &Four, b: &Four) -> Four {
-    let mut product = [0.0; 4];
-    for i in 0..4 {
-        product[i] = a[i] * b[i];
-    }
-    product
-}
-
-/// sum + a · b.
-#[inline(always)]
-fn add_product(sum: &mut Four, a: &Four, b: &Four) {
-    for i in 0..4 {
-        sum[i] += a[i] * b[i];
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -369,68 +233,59 @@ mod tests {
     }
 
     #[test]
-    fn sums_are_those_of_their_definition_with_the_same_bits_on_every_back_end() {
+    fn sums_are_those_of_their_definition() {
         const POINTS: usize = 43;
         let mut equations = Equations::default();
         // What an earlier, larger problem leaves behind counts for nothing.
         for points in [POINTS + 9, POINTS] {
             equations.clear();
-            (0..points).for_each(|point| equations.push(&equation(point)));
+            (0..points).for_each(|point| equations.push(equation(point)));
         }
         let further = [0.05, -0.02, 0.03, 0.04, -0.01, 0.02];
         let probe = [0.3, -0.7, 0.5, 0.9, -0.2, 0.4];
-        let mut bits = Vec::new();
-        for backend in Backend::available() {
-            for function in [WeightFunction::Huber, WeightFunction::Tukey] {
-                let scale = equations.weigh(backend, function, &further, 0.02);
-                let sums = equations.sums(backend);
-                let after = |e: &Equation| {
-                    let taken = e.jacobian.iter().zip(further).map(|(r, x)| r * x);
-                    e.residual - taken.sum::<f64>()
+        for function in [WeightFunction::Huber, WeightFunction::Tukey] {
+            let scale = equations.weigh(function, &further, 0.02);
+            let sums = equations.sums();
+            let after = |e: &Equation| {
+                let taken = e.jacobian.iter().zip(further).map(|(r, x)| r * x);
+                e.residual - taken.sum::<f64>()
+            };
+            let (mut squares, mut right, mut noise) = (0.0, 0.0, 0.0);
+            let (mut sizes, mut inside) = (Vec::new(), 0);
+            for e in (0..POINTS).map(equation) {
+                let weight = match function {
+                    WeightFunction::Huber => WeightFunction::huber(after(&e) / scale),
+                    WeightFunction::Tukey => WeightFunction::tukey(after(&e) / scale),
                 };
-                let (mut squares, mut right, mut noise) = (0.0, 0.0, 0.0);
-                let (mut sizes, mut inside) = (Vec::new(), 0);
-                for e in (0..POINTS).map(equation) {
-                    let weight = match function {
-                        WeightFunction::Huber => WeightFunction::huber(after(&e) / scale),
-                        WeightFunction::Tukey => WeightFunction::tukey(after(&e) / scale),
-                    };
-                    let dot = |r: &[f64; 6]| r.iter().zip(probe).map(|(r, p)| r * p).sum::<f64>();
-                    let Vector { x, y, z } = e.lever;
-                    let (by_x, by_y) = ([1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x]);
-                    let n = weight * e.lift_variance;
-                    squares += weight * dot(&e.jacobian) * dot(&e.jacobian);
-                    right += weight * dot(&e.jacobian) * e.residual;
-                    noise += n * (dot(&by_x) * dot(&by_x) + dot(&by_y) * dot(&by_y));
-                    inside += usize::from(weight > 0.0);
-                    sizes.push(after(&e).abs());
-                }
-                sizes.sort_by(f64::total_cmp);
-                assert!((scale - MEDIAN_TO_SIGMA * sizes[POINTS / 2]).abs() < 1e-12);
-                assert_eq!(equations.inside(), inside);
-                let along: f64 = sums
-                    .right_side()
-                    .iter()
-                    .zip(probe)
-                    .map(|(r, p)| r * p)
-                    .sum();
-                let found = [
-                    form(&probe, &sums.matrix(), &probe),
-                    along,
-                    form(&probe, &sums.lift_noise(), &probe),
-                ];
-                for (found, expected) in found.into_iter().zip([squares, right, noise]) {
-                    assert!((found - expected).abs() < 1e-12, "{found} {expected}");
-                }
-                let spread = equations.covariance(backend, &further, scale);
-                bits.push((sums.0, scale, spread));
+                let dot = |r: &[f64; 6]| r.iter().zip(probe).map(|(r, p)| r * p).sum::<f64>();
+                let Vector { x, y, z } = e.lever;
+                let (by_x, by_y) = ([1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x]);
+                let n = weight * e.lift_variance;
+                squares += weight * dot(&e.jacobian) * dot(&e.jacobian);
+                right += weight * dot(&e.jacobian) * e.residual;
+                noise += n * (dot(&by_x) * dot(&by_x) + dot(&by_y) * dot(&by_y));
+                inside += usize::from(weight > 0.0);
+                sizes.push(after(&e).abs());
+            }
+            sizes.sort_by(f64::total_cmp);
+            assert!((scale - MEDIAN_TO_SIGMA * sizes[POINTS / 2]).abs() < 1e-12);
+            assert_eq!(equations.inside(), inside);
+            let along: f64 = sums
+                .right_side()
+                .iter()
+                .zip(probe)
+                .map(|(r, p)| r * p)
+                .sum();
+            let found = [
+                form(&probe, &sums.matrix(), &probe),
+                along,
+                form(&probe, &sums.lift_noise(), &probe),
+            ];
+            for (found, expected) in found.into_iter().zip([squares, right, noise]) {
+                assert!((found - expected).abs() < 1e-12, "{found} {expected}");
             }
         }
-        assert!(bits.chunks(2).all(|pair| pair == &bits[..2]));
         // The least σ holds where the median is below it.
-        assert_eq!(
-            equations.weigh(Backend::PORTABLE, WeightFunction::Huber, &further, 9.0),
-            9.0
-        );
+        assert_eq!(equations.weigh(WeightFunction::Huber, &further, 9.0), 9.0);
     }
 }

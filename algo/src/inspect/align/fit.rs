@@ -29,7 +29,6 @@ use super::spots::Alignment;
 use super::surface::{Facet, GoldenSurface};
 use super::weight::{TUKEY, WeightFunction};
 use crate::geometry::Vector;
-use crate::simd::Backend;
 
 /// A measured point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -118,7 +117,6 @@ pub struct Fitting<'a> {
     /// The motion to begin with; along directions that the shape does not determine it is kept.
     /// `None` begins without a motion.
     pub from: Option<Motion>,
-    pub(super) backend: Backend,
 }
 
 /// Where a descent ended.
@@ -210,7 +208,7 @@ impl Fitting<'_> {
     }
 
     fn placed(&self, motion: Motion, solved: &SolvedMotion, equations: &mut Equations) -> Placed {
-        let spread = equations.covariance(self.backend, &solved.further, solved.scale);
+        let spread = equations.covariance(&solved.further, solved.scale);
         let covariance = solved.directions.covariance(&spread);
         let (reach, reach_sigma) = self.reach(&motion, solved.directions.free(), &covariance);
         Placed {
@@ -307,7 +305,7 @@ impl Fitting<'_> {
         equations.clear();
         for sample in samples {
             if let Some(equation) = self.equation(sample, motion, still) {
-                equations.push(&equation);
+                equations.push(equation);
             }
         }
     }
@@ -353,8 +351,8 @@ impl Fitting<'_> {
         let mut further = guess;
         let mut left = REWEIGHTINGS;
         loop {
-            let scale = equations.weigh(self.backend, weights, &further, predicted);
-            let sums = equations.sums(self.backend);
+            let scale = equations.weigh(weights, &further, predicted);
+            let sums = equations.sums();
             let directions = Directions::of(&sums.matrix(), &sums.lift_noise(), predicted);
             let next = directions.solve(&sums.right_side());
             let change: f64 = next

@@ -5,7 +5,6 @@ use super::spots::{Alignment, Spot};
 use super::surface::GoldenSurface;
 use crate::geometry::Vector;
 use crate::pipeline::Window;
-use crate::simd::Backend;
 use alloc::vec::Vec;
 
 /// About so many rows of the part are used.
@@ -70,7 +69,6 @@ impl Alignment {
         let centre = Vector::new(sum(&|p| p.x), sum(&|p| p.y), sum(&|p| p.z)) * share;
         let radius = libm::sqrt(sum(&|p| (p - centre).dot(p - centre)) * share);
         let mut alignment = Self {
-            backend: Backend::best()?,
             centre,
             radius: radius.max(1e-3),
             left_out: [false; 6],
@@ -102,7 +100,6 @@ impl Alignment {
             golden,
             plan: self,
             from: None,
-            backend: self.backend,
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use super::surface::Facet;
 use crate::geometry::Vector;
-use crate::simd::Backend;
 use alloc::vec::Vec;
 use core::ops::Range;
 
@@ -23,8 +22,6 @@ pub struct Spot {
 /// shape determines.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Alignment {
-    /// What the fit is computed on.
-    pub(super) backend: Backend,
     /// The point that is turned about: the mean of the surface's points, mm.
     pub centre: Vector,
     /// RMS distance of the points from it, mm.

@@ -12,9 +12,8 @@
 //! The wall is seen where x − t v lies on the material, over t (−∇d · v) of the plane. It is lit
 //! (n·l)/(n_z·l) times as much as the face, n its normal, l the direction to the light.
 
-use super::sample::Signals;
+use super::light::{PlaneView, Setup, Signals};
 use super::shape::{Foot, Parameters, Shape};
-use super::view::{PlaneView, Setup};
 use crate::geometry::Vector;
 
 /// The wall of a sheet as one piece of its rim shows it.

@@ -4,13 +4,11 @@
 use super::associate::{EdgePoint, associate, response};
 use super::edge::Edge;
 use super::fit::{EdgeFit, Problem, SeenPixel, damp};
-use super::piece::{BAND, LENGTH, MARGIN, Pieces, pixel_size};
-use super::ring::Ring;
-use super::sample::Signals;
+use super::light::{PlaneView, Setup, Signals};
+use super::piece::{BAND, LENGTH, MARGIN, Pieces, Ring, pixel_size};
 use super::shape::{Covariance, Parameters, Shape};
 use super::start::start;
 use super::verdict::{Outcome, State, state};
-use super::view::{PlaneView, Setup};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;

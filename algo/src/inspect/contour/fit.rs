@@ -32,9 +32,8 @@
 
 use super::beyond::Wall;
 use super::edge::{Edge, EdgeProfile};
+use super::light::{Fringes, PlaneView, Signals};
 use super::piece::{BAND, Piece, Pixel};
-use super::sample::Signals;
-use super::view::{Fringes, PlaneView};
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;

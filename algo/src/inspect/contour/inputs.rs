@@ -4,8 +4,8 @@
 use super::associate::EdgePoint;
 use super::beyond::{Wall, slope};
 use super::find::Contour;
+use super::light::Setup;
 use super::shape::{Parameters, Shape};
-use super::view::Setup;
 use alloc::vec::Vec;
 
 /// A shift of every edge towards its material, px: by the model of the edge. Diameters of rendered

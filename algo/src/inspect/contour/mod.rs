@@ -14,7 +14,7 @@
 //!
 //! # Stages
 //! `start` finds the contour to a tenth of a pixel on some of its normals. `piece` divides it and
-//! gathers the pixels of each piece, whose levels `sample` demodulates and adds. `fit` finds the
+//! gathers the pixels of each piece, whose levels `light` demodulates and adds. `fit` finds the
 //! edge of each piece by the profile of `edge` and what `beyond` knows of walls and floors,
 //! `associate` the shape through the edges, `find` does this with some of
 //! the pieces until nothing moves and with all of them in the end, and `verdict` says whether the
@@ -29,19 +29,17 @@ mod edge;
 mod find;
 mod fit;
 mod inputs;
+mod light;
 mod piece;
-mod ring;
-mod sample;
 pub mod shape;
 mod start;
 mod verdict;
-mod view;
 
 pub use associate::EdgePoint;
 pub use find::{Contour, find};
 pub use inputs::{ContourInput, ContourSource, PIECE_PX, inputs};
+pub use light::{Fringes, PlaneSpot, PlaneView, Setup};
 pub use verdict::{Outcome, State};
-pub use view::{Fringes, PlaneSpot, PlaneView, Setup};
 
 #[cfg(test)]
 mod tests;

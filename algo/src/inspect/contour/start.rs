@@ -6,10 +6,9 @@
 //! both tell by their share where in between the edge lies. The shape goes through these edges.
 
 use super::associate::{EdgePoint, associate};
-use super::sample::Signals;
+use super::light::{PlaneView, Signals};
 use super::shape::{Parameters, Shape};
 use super::verdict::CONTINUES;
-use super::view::PlaneView;
 use crate::math::complex::Complex;
 use alloc::vec::Vec;
 

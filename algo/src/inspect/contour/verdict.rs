@@ -1,9 +1,9 @@
 //! What became of a piece of a contour, and of all of them.
 
 use super::fit::{CHI_SQUARE, EdgeFit, Problem};
+use super::light::PlaneView;
 use super::piece::BAND;
 use super::shape::Shape;
-use super::view::PlaneView;
 use crate::math::complex::Complex;
 
 /// Fewest pixels of a piece.

@@ -5,8 +5,7 @@
 //! contour the highest of the large ones, because the camera sees the rim of the upper face. A cell
 //! is left out if one of its pixels lies off the plane of that surface.
 
-use super::grid::Grid;
-use super::taught::TaughtCell;
+use super::taught::{Grid, TaughtCell};
 use crate::geometry::Vector;
 use crate::inspect::align::GoldenSurface;
 use crate::inspect::region::Region;

@@ -9,22 +9,18 @@
 mod cells;
 mod face;
 mod geometry;
-mod grid;
 mod kind;
-mod level;
 mod plane;
 mod rim;
 mod taught;
 
-pub use cells::{Cell, Sum, cells};
+pub use cells::{Cell, LevelPlane, Sum, cells, mean, weight};
 pub use face::keep_face;
 pub use geometry::Geometry;
-pub use grid::{Grid, TooFine};
 pub use kind::{Cut, Feature, FeatureKind};
-pub use level::{LevelPlane, mean, weight};
 pub use plane::{FittedPlane, Middle};
 pub use rim::{PlaneFrame, Rim};
-pub use taught::{TaughtCell, taught_cells};
+pub use taught::{Grid, TaughtCell, TooFine, taught_cells};
 
 #[cfg(test)]
 mod tests;

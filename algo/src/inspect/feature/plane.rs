@@ -30,9 +30,8 @@
 //! `a_plane_is_found_exactly_from_points_on_rays`, and on parts of the simulated head
 //! `tests/suite/planes.rs`. Faces that lie along z have no such plane.
 
-use super::cells::Cell;
+use super::cells::{Cell, LevelPlane, weight};
 use super::geometry::Geometry;
-use super::level::{LevelPlane, weight};
 use super::taught::TaughtCell;
 use crate::geometry::Vector;
 use crate::inspect::align::Motion;

@@ -8,9 +8,9 @@
 //! ∂p/∂L = −Σ ρ_i ∂d_i/∂L = G      C_p = Σ ρ_i ρ_iᵀ σ_i² + G C_L Gᵀ      C_pL = G C_L
 //! ```
 
-use super::fit::{CircleFit, FitRow};
+use super::circle::{CircleFit, FitRow};
 use super::line::StretchLine;
-use super::view::SideView;
+use super::profile::SideView;
 use crate::math::solve::Normal;
 
 /// The share of what blur does by which it is uncertain, along the whole edge: the camera's blur is

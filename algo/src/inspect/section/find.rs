@@ -5,8 +5,7 @@ use super::bins::Bins;
 use super::edge::RoundEdge;
 use super::geometry::Joint;
 use super::line::Moments;
-use super::reason::{Side, Unseen, Why};
-use super::request::{Optics, Request, SectionPoint};
+use super::request::{Optics, Request, SectionPoint, Side, Unseen, Why};
 use super::rough::Rough;
 
 /// A section as it was found.

@@ -1,6 +1,6 @@
 //! The geometry of a section, and what is measured of it.
 
-use super::reason::Side;
+use super::request::Side;
 
 /// A point or direction in the section's plane: s and z, mm.
 pub type Pair = (f64, f64);

@@ -8,7 +8,7 @@
 use super::edge::RoundEdge;
 use super::find::Section;
 use super::geometry::Joint;
-use super::reason::Side;
+use super::request::Side;
 use crate::math::propagate::{Dependence, derivative};
 use alloc::vec::Vec;
 

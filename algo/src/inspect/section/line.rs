@@ -13,7 +13,7 @@
 //!
 //! One pass over the points, whose sums run in their order.
 
-use super::reason::Why;
+use super::request::Why;
 
 /// Fewest points of a stretch.
 const POINTS: usize = 30;

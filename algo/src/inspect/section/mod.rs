@@ -12,10 +12,10 @@
 //!
 //! # Stages
 //! `find` sorts points in one pass, `line` fits a stretch, `bins` averages what lies between both;
-//! `rough` has the first circle of an edge by `search` and `fit`, through how `view` and `profile`
-//! say that pixels see it; after a second pass, without points that are off both circles, `edge` has
-//! it with its covariance. `geometry` has gap, flush and radius, and `inputs` their uncertainty.
-//! `reason` says why a section is not measured.
+//! `rough` has the first circle of an edge by `circle`, through how `profile` says that pixels see
+//! it; after a second pass, without points that are off both circles, `edge` has it with its
+//! covariance. `geometry` has gap, flush and radius, and `inputs` their uncertainty. `request` says
+//! why a section is not measured.
 //!
 //! # Accuracy
 //! `tests/measured.rs`: radii of 1 to 2 mm, gaps of 2 to 6 mm, at 0.145 mm per px and, where the
@@ -29,25 +29,21 @@
 //! mm along the section (s) and of height (z), mm², rad.
 
 mod bins;
+mod circle;
 mod edge;
 mod find;
-mod fit;
 mod geometry;
 mod inputs;
 mod line;
 mod profile;
-mod reason;
 mod request;
 mod rough;
-mod search;
-mod view;
 
 pub use edge::RoundEdge;
 pub use find::Section;
 pub use geometry::{Joint, Pair, Round, flush, gap, radius};
 pub use inputs::{JointInput, JointSource, JointValue, Knowledge};
-pub use reason::{Side, Unseen, Why};
-pub use request::{Optics, Request, SectionPoint};
+pub use request::{Optics, Request, SectionPoint, Side, Unseen, Why};
 
 #[cfg(test)]
 mod tests;

@@ -6,14 +6,11 @@
 //! (`fit`); the same of bins without the points that are off that circle.
 
 use super::bins::{Bin, Bins};
+use super::circle::{BINS, CircleFit, search};
 use super::edge::RoundEdge;
-use super::fit::{BINS, CircleFit};
 use super::line::StretchLine;
-use super::profile::SideProfile;
-use super::reason::Why;
-use super::request::Optics;
-use super::search::search;
-use super::view::SideView;
+use super::profile::{SideProfile, SideView};
+use super::request::{Optics, Why};
 
 /// The arc that determines a radius, °.
 const ARC: f64 = 30.0;

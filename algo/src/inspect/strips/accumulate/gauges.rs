@@ -140,6 +140,23 @@ pub struct Patch {
     pub taught: Vec<TaughtCell>,
 }
 
+impl Patch {
+    /// Its cells' pixels as taught.
+    pub fn pixels(&self) -> u32 {
+        self.taught.iter().map(|cell| cell.pixels).sum()
+    }
+
+    /// The mean variance of a pixel as taught, in height or along the normal, mm².
+    pub fn pixel_variance(&self, along_normal: bool) -> f64 {
+        let variances = self.taught.iter().map(|cell| match along_normal {
+            true => cell.along_normal().variance,
+            false => cell.variance,
+        });
+        let sum: f64 = variances.sum();
+        sum / f64::from(self.pixels().max(1))
+    }
+}
+
 /// The squares of one side that a gauge of deviation looks at.
 #[derive(Clone, Copy, Debug)]
 pub struct SquaresOf {

@@ -4,6 +4,8 @@ use super::counts::Counts;
 use super::gauges::Gauges;
 use super::sections::SectionPoints;
 use super::squares::Squares;
+use crate::inspect::feature::Sum;
+use alloc::vec::Vec;
 use core::ops::Range;
 
 /// The sums over the rows of a strip: all that readings are worked out from.
@@ -33,5 +35,16 @@ impl StripSums {
         self.counts.clear();
         self.squares.clear();
         self.sections.clear();
+    }
+}
+
+/// The sums of all strips over the cells of a patch.
+pub fn add_up(strips: &[StripSums], patch: usize, cells: usize, sums: &mut Vec<Sum>) {
+    sums.clear();
+    sums.resize(cells, Sum::default());
+    for strip in strips {
+        for (sum, more) in sums.iter_mut().zip(&strip.counts.cells[patch]) {
+            sum.add(more);
+        }
     }
 }

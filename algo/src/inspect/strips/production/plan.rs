@@ -1,6 +1,6 @@
 //! What inspecting parts needs, worked out once.
 
-use super::by_openings::{Anchors, anchors};
+use super::anchors::{Anchors, anchors};
 use crate::frame::SampleNoise;
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::align::{Alignment, Picture};

@@ -5,7 +5,6 @@ use super::deviation::SquareNoise;
 use super::findings::{Findings, Skipped};
 use super::joints::SectionFit;
 use super::planes::PlaneFit;
-use super::reading::{add_up, pixel_variance, pixels};
 use super::uncertainty::ErrorBudget;
 use crate::inspect::align::Placed;
 use crate::inspect::contour::State;
@@ -15,7 +14,7 @@ use crate::inspect::strips::accumulate::counts::TRUSTS;
 use crate::inspect::strips::accumulate::gauges::{Gauges, MAX_FEATURES, MAX_GAUGES};
 use crate::inspect::strips::accumulate::sections::Sections;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
-use crate::inspect::strips::accumulate::sums::StripSums;
+use crate::inspect::strips::accumulate::sums::{StripSums, add_up};
 use crate::inspect::strips::align::pose::PoseField;
 use crate::inspect::strips::golden::part::Golden;
 use crate::phase::Trust;
@@ -162,9 +161,9 @@ impl Evaluation<'_> {
         for_each_item(fits, |fit: &mut PlaneFit| {
             let patch = &self.gauges.patches[fit.patch];
             add_up(sums, fit.patch, patch.grid.len(), &mut fit.sums);
-            let side = pixels(&patch.taught).isqrt() as usize;
+            let side = patch.pixels().isqrt() as usize;
             let smoothed = self.plan.budget.square_variance(side);
-            let pixel = pixel_variance(&patch.taught, false);
+            let pixel = patch.pixel_variance(false);
             let bend = placed.and_then(|placed| fit.bend(self.golden, &placed.motion));
             fit.find(patch, pixel * noisier * noisier * smoothed, bend);
         });

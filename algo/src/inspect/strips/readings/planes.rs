@@ -110,7 +110,7 @@ impl PlaneFit {
 
     /// The share of its cells' pixels as taught that was measured.
     pub fn share(&self, patch: &Patch) -> f64 {
-        let had: u32 = patch.taught.iter().map(|cell| cell.pixels).sum();
+        let had = patch.pixels();
         let pairs = self.sums.iter().zip(&patch.taught);
         let has = pairs.filter(|(_, taught)| taught.pixels > 0);
         let has: i64 = has.map(|(sum, _)| sum.count).sum();

@@ -7,7 +7,7 @@ use super::planes::PlaneFit;
 use super::uncertainty::Made;
 use crate::inspect::contour::State;
 use crate::inspect::contour::shape::Outline;
-use crate::inspect::feature::{Geometry, Sum, TaughtCell, cells};
+use crate::inspect::feature::{Geometry, cells};
 use crate::inspect::gauge::{
     Basis, Characteristic, Evidence, Facts, MAX_DATUMS, MAX_PLACES, OfRim, Propagated, Reading,
     Sensitive,
@@ -16,9 +16,8 @@ use crate::inspect::strips::accumulate::coverage;
 use crate::inspect::strips::accumulate::gauges::Gauge;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
 use crate::inspect::strips::accumulate::squares::rivals::rivals;
-use crate::inspect::strips::accumulate::sums::StripSums;
+use crate::inspect::strips::accumulate::sums::{StripSums, add_up};
 use crate::inspect::strips::align::pose::PoseField;
-use alloc::vec::Vec;
 
 impl Evaluation<'_> {
     /// The reading of a gauge; `noisier` is the ratio of σ_z to that as taught.
@@ -123,7 +122,7 @@ impl Evaluation<'_> {
         let (&first, &last) = (patches.first()?, patches.last()?);
         buffers.cells.clear();
         buffers.weights.clear();
-        let taught: &[TaughtCell] = &self.gauges.patches[first].taught;
+        let [patch, other] = [first, last].map(|at| &self.gauges.patches[at]);
         self.gather(first, side, sums, buffers);
         let count = buffers.cells.len();
         if patches.len() > 1 {
@@ -139,17 +138,16 @@ impl Evaluation<'_> {
         }
         // A region without cells as a square of its area.
         let smoothed = self.plan.budget.square_variance(match side {
-            0 => pixels(taught).isqrt() as usize,
+            0 => patch.pixels().isqrt() as usize,
             side => side,
         });
-        let variance = |taught| pixel_variance(taught, compares) * noisier * noisier * smoothed;
-        let pixel = variance(taught);
-        let from = variance(&self.gauges.patches[last].taught);
+        let noise = noisier * noisier * smoothed;
+        let [pixel, from] = [patch, other].map(|of| of.pixel_variance(compares) * noise);
         let placed = pose.placed.as_ref();
         let mut found = measure.kind().find(Evidence {
             all: cells,
             count,
-            columns: self.gauges.patches[first].grid.columns(),
+            columns: patch.grid.columns(),
             sigma: libm::sqrt(pixel) / side.max(1) as f64,
             variances: [pixel, from],
             placed,
@@ -294,7 +292,7 @@ impl Evaluation<'_> {
         if !own.is_empty() {
             let mut shares = [1.0; MAX_PLACES];
             for (share, &patch) in shares.iter_mut().zip(own) {
-                let had = pixels(&self.gauges.patches[patch].taught);
+                let had = self.gauges.patches[patch].pixels();
                 let cells = sums.iter().flat_map(|strip| &strip.counts.cells[patch]);
                 let has: i64 = cells.map(|sum| sum.count).sum();
                 *share = has as f64 / f64::from(had.max(1));
@@ -344,30 +342,4 @@ fn sensitive<'a, const N: usize>(
         Some(Sensitive::Plane(fit.sensitive()?))
     };
     features.iter().map(sensitive).collect()
-}
-
-/// The sums of all strips over the cells of a patch.
-pub fn add_up(strips: &[StripSums], patch: usize, cells: usize, sums: &mut Vec<Sum>) {
-    sums.clear();
-    sums.resize(cells, Sum::default());
-    for strip in strips {
-        for (sum, more) in sums.iter_mut().zip(&strip.counts.cells[patch]) {
-            sum.add(more);
-        }
-    }
-}
-
-/// The pixels of cells as taught.
-pub fn pixels(taught: &[TaughtCell]) -> u32 {
-    taught.iter().map(|cell| cell.pixels).sum()
-}
-
-/// The mean variance of a pixel as taught, in height or along the normal, mm².
-pub fn pixel_variance(taught: &[TaughtCell], along_normal: bool) -> f64 {
-    let variances = taught.iter().map(|cell| match along_normal {
-        true => cell.along_normal().variance,
-        false => cell.variance,
-    });
-    let sum: f64 = variances.sum();
-    sum / f64::from(pixels(taught).max(1))
 }
