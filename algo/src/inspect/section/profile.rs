@@ -28,7 +28,8 @@
 //! The integral ends at the silhouette, beyond which is nothing or a floor. B depends on i and r
 //! only, so three values of it have its derivatives by all parameters.
 //!
-//! How a bin sees a circle: by how much its height is off, and how uncertain that is.
+//! # A bin
+//! By how much its height is off, and how uncertain that is.
 //!
 //! Heights near the rim are wrong: a pixel there averages the phase of a curved surface, and beyond
 //! the silhouette of a floor. The first follows from the profile, whose form leaves a share `BLUR` of

@@ -1,4 +1,5 @@
-//! `fleet.toml`: which heads there are, and where their results go.
+//! `fleet.toml`: which heads there are, and where their results go. A key is described in
+//! docs/fleet.md, whose table the tests compare with the structs.
 
 mod range;
 
@@ -11,10 +12,6 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Every key with its unit, range, default and meaning, as a table in Markdown; docs/fleet.md has
-/// the same.
-pub const KEYS: &str = include_str!("keys.md");
 
 /// The file that is read if it is there and no other is named.
 const FILE: &str = "fleet.toml";
