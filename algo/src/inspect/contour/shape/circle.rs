@@ -2,7 +2,7 @@
 
 use super::outline::{
     ContourKind, Dimensions, Foot, Marks, Outline, Parameters, PlanePlace, Shape, axes_of,
-    axis_marks,
+    axis_marks, padded,
 };
 use crate::geometry::Vector;
 use crate::math::solve::Normal;
@@ -53,7 +53,7 @@ impl Shape for Circle {
     fn derivative(&self, &[cx, cy, ..]: &Parameters, x: f64, y: f64) -> Parameters {
         let (x, y) = (x - cx, y - cy);
         let away = libm::sqrt(x * x + y * y);
-        [-x / away, -y / away, -1.0, 0.0, 0.0]
+        padded(&[-x / away, -y / away, -1.0])
     }
 
     fn length(&self, &[_, _, r, ..]: &Parameters) -> f64 {

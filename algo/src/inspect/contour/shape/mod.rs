@@ -8,7 +8,7 @@ pub mod slot;
 
 pub use outline::{
     ContourKind, Covariance, Dimensions, Foot, MAX_PARAMETERS, Marks, Outline, Parameters,
-    PlanePlace, Shape, Trace,
+    PlanePlace, Shape, Trace, padded,
 };
 
 #[cfg(test)]

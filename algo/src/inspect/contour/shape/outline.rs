@@ -6,9 +6,14 @@ use alloc::vec::Vec;
 use core::fmt::Debug;
 
 /// Most parameters of a shape.
-pub const MAX_PARAMETERS: usize = 5;
+pub const MAX_PARAMETERS: usize = 6;
 /// The parameters p of a shape in mm and rad, in its own order; those behind its own are 0.
 pub type Parameters = [f64; MAX_PARAMETERS];
+/// A shape's own parameters, followed by zeros.
+pub fn padded(own: &[f64]) -> Parameters {
+    core::array::from_fn(|i| own.get(i).copied().unwrap_or(0.0))
+}
+
 /// A symmetric matrix over them.
 pub type Covariance = [Parameters; MAX_PARAMETERS];
 /// A place in the plane of a contour, mm.
@@ -130,11 +135,7 @@ pub struct ContourKind {
 impl Outline {
     /// A shape with the first of its parameters, the others 0.
     pub fn new(shape: impl Shape + 'static, own: &[f64]) -> Self {
-        let mut parameters = Parameters::default();
-        for (p, own) in parameters.iter_mut().zip(own) {
-            *p = *own;
-        }
-        let shape = Arc::new(shape);
+        let (shape, parameters) = (Arc::new(shape), padded(own));
         Self { shape, parameters }
     }
 

@@ -25,7 +25,7 @@ pub const KIND: ContourKind = ContourKind {
 
 /// The slot about an outline's corners: along the direction in which they reach farthest.
 /// `None` if they enclose nothing.
-fn about(outline: &[PlanePlace]) -> Option<Parameters> {
+fn about(outline: &[PlanePlace]) -> Option<[f64; 5]> {
     let mut farthest = (0.0, (1.0, 0.0));
     for (i, a) in outline.iter().enumerate() {
         for b in &outline[..i] {

@@ -4,7 +4,7 @@ use super::placed::sheet;
 use super::scene::{Chance, Noise, Rendered, Scene};
 use crate::inspect::contour::shape::line::Line;
 use crate::inspect::contour::shape::slot::Slot;
-use crate::inspect::contour::shape::{Parameters, Shape};
+use crate::inspect::contour::shape::{Parameters, Shape, padded};
 use crate::inspect::contour::{State, find};
 
 const PLACEMENTS: u64 = 4;
@@ -24,12 +24,12 @@ fn a_slot_has_its_length_width_place_and_direction() {
         for seed in 0..PLACEMENTS {
             let mut chance = Chance::new(seed);
             let (x, y) = (chance.within(1.0), chance.within(1.0));
-            let slot = [x, y, 5.0, 3.0, 0.5 + chance.within(0.02)];
+            let slot = padded(&[x, y, 5.0, 3.0, 0.5 + chance.within(0.02)]);
             let opening = move |px: f64, py: f64| Slot.distance(&slot, px, py);
             let mut scene = placed(&sheet(0.41), &mut chance);
             (scene.noise, scene.floor, scene.opening) = (noise, floor, &opening);
             let rendered = Rendered::new(scene, 6.0, seed);
-            let expected = [x + 0.2, y - 0.2, 5.05, 2.95, 0.49];
+            let expected = padded(&[x + 0.2, y - 0.2, 5.05, 2.95, 0.49]);
             let capture = rendered.capture(seed);
             let contour = find(&Slot, &expected, &capture, &rendered.setup());
             let p = contour.parameters;
@@ -54,7 +54,7 @@ fn a_straight_edge_has_its_place_and_direction_and_material_on_its_left() {
             let (sin, cos) = (libm::sin(angle), libm::cos(angle));
             let ends = [(-10.0 * cos, -10.0 * sin), (10.0 * cos, 10.0 * sin)];
             let line = Line::between(ends[0], ends[1]).unwrap();
-            let is = [chance.within(0.3), chance.within(0.01), 0.0, 0.0, 0.0];
+            let is = padded(&[chance.within(0.3), chance.within(0.01)]);
             let opening = move |px: f64, py: f64| line.distance(&is, px, py);
             let mut scene = placed(&sheet(0.41), &mut chance);
             (scene.noise, scene.opening) = (noise, &opening);

@@ -1,8 +1,8 @@
 //! Holes in many placements: errors, scatter, share of the rim.
 
 use super::scene::{Chance, Noise, Rendered, Scene};
-use crate::inspect::contour::shape::Parameters;
 use crate::inspect::contour::shape::circle::Circle;
+use crate::inspect::contour::shape::padded;
 use crate::inspect::contour::{State, find, inputs};
 use std::vec::Vec;
 
@@ -82,13 +82,11 @@ pub fn figures(scene: &Scene<'_>, r: f64, many: Many) -> Figures {
         if !many.is_told {
             setup.thickness = None;
         }
-        let expected: Parameters = [
+        let expected = padded(&[
             x + chance.within(0.25),
             y + chance.within(0.25),
             r + chance.within(0.1),
-            0.0,
-            0.0,
-        ];
+        ]);
         let mut found = Vec::new();
         for draw in 0..draws {
             let capture = rendered.capture(placement * 100 + draw);

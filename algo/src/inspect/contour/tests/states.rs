@@ -2,9 +2,9 @@
 
 use super::placed::{LEVELS, NOTHING, sheet};
 use super::scene::{Chance, Noise, Rendered, Scene};
-use crate::inspect::contour::shape::Parameters;
 use crate::inspect::contour::shape::circle::Circle;
 use crate::inspect::contour::shape::line::Line;
+use crate::inspect::contour::shape::{Parameters, padded};
 use crate::inspect::contour::{Contour, Outcome, Setup, State, find, inputs};
 
 const SINGLE: &[f64] = &[1.0];
@@ -34,13 +34,7 @@ fn look_with(
     let rendered = Rendered::new(scene, reach, seed);
     let mut setup = rendered.setup();
     change(&mut setup);
-    let expected = [
-        x + chance.within(0.25),
-        y + chance.within(0.25),
-        r,
-        0.0,
-        0.0,
-    ];
+    let expected = padded(&[x + chance.within(0.25), y + chance.within(0.25), r]);
     let contour = find(&Circle, &expected, &rendered.capture(seed), &setup);
     let inputs = inputs(&Circle, &contour, &setup, 0.0);
     let u = [0, 1, 2].map(|i| {
@@ -134,12 +128,7 @@ fn a_hole_outside_of_the_frame_is_unseen() {
     let rendered = Rendered::new(scene, 40.0, 1);
     let setup = rendered.setup();
     for (x, y) in [(40.0, 0.0), (0.0, -40.0), (14.0, 0.0)] {
-        let contour = find(
-            &Circle,
-            &[x, y, 3.0, 0.0, 0.0],
-            &rendered.capture(1),
-            &setup,
-        );
+        let contour = find(&Circle, &padded(&[x, y, 3.0]), &rendered.capture(1), &setup);
         assert_eq!(contour.state, State::Unseen, "{contour:?}");
     }
 }
@@ -255,7 +244,7 @@ fn contours_are_found_as_far_off_as_they_may_lie() {
                 let rendered = Rendered::new(scene.clone(), f64::MAX, seed);
                 let mut setup = rendered.setup();
                 setup.reach = reach;
-                let (expected, capture) = ([x, y, 3.0, 0.0, 0.0], rendered.capture(seed));
+                let (expected, capture) = (padded(&[x, y, 3.0]), rendered.capture(seed));
                 let contour = find(&Circle, &expected, &capture, &setup);
                 assert_eq!(contour.state, State::Found, "{off} {contour:?}");
                 assert!((contour.parameters[0] - x - off).abs() < 0.012);
