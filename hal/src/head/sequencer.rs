@@ -10,10 +10,8 @@
 
 use std::collections::VecDeque;
 
-use super::Exposure;
-use super::count::FrameCount;
-use super::failure::{Blocked, Failure};
-use super::identity::{Identity, Views};
+use super::identity::{FrameCount, Identity, Views};
+use super::outcome::{Blocked, Exposure, Failure};
 use super::pacing::{Attempt, Pacing};
 use crate::frame::Frame;
 use crate::latest;
@@ -435,7 +433,7 @@ impl Sequencer {
                 .iter()
                 .filter(|p| !matches!(p.frame, Taken::Not))
                 .count(),
-            of: self.positions.len(),
+            patterns: self.positions.len(),
             so_far: self.so_far(),
         }
     }
