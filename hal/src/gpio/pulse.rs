@@ -11,8 +11,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::chip::find;
-use super::failure::{LineError, means};
+use super::line::{LineError, find, means};
 use crate::clock::monotonic;
 use crate::error::Error;
 use crate::latest;
