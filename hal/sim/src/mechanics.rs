@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::scenario::Scenario;
-use hal::virtual_head::Mechanics;
+use hal::virtual_head::{FreeRunning, Mechanics};
 
 impl Scenario {
     /// Time from one refresh of the projector to the next.
@@ -31,8 +31,10 @@ impl Scenario {
             dead: us(timing.dead_us),
             calibrated_hold: timing.calibrated_refreshes.unwrap_or(self.needed()),
             by_projector: timing.by_projector,
-            free_running: (timing.camera_period_us > 0)
-                .then(|| (us(timing.camera_period_us), us(timing.camera_phase_us))),
+            free_running: (timing.camera_period_us > 0).then(|| FreeRunning {
+                period: us(timing.camera_period_us),
+                phase: us(timing.camera_phase_us),
+            }),
             stamp: timing.stamp,
             stamp_late: us(timing.stamp_late_us),
             calibrated_stamp_late: us(believed_late.unwrap_or(timing.stamp_late_us)),

@@ -16,7 +16,7 @@ use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Pool};
 use hal::projector::Raster;
 use hal::units::Timestamp;
-use hal::virtual_head::Scene;
+use hal::virtual_head::{InView, Scene};
 
 /// How many frames may be kept before each further one costs an allocation.
 const MAX_KEPT_FRAMES: usize = 64;
@@ -28,8 +28,8 @@ const MAX_PICTURES: usize = 24 << 20;
 /// exposures often see the same two, with other shares.
 const MAX_LIGHTS: usize = 3;
 
-/// The patterns in view during an exposure, and their shares of it.
-type View = Vec<(Option<usize>, f32)>;
+/// What was in view during an exposure.
+type View = Vec<InView>;
 
 /// Part, rasters and sensor of a simulated head.
 pub(crate) struct SimScene {
@@ -93,7 +93,7 @@ impl SimScene {
 
     /// The number of the picture of what is in view, which is computed unless it is kept: frames of
     /// one pattern differ by their noise alone.
-    fn picture(&mut self, seen: &[(Option<usize>, f32)]) -> usize {
+    fn picture(&mut self, seen: &[InView]) -> usize {
         if let Some(known) = self.pictures.iter().position(|(view, _)| view == seen) {
             return known;
         }
@@ -102,15 +102,15 @@ impl SimScene {
         }
         let mut picture = vec![0.0; self.sensor_size];
         match seen {
-            [(shown, share)] => {
+            [InView { pattern, share }] => {
                 self.lights.clear();
-                let raster = self.lit(*shown);
+                let raster = self.lit(*pattern);
                 self.placed.transport.light(raster.as_deref(), &mut picture);
                 picture.iter_mut().for_each(|light| *light *= share);
             }
             several => {
-                for (shown, share) in several {
-                    let parts = picture.iter_mut().zip(self.light(*shown));
+                for InView { pattern, share } in several {
+                    let parts = picture.iter_mut().zip(self.light(*pattern));
                     parts.for_each(|(sum, light)| *sum += share * light);
                 }
             }
@@ -186,7 +186,7 @@ impl Scene for SimScene {
     fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let stays = |shown: &Option<usize>| shown.is_none_or(|index| index < kept);
         self.pictures
-            .retain(|(view, _)| view.iter().all(|(shown, _)| stays(shown)));
+            .retain(|(view, _)| view.iter().all(|seen| stays(&seen.pattern)));
         self.lights.retain(|(shown, _)| stays(shown));
         // Teaching holds more frames at a time than a cycle.
         self.pool.release();
@@ -201,7 +201,7 @@ impl Scene for SimScene {
 
     fn expose(
         &mut self,
-        seen: &[(Option<usize>, f32)],
+        seen: &[InView],
         timestamp: Timestamp,
         count: u64,
     ) -> Result<Frame, Error> {

@@ -11,7 +11,7 @@
 //! There is no command for dithering or the degamma curve in these sources, so they cannot be
 //! switched here; what is left of them is measured as the response of the projector.
 
-use crate::controller::fault;
+use crate::projector::fault;
 use crate::setup::Led;
 
 /// Write Operating Mode Select: one byte, [`PATTERN_STREAMING`] and others

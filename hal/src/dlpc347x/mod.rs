@@ -15,8 +15,8 @@ pub mod bus;
 mod command;
 
 use crate::clock::monotonic;
-use crate::controller::{ControllerState, processing};
 use crate::error::{DeviceKind, Error};
+use crate::projector::{ControllerState, processing};
 use crate::projector::{Flip, Projector, Raster};
 use crate::setup::Led;
 use crate::units::Timestamp;

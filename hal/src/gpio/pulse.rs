@@ -14,9 +14,8 @@ use std::time::Duration;
 use super::line::{LineError, find, means};
 use crate::clock::monotonic;
 use crate::error::Error;
-use crate::latest;
 use crate::setup::TriggerSetup;
-use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger, decides};
+use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger, decides, keep_latest};
 use crate::units::Timestamp;
 
 /// How long before the end of a pulse the thread wakes: longer than waking usually takes, short
@@ -184,7 +183,7 @@ impl Pulsed {
             let fall = (before, monotonic());
             state.rise = None;
             if let Some(spoiled) = Spoiled::by(&Edges { rise, fall }, state.width) {
-                latest::keep(&mut state.spoiled, spoiled);
+                keep_latest(&mut state.spoiled, spoiled);
             }
         }
     }

@@ -12,8 +12,8 @@
 use std::time::Duration;
 
 use super::pacing::Pacing;
-use crate::latest;
 use crate::projector::Flip;
+use crate::trigger::keep_latest;
 use crate::units::Timestamp;
 
 /// How far below the newest count a count is remembered, frames.
@@ -152,7 +152,7 @@ impl Views {
             latest: latest + self.flip_to_light,
             flip,
         };
-        latest::keep(&mut self.views, view);
+        keep_latest(&mut self.views, view);
         off
     }
 

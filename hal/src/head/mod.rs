@@ -14,9 +14,9 @@ use std::time::Duration;
 
 use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::clock::Clock;
-use crate::controller::ControllerState;
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
+use crate::projector::ControllerState;
 use crate::projector::Projector;
 use crate::trigger::Trigger;
 use crate::units::Timestamp;

@@ -11,9 +11,8 @@
 use std::time::Duration;
 
 use crate::camera::{CameraTiming, Starts};
-use crate::latest;
 use crate::projector::Flip;
-use crate::trigger::{REMEMBERED, Spoiled, SpoiledPulses};
+use crate::trigger::{REMEMBERED, Spoiled, SpoiledPulses, keep_latest};
 use crate::units::Timestamp;
 
 /// Default of [`Timing::tolerance`]: an exposure of exactly one refresh leaves no slack for jitter
@@ -201,7 +200,7 @@ impl Pacing {
 
     pub fn fired(&mut self, at: Timestamp) {
         self.free = at + self.period;
-        latest::keep(&mut self.triggers, at);
+        keep_latest(&mut self.triggers, at);
         self.count += 1;
     }
 
@@ -230,7 +229,7 @@ impl Pacing {
         }
         // The camera is busy for that much longer.
         self.free = self.free.max(pulse.fired + (pulse.longer + self.period));
-        latest::keep(&mut self.spoiled, pulse);
+        keep_latest(&mut self.spoiled, pulse);
     }
 
     /// The pulse that spoiled an exposure which started at `start` by its stamp, if one did.

@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path};
 
-use super::failure::Wrong;
+use super::Wrong;
 use super::manifest::{CodeEntry, Manifest, PatternEntry};
 use crate::bounds::{
     Bound, Fields, MAX_FRINGES, MAX_HARMONIC, MAX_NAME, MAX_SIDE, clipped, fingerprint, within,

@@ -5,7 +5,7 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::failure::Wrong;
+use super::Wrong;
 use crate::bounded;
 use crate::bounds::{
     Fields, Longest, MAX_EXPOSURE_US, MAX_NAME, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS,

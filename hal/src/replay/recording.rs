@@ -6,9 +6,8 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::failure::{RecordingError, Wrong};
 use super::manifest::{self, CodeEntry, Manifest, PatternEntry};
-use super::{check, grey};
+use super::{RecordingError, Wrong, check, grey};
 use crate::frame::{Frame, FrameFormat};
 use crate::model::DeviceModel;
 use crate::npy::{self, Element};
