@@ -4,21 +4,24 @@
 //! The defaults are the study's rig and lighting (docs/measurement.md, *The study's head and
 //! parts*) with the sheet-metal part.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Deserializer};
 
-use super::ground::Ground;
 use super::material::{Lighting, Material};
 use super::optics::{Lens, turn, turned};
 use super::parts::Part;
-use super::placement::Placement;
+use super::placement::{Ground, Placement};
 use super::timing::Timing;
 use hal::bounded;
-use hal::bounds::{Fields, shortened};
+use hal::bounds::{Bound, Fields, shortened};
 use hal::model::DeviceModel;
-use hal::virtual_head::Faults;
+use hal::virtual_head::{Faults, Mechanics};
 
 /// Column and row of the green pixel that is read of each 2×2 pixels of a colour sensor.
 const GREEN: (u32, u32) = (1, 0);
+/// Most rays of a light transport; so many take minutes.
+const MAX_RAYS: u64 = 1 << 28;
 
 bounded! {
     /// A whole simulated head. Keys that are missing in the TOML have their default values.
@@ -251,6 +254,48 @@ impl Scenario {
         let scenario: Self = toml::from_str(text).map_err(|error| failed(error.to_string()))?;
         scenario.check().map_err(failed)?;
         Ok(scenario)
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// A message that names the first key that is out of its range, and the range.
+    pub fn check(&self) -> Result<(), String> {
+        if ![8, 10, 12].contains(&self.bit_depth) {
+            return Err(format!(
+                "bit_depth is {}: write 8, 10 or 12",
+                self.bit_depth
+            ));
+        }
+        Fields.check("", self)?;
+        let camera = &self.rig.camera;
+        if self.colour && camera.width.min(camera.height) < 2 {
+            return Err(format!(
+                "rig.camera of {}×{} pixels with colour = true has no green plane: write at least 2 columns and rows",
+                camera.width, camera.height
+            ));
+        }
+        let pixels = u64::from(camera.width) * u64::from(camera.height);
+        let rays = pixels * u64::from(self.sub_rays).pow(2);
+        if rays > MAX_RAYS {
+            return Err(format!(
+                "rig.camera of {}×{} pixels with {}² sub_rays is {rays} rays: keep within {MAX_RAYS}",
+                camera.width, camera.height, self.sub_rays
+            ));
+        }
+        self.timing.check(self.refresh())?;
+        self.part.check()
+    }
+
+    /// Time from one refresh of the projector to the next.
+    #[must_use]
+    pub fn refresh(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.refresh_hz)
+    }
+
+    /// The times and faults in the form of the virtual devices.
+    pub(super) fn mechanics(&self) -> Mechanics {
+        self.timing.mechanics(self.refresh(), self.faults.clone())
     }
 
     /// Columns and rows of a frame.

@@ -3,13 +3,11 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::ground::Ground;
 use super::material::Material;
 use super::parts::Part;
-use super::placement::Placement;
+use super::placement::{Ground, Placement};
 use super::scenario::Scenario;
-use super::scene::SimScene;
-use super::staged::Staged;
+use super::scene::{SimScene, Staged};
 use super::transport::Truth;
 use hal::bounds::{Bound, Fields, within};
 use hal::error::{DeviceKind, Error};

@@ -12,8 +12,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::sheet::Sheet;
-use super::solid::{Floor, Solid};
+use super::sheet::{Floor, Sheet, Solid};
 use hal::bounded;
 use hal::bounds::{Bound, Fields, within};
 

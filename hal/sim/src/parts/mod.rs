@@ -5,37 +5,28 @@
 //! study's head and parts*); a scenario may change them.
 
 mod board;
-mod bump;
 mod defect;
-mod dented;
-mod face;
-mod handset;
 mod joint;
 mod plate;
 mod relief;
 mod shapes;
 mod sheet;
 mod sheet_metal;
-mod solid;
-mod spline;
-mod turned_over;
 
 use serde::{Deserialize, Serialize};
 
-use super::optics::Vector;
+use super::trace::Surface;
 use hal::bounds::{Bound, Fields, within};
 
 pub use board::Board;
 pub use defect::Defect;
-pub use face::Face;
-pub use handset::Handset;
 pub use joint::{Across, Joint};
 pub use plate::{Hole, Joggle, Plate, Slot};
-pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
+pub use relief::{Face, Handset};
+pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Spline, Tube};
+pub use sheet::Floor;
+pub(crate) use sheet::Solid;
 pub use sheet_metal::SheetMetal;
-pub use solid::Floor;
-pub(crate) use solid::Solid;
-pub use spline::Spline;
 
 /// A part by kind, with its measures in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -75,29 +66,6 @@ impl Default for Part {
     fn default() -> Self {
         Self::SheetMetal(SheetMetal::default())
     }
-}
-
-/// A thin surface z(x, y) in the part's own coordinates, mm.
-///
-/// `height` is defined and has bounded slope everywhere, also where the part is not `present`
-/// (outside its outline, in its holes), where a ray passes through.
-pub(crate) trait Surface: Send + Sync {
-    /// z at (x, y).
-    fn height(&self, x: f64, y: f64) -> f64;
-
-    /// Whether there is material at (x, y).
-    fn present(&self, x: f64, y: f64) -> bool;
-
-    /// The light that the material reflects at (x, y), as a share of what white would reflect.
-    fn albedo(&self, _x: f64, _y: f64) -> f64 {
-        1.0
-    }
-
-    /// No slope of `height` is larger than this, in any direction.
-    fn slope_bound(&self) -> f64;
-
-    /// Lowest and highest corner of a box around all material.
-    fn bounds(&self) -> [Vector; 2];
 }
 
 impl Part {
@@ -231,7 +199,7 @@ impl Part {
             Self::SheetMetal(part) => {
                 let stamping = Box::new(sheet_metal::Stamping::new(part));
                 match part.upside_down {
-                    true => Box::new(turned_over::TurnedOver::new(stamping)),
+                    true => Box::new(sheet_metal::TurnedOver::new(stamping)),
                     false => stamping,
                 }
             }
@@ -239,7 +207,7 @@ impl Part {
         };
         let is_dent = |defect: &Defect| matches!(defect, Defect::Dent { .. });
         Some(match self.defects().iter().any(is_dent) {
-            true => Box::new(dented::Dented::new(good, self.defects())),
+            true => Box::new(defect::Dented::new(good, self.defects())),
             false => good,
         })
     }

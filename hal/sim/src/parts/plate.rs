@@ -1,8 +1,7 @@
 //! A flat rectangular sheet with round holes, slots and a joggle, over a floor.
 
 use super::Defect;
-use super::sheet::{Dent, Fall, Opening, Sheet};
-use super::solid::{Floor, Solid};
+use super::sheet::{Fall, Floor, Opening, Sheet, SheetDent, Solid};
 use hal::bounded;
 use hal::bounds::{Bound, Fields, length, within};
 
@@ -158,7 +157,7 @@ impl Plate {
                 y,
                 depth_mm,
                 diameter_mm,
-            } => Some(Dent {
+            } => Some(SheetDent {
                 centre: [x, y],
                 depth: depth_mm,
                 half_width: diameter_mm / 2.0,
