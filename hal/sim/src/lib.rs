@@ -18,6 +18,7 @@ mod stage;
 pub mod timing;
 mod trace;
 pub mod transport;
+mod unfit;
 
 pub use hal::virtual_head::Faults;
 pub use material::Material;
@@ -28,6 +29,7 @@ pub use scene::Staged;
 pub use stage::{Stage, head, head_with_progress};
 pub use timing::Timing;
 pub use transport::Truth;
+pub use unfit::Unfit;
 
 #[cfg(test)]
 mod tests;

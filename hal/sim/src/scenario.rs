@@ -13,6 +13,7 @@ use super::optics::{Lens, turn, turned};
 use super::parts::Part;
 use super::placement::{Ground, Placement};
 use super::timing::Timing;
+use super::unfit::{MAX_RAYS, Unfit};
 use hal::bounded;
 use hal::bounds::{Bound, Fields, shortened};
 use hal::model::DeviceModel;
@@ -20,8 +21,6 @@ use hal::virtual_head::{Faults, Mechanics};
 
 /// Column and row of the green pixel that is read of each 2×2 pixels of a colour sensor.
 const GREEN: (u32, u32) = (1, 0);
-/// Most rays of a light transport; so many take minutes.
-const MAX_RAYS: u64 = 1 << 28;
 
 bounded! {
     /// A whole simulated head. Keys that are missing in the TOML have their default values.
@@ -252,36 +251,32 @@ impl Scenario {
             problem: shortened(&problem),
         };
         let scenario: Self = toml::from_str(text).map_err(|error| failed(error.to_string()))?;
-        scenario.check().map_err(failed)?;
+        scenario.check().map_err(|unfit| failed(unfit.into()))?;
         Ok(scenario)
     }
 
     /// Checks every value.
     ///
     /// # Errors
-    /// A message that names the first key that is out of its range, and the range.
-    pub fn check(&self) -> Result<(), String> {
+    /// [`Unfit`] for the first value that is wrong.
+    pub fn check(&self) -> Result<(), Unfit> {
         if ![8, 10, 12].contains(&self.bit_depth) {
-            return Err(format!(
-                "bit_depth is {}: write 8, 10 or 12",
-                self.bit_depth
-            ));
+            return Err(Unfit::BitDepth(self.bit_depth));
         }
         Fields.check("", self)?;
-        let camera = &self.rig.camera;
-        if self.colour && camera.width.min(camera.height) < 2 {
-            return Err(format!(
-                "rig.camera of {}×{} pixels with colour = true has no green plane: write at least 2 columns and rows",
-                camera.width, camera.height
-            ));
+        let RigDevice { width, height, .. } = self.rig.camera;
+        if self.colour && width.min(height) < 2 {
+            return Err(Unfit::NoGreenPlane { width, height });
         }
-        let pixels = u64::from(camera.width) * u64::from(camera.height);
-        let rays = pixels * u64::from(self.sub_rays).pow(2);
+        let sub_rays = self.sub_rays;
+        let rays = u64::from(width) * u64::from(height) * u64::from(sub_rays).pow(2);
         if rays > MAX_RAYS {
-            return Err(format!(
-                "rig.camera of {}×{} pixels with {}² sub_rays is {rays} rays: keep within {MAX_RAYS}",
-                camera.width, camera.height, self.sub_rays
-            ));
+            return Err(Unfit::TooManyRays {
+                width,
+                height,
+                sub_rays,
+                rays,
+            });
         }
         self.timing.check(self.refresh())?;
         self.part.check()

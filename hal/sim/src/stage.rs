@@ -130,7 +130,7 @@ impl Stage {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Staged, Error> {
         part.check()
-            .and_then(|()| Fields.check("placement", placement))
+            .and_then(|()| Ok(Fields.check("placement", placement)?))
             .map_err(|problem| Error::unsupported("placing this part", problem))?;
         let scenario = Scenario {
             floor: self.floor(),

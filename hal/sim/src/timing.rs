@@ -3,6 +3,7 @@
 
 use std::time::Duration;
 
+use super::unfit::Unfit;
 use hal::bounded;
 use hal::head::Stamp;
 use hal::virtual_head::{Faults, FreeRunning, Mechanics};
@@ -108,22 +109,19 @@ impl Timing {
         refresh.mul_f64(refreshes)
     }
 
-    /// Checks the times of a camera against each other; the error names the key.
-    pub(super) fn check(&self, refresh: Duration) -> Result<(), String> {
-        if self.by_projector && self.camera_period_us > 0 {
-            return Err(
-                "timing.camera_period_us: write 0 for a camera that the projector triggers (timing.by_projector)".into(),
-            );
+    /// Checks the times of a camera against each other.
+    pub(super) fn check(&self, refresh: Duration) -> Result<(), Unfit> {
+        let period_us = self.camera_period_us;
+        if self.by_projector && period_us > 0 {
+            return Err(Unfit::OwnPeriod);
         }
-        let busy = self
-            .exposure(refresh)
-            .max(Duration::from_micros(self.readout_us));
-        if self.camera_period_us > 0 && Duration::from_micros(self.camera_period_us) < busy {
-            return Err(format!(
-                "timing.camera_period_us is {}: write at least {}, its exposure or readout, or 0 for a triggered camera",
-                self.camera_period_us,
-                busy.as_nanos().div_ceil(1000)
-            ));
+        let readout = Duration::from_micros(self.readout_us);
+        let busy = self.exposure(refresh).max(readout);
+        if period_us > 0 && Duration::from_micros(period_us) < busy {
+            return Err(Unfit::ShortPeriod {
+                period_us,
+                least_us: busy.as_nanos().div_ceil(1000),
+            });
         }
         Ok(())
     }

@@ -73,7 +73,7 @@ impl Wrong {
     }
 
     /// This problem, naming the key of the manifest that is concerned.
-    pub(crate) fn of(self, key: &str) -> Self {
+    pub(crate) fn under(self, key: &str) -> Self {
         Self {
             problem: format!("{key}: {}", self.problem),
             ..self

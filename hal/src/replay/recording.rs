@@ -284,7 +284,7 @@ fn picture(
 ) -> Result<Frame, RecordingError> {
     let found = frame(folder, file, format, Timestamp(0), 0);
     found.map_err(|error| match error {
-        RecordingError::Content { path, wrong } => wrong.of(key).at(&path),
+        RecordingError::Content { path, wrong } => wrong.under(key).at(&path),
         missing @ RecordingError::Missing { .. } => missing,
     })
 }

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::optics::Vector;
 use crate::trace::Surface;
-use hal::bounds::{length, within};
+use crate::unfit::Unfit;
+use hal::bounds::{OutOfBounds, length, within};
 
 /// Most defects of a scenario.
 const MAX_DEFECTS: usize = 64;
@@ -66,9 +67,8 @@ pub enum Defect {
 }
 
 impl Defect {
-    /// Checks the number of defects and the measures of the dents; the error names the key and its
-    /// range.
-    pub(super) fn check(defects: &[Self]) -> Result<(), String> {
+    /// Checks the number of defects and the measures of the dents.
+    pub(super) fn check(defects: &[Self]) -> Result<(), OutOfBounds> {
         length("part.defects", defects.len(), 0, MAX_DEFECTS)?;
         for defect in defects {
             if let Self::Dent {
@@ -88,8 +88,8 @@ impl Defect {
         Ok(())
     }
 
-    /// Checks what is wrong with a hole of a part that has so many of them; the error names the key.
-    pub(super) fn check_hole(&self, holes: usize) -> Result<(), String> {
+    /// Checks a defect of a hole of a part that has so many of them.
+    pub(super) fn check_hole(&self, holes: usize) -> Result<(), Unfit> {
         let index = match *self {
             Self::Dent { .. } | Self::BentFlange { .. } => return Ok(()),
             Self::MissingHole { index } => index,
@@ -104,10 +104,8 @@ impl Defect {
             }
         };
         match holes.checked_sub(1) {
-            Some(last) => within("part.defects.index", index, 0, last),
-            None => Err(format!(
-                "part.defects.index is {index}: the part has no holes"
-            )),
+            Some(last) => Ok(within("part.defects.index", index, 0, last)?),
+            None => Err(Unfit::NoHoles { index }),
         }
     }
 }

@@ -16,6 +16,7 @@ mod sheet_metal;
 use serde::{Deserialize, Serialize};
 
 use super::trace::Surface;
+use super::unfit::Unfit;
 use hal::bounds::{Bound, Fields, within};
 
 pub use board::Board;
@@ -89,41 +90,40 @@ impl Part {
         ]
     }
 
-    /// Checks the measures of the part and of its defects; the error names the first key that is
-    /// out of its range, and the range.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    /// Checks the measures of the part and of its defects.
+    pub(crate) fn check(&self) -> Result<(), Unfit> {
         Defect::check(self.defects())?;
-        self.defects()
-            .iter()
-            .try_for_each(|defect| self.can_have(defect))
-            .map_err(|words| format!("part.defects: {words}"))?;
+        for defect in self.defects() {
+            self.can_have(defect).map_err(Unfit::Defect)?;
+        }
         match self {
-            Self::Cone(part) => Fields.check("part", part),
-            Self::Sawtooth(part) => Fields.check("part", part),
+            Self::Cone(part) => Fields.check("part", part)?,
+            Self::Sawtooth(part) => Fields.check("part", part)?,
             Self::Sphere(part) => {
                 Fields.check("part", part)?;
                 // Lower than a tenth of the radius above the centre, the surface is too steep for a
                 // height field.
                 let low = part.centre_z + 0.1 * part.radius;
-                within("part.cut", part.cut, low, part.centre_z + part.radius)
+                within("part.cut", part.cut, low, part.centre_z + part.radius)?;
             }
-            Self::Tube(part) => Fields.check("part", part),
+            Self::Tube(part) => Fields.check("part", part)?,
             Self::Flowerpot(part) => {
                 Fields.check("part", part)?;
                 // The wall leans outwards by at least 0.025 mm per mm of depth: a height field has
                 // no upright walls.
                 let least = part.bottom_diameter + 0.05 * part.depth;
-                within("part.rim_diameter", part.rim_diameter, least, 1000.0)
+                within("part.rim_diameter", part.rim_diameter, least, 1000.0)?;
             }
-            Self::Spline(part) => Fields.check("part", &**part),
-            Self::Plane(part) => Fields.check("part", part),
-            Self::Board(part) => Fields.check("part", part),
-            Self::SheetMetal(part) => part.check(),
-            Self::Plate(part) => part.check(),
-            Self::Joint(part) => part.check(),
+            Self::Spline(part) => Fields.check("part", &**part)?,
+            Self::Plane(part) => Fields.check("part", part)?,
+            Self::Board(part) => Fields.check("part", part)?,
+            Self::SheetMetal(part) => part.check()?,
+            Self::Plate(part) => part.check()?,
+            Self::Joint(part) => part.check()?,
             // The measures of these parts are fixed.
-            Self::Face(_) | Self::Handset(_) | Self::Empty {} => Ok(()),
+            Self::Face(_) | Self::Handset(_) | Self::Empty {} => {}
         }
+        Ok(())
     }
 
     /// Its defects.

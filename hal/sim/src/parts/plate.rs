@@ -2,6 +2,7 @@
 
 use super::Defect;
 use super::sheet::{Fall, Floor, Opening, Sheet, SheetDent, Solid};
+use crate::unfit::Unfit;
 use hal::bounded;
 use hal::bounds::{Bound, Fields, length, within};
 
@@ -106,7 +107,7 @@ impl Plate {
         holes
     }
 
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), Unfit> {
         Fields.check("part", self)?;
         length("part.holes", self.holes.len(), 0, MAX_OPENINGS)?;
         length("part.slots", self.slots.len(), 0, MAX_OPENINGS)?;
@@ -117,12 +118,12 @@ impl Plate {
             .joggle
             .map_or(0.0, |joggle| (self.side() * joggle.drop).max(0.0));
         match self.floor.albedo > 0.0 {
-            true => within(
+            true => Ok(within(
                 "part.floor.depth",
                 self.floor.depth,
                 self.sheet() + drop,
                 1000.0,
-            ),
+            )?),
             false => Ok(()),
         }
     }

@@ -10,6 +10,7 @@ use super::Defect;
 use super::defect::{BUMP_SLOPE, bump};
 use crate::optics::Vector;
 use crate::trace::Surface;
+use crate::unfit::Unfit;
 use hal::bounds::within;
 
 /// z of the plate's upper side.
@@ -56,7 +57,7 @@ pub struct SheetMetal {
 }
 
 impl SheetMetal {
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), Unfit> {
         let mut degrees_more = 0.0;
         for defect in &self.defects {
             defect.check_hole(HOLES.len())?;
@@ -64,7 +65,8 @@ impl SheetMetal {
                 degrees_more += degrees;
             }
         }
-        within("part.defects.degrees", degrees_more, -FLANGE_DEG, 40.0)
+        let bounds = within("part.defects.degrees", degrees_more, -FLANGE_DEG, 40.0);
+        Ok(bounds?)
     }
 }
 
