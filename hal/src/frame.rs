@@ -188,7 +188,7 @@ impl Frame {
     }
 }
 
-/// Buffers that are used again when no frame refers to them any more.
+/// Buffers that are used again once no frame refers to them.
 ///
 /// As long as no more frames are kept at a time than before, taking a buffer allocates nothing.
 #[derive(Debug)]
@@ -380,7 +380,7 @@ mod tests {
         moved::<crate::head::Head>();
     }
 
-    /// The mean of rows of three samples, of which the last is padding.
+    /// The mean of rows of three samples; the last one is padding.
     fn mean(bit_depth: u8, rows: [[u16; 3]; FrameSum::CAPTURES]) -> [u16; 2] {
         let format = FrameFormat {
             stride: 3,

@@ -1,8 +1,7 @@
 //! The blur of lenses: a Gaussian blur of whole pictures, and how the light of a projector's pixel
 //! spreads.
 //!
-//! A projector's pixel is a bright square, which the lens blurs.
-//! The light at a point (x, y) of the projector plane is Σ raster(i, j) · k(x − i) · k(y − j), in
+//! A projector's pixel is a bright square, which the lens blurs. The light at a point (x, y) of the projector plane is Σ raster(i, j) · k(x − i) · k(y − j), in
 //! projector pixels, with k = box ⊗ Gaussian of σ, which is k(d) = F((d + ½) / σ) − F((d − ½) / σ),
 //! where F is the cumulative normal distribution. The Gaussian is cut at ± 4 σ and scaled so that
 //! the weights of all pixels sum to 1 at every point.

@@ -30,8 +30,8 @@ bounded! {
         pub calibrated: bool => true,
         /// Camera bits, 8, 10 or 12.
         pub bit_depth: u8 => 8,
-        /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its
-        /// frames have half its columns and rows.
+        /// Whether the camera has a colour sensor (RGGB); one of its green planes is read, so frames
+        /// have half its columns and rows.
         pub colour: bool,
         /// Rays per pixel along each side, 1…16.
         pub sub_rays: u32 = 1..=16 => 4,

@@ -215,7 +215,7 @@ fn open_chips(line: &str) -> Result<Vec<Chip>, LineError> {
     let mut denied = false;
     for chip in chips().map_err(failed)? {
         match chip {
-            Ok(chip) if found.iter().all(|other| other.name() != chip.name()) => found.push(chip),
+            Ok(chip) if found.iter().all(|known| known.name() != chip.name()) => found.push(chip),
             Ok(_) => {}
             Err(error) => match errno(&error) {
                 Some(Errno::EACCES | Errno::EPERM) => denied = true,

@@ -163,7 +163,7 @@ impl OutputLine for Output {
 
 impl Drop for Output {
     fn drop(&mut self) {
-        // An error could not be reported any more.
+        // Nothing is left that could report an error.
         let _ = self.put(self.idle);
     }
 }

@@ -148,7 +148,7 @@ impl Drop for Pulse {
             // If the thread panicked, the line is set idle below all the same.
             let _ = ending.join();
         }
-        // An error could not be reported any more.
+        // Nothing is left that could report an error.
         let _ = (self.line.put)(false);
     }
 }
@@ -218,22 +218,25 @@ mod tests {
         let mut pulse = Pulse::of(Box::new(put), WIDTH, || ()).unwrap();
         let fired = pulse.fire().unwrap();
         ended.recv().unwrap();
-        let told = pulse.poll_spoiled();
-        assert_eq!(pulse.poll_spoiled(), None, "told twice");
-        (fired, told)
+        let reported = pulse.poll_spoiled();
+        assert_eq!(pulse.poll_spoiled(), None, "reported twice");
+        (fired, reported)
     }
 
     #[test]
     fn a_pulse_with_an_interrupted_edge_is_told_once_it_ended_and_by_how_much_it_was_off() {
         // Other work of this computer can only make the error larger.
-        let (fired, told) = first(STALL, Duration::ZERO);
-        let told = told.expect("an interrupted rise");
-        assert_eq!((told.fired, told.width), (fired, WIDTH));
-        assert!(told.shorter >= STALL || told.longer >= STALL, "{told:?}");
-        let (fired, told) = first(Duration::ZERO, STALL);
-        let told = told.expect("an interrupted fall");
-        assert_eq!((told.fired, told.width), (fired, WIDTH));
-        assert!(told.longer >= STALL, "{told:?}");
+        let (fired, reported) = first(STALL, Duration::ZERO);
+        let reported = reported.expect("an interrupted rise");
+        assert_eq!((reported.fired, reported.width), (fired, WIDTH));
+        assert!(
+            reported.shorter >= STALL || reported.longer >= STALL,
+            "{reported:?}"
+        );
+        let (fired, reported) = first(Duration::ZERO, STALL);
+        let reported = reported.expect("an interrupted fall");
+        assert_eq!((reported.fired, reported.width), (fired, WIDTH));
+        assert!(reported.longer >= STALL, "{reported:?}");
     }
 
     #[test]
@@ -263,8 +266,8 @@ mod tests {
                 std::thread::yield_now();
             }
         }
-        let told: Vec<_> = std::iter::from_fn(|| pulse.poll_spoiled()).collect();
-        let told: Vec<_> = told.iter().map(|spoiled| spoiled.fired).collect();
-        assert_eq!(told, fired[3..]);
+        let reported: Vec<_> = std::iter::from_fn(|| pulse.poll_spoiled()).collect();
+        let reported: Vec<_> = reported.iter().map(|spoiled| spoiled.fired).collect();
+        assert_eq!(reported, fired[3..]);
     }
 }

@@ -195,12 +195,12 @@ pub(super) fn crtc_for(
     connector: &Info,
 ) -> io::Result<Option<crtc::Handle>> {
     let mut taken = Vec::new();
-    for other in all
+    for neighbour in all
         .connectors()
         .iter()
         .filter(|handle| **handle != connector.handle())
     {
-        if let Some(encoder) = card.get_connector(*other, false)?.current_encoder() {
+        if let Some(encoder) = card.get_connector(*neighbour, false)?.current_encoder() {
             taken.extend(card.get_encoder(encoder)?.crtc());
         }
     }

@@ -282,22 +282,22 @@ impl Pipeline {
         let crtc = u64::from(u32::from(self.crtc));
         let planes = self.card.plane_handles().map_err(failed)?;
         let all = self.card.resource_handles().map_err(failed)?;
-        let mut others = Vec::new();
+        let mut shown = Vec::new();
         for plane in planes {
-            others.push((self.card.properties(plane)?, &["FB_ID", "CRTC_ID"][..]));
+            shown.push((self.card.properties(plane)?, &["FB_ID", "CRTC_ID"][..]));
         }
         for connector in all.connectors() {
-            others.push((self.card.properties(*connector)?, &["CRTC_ID"][..]));
+            shown.push((self.card.properties(*connector)?, &["CRTC_ID"][..]));
         }
-        for (other, names) in others {
-            let ours = other.object == self.plane.object || other.object == self.connector.object;
-            let here = other
+        for (object, names) in shown {
+            let ours = object.object == self.plane.object || object.object == self.connector.object;
+            let here = object
                 .all
                 .iter()
                 .any(|property| property.name == "CRTC_ID" && property.value == crtc);
             if here && !ours {
                 for name in names {
-                    other.set(request, name, 0)?;
+                    object.set(request, name, 0)?;
                 }
             }
         }

@@ -99,7 +99,7 @@ impl Settings {
 pub struct Exposing {
     /// How long a frame is exposed.
     pub exposure: Duration,
-    /// Gain of the sensor's amplifier; 1 is none.
+    /// Gain of the sensor's amplifier, 1 without amplification.
     pub gain: f32,
     /// From the start of one exposure to the start of the next.
     pub period: Duration,

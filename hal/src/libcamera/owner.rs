@@ -40,7 +40,7 @@ pub(super) enum Order {
     /// The library has completed a request.
     Done(Request),
     /// The frame of this request was fetched. Until then the camera does not get the request back,
-    /// so frames that nobody fetches do not pile up.
+    /// so frames that are not fetched do not pile up.
     Fetched(usize),
     /// Close the camera and end.
     Close,

@@ -138,8 +138,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// A recording of frames of this format in front of this projector, of which nothing else is
-    /// known yet.
+    /// A recording of frames of this format in front of this projector; nothing else is known of it
+    /// yet.
     pub fn new(format: FrameFormat, projector: RecordedProjector) -> Self {
         Self {
             width: format.width,

@@ -103,7 +103,7 @@ impl Sensor {
         let place = self
             .exposures
             .iter()
-            .take_while(|other| other.ready <= ready)
+            .take_while(|pending| pending.ready <= ready)
             .count();
         self.exposures.insert(place, exposure);
     }

@@ -274,7 +274,7 @@ impl Surface for Relief {
 impl Face {
     /// The surface of a good face.
     pub(super) fn surface() -> Relief {
-        let one = [
+        let middle = [
             // The oval, first: its outline.
             Swell::along([[0.0, -26.0], [0.0, 28.0]], [0.0, 84.0], 46.0),
             // Forehead.
@@ -310,7 +310,7 @@ impl Face {
             Swell::round([21.0, -46.0], [0.0, 10.0], -1.8),
         ];
         let left: Vec<Swell> = right.iter().map(Swell::mirrored).collect();
-        let swells = one.into_iter().chain(right).chain(left);
+        let swells = middle.into_iter().chain(right).chain(left);
         Relief::new(swells.collect(), FACE_BASE, FACE_RIM)
     }
 }

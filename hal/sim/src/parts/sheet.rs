@@ -228,8 +228,8 @@ impl Sheet {
             _ => slopes(own, |at| self.above(at)),
         };
         let turned = |axis: usize| {
-            let of = |own: usize| normal[own] * self.axes[own][axis];
-            of(0) + of(1) + of(2)
+            let share = |own: usize| normal[own] * self.axes[own][axis];
+            share(0) + share(1) + share(2)
         };
         ([0, 1, 2].map(turned), face)
     }
@@ -249,7 +249,10 @@ impl Sheet {
     /// z of its lowest corner, in the coordinates of its part.
     pub fn lowest(&self) -> f64 {
         let [low, high] = self.bounds();
-        let end = |of: usize| (low[of] * self.axes[of][2]).min(high[of] * self.axes[of][2]);
+        let end = |axis: usize| {
+            let up = self.axes[axis][2];
+            (low[axis] * up).min(high[axis] * up)
+        };
         self.origin[2] + end(0) + end(1) + end(2)
     }
 }
