@@ -5,7 +5,7 @@
 //!
 //! In this version the kernel stamps edges on `CLOCK_MONOTONIC` (since Linux 5.7), queues 16 of
 //! them, drops further ones without notice, and does not debounce. So
-//! [`Debounce`](crate::lines::Debounce) debounces here, and reads the level at the end.
+//! [`Debounce`] debounces here, and reads the level at the end.
 //!
 //! A line is left at its idle level when its owner is dropped, also by a panic. After a kill it
 //! depends on the driver of the chip. Raspberry Pi kernels keep the line an output at its last

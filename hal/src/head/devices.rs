@@ -80,7 +80,7 @@ impl Head {
     /// are exposed as the camera is set, unless [`Head::expose`] follows.
     ///
     /// # Errors
-    /// As [`Projector::load_behind`](crate::projector::Projector::load_behind); `Ended` as
+    /// As [`Projector::load_behind`]; `Ended` as
     /// described there.
     pub fn load(&mut self, rasters: Vec<Raster>) -> Result<(), Error> {
         self.devices.expose(1)?;
