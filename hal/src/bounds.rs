@@ -76,9 +76,9 @@ macro_rules! bounded {
         }
 
         impl $crate::bounds::Bound<$name> for $crate::bounds::Fields {
-            fn check(&self, key: &str, of: &$name) -> Result<(), String> {
+            fn check(&self, key: &str, whole: &$name) -> Result<(), $crate::bounds::OutOfBounds> {
                 use $crate::bounds::Values as _;
-                $($(for value in of.$field.as_slice() {
+                $($(for value in whole.$field.as_slice() {
                     let key = [key, ".", stringify!($field)].concat();
                     $crate::bounds::Bound::check(&$bound, key.trim_start_matches('.'), value)?;
                 })?)*
@@ -106,23 +106,97 @@ macro_rules! bounded {
     };
 }
 
+/// A value outside its bounds; the message names its key and says what to write.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum OutOfBounds {
+    /// A number, with its bounds, each as it would be written in a file.
+    #[error("{key} is {value}: write {low} to {high}")]
+    Number {
+        /// Its key.
+        key: String,
+        /// The number.
+        value: String,
+        /// The smallest that is allowed.
+        low: String,
+        /// The largest that is allowed.
+        high: String,
+    },
+    /// A text with too many characters.
+    #[error("{key} {value:?} has {length} characters: write at most {most}")]
+    LongText {
+        /// Its key.
+        key: String,
+        /// Its beginning.
+        value: String,
+        /// Its characters.
+        length: usize,
+        /// The most that are allowed.
+        most: usize,
+    },
+    /// A text with control characters.
+    #[error("{key} {value:?} has control characters: write it in one line of plain text")]
+    ControlCharacters {
+        /// Its key.
+        key: String,
+        /// The text.
+        value: String,
+    },
+    /// A text that could look like another one.
+    #[error(
+        "{key} {value:?} has characters that cannot be seen or turn the direction of others: write it without them"
+    )]
+    HiddenCharacters {
+        /// Its key.
+        key: String,
+        /// The text.
+        value: String,
+    },
+    /// A list with too few or too many members.
+    #[error("{key} has {count} members: write {low} to {high}")]
+    Members {
+        /// Its key.
+        key: String,
+        /// Its members.
+        count: usize,
+        /// The fewest that are allowed.
+        low: usize,
+        /// The most that are allowed.
+        high: usize,
+    },
+    /// A text that is no SHA-256.
+    #[error("{key} is {value:?}: it must be {FINGERPRINT_DIGITS} hexadecimal digits")]
+    NoFingerprint {
+        /// Its key.
+        key: String,
+        /// Its beginning.
+        value: String,
+    },
+}
+
+/// The message, for callers that hand it to a person as it is.
+impl From<OutOfBounds> for String {
+    fn from(error: OutOfBounds) -> Self {
+        error.to_string()
+    }
+}
+
 /// The bounds of one value: a range of numbers, [`Longest`] or [`Fields`].
 pub trait Bound<T> {
     /// Checks the value of a key.
     ///
     /// # Errors
-    /// A message that names the key.
-    fn check(&self, key: &str, value: &T) -> Result<(), String>;
+    /// [`OutOfBounds`]
+    fn check(&self, key: &str, value: &T) -> Result<(), OutOfBounds>;
 }
 
 impl<T: PartialOrd + Debug + Copy> Bound<T> for RangeInclusive<T> {
-    fn check(&self, key: &str, value: &T) -> Result<(), String> {
+    fn check(&self, key: &str, value: &T) -> Result<(), OutOfBounds> {
         within(key, *value, *self.start(), *self.end())
     }
 }
 
 impl<T: PartialOrd + Debug + Copy, const N: usize> Bound<[T; N]> for RangeInclusive<T> {
-    fn check(&self, key: &str, values: &[T; N]) -> Result<(), String> {
+    fn check(&self, key: &str, values: &[T; N]) -> Result<(), OutOfBounds> {
         values.iter().try_for_each(|value| self.check(key, value))
     }
 }
@@ -131,7 +205,7 @@ impl<T: PartialOrd + Debug + Copy, const N: usize> Bound<[T; N]> for RangeInclus
 pub struct Longest(pub usize);
 
 impl<T: AsRef<OsStr>> Bound<T> for Longest {
-    fn check(&self, key: &str, value: &T) -> Result<(), String> {
+    fn check(&self, key: &str, value: &T) -> Result<(), OutOfBounds> {
         text(key, &value.as_ref().to_string_lossy(), self.0)
     }
 }
@@ -154,47 +228,52 @@ impl<T> Values for T {}
 /// Checks that a value lies in `low` to `high`; a NaN does not.
 ///
 /// # Errors
-/// A message that names the key, the value and the bounds.
+/// [`OutOfBounds::Number`]
 pub fn within<T: PartialOrd + Debug + Copy>(
     key: &str,
     value: T,
     low: T,
     high: T,
-) -> Result<(), String> {
+) -> Result<(), OutOfBounds> {
     if (low..=high).contains(&value) {
         return Ok(());
     }
     // Debug format: 1e300 is written as it would be in a file, not with 301 digits.
-    Err(format!("{key} is {value:?}: write {low:?} to {high:?}"))
+    let [value, low, high] = [value, low, high].map(|number| format!("{number:?}"));
+    Err(OutOfBounds::Number {
+        key: key.into(),
+        value,
+        low,
+        high,
+    })
 }
 
-/// Characters that show nothing, or turn the direction of what stands beside them, so that two texts that look alike
-/// differ. Joiners are none: emoji and scripts need them.
+/// Whether a character shows nothing, or turns the direction of what stands beside it, so that two texts
+/// that look alike differ. Joiners do not count: emoji and scripts need them.
 fn is_hidden(letter: char) -> bool {
     matches!(letter,
         '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{200b}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}'
         | '\u{2060}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
 }
 
-/// Checks that a text has at most `most` characters, no control characters, and none that show nothing.
+/// Checks that a text has at most `most` characters, no control characters, and no hidden ones.
 ///
 /// # Errors
-/// A message that names the key.
-pub fn text(key: &str, value: &str, most: usize) -> Result<(), String> {
+/// [`OutOfBounds`]
+pub fn text(key: &str, value: &str, most: usize) -> Result<(), OutOfBounds> {
     let length = value.chars().count();
     if length > most {
-        return Err(format!(
-            "{key} {:?} has {length} characters: write at most {most}",
-            clipped(value)
-        ));
+        return Err(OutOfBounds::LongText {
+            key: key.into(),
+            value: clipped(value),
+            length,
+            most,
+        });
     }
+    let (key, value) = (key.to_owned(), value.to_owned());
     match value.chars().any(char::is_control) {
-        true => Err(format!(
-            "{key} {value:?} has control characters: write it in one line of plain text"
-        )),
-        false if value.chars().any(is_hidden) => Err(format!(
-            "{key} {value:?} has characters that cannot be seen or turn the direction of others: write it without them"
-        )),
+        true => Err(OutOfBounds::ControlCharacters { key, value }),
+        false if value.chars().any(is_hidden) => Err(OutOfBounds::HiddenCharacters { key, value }),
         false => Ok(()),
     }
 }
@@ -202,26 +281,31 @@ pub fn text(key: &str, value: &str, most: usize) -> Result<(), String> {
 /// Checks that a list has `low` to `high` members.
 ///
 /// # Errors
-/// A message that names the key.
-pub fn length(key: &str, count: usize, low: usize, high: usize) -> Result<(), String> {
+/// [`OutOfBounds::Members`]
+pub fn length(key: &str, count: usize, low: usize, high: usize) -> Result<(), OutOfBounds> {
     match (low..=high).contains(&count) {
         true => Ok(()),
-        false => Err(format!("{key} has {count} members: write {low} to {high}")),
+        false => Err(OutOfBounds::Members {
+            key: key.into(),
+            count,
+            low,
+            high,
+        }),
     }
 }
 
 /// Checks that a text is a SHA-256 in hexadecimal digits.
 ///
 /// # Errors
-/// A message that names the key.
-pub fn fingerprint(key: &str, value: &str) -> Result<(), String> {
+/// [`OutOfBounds::NoFingerprint`]
+pub fn fingerprint(key: &str, value: &str) -> Result<(), OutOfBounds> {
     let digits = value.bytes().all(|byte| byte.is_ascii_hexdigit());
     match digits && value.len() == FINGERPRINT_DIGITS {
         true => Ok(()),
-        false => Err(format!(
-            "{key} is {:?}: it must be {FINGERPRINT_DIGITS} hexadecimal digits",
-            clipped(value)
-        )),
+        false => Err(OutOfBounds::NoFingerprint {
+            key: key.into(),
+            value: clipped(value),
+        }),
     }
 }
 
@@ -297,23 +381,26 @@ mod tests {
                 "sides is NaN: write -1.0 to 1.0",
             ),
         ] {
-            assert_eq!(refused.unwrap_err(), words);
+            assert_eq!(refused.unwrap_err().to_string(), words);
         }
     }
 
     #[test]
     fn a_message_names_key_value_and_bounds_and_stays_short() {
         let words = within("projector.width", u32::MAX, 1, MAX_SIDE).unwrap_err();
-        assert_eq!(words, "projector.width is 4294967295: write 1 to 8192");
+        assert_eq!(
+            words.to_string(),
+            "projector.width is 4294967295: write 1 to 8192"
+        );
         let words = within("range_mm", 1e300, -1.0, 1.0).unwrap_err();
-        assert_eq!(words, "range_mm is 1e300: write -1.0 to 1.0");
+        assert_eq!(words.to_string(), "range_mm is 1e300: write -1.0 to 1.0");
         within("x", f64::NAN, f64::MIN, f64::MAX).unwrap_err();
         within("x", 1.0, 0.0, 1.0).unwrap();
         for words in [
             text("name", &"ä".repeat(1 << 20), 64).unwrap_err(),
             fingerprint("fingerprint", &"0".repeat(1 << 20)).unwrap_err(),
         ] {
-            assert!(words.len() < 200, "{words}");
+            assert!(words.to_string().len() < 200, "{words}");
         }
         let long = format!("unknown field `{}` at line 7", "ä".repeat(1 << 20));
         let short = shortened(&long);
@@ -321,10 +408,10 @@ mod tests {
         assert!(short.chars().count() < LONGEST_MESSAGE, "{short}");
         text("name", "a\u{1b}[2J", 64).unwrap_err();
         text("name", "Gehäuse 7", 9).unwrap();
-        // Turned about, of no width, and a woman who works, who is joined.
+        // A turn of the direction, no width, and below emoji that are joined.
         for hidden in ["a\u{202e}b", "a\u{200b}b", "\u{feff}a", "\u{2066}a"] {
-            let words = text("name", hidden, 9).unwrap_err();
-            assert!(words.contains("cannot be seen"), "{words}");
+            let refused = text("name", hidden, 9).unwrap_err();
+            assert!(matches!(refused, OutOfBounds::HiddenCharacters { .. }));
         }
         text("name", "\u{1f469}\u{200d}\u{1f3ed}", 9).unwrap();
     }

@@ -1,9 +1,16 @@
-//! One camera image: its format, its samples and its time stamp.
+//! One camera image: its format, its samples and its time stamp; buffers for many of them, and the mean
+//! of several.
 
 use std::sync::Arc;
 
 use crate::error::Error;
 use crate::units::Timestamp;
+
+/// Bits of the samples that are summed; the samples of a camera with more bits lose their last
+/// ones. The sum of four samples is less than [`SATURATED`].
+const SUMMED_BITS: u8 = 14;
+/// The sum where one of the samples was at full scale.
+const SATURATED: u16 = u16::MAX;
 
 /// Shape and depth of a camera's frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -181,7 +188,7 @@ impl Frame {
     }
 }
 
-/// Buffers that are used again when no frame refers to them any more.
+/// Buffers that are used again once no frame refers to them.
 ///
 /// As long as no more frames are kept at a time than before, taking a buffer allocates nothing.
 #[derive(Debug)]
@@ -235,6 +242,76 @@ impl Pool {
             self.buffers.push(Arc::clone(&buffer));
         }
         Frame::new(self.format, buffer, timestamp, count)
+    }
+}
+
+/// The sum of several frames of a scene that does not move, from which follows their mean with 16
+/// bits. Where one of the samples of a pixel is at full scale, so is its mean.
+#[derive(Debug)]
+pub struct FrameSum {
+    /// The sums, without padding between the rows.
+    samples: Vec<u16>,
+    /// Format, time and count of the first frame.
+    format: FrameFormat,
+    timestamp: Timestamp,
+    count: u64,
+}
+
+impl FrameSum {
+    /// Number of frames that are averaged.
+    pub const CAPTURES: usize = 4;
+
+    /// The sum of no frames yet; they will have the format of `first`, and the mean its time and count.
+    pub fn new(first: &Frame) -> Self {
+        let format = first.format();
+        let samples = vec![0; format.width as usize * format.height as usize];
+        Self {
+            samples,
+            format,
+            timestamp: first.timestamp(),
+            count: first.count(),
+        }
+    }
+
+    /// Adds one of [`FrameSum::CAPTURES`] frames of this format.
+    pub fn add(&mut self, frame: &Frame) {
+        match frame.samples() {
+            Samples::Eight(samples) => self.add_samples(samples, frame.format()),
+            Samples::Sixteen(samples) => self.add_samples(samples, frame.format()),
+        }
+    }
+
+    fn add_samples<T: Copy + Into<u16>>(&mut self, samples: &[T], format: FrameFormat) {
+        let (width, full_scale) = (format.width as usize, format.full_scale());
+        let shift = format.bit_depth.saturating_sub(SUMMED_BITS);
+        let rows = samples.chunks(format.stride);
+        for (sums, row) in self.samples.chunks_mut(width).zip(rows) {
+            for (sum, &sample) in sums.iter_mut().zip(row) {
+                let sample: u16 = sample.into();
+                *sum = match sample < full_scale {
+                    true => sum.saturating_add(sample >> shift),
+                    false => SATURATED,
+                };
+            }
+        }
+    }
+
+    /// The mean of the [`FrameSum::CAPTURES`] frames that were added, scaled to 16 bits.
+    ///
+    /// # Errors
+    /// As [`Frame::new`].
+    pub fn mean(mut self) -> Result<Frame, Error> {
+        let format = self.format;
+        let full_scale = (1_u32 << format.bit_depth.min(SUMMED_BITS)) - 1;
+        let whole = full_scale * Self::CAPTURES as u32;
+        for sum in self.samples.iter_mut().filter(|sum| **sum != SATURATED) {
+            // At most 32 bits, as the sum is at most `whole`.
+            let mean = (u32::from(*sum) * u32::from(u16::MAX) + whole / 2) / whole;
+            *sum = mean.min(u32::from(SATURATED) - 1) as u16;
+        }
+        let format = FrameFormat::packed(format.width, format.height, 16);
+        let pixels = Arc::new(Pixels::Sixteen(self.samples));
+        Frame::new(format, pixels, self.timestamp, self.count)
     }
 }
 
@@ -301,5 +378,43 @@ mod tests {
         fn moved<T: Send>() {}
         shared::<Frame>();
         moved::<crate::head::Head>();
+    }
+
+    /// The mean of rows of three samples; the last one is padding.
+    fn mean(bit_depth: u8, rows: [[u16; 3]; FrameSum::CAPTURES]) -> [u16; 2] {
+        let format = FrameFormat {
+            stride: 3,
+            ..FrameFormat::packed(2, 1, bit_depth)
+        };
+        let pixels = |row: [u16; 3]| match bit_depth {
+            8 => Pixels::Eight(row.map(|sample| sample as u8).to_vec()),
+            _ => Pixels::Sixteen(row.to_vec()),
+        };
+        let frames =
+            rows.map(|row| Frame::new(format, Arc::new(pixels(row)), Timestamp(0), 0).unwrap());
+        let mut sum = FrameSum::new(&frames[0]);
+        frames.iter().for_each(|frame| sum.add(frame));
+        match sum.mean().unwrap().samples() {
+            Samples::Sixteen(&[a, b]) => [a, b],
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn a_mean_has_16_bits_and_is_saturated_where_one_of_its_samples_is() {
+        let eight = [[0, 10, 9], [1, 10, 9], [0, 255, 9], [1, 10, 9]];
+        // (0 + 1 + 0 + 1) / 4 of 255.
+        assert_eq!(
+            mean(8, eight),
+            [(0.5 * 65_535.0 / 255.0_f64).round() as u16, u16::MAX]
+        );
+        for (depth, largest) in [(8, 255), (12, 4095), (14, 16_383), (16, u16::MAX)] {
+            let [most, all] = mean(depth, [[largest - 1, largest, 0]; FrameSum::CAPTURES]);
+            let expected = f64::from(largest - 1) / f64::from(largest) * 65_535.0;
+            assert!(
+                (f64::from(most) - expected).abs() < 4.5 && most < all,
+                "{depth}: {most}"
+            );
+        }
     }
 }

@@ -9,7 +9,6 @@ pub mod bounds;
 pub mod camera;
 pub mod clock;
 pub mod contract;
-pub mod controller;
 pub mod dlpc347x;
 pub mod error;
 pub mod frame;
@@ -18,11 +17,9 @@ pub mod gpio;
 pub mod head;
 #[cfg(feature = "kms")]
 pub mod kms;
-mod latest;
 #[cfg(any(test, feature = "libcamera"))]
 pub mod libcamera;
 pub mod lines;
-pub mod mean;
 pub mod model;
 pub mod npy;
 pub mod projector;

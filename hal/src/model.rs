@@ -5,7 +5,7 @@
 //! are only stored, and refused if they are not finite; the crate that measures with them checks
 //! whether they describe a usable camera.
 
-use crate::bounds::{Bound, Fields, MAX_SIDE, within};
+use crate::bounds::{Bound, Fields, MAX_SIDE, OutOfBounds, within};
 use serde::{Deserialize, Serialize};
 
 /// `MODEL` of recording format 1 (docs/formats.md).
@@ -45,7 +45,7 @@ pub struct PlaneModel {
 impl Bound<PlaneModel> for Fields {
     /// None of the coefficients can be longer than the longest raster. A message names the key of
     /// the whole plane.
-    fn check(&self, key: &str, plane: &PlaneModel) -> Result<(), String> {
+    fn check(&self, key: &str, plane: &PlaneModel) -> Result<(), OutOfBounds> {
         let most = f64::from(MAX_SIDE);
         let mut all = plane.xi.iter().chain(&plane.eta);
         all.try_for_each(|&coefficient| within(key, coefficient, -most, most))

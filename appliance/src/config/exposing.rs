@@ -49,7 +49,7 @@ mod tests {
         exposing.check(of(Backend::Sim).least_gain()).unwrap();
         let words = exposing.check(of(Backend::Rpi).least_gain()).unwrap_err();
         assert!(
-            words.contains("gain") && words.contains("1.0 to 64.0"),
+            words.to_string().contains("gain is") && words.to_string().contains("1.0 to 64.0"),
             "{words}"
         );
     }

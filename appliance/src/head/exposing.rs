@@ -1,7 +1,7 @@
 //! Exposure and gain of the camera. The noise of a sample belongs to both: what was measured or
 //! taught at one setting is not true of another.
 
-use hal::bounds::{Bound, Fields, MAX_EXPOSURE_US, within};
+use hal::bounds::{Bound, Fields, MAX_EXPOSURE_US, OutOfBounds, within};
 use hal::setup::MOST_GAIN;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -27,7 +27,7 @@ pub struct Exposing {
 }
 
 impl Bound<Exposing> for Fields {
-    fn check(&self, key: &str, of: &Exposing) -> Result<(), String> {
+    fn check(&self, key: &str, of: &Exposing) -> Result<(), OutOfBounds> {
         let exposure = f64::from(of.exposure_us);
         within(
             &format!("{key}.exposure_us"),
@@ -49,7 +49,7 @@ impl Exposing {
     ///
     /// # Errors
     /// In words that name the key and its range.
-    pub fn check(&self, least_gain: f64) -> Result<(), String> {
+    pub fn check(&self, least_gain: f64) -> Result<(), OutOfBounds> {
         within("exposure_us", self.exposure_us, 1, MOST_US)?;
         within("gain", self.gain, least_gain, MOST_GAIN)
     }

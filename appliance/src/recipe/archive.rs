@@ -310,6 +310,7 @@ pub fn parse(text: &str) -> Result<RecipeFile, String> {
         serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;
     // Checked apart from the bounds: a recipe that is being made has no fingerprint yet.
     bounds::fingerprint("fingerprint", &file.fingerprint)
+        .map_err(String::from)
         .and_then(|()| file.check_bounds())
         .map_err(|error| broken(format!("recipe.json: {error}")))?;
     Ok(file)

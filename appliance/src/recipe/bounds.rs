@@ -9,8 +9,8 @@ use crate::station::MAX_GAUGES;
 use algo::inspect::{MAX_PLACES, Marking};
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
 use hal::bounds::{
-    Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, RATIOS, clipped, length, text,
-    within,
+    Bound, Fields, MAX_FRINGES, MAX_RANGE_MM, MAX_SHIFT_TURNS, OutOfBounds, RATIOS, clipped,
+    length, text, within,
 };
 
 /// Sequences that a part can be measured with; teaching makes four.
@@ -25,7 +25,7 @@ const MAX_SLOT: u16 = MAX_GAUGES as u16;
 ///
 /// # Errors
 /// In words that name the key, the number and the bounds.
-pub fn check_marking(marking: &Marking) -> Result<(), String> {
+pub fn check_marking(marking: &Marking) -> Result<(), OutOfBounds> {
     let corners = marking.outline.len();
     if corners > 0 {
         length("marking.outline", corners, 3, MAX_CORNERS)?;
@@ -91,7 +91,7 @@ impl RecipeFile {
     /// # Errors
     /// As above.
     pub(super) fn check_count(&self) -> Result<(), String> {
-        length("gauges", self.gauges.len(), 1, MAX_GAUGES)
+        Ok(length("gauges", self.gauges.len(), 1, MAX_GAUGES)?)
     }
 
     /// Pixels of the longer side of the camera's frames.
@@ -141,7 +141,8 @@ impl SequenceFile {
             within("ratio", shot.ratio, low, high)?;
             within("shift", shot.shift, -MAX_SHIFT_TURNS, MAX_SHIFT_TURNS)?;
             let mut harmonics = shot.waveform.harmonics();
-            harmonics.try_for_each(|(_, share)| within("share of a harmonic", share, -1.0, 1.0))
+            harmonics.try_for_each(|(_, share)| within("share of a harmonic", share, -1.0, 1.0))?;
+            Ok(())
         })?;
         Fields.check("", self)?;
         Sequence::from_frames(&self.frames)

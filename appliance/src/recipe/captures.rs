@@ -28,7 +28,7 @@ use hal::replay::Recording;
 /// Means of captures.
 const MEANS: usize = 2;
 /// All captures.
-pub const CAPTURES: usize = MEANS * hal::mean::CAPTURES;
+pub const CAPTURES: usize = MEANS * hal::frame::FrameSum::CAPTURES;
 
 /// For each mean, the phase of each pixel by a sequence less its phase by the full sequence,
 /// 1/65536 turn; 0 where one of both phases is not resolved.

@@ -238,6 +238,7 @@ impl DatumFile {
         Fields.check("", self)?;
         length("of", self.of.len(), 1, MAX_OF)?;
         let mut names = self.of.iter();
-        names.try_for_each(|name| text("of", name, LONGEST_NAME))
+        names.try_for_each(|name| text("of", name, LONGEST_NAME))?;
+        Ok(())
     }
 }

@@ -134,7 +134,8 @@ impl GaugeFile {
             within("master_u", u, 0.0, most)?;
         }
         let mut golden = self.golden_value.into_iter();
-        golden.try_for_each(|value| within("golden_value", value, f64::MIN, f64::MAX))
+        golden.try_for_each(|value| within("golden_value", value, f64::MIN, f64::MAX))?;
+        Ok(())
     }
 
     /// Whether a part can miss one of its limits: limits at the ends of what its unit can have are

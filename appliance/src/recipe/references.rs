@@ -27,7 +27,7 @@ impl RecipeFile {
     /// As above.
     pub(super) fn check_counts(&self) -> Result<(), String> {
         length("features", self.features.len(), 0, MAX_FEATURES)?;
-        length("datums", self.datums.len(), 0, MAX_DATUMS)
+        Ok(length("datums", self.datums.len(), 0, MAX_DATUMS)?)
     }
 
     /// Checks that what datum systems and gauges name is there, once in each, and of a kind that

@@ -5,7 +5,7 @@ use super::good_parts::DEVIATION_MM;
 use super::{RecipeFile, Store};
 use crate::system::headway::Headway;
 use algo::inspect::Marking;
-use hal::bounds::within;
+use hal::bounds::{OutOfBounds, within};
 
 /// Least and largest limit of the deviation that may be asked for, ± mm.
 pub const LEAST_LIMIT_MM: f64 = 0.001;
@@ -15,7 +15,7 @@ pub const MOST_LIMIT_MM: f64 = 100.0;
 ///
 /// # Errors
 /// In words, with the bounds.
-pub fn check_limit(limit_mm: Option<f64>) -> Result<(), String> {
+pub fn check_limit(limit_mm: Option<f64>) -> Result<(), OutOfBounds> {
     limit_mm.map_or(Ok(()), |limit| {
         within("limit_mm", limit, LEAST_LIMIT_MM, MOST_LIMIT_MM)
     })

@@ -36,7 +36,7 @@ const COMMANDS: [(u8, usize, usize); 21] = [
 /// What can go wrong, set by a test.
 #[derive(Clone, Debug)]
 pub struct Disturbances {
-    /// Nobody answers at any address.
+    /// No device answers at any address.
     pub unplugged: bool,
     /// So many of the next transfers are not acknowledged.
     pub not_acknowledged: u32,

@@ -5,37 +5,31 @@
 //! the rasters that the projector shows.
 
 mod blur;
-mod body;
 pub mod controller;
 mod footprint;
-mod ground;
-mod limits;
 pub mod material;
-mod mechanics;
 pub mod optics;
 pub mod parts;
 pub mod placement;
-mod reflection;
 pub mod scenario;
 mod scene;
 mod sensor;
-mod spread;
 mod stage;
-mod staged;
 pub mod timing;
 mod trace;
 pub mod transport;
+mod unfit;
 
-pub use ground::{Clamp, Ground, Pin};
 pub use hal::virtual_head::Faults;
 pub use material::Material;
 pub use parts::Part;
-pub use placement::Placement;
+pub use placement::{Clamp, Ground, Pin, Placement};
 pub use scenario::Scenario;
+pub use scene::Staged;
 pub use stage::{Stage, head, head_with_progress};
-pub use staged::Staged;
 pub use timing::Timing;
 pub use transport::Truth;
+pub use unfit::Unfit;
 
 #[cfg(test)]
 mod tests;

@@ -1,7 +1,9 @@
-//! What a part is made of: how it reflects the projector's light.
+//! What a part is made of, and how much of a projector's light it reflects towards the camera
+//! (B. T. Phong, 1975).
 
 use serde::{Deserialize, Serialize};
 
+use super::optics::{Vector, dot};
 use hal::bounded;
 
 bounded! {
@@ -58,4 +60,51 @@ impl Material {
             shininess,
         }
     }
+}
+
+/// How a part reflects, in shares of the brightest that it can be, so that no weight is larger than
+/// that of a pixel that arrives completely.
+pub(super) struct Reflection {
+    /// diffuse + specular.
+    pub brightest: f64,
+    diffuse: f64,
+    specular: f64,
+    shininess: f64,
+}
+
+impl Reflection {
+    /// The reflection that a light asks for.
+    pub fn new(light: &Lighting) -> Self {
+        let brightest = light.diffuse + light.specular;
+        // A black part has weights, which are multiplied by 0.
+        let [diffuse, specular] = match brightest > 0.0 {
+            true => [light.diffuse / brightest, light.specular / brightest],
+            false => [1.0, 0.0],
+        };
+        Self {
+            brightest,
+            diffuse,
+            specular,
+            shininess: light.shininess,
+        }
+    }
+
+    /// The share of the light from `towards` that goes to `eye`; none if it comes from behind.
+    pub fn share(&self, normal: Vector, towards: Vector, eye: Vector) -> Option<f64> {
+        let cosine = facing(normal, towards)?;
+        let mut share = self.diffuse * cosine;
+        if self.specular > 0.0 {
+            // r·v with r = 2 (n·l) n − l.
+            let mirrored = 2.0 * cosine * dot(normal, eye) - dot(towards, eye);
+            share += self.specular * mirrored.max(0.0).powf(self.shininess);
+        }
+        Some(share)
+    }
+}
+
+/// The cosine between normal and direction to the light: the share of the light that the surface
+/// receives; none from behind.
+fn facing(normal: Vector, towards: Vector) -> Option<f64> {
+    let cosine = dot(normal, towards);
+    (cosine > 0.0).then_some(cosine)
 }

@@ -4,18 +4,20 @@
 //! The defaults are the study's rig and lighting (docs/measurement.md, *The study's head and
 //! parts*) with the sheet-metal part.
 
+use std::time::Duration;
+
 use serde::{Deserialize, Deserializer};
 
-use super::ground::Ground;
 use super::material::{Lighting, Material};
 use super::optics::{Lens, turn, turned};
 use super::parts::Part;
-use super::placement::Placement;
+use super::placement::{Ground, Placement};
 use super::timing::Timing;
+use super::unfit::{MAX_RAYS, Unfit};
 use hal::bounded;
-use hal::bounds::{Fields, shortened};
+use hal::bounds::{Bound, Fields, shortened};
 use hal::model::DeviceModel;
-use hal::virtual_head::Faults;
+use hal::virtual_head::{Faults, Mechanics};
 
 /// Column and row of the green pixel that is read of each 2×2 pixels of a colour sensor.
 const GREEN: (u32, u32) = (1, 0);
@@ -28,8 +30,8 @@ bounded! {
         pub calibrated: bool => true,
         /// Camera bits, 8, 10 or 12.
         pub bit_depth: u8 => 8,
-        /// Whether the camera has a colour sensor (RGGB), of which one green plane is read: its
-        /// frames have half its columns and rows.
+        /// Whether the camera has a colour sensor (RGGB); one of its green planes is read, so frames
+        /// have half its columns and rows.
         pub colour: bool,
         /// Rays per pixel along each side, 1…16.
         pub sub_rays: u32 = 1..=16 => 4,
@@ -249,8 +251,46 @@ impl Scenario {
             problem: shortened(&problem),
         };
         let scenario: Self = toml::from_str(text).map_err(|error| failed(error.to_string()))?;
-        scenario.check().map_err(failed)?;
+        scenario.check().map_err(|unfit| failed(unfit.into()))?;
         Ok(scenario)
+    }
+
+    /// Checks every value.
+    ///
+    /// # Errors
+    /// [`Unfit`] for the first value that is wrong.
+    pub fn check(&self) -> Result<(), Unfit> {
+        if ![8, 10, 12].contains(&self.bit_depth) {
+            return Err(Unfit::BitDepth(self.bit_depth));
+        }
+        Fields.check("", self)?;
+        let RigDevice { width, height, .. } = self.rig.camera;
+        if self.colour && width.min(height) < 2 {
+            return Err(Unfit::NoGreenPlane { width, height });
+        }
+        let sub_rays = self.sub_rays;
+        let rays = u64::from(width) * u64::from(height) * u64::from(sub_rays).pow(2);
+        if rays > MAX_RAYS {
+            return Err(Unfit::TooManyRays {
+                width,
+                height,
+                sub_rays,
+                rays,
+            });
+        }
+        self.timing.check(self.refresh())?;
+        self.part.check()
+    }
+
+    /// Time from one refresh of the projector to the next.
+    #[must_use]
+    pub fn refresh(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.refresh_hz)
+    }
+
+    /// The times and faults in the form of the virtual devices.
+    pub(super) fn mechanics(&self) -> Mechanics {
+        self.timing.mechanics(self.refresh(), self.faults.clone())
     }
 
     /// Columns and rows of a frame.

@@ -1,4 +1,5 @@
-//! The frames of the simulated camera, from the rasters in view: light, blur, noise and counts.
+//! The frames of the simulated camera, from the part in place and the rasters in view: light, blur,
+//! noise and counts.
 //!
 //! Measured in release on one core for 512 × 512 pixels: about 3 ms per frame including noise (the
 //! test `speed_of_building_a_transport_and_of_one_frame` prints it).
@@ -6,30 +7,59 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use super::blur;
+use super::blur::{gaussian, split};
+use super::material::Material;
+use super::parts::Part;
+use super::placement::{Ground, Placement};
 use super::scenario::Scenario;
 use super::sensor::Sensor;
-use super::spread;
-use super::staged::Staged;
-use super::transport::PADDING;
+use super::transport::{PADDING, Transport};
 use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Pool};
 use hal::projector::Raster;
 use hal::units::Timestamp;
-use hal::virtual_head::Scene;
+use hal::virtual_head::{InView, Scene};
 
 /// How many frames may be kept before each further one costs an allocation.
 const MAX_KEPT_FRAMES: usize = 64;
 /// The pictures of the part in place are kept if those of all patterns take so many bytes at most: a
 /// recipe's for 512 × 512 pixels, and less than the part's light transport takes.
 const MAX_PICTURES: usize = 24 << 20;
-
-/// Of so many patterns the light is kept while exposures see one pattern change to another: the next
+/// The light of so many patterns is kept while exposures see one pattern change to another: the next
 /// exposures often see the same two, with other shares.
 const MAX_LIGHTS: usize = 3;
 
-/// The patterns in view during an exposure, and their shares of it.
-type View = Vec<(Option<usize>, f32)>;
+/// What was in view during an exposure.
+type View = Vec<InView>;
+
+/// A placed part with its light transport, ready to be put in place.
+#[derive(Clone, Debug)]
+pub struct Staged {
+    pub(super) part: Part,
+    pub(super) material: Option<Material>,
+    pub(super) placement: Placement,
+    pub(super) floor: Option<Ground>,
+    pub(super) transport: Arc<Transport>,
+}
+
+impl Staged {
+    pub(super) fn new(
+        scenario: &Scenario,
+        part: &Part,
+        material: Option<Material>,
+        placement: &Placement,
+        progress: &(dyn Fn(f64) + Sync),
+    ) -> Self {
+        let transport = Transport::build(scenario, part, material, placement, progress);
+        Self {
+            part: part.clone(),
+            material,
+            placement: *placement,
+            floor: scenario.floor.clone(),
+            transport: Arc::new(transport),
+        }
+    }
+}
 
 /// Part, rasters and sensor of a simulated head.
 pub(crate) struct SimScene {
@@ -93,7 +123,7 @@ impl SimScene {
 
     /// The number of the picture of what is in view, which is computed unless it is kept: frames of
     /// one pattern differ by their noise alone.
-    fn picture(&mut self, seen: &[(Option<usize>, f32)]) -> usize {
+    fn picture(&mut self, seen: &[InView]) -> usize {
         if let Some(known) = self.pictures.iter().position(|(view, _)| view == seen) {
             return known;
         }
@@ -102,28 +132,31 @@ impl SimScene {
         }
         let mut picture = vec![0.0; self.sensor_size];
         match seen {
-            [(shown, share)] => {
+            [InView { pattern, share }] => {
                 self.lights.clear();
-                let raster = self.lit(*shown);
+                let raster = self.lit(*pattern);
                 self.placed.transport.light(raster.as_deref(), &mut picture);
                 picture.iter_mut().for_each(|light| *light *= share);
             }
             several => {
-                for (shown, share) in several {
-                    let parts = picture.iter_mut().zip(self.light(*shown));
+                for InView { pattern, share } in several {
+                    let parts = picture.iter_mut().zip(self.light(*pattern));
                     parts.for_each(|(sum, light)| *sum += share * light);
                 }
             }
         }
         let width = self.scenario.rig.camera.width as usize;
-        blur::gaussian(&mut picture, width, self.placed.transport.blur_px);
+        gaussian(&mut picture, width, self.placed.transport.blur_px);
         self.pictures.push_back((seen.to_vec(), picture));
         self.pictures.len() - 1
     }
 
     /// The light on the camera while this pattern is shown, or none.
     fn light(&mut self, shown: Option<usize>) -> &[f32] {
-        let known = self.lights.iter().position(|(of, _)| *of == shown);
+        let known = self
+            .lights
+            .iter()
+            .position(|(pattern, _)| *pattern == shown);
         let oldest = || (self.lights.len() >= MAX_LIGHTS).then_some(0);
         let kept = known.or_else(oldest).and_then(|at| self.lights.remove(at));
         let mut light = kept.map_or_else(|| vec![0.0; self.sensor_size], |(_, light)| light);
@@ -152,10 +185,10 @@ impl SimScene {
         let greys = raster.pixels().iter();
         let mut light = Vec::with_capacity(raster.pixels().len() + PADDING);
         light.extend(greys.map(|grey| response[usize::from(*grey)]));
-        blur::gaussian(
+        gaussian(
             &mut light,
             raster.width() as usize,
-            spread::split(optics.projector_blur_px).1,
+            split(optics.projector_blur_px).1,
         );
         adapt(&mut light, optics.content_gain);
         light.resize(light.len() + PADDING, 0.0);
@@ -186,7 +219,7 @@ impl Scene for SimScene {
     fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let stays = |shown: &Option<usize>| shown.is_none_or(|index| index < kept);
         self.pictures
-            .retain(|(view, _)| view.iter().all(|(shown, _)| stays(shown)));
+            .retain(|(view, _)| view.iter().all(|seen| stays(&seen.pattern)));
         self.lights.retain(|(shown, _)| stays(shown));
         // Teaching holds more frames at a time than a cycle.
         self.pool.release();
@@ -201,7 +234,7 @@ impl Scene for SimScene {
 
     fn expose(
         &mut self,
-        seen: &[(Option<usize>, f32)],
+        seen: &[InView],
         timestamp: Timestamp,
         count: u64,
     ) -> Result<Frame, Error> {

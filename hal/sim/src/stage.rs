@@ -3,13 +3,11 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use super::ground::Ground;
 use super::material::Material;
 use super::parts::Part;
-use super::placement::Placement;
+use super::placement::{Ground, Placement};
 use super::scenario::Scenario;
-use super::scene::SimScene;
-use super::staged::Staged;
+use super::scene::{SimScene, Staged};
 use super::transport::Truth;
 use hal::bounds::{Bound, Fields, within};
 use hal::error::{DeviceKind, Error};
@@ -132,7 +130,7 @@ impl Stage {
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<Staged, Error> {
         part.check()
-            .and_then(|()| Fields.check("placement", placement))
+            .and_then(|()| Ok(Fields.check("placement", placement)?))
             .map_err(|problem| Error::unsupported("placing this part", problem))?;
         let scenario = Scenario {
             floor: self.floor(),

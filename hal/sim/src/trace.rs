@@ -1,13 +1,12 @@
-//! Ray tracing: where a ray meets a surface, and whether a point of the surface sees the projector.
+//! Ray tracing: what rays meet, where a ray meets a thin surface, and whether a point of the surface
+//! sees the projector.
 //!
 //! Sphere tracing (J. C. Hart, 1996) of f(t) = z(t) − height(x(t), y(t)) along a ray with direction
 //! d: with slopes of at most L, f changes by at most |d_z| + L·|d_xy| per unit of t, so a step
 //! of |f| divided by that rate crosses nothing. Close to the surface a Newton step is tried and
 //! kept if it brackets the crossing; regula falsi then refines the crossing.
 
-use super::body::{Body, Hit, clip};
-use super::optics::{Vector, along, dot, normalised};
-use super::parts::Surface;
+use super::optics::{Vector, along, normalised};
 
 /// Accuracy of a crossing along the ray, mm.
 const TOLERANCE_MM: f64 = 1e-7;
@@ -23,6 +22,51 @@ const MARGIN_MM: f64 = 1e-3;
 const SLOPE_STEP_MM: f64 = 1e-4;
 /// Most steps along a ray, more than any ray needs; a ray that takes them all meets nothing.
 const MAX_RAY_STEPS: usize = 100_000;
+
+/// Something that rays meet, in the coordinates of its part, mm.
+pub(crate) trait Body: Sync {
+    /// The first point of material on the ray from `origin` along the unit vector `direction`.
+    fn first_hit(&self, origin: Vector, direction: Vector) -> Option<Hit>;
+
+    /// Whether material lies between `hit` and a distant point in direction `towards`, a unit
+    /// vector on the side of the normal.
+    fn shadowed(&self, hit: &Hit, towards: Vector) -> bool;
+}
+
+/// Where a ray met a body.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hit {
+    pub point: Vector,
+    /// The unit normal, on the side from which the ray came.
+    pub normal: Vector,
+    /// The light that the material reflects, as a share of what white would reflect.
+    pub albedo: f64,
+    /// Number of the smooth face, so that an edge between two of them is known.
+    pub face: u16,
+}
+
+/// A thin surface z(x, y) in the part's own coordinates, mm.
+///
+/// `height` is defined and has bounded slope everywhere, also where the part is not `present`
+/// (outside its outline, in its holes), where a ray passes through.
+pub(crate) trait Surface: Send + Sync {
+    /// z at (x, y).
+    fn height(&self, x: f64, y: f64) -> f64;
+
+    /// Whether there is material at (x, y).
+    fn present(&self, x: f64, y: f64) -> bool;
+
+    /// The light that the material reflects at (x, y), as a share of what white would reflect.
+    fn albedo(&self, _x: f64, _y: f64) -> f64 {
+        1.0
+    }
+
+    /// No slope of `height` is larger than this, in any direction.
+    fn slope_bound(&self) -> f64;
+
+    /// Lowest and highest corner of a box around all material.
+    fn bounds(&self) -> [Vector; 2];
+}
 
 /// A surface with its bounds, computed once for all rays.
 pub(super) struct Traced<'a> {
@@ -147,6 +191,29 @@ impl Body for Traced<'_> {
     }
 }
 
+/// The interval of t ≥ 0 in which a ray is inside the box between two corners; none if it misses
+/// the box, or never leaves it.
+pub(crate) fn clip(
+    [low, high]: &[Vector; 2],
+    origin: Vector,
+    direction: Vector,
+) -> Option<(f64, f64)> {
+    let (mut start, mut end) = (0.0_f64, f64::INFINITY);
+    for axis in 0..3 {
+        if direction[axis].abs() < 1e-12 {
+            if !(low[axis]..=high[axis]).contains(&origin[axis]) {
+                return None;
+            }
+            continue;
+        }
+        let a = (low[axis] - origin[axis]) / direction[axis];
+        let b = (high[axis] - origin[axis]) / direction[axis];
+        start = start.max(a.min(b));
+        end = end.min(a.max(b));
+    }
+    (start < end && end.is_finite()).then_some((start, end))
+}
+
 /// The sign change between two points, by regula falsi with the Illinois rule.
 fn close_in(over: &impl Fn(f64) -> f64, near: (f64, f64), far: (f64, f64)) -> f64 {
     let ((mut a, mut fa), (mut b, mut fb)) = (near, far);
@@ -167,11 +234,4 @@ fn close_in(over: &impl Fn(f64) -> f64, near: (f64, f64), far: (f64, f64)) -> f6
         (b, fb) = (middle, value);
     }
     b
-}
-
-/// The cosine between normal and direction to the light: the share of the light that the surface
-/// receives; none from behind.
-pub(super) fn facing(normal: Vector, towards: Vector) -> Option<f64> {
-    let cosine = dot(normal, towards);
-    (cosine > 0.0).then_some(cosine)
 }

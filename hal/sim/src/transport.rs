@@ -15,17 +15,14 @@
 
 use rayon::prelude::*;
 
-use super::body::{Body, Hit};
+use super::blur::{Spread, split};
 use super::footprint::Footprint;
-use super::ground::World;
-use super::material::Material;
-use super::optics::{Lens, Vector, dot, minus, normalised, plus, turned, turned_back};
+use super::material::{Material, Reflection};
+use super::optics::{Lens, Vector, dot, minus, normalised, turned, turned_back};
 use super::parts::{Part, Solid};
-use super::placement::Placement;
-use super::reflection::Reflection;
+use super::placement::{Placement, Pose, World};
 use super::scenario::Scenario;
-use super::spread::{self, Spread};
-use super::trace::Traced;
+use super::trace::{Body, Hit, Traced};
 
 /// A pixel has a depth edge if a sub-ray meets the surface farther than this from the tangent plane
 /// at the central ray's hit, measured along the ray, mm.
@@ -74,29 +71,21 @@ struct Tap {
     weights: [u16; LANES],
 }
 
-/// The devices in the coordinates of a placed part.
+/// A placed part, and the devices in its coordinates.
 struct Placed {
-    rotation: [f64; 9],
-    shift: Vector,
+    pose: Pose,
     eye: Vector,
     lamp: Vector,
 }
 
 impl Placed {
     fn new(placement: &Placement, camera: &Lens, projector: &Lens) -> Self {
-        let rotation = placement.rotation();
-        let to_part = |point| turned_back(&rotation, minus(point, placement.shift_mm));
-        let (eye, lamp) = (to_part(camera.centre()), to_part(projector.centre()));
+        let pose = placement.pose();
         Self {
-            rotation,
-            shift: placement.shift_mm,
-            eye,
-            lamp,
+            eye: pose.to_part(camera.centre()),
+            lamp: pose.to_part(projector.centre()),
+            pose,
         }
-    }
-
-    fn to_world(&self, point: Vector) -> Vector {
-        plus(turned(&self.rotation, point), self.shift)
     }
 }
 
@@ -137,13 +126,13 @@ impl Transport {
             scenario,
             camera: &camera,
             projector: &projector,
-            spread: Spread::new(spread::split(scenario.optics.projector_blur_px).0),
+            spread: Spread::new(split(scenario.optics.projector_blur_px).0),
             placed: &placed,
             reflection: &reflection,
             body,
             world: ground.map(|ground| {
                 let next = body_of(&thin_of_next, &solid_of_next);
-                World::below(&designed, ground, next)
+                World::below(designed.lowest(), ground, next)
             }),
             footprint: Footprint::bare(scenario.sub_rays),
         };
@@ -300,7 +289,7 @@ impl Tracer<'_> {
             row.truth.class.push(class);
             row.truth
                 .height
-                .push(seen.map_or(f32::NAN, |point| self.placed.to_world(point)[2] as f32));
+                .push(seen.map_or(f32::NAN, |point| self.placed.pose.to_world(point)[2] as f32));
             row.ambient
                 .push((self.scenario.light.ambient * bright * share) as f32);
             self.taps(&points, share, &mut weights, &mut row.taps);
@@ -311,15 +300,14 @@ impl Tracer<'_> {
 
     /// Where the ray of camera point (u, v) meets the part or the world around it, in the part's coordinates.
     fn hit(&self, u: f64, v: f64) -> Option<(Hit, Vector)> {
-        let (rotation, eye) = (&self.placed.rotation, self.placed.eye);
+        let Placed { pose, eye, .. } = self.placed;
         let ray = self.camera.ray(u, v);
-        let direction = turned_back(rotation, ray);
-        let met = self.body.and_then(|body| body.first_hit(eye, direction));
-        let lies = (rotation, self.placed.shift);
+        let direction = turned_back(&pose.rotation, ray);
+        let met = self.body.and_then(|body| body.first_hit(*eye, direction));
         let world = self.world.as_ref();
-        let world = world.and_then(|world| world.meets((self.camera.centre(), ray), lies));
+        let world = world.and_then(|world| world.meets(self.camera.centre(), ray, pose));
         let hit = match (met, world) {
-            (Some(met), Some((t, _))) if dot(minus(met.point, eye), direction) <= t => met,
+            (Some(met), Some((t, _))) if dot(minus(met.point, *eye), direction) <= t => met,
             (_, Some((_, world))) => world,
             (met, None) => met?,
         };
@@ -339,7 +327,9 @@ impl Tracer<'_> {
         let towards = normalised(minus(self.placed.lamp, hit.point));
         let eye = normalised(minus(self.placed.eye, hit.point));
         let share = self.reflection.share(hit.normal, towards, eye)? * hit.albedo;
-        let raster = self.projector.project(self.placed.to_world(hit.point))?;
+        let raster = self
+            .projector
+            .project(self.placed.pose.to_world(hit.point))?;
         let device = &self.scenario.rig.projector;
         let on = |place: f64, pixels: u32| (-0.5..f64::from(pixels) - 0.5).contains(&place);
         if !on(raster[0], device.width) || !on(raster[1], device.height) {
@@ -351,8 +341,8 @@ impl Tracer<'_> {
         });
         let is_shaded = self.world.as_ref().is_some_and(|world| {
             let [normal, towards] =
-                [hit.normal, towards].map(|way| turned(&self.placed.rotation, way));
-            world.shades(self.placed.to_world(hit.point), normal, towards)
+                [hit.normal, towards].map(|way| turned(&self.placed.pose.rotation, way));
+            world.shades(self.placed.pose.to_world(hit.point), normal, towards)
         });
         (!is_shadowed && !is_shaded).then_some(Lit { raster, share })
     }

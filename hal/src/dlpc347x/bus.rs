@@ -33,7 +33,7 @@ impl Bus {
 }
 
 impl i2c::Error for BusError {
-    /// Errors of the kernel's drivers: `ENXIO` and `EREMOTEIO` mean that nobody acknowledged
+    /// Errors of the kernel's drivers: `ENXIO` and `EREMOTEIO` mean that no device acknowledged
     /// (Documentation/i2c/fault-codes.rst).
     fn kind(&self) -> ErrorKind {
         let number = match &self.0 {

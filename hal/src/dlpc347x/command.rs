@@ -1,4 +1,5 @@
-//! The commands that are used, and how their parameters and answers are laid out.
+//! The commands that are used, how their parameters and answers are laid out, and what the answers
+//! say of the controller's condition.
 //!
 //! Each constant is an opcode, with its name in TI's guides and in brackets the function of TI's
 //! generated interface that has the same layout. The guides are the software programmer's guides of
@@ -10,6 +11,7 @@
 //! There is no command for dithering or the degamma curve in these sources, so they cannot be
 //! switched here; what is left of them is measured as the response of the projector.
 
+use crate::projector::fault;
 use crate::setup::Led;
 
 /// Write Operating Mode Select: one byte, [`PATTERN_STREAMING`] and others
@@ -63,9 +65,9 @@ pub const EIGHT_BIT_MONO: u8 = 2;
 /// [`DLPC347X_ReadValidateExposureTime`].
 pub const READ_VALID_EXPOSURE: u8 = 0x9D;
 
-/// Read Short Status: see [`super::status`] [`DLPC347X_ReadShortStatus`].
+/// Read Short Status: a byte of bits [`DLPC347X_ReadShortStatus`].
 pub const READ_SHORT_STATUS: u8 = 0xD0;
-/// Read System Status: four bytes, see [`super::status`] [`DLPC347X_ReadSystemStatus`].
+/// Read System Status: four bytes, a byte of bits [`DLPC347X_ReadSystemStatus`].
 pub const READ_SYSTEM_STATUS: u8 = 0xD1;
 /// Read Communication Status, asked with 2 for the I²C bus: a byte of errors and the opcode of the
 /// command that was aborted [`DLPC347X_ReadCommunicationStatus`].
@@ -154,4 +156,49 @@ pub fn currents(answer: [u8; 6]) -> [u16; 3] {
 /// of a negative one is not known here, so that more than 150 °C is taken for not known.
 pub fn celsius(answer: [u8; 2]) -> Option<f64> {
     Some(f64::from(u16::from_le_bytes(answer)) / 10.0).filter(|celsius| *celsius <= 150.0)
+}
+
+/// READ_SHORT_STATUS [`DLPC347X_ShortStatus_s`] bit 0: initialised.
+const INITIALISED: u8 = 1 << 0;
+/// READ_SHORT_STATUS bit 5: an error of the flash memory.
+const FLASH_ERROR: u8 = 1 << 5;
+/// READ_SHORT_STATUS bit 6: the timing of the patterns is not supported.
+const SENSING_ERROR: u8 = 1 << 6;
+/// READ_SHORT_STATUS bit 7: the main application runs, not the one that updates the flash memory.
+const MAIN_APPLICATION: u8 = 1 << 7;
+
+/// Whether the controller has started.
+pub fn is_started(short: u8) -> bool {
+    short & (INITIALISED | MAIN_APPLICATION) == INITIALISED | MAIN_APPLICATION
+}
+
+/// The faults that both answers report ([`DLPC347X_ShortStatus_s`, `DLPC347X_SystemStatus_s`]), as
+/// bits of [`fault`].
+pub fn faults(short: u8, [dmd, leds, sequence, system]: [u8; 4]) -> u16 {
+    let bit = |set: bool, fault: u16| if set { fault } else { 0 };
+    // Device, interface or training of the micromirror device.
+    bit(dmd & 0b111 != 0, fault::DMD)
+        // Errors of the red, green and blue LED; the bits below them say which are on.
+        | bit(leds & 0b11_1000 != 0, fault::LED)
+        // Aborted, and an error.
+        | bit(sequence & 0b11 != 0, fault::SEQUENCE)
+        | bit(sequence & 0b100 != 0, fault::SUPPLY)
+        | bit(sequence >> 3 != 0 || short & SENSING_ERROR != 0, fault::PATTERN_TIMING)
+        | bit(system & 0b1_0000 != 0, fault::CONFIGURATION)
+        | bit(system & 0b10_0000 != 0, fault::WATCHDOG)
+        | bit(short & FLASH_ERROR != 0, fault::FLASH)
+}
+
+/// What is wrong with the timing of the patterns [`DLPC347X_SensingError_e`].
+pub fn timing_error(sequence: u8) -> Option<&'static str> {
+    Some(match sequence >> 3 {
+        0 => return None,
+        1 => "the illumination time is not supported",
+        2 => "the dark time before a pattern is not supported",
+        3 => "the dark time after a pattern is not supported",
+        4 => "the delay of TRIG_OUT_1 is not supported",
+        5 => "the delay of TRIG_OUT_2 is not supported",
+        6 => "there are too many entries in the table of patterns",
+        _ => "the timing of the patterns is not supported",
+    })
 }

@@ -5,22 +5,24 @@
 //! every pattern. [`Controller::set_up`] chooses external pattern streaming: each frame of the
 //! video input is one pattern of 8 bit in one colour. Commands and layouts are in `command`.
 //!
+//! [`Controlled`] is a projector on a display connector whose controller was set up, and is watched.
+//!
 //! A read is a write of the command, with a stop, and then a read, as in TI's own programs; so
 //! nothing else may talk to this controller in between. Every call is tried three times.
 
 #[cfg(feature = "i2c")]
 pub mod bus;
 mod command;
-mod controlled;
-mod status;
 
-pub use controlled::Controlled;
-
-use crate::controller::{ControllerState, processing};
+use crate::clock::monotonic;
 use crate::error::{DeviceKind, Error};
+use crate::projector::{ControllerState, processing};
+use crate::projector::{Flip, Projector, Raster};
 use crate::setup::Led;
+use crate::units::Timestamp;
 use command as c;
 use embedded_hal::i2c::{Error as _, I2c};
+use std::cell::RefCell;
 use std::time::Duration;
 
 /// How often a call is tried: a disturbed transfer need not end a measurement.
@@ -59,7 +61,7 @@ impl<I: I2c> Controller<I> {
                 Error::unsupported(attempt, "it is no DLPC3470, DLPC3478 or DLPC3479: name its bus and address, or set head.projector.controller = \"none\"")
             })?;
         let [short] = found.read("its status", &[c::READ_SHORT_STATUS])?;
-        if !status::is_started(short) {
+        if !c::is_started(short) {
             return Err(found.gone(&format!("it has not started (status {short:02x}h)")));
         }
         Ok(found)
@@ -115,7 +117,7 @@ impl<I: I2c> Controller<I> {
         Ok(ControllerState {
             device: self.device,
             processing: processed,
-            faults: status::faults(short, system),
+            faults: c::faults(short, system),
             temperature_c: c::celsius(temperature),
             led_current: currents[c::led_index(self.led)],
         })
@@ -165,7 +167,7 @@ impl<I: I2c> Controller<I> {
         let state = self.state()?;
         let set: [u8; 15] = self.read("its patterns", &[c::READ_PATTERNS])?;
         let [.., sequence, _] = self.read::<4>("its system status", &[c::READ_SYSTEM_STATUS])?;
-        let wrong = match status::timing_error(sequence) {
+        let wrong = match c::timing_error(sequence) {
             Some(words) => words.to_owned(),
             None if state.processing != 0 => {
                 let on: Vec<&str> = processing::words(state.processing).collect();
@@ -232,5 +234,102 @@ impl<I: I2c> Controller<I> {
             ),
             remedy: "check the projector's power and the I²C wires, and head.projector.controller_bus and controller_address".into(),
         }
+    }
+}
+
+/// A projector together with its controller. It is present as long as the controller answers and
+/// streams patterns: one that was switched off and on shows video again, and has to be set up
+/// again.
+pub struct Controlled<I> {
+    projector: Box<dyn Projector>,
+    polled: RefCell<Polled<I>>,
+    period: Duration,
+}
+
+/// A controller, and what it said of itself when it was last asked.
+struct Polled<I> {
+    controller: Controller<I>,
+    state: ControllerState,
+    at: Timestamp,
+}
+
+impl<I: I2c> Controlled<I> {
+    /// Sets the controller up for the refresh of a projector; [`Projector::present`] asks it at
+    /// most once in a `period`.
+    ///
+    /// # Errors
+    /// As [`Controller::set_up`].
+    pub fn new(
+        projector: Box<dyn Projector>,
+        mut controller: Controller<I>,
+        current: Option<u16>,
+        period: Duration,
+    ) -> Result<Self, Error> {
+        controller.set_up(current, projector.refresh())?;
+        let polled = Polled {
+            state: controller.state()?,
+            at: monotonic(),
+            controller,
+        };
+        Ok(Self {
+            projector,
+            polled: RefCell::new(polled),
+            period,
+        })
+    }
+}
+
+impl<I: I2c> Polled<I> {
+    /// Asks for the controller's condition.
+    fn poll(&mut self) -> Result<(), Error> {
+        self.state = self.controller.state()?;
+        self.at = monotonic();
+        match self.state.processing {
+            0 => Ok(()),
+            _ => Err(self.controller.gone("it does not stream patterns any more: it was switched off and on, or another program has set it up")),
+        }
+    }
+}
+
+impl<I: I2c + Send> Projector for Controlled<I> {
+    fn size(&self) -> (u32, u32) {
+        self.projector.size()
+    }
+
+    fn refresh(&self) -> Duration {
+        self.projector.refresh()
+    }
+
+    fn present(&self) -> Result<(), Error> {
+        self.projector.present()?;
+        let mut polled = self.polled.borrow_mut();
+        if monotonic().since(polled.at) < self.period {
+            return Ok(());
+        }
+        polled.poll()
+    }
+
+    fn starts_dark(&self) -> bool {
+        self.projector.starts_dark()
+    }
+
+    fn controller(&self) -> Option<ControllerState> {
+        Some(self.polled.borrow().state.clone())
+    }
+
+    fn load_behind(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
+        self.projector.load_behind(kept, rasters)
+    }
+
+    fn queue(&mut self, index: usize) -> Result<(), Error> {
+        self.projector.queue(index)
+    }
+
+    fn poll_flip(&mut self) -> Result<Option<Flip>, Error> {
+        self.projector.poll_flip()
+    }
+
+    fn blank(&mut self) -> Result<(), Error> {
+        self.projector.blank()
     }
 }

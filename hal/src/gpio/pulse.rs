@@ -11,13 +11,11 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use super::chip::find;
-use super::failure::{LineError, means};
+use super::line::{LineError, find, means};
 use crate::clock::monotonic;
 use crate::error::Error;
-use crate::latest;
 use crate::setup::TriggerSetup;
-use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger, decides};
+use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger, decides, keep_latest};
 use crate::units::Timestamp;
 
 /// How long before the end of a pulse the thread wakes: longer than waking usually takes, short
@@ -150,7 +148,7 @@ impl Drop for Pulse {
             // If the thread panicked, the line is set idle below all the same.
             let _ = ending.join();
         }
-        // An error could not be reported any more.
+        // Nothing is left that could report an error.
         let _ = (self.line.put)(false);
     }
 }
@@ -185,7 +183,7 @@ impl Pulsed {
             let fall = (before, monotonic());
             state.rise = None;
             if let Some(spoiled) = Spoiled::by(&Edges { rise, fall }, state.width) {
-                latest::keep(&mut state.spoiled, spoiled);
+                keep_latest(&mut state.spoiled, spoiled);
             }
         }
     }
@@ -220,22 +218,25 @@ mod tests {
         let mut pulse = Pulse::of(Box::new(put), WIDTH, || ()).unwrap();
         let fired = pulse.fire().unwrap();
         ended.recv().unwrap();
-        let told = pulse.poll_spoiled();
-        assert_eq!(pulse.poll_spoiled(), None, "told twice");
-        (fired, told)
+        let reported = pulse.poll_spoiled();
+        assert_eq!(pulse.poll_spoiled(), None, "reported twice");
+        (fired, reported)
     }
 
     #[test]
     fn a_pulse_with_an_interrupted_edge_is_told_once_it_ended_and_by_how_much_it_was_off() {
         // Other work of this computer can only make the error larger.
-        let (fired, told) = first(STALL, Duration::ZERO);
-        let told = told.expect("an interrupted rise");
-        assert_eq!((told.fired, told.width), (fired, WIDTH));
-        assert!(told.shorter >= STALL || told.longer >= STALL, "{told:?}");
-        let (fired, told) = first(Duration::ZERO, STALL);
-        let told = told.expect("an interrupted fall");
-        assert_eq!((told.fired, told.width), (fired, WIDTH));
-        assert!(told.longer >= STALL, "{told:?}");
+        let (fired, reported) = first(STALL, Duration::ZERO);
+        let reported = reported.expect("an interrupted rise");
+        assert_eq!((reported.fired, reported.width), (fired, WIDTH));
+        assert!(
+            reported.shorter >= STALL || reported.longer >= STALL,
+            "{reported:?}"
+        );
+        let (fired, reported) = first(Duration::ZERO, STALL);
+        let reported = reported.expect("an interrupted fall");
+        assert_eq!((reported.fired, reported.width), (fired, WIDTH));
+        assert!(reported.longer >= STALL, "{reported:?}");
     }
 
     #[test]
@@ -265,8 +266,8 @@ mod tests {
                 std::thread::yield_now();
             }
         }
-        let told: Vec<_> = std::iter::from_fn(|| pulse.poll_spoiled()).collect();
-        let told: Vec<_> = told.iter().map(|spoiled| spoiled.fired).collect();
-        assert_eq!(told, fired[3..]);
+        let reported: Vec<_> = std::iter::from_fn(|| pulse.poll_spoiled()).collect();
+        let reported: Vec<_> = reported.iter().map(|spoiled| spoiled.fired).collect();
+        assert_eq!(reported, fired[3..]);
     }
 }

@@ -2,16 +2,11 @@
 //!
 //! The `sequencer` decides and knows no device; the loop here carries its decisions out.
 
-mod aside;
-mod closed;
-mod count;
-mod exposures;
-mod failure;
+mod devices;
 mod identity;
+mod outcome;
 mod pacing;
 mod sequencer;
-mod streaming;
-mod timing;
 mod watch;
 
 use std::sync::mpsc;
@@ -19,17 +14,18 @@ use std::time::Duration;
 
 use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::clock::Clock;
-use crate::controller::ControllerState;
 use crate::error::Error;
 use crate::frame::{Frame, FrameFormat};
+use crate::projector::ControllerState;
 use crate::projector::Projector;
 use crate::trigger::Trigger;
 use crate::units::Timestamp;
-pub use aside::GoOn;
+use devices::Devices;
+pub use devices::GoOn;
+pub use outcome::Exposure;
 use pacing::Pacing;
+pub use pacing::{Stamp, TOLERANCE, Timing};
 use sequencer::{Act, Sequencer};
-use streaming::Streaming;
-pub use timing::{Stamp, TOLERANCE, Timing};
 pub use watch::{Showing, Watched, WatchedFrame};
 
 /// A device may disappear without ending a wait; on a real clock the devices are polled at least
@@ -43,64 +39,6 @@ pub struct Head {
     sequencer: Sequencer,
     /// What ends everything that the head does; see [`Head::aside`].
     go_on: Option<GoOn>,
-}
-
-pub(crate) struct Devices {
-    pub camera: Box<dyn Camera>,
-    pub projector: Box<dyn Projector>,
-    pub trigger: Box<dyn Trigger>,
-    pub clock: Box<dyn Clock>,
-    /// Whether the camera stayed on after a sequence, and which frames it had given.
-    streaming: Streaming,
-    /// Each exposure lasts so many times as long as the camera is set to.
-    exposures: u32,
-    /// The first patterns, which stay loaded; indices of the others count from behind them.
-    kept: usize,
-}
-
-/// How a sequence was taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Exposure {
-    /// How long the camera took to start; zero if it was on.
-    pub start_up: Duration,
-    /// When the first pattern came into view.
-    pub started: Timestamp,
-    /// When the exposure of the last frame started.
-    pub done: Timestamp,
-    /// Longest time from a pattern's coming into view to the start of its exposure.
-    pub lag: Duration,
-    /// Largest difference of a flip's stamp from its time by the count, and of an exposure's start
-    /// from its trigger.
-    pub sync_error: Duration,
-    /// How often a pattern was shown again because it had given no usable frame.
-    pub retaken: u32,
-    /// Refreshes by which flips were later than planned.
-    pub missed_flips: u32,
-    /// Frames that were exposed and never arrived: gaps in the camera's count.
-    pub dropped: u32,
-    /// Frames that arrived more than once.
-    pub duplicated: u32,
-    /// Frames that were exposed during a change of patterns.
-    pub straddled: u32,
-    /// Frames that were exposed before the first pattern, or arrived much too late.
-    pub stale: u32,
-    /// Frames whose exposure started at no trigger.
-    pub unexplained: u32,
-    /// Frames of patterns that had their frame already.
-    pub surplus: u32,
-    /// Frames that were exposed for too long or too short because the trigger's pulse was.
-    pub spoiled: u32,
-    /// Largest possible error of the length of such a pulse.
-    pub pulse_error: Duration,
-}
-
-impl Exposure {
-    /// Frames that arrived and could not be used.
-    fn unfit(&self) -> u32 {
-        [self.straddled, self.stale, self.unexplained, self.spoiled]
-            .into_iter()
-            .fold(0, u32::saturating_add)
-    }
 }
 
 impl Head {
@@ -118,7 +56,7 @@ impl Head {
                 projector,
                 trigger,
                 clock,
-                streaming: Streaming::default(),
+                streaming: Default::default(),
                 exposures: 1,
                 kept: 0,
             },

@@ -10,15 +10,12 @@
 
 use std::collections::VecDeque;
 
-use super::Exposure;
-use super::count::FrameCount;
-use super::failure::{Blocked, Failure};
-use super::identity::{Identity, Views};
+use super::identity::{FrameCount, Identity, Views};
+use super::outcome::{Blocked, Exposure, Failure};
 use super::pacing::{Attempt, Pacing};
 use crate::frame::Frame;
-use crate::latest;
 use crate::projector::Flip;
-use crate::trigger::Spoiled;
+use crate::trigger::{Spoiled, keep_latest};
 use crate::units::Timestamp;
 
 /// Attempts at one position before the sequence is given up.
@@ -199,7 +196,7 @@ impl Sequencer {
         }
         self.arrived += 1;
         self.pacing.exposed(frame.timestamp());
-        if latest::keep(&mut self.undecided, frame).is_some() {
+        if keep_latest(&mut self.undecided, frame).is_some() {
             self.so_far.stale = self.so_far.stale.saturating_add(1);
         }
     }
@@ -281,7 +278,7 @@ impl Sequencer {
             match self.views.identify(start, end, now) {
                 Identity::Of(position, light) => self.take(position, light, frame),
                 Identity::Undecided => {
-                    latest::keep(&mut self.undecided, frame);
+                    keep_latest(&mut self.undecided, frame);
                 }
                 Identity::Stale => self.so_far.stale = self.so_far.stale.saturating_add(1),
                 Identity::Straddles => {
@@ -435,7 +432,7 @@ impl Sequencer {
                 .iter()
                 .filter(|p| !matches!(p.frame, Taken::Not))
                 .count(),
-            of: self.positions.len(),
+            patterns: self.positions.len(),
             so_far: self.so_far(),
         }
     }

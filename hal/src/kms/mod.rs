@@ -7,12 +7,9 @@
 //!
 //! Dropping a [`Display`] switches the connector off and returns the card to the console.
 
-mod canvas;
 mod card;
-mod faithful;
 mod find;
-mod modes;
-mod output;
+mod pipeline;
 
 use std::io;
 use std::os::fd::OwnedFd;
@@ -27,8 +24,8 @@ use crate::error::Error;
 use crate::projector::{Flip, Projector, Raster, all_kept, all_of_size};
 use crate::setup::ProjectorSetup;
 use crate::units::Timestamp;
-use canvas::Canvas;
-use output::Output;
+use card::{Canvas, refused};
+use pipeline::Pipeline;
 
 /// How many refreshes to wait for a flip before it is an error.
 const PATIENCE: u32 = 10;
@@ -36,7 +33,7 @@ const PATIENCE: u32 = 10;
 /// A display that shows patterns, each for whole refreshes.
 #[derive(Debug)]
 pub struct Display {
-    output: Output,
+    pipeline: Pipeline,
     black: Canvas,
     /// Canvases in the order of the patterns; there may be more canvases than patterns, from a
     /// longer sequence before.
@@ -54,12 +51,14 @@ pub struct Display {
     missed: u64,
 }
 
+/// What a display shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Picture {
     Black,
     Pattern(usize),
 }
 
+/// A change of the picture that was asked for.
 #[derive(Clone, Copy, Debug)]
 struct Commit {
     picture: Picture,
@@ -72,13 +71,13 @@ struct Commit {
 /// `Unsupported` if card, connector or mode does not exist, or another program uses the card;
 /// `Disconnected` if nothing is plugged in. The message lists what exists.
 pub fn open(setup: &ProjectorSetup) -> Result<Display, Error> {
-    let output = Output::find(setup)?;
-    let size = (output.timings.width, output.timings.height);
-    let mut black = Canvas::new(&output.card, size)?;
-    black.draw(&output.card, &Raster::uniform(size.0, size.1, 0)?)?;
-    output.switch_on(&black)?;
+    let pipeline = Pipeline::find(setup)?;
+    let size = (pipeline.timings.width, pipeline.timings.height);
+    let mut black = Canvas::new(&pipeline.card, size)?;
+    black.draw(&pipeline.card, &Raster::uniform(size.0, size.1, 0)?)?;
+    pipeline.switch_on(&black)?;
     Ok(Display {
-        output,
+        pipeline,
         black,
         canvases: Vec::new(),
         loaded: 0,
@@ -97,7 +96,7 @@ impl Display {
     /// # Errors
     /// The kernel's error.
     pub fn descriptor(&self) -> Result<OwnedFd, Error> {
-        self.output.card.descriptor()
+        self.pipeline.card.descriptor()
     }
 
     /// Refreshes that the driver missed: whole refreshes that passed between the commit of a flip
@@ -115,9 +114,9 @@ impl Display {
             Picture::Pattern(index) => &self.canvases[index],
         };
         let asked = monotonic();
-        self.output
+        self.pipeline
             .flip(canvas)
-            .map_err(|error| card::refused("asking for a flip", &error))?;
+            .map_err(|error| refused("asking for a flip", &error))?;
         self.waiting = Some(Commit { picture, asked });
         Ok(())
     }
@@ -130,15 +129,15 @@ impl Display {
     /// Reads the events that have arrived.
     fn take_events(&mut self) -> Result<(), Error> {
         loop {
-            let events = match self.output.card.receive_events() {
+            let events = match self.pipeline.card.receive_events() {
                 Ok(events) => events,
                 Err(error) if error.kind() == io::ErrorKind::WouldBlock => return Ok(()),
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => continue,
-                Err(error) => return Err(card::refused("reading flips", &error)),
+                Err(error) => return Err(refused("reading flips", &error)),
             };
             for event in events {
                 if let Event::PageFlip(event) = event
-                    && event.crtc == self.output.crtc
+                    && event.crtc == self.pipeline.crtc
                 {
                     self.flipped(&event)?;
                 }
@@ -178,7 +177,7 @@ impl Display {
             if self.waiting.is_none() {
                 return Ok(());
             }
-            self.output.present("waiting for a flip")?;
+            self.pipeline.present("waiting for a flip")?;
             let left = end.since(monotonic()).min(self.refresh());
             if left.is_zero() {
                 return Err(Error::timeout(
@@ -187,7 +186,7 @@ impl Display {
                     "check the display's mode; if that does not help, restart the computer",
                 ));
             }
-            let mut news = [PollFd::new(&self.output.card, PollFlags::IN)];
+            let mut news = [PollFd::new(&self.pipeline.card, PollFlags::IN)];
             // A signal ends the wait early; nothing else can fail with a descriptor that we own.
             let _ = poll(&mut news, Timespec::try_from(left).ok().as_ref());
         }
@@ -196,16 +195,16 @@ impl Display {
 
 impl Projector for Display {
     fn size(&self) -> (u32, u32) {
-        (self.output.timings.width, self.output.timings.height)
+        (self.pipeline.timings.width, self.pipeline.timings.height)
     }
 
     fn refresh(&self) -> Duration {
-        self.output.timings.period
+        self.pipeline.timings.period
     }
 
     fn present(&self) -> Result<(), Error> {
-        self.output.present("looking for the projector")?;
-        self.output.same_display()
+        self.pipeline.present("looking for the projector")?;
+        self.pipeline.same_display()
     }
 
     fn starts_dark(&self) -> bool {
@@ -221,7 +220,7 @@ impl Projector for Display {
         self.blank()?;
         self.settle()?;
         self.loaded = kept;
-        let card = &self.output.card;
+        let card = &self.pipeline.card;
         let wanted = kept + rasters.len();
         for spare in self.canvases.drain(wanted.min(self.canvases.len())..) {
             spare.free(card);
@@ -237,7 +236,7 @@ impl Projector for Display {
     }
 
     fn queue(&mut self, index: usize) -> Result<(), Error> {
-        self.output.present("showing a pattern")?;
+        self.pipeline.present("showing a pattern")?;
         if index >= self.loaded {
             return Err(Error::protocol(
                 format!(
@@ -267,7 +266,7 @@ impl Projector for Display {
         let flip = self.came.take();
         if flip.is_none() && self.waiting.is_some() {
             // A display that is gone sends no events.
-            self.output.present("waiting for a flip")?;
+            self.pipeline.present("waiting for a flip")?;
         }
         Ok(flip)
     }
@@ -288,8 +287,8 @@ impl Projector for Display {
 
 impl Drop for Display {
     fn drop(&mut self) {
-        let _ = self.output.switch_off();
-        let card = &self.output.card;
+        let _ = self.pipeline.switch_off();
+        let card = &self.pipeline.card;
         for canvas in self.canvases.drain(..) {
             canvas.free(card);
         }

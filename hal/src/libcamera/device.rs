@@ -13,8 +13,7 @@ use rustix::event::{EventfdFlags, eventfd};
 
 use super::open::Configured;
 use super::owner::{Event, Order, Wires, own, with_manager};
-use super::report::ContinuedCount;
-use super::{Exposing, Reading, Settings};
+use super::{ContinuedCount, Exposing, Reading, Settings};
 use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};

@@ -17,9 +17,8 @@ use ::libcamera::request::{Request, RequestStatus, ReuseFlag};
 use rustix::fd::OwnedFd;
 use rustix::time::ClockId;
 
-use super::Settings;
 use super::open::{Configured, Opened, open, refused};
-use super::report::{Clocks, Exposing, Reported, on_the_heads_clock};
+use super::{ClockReading, Clocks, Exposing, Reported, Settings, on_the_heads_clock};
 use crate::clock::{monotonic, read};
 use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, Pixels, Pool};
@@ -41,7 +40,7 @@ pub(super) enum Order {
     /// The library has completed a request.
     Done(Request),
     /// The frame of this request was fetched. Until then the camera does not get the request back,
-    /// so frames that nobody fetches do not pile up.
+    /// so frames that are not fetched do not pile up.
     Fetched(usize),
     /// Close the camera and end.
     Close,
@@ -305,8 +304,11 @@ impl Owner<'_> {
 
     /// The event of a completed request; none if its frame is erroneous.
     fn read(&mut self, index: usize) -> Option<Event> {
-        let clocks =
-            Clocks::of(&[(); 3].map(|()| (monotonic(), read(ClockId::Boottime), monotonic())));
+        let clocks = Clocks::of(&[(); 3].map(|()| ClockReading {
+            before: monotonic(),
+            boot: read(ClockId::Boottime),
+            after: monotonic(),
+        }));
         let slot = &self.opened.slots[index];
         let request = slot.request.as_ref()?;
         let stream = &self.opened.stream;

@@ -2,10 +2,11 @@
 
 use std::path::{Component, Path};
 
-use super::failure::Wrong;
+use super::Wrong;
 use super::manifest::{CodeEntry, Manifest, PatternEntry};
 use crate::bounds::{
-    Bound, Fields, MAX_FRINGES, MAX_HARMONIC, MAX_NAME, MAX_SIDE, clipped, fingerprint, within,
+    Bound, Fields, MAX_FRINGES, MAX_HARMONIC, MAX_NAME, MAX_SIDE, OutOfBounds, clipped,
+    fingerprint, within,
 };
 use crate::model::DeviceModel;
 
@@ -26,8 +27,7 @@ const MIN_SHIFTS: usize = 3;
 
 /// Checks everything that can be checked without opening another file.
 pub(crate) fn manifest(manifest: &Manifest) -> Result<(), Wrong> {
-    let remedy = "correct the value, or leave it out if it is optional";
-    values(manifest).map_err(|problem| Wrong::new(problem, remedy))?;
+    values(manifest)?;
     patterns(manifest)?;
     frames(manifest)?;
     codes(manifest)?;
@@ -35,24 +35,31 @@ pub(crate) fn manifest(manifest: &Manifest) -> Result<(), Wrong> {
 }
 
 /// Checks the values that do not depend on others.
-fn values(manifest: &Manifest) -> Result<(), String> {
-    Fields.check("", manifest)?;
+fn values(manifest: &Manifest) -> Result<(), Wrong> {
+    let wrong = |problem: String| {
+        Wrong::new(
+            problem,
+            "correct the value, or leave it out if it is optional",
+        )
+    };
+    let refused = |bounds: OutOfBounds| wrong(bounds.to_string());
+    Fields.check("", manifest).map_err(refused)?;
     let (camera, projector) = (&manifest.camera, &manifest.projector);
     for (device, model) in [("camera", &camera.model), ("projector", &projector.model)] {
         if let Some(name) = model.as_ref().and_then(DeviceModel::first_not_finite) {
-            return Err(format!("{device}.model.{name} is not finite"));
+            return Err(wrong(format!("{device}.model.{name} is not finite")));
         }
     }
     if let Some([lowest, highest]) = manifest.range_mm
         && lowest >= highest
     {
-        return Err(format!(
+        return Err(wrong(format!(
             "range_mm is [{lowest:?}, {highest:?}]: write two heights in mm, the lower one first"
-        ));
+        )));
     }
-    within("the number of notes", manifest.notes.len(), 0, MAX_NOTES)?;
+    within("the number of notes", manifest.notes.len(), 0, MAX_NOTES).map_err(refused)?;
     if let Some(recipe) = &manifest.recipe {
-        fingerprint("recipe.fingerprint", &recipe.fingerprint)?;
+        fingerprint("recipe.fingerprint", &recipe.fingerprint).map_err(refused)?;
     }
     Ok(())
 }
@@ -117,9 +124,10 @@ fn frames(manifest: &Manifest) -> Result<(), Wrong> {
         for (at, &(order, share)) in frame.harmonics.iter().enumerate() {
             let repeated = frame.harmonics[..at]
                 .iter()
-                .any(|(other, _)| *other == order);
+                .any(|(earlier, _)| *earlier == order);
             let checked = within("order", order, 2, MAX_HARMONIC)
                 .and_then(|()| within("share", share, -1.0, 1.0))
+                .map_err(String::from)
                 .and_then(|()| match repeated {
                     true => Err(format!("order {order} is there twice")),
                     false => Ok(()),
@@ -158,7 +166,7 @@ fn codes_alone(manifest: &Manifest) -> bool {
 /// Checks the Gray codes, and the names of all pictures that are not frames of levels.
 fn codes(manifest: &Manifest) -> Result<(), Wrong> {
     for (key, picture) in manifest.pictures() {
-        inside(picture).map_err(|wrong| wrong.of(key))?;
+        inside(picture).map_err(|wrong| wrong.under(key))?;
     }
     let wrong = |problem: String, remedy: &str| Err(Wrong::new(problem, remedy));
     for (at, code) in manifest.codes.iter().enumerate() {
@@ -183,7 +191,7 @@ fn codes(manifest: &Manifest) -> Result<(), Wrong> {
         };
         if manifest.codes[..at]
             .iter()
-            .any(|other| other.pattern == *pattern)
+            .any(|earlier| earlier.pattern == *pattern)
         {
             return wrong(
                 format!("codes has two entries for pattern {pattern}"),
@@ -254,8 +262,8 @@ fn levels(manifest: &Manifest) -> Result<(), Wrong> {
         let shifts: Vec<f64> = manifest
             .frames
             .iter()
-            .filter(|other| (other.ratio.to_bits(), other.pattern) == level)
-            .map(|other| other.shift_turns)
+            .filter(|frame| (frame.ratio.to_bits(), frame.pattern) == level)
+            .map(|frame| frame.shift_turns)
             .collect();
         // A recording of a fringe and its complement alone, as a station keeps it.
         let pair = shifts.len() == 2 && manifest.frames.len() == 2;

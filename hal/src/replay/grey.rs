@@ -4,7 +4,7 @@ use std::io::Cursor;
 
 use png::{BitDepth, ColorType};
 
-use super::failure::Wrong;
+use super::Wrong;
 use crate::frame::{FrameFormat, Pixels, Samples};
 
 /// Bytes that the decoder may allocate in addition to the samples.

@@ -5,7 +5,7 @@ use serde::de::value::{MapAccessDeserializer, SeqAccessDeserializer};
 use serde::de::{MapAccess, SeqAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-use super::failure::Wrong;
+use super::Wrong;
 use crate::bounded;
 use crate::bounds::{
     Fields, Longest, MAX_EXPOSURE_US, MAX_NAME, MAX_NOISE_COUNTS, MAX_RANGE_MM, MAX_SHIFT_TURNS,
@@ -193,7 +193,7 @@ pub(crate) struct PatternEntries(pub Vec<PatternEntry>);
 impl Serialize for PatternEntries {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self.0.as_slice() {
-            [one] => one.serialize(serializer),
+            [pattern] => pattern.serialize(serializer),
             several => several.serialize(serializer),
         }
     }
@@ -210,8 +210,8 @@ impl<'de> Deserialize<'de> for PatternEntries {
             }
 
             fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
-                let one = PatternEntry::deserialize(MapAccessDeserializer::new(map))?;
-                Ok(PatternEntries(vec![one]))
+                let pattern = PatternEntry::deserialize(MapAccessDeserializer::new(map))?;
+                Ok(PatternEntries(vec![pattern]))
             }
 
             fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {

@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::entries::{Names, manifest_of, phase_file, pictures};
 use super::manifest::Manifest;
 use super::recording::{MANIFEST, PatternSpec, Recording, TRUTH_CLASS, TRUTH_HEIGHT};
-use super::{check, grey};
+use super::{Wrong, check, grey};
 use crate::frame::{Frame, Samples};
 use crate::npy;
 
@@ -22,12 +22,12 @@ pub enum RecorderError {
         path: PathBuf,
     },
     /// The recording could not be opened again.
-    #[error("write recording {}: {problem}", path.display())]
+    #[error("write recording {}: {wrong}", path.display())]
     Content {
         /// The folder.
         path: PathBuf,
-        /// What is wrong, and the remedy.
-        problem: String,
+        /// What is wrong with it.
+        wrong: Wrong,
     },
     /// A file or folder could not be created.
     #[error("write recording: cannot create {} ({source}): check that the folder is writable and has space", path.display())]
@@ -58,10 +58,7 @@ pub fn write_with(
     add: impl FnOnce(&Path),
 ) -> Result<(), RecorderError> {
     let manifest = checked(recording, Names::Kinds, folder)?;
-    check_samples(recording).map_err(|problem| RecorderError::Content {
-        path: folder.to_path_buf(),
-        problem,
-    })?;
+    check_samples(recording).map_err(content(folder))?;
     settled(folder, |partial| {
         put_pictures(recording, partial)?;
         fill(recording, &manifest, partial)?;
@@ -136,13 +133,14 @@ fn absent(folder: &Path) -> Result<(), RecorderError> {
 fn checked(recording: &Recording, names: Names, folder: &Path) -> Result<Manifest, RecorderError> {
     absent(folder)?;
     let manifest = manifest_of(recording, names);
-    match check::manifest(&manifest) {
-        Ok(()) => Ok(manifest),
-        Err(wrong) => Err(RecorderError::Content {
-            path: folder.to_path_buf(),
-            problem: wrong.to_string(),
-        }),
-    }
+    check::manifest(&manifest).map_err(content(folder))?;
+    Ok(manifest)
+}
+
+/// The error of writing something wrong to `folder`.
+fn content(folder: &Path) -> impl FnOnce(Wrong) -> RecorderError {
+    let path = folder.to_path_buf();
+    move |wrong| RecorderError::Content { path, wrong }
 }
 
 /// Makes a folder with `fill` under a temporary name, syncs it and renames it. Nothing is left
@@ -215,8 +213,9 @@ fn sync_folder(folder: &Path) -> io::Result<()> {
     }
 }
 
-fn check_samples(recording: &Recording) -> Result<(), String> {
-    let refuse = |problem: String| Err(format!("{problem}: record it again"));
+/// Checks that frames, phases and truth have the shape that the recording states.
+fn check_samples(recording: &Recording) -> Result<(), Wrong> {
+    let refuse = |problem: String| Err(Wrong::new(problem, "record it again"));
     let wanted = recording.format();
     for (file, frame) in pictures(recording) {
         let format = frame.format();

@@ -6,9 +6,8 @@ use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::failure::{RecordingError, Wrong};
 use super::manifest::{self, CodeEntry, Manifest, PatternEntry};
-use super::{check, grey};
+use super::{RecordingError, Wrong, check, grey};
 use crate::frame::{Frame, FrameFormat};
 use crate::model::DeviceModel;
 use crate::npy::{self, Element};
@@ -139,8 +138,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// A recording of frames of this format in front of this projector, of which nothing else is
-    /// known yet.
+    /// A recording of frames of this format in front of this projector; nothing else is known of it
+    /// yet.
     pub fn new(format: FrameFormat, projector: RecordedProjector) -> Self {
         Self {
             width: format.width,
@@ -285,7 +284,7 @@ fn picture(
 ) -> Result<Frame, RecordingError> {
     let found = frame(folder, file, format, Timestamp(0), 0);
     found.map_err(|error| match error {
-        RecordingError::Content { path, wrong } => wrong.of(key).at(&path),
+        RecordingError::Content { path, wrong } => wrong.under(key).at(&path),
         missing @ RecordingError::Missing { .. } => missing,
     })
 }

@@ -7,8 +7,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::faults::{Dice, Kind};
-use super::timing::Mechanics;
+use super::mechanics::{Dice, Event, FreeRunning, Mechanics};
 use super::{Bench, Scene, VirtualDevice, lock};
 use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::error::{DeviceKind, Error};
@@ -63,12 +62,12 @@ impl Sensor {
             || mechanics.camera().starts != Starts::OnTrigger
             || now < self.busy_until
             || faults.wire_open
-            || dice.happens(Kind::LostTrigger, self.count ^ now.0, faults.lost_trigger);
+            || dice.happens(Event::LostTrigger, self.count ^ now.0, faults.lost_trigger);
         if lost {
             return;
         }
         let jitter = Duration::from_micros(faults.trigger_jitter_us);
-        let start = now + dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
+        let start = now + dice.up_to(Event::TriggerJitter, self.count, 1.0, jitter);
         let longer = length.saturating_sub(mechanics.exposure);
         self.busy_until = now + (mechanics.camera().period + mechanics.dead + longer);
         self.expose(start, length, mechanics, dice);
@@ -81,13 +80,13 @@ impl Sensor {
             return;
         }
         self.count += 1;
-        if dice.happens(Kind::Dropped, n, faults.dropped) {
+        if dice.happens(Event::Dropped, n, faults.dropped) {
             return;
         }
         let late = Duration::from_micros(faults.late_frame_us);
-        let late = dice.up_to(Kind::LateFrame, n, faults.late_frame, late);
+        let late = dice.up_to(Event::LateFrame, n, faults.late_frame, late);
         let mut ready = start + (length + mechanics.readout + late);
-        if dice.happens(Kind::Swapped, n, faults.swapped) {
+        if dice.happens(Event::Swapped, n, faults.swapped) {
             ready = ready + (mechanics.camera().period + mechanics.exposure / 4);
         }
         if !mechanics.copy.is_zero() {
@@ -99,12 +98,12 @@ impl Sensor {
             length,
             count: n,
             ready,
-            twice: dice.happens(Kind::Duplicated, n, faults.duplicated),
+            twice: dice.happens(Event::Duplicated, n, faults.duplicated),
         };
         let place = self
             .exposures
             .iter()
-            .take_while(|other| other.ready <= ready)
+            .take_while(|pending| pending.ready <= ready)
             .count();
         self.exposures.insert(place, exposure);
     }
@@ -119,7 +118,7 @@ impl Sensor {
             let start = ready.div_ceil(refresh.max(1)).saturating_mul(refresh);
             return Some(Timestamp(start.saturating_add(lag)));
         }
-        let (period, phase) = mechanics.free_running.filter(|_| self.armed)?;
+        let FreeRunning { period, phase } = mechanics.free_running.filter(|_| self.armed)?;
         let drifted =
             period.as_nanos() as f64 * (1.0 + f64::from(mechanics.faults.drift_ppm) * 1e-6);
         Some(self.started + phase + Duration::from_nanos((drifted * self.since as f64) as u64))
@@ -133,7 +132,7 @@ impl Sensor {
             .filter(|start| *start + jitter <= now)
         {
             self.since += 1;
-            let off = dice.up_to(Kind::TriggerJitter, self.count, 1.0, jitter);
+            let off = dice.up_to(Event::TriggerJitter, self.count, 1.0, jitter);
             self.expose(start + off, mechanics.exposure, mechanics, dice);
             let busy = mechanics.exposure + mechanics.readout + mechanics.dead;
             self.busy_until = start + off + busy;
@@ -171,8 +170,8 @@ impl<S: Scene> Bench<S> {
     pub fn expose(&mut self, times: u32) {
         let own = self.own_exposure();
         let before = std::mem::replace(&mut self.mechanics.exposure, own * times);
-        if let Some((period, _)) = &mut self.mechanics.free_running {
-            *period = *period + own * times - before;
+        if let Some(camera) = &mut self.mechanics.free_running {
+            camera.period = camera.period + own * times - before;
         }
         self.exposures = times;
     }
@@ -200,7 +199,7 @@ impl<S: Scene> Bench<S> {
         let jitter = Duration::from_micros(mechanics.faults.stamp_jitter_us);
         let off = self
             .dice
-            .up_to(Kind::StampJitter, exposure.count, 1.0, 2 * jitter);
+            .up_to(Event::StampJitter, exposure.count, 1.0, 2 * jitter);
         let frame = self.scene.expose(
             seen,
             marked + (mechanics.stamp_late + off) - jitter,

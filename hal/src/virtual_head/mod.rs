@@ -9,32 +9,33 @@
 //! fast as the computer can, and is the same every time. Light is integrated over each exposure: a
 //! frame that straddles two patterns shows both.
 
-mod cables;
 mod camera;
-mod faults;
-mod light;
+mod mechanics;
 mod projector;
-mod pulse;
-mod timing;
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use crate::clock::Clock;
-use crate::error::Error;
+use crate::error::{DeviceKind, Error};
 use crate::frame::{Frame, FrameFormat};
 use crate::head::Head;
 use crate::projector::Raster;
-use crate::trigger::{Spoiled, Trigger};
+use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger, keep_latest};
 use crate::units::Timestamp;
-use cables::Cables;
 use camera::Sensor;
-use faults::Dice;
-pub use faults::Faults;
-use light::LightHistory;
-use projector::Screen;
-use pulse::Pulses;
-pub use timing::Mechanics;
+use mechanics::{Dice, Event};
+pub use mechanics::{Faults, FreeRunning, Mechanics};
+use projector::{LightHistory, Screen};
+
+/// What was in view for a part of an exposure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InView {
+    /// The pattern, or none.
+    pub pattern: Option<usize>,
+    /// How long, as a share of the exposure that the camera is set to.
+    pub share: f32,
+}
 
 /// What the virtual devices look at.
 pub trait Scene: Send {
@@ -59,20 +60,27 @@ pub trait Scene: Send {
     /// Patterns loaded.
     fn loaded(&self) -> usize;
 
-    /// The frame of an exposure. `seen` lists the patterns (or none) that were in view, in order,
-    /// each with its share of the exposure that the camera is set to; it is not empty, and its
+    /// The frame of an exposure. `seen` lists what was in view, in order; it is not empty, and its
     /// shares sum to 1, or to more if the exposure lasted longer. `timestamp` and `count` are the
     /// frame's.
     ///
     /// # Errors
     /// If the scene has no frame for this.
-    fn expose(
-        &mut self,
-        seen: &[(Option<usize>, f32)],
-        timestamp: Timestamp,
-        count: u64,
-    ) -> Result<Frame, Error>;
+    fn expose(&mut self, seen: &[InView], timestamp: Timestamp, count: u64)
+    -> Result<Frame, Error>;
 }
+
+/// The cable of one device.
+#[derive(Clone, Copy, Default, PartialEq, Eq)]
+struct Cable {
+    out: bool,
+    /// How often it was pulled out. A device that was opened before the last time fails for ever.
+    pulled: u64,
+}
+
+/// The cables by [`DeviceKind`]. That of the GPIO chip has no effect, because the virtual trigger
+/// has none.
+type Cables = [Cable; 3];
 
 /// The scene and the state of the devices in front of it.
 struct Bench<S> {
@@ -90,6 +98,23 @@ struct Bench<S> {
     pulses: Pulses,
     waits: u64,
     cables: Cables,
+}
+
+impl<S: Scene> Bench<S> {
+    /// Stops the camera and blanks the projector, if both are plugged in.
+    fn reset(&mut self) -> Result<(), Error> {
+        for device in [DeviceKind::Camera, DeviceKind::Projector] {
+            if self.cables[device as usize].out {
+                let attempt = format!("opening the {}", device.word());
+                return Err(Error::disconnected(device, attempt));
+            }
+        }
+        self.sensor.stop();
+        self.expose(1);
+        self.blank();
+        self.first_light = self.now + self.mechanics.first_light;
+        Ok(())
+    }
 }
 
 /// One bench, shared by the devices and the [`Control`].
@@ -126,6 +151,14 @@ impl<S: Scene + 'static> Control<S> {
     pub fn set_exposure(&self, exposure: Duration) {
         let mut bench = lock(&self.bench);
         bench.mechanics.exposure = exposure * bench.exposures;
+    }
+
+    /// Plugs a device in, or unplugs it. A device that was opened before it was unplugged keeps
+    /// failing.
+    pub fn plug(&self, device: DeviceKind, plugged: bool) {
+        let cable = &mut lock(&self.bench).cables[device as usize];
+        cable.pulled += u64::from(!plugged);
+        cable.out = !plugged;
     }
 
     /// Opens the devices again: a stopped camera and a blank projector.
@@ -184,6 +217,22 @@ struct VirtualDevice<S> {
     opened: Cables,
 }
 
+impl<S> VirtualDevice<S> {
+    /// The bench, if `device` was not unplugged since it was opened.
+    fn plugged(
+        &self,
+        device: DeviceKind,
+        attempt: &str,
+    ) -> Result<MutexGuard<'_, Bench<S>>, Error> {
+        let bench = lock(&self.bench);
+        let at = device as usize;
+        match bench.cables[at] == self.opened[at] {
+            true => Ok(bench),
+            false => Err(Error::disconnected(device, attempt)),
+        }
+    }
+}
+
 impl<S: Scene> Clock for VirtualDevice<S> {
     fn now(&self) -> Timestamp {
         lock(&self.bench).now
@@ -201,7 +250,7 @@ impl<S: Scene> Clock for VirtualDevice<S> {
             .fold(until, Timestamp::min);
         bench.waits += 1;
         let stall = bench.dice.up_to(
-            faults::Kind::Stall,
+            Event::Stall,
             bench.waits,
             bench.mechanics.faults.stall,
             Duration::from_micros(bench.mechanics.faults.stall_us),
@@ -211,6 +260,49 @@ impl<S: Scene> Clock for VirtualDevice<S> {
 
     fn stands_still(&self) -> bool {
         true
+    }
+}
+
+/// The pulses of the trigger, each as long as the exposure that it starts, and reports of those that
+/// last too long.
+#[derive(Default)]
+struct Pulses {
+    begun: u64,
+    /// The end of the latest pulse that lasts too long. All other pulses end before the camera can
+    /// take the next one.
+    on_until: Timestamp,
+    /// Spoiled pulses that were not fetched yet.
+    spoiled: SpoiledPulses,
+}
+
+impl Pulses {
+    /// Begins a pulse and returns how long it will last; none if one is still on.
+    fn begin(&mut self, now: Timestamp, mechanics: &Mechanics, dice: Dice) -> Option<Duration> {
+        if now < self.on_until {
+            return None;
+        }
+        self.begun += 1;
+        let faults = &mechanics.faults;
+        let longest = Duration::from_micros(faults.long_pulse_us);
+        let longer = dice.up_to(Event::LongPulse, self.begun, faults.long_pulse, longest);
+        if longer.is_zero() {
+            return Some(mechanics.exposure);
+        }
+        let end = now + (mechanics.exposure + longer);
+        self.on_until = end;
+        let edges = Edges {
+            rise: (now, now),
+            fall: (end, end),
+        };
+        if let Some(spoiled) = Spoiled::by(&edges, mechanics.exposure) {
+            keep_latest(&mut self.spoiled, spoiled);
+        }
+        Some(mechanics.exposure + longer)
+    }
+
+    /// The next spoiled pulse that has ended.
+    fn poll(&mut self, now: Timestamp) -> Option<Spoiled> {
+        self.spoiled.pop_front_if(|pulse| pulse.ended() <= now)
     }
 }
 

@@ -1,15 +1,78 @@
 //! The virtual projector: flips happen with its refreshes; their reports and their light follow
-//! with delays.
+//! with delays. Its light is remembered, so that an exposure gets the pattern of each moment.
 
+use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::faults::Kind;
-use super::{Bench, Scene, VirtualDevice, lock};
+use super::mechanics::Event;
+use super::{Bench, InView, Scene, VirtualDevice, lock};
 use crate::error::{DeviceKind, Error};
 use crate::projector::{Flip, Projector, Raster, all_kept, all_of_size};
 use crate::units::Timestamp;
 
+/// Capacity for changes of light; more than are normally remembered.
+const CAPACITY: usize = 64;
 const DEVICE: DeviceKind = DeviceKind::Projector;
+
+/// The changes of light, oldest first.
+pub(super) struct LightHistory {
+    /// When a pattern came into view, or none.
+    changes: VecDeque<(Timestamp, Option<usize>)>,
+    seen: Vec<InView>,
+}
+
+impl LightHistory {
+    pub fn new() -> Self {
+        let mut changes = VecDeque::with_capacity(CAPACITY);
+        changes.push_back((Timestamp(0), None));
+        Self {
+            changes,
+            seen: Vec::with_capacity(CAPACITY),
+        }
+    }
+
+    /// From `at` on, `pattern` is in view. Later changes are removed, and those that no exposure
+    /// since `needed` can receive.
+    pub fn change(&mut self, at: Timestamp, pattern: Option<usize>, needed: Timestamp) {
+        while self.changes.len() > 1 && self.changes[1].0 <= needed {
+            self.changes.pop_front();
+        }
+        while self.changes.len() > 1 && self.changes.back().is_some_and(|last| last.0 >= at) {
+            self.changes.pop_back();
+        }
+        self.changes.push_back((at, pattern));
+    }
+
+    /// The patterns that were in view for `length` from `start` on, in order, each with its time as
+    /// a share of `planned`.
+    pub fn seen(&mut self, start: Timestamp, length: Duration, planned: Duration) -> &[InView] {
+        self.seen.clear();
+        let end = start + length;
+        let whole = planned.as_nanos().max(1) as f64;
+        let last = self.changes.len() - 1;
+        for (at, (from, pattern)) in self.changes.iter().enumerate() {
+            // The first state has no beginning, the last no end.
+            let from = if at == 0 { start } else { (*from).max(start) };
+            let until = if at == last {
+                end
+            } else {
+                self.changes[at + 1].0.min(end)
+            };
+            let share = (until.since(from).as_nanos() as f64 / whole) as f32;
+            if share > 0.0 {
+                let pattern = *pattern;
+                match self.seen.last_mut() {
+                    Some(before) if before.pattern == pattern => before.share += share,
+                    _ => self.seen.push(InView { pattern, share }),
+                }
+            }
+        }
+        if let [alone] = self.seen.as_mut_slice() {
+            alone.share = (length.as_nanos().max(1) as f64 / whole) as f32;
+        }
+        &self.seen
+    }
+}
 
 /// The state of the projector's flips.
 #[derive(Default)]
@@ -57,9 +120,9 @@ impl<S: Scene> Bench<S> {
             .unwrap_or(u64::MAX)
             .max(1);
         let mut count = self.now.0 / period + 1;
-        if dice.happens(Kind::LateFlip, n, faults.late_flip) {
+        if dice.happens(Event::LateFlip, n, faults.late_flip) {
             let more = dice.up_to(
-                Kind::LateFlip,
+                Event::LateFlip,
                 n ^ 1 << 40,
                 1.0,
                 Duration::from_nanos(1 << 20),
@@ -68,14 +131,14 @@ impl<S: Scene> Bench<S> {
         }
         let at = Timestamp(count.saturating_mul(period));
         let news = dice.up_to(
-            Kind::LateNews,
+            Event::LateNews,
             n,
             faults.late_news,
             Duration::from_micros(faults.late_news_us),
         );
         let jitter = Duration::from_micros(faults.flip_jitter_us);
-        let mut timestamp = at + dice.up_to(Kind::FlipJitter, n, 1.0, 2 * jitter) - jitter;
-        let wrong = |n| dice.happens(Kind::WrongStamp, n, faults.wrong_stamp);
+        let mut timestamp = at + dice.up_to(Event::FlipJitter, n, 1.0, 2 * jitter) - jitter;
+        let wrong = |n| dice.happens(Event::WrongStamp, n, faults.wrong_stamp);
         if wrong(n) && !wrong(n - 1) {
             timestamp = timestamp + self.mechanics.refresh;
         }
@@ -148,5 +211,68 @@ impl<S: Scene> Projector for VirtualDevice<S> {
     fn blank(&mut self) -> Result<(), Error> {
         self.plugged(DEVICE, "blanking the projector")?.blank();
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exposure_sees_each_pattern_for_its_share_of_the_planned_time_and_one_alone_for_all() {
+        let mut light = LightHistory::new();
+        light.change(Timestamp(100), Some(3), Timestamp(0));
+        light.change(Timestamp(200), Some(4), Timestamp(0));
+        light.change(Timestamp(300), Some(4), Timestamp(0));
+        let ns = Duration::from_nanos;
+        let pair = |seen: &InView| (seen.pattern, seen.share);
+        let mut seen = |start, end| {
+            let length = ns(end - start);
+            light
+                .seen(Timestamp(start), length, length)
+                .iter()
+                .map(pair)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(seen(20, 90), [(None, 1.0)]);
+        assert_eq!(seen(100, 200), [(Some(3), 1.0)]);
+        assert_eq!(
+            seen(50, 250),
+            [(None, 0.25), (Some(3), 0.5), (Some(4), 0.25)]
+        );
+        assert_eq!(seen(210, 900), [(Some(4), 1.0)]);
+        let mut longer = |start, length| {
+            light
+                .seen(Timestamp(start), length, ns(80))
+                .iter()
+                .map(pair)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(longer(210, ns(100)), [(Some(4), 1.25)]);
+        assert_eq!(longer(120, ns(100)), [(Some(3), 1.0), (Some(4), 0.25)]);
+    }
+
+    #[test]
+    fn what_no_exposure_can_see_any_more_is_forgotten() {
+        let mut light = LightHistory::new();
+        for at in 1..1000 {
+            light.change(
+                Timestamp(100 * at),
+                Some(at as usize),
+                Timestamp((100 * at).saturating_sub(350)),
+            );
+        }
+        assert!(light.changes.len() < 8, "{}", light.changes.len());
+        assert_eq!(
+            light.seen(
+                Timestamp(99_650),
+                Duration::from_nanos(10),
+                Duration::from_nanos(10)
+            ),
+            [InView {
+                pattern: Some(996),
+                share: 1.0
+            }]
+        );
     }
 }

@@ -44,6 +44,6 @@ impl MapFile {
                 self.file
             ));
         }
-        fingerprint(&format!("{key}.sha256"), &self.sha256)
+        Ok(fingerprint(&format!("{key}.sha256"), &self.sha256)?)
     }
 }

@@ -2,7 +2,7 @@
 //! with, and how well they fit.
 
 use hal::bounded;
-use hal::bounds::{Bound, Fields, Longest, MAX_NAME, MAX_SIDE, length};
+use hal::bounds::{Bound, Fields, Longest, MAX_NAME, MAX_SIDE, OutOfBounds, length};
 
 /// Most poses.
 pub const MAX_POSES: usize = 64;
@@ -72,7 +72,7 @@ impl GeometryFile {
     ///
     /// # Errors
     /// In words that name the key, the value and the bounds.
-    pub fn check_bounds(&self) -> Result<(), String> {
+    pub fn check_bounds(&self) -> Result<(), OutOfBounds> {
         length("geometry.poses", self.poses.len(), 1, MAX_POSES)?;
         Fields.check("geometry", self)
     }

@@ -15,7 +15,7 @@ use crate::head::scan::take_loaded;
 use crate::head::seam;
 use algo::calibration::{Board, Picture};
 use hal::bounded;
-use hal::bounds::{Bound as _, Fields};
+use hal::bounds::{Bound as _, Fields, OutOfBounds};
 use hal::error::Error;
 use serde_json::json;
 use std::time::Duration;
@@ -39,7 +39,7 @@ impl Solving {
     ///
     /// # Errors
     /// In words that name the key.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), OutOfBounds> {
         Fields.check("", self)
     }
 }

@@ -3,7 +3,7 @@
 
 use super::{Check, named};
 use crate::station::HOT_PROJECTOR_C;
-use hal::controller::{ControllerState, fault, processing};
+use hal::projector::{ControllerState, fault, processing};
 use serde_json::json;
 
 /// Checks what a controller said of itself.

@@ -218,7 +218,7 @@ impl Placed {
             floor: self.floor.clone().flatten(),
             ..Scenario::default()
         };
-        scenario.check()
+        Ok(scenario.check()?)
     }
 }
 

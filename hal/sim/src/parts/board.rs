@@ -1,8 +1,8 @@
 //! A printed checkerboard, and the poses in which it is shown to a head that is calibrated.
 
-use super::Surface;
 use crate::optics::Vector;
 use crate::placement::Placement;
+use crate::trace::Surface;
 use hal::bounded;
 
 /// What black squares reflect of the light that white ones do.

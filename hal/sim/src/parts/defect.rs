@@ -1,12 +1,24 @@
-//! Defects of parts: dents, which every part with a surface of its own can have, and those of holes
-//! and flanges.
+//! Defects of parts: round, smooth dents, which every part with a surface of its own can have, and
+//! those of holes and flanges.
+//!
+//! A dent of depth d and diameter D at the point c of a thin surface lowers z by d/n_z · cos²(π/2 · r
+//! / (D/2)), where r is the distance in space from c to the undented surface, and n the unit normal
+//! at c: d is measured along the normal, and D across the surface, also where it is steep.
 
 use serde::{Deserialize, Serialize};
 
-use hal::bounds::{length, within};
+use crate::optics::Vector;
+use crate::trace::Surface;
+use crate::unfit::Unfit;
+use hal::bounds::{OutOfBounds, length, within};
 
 /// Most defects of a scenario.
 const MAX_DEFECTS: usize = 64;
+/// Half the distance over which slopes are computed, mm.
+const SLOPE_MM: f64 = 1e-3;
+
+/// The largest slope of [`bump`], multiplied by the half-width.
+pub(super) const BUMP_SLOPE: f64 = std::f64::consts::FRAC_PI_2;
 
 /// One defect of a part. A printed board and a joint have none; the other parts can have dents, the
 /// sheet metal and the plate also missing holes, the sheet metal a bent flange, the plate holes in
@@ -55,9 +67,8 @@ pub enum Defect {
 }
 
 impl Defect {
-    /// Checks the number of defects and the measures of the dents; the error names the key and its
-    /// range.
-    pub(super) fn check(defects: &[Self]) -> Result<(), String> {
+    /// Checks the number of defects and the measures of the dents.
+    pub(super) fn check(defects: &[Self]) -> Result<(), OutOfBounds> {
         length("part.defects", defects.len(), 0, MAX_DEFECTS)?;
         for defect in defects {
             if let Self::Dent {
@@ -77,8 +88,8 @@ impl Defect {
         Ok(())
     }
 
-    /// Checks what is wrong with a hole of a part that has so many of them; the error names the key.
-    pub(super) fn check_hole(&self, holes: usize) -> Result<(), String> {
+    /// Checks a defect of a hole of a part that has so many of them.
+    pub(super) fn check_hole(&self, holes: usize) -> Result<(), Unfit> {
         let index = match *self {
             Self::Dent { .. } | Self::BentFlange { .. } => return Ok(()),
             Self::MissingHole { index } => index,
@@ -93,10 +104,98 @@ impl Defect {
             }
         };
         match holes.checked_sub(1) {
-            Some(last) => within("part.defects.index", index, 0, last),
-            None => Err(format!(
-                "part.defects.index is {index}: the part has no holes"
-            )),
+            Some(last) => Ok(within("part.defects.index", index, 0, last)?),
+            None => Err(Unfit::NoHoles { index }),
         }
     }
+}
+
+/// A surface and its dents.
+pub(super) struct Dented {
+    surface: Box<dyn Surface>,
+    dents: Vec<SurfaceDent>,
+}
+
+/// A dent of a thin surface.
+struct SurfaceDent {
+    centre: Vector,
+    /// The depth of the dent along z.
+    drop: f64,
+    half_width: f64,
+}
+
+impl Dented {
+    /// The surface with the dents among the defects; other defects are ignored.
+    pub fn new(surface: Box<dyn Surface>, defects: &[Defect]) -> Self {
+        let dent = |defect: &Defect| match *defect {
+            Defect::Dent {
+                x,
+                y,
+                depth_mm,
+                diameter_mm,
+            } => {
+                let along = surface.height(x + SLOPE_MM, y) - surface.height(x - SLOPE_MM, y);
+                let down = surface.height(x, y + SLOPE_MM) - surface.height(x, y - SLOPE_MM);
+                let slope = along.hypot(down) / (2.0 * SLOPE_MM);
+                Some(SurfaceDent {
+                    centre: [x, y, surface.height(x, y)],
+                    drop: depth_mm * slope.hypot(1.0),
+                    half_width: diameter_mm / 2.0,
+                })
+            }
+            _ => None,
+        };
+        let dents = defects.iter().filter_map(dent).collect();
+        Self { surface, dents }
+    }
+}
+
+impl Surface for Dented {
+    fn height(&self, x: f64, y: f64) -> f64 {
+        let z = self.surface.height(x, y);
+        let drop = |dent: &SurfaceDent| {
+            let [cx, cy, cz] = dent.centre;
+            let (dx, dy) = (x - cx, y - cy);
+            // Most rays are far away; skip the square root for them.
+            match dx.abs().max(dy.abs()) < dent.half_width {
+                true => dent.drop * bump(dx.hypot(dy).hypot(z - cz), dent.half_width),
+                false => 0.0,
+            }
+        };
+        z - self.dents.iter().map(drop).sum::<f64>()
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        self.surface.present(x, y)
+    }
+
+    fn albedo(&self, x: f64, y: f64) -> f64 {
+        self.surface.albedo(x, y)
+    }
+
+    fn slope_bound(&self) -> f64 {
+        let slope = self.surface.slope_bound();
+        // The distance in space changes by up to √(1 + slope²) per mm in x and y.
+        let steepest = |dent: &SurfaceDent| dent.drop.abs() * BUMP_SLOPE / dent.half_width;
+        slope + self.dents.iter().map(steepest).sum::<f64>() * slope.hypot(1.0)
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        let [mut low, mut high] = self.surface.bounds();
+        for dent in &self.dents {
+            low[2] -= dent.drop.max(0.0);
+            high[2] += (-dent.drop).max(0.0);
+        }
+        [low, high]
+    }
+}
+
+/// The profile of dents and beads, a smooth, round elevation: cos² from 1 at distance 0 to 0 at `half_width`, smooth at both; its slope is at most π / (2 ·
+/// half_width).
+pub(super) fn bump(distance: f64, half_width: f64) -> f64 {
+    if distance >= half_width {
+        return 0.0;
+    }
+    let cos = (std::f64::consts::FRAC_PI_2 * distance / half_width).cos();
+    cos * cos
 }

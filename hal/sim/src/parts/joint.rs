@@ -12,10 +12,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::sheet::Sheet;
-use super::solid::{Floor, Solid};
+use super::sheet::{Floor, Sheet, Solid};
 use hal::bounded;
-use hal::bounds::{Bound, Fields, within};
+use hal::bounds::{Bound, Fields, OutOfBounds, within};
 
 /// The direction across a joint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -58,7 +57,7 @@ bounded! {
 }
 
 impl Joint {
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), OutOfBounds> {
         Fields.check("part", self)?;
         for (key, radius) in [
             ("part.left_radius", self.left_radius),

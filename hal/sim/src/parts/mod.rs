@@ -5,37 +5,29 @@
 //! study's head and parts*); a scenario may change them.
 
 mod board;
-mod bump;
 mod defect;
-mod dented;
-mod face;
-mod handset;
 mod joint;
 mod plate;
 mod relief;
 mod shapes;
 mod sheet;
 mod sheet_metal;
-mod solid;
-mod spline;
-mod turned_over;
 
 use serde::{Deserialize, Serialize};
 
-use super::optics::Vector;
+use super::trace::Surface;
+use super::unfit::Unfit;
 use hal::bounds::{Bound, Fields, within};
 
 pub use board::Board;
 pub use defect::Defect;
-pub use face::Face;
-pub use handset::Handset;
 pub use joint::{Across, Joint};
 pub use plate::{Hole, Joggle, Plate, Slot};
-pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Tube};
+pub use relief::{Face, Handset};
+pub use shapes::{Cone, Flowerpot, Plane, Sawtooth, Sphere, Spline, Tube};
+pub use sheet::Floor;
+pub(crate) use sheet::Solid;
 pub use sheet_metal::SheetMetal;
-pub use solid::Floor;
-pub(crate) use solid::Solid;
-pub use spline::Spline;
 
 /// A part by kind, with its measures in mm.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -77,29 +69,6 @@ impl Default for Part {
     }
 }
 
-/// A thin surface z(x, y) in the part's own coordinates, mm.
-///
-/// `height` is defined and has bounded slope everywhere, also where the part is not `present`
-/// (outside its outline, in its holes), where a ray passes through.
-pub(crate) trait Surface: Send + Sync {
-    /// z at (x, y).
-    fn height(&self, x: f64, y: f64) -> f64;
-
-    /// Whether there is material at (x, y).
-    fn present(&self, x: f64, y: f64) -> bool;
-
-    /// The light that the material reflects at (x, y), as a share of what white would reflect.
-    fn albedo(&self, _x: f64, _y: f64) -> f64 {
-        1.0
-    }
-
-    /// No slope of `height` is larger than this, in any direction.
-    fn slope_bound(&self) -> f64;
-
-    /// Lowest and highest corner of a box around all material.
-    fn bounds(&self) -> [Vector; 2];
-}
-
 impl Part {
     /// One good part of each kind of thin surface with its default measures. Plate and joint are not
     /// among them.
@@ -121,41 +90,40 @@ impl Part {
         ]
     }
 
-    /// Checks the measures of the part and of its defects; the error names the first key that is
-    /// out of its range, and the range.
-    pub(crate) fn check(&self) -> Result<(), String> {
+    /// Checks the measures of the part and of its defects.
+    pub(crate) fn check(&self) -> Result<(), Unfit> {
         Defect::check(self.defects())?;
-        self.defects()
-            .iter()
-            .try_for_each(|defect| self.can_have(defect))
-            .map_err(|words| format!("part.defects: {words}"))?;
+        for defect in self.defects() {
+            self.can_have(defect).map_err(Unfit::Defect)?;
+        }
         match self {
-            Self::Cone(part) => Fields.check("part", part),
-            Self::Sawtooth(part) => Fields.check("part", part),
+            Self::Cone(part) => Fields.check("part", part)?,
+            Self::Sawtooth(part) => Fields.check("part", part)?,
             Self::Sphere(part) => {
                 Fields.check("part", part)?;
                 // Lower than a tenth of the radius above the centre, the surface is too steep for a
                 // height field.
                 let low = part.centre_z + 0.1 * part.radius;
-                within("part.cut", part.cut, low, part.centre_z + part.radius)
+                within("part.cut", part.cut, low, part.centre_z + part.radius)?;
             }
-            Self::Tube(part) => Fields.check("part", part),
+            Self::Tube(part) => Fields.check("part", part)?,
             Self::Flowerpot(part) => {
                 Fields.check("part", part)?;
                 // The wall leans outwards by at least 0.025 mm per mm of depth: a height field has
                 // no upright walls.
                 let least = part.bottom_diameter + 0.05 * part.depth;
-                within("part.rim_diameter", part.rim_diameter, least, 1000.0)
+                within("part.rim_diameter", part.rim_diameter, least, 1000.0)?;
             }
-            Self::Spline(part) => Fields.check("part", &**part),
-            Self::Plane(part) => Fields.check("part", part),
-            Self::Board(part) => Fields.check("part", part),
-            Self::SheetMetal(part) => part.check(),
-            Self::Plate(part) => part.check(),
-            Self::Joint(part) => part.check(),
+            Self::Spline(part) => Fields.check("part", &**part)?,
+            Self::Plane(part) => Fields.check("part", part)?,
+            Self::Board(part) => Fields.check("part", part)?,
+            Self::SheetMetal(part) => part.check()?,
+            Self::Plate(part) => part.check()?,
+            Self::Joint(part) => part.check()?,
             // The measures of these parts are fixed.
-            Self::Face(_) | Self::Handset(_) | Self::Empty {} => Ok(()),
+            Self::Face(_) | Self::Handset(_) | Self::Empty {} => {}
         }
+        Ok(())
     }
 
     /// Its defects.
@@ -231,7 +199,7 @@ impl Part {
             Self::SheetMetal(part) => {
                 let stamping = Box::new(sheet_metal::Stamping::new(part));
                 match part.upside_down {
-                    true => Box::new(turned_over::TurnedOver::new(stamping)),
+                    true => Box::new(sheet_metal::TurnedOver::new(stamping)),
                     false => stamping,
                 }
             }
@@ -239,7 +207,7 @@ impl Part {
         };
         let is_dent = |defect: &Defect| matches!(defect, Defect::Dent { .. });
         Some(match self.defects().iter().any(is_dent) {
-            true => Box::new(dented::Dented::new(good, self.defects())),
+            true => Box::new(defect::Dented::new(good, self.defects())),
             false => good,
         })
     }

@@ -1,8 +1,8 @@
 //! A flat rectangular sheet with round holes, slots and a joggle, over a floor.
 
 use super::Defect;
-use super::sheet::{Dent, Fall, Opening, Sheet};
-use super::solid::{Floor, Solid};
+use super::sheet::{Fall, Floor, Opening, Sheet, SheetDent, Solid};
+use crate::unfit::Unfit;
 use hal::bounded;
 use hal::bounds::{Bound, Fields, length, within};
 
@@ -107,7 +107,7 @@ impl Plate {
         holes
     }
 
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), Unfit> {
         Fields.check("part", self)?;
         length("part.holes", self.holes.len(), 0, MAX_OPENINGS)?;
         length("part.slots", self.slots.len(), 0, MAX_OPENINGS)?;
@@ -118,12 +118,12 @@ impl Plate {
             .joggle
             .map_or(0.0, |joggle| (self.side() * joggle.drop).max(0.0));
         match self.floor.albedo > 0.0 {
-            true => within(
+            true => Ok(within(
                 "part.floor.depth",
                 self.floor.depth,
                 self.sheet() + drop,
                 1000.0,
-            ),
+            )?),
             false => Ok(()),
         }
     }
@@ -158,7 +158,7 @@ impl Plate {
                 y,
                 depth_mm,
                 diameter_mm,
-            } => Some(Dent {
+            } => Some(SheetDent {
                 centre: [x, y],
                 depth: depth_mm,
                 half_width: diameter_mm / 2.0,

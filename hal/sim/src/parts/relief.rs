@@ -1,17 +1,51 @@
-//! A free-form surface as a sum of smooth swells, and its outline.
+//! Free-form surfaces as sums of smooth swells: a face, and the base of a telephone's handset.
 //!
 //! A swell of height h about a segment is h · s(t) with s(t) = t³(10 − 15t + 6t²) and t = (reach −
 //! d) / (reach − flat), clamped to 0…1, where d is the distance from the segment: a plateau up to
 //! `flat`, and nothing beyond `reach`. With w = reach − flat its slope is at most 1.875 |h| / w;
 //! its second derivative is at most 10/√3 |h| / w² along d, and at most 40/9 |h| / w² across it.
 
-use super::Surface;
+use serde::{Deserialize, Serialize};
+
+use super::Defect;
 use crate::optics::Vector;
+use crate::trace::Surface;
 
 /// Distance of the points at which slopes and heights are computed to bound them, mm.
 const GRID_MM: f64 = 0.5;
 /// Side of the squares for which the swells near them are known, mm.
 const CELL_MM: f64 = 5.0;
+/// z of the foot of the face's oval, and how far its material reaches, mm.
+const FACE_BASE: f64 = -37.0;
+const FACE_RIM: f64 = 68.0;
+/// z of the foot of the handset's shell, and how far its material reaches, mm.
+const HANDSET_BASE: f64 = -16.0;
+const HANDSET_RIM: f64 = 42.0;
+
+/// The face, and its dents: the subject of the paper's Fig. 18, in a design of this project.
+///
+/// 136 mm wide, 192 mm high and 75 mm deep, in front of z = 0 by half of that: forehead, brows, eyes
+/// in their sockets, nose, cheeks, lips and chin on an oval. Its steepest places are the flanks of
+/// the nose.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Face {
+    /// Dents; a good part has none.
+    pub defects: Vec<Defect>,
+}
+
+/// The base of a telephone's handset, and its dents: the subject of the paper's Fig. 19, in a design
+/// of this project.
+///
+/// 84 mm wide, 196 mm long along y and 30 mm deep, about z = 0: a rounded shell with an ear piece and
+/// a mouth piece, the cradle's hollow between them, a ridge along the grip, and flat panels, each a
+/// plateau with smooth flanks.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Handset {
+    /// Dents; a good part has none.
+    pub defects: Vec<Defect>,
+}
 
 /// An elevation, or a hollow where the height is negative, about a straight line; mm.
 #[derive(Clone, Copy)]
@@ -234,5 +268,73 @@ impl Surface for Relief {
 
     fn bounds(&self) -> [Vector; 2] {
         self.bounds
+    }
+}
+
+impl Face {
+    /// The surface of a good face.
+    pub(super) fn surface() -> Relief {
+        let middle = [
+            // The oval, first: its outline.
+            Swell::along([[0.0, -26.0], [0.0, 28.0]], [0.0, 84.0], 46.0),
+            // Forehead.
+            Swell::along([[-14.0, 60.0], [14.0, 60.0]], [0.0, 50.0], 6.0),
+            // Nose: its root, bridge and tip.
+            Swell::along([[0.0, 40.0], [0.0, -8.0]], [0.0, 24.0], 8.0),
+            Swell::along([[0.0, 14.0], [0.0, -15.0]], [0.0, 19.0], 8.5),
+            Swell::round([0.0, -15.5], [0.0, 17.0], 7.5),
+            // Mouth: its swelling, the lips, and the line between them.
+            Swell::along([[-9.0, -47.0], [9.0, -47.0]], [0.0, 32.0], 6.0),
+            Swell::along([[-12.0, -43.0], [0.0, -41.0]], [0.0, 9.0], 2.0),
+            Swell::along([[12.0, -43.0], [0.0, -41.0]], [0.0, 9.0], 2.0),
+            Swell::along([[-9.0, -52.0], [9.0, -52.0]], [0.0, 10.5], 4.2),
+            Swell::along([[-18.0, -46.0], [18.0, -46.0]], [0.0, 5.5], -2.2),
+            // Philtrum, the hollow below the lips, and the chin.
+            Swell::along([[0.0, -28.0], [0.0, -36.0]], [0.0, 6.5], -1.2),
+            Swell::along([[-8.0, -62.0], [8.0, -62.0]], [0.0, 13.0], -3.2),
+            Swell::along([[-6.0, -77.0], [6.0, -77.0]], [0.0, 27.0], 11.0),
+        ];
+        let right = [
+            // Brow, eye socket and eye.
+            Swell::along([[10.0, 34.0], [38.0, 33.0]], [0.0, 19.0], 5.5),
+            Swell::along([[21.0, 17.0], [33.0, 16.0]], [0.0, 21.0], -10.0),
+            Swell::along([[24.0, 16.0], [31.0, 15.5]], [0.0, 13.0], 6.0),
+            // The fold of the lid, the wing of the nose, and the cheekbone.
+            Swell::along([[17.0, 22.0], [36.0, 21.5]], [0.0, 6.0], -1.2),
+            Swell::along([[8.0, -17.0], [9.5, -19.0]], [0.0, 12.0], 5.5),
+            Swell::along([[36.0, -4.0], [46.0, 4.0]], [0.0, 38.0], 8.0),
+            // The hollow of the cheek, the fold from the nose to the mouth, and the corner of the
+            // mouth.
+            Swell::along([[48.0, -38.0], [40.0, -56.0]], [0.0, 34.0], -4.5),
+            Swell::along([[17.0, -22.0], [27.0, -42.0]], [0.0, 11.0], -2.2),
+            Swell::round([21.0, -46.0], [0.0, 10.0], -1.8),
+        ];
+        let left: Vec<Swell> = right.iter().map(Swell::mirrored).collect();
+        let swells = middle.into_iter().chain(right).chain(left);
+        Relief::new(swells.collect(), FACE_BASE, FACE_RIM)
+    }
+}
+
+impl Handset {
+    /// The surface of a good handset.
+    pub(super) fn surface() -> Relief {
+        let swells = vec![
+            // The shell, first: its outline.
+            Swell::along([[0.0, -56.0], [0.0, 56.0]], [24.0, 46.0], 17.0),
+            // The cradle's hollow across the grip.
+            Swell::along([[-60.0, 0.0], [60.0, 0.0]], [12.0, 40.0], -7.0),
+            // Ear piece: a raised disc with a dish.
+            Swell::round([0.0, 60.0], [22.0, 31.0], 7.0),
+            Swell::round([0.0, 60.0], [4.0, 19.0], -4.5),
+            // Mouth piece: a lower disc, with a flat panel in it and a boss on that.
+            Swell::round([0.0, -60.0], [20.0, 30.0], 5.5),
+            Swell::round([0.0, -60.0], [13.0, 17.0], -2.0),
+            Swell::round([0.0, -60.0], [3.0, 8.0], 2.5),
+            // A ridge along the grip, and a flat panel on either side of it.
+            Swell::along([[0.0, -22.0], [0.0, 22.0]], [1.0, 7.0], 3.0),
+            Swell::along([[17.0, -14.0], [17.0, 14.0]], [6.0, 8.0], -1.2),
+            Swell::along([[-17.0, -14.0], [-17.0, 14.0]], [6.0, 8.0], -1.2),
+        ];
+        Relief::new(swells, HANDSET_BASE, HANDSET_RIM)
     }
 }

@@ -1,5 +1,5 @@
-//! A flat sheet with an outline, openings, a joggle and rounded rims, by a bound of the distance to
-//! it.
+//! Flat sheets with an outline, openings, a joggle and rounded rims, over a floor: what rays meet of
+//! plates and joints, by a bound of the distance to a sheet.
 //!
 //! In the sheet's own coordinates z = 0 is its upper side. With s the signed distance to the upper
 //! side (positive above), d the distance to the contour in the plane (positive on the material), t
@@ -14,23 +14,46 @@
 //! large, as sphere tracing needs it (J. C. Hart, 1996). A sheet without thickness is the face alone.
 //! Dents change s by their depth, which divides the bound by 1 + their slopes.
 
-use super::bump::{BUMP_SLOPE, bump};
-use crate::body::clip;
+use super::defect::{BUMP_SLOPE, bump};
 use crate::optics::{Vector, along, dot, minus, normalised};
+use crate::trace::{Body, Hit, clip};
+use hal::bounded;
 
 /// A ray meets what it comes this close to, mm.
 const TOLERANCE_MM: f64 = 1e-5;
 /// The box around the material is widened by this, mm: by less than the tolerance, so that rays meet
 /// the highest face at once, and than shadow rays are lifted, so that those from there end at once.
 const MARGIN_MM: f64 = 5e-6;
+/// Shadow rays start at this distance from the surface, mm.
+const LIFT_MM: f64 = 1e-4;
 /// Most steps along a ray; a ray that takes them all meets nothing.
 const MAX_RAY_STEPS: usize = 10_000;
 /// Half the distance over which slopes are computed, mm.
 const SLOPE_STEP_MM: f64 = 1e-5;
 /// How many numbers the faces of a sheet have.
-pub(super) const FACES: u16 = 5;
+const FACES: u16 = 5;
+/// Number of the face of rounded upper edges.
 const RIM: u16 = 3;
+/// Number of the face of upright walls.
 const WALL: u16 = 4;
+
+bounded! {
+    /// A flat floor without an end, parallel to the part's xy plane.
+    #[derive(Copy)]
+    pub struct Floor: Default {
+        /// How far it lies below the part's upper side as designed, mm.
+        pub depth: f64 = 0.0..=1000.0 => 18.0,
+        /// What it reflects of the light that the part would reflect; 0 is no floor.
+        pub albedo: f64 = 0.0..=1.0,
+    }
+}
+
+/// Sheets, and the floor below them.
+pub(crate) struct Solid {
+    sheets: Vec<Sheet>,
+    /// z and albedo of the floor.
+    floor: Option<[f64; 2]>,
+}
 
 /// A sheet in the coordinates of its part, mm.
 #[derive(Debug)]
@@ -43,7 +66,7 @@ pub(super) struct Sheet {
     pub outline: [[f64; 2]; 2],
     pub openings: Vec<Opening>,
     pub joggle: Option<Fall>,
-    pub dents: Vec<Dent>,
+    pub dents: Vec<SheetDent>,
     pub thickness: f64,
     /// Radius of its upper edges; at most the thickness.
     pub rim: f64,
@@ -67,7 +90,7 @@ pub(super) struct Fall {
 
 /// A round, smooth dent of the upper side.
 #[derive(Clone, Debug)]
-pub(super) struct Dent {
+pub(super) struct SheetDent {
     pub centre: [f64; 2],
     pub depth: f64,
     pub half_width: f64,
@@ -143,7 +166,7 @@ impl Sheet {
             Some(fall) => fall.above(x, z),
             None => z,
         };
-        let drop = |dent: &Dent| {
+        let drop = |dent: &SheetDent| {
             let [cx, cy] = dent.centre;
             dent.depth * bump(length(x - cx, y - cy), dent.half_width)
         };
@@ -152,7 +175,7 @@ impl Sheet {
 
     /// How fast [`Sheet::above`] changes at most.
     fn steepness(&self) -> f64 {
-        let slope = |dent: &Dent| dent.depth.abs() * BUMP_SLOPE / dent.half_width;
+        let slope = |dent: &SheetDent| dent.depth.abs() * BUMP_SLOPE / dent.half_width;
         1.0 + self.dents.iter().map(slope).sum::<f64>()
     }
 
@@ -205,8 +228,8 @@ impl Sheet {
             _ => slopes(own, |at| self.above(at)),
         };
         let turned = |axis: usize| {
-            let of = |own: usize| normal[own] * self.axes[own][axis];
-            of(0) + of(1) + of(2)
+            let share = |own: usize| normal[own] * self.axes[own][axis];
+            share(0) + share(1) + share(2)
         };
         ([0, 1, 2].map(turned), face)
     }
@@ -226,8 +249,59 @@ impl Sheet {
     /// z of its lowest corner, in the coordinates of its part.
     pub fn lowest(&self) -> f64 {
         let [low, high] = self.bounds();
-        let end = |of: usize| (low[of] * self.axes[of][2]).min(high[of] * self.axes[of][2]);
+        let end = |axis: usize| {
+            let up = self.axes[axis][2];
+            (low[axis] * up).min(high[axis] * up)
+        };
         self.origin[2] + end(0) + end(1) + end(2)
+    }
+}
+
+impl Solid {
+    /// Sheets whose upper side as designed lies at `z`, and the floor below.
+    pub(super) fn new(sheets: Vec<Sheet>, z: f64, floor: &Floor) -> Self {
+        Self {
+            sheets,
+            floor: (floor.albedo > 0.0).then_some([z - floor.depth, floor.albedo]),
+        }
+    }
+
+    /// z of the lowest corner of its sheets.
+    pub fn lowest(&self) -> f64 {
+        let sheets = self.sheets.iter().map(Sheet::lowest);
+        sheets.fold(f64::INFINITY, f64::min)
+    }
+}
+
+impl Body for Solid {
+    fn first_hit(&self, origin: Vector, direction: Vector) -> Option<Hit> {
+        let sheets = self.sheets.iter().enumerate();
+        let met = sheets.filter_map(|(at, sheet)| Some((sheet.meets(origin, direction)?, at)));
+        if let Some((t, at)) = met.reduce(|a, b| if b.0 < a.0 { b } else { a }) {
+            let point = along(origin, direction, t);
+            let (outward, face) = self.sheets[at].face(point);
+            let sign = -dot(outward, direction).signum();
+            return Some(Hit {
+                point,
+                normal: outward.map(|component| sign * component),
+                albedo: 1.0,
+                face: at as u16 * FACES + face,
+            });
+        }
+        let [z, albedo] = self.floor?;
+        let t = (z - origin[2]) / direction[2];
+        (t > 0.0 && t.is_finite()).then(|| Hit {
+            point: along(origin, direction, t),
+            normal: [0.0, 0.0, -direction[2].signum()],
+            albedo,
+            face: self.sheets.len() as u16 * FACES,
+        })
+    }
+
+    fn shadowed(&self, hit: &Hit, towards: Vector) -> bool {
+        let start = along(hit.point, hit.normal, LIFT_MM);
+        let mut sheets = self.sheets.iter();
+        sheets.any(|sheet| sheet.meets(start, towards).is_some())
     }
 }
 

@@ -6,9 +6,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::bump::{BUMP_SLOPE, bump};
-use super::{Defect, Surface};
+use super::Defect;
+use super::defect::{BUMP_SLOPE, bump};
 use crate::optics::Vector;
+use crate::trace::Surface;
+use crate::unfit::Unfit;
 use hal::bounds::within;
 
 /// z of the plate's upper side.
@@ -55,7 +57,7 @@ pub struct SheetMetal {
 }
 
 impl SheetMetal {
-    pub(super) fn check(&self) -> Result<(), String> {
+    pub(super) fn check(&self) -> Result<(), Unfit> {
         let mut degrees_more = 0.0;
         for defect in &self.defects {
             defect.check_hole(HOLES.len())?;
@@ -63,7 +65,8 @@ impl SheetMetal {
                 degrees_more += degrees;
             }
         }
-        within("part.defects.degrees", degrees_more, -FLANGE_DEG, 40.0)
+        let bounds = within("part.defects.degrees", degrees_more, -FLANGE_DEG, 40.0);
+        Ok(bounds?)
     }
 }
 
@@ -176,5 +179,45 @@ impl Surface for Stamping {
             [LEFT, -HALF_HEIGHT, low],
             [self.right, HALF_HEIGHT, PLATE_Z + BEAD_HEIGHT],
         ]
+    }
+}
+
+/// A thin surface that lies upside down: turned over about x, in the middle plane of its box.
+pub(super) struct TurnedOver {
+    surface: Box<dyn Surface>,
+    /// The sum of z of its lowest and of its highest point, mm.
+    ends: f64,
+}
+
+impl TurnedOver {
+    pub fn new(surface: Box<dyn Surface>) -> Self {
+        let [low, high] = surface.bounds();
+        Self {
+            surface,
+            ends: low[2] + high[2],
+        }
+    }
+}
+
+impl Surface for TurnedOver {
+    fn height(&self, x: f64, y: f64) -> f64 {
+        self.ends - self.surface.height(x, -y)
+    }
+
+    fn present(&self, x: f64, y: f64) -> bool {
+        self.surface.present(x, -y)
+    }
+
+    fn albedo(&self, x: f64, y: f64) -> f64 {
+        self.surface.albedo(x, -y)
+    }
+
+    fn slope_bound(&self) -> f64 {
+        self.surface.slope_bound()
+    }
+
+    fn bounds(&self) -> [Vector; 2] {
+        let [low, high] = self.surface.bounds();
+        [[low[0], -high[1], low[2]], [high[0], -low[1], high[2]]]
     }
 }

@@ -104,6 +104,6 @@ fn a_bowed_board_is_high_in_its_middle_and_a_large_one_has_larger_squares() {
         (board(|board| board.bow_um = f64::NAN), "part.bow_um"),
         (board(|board| board.scale_ppm = -1e6), "part.scale_ppm"),
     ] {
-        assert!(wrong.unwrap_err().contains(key), "{key}");
+        assert!(wrong.unwrap_err().to_string().contains(key), "{key}");
     }
 }

@@ -2,10 +2,10 @@
 
 use crate::controller::{ControllerBus, Registers};
 use embedded_hal::i2c::{ErrorKind as BusKind, ErrorType, I2c, NoAcknowledgeSource, Operation};
-use hal::controller::{fault, processing};
 use hal::dlpc347x::{Controlled, Controller};
 use hal::error::{Error, ErrorKind};
 use hal::projector::{Flip, Projector, Raster};
+use hal::projector::{fault, processing};
 use hal::setup::Led;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng as _, SeedableRng as _};

@@ -2,10 +2,9 @@
 //! surface where a march in small steps does.
 
 use super::all_parts;
-use crate::body::Body;
 use crate::optics::{Lens, Vector, along};
 use crate::parts::Defect;
-use crate::trace::Traced;
+use crate::trace::{Body, Traced};
 use crate::{Part, Scenario};
 
 #[test]

@@ -43,7 +43,7 @@ fn what_is_loaded_aside_comes_behind_the_patterns_that_stay() {
 
 #[test]
 fn a_sequence_that_is_ended_takes_at_most_a_frame_and_leaves_the_camera_on() {
-    for free_running in [None, Some((2 * REFRESH, Duration::ZERO))] {
+    for free_running in [None, free_running(2 * REFRESH, Duration::ZERO)] {
         for often in 0..40 {
             let mechanics = Mechanics {
                 start_up: START_UP,

@@ -28,7 +28,7 @@ fn patterns() -> Vec<Raster> {
 fn a_pattern_is_exposed_twice_as_long_until_another_is_loaded_and_work_aside_is_not() {
     const START_UP: Duration = Duration::from_millis(500);
     let by_itself = Mechanics {
-        free_running: Some((REFRESH * 2, REFRESH / 3)),
+        free_running: free_running(REFRESH * 2, REFRESH / 3),
         ..plain()
     };
     let triggered = Mechanics {

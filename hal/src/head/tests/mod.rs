@@ -14,7 +14,12 @@ use std::time::Duration;
 use super::*;
 use crate::frame::{Pixels, Samples};
 use crate::projector::Raster;
-use crate::virtual_head::{self, Faults, Mechanics, Scene};
+use crate::virtual_head::{self, Faults, FreeRunning, InView, Mechanics, Scene};
+
+/// A camera that runs by itself, with this period, and from its start to its first exposure `phase`.
+fn free_running(period: Duration, phase: Duration) -> Option<FreeRunning> {
+    Some(FreeRunning { period, phase })
+}
 
 const REFRESH: Duration = Duration::from_micros(16_667);
 const TIMEOUT: Duration = Duration::from_millis(500);
@@ -61,16 +66,17 @@ impl Scene for Labels {
 
     fn expose(
         &mut self,
-        seen: &[(Option<usize>, f32)],
+        seen: &[InView],
         timestamp: Timestamp,
         count: u64,
     ) -> Result<Frame, Error> {
         if let Some(exposed) = &self.exposed {
             exposed.send(()).unwrap();
         }
-        let (shown, share) = *seen.iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
-        let label = shown.map_or(0, |index| index as u16 + 1);
-        let sum: f32 = seen.iter().map(|(_, share)| share).sum();
+        let longest = seen.iter().max_by(|a, b| a.share.total_cmp(&b.share));
+        let InView { pattern, share } = *longest.unwrap();
+        let label = pattern.map_or(0, |index| index as u16 + 1);
+        let sum: f32 = seen.iter().map(|seen| seen.share).sum();
         // The cast saturates at a share of 1, which is enough.
         let sample = |share: f32| (share * SHARES).round() as u16;
         let pixels = Pixels::Sixteen(vec![label, sample(sum - share), sample(sum - 1.0)]);

@@ -62,7 +62,10 @@ fn schedule(seed: u64) -> (Mechanics, usize) {
             1 => shortest.max(refresh) + draw.us(20_000),
             _ => shortest,
         };
-        (period, draw.us(40_000))
+        FreeRunning {
+            period,
+            phase: draw.us(40_000),
+        }
     });
     let faults = Faults {
         seed,

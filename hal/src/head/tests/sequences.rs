@@ -102,7 +102,7 @@ fn a_camera_that_runs_by_itself_is_followed_from_any_phase() {
     for phase_us in (0..40_000).step_by(1111) {
         for drift_ppm in [-300, 0, 300] {
             let mechanics = Mechanics {
-                free_running: Some((2 * REFRESH, Duration::from_micros(phase_us))),
+                free_running: free_running(2 * REFRESH, Duration::from_micros(phase_us)),
                 flip_to_light: Duration::from_millis(25),
                 calibrated_flip_to_light: Duration::from_millis(25),
                 readout: Duration::from_millis(12),
@@ -294,7 +294,7 @@ fn a_frame_whose_pulse_was_too_long_is_taken_again_once() {
     }
     // A camera that runs by itself has no pulses.
     let mechanics = Mechanics {
-        free_running: Some((2 * REFRESH, Duration::ZERO)),
+        free_running: free_running(2 * REFRESH, Duration::ZERO),
         faults: pulses(2_000),
         ..plain()
     };

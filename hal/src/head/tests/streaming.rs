@@ -54,7 +54,7 @@ fn a_camera_is_stopped_after_a_sequence_whose_frames_may_still_come_and_where_it
         ..slow_to_start(Faults::default())
     };
     let mut by_itself = slow_to_start(Faults::default());
-    by_itself.free_running = Some((2 * REFRESH, Duration::ZERO));
+    by_itself.free_running = free_running(2 * REFRESH, Duration::ZERO);
     for mechanics in [never, by_itself] {
         let mut head = labelled(mechanics, 3);
         assert_eq!(start_up(&mut head), START_UP);

@@ -283,9 +283,9 @@ impl Readable {
     fn sample(&self, row: &[u8], column: usize) -> u16 {
         let word = |at: usize| u16::from_le_bytes([row[at], row[at + 1]]);
         // A group of packed samples has the upper bytes of each, then the lower bits of all.
-        let packed = |of: usize, bits: usize| {
-            let (group, at) = (column / of * (of + 1), column % of);
-            let lower = u16::from(row[group + of]) >> (bits * at) & ((1 << bits) - 1);
+        let packed = |samples: usize, bits: usize| {
+            let (group, at) = (column / samples * (samples + 1), column % samples);
+            let lower = u16::from(row[group + samples]) >> (bits * at) & ((1 << bits) - 1);
             u16::from(row[group + at]) << bits | lower
         };
         match self.layout {

@@ -1,4 +1,5 @@
-//! Bounds of how long a pulse lasted, and whether the frame that it exposed can be used.
+//! The trigger of a head, which starts one exposure of the camera per pulse; bounds of how long a
+//! pulse lasted, and whether the frame that it exposed can be used.
 //!
 //! Many cameras expose for as long as the pulse lasts, and the program that makes the pulses may be
 //! interrupted at any instruction for any time. Therefore the clock is read before and after each
@@ -25,14 +26,60 @@
 
 use std::time::Duration;
 
+use heapless::Deque;
+
+use crate::error::Error;
 use crate::units::Timestamp;
 
+/// How many triggers back a frame may belong to: so many pulses are remembered, and so many spoiled
+/// ones are kept until fetched.
+pub const REMEMBERED: usize = 16;
 /// The width of a pulse divided by this is how much the pulse may be off: 0.5 %.
 const WIDTH_DIVISOR: u32 = 200;
 /// Every pulse may be off by this much: even on an idle computer two edges are not known better (a
 /// system call for each takes some µs). This is more than 0.5 % of pulses below 4 ms, but a pulse
 /// that lasts a refresh of a projector that shows grey levels is longer.
 const LEAST: Duration = Duration::from_micros(20);
+
+/// Starts one camera exposure per call.
+pub trait Trigger: Send {
+    /// Begins one pulse and returns the time at which it began, without waiting for its end.
+    ///
+    /// Only the frames show whether the camera took it: a pulse on an open wire, or to a camera
+    /// that is stopped or busy, is lost.
+    ///
+    /// # Errors
+    /// The device's error.
+    fn fire(&mut self) -> Result<Timestamp, Error>;
+
+    /// From now on the camera exposes `times` as long as its own `exposure`: so do pulses that set
+    /// the exposure.
+    fn expose(&mut self, _exposure: Duration, _times: u32) {}
+
+    /// The next spoiled pulse that was not fetched yet; at most the latest [`REMEMBERED`] are kept.
+    ///
+    /// A spoiled pulse is known as soon as it has ended. So a caller that first fetches a frame and
+    /// then calls this learns of the pulse that exposed it. A trigger that does not measure its
+    /// pulses returns `None`.
+    fn poll_spoiled(&mut self) -> Option<Spoiled> {
+        None
+    }
+}
+
+/// No trigger, for a camera that runs by itself.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoTrigger;
+
+impl Trigger for NoTrigger {
+    /// # Errors
+    /// Always `Unsupported`.
+    fn fire(&mut self) -> Result<Timestamp, Error> {
+        Err(Error::unsupported(
+            "triggering the camera without a trigger line",
+            "name the line in head.trigger.line",
+        ))
+    }
+}
 
 /// Readings of the head's clock around the two edges of a pulse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +93,7 @@ pub struct Edges {
 /// A pulse that was too long or too short, or that may have been.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Spoiled {
-    /// When it began, as [`super::Trigger::fire`] returned.
+    /// When it began, as [`Trigger::fire`] returned.
     pub fired: Timestamp,
     /// How long it should have lasted.
     pub width: Duration,
@@ -95,6 +142,22 @@ impl Spoiled {
     pub fn ended(&self) -> Timestamp {
         self.fired + (self.width + self.longer)
     }
+}
+
+/// The latest spoiled pulses, oldest first; filled with [`keep_latest`].
+pub(crate) type SpoiledPulses = Deque<Spoiled, REMEMBERED>;
+
+/// Appends `item` to a queue of the latest items; if it is full, its oldest item is removed first and
+/// returned.
+pub(crate) fn keep_latest<T, const N: usize>(queue: &mut Deque<T, N>, item: T) -> Option<T> {
+    let oldest = if queue.is_full() {
+        queue.pop_front()
+    } else {
+        None
+    };
+    // There is room now, unless N is 0.
+    let _ = queue.push_back(item);
+    oldest
 }
 
 #[cfg(test)]

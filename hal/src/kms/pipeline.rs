@@ -1,5 +1,9 @@
 //! The display pipeline from a buffer to the projector: a plane, the CRTC that shows it, and the
-//! connector.
+//! connector, with settings that leave grey levels unchanged.
+//!
+//! A pattern is measured, not looked at: 0…255 must reach the projector as 0…255, pixel by pixel.
+//! Drivers may scale, dither or convert colours for better pictures. A property is set only if the
+//! driver has it with another value.
 
 use std::fs::File;
 use std::io;
@@ -7,13 +11,12 @@ use std::os::unix::fs::FileExt;
 use std::path::PathBuf;
 
 use drm::control::atomic::AtomicModeReq;
+use drm::control::property::ValueType;
 use drm::control::{AtomicCommitFlags, Device, Mode, crtc, property};
 
-use super::card::{Card, Properties, refused};
-use super::find::{crtc_for, no_mode, primary_plane, the_connector};
-use super::modes::{Timings, choose};
-use super::{canvas, faithful};
-use crate::error::{self, Error};
+use super::card::{Canvas, Card, FORMAT, Properties, refused};
+use super::find::{Timings, choose, crtc_for, no_mode, primary_plane, the_connector};
+use crate::error::{DeviceKind, Error};
 use crate::setup::ProjectorSetup;
 
 /// Where the kernel shows the state of its connectors.
@@ -23,9 +26,50 @@ const CONNECTORS: &str = "/sys/class/drm";
 /// without a display that answers.
 type Edid = [u8; 128];
 
+/// A value by its name in a list of names, or a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wanted {
+    Named(&'static str),
+    Number(u64),
+}
+
+/// Properties of a connector by the kernel's names, grouped by driver.
+const CONNECTOR: &[(&str, Wanted)] = &[
+    // Black is 0 and white is 255, also on television modes.
+    ("Broadcast RGB", Wanted::Named("Full")),
+    ("output_csc", Wanted::Named("bypass")),
+    // No dithering.
+    ("dithering mode", Wanted::Named("off")),
+    ("dither", Wanted::Named("off")),
+    // No borders and no scaling: pixel for pixel.
+    ("left margin", Wanted::Number(0)),
+    ("right margin", Wanted::Number(0)),
+    ("top margin", Wanted::Number(0)),
+    ("bottom margin", Wanted::Number(0)),
+    ("underscan", Wanted::Named("off")),
+    ("scaling mode", Wanted::Named("None")),
+    ("Colorspace", Wanted::Named("Default")),
+];
+
+/// Properties of a CRTC: no look-up tables and colour matrices between buffer and connector, and a
+/// constant refresh rate.
+const CRTC: &[(&str, Wanted)] = &[
+    ("DEGAMMA_LUT", Wanted::Number(0)),
+    ("CTM", Wanted::Number(0)),
+    ("GAMMA_LUT", Wanted::Number(0)),
+    ("VRR_ENABLED", Wanted::Number(0)),
+];
+
+/// Properties of a plane: not rotated and opaque, whatever another program has set before.
+const PLANE: &[(&str, Wanted)] = &[
+    // The bit for 0°.
+    ("rotation", Wanted::Number(1)),
+    ("alpha", Wanted::Number(0xffff)),
+];
+
 /// A connector in its mode.
 #[derive(Debug)]
-pub(super) struct Output {
+pub(super) struct Pipeline {
     pub card: Card,
     pub crtc: crtc::Handle,
     pub timings: Timings,
@@ -44,7 +88,7 @@ pub(super) struct Output {
     edid: Option<(File, Edid)>,
 }
 
-impl Output {
+impl Pipeline {
     /// Finds the card, connector and mode of a setup, and becomes the card's master. Sets nothing
     /// yet.
     pub fn find(setup: &ProjectorSetup) -> Result<Self, Error> {
@@ -65,13 +109,13 @@ impl Output {
             })?;
         let plane = primary_plane(&card, &all, crtc)?.ok_or_else(|| {
             Error::unsupported(
-                format!("showing {} on {name}", canvas::FORMAT),
+                format!("showing {} on {name}", FORMAT),
                 "use a driver that has it",
             )
         })?;
-        let file = |of: &str| {
+        let file = |kind: &str| {
             let folder = format!("{}-{name}", card.path.file_name()?.to_string_lossy());
-            File::open(PathBuf::from(CONNECTORS).join(folder).join(of)).ok()
+            File::open(PathBuf::from(CONNECTORS).join(folder).join(kind)).ok()
         };
         let status = file("status");
         let edid = file("edid").map(|file| {
@@ -104,7 +148,7 @@ impl Output {
         let attempt = || format!("{attempt} on {}", self.name);
         match status.read_at(&mut text, 0) {
             Ok(_) if text.starts_with(b"disconnected") => {
-                Err(Error::disconnected(error::DeviceKind::Projector, attempt()))
+                Err(Error::disconnected(DeviceKind::Projector, attempt()))
             }
             Ok(_) => Ok(()),
             Err(error) => Err(refused(attempt(), &error)),
@@ -121,7 +165,7 @@ impl Output {
             .map(|(file, known)| (known, described(file)));
         match now {
             Some((known, now)) if now != [0; 128] && now != *known => Err(Error::Disconnected {
-                device: error::DeviceKind::Projector,
+                device: DeviceKind::Projector,
                 attempt: format!("showing {} on {}", self.timings, self.name),
                 remedy: "another display answers there now, or the same one with other modes (EDID): the head is opened again with its modes"
                     .into(),
@@ -131,7 +175,7 @@ impl Output {
     }
 
     /// Sets the mode and shows `canvas`. Waits for the display.
-    pub fn switch_on(&self, canvas: &canvas::Canvas) -> Result<(), Error> {
+    pub fn switch_on(&self, canvas: &Canvas) -> Result<(), Error> {
         let attempt = format!("setting {} on {}", self.timings, self.name);
         let failed = |error| refused(attempt.clone(), &error);
         let mode = self.card.create_property_blob(&self.mode).map_err(failed)?;
@@ -144,7 +188,7 @@ impl Output {
     }
 
     /// Shows another canvas with the next refresh; an event follows. Does not wait.
-    pub fn flip(&self, canvas: &canvas::Canvas) -> io::Result<()> {
+    pub fn flip(&self, canvas: &Canvas) -> io::Result<()> {
         let mut request = AtomicModeReq::new();
         request.add_raw_property(
             self.plane.object,
@@ -179,7 +223,7 @@ impl Output {
 
     /// The commit that sets the mode. It also sets every property that would change grey levels to
     /// a neutral value, and removes everything else from the CRTC.
-    fn mode_request(&self, mode: u64, canvas: &canvas::Canvas) -> Result<AtomicModeReq, Error> {
+    fn mode_request(&self, mode: u64, canvas: &Canvas) -> Result<AtomicModeReq, Error> {
         let mut request = AtomicModeReq::new();
         let (width, height) = (
             u64::from(self.timings.width),
@@ -211,15 +255,15 @@ impl Output {
     }
 
     /// Sets the properties that would change grey levels, such as gamma or scaling, to neutral
-    /// values ([`faithful`]).
+    /// values.
     fn be_faithful(&self, request: &mut AtomicModeReq) {
         for (object, wanted) in [
-            (&self.connector, faithful::CONNECTOR),
-            (&self.crtc_properties, faithful::CRTC),
-            (&self.plane, faithful::PLANE),
+            (&self.connector, CONNECTOR),
+            (&self.crtc_properties, CRTC),
+            (&self.plane, PLANE),
         ] {
             for property in object.all.iter().filter(|property| property.info.mutable()) {
-                let value = faithful::find(wanted, &property.name, property.info.value_type());
+                let value = neutral(wanted, &property.name, property.info.value_type());
                 if let Some(value) = value.filter(|value| *value != property.value) {
                     request.add_raw_property(object.object, property.info.handle(), value);
                 }
@@ -238,22 +282,22 @@ impl Output {
         let crtc = u64::from(u32::from(self.crtc));
         let planes = self.card.plane_handles().map_err(failed)?;
         let all = self.card.resource_handles().map_err(failed)?;
-        let mut others = Vec::new();
+        let mut shown = Vec::new();
         for plane in planes {
-            others.push((self.card.properties(plane)?, &["FB_ID", "CRTC_ID"][..]));
+            shown.push((self.card.properties(plane)?, &["FB_ID", "CRTC_ID"][..]));
         }
         for connector in all.connectors() {
-            others.push((self.card.properties(*connector)?, &["CRTC_ID"][..]));
+            shown.push((self.card.properties(*connector)?, &["CRTC_ID"][..]));
         }
-        for (other, names) in others {
-            let ours = other.object == self.plane.object || other.object == self.connector.object;
-            let here = other
+        for (object, names) in shown {
+            let ours = object.object == self.plane.object || object.object == self.connector.object;
+            let here = object
                 .all
                 .iter()
                 .any(|property| property.name == "CRTC_ID" && property.value == crtc);
             if here && !ours {
                 for name in names {
-                    other.set(request, name, 0)?;
+                    object.set(request, name, 0)?;
                 }
             }
         }
@@ -267,5 +311,23 @@ fn described(file: &File) -> Edid {
     match file.read_at(&mut edid, 0) {
         Ok(128) => edid,
         _ => [0; 128],
+    }
+}
+
+/// The value that a property should have, by one of the lists above; none if it does not matter or
+/// the driver has no such value.
+fn neutral(known: &[(&str, Wanted)], name: &str, kind: &ValueType) -> Option<u64> {
+    let (_, wanted) = known.iter().find(|(known, _)| *known == name)?;
+    match (wanted, kind) {
+        (Wanted::Number(number), _) => Some(*number),
+        (Wanted::Named(wanted), ValueType::Enum(values)) => {
+            let (numbers, names) = values.values();
+            let is_wanted = |name: &str| name.eq_ignore_ascii_case(wanted);
+            let at = names
+                .iter()
+                .position(|value| value.name().to_str().is_ok_and(is_wanted))?;
+            numbers.get(at).copied()
+        }
+        (Wanted::Named(_), _) => None,
     }
 }

@@ -1,15 +1,42 @@
-//! Debouncing of a start line: which of its edges is a start.
-//!
-//! A level counts when the line has kept it for the debounce time, so neither the bounces of a
-//! contact nor the spike of a press's motor start a cycle. The kernel queues 16 edges and drops
-//! further ones without notice. So the level after the last edge counts only if the line is read at
-//! the same level when it has settled.
+//! The lines between a station and the machine that starts it by wire, as traits: start as input;
+//! busy, ok and fault as outputs. [`Debounce`] says which edges of a start line are a start.
 
+use std::os::fd::AsFd;
 use std::time::Duration;
 
+use crate::error::Error;
 use crate::units::Timestamp;
 
-/// The state of a line, from its edges.
+/// A line that starts cycles. Its descriptor is readable as long as there are edges that were not
+/// fetched.
+pub trait StartLine: AsFd + Send {
+    /// The start that has come since the last call, if any: the time since which the line is
+    /// active. Does not wait.
+    ///
+    /// # Errors
+    /// `Disconnected` if the line's chip is gone.
+    fn poll_start(&mut self) -> Result<Option<Timestamp>, Error>;
+
+    /// When to call [`StartLine::poll_start`] again even if the descriptor is not readable: the
+    /// line may have settled by then.
+    fn settles(&self) -> Option<Timestamp>;
+}
+
+/// A line that shows a state of the station.
+pub trait OutputLine: Send {
+    /// Switches it on or off.
+    ///
+    /// # Errors
+    /// `Disconnected` if the line's chip is gone.
+    fn set(&mut self, on: bool) -> Result<(), Error>;
+}
+
+/// The state of a start line, from its edges.
+///
+/// A level counts when the line has kept it for the debounce time, so neither the bounces of a
+/// contact nor the spike of a press's motor start a cycle. The kernel queues 16 edges and drops
+/// further ones without notice. So the level after the last edge counts only if the line is read at
+/// the same level when it has settled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Debounce {
     quiet: Duration,

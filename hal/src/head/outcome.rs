@@ -1,14 +1,60 @@
-//! Why a sequence ended without all its frames, as an error with the counts and the remedy.
+//! How a sequence was taken, or why it ended without all its frames: as an error with the counts and
+//! the remedy.
 //!
-//! A camera that times out between two frames: the attempt is overdue, and its pattern is shown
-//! again before later ones, up to `MAX_ATTEMPTS` times or until the deadline. Then the error is
-//! `Timeout` if the camera fell silent, the projector never flipped, time ran out, or pulses of the
-//! trigger spoiled most frames, and `Protocol` if frames came that fit no pattern.
+//! If the camera gives no frame within the time of an attempt, the attempt is overdue, and its
+//! pattern is shown again before later ones, up to `MAX_ATTEMPTS` times or until the deadline. Then
+//! the error is `Timeout` if the camera fell silent, the projector never flipped, time ran out, or
+//! pulses of the trigger spoiled most frames, and `Protocol` if frames came that fit no pattern.
 
 use std::time::Duration;
 
-use super::Exposure;
 use crate::error::Error;
+use crate::units::Timestamp;
+
+/// How a sequence was taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Exposure {
+    /// How long the camera took to start; zero if it was on.
+    pub start_up: Duration,
+    /// When the first pattern came into view.
+    pub started: Timestamp,
+    /// When the exposure of the last frame started.
+    pub done: Timestamp,
+    /// Longest time from a pattern's coming into view to the start of its exposure.
+    pub lag: Duration,
+    /// Largest difference of a flip's stamp from its time by the count, and of an exposure's start
+    /// from its trigger.
+    pub sync_error: Duration,
+    /// How often a pattern was shown again because it had given no usable frame.
+    pub retaken: u32,
+    /// Refreshes by which flips were later than planned.
+    pub missed_flips: u32,
+    /// Frames that were exposed and never arrived: gaps in the camera's count.
+    pub dropped: u32,
+    /// Frames that arrived more than once.
+    pub duplicated: u32,
+    /// Frames that were exposed during a change of patterns.
+    pub straddled: u32,
+    /// Frames that were exposed before the first pattern, or arrived much too late.
+    pub stale: u32,
+    /// Frames whose exposure started at no trigger.
+    pub unexplained: u32,
+    /// Frames of patterns that had their frame already.
+    pub surplus: u32,
+    /// Frames that were exposed for too long or too short because the trigger's pulse was.
+    pub spoiled: u32,
+    /// Largest possible error of the length of such a pulse.
+    pub pulse_error: Duration,
+}
+
+impl Exposure {
+    /// Frames that arrived and could not be used.
+    pub(super) fn unfit(&self) -> u32 {
+        [self.straddled, self.stale, self.unexplained, self.spoiled]
+            .into_iter()
+            .fold(0, u32::saturating_add)
+    }
+}
 
 /// What prevented the sequence from ending.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,7 +92,8 @@ pub(super) struct Failure {
     pub index: usize,
     pub attempts: u32,
     pub taken: usize,
-    pub of: usize,
+    /// Patterns of the sequence.
+    pub patterns: usize,
     pub so_far: Exposure,
 }
 
@@ -56,7 +103,7 @@ impl Failure {
         let (attempts, so_far) = (self.attempts, self.so_far);
         let acquiring = format!(
             "acquiring pattern {} ({} of {} taken)",
-            self.index, self.taken, self.of
+            self.index, self.taken, self.patterns
         );
         let counts = format!(
             "{} frames straddled two patterns, {} were older, {} began at no trigger, {} were spoiled by their pulses, {} were lost, \
