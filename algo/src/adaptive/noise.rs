@@ -15,9 +15,9 @@
 //! n is the noise of the phase where M = 1, and R what the squares of the projector's pixels add
 //! ([`replicas`]), both in radian.
 
-use super::contrast::{Blur, Optics, contrast, replicas};
+use super::blur::{Blur, FringeOptics, contrast, replicas};
 use super::field::Field;
-use super::integrate::balanced_rows;
+use super::field::balanced_rows;
 use super::{AdaptError, ProjectorMap};
 use crate::math::around;
 use crate::pattern::PhaseFunction;
@@ -161,7 +161,12 @@ struct Asked {
 /// 99.8 % of the maximum within both limits of pitch, or the highest with the contrast that is
 /// asked for, if that is lower. `near` are the steps of a similar pixel, from which the search
 /// begins, and become those of this one.
-fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked, near: &mut [usize; 3]) -> f64 {
+fn best_frequency(
+    optics: &FringeOptics,
+    [ju, jv]: [f64; 2],
+    asked: Asked,
+    near: &mut [usize; 3],
+) -> f64 {
     let blur = &optics.blur;
     let slope = libm::sqrt(ju * ju + jv * jv);
     let coarsest = 1.0 / MAX_PITCH;
@@ -258,7 +263,7 @@ pub fn adapt(
     map: &ProjectorMap,
     columns: usize,
     rows: usize,
-    optics: &Optics,
+    optics: &FringeOptics,
     light: &Light,
     progress: Progress<'_>,
 ) -> Result<PhaseFunction, AdaptError> {
@@ -291,7 +296,7 @@ pub fn adapt(
 fn frequencies(
     slopes: &[[f64; 2]],
     width: usize,
-    (optics, light): (&Optics, &Light),
+    (optics, light): (&FringeOptics, &Light),
     progress: Progress<'_>,
 ) -> Vec<f64> {
     let mut frequencies = vec![f64::NAN; slopes.len()];
@@ -313,7 +318,7 @@ fn frequencies(
 mod tests {
     use super::*;
 
-    const FREE: Optics = Optics {
+    const FREE: FringeOptics = FringeOptics {
         blur: Blur {
             projector: 0.0,
             camera: 0.0,
@@ -328,13 +333,13 @@ mod tests {
     };
 
     /// The best frequency, searched for from the coarsest.
-    fn alone(optics: &Optics, slope: [f64; 2], asked: Asked) -> f64 {
+    fn alone(optics: &FringeOptics, slope: [f64; 2], asked: Asked) -> f64 {
         best_frequency(optics, slope, asked, &mut [0; 3])
     }
 
-    fn blurred(projector: f64, camera: f64) -> Optics {
+    fn blurred(projector: f64, camera: f64) -> FringeOptics {
         let blur = Blur { projector, camera };
-        Optics { blur, ..FREE }
+        FringeOptics { blur, ..FREE }
     }
 
     #[test]
@@ -401,7 +406,7 @@ mod tests {
         // Each search begins where the one before ended.
         let mut near = [0; 3];
         for at in 0..6000 {
-            let optics = Optics {
+            let optics = FringeOptics {
                 projector_pitch: 4.0 + f64::from(at % 3),
                 image_pitch: IMAGE_PITCH,
                 ..blurred(
@@ -442,7 +447,7 @@ mod tests {
 
     #[test]
     fn limits_of_pitch_hold() {
-        let optics = Optics {
+        let optics = FringeOptics {
             projector_pitch: 8.0,
             image_pitch: 5.0,
             ..FREE

@@ -9,17 +9,17 @@
 //! View Geometry", section 6.2.4). No shift of the projector's lens disturbs it.
 
 use super::board::Board;
-use super::pose::Pose;
+use super::rig::Pose;
 use crate::geometry::{Lens, Vector};
 use crate::math::solve::Normal;
 use alloc::vec::Vec;
 
 /// A corner's place on the board and in the picture.
-pub(super) type Pair = ((f64, f64), (f64, f64));
+pub(super) type Correspondence = ((f64, f64), (f64, f64));
 
 /// The columns of H from places on the board to places in the picture, both about their centres and
 /// of the order of 1: then its last element is not 0 and is set to 1.
-fn homography(pairs: impl Iterator<Item = Pair>) -> Option<[Vector; 3]> {
+fn homography(pairs: impl Iterator<Item = Correspondence>) -> Option<[Vector; 3]> {
     let equations = pairs.flat_map(|((x, y), (u, v))| {
         [
             ([x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], u),
@@ -39,7 +39,7 @@ fn homography(pairs: impl Iterator<Item = Pair>) -> Option<[Vector; 3]> {
 pub(super) fn camera(
     board: &Board,
     (width, height): (usize, usize),
-    poses: &[Vec<Pair>],
+    poses: &[Vec<Correspondence>],
 ) -> Option<(Lens, Vec<Pose>)> {
     let (cx, cy) = ((width as f64 - 1.0) / 2.0, (height as f64 - 1.0) / 2.0);
     let (scale, size) = (

@@ -1,10 +1,10 @@
 //! From views of a board to an adjusted rig, or the pose that is to blame.
 
-use super::adjust::{Adjusted, Undetermined, View, adjust};
+use super::adjust::{Adjusted, Undetermined, adjust};
 use super::board::Board;
-use super::initial::{self, Mirrored, Pair};
-use super::pose::Pose;
-use super::rig::{Rig, SHARED};
+use super::initial::{self, Correspondence, Mirrored};
+use super::look::BoardView;
+use super::rig::{Pose, Rig, SHARED};
 use crate::geometry::Vector;
 use crate::math::solve::Normal;
 use alloc::vec::Vec;
@@ -124,7 +124,7 @@ impl CalibrationError {
 pub fn calibrate(
     board: &Board,
     frame: (usize, usize),
-    views: &[View],
+    views: &[BoardView],
 ) -> Result<Adjusted, CalibrationError> {
     if views.len() < LEAST_POSES {
         return Err(CalibrationError::Few { given: views.len() });
@@ -134,7 +134,7 @@ pub fn calibrate(
         Ok(rig) => adjusted(rig, views),
         // The finding is named only if nothing else is wrong.
         Err(mirrored) => {
-            let righted: Vec<View> = views.iter().map(|view| mirrored.righted(view)).collect();
+            let righted: Vec<BoardView> = views.iter().map(|view| mirrored.righted(view)).collect();
             let rig = first(board, frame, &righted).and_then(Result::ok);
             adjusted(rig.ok_or(Undetermined)?, &righted)?;
             Err(match mirrored {
@@ -147,7 +147,7 @@ pub fn calibrate(
 
 /// The geometry of these views as it is known before it is adjusted: angles are right within a few
 /// degrees. `None` if there are too few, or they do not determine it.
-pub fn estimate(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Rig> {
+pub fn estimate(board: &Board, frame: (usize, usize), views: &[BoardView]) -> Option<Rig> {
     if views.len() < LEAST_POSES {
         return None;
     }
@@ -155,7 +155,7 @@ pub fn estimate(board: &Board, frame: (usize, usize), views: &[View]) -> Option<
 }
 
 /// Adjusts a rig from first values, and checks what is left.
-fn adjusted(first: Rig, views: &[View]) -> Result<Adjusted, CalibrationError> {
+fn adjusted(first: Rig, views: &[BoardView]) -> Result<Adjusted, CalibrationError> {
     let flat = adjust(first, views, false)?;
     fits(&flat)?;
     let bowed = (views.len() >= BOWED_FROM)
@@ -176,8 +176,12 @@ fn adjusted(first: Rig, views: &[View]) -> Result<Adjusted, CalibrationError> {
 
 /// First values in closed form; the error says how one picture is mirrored, `None` that the views
 /// do not determine them.
-fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Result<Rig, Mirrored>> {
-    let pairs: Vec<Vec<Pair>> = views
+fn first(
+    board: &Board,
+    frame: (usize, usize),
+    views: &[BoardView],
+) -> Option<Result<Rig, Mirrored>> {
+    let pairs: Vec<Vec<Correspondence>> = views
         .iter()
         .map(|view| {
             let corners = view.found.corners.iter().enumerate();
@@ -211,7 +215,7 @@ fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Result<
 
 impl Mirrored {
     /// The view by a projector that is not mirrored.
-    fn righted(self, view: &View) -> View {
+    fn righted(self, view: &BoardView) -> BoardView {
         let mut righted = view.clone();
         for node in &mut righted.nodes {
             let (xi, eta) = node.lit_by;
@@ -231,7 +235,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Checks that no pose is much less sharp than the others.
-fn sharp(views: &[View]) -> Result<(), CalibrationError> {
+fn sharp(views: &[BoardView]) -> Result<(), CalibrationError> {
     let median = median(views.iter().map(|view| view.found.blur()));
     for (pose, view) in views.iter().enumerate() {
         let blur = view.found.blur();

@@ -8,11 +8,10 @@
 //! there are no borders, and half a cell is small.
 //!
 //! A lens that blurs more than a cell takes the contrast of the finest bits first. The bits above
-//! them are a code of cells that are 2, 4 or 8 times as wide, and a pixel is read by as many bits as
-//! it resolves.
+//! them are a code of cells that are 2, 4 or 8 times as wide, and a pixel is read by as many bits
+//! as it resolves.
 
 use super::{Cells, CodeError, CodePictures};
-use crate::frame::{FrameView, Samples};
 use crate::pipeline::{PhaseMap, for_each_row};
 use crate::trust::{LeastModulation, Trust};
 use crate::units::{AbsolutePhase, Modulation};
@@ -42,7 +41,7 @@ pub struct CodePhases {
 
 /// What a pixel sees of a code.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pixel {
+struct CodePixel {
     /// Its bits.
     seen: u16,
     /// Those of them that are in doubt.
@@ -78,14 +77,14 @@ impl CodePictures<'_> {
         let count = self.bits.len();
         let (width, height) = self.size()?;
         let least = least.counts(full_scale);
-        let mut pixels = vec![Pixel::default(); width * height];
+        let mut pixels = vec![CodePixel::default(); width * height];
         for_each_row(&mut pixels, width, |v, row| {
             let mut contrasts = vec![0.0; count];
             for (u, pixel) in row.iter_mut().enumerate() {
                 for (bit, contrast) in contrasts.iter_mut().enumerate() {
                     *contrast = self.contrast(bit, u, v);
                 }
-                *pixel = Pixel::of(&contrasts, cells, least);
+                *pixel = CodePixel::of(&contrasts, cells, least);
             }
         });
         let refined = self.refined(&pixels, cells, (width, height), vertical);
@@ -109,8 +108,11 @@ impl CodePictures<'_> {
     /// How far the sample of a bit's picture is above the middle between bright and dark, counts.
     fn contrast(&self, bit: usize, u: usize, v: usize) -> f64 {
         let against = self.against.get(bit).unwrap_or(&self.against[0]);
-        let sum: f64 = against.iter().map(|frame| sample(frame, u, v)).sum();
-        let own = sample(&self.bits[bit], u, v);
+        let sum: f64 = against
+            .iter()
+            .map(|frame| f64::from(frame.row(v).at(u)))
+            .sum();
+        let own = f64::from(self.bits[bit].row(v).at(u));
         // An inverse picture is as far below the middle as the bit's own is above it.
         match against.len() {
             1 => (own - sum) / 2.0,
@@ -122,7 +124,7 @@ impl CodePictures<'_> {
     /// are seen, and how many bits are missing where they are not.
     fn refined(
         &self,
-        pixels: &[Pixel],
+        pixels: &[CodePixel],
         cells: &Cells,
         (width, height): (usize, usize),
         vertical: bool,
@@ -214,7 +216,7 @@ impl CodePictures<'_> {
     }
 }
 
-impl Pixel {
+impl CodePixel {
     /// What a pixel sees, from the contrast of each bit of a code of these cells, the most
     /// significant bit first.
     fn of(contrasts: &[f64], cells: &Cells, least: f64) -> Self {
@@ -294,17 +296,11 @@ impl Cells {
     }
 }
 
-fn sample(frame: &FrameView<'_>, u: usize, v: usize) -> f64 {
-    match frame.row(v) {
-        Samples::Eight(row) => f64::from(row[u]),
-        Samples::Sixteen(row) => f64::from(row[u]),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::Coding;
     use super::*;
+    use crate::frame::{FrameView, Samples};
 
     const WIDTH: usize = 90;
     const HEIGHT: usize = 7;
@@ -510,15 +506,15 @@ mod tests {
         let cells = |count, binary| cells_of(3, count, binary);
         let gray = cells(8, false);
         // Cells 5 and 6 of 8 show 111 and 101.
-        let border = Pixel::of(&[100.0, 3.0, 90.0], &gray, 16.0);
+        let border = CodePixel::of(&[100.0, 3.0, 90.0], &gray, 16.0);
         assert_eq!((border.trust, border.place), (Trust::Resolved, 6.0));
         // Without the highest bit it may be one of the cells 2 and 5.
-        let far = Pixel::of(&[3.0, 100.0, 90.0], &gray, 16.0);
+        let far = CodePixel::of(&[3.0, 100.0, 90.0], &gray, 16.0);
         assert_eq!(far.trust, Trust::Residual);
-        let two = Pixel::of(&[100.0, 3.0, 3.0, 90.0], &cells_of(4, 16, false), 16.0);
+        let two = CodePixel::of(&[100.0, 3.0, 3.0, 90.0], &cells_of(4, 16, false), 16.0);
         assert_eq!(two.trust, Trust::Residual);
         // If they are the finest, it lies in the middle of four cells.
-        let four = Pixel::of(&[100.0, 3.0, 3.0], &gray, 16.0);
+        let four = CodePixel::of(&[100.0, 3.0, 3.0], &gray, 16.0);
         assert_eq!(
             (four.trust, four.without, four.place),
             (Trust::Resolved, 1, 6.0)
@@ -526,13 +522,16 @@ mod tests {
         // Light that makes five bits out of ten comes by way of something else.
         let mut stray = [2.0; 10];
         stray[..5].copy_from_slice(&[50.0, 30.0, 25.0, 15.0, 20.0]);
-        let stray = Pixel::of(&stray, &cells_of(10, 1024, false), 16.0);
+        let stray = CodePixel::of(&stray, &cells_of(10, 1024, false), 16.0);
         assert_eq!(stray.trust, Trust::LowModulation);
-        assert_eq!(Pixel::of(&[9.0, -9.0, 9.0], &gray, 16.0).trust, Trust::Dark);
-        let beside = Pixel::of(&[100.0, 90.0, 90.0], &cells(5, false), 16.0);
+        assert_eq!(
+            CodePixel::of(&[9.0, -9.0, 9.0], &gray, 16.0).trust,
+            Trust::Dark
+        );
+        let beside = CodePixel::of(&[100.0, 90.0, 90.0], &cells(5, false), 16.0);
         assert_eq!(beside.trust, Trust::Residual);
         // In plain binary two bits change from cell 5 to cell 6, and the middle one never alone.
-        let border = Pixel::of(&[100.0, -3.0, 4.0], &cells(8, true), 16.0);
+        let border = CodePixel::of(&[100.0, -3.0, 4.0], &cells(8, true), 16.0);
         assert_eq!(
             (
                 border.trust,
@@ -543,7 +542,7 @@ mod tests {
             ),
             (Trust::Resolved, 6.0, 5)
         );
-        let middle = Pixel::of(&[100.0, 3.0, 90.0], &cells(8, true), 16.0);
+        let middle = CodePixel::of(&[100.0, 3.0, 90.0], &cells(8, true), 16.0);
         assert_eq!(middle.trust, Trust::Residual);
     }
 }

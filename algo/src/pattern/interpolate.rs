@@ -8,8 +8,8 @@ pub(super) fn catmull_rom(turns: &[f64], size: (usize, usize), point: (f64, f64)
 
 /// The value anywhere.
 fn anywhere(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64)) -> f64 {
-    let (column, across) = Cell::new(xi, columns);
-    let (row, down) = Cell::new(eta, rows);
+    let (column, across) = LinePosition::new(xi, columns);
+    let (row, down) = LinePosition::new(eta, rows);
     let mut lines = [0.0; 4];
     for (line, offset) in lines.iter_mut().zip(-1_isize..) {
         *line = extended(row + offset, rows, |row| {
@@ -73,25 +73,25 @@ fn weights(t: f64) -> [f64; 4] {
 }
 
 /// The position of a point between two samples of a line.
-enum Cell {
+enum LinePosition {
     /// In or next to the raster: the fraction of the cell, for Catmull–Rom.
     Within(f64),
     /// Far outside: the distance from the cell's start, for linear continuation.
     Beyond(f64),
 }
 
-impl Cell {
+impl LinePosition {
     /// The sample before `x` on a line of `count` samples, and the position after it.
     #[inline]
     fn new(x: f64, count: usize) -> (isize, Self) {
         let floor = libm::floor(x);
         if floor >= -2.0 && floor <= count as f64 {
-            (floor as isize, Cell::Within(x - floor))
+            (floor as isize, LinePosition::Within(x - floor))
         } else if x < 0.0 {
-            (-2, Cell::Beyond(x + 2.0))
+            (-2, LinePosition::Beyond(x + 2.0))
         } else {
             // A NaN lands here and stays a NaN.
-            (count as isize, Cell::Beyond(x - count as f64))
+            (count as isize, LinePosition::Beyond(x - count as f64))
         }
     }
 
@@ -99,12 +99,12 @@ impl Cell {
     #[inline]
     fn interpolate(&self, [a, b, c, d]: [f64; 4]) -> f64 {
         match *self {
-            Cell::Within(t) => {
+            LinePosition::Within(t) => {
                 let cubic = 3.0 * (b - c) + d - a;
                 let square = 2.0 * a - 5.0 * b + 4.0 * c - d;
                 b + 0.5 * t * ((c - a) + t * (square + t * cubic))
             }
-            Cell::Beyond(distance) => b + distance * (c - b),
+            LinePosition::Beyond(distance) => b + distance * (c - b),
         }
     }
 }

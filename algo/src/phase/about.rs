@@ -316,11 +316,10 @@ impl<V: Lanes> DenseLanes<V> {
         let mut fast = Absolute::from_wrapped(v, fast_beat);
         if let Some((ratio, slow)) = &self.middle {
             q_m = v.sub(levels.middle.phase[half], ratio.fraction_below_one(v, map));
-            let slow_beat = v.sub(q_f, q_m);
-            let slow_beat = Absolute::from_wrapped(v, slow_beat);
-            [(fast, residual), _] = slow.unwrap(v, [slow_beat; 2], [fast_beat; 2]);
+            let slow_beat = Absolute::from_wrapped(v, v.sub(q_f, q_m));
+            (fast, residual) = slow.unwrap(v, slow_beat, fast_beat);
         }
-        let [(d_f, residual_fast), _] = self.fast.unwrap(v, [fast; 2], [q_f; 2]);
+        let (d_f, residual_fast) = self.fast.unwrap(v, fast, q_f);
         let d_f = d_f.turns;
         let e_c = v.sub(self.coarse.fraction_below_one(v, d_f), q_c);
         residual = v.max_unsigned(residual, v.max_unsigned(residual_fast, v.abs(e_c)));

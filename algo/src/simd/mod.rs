@@ -13,8 +13,6 @@
 #![allow(unsafe_code)]
 
 mod lanes;
-pub(crate) mod plain;
-mod results;
 mod rows;
 #[cfg(test)]
 mod tests;
@@ -22,8 +20,7 @@ mod tests;
 mod x86;
 
 pub(crate) use lanes::{Lanes, MAX_PIXELS};
-pub(crate) use results::Results;
-pub(crate) use rows::Rows;
+pub(crate) use rows::{Results, Rows, phase_bits};
 
 /// A back-end of the phase kernels: the instructions that they are compiled for. All give the same
 /// bits.

@@ -10,8 +10,8 @@ use super::shape::Shape;
 use super::start::start;
 use super::verdict::{Outcome, State, state};
 use super::view::{Setup, View};
-use crate::math::associate::{Point, associate, response};
 use crate::math::complex::Complex;
+use crate::math::solve::{Point, associate, response};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 

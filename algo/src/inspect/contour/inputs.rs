@@ -5,7 +5,7 @@ use super::beyond::{Wall, slope};
 use super::find::Contour;
 use super::shape::Shape;
 use super::view::Setup;
-use crate::math::associate::Point;
+use crate::math::solve::Point;
 use alloc::vec::Vec;
 
 /// A shift of every edge towards its material, px: by the model of the edge. Diameters of rendered

@@ -16,7 +16,7 @@
 //! `start` finds the contour to a tenth of a pixel on some of its normals. `piece` divides it and
 //! gathers the pixels of each piece, whose levels `sample` demodulates and adds. `fit` finds the
 //! edge of each piece by the profile of `edge` and what `beyond` knows of walls and floors,
-//! [`associate`](crate::math::associate) the shape through the edges, `find` does this with some of
+//! [`associate`](crate::math::solve) the shape through the edges, `find` does this with some of
 //! the pieces until nothing moves and with all of them in the end, and `verdict` says whether the
 //! contour is found, absent or unseen. `inputs` states what else is uncertain.
 //!
@@ -36,7 +36,7 @@ mod start;
 mod verdict;
 mod view;
 
-pub use crate::math::associate::Point;
+pub use crate::math::solve::Point;
 pub use find::{Contour, find};
 pub use inputs::{Input, PIECE_PX, Source, inputs};
 pub use verdict::{Outcome, State};

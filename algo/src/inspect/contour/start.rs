@@ -8,8 +8,8 @@
 use super::sample::Signals;
 use super::shape::Shape;
 use super::view::View;
-use crate::math::associate::{Point, associate};
 use crate::math::complex::Complex;
+use crate::math::solve::{Point, associate};
 use alloc::vec::Vec;
 
 /// Distance of normals, px, and how many there are at most.

@@ -32,7 +32,7 @@ use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed, form};
 use crate::inspect::contour::Source;
 use crate::inspect::feature::{FittedPlane, Geometry, Parameters, Rim};
-use crate::math::derivative::derivative;
+use crate::math::derivative;
 
 /// A plane, and how it depends on what was measured.
 #[derive(Clone, Copy, Debug)]

@@ -11,7 +11,7 @@ use super::edge::Edge;
 use super::find::Section;
 use super::geometry::Geometry;
 use super::reason::Side;
-use crate::math::derivative::derivative;
+use crate::math::derivative;
 use alloc::vec::Vec;
 
 /// By how much the radius of what is not seen of an edge differs from that of what is seen, of it,

@@ -1,7 +1,7 @@
 //! A round hole.
 
 use super::distance::{Foot, Shape};
-use crate::math::associate::Distance;
+use crate::math::solve::Distance;
 use crate::math::solve::Normal;
 use core::f64::consts::{PI, TAU};
 

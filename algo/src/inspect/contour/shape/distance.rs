@@ -1,6 +1,6 @@
 //! What a contour's shape is: a signed distance with N parameters, and its places.
 
-use crate::math::associate::Distance;
+use crate::math::solve::Distance;
 
 /// A place of a contour.
 #[derive(Clone, Copy, Debug, PartialEq)]

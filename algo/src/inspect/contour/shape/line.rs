@@ -1,7 +1,7 @@
 //! A straight edge.
 
 use super::distance::{Foot, Shape};
-use crate::math::associate::Distance;
+use crate::math::solve::Distance;
 
 /// A straight edge with the material on its left, seen from the side that the camera is on; p =
 /// distance to the left of where it was expected, mm, and angle to the left, rad, both at its

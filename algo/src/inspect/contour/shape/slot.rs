@@ -1,7 +1,7 @@
 //! A slot with round ends.
 
 use super::distance::{Foot, Shape};
-use crate::math::associate::Distance;
+use crate::math::solve::Distance;
 use core::f64::consts::PI;
 
 /// A slot with the material around it; p = centre x, centre y, half the distance of the centres of

@@ -1,7 +1,7 @@
 //! Every shape: its distance, its places, and its start from an outline.
 
 use super::*;
-use crate::math::associate::Distance;
+use crate::math::solve::Distance;
 use std::vec::Vec;
 
 fn corners<const N: usize>(shape: &impl Shape<N>, p: &[f64; N], count: usize) -> Vec<(f64, f64)> {

@@ -4,7 +4,7 @@ use super::placed::sheet;
 use super::scene::{Chance, Noise, Rendered, Scene};
 use crate::inspect::contour::shape::{Line, Slot};
 use crate::inspect::contour::{State, find};
-use crate::math::associate::Distance;
+use crate::math::solve::Distance;
 
 const PLACEMENTS: u64 = 4;
 /// Of every parameter in mm, and of angles over half a length.
