@@ -70,12 +70,12 @@ pub fn contrast(blur: &Blur, g: f64, [a, b]: [f64; 2]) -> f64 {
 /// blind depends on more than the slope.
 pub fn replicas(blur: &Blur, g: f64, [ju, jv]: [f64; 2]) -> f64 {
     let slope = libm::sqrt(ju * ju + jv * jv);
-    let at = |f: f64| {
+    let replica = |f: f64| {
         let across = f * slope;
         let camera = (1.0 / (PI * across)).min(1.0) * gauss(blur.camera, across);
         libm::fabs(sinc(f)) * gauss(blur.projector, f) * camera
     };
-    at(1.0 - g) + at(1.0 + g)
+    replica(1.0 - g) + replica(1.0 + g)
 }
 
 /// The Fourier transform of a Gaussian of this σ.
@@ -104,8 +104,8 @@ pub struct Spread {
 
 impl Spread {
     /// The point of the modulation at `fine` as a share of that at `coarse` (turns per projector
-    /// pixel) on a surface of slope `[ju, jv]`. `None` if they tell nothing, for example because
-    /// one of them is unknown.
+    /// pixel) on a surface of slope `[ju, jv]`. `None` if no number follows, for example
+    /// because one of them is unknown.
     pub fn new([ju, jv]: [f64; 2], share: f64, [fine, coarse]: [f64; 2]) -> Option<Self> {
         let pixels = |g: f64| contrast(&Blur::default(), g, [g * ju, g * jv]);
         let lost = -libm::log(share * pixels(coarse) / pixels(fine));

@@ -84,10 +84,10 @@ impl Field {
 
     fn transposed(&self) -> Self {
         let (columns, rows) = (self.columns, self.rows());
-        let at = |place: usize| self.values[place % rows * columns + place / rows];
+        let value = |place: usize| self.values[place % rows * columns + place / rows];
         Self {
             columns: rows,
-            values: (0..self.values.len()).map(at).collect(),
+            values: (0..self.values.len()).map(value).collect(),
         }
     }
 
@@ -130,9 +130,9 @@ impl Field {
     pub fn fill_columns(&mut self) {
         let (columns, rows) = (self.columns, self.rows());
         for column in 0..columns {
-            let at = |row: usize| row * columns + column;
+            let cell = |row: usize| row * columns + column;
             let known: Vec<usize> = (0..rows)
-                .filter(|&row| !self.values[at(row)].is_nan())
+                .filter(|&row| !self.values[cell(row)].is_nan())
                 .collect();
             let mut next = 0;
             for row in 0..rows {
@@ -142,7 +142,7 @@ impl Field {
                     next += 1;
                 }
                 if let Some(&nearest) = known.get(next) {
-                    self.values[at(row)] = self.values[at(nearest)];
+                    self.values[cell(row)] = self.values[cell(nearest)];
                 }
             }
         }

@@ -75,8 +75,8 @@ pub struct Adjusted {
 )]
 pub struct Undetermined;
 
-/// Whether a number is adjusted. k₃ stays 0: over a frame it differs from k₁ and k₂ by less than it
-/// costs in uncertainty.
+/// Whether a number is adjusted. k₃ stays 0: over a frame its effect beside k₁ and k₂ is smaller than
+/// the uncertainty that it adds.
 fn is_free(number: usize, bowed: bool) -> bool {
     match number {
         at if at < 2 * LENS => at % LENS != LENS - 1,
@@ -283,7 +283,7 @@ impl Adjustment<'_> {
     }
 
     fn residuals(&self, rig: &Rig) -> Option<Vec<[Residuals; 2]>> {
-        let of = |all: &[[f64; 2]]| Residuals {
+        let sum = |all: &[[f64; 2]]| Residuals {
             squares: all.iter().map(|r| r[0] * r[0] + r[1] * r[1]).sum(),
             points: all.len(),
         };
@@ -291,7 +291,7 @@ impl Adjustment<'_> {
         let split = |at: usize| {
             let all = self.view(rig, at)?;
             let corners = self.views[at].found.corners.iter().flatten().count();
-            Some([of(&all[..corners]), of(&all[corners..])])
+            Some([sum(&all[..corners]), sum(&all[corners..])])
         };
         views.map(split).collect()
     }

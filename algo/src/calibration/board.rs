@@ -121,20 +121,23 @@ fn grow(grid: &mut CornerGrid, candidates: &[Candidate]) {
 /// neighbours on each side, with the step behind them, or, where there is none, with the step in a
 /// line beside it.
 pub(super) fn predicted(grid: &CornerGrid, (column, row): (i32, i32)) -> Option<((f64, f64), f64)> {
-    let at = |right: i32, down: i32| {
+    let neighbour = |right: i32, down: i32| {
         let corner = grid.get(&(column + right, row + down));
         corner.map(|corner| (corner.u, corner.v))
     };
     let (mut sum, mut n, mut steps) = ((0.0, 0.0), 0.0, 0.0);
     for (right, down) in AROUND {
-        let Some(near) = at(right, down) else {
+        let Some(near) = neighbour(right, down) else {
             continue;
         };
-        let behind = at(2 * right, 2 * down).map(|far| (near.0 - far.0, near.1 - far.1));
+        let behind = neighbour(2 * right, 2 * down).map(|far| (near.0 - far.0, near.1 - far.1));
         let beside = || {
             [1, -1].into_iter().find_map(|side| {
                 let (across, along) = (side * down, side * right);
-                let (here, there) = (at(across, along)?, at(right + across, down + along)?);
+                let (here, there) = (
+                    neighbour(across, along)?,
+                    neighbour(right + across, down + along)?,
+                );
                 Some((here.0 - there.0, here.1 - there.1))
             })
         };
@@ -270,14 +273,14 @@ impl Board {
         let mut steps = Vec::new();
         for &(column, row) in &places {
             let (edges, step) = edges(grid, place(column, row));
-            let at = grid
+            let expected = grid
                 .get(&place(column, row))
                 .map(|candidate| (candidate.u, candidate.v))
-                .or_else(|| predicted(grid, place(column, row)).map(|(at, _)| at));
-            let corner = at.zip(edges).and_then(|(at, edges)| {
+                .or_else(|| predicted(grid, place(column, row)).map(|(expected, _)| expected));
+            let corner = expected.zip(edges).and_then(|(expected, edges)| {
                 let radius = (WINDOW * step).clamp(WINDOW_BOUNDS.0, WINDOW_BOUNDS.1);
                 steps.push(step);
-                locate(picture, at, edges, radius)
+                locate(picture, expected, edges, radius)
             });
             corners.push(corner);
         }
@@ -345,10 +348,14 @@ fn extent(numbers: impl Iterator<Item = i32> + Clone) -> (i32, usize) {
 /// Directions of the two edges through a corner, from its neighbours in the grid, and the length of
 /// the shorter side beside it.
 fn edges(grid: &CornerGrid, (column, row): (i32, i32)) -> (Option<[(f64, f64); 2]>, f64) {
-    let at = |right: i32, down: i32| grid.get(&(column + right, row + down));
+    let neighbour = |right: i32, down: i32| grid.get(&(column + right, row + down));
     let mut shortest = f64::INFINITY;
     let mut edge = |right: i32, down: i32| {
-        let ends = [at(-right, -down), at(0, 0), at(right, down)];
+        let ends = [
+            neighbour(-right, -down),
+            neighbour(0, 0),
+            neighbour(right, down),
+        ];
         let mut known = ends
             .iter()
             .enumerate()

@@ -174,12 +174,12 @@ pub(super) fn candidates(picture: &GreyPicture) -> Vec<Candidate> {
     let mut found = Vec::new();
     for v in MARGIN..height - MARGIN {
         for u in MARGIN..width - MARGIN {
-            let here = responses.at(u, v);
-            if here >= LEAST_RESPONSE && largest(&responses, u, v) {
+            let strength = responses.at(u, v);
+            if strength >= LEAST_RESPONSE && largest(&responses, u, v) {
                 found.push(Candidate {
                     u: u as f64,
                     v: v as f64,
-                    strength: here,
+                    strength,
                     harmonic: harmonic(&ring(picture, u, v)),
                 });
             }
@@ -193,9 +193,9 @@ pub(super) fn candidates(picture: &GreyPicture) -> Vec<Candidate> {
 #[inline]
 fn ring(picture: &GreyPicture, u: usize, v: usize) -> [f32; 16] {
     // The margin keeps every sample inside the picture.
-    let at = (v * picture.width + u) as isize;
+    let centre = (v * picture.width + u) as isize;
     RING.map(|(du, dv)| {
-        picture.counts[(at + dv as isize * picture.width as isize + du as isize) as usize]
+        picture.counts[(centre + dv as isize * picture.width as isize + du as isize) as usize]
     })
 }
 
@@ -220,13 +220,13 @@ fn response(picture: &GreyPicture, u: usize, v: usize) -> f32 {
 
 /// Whether no response nearby is larger, and none before this place, row by row, is equal.
 fn largest(responses: &GreyPicture, u: usize, v: usize) -> bool {
-    let here = responses.at(u, v);
+    let strength = responses.at(u, v);
     let rows = v.saturating_sub(LEAST_APART)..(v + LEAST_APART + 1).min(responses.height);
     rows.into_iter().all(|row| {
         let columns = u.saturating_sub(LEAST_APART)..(u + LEAST_APART + 1).min(responses.width);
         columns.into_iter().all(|column| {
-            let there = responses.at(column, row);
-            there < here || (there == here && (row, column) >= (v, u))
+            let other = responses.at(column, row);
+            other < strength || (other == strength && (row, column) >= (v, u))
         })
     })
 }

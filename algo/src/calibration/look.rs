@@ -69,14 +69,14 @@ pub struct FringeMaps<'a> {
 impl FringeMaps<'_> {
     /// ξ and η at a pixel, where both phases are resolved.
     fn at(&self, u: usize, v: usize) -> Option<(f64, f64)> {
-        let of = |map: &PhaseMap| {
-            let at = v * map.width + u;
-            let resolved = u < map.width && map.trust.get(at)?.has_phase();
-            resolved.then(|| map.phase[at].turns())
+        let turns = |map: &PhaseMap| {
+            let pixel = v * map.width + u;
+            let resolved = u < map.width && map.trust.get(pixel)?.has_phase();
+            resolved.then(|| map.phase[pixel].turns())
         };
         Some((
-            of(self.vertical)? * self.pitch.0,
-            of(self.horizontal)? * self.pitch.1,
+            turns(self.vertical)? * self.pitch.0,
+            turns(self.horizontal)? * self.pitch.1,
         ))
     }
 
@@ -85,9 +85,15 @@ impl FringeMaps<'_> {
         let mut nodes = Vec::new();
         for row in 0..board.rows.saturating_sub(1) {
             for column in 0..board.columns.saturating_sub(1) {
-                let at = row * board.columns + column;
-                let square = [at, at + 1, at + board.columns, at + board.columns + 1];
-                let [Some(a), Some(b), Some(c), Some(d)] = square.map(|at| found.corners[at])
+                let corner = row * board.columns + column;
+                let square = [
+                    corner,
+                    corner + 1,
+                    corner + board.columns,
+                    corner + board.columns + 1,
+                ];
+                let [Some(a), Some(b), Some(c), Some(d)] =
+                    square.map(|corner| found.corners[corner])
                 else {
                     continue;
                 };
@@ -153,16 +159,16 @@ fn terms((x, y): (f64, f64)) -> [f64; 6] {
 
 fn off(fit: &[[f64; 6]; 2], place: (f64, f64), lit_by: (f64, f64)) -> (f64, f64) {
     let terms = terms(place);
-    let at = |fit: &[f64; 6]| -> f64 { fit.iter().zip(&terms).map(|(a, b)| a * b).sum() };
-    (lit_by.0 - at(&fit[0]), lit_by.1 - at(&fit[1]))
+    let value = |fit: &[f64; 6]| -> f64 { fit.iter().zip(&terms).map(|(a, b)| a * b).sum() };
+    (lit_by.0 - value(&fit[0]), lit_by.1 - value(&fit[1]))
 }
 
 /// Least-squares quadratics of ξ and η, and the RMS distance of the samples from them.
 fn quadratic(samples: &[NodeSample]) -> Option<([[f64; 6]; 2], f64)> {
-    let of = |lit_by: fn(&NodeSample) -> f64| {
+    let fitted = |lit_by: fn(&NodeSample) -> f64| {
         Normal::of(samples.iter().map(|s| (terms(s.0), lit_by(s)))).solve()
     };
-    let fit = [of(|(_, (xi, _))| *xi)?, of(|(_, (_, eta))| *eta)?];
+    let fit = [fitted(|(_, (xi, _))| *xi)?, fitted(|(_, (_, eta))| *eta)?];
     let squares: f64 = samples
         .iter()
         .map(|&(place, lit_by)| {
@@ -313,8 +319,8 @@ fn apart(a: &FoundBoard, b: &FoundBoard) -> f64 {
     }
 }
 
-/// Share of the bright squares between inner corners that have a node. Bright are the squares of
-/// the colour of which more have one.
+/// Share of the bright squares between inner corners that have a node. The bright
+/// squares are those of the colour with more nodes.
 fn covered(board: &Board, squares: &[(usize, usize)]) -> f64 {
     let (columns, rows) = (board.columns - 1, board.rows - 1);
     let share = |colour: usize| {

@@ -1,4 +1,4 @@
-//! From views of a board to an adjusted rig, or the pose that is to blame.
+//! From views of a board to an adjusted rig, or the pose that does not fit.
 
 use super::adjust::{Adjusted, Undetermined, adjust};
 use super::board::Board;
@@ -10,13 +10,13 @@ use crate::math::solve::Normal;
 use alloc::vec::Vec;
 use core::array::from_fn;
 
-/// Least poses: three give the equations, and no more.
+/// Least poses: three determine the models without redundancy.
 const LEAST_POSES: usize = 3;
-/// Least angle between two of the board's normals, rad: parallel boards do not tell focal lengths
-/// from distances.
+/// Least angle between two of the board's normals, rad: with parallel boards focal lengths and
+/// distances cannot be separated.
 const LEAST_TILT: f64 = 10.0 / 180.0 * core::f64::consts::PI;
-/// Poses from which the board's bow is adjusted: with fewer, it cannot be told from the lenses'
-/// distortion.
+/// Poses from which the board's bow is adjusted: with fewer, it cannot be separated from the
+/// lenses' distortion.
 const BOWED_FROM: usize = 6;
 /// χ² of three degrees of freedom that a flat board exceeds once in 10⁶.
 const BOWED: f64 = 31.8;
@@ -30,7 +30,7 @@ const BLURRED: (f64, f64) = (2.5, 1.0);
 /// Largest relative σ of a focal length.
 const MOST_FOCAL_SIGMA: f64 = 0.01;
 
-/// Views that make no calibration; poses are counted from 0.
+/// Views that give no calibration; poses are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
@@ -104,7 +104,7 @@ pub enum CalibrationError {
 }
 
 impl CalibrationError {
-    /// The pose to blame, if it is one.
+    /// The pose at fault, if a single one is.
     pub fn pose(&self) -> Option<usize> {
         match self {
             Self::Blurred { pose, .. }
@@ -119,8 +119,8 @@ impl CalibrationError {
 /// picture.
 ///
 /// # Errors
-/// If the views do not determine the models, or one of them does not fit the others; if a picture
-/// is mirrored, which of both axes.
+/// If the views do not determine the models, one of them does not fit the others, or a picture is
+/// mirrored.
 pub fn calibrate(
     board: &Board,
     frame: (usize, usize),
@@ -145,8 +145,8 @@ pub fn calibrate(
     }
 }
 
-/// The geometry of these views as it is known before it is adjusted: angles are right within a few
-/// degrees. `None` if there are too few, or they do not determine it.
+/// First values of the geometry of these views, with angles right within a few degrees; `None` if
+/// the views are too few or do not determine it.
 pub fn estimate(board: &Board, frame: (usize, usize), views: &[BoardView]) -> Option<Rig> {
     if views.len() < LEAST_POSES {
         return None;
@@ -251,7 +251,7 @@ fn fits(adjusted: &Adjusted) -> Result<(), CalibrationError> {
     let each: Vec<[f64; 2]> = adjusted
         .residuals
         .iter()
-        .map(|pose| pose.map(|of| of.rms()))
+        .map(|pose| pose.map(|residuals| residuals.rms()))
         .collect();
     let larger = |rms: &[f64; 2]| rms[0].max(rms[1]);
     let worst = (0..each.len()).max_by(|&a, &b| larger(&each[a]).total_cmp(&larger(&each[b])));

@@ -204,8 +204,8 @@ impl Adjusted {
         let (mut squares, mut worst) = (0.0, 0.0_f64);
         for target in &targets {
             let height = |rig: &Rig| Some(rig.measured(target)?.z);
-            let of_scale = scale * target.at.z;
-            let variance = self.variance(&height)? + of_scale * of_scale;
+            let by_scale = scale * target.at.z;
+            let variance = self.variance(&height)? + by_scale * by_scale;
             squares += variance;
             worst = worst.max(variance);
         }
@@ -229,7 +229,7 @@ impl Adjusted {
     }
 
     /// gᵀ C g of a quantity.
-    fn variance(&self, of: &dyn Fn(&Rig) -> Option<f64>) -> Option<f64> {
+    fn variance(&self, quantity: &dyn Fn(&Rig) -> Option<f64>) -> Option<f64> {
         let n = self.rig.numbers();
         let mut gradient = vec![0.0; n];
         for (at, slope) in gradient.iter_mut().enumerate() {
@@ -237,9 +237,9 @@ impl Adjusted {
                 let step = step_of(at);
                 let mut by = vec![0.0; n];
                 by[at] = step;
-                let after = of(&self.rig.moved(&by))?;
+                let after = quantity(&self.rig.moved(&by))?;
                 by[at] = -step;
-                *slope = (after - of(&self.rig.moved(&by))?) / (2.0 * step);
+                *slope = (after - quantity(&self.rig.moved(&by))?) / (2.0 * step);
             }
         }
         let mut sum = 0.0;

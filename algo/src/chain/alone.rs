@@ -1,15 +1,14 @@
 //! A Gray code without fringes: the projector's coordinate of each pixel from the cells alone.
 //!
-//! A pixel's cell gives its coordinate within half a cell. Where the picture crosses from one cell
-//! into the next, the one bit that changes there passes through the middle between bright and dark,
-//! and that place lies between two pixels as the zero of the bit's contrast does (linear
-//! interpolation; Trobina 1995 compares it with other ways). Between the two borders of a cell that
-//! are found in this way the coordinate runs linearly; where neighbouring pixels are cells apart,
-//! there are no borders, and half a cell is small.
+//! A pixel's cell gives its coordinate within half a cell. At the border of two cells one bit
+//! changes, and its contrast has a zero, which is found between two pixels by linear interpolation
+//! (Trobina 1995 compares it with other ways). Between the two borders of a cell the coordinate is
+//! interpolated linearly. Where neighbouring pixels are several cells apart there are no borders;
+//! half a cell is then less than a pixel.
 //!
-//! A lens that blurs more than a cell takes the contrast of the finest bits first. The bits above
-//! them are a code of cells that are 2, 4 or 8 times as wide, and a pixel is read by as many bits
-//! as it resolves.
+//! A lens whose blur is wider than a cell removes the contrast of the finest bits first. The coarser
+//! bits are a code of cells that are 2, 4 or 8 times as wide, and a pixel is read by as many bits as
+//! it resolves.
 
 use super::{Cells, CodeError, CodePictures};
 use crate::pipeline::{PhaseMap, for_each_row};
@@ -20,11 +19,11 @@ use alloc::vec::Vec;
 
 /// A bit whose contrast is below this share of the clearest bit's is undecided.
 const UNDECIDED: f64 = 0.25;
-/// Most of the finest bits that may be washed out: a blur over cells of 8 projector pixels is no
-/// lens, but light that reaches the pixel by way of something else.
+/// Most of the finest bits that may be washed out: a blur over cells of 8 projector pixels is not
+/// the lens's, but light that reaches the pixel by reflection.
 const MOST_WASHED: u32 = 3;
-/// Pixels along a line, to both sides, in which nowhere a bit is decided that is washed out; on the
-/// border of two cells fewer are in doubt.
+/// Pixels along a line, to both sides, over which a bit that is washed out is undecided everywhere;
+/// on the border of two cells it is undecided over fewer.
 const WINDOW: usize = 6;
 /// σ of a coordinate that is known within a cell, in cells: that of a uniform distribution.
 pub const SIGMA_CELLS: f64 = 0.288_675_134_594_812_9;
@@ -136,26 +135,28 @@ impl CodePictures<'_> {
             (width, height)
         };
         for line in 0..lines {
-            let at = |along: usize| match vertical {
+            let index = |along: usize| match vertical {
                 true => line * width + along,
                 false => along * width + line,
             };
             let washed: Vec<u32> = (0..length)
                 .map(|along| {
                     let window = along.saturating_sub(WINDOW)..length.min(along + WINDOW + 1);
-                    let lit = window.map(at).filter(|&at| pixels[at].modulation > 0.0);
-                    lit.map(|at| pixels[at].faint).min().unwrap_or(0)
+                    let lit = window
+                        .map(index)
+                        .filter(|&index| pixels[index].modulation > 0.0);
+                    lit.map(|index| pixels[index].faint).min().unwrap_or(0)
                 })
                 .collect();
             for (along, &washed) in washed.iter().enumerate() {
-                places[at(along)].1 = washed.max(pixels[at(along)].without);
+                places[index(along)].1 = washed.max(pixels[index(along)].without);
             }
             // The border behind, if the pixels since it are all of one cell: where it is, in pixels
             // and in cells.
             let mut behind: Option<(f64, f64)> = None;
             let mut widest = 1.0;
             for along in 0..length.saturating_sub(1) {
-                let (here, next) = (&pixels[at(along)], &pixels[at(along + 1)]);
+                let (here, next) = (&pixels[index(along)], &pixels[index(along + 1)]);
                 let resolved = [here, next]
                     .iter()
                     .all(|pixel| pixel.trust == Trust::Resolved);
@@ -180,7 +181,7 @@ impl CodePictures<'_> {
                 {
                     let slope = (to.1 - from.1) / (to.0 - from.0);
                     for inside in libm::ceil(from.0) as usize..=along {
-                        places[at(inside)] = (from.1 + (inside as f64 - from.0) * slope, 0);
+                        places[index(inside)] = (from.1 + (inside as f64 - from.0) * slope, 0);
                     }
                 }
                 behind = border;
@@ -283,7 +284,7 @@ impl Cells {
         let mut own = seen;
         if self.coding.binary {
             // On the border of two cells the lowest bits are 0111 on one side and 1000 on the
-            // other; the lowest bit tells on which side the pixel lies.
+            // other; the lowest bit says on which side the pixel lies.
             let low = undecided >> 1 & undecided;
             let settled = match (low ^ seen) & 1 {
                 0 => low,
@@ -519,7 +520,7 @@ mod tests {
             (four.trust, four.without, four.place),
             (Trust::Resolved, 1, 6.0)
         );
-        // Light that makes five bits out of ten comes by way of something else.
+        // Light that washes out five bits of ten comes by reflection.
         let mut stray = [2.0; 10];
         stray[..5].copy_from_slice(&[50.0, 30.0, 25.0, 15.0, 20.0]);
         let stray = CodePixel::of(&stray, &cells_of(10, 1024, false), 16.0);

@@ -1,9 +1,8 @@
 //! Gray code: which cell of the projector lights a pixel, from one picture per bit (Sansoni,
 //! Carocci & Rodella 1999, with phase shifts as here), and where the cells end within the fringes.
 //!
-//! The code and the phase know each other's edges: edge e of the cells lies at Φ = origin + e ·
-//! width, so the phases that pixels have there tell whether offset, width, and the sign of the
-//! shifts are as stated ([`Edges`]).
+//! Edge e of the cells lies at Φ = origin + e · width, so the phases that pixels have there check the
+//! stated offset, width, and sign of the shifts ([`Edges`]).
 
 use super::Cells;
 use crate::frame::FrameView;
@@ -17,8 +16,8 @@ pub const MAX_CODE_BITS: u8 = 13;
 /// Largest misalignment of cells and fringes that is not a matter of conventions, in turns: these
 /// differ by quarters of a turn.
 pub const EXPECTED_TURNS: f64 = 0.125;
-/// Fewest edges that tell anything: any phases of so many are concentrated by chance once in 25 000
-/// times.
+/// Fewest edges that are significant: random phases of so many edges have [`CONCENTRATED`] by chance
+/// once in 25 000 times.
 const FEWEST: usize = 24;
 /// Concentration of phases at edges that belong together: 0 for any phases, 1 for equal ones, and
 /// 0.65 if they are spread evenly over half a turn.
@@ -93,9 +92,9 @@ pub struct CodePictures<'a> {
 }
 
 impl GrayCode {
-    /// Number of cells on a raster of `length` pixels across them that can be told apart. Where the
-    /// bits number one cell less than there are, as where a code of as many cells as fringes was
-    /// moved by half a cell, the last two show the same Gray code, and neither counts.
+    /// Number of cells on a raster of `length` pixels across them that can be told apart. Where there
+    /// is one cell more than the bits can number, as in a code of as many cells as fringes that is
+    /// shifted by half a cell, the last two show the same Gray code, and neither counts.
     pub fn cells(&self, length: u32) -> u32 {
         let most = 1_u32 << self.bits;
         let cells = libm::ceil((f64::from(length) + self.offset) / self.cell - 1e-9).max(1.0);
@@ -293,7 +292,7 @@ impl Edges {
         }
     }
 
-    /// Whether there are enough edges to tell anything.
+    /// Whether there are enough edges to be significant.
     pub fn are_many(&self) -> bool {
         self.located >= FEWEST
     }

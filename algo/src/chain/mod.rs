@@ -1,4 +1,4 @@
-//! Temporal unwrapping of levels that the production kernels do not know: by beats of any ratios,
+//! Temporal unwrapping of levels that the production kernels do not support: by beats of any ratios,
 //! and by a Gray code.
 //!
 //! Recordings of other people's heads have levels such as 64 and 63 fringes, fractional numbers of
@@ -13,9 +13,9 @@
 //! most one turn of the pattern is absolute by itself, as 2 φ_b − φ_a of 13 and 7 fringes; a Gray
 //! code is absolute within half a cell. From an absolute phase of ratio r_a the next level b gets
 //! its fringe order k = round(r_b Φ − φ_b). With a = Σ m_i φ_i and b = Σ n_i φ_i its argument has
-//! the error Σ (m_i r_b / r_a − n_i) e_i, where e_i is the noise of φ_i, which falls with √N_i. Of
-//! all chains of levels, beats and beats of beats the one is taken whose least safe step is the
-//! safest: (½ turn − what is uncertain by the code's cell) / noise.
+//! the error Σ (m_i r_b / r_a − n_i) e_i, where e_i is the noise of φ_i, which falls with √N_i. The
+//! safety of a step is (½ turn − the uncertainty by the code's cell) / noise. Of all chains of
+//! levels, beats and beats of beats, the one whose least safe step is the safest is taken.
 
 mod alone;
 mod gray;
@@ -36,15 +36,15 @@ use alloc::vec::Vec;
 pub const MAX_MAGNIFICATION: f64 = 128.0;
 /// Largest span of the chain's first level, in turns, that is still absolute by itself.
 const ONE_TURN: f64 = 1.001;
-/// Noise of a sample that the safety of steps is computed with, in turns of phase times √N: 0.01
-/// turn for 4 shifts.
+/// Noise with which the safety of steps is computed: σ of a level's phase times √N, turns; 0.01 turn
+/// for 4 shifts.
 const NOISE: f64 = 0.02;
-/// Ratios below this are differences of equal numbers.
+/// Smaller ratios of beats are rounding of equal ratios.
 const LEAST_RATIO: f64 = 1e-6;
-/// Rounding of a code's half cell beside half a turn.
+/// Relative rounding by which half a cell of a code may exceed half a turn.
 const ROUNDING: f64 = 1e-6;
-/// Least safety of the steps of a chain that starts about a map: 50 times the ratio in one step,
-/// with 4 shifts. [`NOISE`] is that of faint fringes, and wrong orders at its σ leave large
+/// Least safety of the steps of a chain that starts about a map. It allows a step to 50 times the
+/// ratio with 4 shifts. [`NOISE`] is that of faint fringes, whose wrong orders leave large
 /// residuals.
 const SAFE: f64 = 1.0;
 
@@ -63,7 +63,7 @@ pub struct Cells {
     pub coding: Coding,
 }
 
-/// Levels, and perhaps a code, that give no absolute phase.
+/// Levels (and a code, if there is one) without an absolute phase.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ChainError {
     /// Nothing is absolute by itself.
@@ -150,7 +150,7 @@ impl Chain {
     /// code if there is one.
     ///
     /// # Errors
-    /// If there is none; the message says what to add.
+    /// If the levels and the code have no chain; the message says what to add.
     pub fn new(
         levels: &[Level],
         range: PhaseRange,

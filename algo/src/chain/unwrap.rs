@@ -4,11 +4,9 @@ use super::{Cells, Chain, CodeWord, Edges};
 use crate::chain::{ChainStart, Link};
 use crate::phase::Trust;
 use crate::pipeline::{PhaseMap, for_each_row};
+use crate::trust::MAX_RESIDUAL;
 use crate::units::AbsolutePhase;
 use alloc::vec;
-
-/// Largest rounding residual of a step, in turns: as in the production kernels.
-const MAX_RESIDUAL: f64 = 0.40;
 
 impl Chain {
     /// The chain with the cells of its code moved to where they end within the fringes of the
@@ -59,18 +57,18 @@ impl Chain {
         let mut pixels = vec![(AbsolutePhase::UNKNOWN, Trust::Dark); finest.phase.len()];
         for_each_row(&mut pixels, width, |v, row| {
             for (u, pixel) in row.iter_mut().enumerate() {
-                let at = v * width + u;
+                let index = v * width + u;
                 let levels = || wrapped.iter().zip(&uses).filter(|(_, used)| **used);
                 let refusal = levels()
-                    .map(|(level, _)| level.trust[at])
+                    .map(|(level, _)| level.trust[index])
                     .filter(|trust| !trust.has_phase())
                     .min();
                 pixel.1 = match refusal {
-                    Some(Trust::Dark) if wrapped[coarsest].trust[at] != Trust::Dark => {
+                    Some(Trust::Dark) if wrapped[coarsest].trust[index] != Trust::Dark => {
                         Trust::LowModulation
                     }
                     Some(refusal) => refusal,
-                    None => match self.phase(residual, wrapped, given, at) {
+                    None => match self.phase(residual, wrapped, given, index) {
                         Err(refusal) => refusal,
                         Ok(turns) => {
                             pixel.0 = AbsolutePhase::from_turns(turns);
@@ -184,13 +182,13 @@ impl Cells {
     /// have the same phase: the bits in which both differ are decisive. `aside` is how far the
     /// pixel lies before the middle of the cell, in turns.
     fn decides(&self, cell: u32, aside: f64, seen: CodeWord) -> bool {
-        let other = match aside > 0.0 {
-            true => Some(cell + 1).filter(|&other| other < self.count),
+        let neighbour = match aside > 0.0 {
+            true => Some(cell + 1).filter(|&neighbour| neighbour < self.count),
             false => cell.checked_sub(1),
         };
-        other.is_none_or(|other| {
+        neighbour.is_none_or(|neighbour| {
             let word = |cell| self.coding.word(cell, self.bits);
-            let differ = word(cell) ^ word(other);
+            let differ = word(cell) ^ word(neighbour);
             seen.decisive & differ == differ
         })
     }

@@ -142,10 +142,10 @@ impl PhotonTransfer {
         };
         let points: Vec<NoisePoint> = points.iter().filter(clear).copied().collect();
         let (read, shot) = fit(&points)?;
-        let at = |level: f64| sqrt((read + shot * level).max(ROUNDING));
+        let sigma = |level: f64| sqrt((read + shot * level).max(ROUNDING));
         Some(CameraNoise {
-            counts: at(level),
-            read_counts: at(0.0),
+            counts: sigma(level),
+            read_counts: sigma(0.0),
             shot,
             points,
         })

@@ -121,8 +121,8 @@ impl Rays {
         // No row of theirs is beyond their number.
         let inside = column < width && row < self.0.len();
         let whole = inside && column as f64 == u && row as f64 == v;
-        let at = whole.then(|| row * width + column)?;
-        let known = self.0.get(at).copied();
+        let index = whole.then(|| row * width + column)?;
+        let known = self.0.get(index).copied();
         known.filter(|(x, _)| !x.is_nan())
     }
 }

@@ -87,8 +87,8 @@ const MAX_SECANT_STEP: f64 = 2.0;
 /// The numeric slope is taken over ± this many mm: small against any fringe, large against
 /// rounding. The first secant starts this far below the guess.
 const SLOPE_STEP: f64 = 0.01;
-/// Pieces of the working range, each of which is searched for a change of sign, for a sampled phase
-/// function: it need not be monotone along the line of projector pixels that a camera ray crosses.
+/// Pieces of the working range in which a sampled phase function is searched for a change of sign: it
+/// need not be monotone along the line of projector pixels that a camera ray crosses.
 const PIECES: usize = 16;
 /// Largest z component of a usable ray whose component along the optical axis is 1: from a height
 /// of 1 m, other rays meet the plane a thousand kilometres away or nowhere.
@@ -267,14 +267,14 @@ impl Triangulator {
         let mut before = (low, off(low)?);
         for piece in 1..=pieces {
             let z = low + (high - low) * piece as f64 / pieces as f64;
-            let here = (z, off(z)?);
-            if (before.1 < 0.0) != (here.1 < 0.0) {
+            let next = (z, off(z)?);
+            if (before.1 < 0.0) != (next.1 < 0.0) {
                 if bracket.is_some() {
                     return None;
                 }
-                bracket = Some((before, here));
+                bracket = Some((before, next));
             }
-            before = here;
+            before = next;
         }
         let (a, b) = bracket?;
         let z = bracketed(off, a, b, HEIGHT_TOLERANCE)?;
@@ -310,8 +310,8 @@ impl Triangulator {
     }
 
     fn solution(&self, ray: Vector, z: f64) -> Option<Solution> {
-        let at = |z: f64| self.phase_at(self.on_ray(ray, z));
-        let rise = at(z + SLOPE_STEP)? - at(z - SLOPE_STEP)?;
+        let phase = |z: f64| self.phase_at(self.on_ray(ray, z));
+        let rise = phase(z + SLOPE_STEP)? - phase(z - SLOPE_STEP)?;
         let slope = rise / (2.0 * SLOPE_STEP);
         (libm::fabs(slope) >= self.slope_min).then(|| Solution {
             point: self.on_ray(ray, z),

@@ -41,10 +41,15 @@ fn inside(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64))
     let taps =
         |line: usize| -> Option<&[f64; 4]> { turns.get(start + line * columns..)?.first_chunk() };
     let (first, second, third, last) = (taps(0)?, taps(1)?, taps(2)?, taps(3)?);
-    let at = |i: usize| {
+    let column_value = |i: usize| {
         (down[0] * first[i] + down[1] * second[i]) + (down[2] * third[i] + down[3] * last[i])
     };
-    let [a, b, c, d] = [at(0), at(1), at(2), at(3)];
+    let [a, b, c, d] = [
+        column_value(0),
+        column_value(1),
+        column_value(2),
+        column_value(3),
+    ];
     Some((across[0] * a + across[1] * b) + (across[2] * c + across[3] * d))
 }
 

@@ -34,25 +34,26 @@
 //!
 //! **Idea.** Every frame of a dense level carries accuracy, the more the nearer its ratio is to 1;
 //! but the nearer the ratios, the larger the factor by which the noise of their beats is
-//! multiplied. So the best split has as much information as the rate of wrong fringe orders that
-//! nobody sees allows.
+//! multiplied. So the best split has as much information as the largest accepted rate of slips
+//! allows.
 //!
 //! **Equation.** σ_Φ² = σ_I² / (2π² Σ N_i r_i² b_i² B²) with the fundamentals b_i of the levels'
 //! waveforms ([`super::Waveform`]), for ratios 1, 1 − 1/n² (not with two levels) and 1 − 1/n. The
-//! rate of wrong orders that nobody sees is that of [`super::Slips`] with sines, at the map and at
-//! the least modulation that is trusted.
+//! rate of slips is that of [`Slips`] with sines, at the map and at the least modulation that is
+//! trusted.
 //!
 //! **Reach.** How far the phase may lie from the map: 0.40 turn for one level, n/2 − 0.2 for two,
 //! n²/2 − n for three.
 
 use super::sequence::MAX_LEVELS;
 use super::{Level, PhaseRange, Sequence, SequenceError, Shot, Unwrapping, Waveforms};
-use crate::trust::{LeastModulation, NOISE_OVER_LEAST};
+use crate::trust::{LeastModulation, MAX_RESIDUAL, NOISE_OVER_LEAST};
 use alloc::vec::Vec;
 use core::f64::consts::{SQRT_2, TAU};
 
-/// One turn less the largest residual.
-const UNSEEN: f64 = 0.60;
+/// Turns by which noise must move a step for its wrong order to leave no residual: one turn less the
+/// largest residual.
+const UNSEEN: f64 = 1.0 - MAX_RESIDUAL;
 /// The largest rate of unseen wrong orders among the pixels of the least trusted modulation, if any
 /// split keeps it.
 const MAX_SLIPS: f64 = 2e-4;
@@ -69,7 +70,8 @@ impl Sequence {
     pub fn chance_of_trust(
         &self,
         least: LeastModulation,
-        (noise, full_scale): (f64, u16),
+        noise: f64,
+        full_scale: u16,
     ) -> impl Fn(f64) -> f64 {
         let least = least.counts(full_scale);
         let levels = self.levels().iter().map(|level| {
@@ -260,7 +262,7 @@ pub(crate) mod tests {
         let chance = |levels: &[f64], modulation| {
             let shots: Vec<_> = levels.iter().flat_map(|&r| Shot::level(r, 8)).collect();
             let sequence = Sequence::from_frames(&shots).unwrap();
-            sequence.chance_of_trust(least, (2.0, 255))(modulation)
+            sequence.chance_of_trust(least, 2.0, 255)(modulation)
         };
         assert!((chance(&[1.0], 16.0) - 0.5).abs() < 1e-12);
         assert!((chance(&[0.75, 0.9375, 1.0], 16.0) - 0.125).abs() < 1e-12);

@@ -249,8 +249,8 @@ impl WrappedRow<'_> {
 
 impl WrappedRowMut<'_> {
     /// Of several levels of `pixels` each: the coarsest, if it has arrived before, and level `at`
-    /// to be written. `None` if there is no room for level `at`; there is none for the finest
-    /// level.
+    /// to be written. `None` if there is no room for level `at`, as for the finest
+    /// level, which is never stored.
     pub fn level(
         &mut self,
         at: usize,

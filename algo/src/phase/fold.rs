@@ -368,10 +368,10 @@ fn splat<V: Lanes, const N: usize>(v: V, constants: [i16; N]) -> [V::W; N] {
     // loading it.
     let constants = black_box(constants);
     let mut lanes = [v.splat16(0); N];
-    let mut at = 0;
-    while at < N {
-        lanes[at] = v.splat16(constants[at]);
-        at += 1;
+    let mut k = 0;
+    while k < N {
+        lanes[k] = v.splat16(constants[k]);
+        k += 1;
     }
     lanes
 }
@@ -380,10 +380,10 @@ fn splat<V: Lanes, const N: usize>(v: V, constants: [i16; N]) -> [V::W; N] {
 #[inline(always)]
 fn polynomial<V: Lanes, const N: usize>(v: V, coefficients: [V::W; N], x: V::W) -> V::W {
     let mut sum = coefficients[N - 1];
-    let mut at = N - 1;
-    while at > 0 {
-        at -= 1;
-        sum = v.add(v.mul_q15(x, sum), coefficients[at]);
+    let mut k = N - 1;
+    while k > 0 {
+        k -= 1;
+        sum = v.add(v.mul_q15(x, sum), coefficients[k]);
     }
     sum
 }

@@ -6,16 +6,16 @@
 //!
 //! | stage | files |
 //! |---|---|
-//! | plan: the levels, their unwrapping, the check that frames fit | [`decode`]: [`level`], [`geometric`] or [`about`] |
-//! | row: sample type, the rows of a level's frames, what has arrived | [`rows`], [`arrived`] |
-//! | kernel: the blocks of a row, compiled for each back-end | [`kernel`]: one file for geometric levels, one for levels about a map |
-//! | block, demodulated: samples → S and C → wrapped phase and modulation | [`samples`], [`terms`], [`fold`] |
-//! | block, unwrapped: wrapped phases → absolute phase | [`unwrap_step`], and again [`geometric`] or [`about`] |
-//! | block, judged: the first reason to reject a pixel | [`quality`] |
-//! | vector instructions | [`crate::simd`] |
+//! | plan: the levels, their unwrapping, the check that frames fit | `decode`: `level`, `geometric` or `about` |
+//! | row: sample type, the rows of a level's frames, what has arrived | `rows`, `arrived` |
+//! | kernel: the blocks of a row, compiled for each back-end | `kernel`: one file for geometric levels, one for levels about a map |
+//! | block, demodulated: samples → S and C → wrapped phase and modulation | `samples`, `terms`, `fold` |
+//! | block, unwrapped: wrapped phases → absolute phase | `unwrap_step`, and again `geometric` or `about` |
+//! | block, judged: the first reason to reject a pixel | `quality` |
+//! | vector instructions | `simd` |
 //!
 //! Plans are made once and hold numbers; before a row they are spread over all lanes of a back-end
-//! (`…Lanes`). A block is [`crate::simd::Lanes::PIXELS`] neighbouring pixels. Every step of a block
+//! (`…Lanes`). A block is `Lanes::PIXELS` neighbouring pixels. Every step of a block
 //! is an inlined function of `v: impl Lanes`, without closures, because those would be compiled
 //! without the back-end's instructions.
 

@@ -6,11 +6,8 @@
 
 use super::arrived::NO_REASON;
 use crate::simd::Lanes;
-use crate::trust::Trust;
+use crate::trust::{MAX_RESIDUAL, Trust};
 
-/// Largest rounding residual of an unwrapping step, in turns; the fringe order of a larger one would
-/// be a guess.
-const MAX_RESIDUAL: f64 = 0.40;
 /// [`MAX_RESIDUAL`] in 1/65536 turn.
 const MAX_RESIDUAL_BITS: i16 = (MAX_RESIDUAL * 65_536.0) as i16;
 
@@ -43,8 +40,8 @@ impl<V: Lanes> Quality<V> {
         self.brightest = v.max8(self.brightest, brightest);
     }
 
-    /// The first reason against each pixel. Does not tell [`Trust::Dark`] from
-    /// [`Trust::LowModulation`].
+    /// The first reason against each pixel. [`Trust::Dark`] is not
+    /// distinguished from [`Trust::LowModulation`].
     #[inline(always)]
     pub fn first_reason(&self, v: V) -> V::B {
         let residual = v.splat8(Trust::Residual as u8);
@@ -56,7 +53,7 @@ impl<V: Lanes> Quality<V> {
     /// Whether all pixels of the block are resolved: no reason here, and the mask `clear` is set.
     #[inline(always)]
     pub fn all_resolved(&self, v: V, clear: V::B) -> bool {
-        // Which pixel it is does not matter.
+        // All pixels of the block are decided together, so the halves may be merged.
         let residual = v.max_unsigned(self.residual[0], self.residual[1]);
         let ambiguous = v.excess(residual, v.splat16(MAX_RESIDUAL_BITS));
         // 255 less the brightest sample is 0 where that is at full scale.
@@ -90,8 +87,7 @@ fn too_large<V: Lanes>(v: V, residual: V::W) -> V::W {
     )
 }
 
-/// Reasons of a block of which only the mask of lit pixels is known: [`NO_REASON`] or
-/// [`Trust::Dark`].
+/// Reasons of a block by the mask of lit pixels: [`NO_REASON`] or [`Trust::Dark`].
 #[inline(always)]
 pub(super) fn dark_unless<V: Lanes>(v: V, lit: V::B) -> V::B {
     v.max8(lit, v.splat8(Trust::Dark as u8))

@@ -141,13 +141,13 @@ impl Decoder {
     ) {
         let (backend, levels) = (self.backend, &self.levels[..]);
         let out = results(out, &columns);
-        let there = start..start + columns.end;
+        let arrived_columns = start..start + columns.end;
         match (&self.unwrapper, arrived, levels) {
             (Unwrapper::Geometric(plan), _, [level]) => {
                 geometric::single_row(backend, plan, level, rows, columns, out);
             }
             (Unwrapper::Geometric(plan), ArrivedRow::Predicted(before), [.., level]) => {
-                let before = before.part(there);
+                let before = before.part(arrived_columns);
                 geometric::finest_row(backend, plan, level, rows, before, columns, out);
             }
             (
@@ -159,7 +159,8 @@ impl Decoder {
                 [coarser @ .., level],
             ) => {
                 let of_level = |at: usize| row.part(at * pixels..(at + 1) * pixels);
-                let before = (0..coarser.len()).map(|at| of_level(at).part(there.clone()));
+                let before =
+                    (0..coarser.len()).map(|at| of_level(at).part(arrived_columns.clone()));
                 let before: heapless::Vec<WrappedRow<'_>, MAX_LEVELS> = before.collect();
                 about::finest_row(backend, plan, level, &before, rows, map, columns, out);
             }

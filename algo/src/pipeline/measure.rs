@@ -1,5 +1,5 @@
-//! Whole frames: frames → phase map → height map, the wrapped phase of one level by itself, and
-//! what a head has for all pixels of a frame.
+//! Whole frames: frames → phase map → height map, the wrapped phase of a single level, and a head's
+//! reference map and rays of all pixels.
 
 use super::{Done, Progress, for_each, for_each_row, for_each_row_of_two};
 use crate::frame::{FrameView, SampleNoise};
@@ -186,8 +186,8 @@ pub fn triangulate(
     triangulate_with(triangulator, phases, sigma, progress)
 }
 
-/// As [`triangulate`], of phases whose σ in turns follows in another way from the modulation, or is
-/// not known.
+/// As [`triangulate`], with σ of the phase in turns as any function of the modulation; `None` where
+/// it is not known.
 pub fn triangulate_with(
     triangulator: &Triangulator,
     phases: &mut PhaseMap,

@@ -23,8 +23,8 @@ use core::f64::consts::TAU;
 /// are fitted by least squares and taken off, each with its degrees of freedom, and so is what the
 /// noise of φ and |X_1| adds.
 ///
-/// Harmonics of a *projected* waveform are large, and optics take of them what is not known; the
-/// places that they take are left out whole. The waveforms for 5, 7 and 9 shifts leave none, those
+/// Harmonics of a *projected* waveform are large, and optics attenuate them by an unknown factor;
+/// the places that they fall on are left out. The waveforms for 5, 7 and 9 shifts leave none, those
 /// for 6 and 8 shifts 2 and 3.
 ///
 /// **Accuracy.** A response of gamma 2, N = 4 to 12: within 6 %
@@ -43,10 +43,10 @@ pub fn off_sine(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) 
 
 /// Pixels of a row over which the harmonics of a response are the same shares of the modulation.
 const RUN: usize = 64;
-/// Two harmonics cannot be told apart where the squared sine between them, over the pixels of a
+/// Two harmonics cannot be separated where the squared sine between them, over the pixels of a
 /// run, is below this.
 const ALIKE: f64 = 1e-6;
-/// From here on their shares are known well one by one.
+/// From this squared sine on, the share of each harmonic is well determined by itself.
 const CLEARLY: f64 = 0.1;
 
 /// Sums of squares of what a sine leaves of the samples, counts².
@@ -141,20 +141,20 @@ impl HarmonicSums {
     fn fitted(&self, place: usize, shifts: usize) -> Fitted {
         // By how much noise of |X_1| and φ turns and stretches harmonic h of a share of 1.
         let stirred = |order: usize| (1.0 + (order * order) as f64) / 2.0;
-        let one = if self.aa > 0.0 {
+        let by_one = if self.aa > 0.0 {
             self.ax.square() / self.aa
         } else {
             0.0
         };
         let real = if 2 * place == shifts { 0.5 } else { 1.0 };
-        let of_one = real * stirred(place) * one / self.aa.max(1.0);
+        let stirred_one = real * stirred(place) * by_one / self.aa.max(1.0);
         let determinant = self.aa * self.bb - self.ab.square();
         let apart = determinant / (self.aa * self.bb);
         if !(apart > ALIKE) {
             return Fitted {
-                left: self.xx - one,
+                left: self.xx - by_one,
                 coefficients: 1.0,
-                stirred: of_one,
+                stirred: stirred_one,
             };
         }
         let crossed = (self.ax * self.bx.conj()).dot(self.ab);
@@ -162,15 +162,15 @@ impl HarmonicSums {
         // a b* x and a* b x, the coefficients' numerators beside those of each alone.
         let across = self.bx * self.ab;
         let along = self.ax * self.ab.conj();
-        let of_a = (self.ax * self.bb - across).square();
-        let of_b = (self.bx * self.aa - along).square();
-        let of_both = stirred(place) * of_a + stirred(shifts - place) * of_b;
+        let numerator_a = (self.ax * self.bb - across).square();
+        let numerator_b = (self.bx * self.aa - along).square();
+        let stirred_both = stirred(place) * numerator_a + stirred(shifts - place) * numerator_b;
         Fitted {
             left: self.xx - explained / determinant,
             coefficients: 2.0,
             stirred: match apart > CLEARLY {
-                true => of_both / (determinant * determinant),
-                false => of_one,
+                true => stirred_both / (determinant * determinant),
+                false => stirred_one,
             },
         }
     }
@@ -182,8 +182,8 @@ struct Fitted {
     left: f64,
     /// How many complex coefficients explain it.
     coefficients: f64,
-    /// What the noise of the fundamental, of which harmonics are made here, adds to the place, as a
-    /// share of its own noise.
+    /// What the noise of the fundamental, from which the harmonics are computed, adds to the place,
+    /// as a share of its own noise.
     stirred: f64,
 }
 
@@ -245,12 +245,12 @@ impl Transform {
         let mut found = SineResiduals::default();
         let count = pixels.len() as f64;
         for (sum, (place, _)) in sums.iter().zip(&self.places) {
-            let of = sum.fitted(*place, shifts);
+            let fitted = sum.fitted(*place, shifts);
             // The mirror image has as much again; the place of half of all shifts is its own, and
             // real.
             let share = if 2 * place == shifts { 1.0 } else { 2.0 };
-            found.noise += share * of.left.max(0.0) / (1.0 + of.stirred) / shifts as f64;
-            found.freedom += share * (count - of.coefficients);
+            found.noise += share * fitted.left.max(0.0) / (1.0 + fitted.stirred) / shifts as f64;
+            found.freedom += share * (count - fitted.coefficients);
             found.all += share * sum.xx / shifts as f64;
         }
         found.samples = count * shifts as f64;
@@ -297,7 +297,8 @@ pub(super) mod tests {
         for (shifts, freedom) in [(3, 0), (4, 1), (5, 0), (6, 2), (7, 0), (8, 3), (9, 0)] {
             let shots: Vec<Shot> = Shot::level_as(1.0, shifts, Waveform::brightest).collect();
             let sequence = Sequence::from_frames(&shots).unwrap();
-            let places = Transform::new(&sequence.levels()[0]).map_or(Vec::new(), |of| of.places);
+            let places = Transform::new(&sequence.levels()[0])
+                .map_or(Vec::new(), |transform| transform.places);
             let free = places.iter().map(|(place, _)| match 2 * place == shifts {
                 true => 1,
                 false => 2,

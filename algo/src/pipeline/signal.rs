@@ -67,7 +67,8 @@ fn add<T: Copy + Into<f64>>(sums: &mut [[f64; 2]], samples: &[T], [sin, cos]: [f
 /// counts at most.
 pub fn signal_by_modulation(
     sequence: &Sequence,
-    (frames, full_scale): (&[FrameView<'_>], u16),
+    frames: &[FrameView<'_>],
+    full_scale: u16,
     phases: &PhaseMap,
 ) -> [f64; 2] {
     let (Some(finest), Some(first)) = (sequence.levels().last(), frames.first()) else {
@@ -175,7 +176,7 @@ mod tests {
             for (at, here) in phases.modulation.iter_mut().enumerate() {
                 *here = Modulation::from_bits((modulation(at) * 257.0) as u16);
             }
-            let [offset, slope] = signal_by_modulation(&sequence, (&views, 255), &phases);
+            let [offset, slope] = signal_by_modulation(&sequence, &views, 255, &phases);
             let signal = |b: f64| offset + slope * b;
             for b in [50.0, 50.0 + (shades - 1) as f64] {
                 let found = signal(b) - (elsewhere + b / 0.9);
@@ -190,7 +191,7 @@ mod tests {
         }
         let nothing = PhaseMap::new(SIDE, SIDE);
         assert_eq!(
-            signal_by_modulation(&sequence, (&[], 255), &nothing),
+            signal_by_modulation(&sequence, &[], 255, &nothing),
             [0.0, 1.0]
         );
     }

@@ -58,17 +58,17 @@ impl<'a, T> Rows<'a, T> {
         self.rows.len()
     }
 
-    /// The rows, of which there are N.
+    /// The N rows.
     ///
     /// # Panics
     /// If there are fewer.
     #[inline(always)]
     pub fn all<const N: usize>(&self) -> [&'a [T]; N] {
         let mut rows = [self.row(0); N];
-        let mut at = 1;
-        while at < N {
-            rows[at] = self.row(at);
-            at += 1;
+        let mut k = 1;
+        while k < N {
+            rows[k] = self.row(k);
+            k += 1;
         }
         rows
     }

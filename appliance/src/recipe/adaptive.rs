@@ -58,7 +58,8 @@ impl Preliminary {
         let slopes = map.slopes(noise::MAX_SLOPE);
         let blur = self.blur(part, calibration, &slopes)?;
         let light = Light::of(
-            (&part.phases, &part.decoder),
+            &part.phases,
+            &part.decoder,
             &slopes,
             1.0 / STRAIGHT_PITCH_PX,
             &blur,

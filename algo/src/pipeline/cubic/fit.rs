@@ -82,7 +82,7 @@ pub(super) struct Cubic {
     pub reach: u8,
 }
 
-/// What the fits of all pixels have in common.
+/// The fit of a pixel's cubic, prepared for all pixels.
 pub(super) struct CubicFit<'a> {
     triangulator: &'a Triangulator,
     range: f64,
@@ -106,7 +106,7 @@ impl<'a> CubicFit<'a> {
         }
     }
 
-    /// Computes the phases of columns of row `v`, none of which is known: the outermost two from
+    /// Computes the unknown phases of columns of row `v`: the outermost two from
     /// their heights, the others by linear interpolation.
     pub fn between(
         &self,

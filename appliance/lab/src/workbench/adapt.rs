@@ -102,7 +102,8 @@ pub fn adapt(recording: &Recording, folder: &Path, options: &AdaptOptions) -> Re
         Method::Fringed => {
             let slopes = map.slopes(noise::MAX_SLOPE);
             let light = Light::of(
-                (&measurement.phases[measurement.primary], decoder),
+                &measurement.phases[measurement.primary],
+                decoder,
                 &slopes,
                 1.0 / before.pitches()[0],
                 &options.optics.blur,
