@@ -21,7 +21,7 @@
 //! (`every_back_end_gives_the_same_bits`).
 
 use super::{Frames, next_block, of_bytes};
-use crate::phase::about::{About, AboutLanes, BlockLevels};
+use crate::phase::about::{About, BlockLevels, DenseLanes, SingleLanes, Unwrapped};
 use crate::phase::arrived::{WrappedRow, WrappedRowMut};
 use crate::phase::fold::AngleLanes;
 use crate::phase::level::{LevelLanes, LevelPlan};
@@ -121,9 +121,7 @@ fn single_columns<V: Lanes, S: Frames>(
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
-    let Some(about) = AboutLanes::new::<1>(v, plan) else {
-        return;
-    };
+    let about = SingleLanes::new(v, plan);
     let level = LevelLanes::new(v, level);
     let angle = AngleLanes::new(v);
     let (frames, mut out) = (frames.first(columns.end), out.first(columns.end));
@@ -145,14 +143,11 @@ fn single_columns<V: Lanes, S: Frames>(
         }
         quality.brightest = folded.brightest;
         let (finest, modulation) = level.fine(v, &angle, &folded, S::DOUBLED);
-        let block = BlockLevels {
-            coarse: finest,
-            middle: finest,
-            finest,
-        };
-        store(
-            v, &about, &known, &block, lit, quality, modulation, at, &mut out,
-        );
+        let unwrapped = [
+            about.unwrap(v, known.phase[0], known.turns[0], finest.phase[0]),
+            about.unwrap(v, known.phase[1], known.turns[1], finest.phase[1]),
+        ];
+        store(v, &known, unwrapped, lit, quality, modulation, at, &mut out);
     }
 }
 
@@ -169,11 +164,7 @@ fn dense_columns<V: Lanes, S: Frames, const OTHERS: usize>(
     out: &mut Results<'_>,
 ) {
     let three = OTHERS == 2;
-    let about = if three {
-        AboutLanes::new::<3>(v, plan)
-    } else {
-        AboutLanes::new::<2>(v, plan)
-    };
+    let about = DenseLanes::new(v, plan, three);
     // With two levels there is no middle one; `middle` is then a copy that is not used.
     let (Some(coarse), Some(middle), Some(about)) = (others.first(), others.last(), about) else {
         return;
@@ -212,9 +203,11 @@ fn dense_columns<V: Lanes, S: Frames, const OTHERS: usize>(
         let modulation;
         (block.finest, modulation) = level.fine(v, &angle, &folded, S::DOUBLED);
         quality.add(v, block.finest.strong, block.finest.brightest);
-        store(
-            v, &about, &known, &block, lit, quality, modulation, at, &mut out,
-        );
+        let unwrapped = [
+            about.unwrap(v, known.phase[0], known.turns[0], &block, 0),
+            about.unwrap(v, known.phase[1], known.turns[1], &block, 1),
+        ];
+        store(v, &known, unwrapped, lit, quality, modulation, at, &mut out);
     }
 }
 
@@ -284,23 +277,20 @@ impl<V: Lanes> KnownBlock<V> {
     }
 }
 
-/// Unwraps a block about the map and stores it. `lit` is the mask of the coarsest level's
+/// Stores a block that was unwrapped about the map. `lit` is the mask of the coarsest level's
 /// modulation, `modulation` is the finest level's.
 #[inline(always)]
 #[allow(clippy::too_many_arguments)]
 fn store<V: Lanes>(
     v: V,
-    about: &AboutLanes<V>,
     known: &KnownBlock<V>,
-    levels: &BlockLevels<V>,
+    [low, high]: [Unwrapped<V>; 2],
     lit: V::B,
     mut quality: Quality<V>,
     modulation: [V::W; 2],
     at: usize,
     out: &mut Results<'_>,
 ) {
-    let low = about.unwrap(v, known.phase[0], known.turns[0], levels, 0);
-    let high = about.unwrap(v, known.phase[1], known.turns[1], levels, 1);
     quality.residual = [low.residual, high.residual];
     if quality.all_resolved(v, quality.strong) {
         let resolved = v.splat8(Trust::Resolved as u8);
