@@ -1,13 +1,17 @@
 //! Whether a pixel is resolved, and if not, the first reason.
 //!
-//! A pixel is too dark below the [`LeastModulation`] of its decoder: 4.3 σ of a sample and at least
-//! 4 counts of 255, or 16 where σ is not known. It is `Dark` if the coarsest level is, else of
-//! `LowModulation`.
+//! A level is too dark below the [`LeastModulation`] of its decoder: 4.3 σ of a sample and at least
+//! 4 counts of 255, or 16 where σ is not known. The pixel is `Dark` if its coarsest level is too
+//! dark, and has `LowModulation` if only a finer one is.
 
 /// σ of a sample over the least modulation that is trusted. It decides how rare wrong fringe orders
 /// are: uniform noise of ±2.5 % of full scale (Peng & Gupta 2008), σ = 3.68 of 255 counts, gives 16
 /// counts.
 pub const NOISE_OVER_LEAST: f64 = 0.23;
+
+/// Largest rounding residual of an unwrapping step, in turns: the fringe order of a larger one would
+/// be a guess.
+pub(crate) const MAX_RESIDUAL: f64 = 0.40;
 
 /// The least modulation that is trusted, in counts of an 8-bit sample; scales with full scale.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]

@@ -178,7 +178,7 @@ fn left_out(poses: &[PathBuf], at: usize) -> LeftOut {
         map
     });
     let pitches = [projector.width(), projector.height()].map(|side| side as f64 / 16.0);
-    let epipolar = Epipolar::of((camera, projector), [&phases[0], &phases[1]], pitches);
+    let epipolar = Epipolar::of(camera, projector, [&phases[0], &phases[1]], pitches);
     LeftOut {
         flatness: (squares / kept.len() as f64).sqrt(),
         points: (kept.len(), points.len() - kept.len()),

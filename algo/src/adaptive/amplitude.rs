@@ -10,10 +10,10 @@
 //! > a = (L − n o) / (n w), within 1/2n ≤ a ≤ 1
 //!
 //! of the projector's light: together at least half of one exposure's whole light, whatever else
-//! lights the part. Each camera pixel asks this of the projector pixel that lights it. The
-//! amplitude is the least that is asked for within the reach of the part's placement, and rises
-//! from there by at most 2 % (`SLOPE`) per projector pixel: a gradient within the blur σ of a lens,
-//! in projector pixels, shifts the fringes by a′/a σ² pixels.
+//! lights the part. Each camera pixel limits the projector pixel that lights it to this share. The
+//! amplitude is the least limit within the reach of the part's placement, and rises from there by
+//! at most 2 % (`SLOPE`) per projector pixel, because a gradient a′ under a blur of σ projector
+//! pixels shifts the fringes by a′/a σ² pixels.
 
 use super::ProjectorMap;
 use super::map::UNKNOWN;
@@ -26,10 +26,10 @@ use alloc::vec::Vec;
 /// Largest rise of the amplitude from one projector pixel to the next, relative: with a lens of σ 1
 /// px the fringes shift by 0.02 px.
 const SLOPE: f32 = 0.02;
-/// Projector pixels by which the reach is larger than the placement's: blur, and pixels that no
-/// camera pixel asks for.
+/// Projector pixels added to the reach of the placement, for blur and for projector pixels that no
+/// camera pixel sees.
 const MARGIN: usize = 2;
-/// Every so many camera pixels in each direction, the reach is looked at.
+/// The reach is evaluated every so many camera pixels in each direction.
 const SPACING: usize = 8;
 
 /// The light that a camera pixel gets in one exposure, as shares of its full scale.
@@ -72,10 +72,10 @@ pub fn reach(triangulator: &Triangulator, heights: &HeightMap, tolerance: f64) -
     let width = heights.width.max(1);
     let rows = heights.height.len() / width;
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let at = |u: usize, v: usize| {
+    let per_mm = |u: usize, v: usize| {
         let point = triangulator.point(u, v, heights.height[v * width + u])?;
         let (xi, eta) = triangulator.projector_point(point)?;
-        // The way for 1 mm along each axis; the root of the sum of squares is at least that along
+        // The way for 1 mm along each axis; the root of the sum of squares is per_mm least that along
         // any direction.
         let moved = axes.iter().filter_map(|&[x, y, z]| {
             let (across, down) = triangulator.projector_point(point + Vector { x, y, z })?;
@@ -85,20 +85,21 @@ pub fn reach(triangulator: &Triangulator, heights: &HeightMap, tolerance: f64) -
     };
     let pixels = (0..rows).step_by(SPACING);
     let pixels = pixels.flat_map(|v| (0..width).step_by(SPACING).map(move |u| (u, v)));
-    let most = pixels.filter_map(|(u, v)| at(u, v)).fold(0.0, f64::max);
+    let most = pixels.filter_map(|(u, v)| per_mm(u, v)).fold(0.0, f64::max);
     tolerance * most
 }
 
-/// The amplitude of each pixel of a projector of (columns, rows), in 1/255 of full light: where the
+/// The amplitude of each pixel of a projector of `columns` × `rows`, in 1/255 of full light: where the
 /// camera sees a projector point of `map`, at most the share of `wanted`, also within `reach`
-/// projector pixels; 255 where nothing asks for less.
+/// projector pixels; 255 where nothing limits it.
 ///
 /// Tests: `no_place_within_reach_is_brighter_than_asked_and_it_rises_slowly`,
 /// `a_saturated_place_is_found_between_the_places_around_it`.
 pub fn amplitude(
     map: &ProjectorMap,
     wanted: &[f64],
-    (columns, rows): (usize, usize),
+    columns: usize,
+    rows: usize,
     reach: f64,
 ) -> Vec<u8> {
     let mut asked = vec![1.0_f32; columns * rows];
@@ -108,13 +109,13 @@ pub fn amplitude(
         for (u, &share) in wanted.iter().enumerate().filter(|(_, share)| **share < 1.0) {
             let [xi, eta] = between(points, u);
             // NaN is outside.
-            let inside = |at: f64, end: usize| {
-                let at = libm::rint(at);
-                (at >= 0.0 && at < end as f64).then_some(at as usize)
+            let inside = |coordinate: f64, end: usize| {
+                let coordinate = libm::rint(coordinate);
+                (coordinate >= 0.0 && coordinate < end as f64).then_some(coordinate as usize)
             };
             if let Some((column, row)) = inside(xi, columns).zip(inside(eta, rows)) {
-                let here = &mut asked[row * columns + column];
-                *here = here.min(share as f32);
+                let cell = &mut asked[row * columns + column];
+                *cell = cell.min(share as f32);
             }
         }
     }
@@ -170,15 +171,15 @@ fn rise_slowly(values: &mut [f32], columns: usize) {
     for backwards in [false, true] {
         for step in 0..values.len() {
             let column = step % columns;
-            let at = |step: usize| if backwards { last - step } else { step };
-            let mut most = values[at(step)];
+            let index = |step: usize| if backwards { last - step } else { step };
+            let mut most = values[index(step)];
             if column > 0 {
-                most = most.min(values[at(step - 1)] * (1.0 + SLOPE));
+                most = most.min(values[index(step - 1)] * (1.0 + SLOPE));
             }
             if step >= columns {
-                most = most.min(values[at(step - columns)] * (1.0 + SLOPE));
+                most = most.min(values[index(step - columns)] * (1.0 + SLOPE));
             }
-            values[at(step)] = most;
+            values[index(step)] = most;
         }
     }
 }
@@ -231,7 +232,7 @@ mod tests {
     #[test]
     fn no_place_within_reach_is_brighter_than_asked_and_it_rises_slowly() {
         let bright = |u, v| u == 20 && v == 10;
-        let amplitude = amplitude(&map(|_, _| false), &wanted(0.3, bright), (120, 80), 9.5);
+        let amplitude = amplitude(&map(|_, _| false), &wanted(0.3, bright), 120, 80, 9.5);
         for (at, &here) in amplitude.iter().enumerate() {
             let (column, row) = (at % 120, at / 120);
             let away = column.abs_diff(40).max(row.abs_diff(20));
@@ -259,7 +260,7 @@ mod tests {
     #[test]
     fn a_saturated_place_is_found_between_the_places_around_it() {
         let glint = |u, v| (20..30).contains(&u) && (10..20).contains(&v);
-        let amplitude = amplitude(&map(glint), &wanted(0.125, glint), (120, 80), 0.0);
+        let amplitude = amplitude(&map(glint), &wanted(0.125, glint), 120, 80, 0.0);
         for (column, row) in [(40, 20), (58, 38), (50, 30)] {
             assert_eq!(amplitude[row * 120 + column], 31, "{column}, {row}");
         }

@@ -1,4 +1,19 @@
-//! The blur of both lenses, from the contrast that fringes have on a part and on a plate.
+//! Contrast of fringes after the optics of projector and camera, what the projector's pixels add to
+//! them, and the blur of both lenses, found from the contrast on a part and on a plate.
+//!
+//! # Contrast
+//!
+//! A projector pixel is a bright square, which its lens blurs; a camera pixel integrates over a
+//! square of its own, and its lens blurs as well. So a sine of g turns per projector pixel, which
+//! the camera sees with the gradient (a, b) turns per camera pixel, has the contrast
+//!
+//! ```text
+//! M(g) = sinc g · exp(−2π²σ_P²g²) · sinc a · sinc b · exp(−2π²σ_C²(a² + b²))        sinc x = sin πx / πx
+//! ```
+//!
+//! The squares also show the sine at the frequencies 1 − g and 1 + g ([`replicas`]).
+//!
+//! # Blur
 //!
 //! **Idea.** The projector's blur weakens fringes by their pitch in projector pixels, the camera's
 //! by their pitch in camera pixels. On steep surfaces these differ, so a part with slopes tells
@@ -11,7 +26,6 @@
 //! measured on a plate counts as much as all groups together. Where all slopes are alike, the blur
 //! is put on the projector.
 
-use super::contrast::{Blur, contrast};
 use alloc::vec::Vec;
 use core::f64::consts::PI;
 
@@ -19,6 +33,65 @@ use core::f64::consts::PI;
 const GROUPS: usize = 16;
 /// Below this variance of |J|², as a share of its mean square, all slopes are alike.
 const ALIKE: f64 = 0.05;
+
+/// How contrast falls with frequency, and the limits of pitch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FringeOptics {
+    /// The blur of both lenses.
+    pub blur: Blur,
+    /// Smallest pitch in projector pixels.
+    pub projector_pitch: f64,
+    /// Smallest pitch in camera pixels.
+    pub image_pitch: f64,
+}
+
+/// Gaussian blur of both lenses, beside the squares of the pixels themselves.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Blur {
+    /// σ of the projector's lens, projector pixels.
+    pub projector: f64,
+    /// σ of the camera's lens, camera pixels.
+    pub camera: f64,
+}
+
+/// The contrast M of a sine of frequency `g` (turns per projector pixel) that the camera sees with
+/// gradient `[a, b]` (turns per camera pixel along u and v).
+pub fn contrast(blur: &Blur, g: f64, [a, b]: [f64; 2]) -> f64 {
+    let camera = sinc(a) * sinc(b) * gauss(blur.camera, libm::sqrt(a * a + b * b));
+    sinc(g) * gauss(blur.projector, g) * camera
+}
+
+/// The light, as a share of the raster's sine, that the projector's squares show at 1 − g and 1 + g
+/// turns per pixel, where the camera sees the slope `[ju, jv]` (projector pixels per camera pixel).
+///
+/// Shifting the sine shifts these replicas in step, so demodulation takes them for the sine: the
+/// phase is off by up to this share of the contrast, in radian, once per projector pixel. For the
+/// camera's square the envelope 1/πx is taken instead of |sinc x|, because where the square is
+/// blind depends on more than the slope.
+pub fn replicas(blur: &Blur, g: f64, [ju, jv]: [f64; 2]) -> f64 {
+    let slope = libm::sqrt(ju * ju + jv * jv);
+    let replica = |f: f64| {
+        let across = f * slope;
+        let camera = (1.0 / (PI * across)).min(1.0) * gauss(blur.camera, across);
+        libm::fabs(sinc(f)) * gauss(blur.projector, f) * camera
+    };
+    replica(1.0 - g) + replica(1.0 + g)
+}
+
+/// The Fourier transform of a Gaussian of this σ.
+fn gauss(sigma: f64, f: f64) -> f64 {
+    libm::exp(-2.0 * (PI * sigma * f) * (PI * sigma * f))
+}
+
+/// sin πx / πx.
+fn sinc(x: f64) -> f64 {
+    let angle = PI * x;
+    if libm::fabs(angle) < 1e-9 {
+        1.0
+    } else {
+        libm::sin(angle) / angle
+    }
+}
 
 /// σ_P² + |J|²σ_C² of a surface with slope J, as a point of the line.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,8 +104,8 @@ pub struct Spread {
 
 impl Spread {
     /// The point of the modulation at `fine` as a share of that at `coarse` (turns per projector
-    /// pixel) on a surface of slope `[ju, jv]`. `None` if they tell nothing, for example because
-    /// one of them is unknown.
+    /// pixel) on a surface of slope `[ju, jv]`. `None` if no number follows, for example
+    /// because one of them is unknown.
     pub fn new([ju, jv]: [f64; 2], share: f64, [fine, coarse]: [f64; 2]) -> Option<Self> {
         let pixels = |g: f64| contrast(&Blur::default(), g, [g * ju, g * jv]);
         let lost = -libm::log(share * pixels(coarse) / pixels(fine));

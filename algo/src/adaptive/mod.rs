@@ -8,17 +8,13 @@
 
 pub mod amplitude;
 mod blur;
-mod contrast;
 mod field;
-mod integrate;
 mod map;
 pub mod noise;
 pub mod paper;
 mod placement;
-mod silhouette;
 
-pub use blur::Spread;
-pub use contrast::{Blur, Optics, contrast, replicas};
+pub use blur::{Blur, FringeOptics, Spread, contrast, replicas};
 pub use field::Field;
 pub use map::ProjectorMap;
 pub use placement::phase_reach;

@@ -5,8 +5,8 @@
 //! pitch, but none so fine that its modulation could not be trusted. Needs one preliminary
 //! measurement with vertical fringes.
 //!
-//! **Equation.** Of the frequencies with B₀ · M(g) at least what noise asks for, where B₀ is the
-//! modulation without blur, the one that maximises
+//! **Equation.** Among the frequencies whose modulation B₀ · M(g) can be trusted under the noise,
+//! where B₀ is the modulation without blur, the one that maximises
 //!
 //! ```text
 //! g · M(g) / √(n² + R(g)²/2)
@@ -15,9 +15,9 @@
 //! n is the noise of the phase where M = 1, and R what the squares of the projector's pixels add
 //! ([`replicas`]), both in radian.
 
-use super::contrast::{Blur, Optics, contrast, replicas};
+use super::blur::{Blur, FringeOptics, contrast, replicas};
 use super::field::Field;
-use super::integrate::balanced_rows;
+use super::field::balanced_rows;
 use super::{AdaptError, ProjectorMap};
 use crate::math::around;
 use crate::pattern::PhaseFunction;
@@ -32,8 +32,8 @@ pub const PROJECTOR_PITCH: f64 = 5.0;
 /// Default of the smallest pitch in camera pixels: the maximum of g · M(g) with the box of the
 /// pixel alone.
 pub const IMAGE_PITCH: f64 = 2.2;
-/// Largest pitch of a pattern, projector pixels. Where the part is so steep that this is not
-/// resolved, no pitch is.
+/// Largest pitch of a pattern, projector pixels. A part that is too steep for this pitch is not
+/// resolved with any.
 const MAX_PITCH: f64 = 128.0;
 /// Neighbours that differ by more than this many projector pixels per camera pixel lie on different
 /// surfaces.
@@ -55,19 +55,19 @@ const ENOUGH: f64 = 0.998;
 const STEPS: usize = 160;
 /// √(2 / Σ N_i r_i² b_i²) of 12 frames: 7 + 5 of ratios 1 and 4/5 with the brightest waveforms.
 const TWELVE_FRAMES: f64 = 0.36;
-/// Error of the phase that light of an almost linear response leaves, radian: noise below it gains
+/// Error of the phase by a response that is not quite linear, radian: less noise than this gains
 /// nothing.
 const LEAST_NOISE: f64 = 3e-3;
-/// By how many σ of a sample the modulation of sines stays above the least that is trusted. With
-/// the waveforms of 3 to 9 shifts the modulation is at least 15 % larger, and then three times its
-/// own σ above the least.
+/// Margin of the modulation of sines over the least that is trusted, in σ of a sample. With the
+/// waveforms of 3 to 9 shifts the modulation is at least 15 % larger, and then three times its own
+/// σ above the least.
 const SAFE: f64 = 1.0;
-/// Reach to each side of the median by which light is found, camera pixels: pixels that are lit in
-/// part, along shadows and silhouettes, ask for nothing, because a narrow line of coarse fringes
-/// would shear the rows beside it.
+/// Reach to each side of the median filter of the light, camera pixels. It removes pixels that are
+/// lit in part, along shadows and silhouettes: they would ask for a narrow line of coarse fringes,
+/// which would shear the rows beside it.
 const LIGHT_REACH: usize = 5;
-/// No more contrast than this is asked for: where the light would need more, a coarser pitch does
-/// not help.
+/// Largest contrast that is asked for: where the light would need more, a coarser pitch does not
+/// help.
 const MOST_CONTRAST: f64 = 0.9;
 
 /// The light of each camera pixel.
@@ -86,7 +86,8 @@ impl Light {
     /// The light of a preliminary measurement with fringes of `g` turns per projector pixel, on
     /// slopes by [`ProjectorMap::slopes`]. `noise` is σ of a sample in counts, if it is known.
     pub fn of(
-        (phases, decoder): (&PhaseMap, &Decoder),
+        phases: &PhaseMap,
+        decoder: &Decoder,
         slopes: &[[f64; 2]],
         g: f64,
         blur: &Blur,
@@ -161,7 +162,12 @@ struct Asked {
 /// 99.8 % of the maximum within both limits of pitch, or the highest with the contrast that is
 /// asked for, if that is lower. `near` are the steps of a similar pixel, from which the search
 /// begins, and become those of this one.
-fn best_frequency(optics: &Optics, [ju, jv]: [f64; 2], asked: Asked, near: &mut [usize; 3]) -> f64 {
+fn best_frequency(
+    optics: &FringeOptics,
+    [ju, jv]: [f64; 2],
+    asked: Asked,
+    near: &mut [usize; 3],
+) -> f64 {
     let blur = &optics.blur;
     let slope = libm::sqrt(ju * ju + jv * jv);
     let coarsest = 1.0 / MAX_PITCH;
@@ -258,7 +264,7 @@ pub fn adapt(
     map: &ProjectorMap,
     columns: usize,
     rows: usize,
-    optics: &Optics,
+    optics: &FringeOptics,
     light: &Light,
     progress: Progress<'_>,
 ) -> Result<PhaseFunction, AdaptError> {
@@ -291,7 +297,7 @@ pub fn adapt(
 fn frequencies(
     slopes: &[[f64; 2]],
     width: usize,
-    (optics, light): (&Optics, &Light),
+    (optics, light): (&FringeOptics, &Light),
     progress: Progress<'_>,
 ) -> Vec<f64> {
     let mut frequencies = vec![f64::NAN; slopes.len()];
@@ -313,7 +319,7 @@ fn frequencies(
 mod tests {
     use super::*;
 
-    const FREE: Optics = Optics {
+    const FREE: FringeOptics = FringeOptics {
         blur: Blur {
             projector: 0.0,
             camera: 0.0,
@@ -328,13 +334,13 @@ mod tests {
     };
 
     /// The best frequency, searched for from the coarsest.
-    fn alone(optics: &Optics, slope: [f64; 2], asked: Asked) -> f64 {
+    fn alone(optics: &FringeOptics, slope: [f64; 2], asked: Asked) -> f64 {
         best_frequency(optics, slope, asked, &mut [0; 3])
     }
 
-    fn blurred(projector: f64, camera: f64) -> Optics {
+    fn blurred(projector: f64, camera: f64) -> FringeOptics {
         let blur = Blur { projector, camera };
-        Optics { blur, ..FREE }
+        FringeOptics { blur, ..FREE }
     }
 
     #[test]
@@ -401,7 +407,7 @@ mod tests {
         // Each search begins where the one before ended.
         let mut near = [0; 3];
         for at in 0..6000 {
-            let optics = Optics {
+            let optics = FringeOptics {
                 projector_pitch: 4.0 + f64::from(at % 3),
                 image_pitch: IMAGE_PITCH,
                 ..blurred(
@@ -442,7 +448,7 @@ mod tests {
 
     #[test]
     fn limits_of_pitch_hold() {
-        let optics = Optics {
+        let optics = FringeOptics {
             projector_pitch: 8.0,
             image_pitch: 5.0,
             ..FREE

@@ -5,7 +5,7 @@
 //! the pattern's pitch grows in proportion, G = 1/(c p_I p_P |∂Φ^V/∂u|); elsewhere it is p_P.
 
 use super::field::Field;
-use super::integrate::rows_from_zero;
+use super::field::rows_from_zero;
 use super::{AdaptError, ProjectorMap};
 use crate::inspect::{components, polygon_spans};
 use crate::pattern::PhaseFunction;

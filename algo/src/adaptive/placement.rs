@@ -31,7 +31,7 @@ use alloc::vec::Vec;
 
 /// Most steps of q from a pixel in each direction.
 const MAX_CELLS: usize = 24;
-/// Every so many pixels in each direction, the distance between neighbouring rays is looked at.
+/// The distance between neighbouring rays is evaluated every so many pixels in each direction.
 const SPACING: usize = 8;
 
 /// The largest |ΔΦ| in turns of each pixel when the part is moved by up to `tolerance` mm
@@ -99,7 +99,7 @@ fn spacing(triangulator: &Triangulator, golden: &KnownSurface) -> Option<f64> {
     let pixels = (0..rows).step_by(SPACING);
     let pixels = pixels.flat_map(|v| (0..width).step_by(SPACING).map(move |u| (u, v)));
     let spacings = pixels.filter_map(|(u, v)| of_pixel(u, v));
-    // Between the pixels that are looked at it is hardly less.
+    // Between the sampled pixels it is hardly less.
     let least = spacings.reduce(f64::min);
     least.map(|least| 0.99 * least).filter(|least| *least > 0.0)
 }
@@ -170,7 +170,7 @@ impl Ball {
     }
 }
 
-/// out[u] = max(out[u], line[u + aside] + rise).
+/// `out[u] = max(out[u], line[u + aside] + rise)`.
 fn raise(out: &mut [f32], line: &[f32], aside: isize, rise: f32) {
     let shift = aside.unsigned_abs().min(line.len());
     let (out, line) = match aside < 0 {

@@ -8,10 +8,9 @@
 //! projector are estimated from their residuals and the redundancy, in rounds, until the weights
 //! agree with the residuals (variance components, W. Förstner, 1979). Derivatives are central
 //! differences: each residual depends on 33 numbers only. The inverse of the last normal matrix,
-//! and what errors of the print add to it (`print`), is the covariance.
+//! and what errors of the print add to it (`uncertainty`), is the covariance.
 
-use super::board::FoundBoard;
-use super::nodes::Node;
+use super::look::BoardView;
 use super::rig::{LENS, POSE, Rig, SHARED};
 use crate::math::solve::solve_symmetric;
 use alloc::vec;
@@ -25,19 +24,10 @@ const STEPS: usize = 60;
 const ROUNDS: usize = 5;
 /// A round has converged when a step changes the cost by less than this share.
 const STILL: f64 = 1e-9;
-/// First σ of camera and projector, px.
-const FIRST_SIGMA: [f64; 2] = [0.3, 0.3];
 /// Least σ, px: exact observations have no noise from which weights could follow.
 const LEAST_SIGMA: f64 = 1e-4;
-
-/// One pose of the board as it was seen.
-#[derive(Clone, Debug, PartialEq)]
-pub struct View {
-    /// The corners in the camera.
-    pub found: FoundBoard,
-    /// The projector's points on the board.
-    pub nodes: Vec<Node>,
-}
+/// First σ of camera and projector, px.
+const FIRST_SIGMA: [f64; 2] = [0.3, 0.3];
 
 /// The residuals of corners in the camera or of nodes in the projector; each has two components.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -85,8 +75,8 @@ pub struct Adjusted {
 )]
 pub struct Undetermined;
 
-/// Whether a number is adjusted. k₃ stays 0: over a frame it differs from k₁ and k₂ by less than it
-/// costs in uncertainty.
+/// Whether a number is adjusted. k₃ stays 0: over a frame its effect beside k₁ and k₂ is smaller than
+/// the uncertainty that it adds.
 fn is_free(number: usize, bowed: bool) -> bool {
     match number {
         at if at < 2 * LENS => at % LENS != LENS - 1,
@@ -99,11 +89,15 @@ fn is_free(number: usize, bowed: bool) -> bool {
 ///
 /// # Errors
 /// If the views do not determine it.
-pub(super) fn adjust(first: Rig, views: &[View], bowed: bool) -> Result<Adjusted, Undetermined> {
+pub(super) fn adjust(
+    first: Rig,
+    views: &[BoardView],
+    bowed: bool,
+) -> Result<Adjusted, Undetermined> {
     let free: Vec<usize> = (0..first.numbers())
         .filter(|&at| is_free(at, bowed))
         .collect();
-    let mut problem = Problem {
+    let mut problem = Adjustment {
         views,
         free,
         sigma: FIRST_SIGMA,
@@ -129,8 +123,8 @@ pub(super) fn adjust(first: Rig, views: &[View], bowed: bool) -> Result<Adjusted
     })
 }
 
-pub(super) struct Problem<'a> {
-    pub views: &'a [View],
+pub(super) struct Adjustment<'a> {
+    pub views: &'a [BoardView],
     /// The numbers that are adjusted.
     pub free: Vec<usize>,
     pub sigma: [f64; 2],
@@ -145,7 +139,7 @@ struct ScaledNormal {
     scale: Vec<f64>,
 }
 
-impl Problem<'_> {
+impl Adjustment<'_> {
     /// Steps until the cost stands still.
     fn round(&self, first: Rig) -> Result<Rig, Undetermined> {
         let mut rig = first;
@@ -289,7 +283,7 @@ impl Problem<'_> {
     }
 
     fn residuals(&self, rig: &Rig) -> Option<Vec<[Residuals; 2]>> {
-        let of = |all: &[[f64; 2]]| Residuals {
+        let sum = |all: &[[f64; 2]]| Residuals {
             squares: all.iter().map(|r| r[0] * r[0] + r[1] * r[1]).sum(),
             points: all.len(),
         };
@@ -297,7 +291,7 @@ impl Problem<'_> {
         let split = |at: usize| {
             let all = self.view(rig, at)?;
             let corners = self.views[at].found.corners.iter().flatten().count();
-            Some([of(&all[..corners]), of(&all[corners..])])
+            Some([sum(&all[..corners]), sum(&all[corners..])])
         };
         views.map(split).collect()
     }
@@ -338,13 +332,13 @@ impl Problem<'_> {
                 inverse[i * n + j] = column[j] * scale[i] * scale[j];
             }
         }
-        let of_print = self.of_print(rig, &inverse)?;
+        let covariance_of_print = self.covariance_of_print(rig, &inverse)?;
         let all = rig.numbers();
         let mut covariance = vec![0.0; all * all];
         for i in 0..n {
             for j in 0..n {
                 covariance[self.free[i] * all + self.free[j]] =
-                    inverse[i * n + j] + of_print[i * n + j];
+                    inverse[i * n + j] + covariance_of_print[i * n + j];
             }
         }
         Some(covariance)
@@ -354,7 +348,7 @@ impl Problem<'_> {
 /// Located corners of a view and their places on the board.
 pub(super) fn places<'a>(
     rig: &'a Rig,
-    view: &'a View,
+    view: &'a BoardView,
 ) -> impl Iterator<Item = ((f64, f64), (f64, f64))> + 'a {
     let corners = view.found.corners.iter().enumerate();
     corners.filter_map(|(at, corner)| {
@@ -379,5 +373,32 @@ pub(super) fn step_of(number: usize) -> f64 {
         at if at < 2 * LENS + POSE => in_pose(at - 2 * LENS),
         at if at < SHARED => 1e-3,
         at => in_pose((at - SHARED) % POSE),
+    }
+}
+
+/// One residual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrow {
+    /// Place in the device's picture, px.
+    pub at: (f64, f64),
+    /// What was seen minus what the models predict, px.
+    pub off: (f64, f64),
+}
+
+impl Adjusted {
+    /// The residuals of one pose: of its corners in the camera, and of its nodes in the projector.
+    pub fn arrows(&self, pose: usize, view: &BoardView) -> [Vec<Arrow>; 2] {
+        let (rig, lies) = (&self.rig, &self.rig.poses[pose]);
+        let arrow = |at: (f64, f64), predicted: (f64, f64)| Arrow {
+            at,
+            off: (at.0 - predicted.0, at.1 - predicted.1),
+        };
+        let corners = places(rig, view)
+            .filter_map(|(corner, place)| Some(arrow(corner, rig.corner(lies, place)?)));
+        let nodes = view
+            .nodes
+            .iter()
+            .filter_map(|node| Some(arrow(node.lit_by, rig.node(lies, node.at)?)));
+        [corners.collect(), nodes.collect()]
     }
 }

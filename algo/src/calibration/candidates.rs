@@ -1,4 +1,8 @@
-//! Places that look like the inner corner of a checkerboard, to a pixel.
+//! A grey picture, and the places in it that look like the inner corner of a checkerboard, to a
+//! pixel.
+//!
+//! The picture is the offset of a level's frames in single precision: what the scene looks like
+//! under even light, with less noise than one frame.
 //!
 //! On a ring of 16 samples I₀ … I₁₅ of radius 5 px about a corner, opposite samples are equal, and
 //! the samples a quarter of the ring further on are of the other colour. Response R = Σ|(I_n +
@@ -8,9 +12,19 @@
 //! 118, 2014. Here it is computed of the picture's logarithm, so that a corner in little light
 //! responds as much as a bright one.
 
-use super::picture::Picture;
+use crate::frame::FrameView;
+use alloc::vec;
 use alloc::vec::Vec;
 
+/// Pixels from the border in which there is no ring.
+const MARGIN: usize = 5;
+/// Two corners are at least this many pixels apart.
+const LEAST_APART: usize = 5;
+/// Least response, of logarithms: print of 1 : 1.3 has 16 · ½ · 2 ln 1.3 / 2 ≈ 2 over all of the
+/// ring.
+const LEAST_RESPONSE: f32 = 1.0;
+/// Most candidates: beyond, the weakest are noise.
+const MOST_CANDIDATES: usize = 4000;
 /// The ring: (u, v), anticlockwise in steps of 22.5°, at radius 5.
 const RING: [(i32, i32); 16] = [
     (5, 0),
@@ -30,15 +44,96 @@ const RING: [(i32, i32); 16] = [
     (4, -4),
     (5, -2),
 ];
-/// Pixels from the border in which there is no ring.
-const MARGIN: usize = 5;
-/// Two corners are at least this many pixels apart.
-const APART: usize = 5;
-/// Least response, of logarithms: print of 1 : 1.3 has 16 · ½ · 2 ln 1.3 / 2 ≈ 2 over all of the
-/// ring.
-const LEAST: f32 = 1.0;
-/// Most candidates: beyond, the weakest are noise.
-const MOST: usize = 4000;
+
+/// A grey picture.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GreyPicture {
+    /// Pixels per row.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Counts, row-major.
+    pub counts: Vec<f32>,
+}
+
+impl GreyPicture {
+    /// The mean of frames of equal size; over all shifts of one or more levels it is their offset
+    /// A.
+    pub fn mean(frames: &[FrameView<'_>]) -> Self {
+        let (width, height) = frames
+            .first()
+            .map_or((0, 0), |frame| (frame.width(), frame.height()));
+        let mut sums = vec![0_u32; width * height];
+        for frame in frames {
+            for (v, row) in sums.chunks_mut(width.max(1)).enumerate() {
+                frame.row(v).add_to(row);
+            }
+        }
+        let share = 1.0 / frames.len().max(1) as f32;
+        Self {
+            width,
+            height,
+            counts: sums.into_iter().map(|sum| sum as f32 * share).collect(),
+        }
+    }
+
+    /// The sample at column u and row v.
+    #[inline]
+    pub fn at(&self, u: usize, v: usize) -> f32 {
+        self.counts[v * self.width + u]
+    }
+
+    /// The picture at half the size: means of 2 × 2 pixels. Pixel (u, v) of it lies at (2u + ½,
+    /// 2v + ½) of this one.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let (width, height) = (self.width / 2, self.height / 2);
+        let pixels = (0..height).flat_map(|v| (0..width).map(move |u| (2 * u, 2 * v)));
+        Self {
+            width,
+            height,
+            counts: pixels
+                .map(|(u, v)| {
+                    let above = self.at(u, v) + self.at(u + 1, v);
+                    let below = self.at(u, v + 1) + self.at(u + 1, v + 1);
+                    0.25 * (above + below)
+                })
+                .collect(),
+        }
+    }
+
+    /// The logarithm of the picture, smoothed with the binomial kernel 1 4 6 4 1: even light or
+    /// not, an edge between two albedos has the same height. `floor` counts are added, so that
+    /// noise in the dark stays small.
+    #[must_use]
+    pub(super) fn levelled(&self, floor: f32) -> Self {
+        let logarithm = |&counts: &f32| libm::logf(counts.max(0.0) + floor);
+        let logs = Self {
+            counts: self.counts.iter().map(logarithm).collect(),
+            ..*self
+        };
+        logs.smoothed(1, 0).smoothed(0, 1)
+    }
+
+    /// Smoothed along one axis; the border's pixels are repeated outside.
+    fn smoothed(&self, du: usize, dv: usize) -> Self {
+        const KERNEL: [f32; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
+        let (right, bottom) = (self.width.saturating_sub(1), self.height.saturating_sub(1));
+        let pixels = (0..self.height).flat_map(|v| (0..self.width).map(move |u| (u, v)));
+        let sum = |(u, v): (usize, usize)| {
+            let samples = KERNEL.iter().enumerate().map(|(at, weight)| {
+                let column = (u + at * du).saturating_sub(2 * du).min(right);
+                let row = (v + at * dv).saturating_sub(2 * dv).min(bottom);
+                weight * self.at(column, row)
+            });
+            samples.sum()
+        };
+        Self {
+            counts: pixels.map(sum).collect(),
+            ..*self
+        }
+    }
+}
 
 /// A place that looks like a corner.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,12 +157,12 @@ impl Candidate {
 }
 
 /// The candidates of a levelled picture, the strongest first.
-pub(super) fn candidates(picture: &Picture) -> Vec<Candidate> {
+pub(super) fn candidates(picture: &GreyPicture) -> Vec<Candidate> {
     let (width, height) = (picture.width, picture.height);
     if width <= 2 * MARGIN || height <= 2 * MARGIN {
         return Vec::new();
     }
-    let mut responses = Picture {
+    let mut responses = GreyPicture {
         counts: alloc::vec![0.0; width * height],
         ..*picture
     };
@@ -79,32 +174,32 @@ pub(super) fn candidates(picture: &Picture) -> Vec<Candidate> {
     let mut found = Vec::new();
     for v in MARGIN..height - MARGIN {
         for u in MARGIN..width - MARGIN {
-            let here = responses.at(u, v);
-            if here >= LEAST && largest(&responses, u, v) {
+            let strength = responses.at(u, v);
+            if strength >= LEAST_RESPONSE && largest(&responses, u, v) {
                 found.push(Candidate {
                     u: u as f64,
                     v: v as f64,
-                    strength: here,
+                    strength,
                     harmonic: harmonic(&ring(picture, u, v)),
                 });
             }
         }
     }
     found.sort_by(|a, b| b.strength.total_cmp(&a.strength));
-    found.truncate(MOST);
+    found.truncate(MOST_CANDIDATES);
     found
 }
 
 #[inline]
-fn ring(picture: &Picture, u: usize, v: usize) -> [f32; 16] {
+fn ring(picture: &GreyPicture, u: usize, v: usize) -> [f32; 16] {
     // The margin keeps every sample inside the picture.
-    let at = (v * picture.width + u) as isize;
+    let centre = (v * picture.width + u) as isize;
     RING.map(|(du, dv)| {
-        picture.counts[(at + dv as isize * picture.width as isize + du as isize) as usize]
+        picture.counts[(centre + dv as isize * picture.width as isize + du as isize) as usize]
     })
 }
 
-fn response(picture: &Picture, u: usize, v: usize) -> f32 {
+fn response(picture: &GreyPicture, u: usize, v: usize) -> f32 {
     let ring = ring(picture, u, v);
     let mut sum = 0.0;
     for n in 0..4 {
@@ -124,14 +219,14 @@ fn response(picture: &Picture, u: usize, v: usize) -> f32 {
 }
 
 /// Whether no response nearby is larger, and none before this place, row by row, is equal.
-fn largest(responses: &Picture, u: usize, v: usize) -> bool {
-    let here = responses.at(u, v);
-    let rows = v.saturating_sub(APART)..(v + APART + 1).min(responses.height);
+fn largest(responses: &GreyPicture, u: usize, v: usize) -> bool {
+    let strength = responses.at(u, v);
+    let rows = v.saturating_sub(LEAST_APART)..(v + LEAST_APART + 1).min(responses.height);
     rows.into_iter().all(|row| {
-        let columns = u.saturating_sub(APART)..(u + APART + 1).min(responses.width);
+        let columns = u.saturating_sub(LEAST_APART)..(u + LEAST_APART + 1).min(responses.width);
         columns.into_iter().all(|column| {
-            let there = responses.at(column, row);
-            there < here || (there == here && (row, column) >= (v, u))
+            let other = responses.at(column, row);
+            other < strength || (other == strength && (row, column) >= (v, u))
         })
     })
 }

@@ -8,7 +8,7 @@
 //! θ₂, σ, a, b, g), Levenberg (1944) and Marquardt (1963). Corner and edges together are located
 //! with all of the contrast in the window, and σ says how sharp the picture is.
 
-use super::picture::Picture;
+use super::candidates::GreyPicture;
 use crate::math::solve::Normal;
 
 /// Unknowns.
@@ -37,12 +37,12 @@ pub struct Corner {
 /// Locates the corner near (u, v) with the pixels within `radius` of it; `edges` are the directions
 /// of its two edges. `None` where the picture there is not that of a corner.
 pub(super) fn locate(
-    picture: &Picture,
+    picture: &GreyPicture,
     (u, v): (f64, f64),
     edges: [(f64, f64); 2],
     radius: f64,
 ) -> Option<Corner> {
-    let window = Window::new(picture, (u, v), radius)?;
+    let window = CornerWindow::new(picture, (u, v), radius)?;
     let angle = |(x, y): (f64, f64)| libm::atan2(y, x);
     let mut fit = [
         u,
@@ -86,16 +86,16 @@ pub(super) fn locate(
 }
 
 /// The pixels about a corner.
-struct Window<'a> {
-    picture: &'a Picture,
+struct CornerWindow<'a> {
+    picture: &'a GreyPicture,
     columns: (usize, usize),
     rows: (usize, usize),
     centre: (f64, f64),
     radius: f64,
 }
 
-impl<'a> Window<'a> {
-    fn new(picture: &'a Picture, (u, v): (f64, f64), radius: f64) -> Option<Self> {
+impl<'a> CornerWindow<'a> {
+    fn new(picture: &'a GreyPicture, (u, v): (f64, f64), radius: f64) -> Option<Self> {
         let range = |at: f64, size: usize| {
             let (low, high) = (libm::ceil(at - radius), libm::floor(at + radius));
             (low >= 0.0 && high < size as f64).then_some((low as usize, high as usize))
@@ -181,7 +181,7 @@ struct Model {
 }
 
 /// An edge at a pixel.
-struct Edge {
+struct BlurredEdge {
     /// erf(s/√2σ).
     step: f64,
     /// The derivative of that with s.
@@ -199,14 +199,14 @@ impl Model {
         }
     }
 
-    fn edge(&self, at: usize, x: f64, y: f64) -> Edge {
+    fn edge(&self, at: usize, x: f64, y: f64) -> BlurredEdge {
         let sigma = self.fit[4];
         let (sin, cos) = self.edges[at];
         let side = y * cos - x * sin;
         let t = side / (core::f64::consts::SQRT_2 * sigma);
         // d erf(s/√2σ)/ds = √(2/π)/σ · exp(−s²/2σ²)
         let scale = libm::sqrt(2.0 / core::f64::consts::PI) / sigma;
-        Edge {
+        BlurredEdge {
             step: libm::erf(t),
             slope: scale * libm::exp(-t * t),
             side,

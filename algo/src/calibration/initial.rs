@@ -6,20 +6,20 @@
 //! all poses are then known in the camera's coordinates and do not lie in one plane, so that its 3
 //! × 4 matrix follows from linear equations (Y. I. Abdel-Aziz, H. M. Karara, "Direct linear
 //! transformation", 1971), and from that its lens and pose (R. Hartley, A. Zisserman, "Multiple
-//! View Geometry", section 6.2.4). No shift of the projector's lens disturbs it.
+//! View Geometry", section 6.2.4). The projector's lens may be shifted.
 
 use super::board::Board;
-use super::pose::Pose;
+use super::rig::Pose;
 use crate::geometry::{Lens, Vector};
 use crate::math::solve::Normal;
 use alloc::vec::Vec;
 
 /// A corner's place on the board and in the picture.
-pub(super) type Pair = ((f64, f64), (f64, f64));
+pub(super) type Correspondence = ((f64, f64), (f64, f64));
 
 /// The columns of H from places on the board to places in the picture, both about their centres and
 /// of the order of 1: then its last element is not 0 and is set to 1.
-fn homography(pairs: impl Iterator<Item = Pair>) -> Option<[Vector; 3]> {
+fn homography(pairs: impl Iterator<Item = Correspondence>) -> Option<[Vector; 3]> {
     let equations = pairs.flat_map(|((x, y), (u, v))| {
         [
             ([x, y, 1.0, 0.0, 0.0, 0.0, -u * x, -u * y], u),
@@ -35,11 +35,11 @@ fn homography(pairs: impl Iterator<Item = Pair>) -> Option<[Vector; 3]> {
 }
 
 /// Lens of the camera and poses of the board, from the corners of each pose in a picture of `width`
-/// × `height` pixels. `None` if they do not determine them: no pose is tilted.
+/// × `height` pixels. `None` if no pose is tilted, so that they do not determine the lens.
 pub(super) fn camera(
     board: &Board,
     (width, height): (usize, usize),
-    poses: &[Vec<Pair>],
+    poses: &[Vec<Correspondence>],
 ) -> Option<(Lens, Vec<Pose>)> {
     let (cx, cy) = ((width as f64 - 1.0) / 2.0, (height as f64 - 1.0) / 2.0);
     let (scale, size) = (
@@ -71,7 +71,9 @@ pub(super) fn camera(
         homographies.push(h);
     }
     let [x, y] = equations.solve()?;
-    let focal = |of: f64| (of > 1e-4 && of < 1e4).then(|| libm::sqrt(1.0 / of));
+    let focal = |inverse_square: f64| {
+        (inverse_square > 1e-4 && inverse_square < 1e4).then(|| libm::sqrt(1.0 / inverse_square))
+    };
     let (fx, fy) = (focal(x)?, focal(y)?);
     let poses = homographies.into_iter().map(|h| {
         let [x, y, t] = h.map(|h| Vector::new(h.x / fx, h.y / fy, h.z));

@@ -1,40 +1,29 @@
 //! Calibration of the geometry: from pictures and phases of a checkerboard in several poses to the
 //! models of camera and projector.
 //!
-//! `look` judges one pose (corners: `candidates`, `grid`, `corner`; projector points: `nodes`),
-//! `solve` all of them (`initial`, `adjust`), `predict` gives σ.
+//! `look` judges one pose: `board` finds the board (places that look like corners: `candidates`;
+//! each corner to a few hundredths of a pixel: `corner`), and projector points are fitted inside
+//! its squares. `solve` takes all poses: first values (`initial`), then one adjustment (`adjust`)
+//! of the whole `rig`. `uncertainty` gives σ.
 
 mod adjust;
-mod arrows;
 mod board;
 mod candidates;
 mod corner;
-mod grid;
 mod initial;
-mod lengths;
 mod look;
-mod nodes;
-mod picture;
-mod pose;
-mod predict;
-mod print;
 mod rig;
 mod solve;
-mod standing;
+mod uncertainty;
 
-pub use adjust::{Adjusted, Residuals, Undetermined, View};
-pub use arrows::Arrow;
+pub use adjust::{Adjusted, Arrow, Residuals, Undetermined};
 pub use board::{Board, BoardError, FoundBoard};
+pub use candidates::GreyPicture;
 pub use corner::Corner;
-pub use lengths::MeasuredBoard;
-pub use look::{PoseError, look};
-pub use nodes::{Fringes, Node};
-pub use picture::Picture;
-pub use pose::Pose;
-pub use predict::{LENGTH, Prediction};
-pub use rig::Rig;
+pub use look::{BoardNode, BoardView, FringeMaps, PoseError, look};
+pub use rig::{Pose, Rig, Standing};
 pub use solve::{CalibrationError, calibrate, estimate};
-pub use standing::Standing;
+pub use uncertainty::{LENGTH, MeasuredBoard, Prediction};
 
 #[cfg(test)]
 mod tests;

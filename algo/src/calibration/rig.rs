@@ -1,8 +1,7 @@
 //! What is adjusted: both lenses, the projector's pose to the camera, the board's pose in each
-//! picture, and the board's bow.
+//! picture, and the board's bow; and how the board stands to camera and projector.
 
 use super::board::Board;
-use super::pose::Pose;
 use crate::geometry::{Lens, PinholeModel, Vector};
 use alloc::vec::Vec;
 
@@ -15,6 +14,113 @@ pub(super) const POSE: usize = 6;
 /// Rounds that find the point of a bowed board on a ray: each gains a factor of the board's slope,
 /// 1e-3.
 const ROUNDS: usize = 4;
+/// A normal that is inclined by more than this to the plane of both lines of sight, or lies within
+/// that plane but by more than this outside the angle between the lines, is hardly that of the
+/// plane z = 0 of a head, rad.
+const MOST_ASIDE: f64 = 10.0 / 180.0 * core::f64::consts::PI;
+
+/// A rigid motion from one frame of coordinates to another: X' = R·X + t.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Rows of R.
+    pub rows: [Vector; 3],
+    /// t, mm.
+    pub shift: Vector,
+}
+
+impl Pose {
+    /// The point in the other frame.
+    #[inline]
+    pub fn apply(&self, point: Vector) -> Vector {
+        self.turned(point) + self.shift
+    }
+
+    /// The direction in the other frame.
+    #[inline]
+    pub fn turned(&self, direction: Vector) -> Vector {
+        let [x, y, z] = self.rows.map(|row| row.dot(direction));
+        Vector::new(x, y, z)
+    }
+
+    /// Back from the other frame.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let [a, b, c] = self.rows;
+        let rows = [
+            Vector::new(a.x, b.x, c.x),
+            Vector::new(a.y, b.y, c.y),
+            Vector::new(a.z, b.z, c.z),
+        ];
+        let back = Self {
+            rows,
+            shift: Vector::default(),
+        };
+        Self {
+            shift: back.turned(self.shift) * -1.0,
+            ..back
+        }
+    }
+
+    /// The motion that consists of `first` and then of this one.
+    #[must_use]
+    pub fn after(&self, first: &Self) -> Self {
+        // Row i of R·F is Fᵀ applied to row i of R.
+        let transposed = first.inverse();
+        Self {
+            rows: self.rows.map(|row| transposed.turned(row)),
+            shift: self.apply(first.shift),
+        }
+    }
+
+    /// This pose with a small turn (rotation vector, rad) after R and a shift added to t, given as
+    /// one list: turn, then shift.
+    #[must_use]
+    pub fn moved(&self, by: &[f64]) -> Self {
+        let turn = Vector::new(by[0], by[1], by[2]);
+        let shift = Vector::new(by[3], by[4], by[5]);
+        let angle = turn.length();
+        if angle == 0.0 {
+            return Self {
+                shift: self.shift + shift,
+                ..*self
+            };
+        }
+        // Rodrigues' formula, applied to the columns of R.
+        let axis = turn * (1.0 / angle);
+        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+        let columns = self.inverse().rows.map(|column| {
+            column * cos + axis.cross(column) * sin + axis * (axis.dot(column) * (1.0 - cos))
+        });
+        let turned = Self {
+            rows: columns,
+            shift: Vector::default(),
+        };
+        Self {
+            rows: turned.inverse().rows,
+            shift: self.shift + shift,
+        }
+    }
+
+    /// The pose whose x and y axes are nearly `x` and `y`: made orthogonal, of length 1 and
+    /// right-handed.
+    pub(super) fn from_axes(x: Vector, y: Vector, shift: Vector) -> Self {
+        let x = x * (1.0 / x.length());
+        let y = y * (1.0 / y.length());
+        // Both axes are turned by the same angle until they are at right angles.
+        let (sum, difference) = (x + y, x - y);
+        let sum = sum * (core::f64::consts::FRAC_1_SQRT_2 / sum.length());
+        let difference = difference * (core::f64::consts::FRAC_1_SQRT_2 / difference.length());
+        let (x, y) = (sum + difference, sum - difference);
+        let columns = Self {
+            rows: [x, y, x.cross(y)],
+            shift: Vector::default(),
+        };
+        Self {
+            rows: columns.inverse().rows,
+            shift,
+        }
+    }
+}
 
 /// The geometry of a head and of the poses of a board in front of it.
 #[derive(Clone, Debug, PartialEq)]
@@ -149,5 +255,55 @@ fn model(lens: &Lens, world: &Pose) -> PinholeModel {
         distortion: lens.distortion,
         rotation: [a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z],
         translation: [world.shift.x, world.shift.y, world.shift.z],
+    }
+}
+
+/// Angles of the board's normal to the lines from its centre to the devices, rad.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Standing {
+    /// To the camera.
+    pub camera: f64,
+    /// To the projector.
+    pub projector: f64,
+    /// Out of the plane of both lines.
+    pub aside: f64,
+    /// Between both lines.
+    pub between: f64,
+}
+
+impl Standing {
+    /// The angles of a board with this normal, from whose centre the lines to camera and projector
+    /// begin.
+    pub fn new(normal: Vector, camera: Vector, projector: Vector) -> Self {
+        let angle = |a: Vector, b: Vector| libm::atan2(a.cross(b).length(), a.dot(b));
+        let across = camera.cross(projector);
+        Self {
+            camera: angle(normal, camera),
+            projector: angle(normal, projector),
+            aside: libm::fabs(core::f64::consts::FRAC_PI_2 - angle(normal, across)),
+            between: angle(camera, projector),
+        }
+    }
+
+    /// Whether the board hardly lies in the plane z = 0 of a head, whose normal passes between
+    /// camera and projector.
+    pub fn is_doubtful(&self) -> bool {
+        self.aside > MOST_ASIDE || self.camera + self.projector > self.between + 2.0 * MOST_ASIDE
+    }
+}
+
+impl Rig {
+    /// How the board stands in a pose.
+    pub fn standing(&self, pose: usize) -> Standing {
+        let pose = &self.poses[pose];
+        let normal = pose.turned(Vector::new(0.0, 0.0, 1.0));
+        let projector = self.relative.inverse().shift - pose.shift;
+        Standing::new(normal, pose.shift * -1.0, projector)
+    }
+
+    /// Angle between the board's normal and the camera's axis in a pose, rad.
+    pub fn tilt(&self, pose: usize) -> f64 {
+        let normal = self.poses[pose].turned(Vector::new(0.0, 0.0, -1.0));
+        libm::atan2(libm::hypot(normal.x, normal.y), normal.z)
     }
 }

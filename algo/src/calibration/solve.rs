@@ -1,22 +1,22 @@
-//! From views of a board to an adjusted rig, or the pose that is to blame.
+//! From views of a board to an adjusted rig, or the pose that does not fit.
 
-use super::adjust::{Adjusted, Undetermined, View, adjust};
+use super::adjust::{Adjusted, Undetermined, adjust};
 use super::board::Board;
-use super::initial::{self, Mirrored, Pair};
-use super::pose::Pose;
-use super::rig::{Rig, SHARED};
+use super::initial::{self, Correspondence, Mirrored};
+use super::look::BoardView;
+use super::rig::{Pose, Rig, SHARED};
 use crate::geometry::Vector;
 use crate::math::solve::Normal;
 use alloc::vec::Vec;
 use core::array::from_fn;
 
-/// Least poses: three give the equations, and no more.
+/// Least poses: three determine the models without redundancy.
 const LEAST_POSES: usize = 3;
-/// Least angle between two of the board's normals, rad: parallel boards do not tell focal lengths
-/// from distances.
+/// Least angle between two of the board's normals, rad: with parallel boards focal lengths and
+/// distances cannot be separated.
 const LEAST_TILT: f64 = 10.0 / 180.0 * core::f64::consts::PI;
-/// Poses from which the board's bow is adjusted: with fewer, it cannot be told from the lenses'
-/// distortion.
+/// Poses from which the board's bow is adjusted: with fewer, it cannot be separated from the
+/// lenses' distortion.
 const BOWED_FROM: usize = 6;
 /// χ² of three degrees of freedom that a flat board exceeds once in 10⁶.
 const BOWED: f64 = 31.8;
@@ -30,7 +30,7 @@ const BLURRED: (f64, f64) = (2.5, 1.0);
 /// Largest relative σ of a focal length.
 const MOST_FOCAL_SIGMA: f64 = 0.01;
 
-/// Views that make no calibration; poses are counted from 0.
+/// Views that give no calibration; poses are counted from 0.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum CalibrationError {
@@ -104,7 +104,7 @@ pub enum CalibrationError {
 }
 
 impl CalibrationError {
-    /// The pose to blame, if it is one.
+    /// The pose at fault, if a single one is.
     pub fn pose(&self) -> Option<usize> {
         match self {
             Self::Blurred { pose, .. }
@@ -119,12 +119,12 @@ impl CalibrationError {
 /// picture.
 ///
 /// # Errors
-/// If the views do not determine the models, or one of them does not fit the others; if a picture
-/// is mirrored, which of both axes.
+/// If the views do not determine the models, one of them does not fit the others, or a picture is
+/// mirrored.
 pub fn calibrate(
     board: &Board,
     frame: (usize, usize),
-    views: &[View],
+    views: &[BoardView],
 ) -> Result<Adjusted, CalibrationError> {
     if views.len() < LEAST_POSES {
         return Err(CalibrationError::Few { given: views.len() });
@@ -134,7 +134,7 @@ pub fn calibrate(
         Ok(rig) => adjusted(rig, views),
         // The finding is named only if nothing else is wrong.
         Err(mirrored) => {
-            let righted: Vec<View> = views.iter().map(|view| mirrored.righted(view)).collect();
+            let righted: Vec<BoardView> = views.iter().map(|view| mirrored.righted(view)).collect();
             let rig = first(board, frame, &righted).and_then(Result::ok);
             adjusted(rig.ok_or(Undetermined)?, &righted)?;
             Err(match mirrored {
@@ -145,9 +145,9 @@ pub fn calibrate(
     }
 }
 
-/// The geometry of these views as it is known before it is adjusted: angles are right within a few
-/// degrees. `None` if there are too few, or they do not determine it.
-pub fn estimate(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Rig> {
+/// First values of the geometry of these views, with angles right within a few degrees; `None` if
+/// the views are too few or do not determine it.
+pub fn estimate(board: &Board, frame: (usize, usize), views: &[BoardView]) -> Option<Rig> {
     if views.len() < LEAST_POSES {
         return None;
     }
@@ -155,7 +155,7 @@ pub fn estimate(board: &Board, frame: (usize, usize), views: &[View]) -> Option<
 }
 
 /// Adjusts a rig from first values, and checks what is left.
-fn adjusted(first: Rig, views: &[View]) -> Result<Adjusted, CalibrationError> {
+fn adjusted(first: Rig, views: &[BoardView]) -> Result<Adjusted, CalibrationError> {
     let flat = adjust(first, views, false)?;
     fits(&flat)?;
     let bowed = (views.len() >= BOWED_FROM)
@@ -176,8 +176,12 @@ fn adjusted(first: Rig, views: &[View]) -> Result<Adjusted, CalibrationError> {
 
 /// First values in closed form; the error says how one picture is mirrored, `None` that the views
 /// do not determine them.
-fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Result<Rig, Mirrored>> {
-    let pairs: Vec<Vec<Pair>> = views
+fn first(
+    board: &Board,
+    frame: (usize, usize),
+    views: &[BoardView],
+) -> Option<Result<Rig, Mirrored>> {
+    let pairs: Vec<Vec<Correspondence>> = views
         .iter()
         .map(|view| {
             let corners = view.found.corners.iter().enumerate();
@@ -211,7 +215,7 @@ fn first(board: &Board, frame: (usize, usize), views: &[View]) -> Option<Result<
 
 impl Mirrored {
     /// The view by a projector that is not mirrored.
-    fn righted(self, view: &View) -> View {
+    fn righted(self, view: &BoardView) -> BoardView {
         let mut righted = view.clone();
         for node in &mut righted.nodes {
             let (xi, eta) = node.lit_by;
@@ -231,7 +235,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Checks that no pose is much less sharp than the others.
-fn sharp(views: &[View]) -> Result<(), CalibrationError> {
+fn sharp(views: &[BoardView]) -> Result<(), CalibrationError> {
     let median = median(views.iter().map(|view| view.found.blur()));
     for (pose, view) in views.iter().enumerate() {
         let blur = view.found.blur();
@@ -247,7 +251,7 @@ fn fits(adjusted: &Adjusted) -> Result<(), CalibrationError> {
     let each: Vec<[f64; 2]> = adjusted
         .residuals
         .iter()
-        .map(|pose| pose.map(|of| of.rms()))
+        .map(|pose| pose.map(|residuals| residuals.rms()))
         .collect();
     let larger = |rms: &[f64; 2]| rms[0].max(rms[1]);
     let worst = (0..each.len()).max_by(|&a, &b| larger(&each[a]).total_cmp(&larger(&each[b])));

@@ -1,18 +1,16 @@
 //! A Gray code without fringes: the projector's coordinate of each pixel from the cells alone.
 //!
-//! A pixel's cell gives its coordinate within half a cell. Where the picture crosses from one cell
-//! into the next, the one bit that changes there passes through the middle between bright and dark,
-//! and that place lies between two pixels as the zero of the bit's contrast does (linear
-//! interpolation; Trobina 1995 compares it with other ways). Between the two borders of a cell that
-//! are found in this way the coordinate runs linearly; where neighbouring pixels are cells apart,
-//! there are no borders, and half a cell is small.
+//! A pixel's cell gives its coordinate within half a cell. At the border of two cells one bit
+//! changes, and its contrast has a zero, which is found between two pixels by linear interpolation
+//! (Trobina 1995 compares it with other ways). Between the two borders of a cell the coordinate is
+//! interpolated linearly. Where neighbouring pixels are several cells apart there are no borders;
+//! half a cell is then less than a pixel.
 //!
-//! A lens that blurs more than a cell takes the contrast of the finest bits first. The bits above
-//! them are a code of cells that are 2, 4 or 8 times as wide, and a pixel is read by as many bits as
+//! A lens whose blur is wider than a cell removes the contrast of the finest bits first. The coarser
+//! bits are a code of cells that are 2, 4 or 8 times as wide, and a pixel is read by as many bits as
 //! it resolves.
 
 use super::{Cells, CodeError, CodePictures};
-use crate::frame::{FrameView, Samples};
 use crate::pipeline::{PhaseMap, for_each_row};
 use crate::trust::{LeastModulation, Trust};
 use crate::units::{AbsolutePhase, Modulation};
@@ -21,11 +19,11 @@ use alloc::vec::Vec;
 
 /// A bit whose contrast is below this share of the clearest bit's is undecided.
 const UNDECIDED: f64 = 0.25;
-/// Most of the finest bits that may be washed out: a blur over cells of 8 projector pixels is no
-/// lens, but light that reaches the pixel by way of something else.
+/// Most of the finest bits that may be washed out: a blur over cells of 8 projector pixels is not
+/// the lens's, but light that reaches the pixel by reflection.
 const MOST_WASHED: u32 = 3;
-/// Pixels along a line, to both sides, in which nowhere a bit is decided that is washed out; on the
-/// border of two cells fewer are in doubt.
+/// Pixels along a line, to both sides, over which a bit that is washed out is undecided everywhere;
+/// on the border of two cells it is undecided over fewer.
 const WINDOW: usize = 6;
 /// σ of a coordinate that is known within a cell, in cells: that of a uniform distribution.
 pub const SIGMA_CELLS: f64 = 0.288_675_134_594_812_9;
@@ -42,7 +40,7 @@ pub struct CodePhases {
 
 /// What a pixel sees of a code.
 #[derive(Clone, Copy, Debug, Default)]
-struct Pixel {
+struct CodePixel {
     /// Its bits.
     seen: u16,
     /// Those of them that are in doubt.
@@ -78,14 +76,14 @@ impl CodePictures<'_> {
         let count = self.bits.len();
         let (width, height) = self.size()?;
         let least = least.counts(full_scale);
-        let mut pixels = vec![Pixel::default(); width * height];
+        let mut pixels = vec![CodePixel::default(); width * height];
         for_each_row(&mut pixels, width, |v, row| {
             let mut contrasts = vec![0.0; count];
             for (u, pixel) in row.iter_mut().enumerate() {
                 for (bit, contrast) in contrasts.iter_mut().enumerate() {
                     *contrast = self.contrast(bit, u, v);
                 }
-                *pixel = Pixel::of(&contrasts, cells, least);
+                *pixel = CodePixel::of(&contrasts, cells, least);
             }
         });
         let refined = self.refined(&pixels, cells, (width, height), vertical);
@@ -109,8 +107,11 @@ impl CodePictures<'_> {
     /// How far the sample of a bit's picture is above the middle between bright and dark, counts.
     fn contrast(&self, bit: usize, u: usize, v: usize) -> f64 {
         let against = self.against.get(bit).unwrap_or(&self.against[0]);
-        let sum: f64 = against.iter().map(|frame| sample(frame, u, v)).sum();
-        let own = sample(&self.bits[bit], u, v);
+        let sum: f64 = against
+            .iter()
+            .map(|frame| f64::from(frame.row(v).at(u)))
+            .sum();
+        let own = f64::from(self.bits[bit].row(v).at(u));
         // An inverse picture is as far below the middle as the bit's own is above it.
         match against.len() {
             1 => (own - sum) / 2.0,
@@ -122,7 +123,7 @@ impl CodePictures<'_> {
     /// are seen, and how many bits are missing where they are not.
     fn refined(
         &self,
-        pixels: &[Pixel],
+        pixels: &[CodePixel],
         cells: &Cells,
         (width, height): (usize, usize),
         vertical: bool,
@@ -134,26 +135,28 @@ impl CodePictures<'_> {
             (width, height)
         };
         for line in 0..lines {
-            let at = |along: usize| match vertical {
+            let index = |along: usize| match vertical {
                 true => line * width + along,
                 false => along * width + line,
             };
             let washed: Vec<u32> = (0..length)
                 .map(|along| {
                     let window = along.saturating_sub(WINDOW)..length.min(along + WINDOW + 1);
-                    let lit = window.map(at).filter(|&at| pixels[at].modulation > 0.0);
-                    lit.map(|at| pixels[at].faint).min().unwrap_or(0)
+                    let lit = window
+                        .map(index)
+                        .filter(|&index| pixels[index].modulation > 0.0);
+                    lit.map(|index| pixels[index].faint).min().unwrap_or(0)
                 })
                 .collect();
             for (along, &washed) in washed.iter().enumerate() {
-                places[at(along)].1 = washed.max(pixels[at(along)].without);
+                places[index(along)].1 = washed.max(pixels[index(along)].without);
             }
             // The border behind, if the pixels since it are all of one cell: where it is, in pixels
             // and in cells.
             let mut behind: Option<(f64, f64)> = None;
             let mut widest = 1.0;
             for along in 0..length.saturating_sub(1) {
-                let (here, next) = (&pixels[at(along)], &pixels[at(along + 1)]);
+                let (here, next) = (&pixels[index(along)], &pixels[index(along + 1)]);
                 let resolved = [here, next]
                     .iter()
                     .all(|pixel| pixel.trust == Trust::Resolved);
@@ -178,7 +181,7 @@ impl CodePictures<'_> {
                 {
                     let slope = (to.1 - from.1) / (to.0 - from.0);
                     for inside in libm::ceil(from.0) as usize..=along {
-                        places[at(inside)] = (from.1 + (inside as f64 - from.0) * slope, 0);
+                        places[index(inside)] = (from.1 + (inside as f64 - from.0) * slope, 0);
                     }
                 }
                 behind = border;
@@ -214,7 +217,7 @@ impl CodePictures<'_> {
     }
 }
 
-impl Pixel {
+impl CodePixel {
     /// What a pixel sees, from the contrast of each bit of a code of these cells, the most
     /// significant bit first.
     fn of(contrasts: &[f64], cells: &Cells, least: f64) -> Self {
@@ -281,7 +284,7 @@ impl Cells {
         let mut own = seen;
         if self.coding.binary {
             // On the border of two cells the lowest bits are 0111 on one side and 1000 on the
-            // other; the lowest bit tells on which side the pixel lies.
+            // other; the lowest bit says on which side the pixel lies.
             let low = undecided >> 1 & undecided;
             let settled = match (low ^ seen) & 1 {
                 0 => low,
@@ -294,17 +297,11 @@ impl Cells {
     }
 }
 
-fn sample(frame: &FrameView<'_>, u: usize, v: usize) -> f64 {
-    match frame.row(v) {
-        Samples::Eight(row) => f64::from(row[u]),
-        Samples::Sixteen(row) => f64::from(row[u]),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::Coding;
     use super::*;
+    use crate::frame::{FrameView, Samples};
 
     const WIDTH: usize = 90;
     const HEIGHT: usize = 7;
@@ -510,29 +507,32 @@ mod tests {
         let cells = |count, binary| cells_of(3, count, binary);
         let gray = cells(8, false);
         // Cells 5 and 6 of 8 show 111 and 101.
-        let border = Pixel::of(&[100.0, 3.0, 90.0], &gray, 16.0);
+        let border = CodePixel::of(&[100.0, 3.0, 90.0], &gray, 16.0);
         assert_eq!((border.trust, border.place), (Trust::Resolved, 6.0));
         // Without the highest bit it may be one of the cells 2 and 5.
-        let far = Pixel::of(&[3.0, 100.0, 90.0], &gray, 16.0);
+        let far = CodePixel::of(&[3.0, 100.0, 90.0], &gray, 16.0);
         assert_eq!(far.trust, Trust::Residual);
-        let two = Pixel::of(&[100.0, 3.0, 3.0, 90.0], &cells_of(4, 16, false), 16.0);
+        let two = CodePixel::of(&[100.0, 3.0, 3.0, 90.0], &cells_of(4, 16, false), 16.0);
         assert_eq!(two.trust, Trust::Residual);
         // If they are the finest, it lies in the middle of four cells.
-        let four = Pixel::of(&[100.0, 3.0, 3.0], &gray, 16.0);
+        let four = CodePixel::of(&[100.0, 3.0, 3.0], &gray, 16.0);
         assert_eq!(
             (four.trust, four.without, four.place),
             (Trust::Resolved, 1, 6.0)
         );
-        // Light that makes five bits out of ten comes by way of something else.
+        // Light that washes out five bits of ten comes by reflection.
         let mut stray = [2.0; 10];
         stray[..5].copy_from_slice(&[50.0, 30.0, 25.0, 15.0, 20.0]);
-        let stray = Pixel::of(&stray, &cells_of(10, 1024, false), 16.0);
+        let stray = CodePixel::of(&stray, &cells_of(10, 1024, false), 16.0);
         assert_eq!(stray.trust, Trust::LowModulation);
-        assert_eq!(Pixel::of(&[9.0, -9.0, 9.0], &gray, 16.0).trust, Trust::Dark);
-        let beside = Pixel::of(&[100.0, 90.0, 90.0], &cells(5, false), 16.0);
+        assert_eq!(
+            CodePixel::of(&[9.0, -9.0, 9.0], &gray, 16.0).trust,
+            Trust::Dark
+        );
+        let beside = CodePixel::of(&[100.0, 90.0, 90.0], &cells(5, false), 16.0);
         assert_eq!(beside.trust, Trust::Residual);
         // In plain binary two bits change from cell 5 to cell 6, and the middle one never alone.
-        let border = Pixel::of(&[100.0, -3.0, 4.0], &cells(8, true), 16.0);
+        let border = CodePixel::of(&[100.0, -3.0, 4.0], &cells(8, true), 16.0);
         assert_eq!(
             (
                 border.trust,
@@ -543,7 +543,7 @@ mod tests {
             ),
             (Trust::Resolved, 6.0, 5)
         );
-        let middle = Pixel::of(&[100.0, 3.0, 90.0], &cells(8, true), 16.0);
+        let middle = CodePixel::of(&[100.0, 3.0, 90.0], &cells(8, true), 16.0);
         assert_eq!(middle.trust, Trust::Residual);
     }
 }

@@ -58,7 +58,11 @@ impl Levels<'_> {
             .collect()
     }
 
-    fn decode(&self, noise: f64, cells: Option<(Cells, &[Seen])>) -> Result<PhaseMap, ChainError> {
+    fn decode(
+        &self,
+        noise: f64,
+        cells: Option<(Cells, &[CodeWord])>,
+    ) -> Result<PhaseMap, ChainError> {
         let rows = self.rows(noise);
         let frames: Vec<_> = rows.iter().map(|row| view(row)).collect();
         let sequence = Sequence::from_frames(&self.shots()).unwrap();
@@ -150,8 +154,8 @@ fn fractional_fringes_and_a_gray_code_whose_cell_is_a_fringe_are_unwrapped_by_th
     // Periods of 66.67 and 100 pixels, cells of 100: the beat has 200.
     let code = gray(4, 100.0);
     let fractional = levels(&[19.2, 12.8], 3);
-    let seen = |late: u32| -> Vec<Seen> {
-        let sees = |column| Seen {
+    let seen = |late: u32| -> Vec<CodeWord> {
+        let sees = |column| CodeWord {
             word: code.coding.word((column + late) / 100, code.bits),
             decisive: 0,
         };
@@ -248,7 +252,7 @@ fn what_has_no_chain_is_refused_with_what_to_add() {
 }
 
 /// What pixels with ± `noise` counts see of a code whose edges are blurred over three pixels.
-fn blurred(code: &GrayCode, noise: f64) -> Vec<Seen> {
+fn blurred(code: &GrayCode, noise: f64) -> Vec<CodeWord> {
     let picture = |bit: u8| -> Vec<u8> {
         let lit = |column: u32| f64::from(u8::from(code.lights(bit, column)));
         let sample = |column: u32| {

@@ -1,14 +1,12 @@
 //! Applies a chain to the wrapped phases of its levels.
 
-use super::plan::{Link, Start};
-use super::{Cells, Chain, Edges, Seen};
+use super::{Cells, Chain, CodeWord, Edges};
+use crate::chain::{ChainStart, Link};
 use crate::phase::Trust;
 use crate::pipeline::{PhaseMap, for_each_row};
+use crate::trust::MAX_RESIDUAL;
 use crate::units::AbsolutePhase;
 use alloc::vec;
-
-/// Largest rounding residual of a step, in turns: as in the production kernels.
-const MAX_RESIDUAL: f64 = 0.40;
 
 impl Chain {
     /// The chain with the cells of its code moved to where they end within the fringes of the
@@ -17,7 +15,7 @@ impl Chain {
     #[must_use]
     pub fn aligned(mut self, edges: &Edges) -> Self {
         let finest = self.links[self.links.len() - 1].ratio;
-        if let Start::Code(cells) = &mut self.start {
+        if let ChainStart::Code(cells) = &mut self.start {
             cells.origin += edges.misalignment(cells, finest).unwrap_or(0.0) / finest;
         }
         self
@@ -29,7 +27,7 @@ impl Chain {
     /// The modulation is the finest level's. A pixel is `Dark` or of `LowModulation` where a level
     /// that takes part is, the former if it is the coarsest of them; its phase is a `Residual`
     /// where a fringe order would be a guess or the cell lies outside the projector's raster.
-    pub fn unwrap(&self, wrapped: &[PhaseMap], code: Option<&[Seen]>) -> PhaseMap {
+    pub fn unwrap(&self, wrapped: &[PhaseMap], code: Option<&[CodeWord]>) -> PhaseMap {
         self.unwrap_within(MAX_RESIDUAL, wrapped, code)
     }
 
@@ -46,7 +44,7 @@ impl Chain {
         &self,
         residual: f64,
         wrapped: &[PhaseMap],
-        code: Option<&[Seen]>,
+        code: Option<&[CodeWord]>,
     ) -> PhaseMap {
         self.unwrap_from(residual, wrapped, &code.map_or(Given::Nothing, Given::Code))
     }
@@ -59,18 +57,18 @@ impl Chain {
         let mut pixels = vec![(AbsolutePhase::UNKNOWN, Trust::Dark); finest.phase.len()];
         for_each_row(&mut pixels, width, |v, row| {
             for (u, pixel) in row.iter_mut().enumerate() {
-                let at = v * width + u;
+                let index = v * width + u;
                 let levels = || wrapped.iter().zip(&uses).filter(|(_, used)| **used);
                 let refusal = levels()
-                    .map(|(level, _)| level.trust[at])
+                    .map(|(level, _)| level.trust[index])
                     .filter(|trust| !trust.has_phase())
                     .min();
                 pixel.1 = match refusal {
-                    Some(Trust::Dark) if wrapped[coarsest].trust[at] != Trust::Dark => {
+                    Some(Trust::Dark) if wrapped[coarsest].trust[index] != Trust::Dark => {
                         Trust::LowModulation
                     }
                     Some(refusal) => refusal,
-                    None => match self.phase(residual, wrapped, given, at) {
+                    None => match self.phase(residual, wrapped, given, index) {
                         Err(refusal) => refusal,
                         Ok(turns) => {
                             pixel.0 = AbsolutePhase::from_turns(turns);
@@ -102,18 +100,18 @@ impl Chain {
         at: usize,
     ) -> Result<f64, Trust> {
         let (mut estimate, mut limit) = match (&self.start, given) {
-            (Start::Code(cells), Given::Code(code)) => {
+            (ChainStart::Code(cells), Given::Code(code)) => {
                 let (turns, limit) = self.first(cells, code[at], wrapped, at)?;
                 (Some(turns), limit)
             }
             (_, Given::Map(map)) if map[at].is_known() => (Some(map[at].turns()), 0.5),
-            (Start::Itself(_), Given::Nothing) => (None, residual),
+            (ChainStart::Itself(_), Given::Nothing) => (None, residual),
             _ => return Err(Trust::Unexpected),
         };
         for link in &self.links {
             let phase = link.phase(wrapped, at);
             let absolute = match (estimate, &self.start) {
-                (None, Start::Itself(lowest)) => {
+                (None, ChainStart::Itself(lowest)) => {
                     let above = phase - lowest;
                     lowest + (above - libm::floor(above))
                 }
@@ -140,7 +138,7 @@ impl Chain {
     fn first(
         &self,
         cells: &Cells,
-        seen: Seen,
+        seen: CodeWord,
         wrapped: &[PhaseMap],
         at: usize,
     ) -> Result<(f64, f64), Trust> {
@@ -165,7 +163,7 @@ impl Chain {
 /// What is known of each pixel beside its wrapped phases.
 enum Given<'a> {
     Nothing,
-    Code(&'a [Seen]),
+    Code(&'a [CodeWord]),
     Map(&'a [AbsolutePhase]),
 }
 
@@ -183,14 +181,14 @@ impl Cells {
     /// Whether a pixel is surely in this cell and not in the neighbour at whose far side it would
     /// have the same phase: the bits in which both differ are decisive. `aside` is how far the
     /// pixel lies before the middle of the cell, in turns.
-    fn decides(&self, cell: u32, aside: f64, seen: Seen) -> bool {
-        let other = match aside > 0.0 {
-            true => Some(cell + 1).filter(|&other| other < self.count),
+    fn decides(&self, cell: u32, aside: f64, seen: CodeWord) -> bool {
+        let neighbour = match aside > 0.0 {
+            true => Some(cell + 1).filter(|&neighbour| neighbour < self.count),
             false => cell.checked_sub(1),
         };
-        other.is_none_or(|other| {
+        neighbour.is_none_or(|neighbour| {
             let word = |cell| self.coding.word(cell, self.bits);
-            let differ = word(cell) ^ word(other);
+            let differ = word(cell) ^ word(neighbour);
             seen.decisive & differ == differ
         })
     }

@@ -1,11 +1,19 @@
 //! A lens without its pose: Brown's distortion and the scale to pixels, in OpenCV's convention,
-//! without any check.
+//! without any check; and the directions of a camera's whole pixels, worked out once.
 //!
 //! With r² = x² + y² of a direction (x, y, 1),
 //! x_d = x(1 + k₁r² + k₂r⁴ + k₃r⁶) + 2p₁xy + p₂(r² + 2x²),
 //! y_d = y(1 + k₁r² + k₂r⁴ + k₃r⁶) + p₁(r² + 2y²) + 2p₂xy;
 //! u = f_x x_d + c_x, v = f_y y_d + c_y.
 //! Source: D. C. Brown, "Decentering distortion of lenses", 1966, as in OpenCV's calib3d.
+//!
+//! A direction takes some iterations of [`Lens::undistorted`], and teaching asks for those of the
+//! same pixels dozens of times. A direction takes 16 bytes, so they are only kept while a recipe is
+//! taught or planned ([`Rays`]).
+
+use alloc::sync::Arc;
+use alloc::vec::Vec;
+use core::fmt;
 
 /// Newton iterations after which the undistortion must have converged; real lenses take 4.
 const NEWTON_STEPS: usize = 25;
@@ -88,5 +96,46 @@ impl Lens {
         let (found_x, found_y) = self.distorted(x, y);
         let left = libm::fabs(found_x - xd) + libm::fabs(found_y - yd);
         (left <= 1e-12).then_some((x, y))
+    }
+}
+
+/// The directions (x, y, 1) of whole pixels, row-major; empty where they are not known. Clones
+/// share them.
+#[derive(Clone, Default)]
+pub(super) struct Rays(Arc<[(f64, f64)]>);
+
+impl Rays {
+    pub fn new(directions: Vec<(f64, f64)>) -> Self {
+        Self(directions.into())
+    }
+
+    pub fn are_known(&self) -> bool {
+        !self.0.is_empty()
+    }
+
+    /// The direction of a pixel of a frame of `width` columns, if it is a whole one and known.
+    #[inline]
+    pub fn at(&self, u: f64, v: f64, width: usize) -> Option<(f64, f64)> {
+        // Casts keep to the range of their type.
+        let (column, row) = (u as usize, v as usize);
+        // No row of theirs is beyond their number.
+        let inside = column < width && row < self.0.len();
+        let whole = inside && column as f64 == u && row as f64 == v;
+        let index = whole.then(|| row * width + column)?;
+        let known = self.0.get(index).copied();
+        known.filter(|(x, _)| !x.is_nan())
+    }
+}
+
+/// What is known beforehand makes no other device.
+impl PartialEq for Rays {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+impl fmt::Debug for Rays {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{} rays", self.0.len())
     }
 }

@@ -4,7 +4,7 @@
 //! X_device = R · X_world + t; x = X/Z, y = Y/Z; from (x, y) to pixels as in [`Lens`]. Pixel
 //! centres at integers, x right, y down, z forward.
 
-use super::rays::Rays;
+use super::lens::Rays;
 use super::{Lens, Vector};
 use alloc::vec::Vec;
 

@@ -10,7 +10,8 @@
 //! Units: mm and turns. Accuracy: z within 2.5e-7 mm of the textbook for the same phase
 //! (`heights_beyond_the_raster_and_about_the_ends_of_the_range_are_the_textbooks`).
 
-use super::{Pinhole, Reference, Vector, root};
+use super::{Pinhole, Reference, Vector};
+use crate::math::bracketed;
 use crate::pattern::PhaseFunction;
 use crate::units::{AbsolutePhase, Height};
 
@@ -86,8 +87,8 @@ const MAX_SECANT_STEP: f64 = 2.0;
 /// The numeric slope is taken over ± this many mm: small against any fringe, large against
 /// rounding. The first secant starts this far below the guess.
 const SLOPE_STEP: f64 = 0.01;
-/// Pieces of the working range, each of which is searched for a change of sign, for a sampled phase
-/// function: it need not be monotone along the line of projector pixels that a camera ray crosses.
+/// Pieces of the working range in which a sampled phase function is searched for a change of sign: it
+/// need not be monotone along the line of projector pixels that a camera ray crosses.
 const PIECES: usize = 16;
 /// Largest z component of a usable ray whose component along the optical axis is 1: from a height
 /// of 1 m, other rays meet the plane a thousand kilometres away or nowhere.
@@ -266,17 +267,17 @@ impl Triangulator {
         let mut before = (low, off(low)?);
         for piece in 1..=pieces {
             let z = low + (high - low) * piece as f64 / pieces as f64;
-            let here = (z, off(z)?);
-            if (before.1 < 0.0) != (here.1 < 0.0) {
+            let next = (z, off(z)?);
+            if (before.1 < 0.0) != (next.1 < 0.0) {
                 if bracket.is_some() {
                     return None;
                 }
-                bracket = Some((before, here));
+                bracket = Some((before, next));
             }
-            before = here;
+            before = next;
         }
         let (a, b) = bracket?;
-        let z = root::bracketed(off, a, b, HEIGHT_TOLERANCE)?;
+        let z = bracketed(off, a, b, HEIGHT_TOLERANCE)?;
         self.solution(ray, z)
     }
 
@@ -309,8 +310,8 @@ impl Triangulator {
     }
 
     fn solution(&self, ray: Vector, z: f64) -> Option<Solution> {
-        let at = |z: f64| self.phase_at(self.on_ray(ray, z));
-        let rise = at(z + SLOPE_STEP)? - at(z - SLOPE_STEP)?;
+        let phase = |z: f64| self.phase_at(self.on_ray(ray, z));
+        let rise = phase(z + SLOPE_STEP)? - phase(z - SLOPE_STEP)?;
         let slope = rise / (2.0 * SLOPE_STEP);
         (libm::fabs(slope) >= self.slope_min).then(|| Solution {
             point: self.on_ray(ray, z),
@@ -351,5 +352,63 @@ impl Triangulator {
     pub fn higher(&self, point: Vector, rise: f64) -> Vector {
         let from = point - self.camera.centre();
         point + from * (rise / from.z)
+    }
+}
+
+/// The line of sight of one pixel, prepared once for any number of heights: its point at height z
+/// is start + z · rise.
+///
+/// With a reference from the device models, start and rise are in the projector's coordinates, from
+/// its centre: a point's projector pixel then needs the lens model only. Else they are in the
+/// world's coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct Sight<'a> {
+    triangulator: &'a Triangulator,
+    start: Vector,
+    rise: Vector,
+}
+
+impl Triangulator {
+    /// The point at height 0 that pixel (u, v) sees, and how far its line of sight takes a point
+    /// that rises by 1 mm; `None` if it does not meet every height once.
+    pub fn line(&self, u: f64, v: f64) -> Option<(Vector, Vector)> {
+        let ray = self.falling_ray(u, v)?;
+        Some((self.on_ray(ray, 0.0), ray * (1.0 / ray.z)))
+    }
+
+    /// The line of sight of pixel (u, v), or `None` if it does not meet every height once.
+    pub fn sight(&self, u: f64, v: f64) -> Option<Sight<'_>> {
+        self.line(u, v).map(|line| self.sight_along(line))
+    }
+
+    /// The same along a [`Self::line`].
+    pub fn sight_along(&self, (on_plane, rise): (Vector, Vector)) -> Sight<'_> {
+        let (start, rise) = match &self.reference {
+            Reference::Models => {
+                let lamp = &self.projector;
+                let start = lamp.turned(on_plane - lamp.centre());
+                (start, lamp.turned(rise))
+            }
+            Reference::Measured { .. } => (on_plane, rise),
+        };
+        Sight {
+            triangulator: self,
+            start,
+            rise,
+        }
+    }
+}
+
+impl Sight<'_> {
+    /// Φ in turns of a surface at height `z` mm; `None` if the projector does not light it.
+    #[inline]
+    pub fn phase(&self, z: f64) -> Option<f64> {
+        let point = self.start + self.rise * z;
+        let triangulator = self.triangulator;
+        let (xi, eta) = match triangulator.reference {
+            Reference::Models => triangulator.projector.pixel(point),
+            Reference::Measured { .. } => triangulator.projector_point(point),
+        }?;
+        Some(triangulator.function.at(xi, eta))
     }
 }

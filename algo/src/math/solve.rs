@@ -89,7 +89,7 @@ pub(crate) fn solve_symmetric(a: &mut [f64], b: &mut [f64]) -> Option<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::solve_symmetric;
+    use super::*;
     use std::vec;
 
     #[test]

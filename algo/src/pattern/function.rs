@@ -15,11 +15,11 @@ pub const MAX_TURNS: f64 = 1000.0;
 pub struct PhaseFunction {
     columns: usize,
     rows: usize,
-    shape: Shape,
+    shape: FunctionShape,
 }
 
 #[derive(Clone, Debug, PartialEq)]
-enum Shape {
+enum FunctionShape {
     /// Φ_P = fringes · ξ / columns.
     Vertical { fringes: f64 },
     /// Φ_P = fringes · η / rows.
@@ -82,7 +82,7 @@ impl PhaseFunction {
     /// # Errors
     /// If the raster is empty or `fringes` is not in (0, [`MAX_TURNS`]].
     pub fn vertical(columns: usize, rows: usize, fringes: f64) -> Result<Self, PhaseFunctionError> {
-        Self::fixed(columns, rows, fringes, Shape::Vertical { fringes })
+        Self::fixed(columns, rows, fringes, FunctionShape::Vertical { fringes })
     }
 
     /// Fringes parallel to the projector's rows: Φ_P = fringes · η / rows.
@@ -94,14 +94,19 @@ impl PhaseFunction {
         rows: usize,
         fringes: f64,
     ) -> Result<Self, PhaseFunctionError> {
-        Self::fixed(columns, rows, fringes, Shape::Horizontal { fringes })
+        Self::fixed(
+            columns,
+            rows,
+            fringes,
+            FunctionShape::Horizontal { fringes },
+        )
     }
 
     fn fixed(
         columns: usize,
         rows: usize,
         fringes: f64,
-        shape: Shape,
+        shape: FunctionShape,
     ) -> Result<Self, PhaseFunctionError> {
         if columns == 0 || rows == 0 {
             return Err(PhaseFunctionError::Size { columns, rows });
@@ -146,7 +151,7 @@ impl PhaseFunction {
         Ok(Self {
             columns,
             rows,
-            shape: Shape::Sampled(turns),
+            shape: FunctionShape::Sampled(turns),
         })
     }
 
@@ -162,27 +167,27 @@ impl PhaseFunction {
 
     /// Whether the function is given by samples, so that it need not be monotone.
     pub fn is_sampled(&self) -> bool {
-        matches!(self.shape, Shape::Sampled(_))
+        matches!(self.shape, FunctionShape::Sampled(_))
     }
 
     /// The samples of a sampled function, row-major.
     pub(super) fn samples(&self) -> Option<&[f64]> {
         match &self.shape {
-            Shape::Sampled(turns) => Some(turns),
+            FunctionShape::Sampled(turns) => Some(turns),
             _ => None,
         }
     }
 
     /// Whether all rows are equal, so that one encoded row serves for all.
     pub(super) fn is_vertical(&self) -> bool {
-        matches!(self.shape, Shape::Vertical { .. })
+        matches!(self.shape, FunctionShape::Vertical { .. })
     }
 
     /// Φ_P at the centre of a pixel of the raster, in turns.
     #[inline]
     pub fn at_pixel(&self, column: usize, row: usize) -> f64 {
         match &self.shape {
-            Shape::Sampled(turns) => turns[row * self.columns + column],
+            FunctionShape::Sampled(turns) => turns[row * self.columns + column],
             _ => self.at(column as f64, row as f64),
         }
     }
@@ -199,9 +204,11 @@ impl PhaseFunction {
     #[inline]
     pub fn at(&self, xi: f64, eta: f64) -> f64 {
         match &self.shape {
-            Shape::Vertical { fringes } => fringes * xi / self.columns as f64,
-            Shape::Horizontal { fringes } => fringes * eta / self.rows as f64,
-            Shape::Sampled(turns) => catmull_rom(turns, (self.columns, self.rows), (xi, eta)),
+            FunctionShape::Vertical { fringes } => fringes * xi / self.columns as f64,
+            FunctionShape::Horizontal { fringes } => fringes * eta / self.rows as f64,
+            FunctionShape::Sampled(turns) => {
+                catmull_rom(turns, (self.columns, self.rows), (xi, eta))
+            }
         }
     }
 
@@ -220,11 +227,11 @@ impl PhaseFunction {
     /// The values over the pixel centres of the raster.
     pub fn range(&self) -> PhaseRange {
         match &self.shape {
-            Shape::Vertical { .. } | Shape::Horizontal { .. } => PhaseRange {
+            FunctionShape::Vertical { .. } | FunctionShape::Horizontal { .. } => PhaseRange {
                 min: 0.0,
                 max: self.at_pixel(self.columns - 1, self.rows - 1),
             },
-            Shape::Sampled(turns) => turns.iter().fold(
+            FunctionShape::Sampled(turns) => turns.iter().fold(
                 PhaseRange {
                     min: f64::INFINITY,
                     max: f64::NEG_INFINITY,
@@ -243,9 +250,9 @@ impl fmt::Display for PhaseFunction {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (columns, rows) = (self.columns, self.rows);
         match &self.shape {
-            Shape::Vertical { fringes } => write!(f, "{fringes} vertical fringes"),
-            Shape::Horizontal { fringes } => write!(f, "{fringes} horizontal fringes"),
-            Shape::Sampled(_) => {
+            FunctionShape::Vertical { fringes } => write!(f, "{fringes} vertical fringes"),
+            FunctionShape::Horizontal { fringes } => write!(f, "{fringes} horizontal fringes"),
+            FunctionShape::Sampled(_) => {
                 let PhaseRange { min, max } = self.range();
                 write!(f, "a sampled phase function of {min:.3} to {max:.3} turns")
             }

@@ -8,8 +8,8 @@ pub(super) fn catmull_rom(turns: &[f64], size: (usize, usize), point: (f64, f64)
 
 /// The value anywhere.
 fn anywhere(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64)) -> f64 {
-    let (column, across) = Cell::new(xi, columns);
-    let (row, down) = Cell::new(eta, rows);
+    let (column, across) = LinePosition::new(xi, columns);
+    let (row, down) = LinePosition::new(eta, rows);
     let mut lines = [0.0; 4];
     for (line, offset) in lines.iter_mut().zip(-1_isize..) {
         *line = extended(row + offset, rows, |row| {
@@ -41,10 +41,15 @@ fn inside(turns: &[f64], (columns, rows): (usize, usize), (xi, eta): (f64, f64))
     let taps =
         |line: usize| -> Option<&[f64; 4]> { turns.get(start + line * columns..)?.first_chunk() };
     let (first, second, third, last) = (taps(0)?, taps(1)?, taps(2)?, taps(3)?);
-    let at = |i: usize| {
+    let column_value = |i: usize| {
         (down[0] * first[i] + down[1] * second[i]) + (down[2] * third[i] + down[3] * last[i])
     };
-    let [a, b, c, d] = [at(0), at(1), at(2), at(3)];
+    let [a, b, c, d] = [
+        column_value(0),
+        column_value(1),
+        column_value(2),
+        column_value(3),
+    ];
     Some((across[0] * a + across[1] * b) + (across[2] * c + across[3] * d))
 }
 
@@ -73,25 +78,25 @@ fn weights(t: f64) -> [f64; 4] {
 }
 
 /// The position of a point between two samples of a line.
-enum Cell {
+enum LinePosition {
     /// In or next to the raster: the fraction of the cell, for Catmull–Rom.
     Within(f64),
     /// Far outside: the distance from the cell's start, for linear continuation.
     Beyond(f64),
 }
 
-impl Cell {
+impl LinePosition {
     /// The sample before `x` on a line of `count` samples, and the position after it.
     #[inline]
     fn new(x: f64, count: usize) -> (isize, Self) {
         let floor = libm::floor(x);
         if floor >= -2.0 && floor <= count as f64 {
-            (floor as isize, Cell::Within(x - floor))
+            (floor as isize, LinePosition::Within(x - floor))
         } else if x < 0.0 {
-            (-2, Cell::Beyond(x + 2.0))
+            (-2, LinePosition::Beyond(x + 2.0))
         } else {
             // A NaN lands here and stays a NaN.
-            (count as isize, Cell::Beyond(x - count as f64))
+            (count as isize, LinePosition::Beyond(x - count as f64))
         }
     }
 
@@ -99,12 +104,12 @@ impl Cell {
     #[inline]
     fn interpolate(&self, [a, b, c, d]: [f64; 4]) -> f64 {
         match *self {
-            Cell::Within(t) => {
+            LinePosition::Within(t) => {
                 let cubic = 3.0 * (b - c) + d - a;
                 let square = 2.0 * a - 5.0 * b + 4.0 * c - d;
                 b + 0.5 * t * ((c - a) + t * (square + t * cubic))
             }
-            Cell::Beyond(distance) => b + distance * (c - b),
+            LinePosition::Beyond(distance) => b + distance * (c - b),
         }
     }
 }

@@ -1,13 +1,10 @@
 //! What is projected: phase functions, their grey rasters, and sequences of levels and shifts.
 
-mod chance;
 mod encode;
 mod function;
 mod interpolate;
 mod sequence;
-mod shot;
-pub(crate) mod slips;
-mod split;
+pub(crate) mod split;
 mod waveform;
 
 pub use encode::{Encoder, GreyRaster, GreyResponse, ResponseError};
@@ -16,7 +13,5 @@ pub use sequence::{
     Level, MAX_DENSE_N, MAX_FRAMES, MAX_LEVEL_FACTOR, MAX_LEVELS, MAX_SHIFTS, Sequence,
     SequenceError, Unwrapping,
 };
-pub use shot::Shot;
-pub use slips::Slips;
-pub use split::Split;
-pub use waveform::{MAX_ORDER, Waveform, Waveforms};
+pub use split::{Slips, Split};
+pub use waveform::{MAX_ORDER, Shot, Waveform, Waveforms};

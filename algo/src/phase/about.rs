@@ -181,14 +181,15 @@ impl<V: Lanes> FixedRatioLanes<V> {
     }
 }
 
-/// [`About`] with every constant in all lanes.
-pub(super) struct AboutLanes<V: Lanes> {
-    finest: FixedRatioLanes<V>,
+/// Unwrapping by a single level, with every constant in all lanes.
+pub(super) struct SingleLanes<V: Lanes> {
+    ratio: FixedRatioLanes<V>,
+    /// 1/r, where that is not 1.
     scale: Option<V::F>,
-    dense: Option<DenseLanes<V>>,
 }
 
-struct DenseLanes<V: Lanes> {
+/// Unwrapping by dense levels, with every constant in all lanes.
+pub(super) struct DenseLanes<V: Lanes> {
     coarse: FixedRatioLanes<V>,
     fast: UnwrapStepLanes<V>,
     middle: Option<(FixedRatioLanes<V>, UnwrapStepLanes<V>)>,
@@ -198,14 +199,14 @@ struct DenseLanes<V: Lanes> {
     mean_gain: V::W,
 }
 
-/// The demodulated levels of a block. Levels that the sequence does not have are not read.
+/// The demodulated dense levels of a block.
 #[derive(Clone, Copy)]
 pub(super) struct BlockLevels<V: Lanes> {
     /// r_c = 1 − 1/n.
     pub coarse: Demodulated<V>,
-    /// r_m = 1 − 1/n².
+    /// r_m = 1 − 1/n²; not read where there are two levels.
     pub middle: Demodulated<V>,
-    /// The largest ratio.
+    /// r_f = 1.
     pub finest: Demodulated<V>,
 }
 
@@ -217,69 +218,24 @@ pub(super) struct Unwrapped<V: Lanes> {
     pub residual: V::W,
 }
 
-impl<V: Lanes> AboutLanes<V> {
-    /// `None` if the plan is for another number of levels.
+impl<V: Lanes> SingleLanes<V> {
     #[inline(always)]
-    pub fn new<const LEVELS: usize>(v: V, plan: &About) -> Option<Self> {
+    pub fn new(v: V, plan: &About) -> Self {
         let mut scale = None;
         if let Some(inverse) = plan.scale {
             scale = Some(v.splat_single(inverse));
         }
-        let mut dense = None;
-        if LEVELS > 1 {
-            let Some(plan) = &plan.dense else { return None };
-            let mut middle = None;
-            if LEVELS > 2 {
-                let Some((ratio, slow)) = &plan.middle else {
-                    return None;
-                };
-                middle = Some((
-                    FixedRatioLanes::new(v, *ratio),
-                    UnwrapStepLanes::new(v, slow),
-                ));
-            }
-            dense = Some(DenseLanes {
-                coarse: FixedRatioLanes::new(v, plan.coarse),
-                fast: UnwrapStepLanes::new(v, &plan.fast),
-                middle,
-                weights: [
-                    v.splat16(q15(-plan.weights[0] / 2.0)),
-                    v.splat16(q15(-plan.weights[1] / 2.0)),
-                ],
-                mean_gain: v.splat16(q15(plan.mean_gain)),
-            });
-        }
-        Some(Self {
-            finest: FixedRatioLanes::new(v, plan.finest),
+        Self {
+            ratio: FixedRatioLanes::new(v, plan.finest),
             scale,
-            dense,
-        })
-    }
-
-    /// Unwraps half a block (`half` 0 or 1) about Φ₀, given as double words (`known`) and as orders
-    /// and fractions (`map`).
-    #[inline(always)]
-    pub fn unwrap(
-        &self,
-        v: V,
-        known: [V::D; 2],
-        map: Turns<V>,
-        levels: &BlockLevels<V>,
-        half: usize,
-    ) -> Unwrapped<V> {
-        let finest = &levels.finest;
-        match &self.dense {
-            Some(dense) => dense.unwrap(v, known, map, levels, half),
-            None => {
-                let q_f = v.sub(finest.phase[half], self.finest.fraction_of(v, map));
-                self.single(v, known, q_f)
-            }
         }
     }
 
-    /// Φ = Φ₀ + wrap(q_f) / r_f.
+    /// Half a block: Φ = Φ₀ + wrap(q_f) / r_f, from Φ₀ as double words (`known`) and as orders and
+    /// fractions (`map`), and the level's wrapped phases.
     #[inline(always)]
-    fn single(&self, v: V, known: [V::D; 2], q_f: V::W) -> Unwrapped<V> {
+    pub fn unwrap(&self, v: V, known: [V::D; 2], map: Turns<V>, phase: V::W) -> Unwrapped<V> {
+        let q_f = v.sub(phase, self.ratio.fraction_of(v, map));
         let mut delta = v.join(q_f, v.sar::<15>(q_f));
         if let Some(scale) = self.scale {
             delta = [
@@ -297,8 +253,36 @@ impl<V: Lanes> AboutLanes<V> {
 }
 
 impl<V: Lanes> DenseLanes<V> {
+    /// `None` if the plan is for another number of levels.
     #[inline(always)]
-    fn unwrap(
+    pub fn new(v: V, plan: &About, three: bool) -> Option<Self> {
+        let Some(plan) = &plan.dense else { return None };
+        let mut middle = None;
+        if three {
+            let Some((ratio, slow)) = &plan.middle else {
+                return None;
+            };
+            middle = Some((
+                FixedRatioLanes::new(v, *ratio),
+                UnwrapStepLanes::new(v, slow),
+            ));
+        }
+        Some(Self {
+            coarse: FixedRatioLanes::new(v, plan.coarse),
+            fast: UnwrapStepLanes::new(v, &plan.fast),
+            middle,
+            weights: [
+                v.splat16(q15(-plan.weights[0] / 2.0)),
+                v.splat16(q15(-plan.weights[1] / 2.0)),
+            ],
+            mean_gain: v.splat16(q15(plan.mean_gain)),
+        })
+    }
+
+    /// Unwraps half a block (`half` 0 or 1) about Φ₀, given as double words (`known`) and as orders
+    /// and fractions (`map`).
+    #[inline(always)]
+    pub fn unwrap(
         &self,
         v: V,
         known: [V::D; 2],
@@ -307,7 +291,7 @@ impl<V: Lanes> DenseLanes<V> {
         half: usize,
     ) -> Unwrapped<V> {
         let zero = v.splat16(0);
-        // With several levels r_f is 1 and the others are below 1.
+        // r_f is 1 and the other ratios are below 1.
         let q_f = v.sub(levels.finest.phase[half], map.phase);
         let coarse_expected = self.coarse.fraction_below_one(v, map);
         let q_c = v.sub(levels.coarse.phase[half], coarse_expected);
@@ -316,11 +300,10 @@ impl<V: Lanes> DenseLanes<V> {
         let mut fast = Absolute::from_wrapped(v, fast_beat);
         if let Some((ratio, slow)) = &self.middle {
             q_m = v.sub(levels.middle.phase[half], ratio.fraction_below_one(v, map));
-            let slow_beat = v.sub(q_f, q_m);
-            let slow_beat = Absolute::from_wrapped(v, slow_beat);
-            [(fast, residual), _] = slow.unwrap(v, [slow_beat; 2], [fast_beat; 2]);
+            let slow_beat = Absolute::from_wrapped(v, v.sub(q_f, q_m));
+            (fast, residual) = slow.unwrap(v, slow_beat, fast_beat);
         }
-        let [(d_f, residual_fast), _] = self.fast.unwrap(v, [fast; 2], [q_f; 2]);
+        let (d_f, residual_fast) = self.fast.unwrap(v, fast, q_f);
         let d_f = d_f.turns;
         let e_c = v.sub(self.coarse.fraction_below_one(v, d_f), q_c);
         residual = v.max_unsigned(residual, v.max_unsigned(residual_fast, v.abs(e_c)));

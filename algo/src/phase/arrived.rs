@@ -39,7 +39,7 @@ pub(crate) struct Layout {
 #[derive(Debug)]
 pub(crate) enum ArrivedRow<W, B> {
     /// Of geometric levels: what they predict for the next level.
-    Expected(Expected<W, B>),
+    Predicted(Predicted<W, B>),
     /// Of levels about a known map.
     Wrapped {
         /// All levels but the finest, coarse to fine, one after the other.
@@ -49,10 +49,10 @@ pub(crate) enum ArrivedRow<W, B> {
     },
 }
 
-/// The phase expected at the next level ([`super::unwrap_step::ExpectedPhase`]) along a row, with
+/// The phase predicted for the next level ([`super::unwrap_step::PredictedPhase`]) along a row, with
 /// maps of words `W` and of bytes `B`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Expected<W, B> {
+pub(crate) struct Predicted<W, B> {
     /// Modulo one turn, 1/65536 turn.
     pub fraction: W,
     /// The whole turns of that phase, in the fixed point of the step to the next level.
@@ -61,10 +61,10 @@ pub(crate) struct Expected<W, B> {
     pub reason: B,
 }
 
-/// A row of [`Expected`], borrowed.
-pub(crate) type ExpectedRow<'a> = Expected<&'a [u16], &'a [u8]>;
-/// A row of [`Expected`], to be written.
-pub(crate) type ExpectedRowMut<'a> = Expected<&'a mut [u16], &'a mut [u8]>;
+/// A row of [`Predicted`], borrowed.
+pub(crate) type PredictedRow<'a> = Predicted<&'a [u16], &'a [u8]>;
+/// A row of [`Predicted`], to be written.
+pub(crate) type PredictedRowMut<'a> = Predicted<&'a mut [u16], &'a mut [u8]>;
 
 /// No reason so far to reject a pixel. Larger than every reason, so that the smaller of two numbers
 /// is the first reason.
@@ -178,7 +178,7 @@ impl Layout {
         let pixels = self.pixels;
         if self.geometric {
             let (fraction, turns) = split(words, pixels);
-            ArrivedRow::Expected(Expected {
+            ArrivedRow::Predicted(Predicted {
                 fraction,
                 turns,
                 reason: bytes,
@@ -193,11 +193,11 @@ impl Layout {
     }
 }
 
-impl ExpectedRowMut<'_> {
+impl PredictedRowMut<'_> {
     /// Borrowed to be read.
     #[inline(always)]
-    pub fn row(&self) -> ExpectedRow<'_> {
-        Expected {
+    pub fn row(&self) -> PredictedRow<'_> {
+        Predicted {
             fraction: self.fraction,
             turns: self.turns,
             reason: self.reason,
@@ -205,7 +205,7 @@ impl ExpectedRowMut<'_> {
     }
 }
 
-impl ExpectedRow<'_> {
+impl PredictedRow<'_> {
     /// These columns.
     #[inline(always)]
     pub fn part(self, columns: Range<usize>) -> Self {
@@ -249,8 +249,8 @@ impl WrappedRow<'_> {
 
 impl WrappedRowMut<'_> {
     /// Of several levels of `pixels` each: the coarsest, if it has arrived before, and level `at`
-    /// to be written. `None` if there is no room for level `at`; there is none for the finest
-    /// level.
+    /// to be written. `None` if there is no room for level `at`, as for the finest
+    /// level, which is never stored.
     pub fn level(
         &mut self,
         at: usize,

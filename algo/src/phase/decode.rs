@@ -1,9 +1,10 @@
 //! The decoder of a sequence: its plan, the predicted noise, and the check that frames fit it.
 //! `rows.rs` decodes.
 
+use super::about::About;
 use super::arrived::Arrived;
-use super::level::Level;
-use super::unwrap::{Unwrapper, information};
+use super::geometric::Geometric;
+use super::level::LevelPlan;
 use crate::frame::{FrameView, SampleNoise, Samples};
 use crate::pattern::{PhaseRange, Sequence, SequenceError, Unwrapping};
 use crate::simd::Backend;
@@ -16,7 +17,7 @@ use core::fmt;
 #[derive(Clone, Debug)]
 pub struct Decoder {
     /// From coarse to fine.
-    pub(super) levels: Vec<Level>,
+    pub(super) levels: Vec<LevelPlan>,
     pub(super) unwrapper: Unwrapper,
     unwrapping: Unwrapping,
     /// Σ N_i r_i² (b_i/b_f)² over the levels that carry the result's accuracy ([`information`]).
@@ -25,6 +26,31 @@ pub struct Decoder {
     frame_count: usize,
     pub(super) bit_depth: u8,
     least: LeastModulation,
+}
+
+/// How the levels of a pixel become one absolute phase; prepared once per plan.
+#[derive(Clone, Debug)]
+pub(super) enum Unwrapper {
+    /// From coarse to fine.
+    Geometric(Geometric),
+    /// About a known map.
+    About(About),
+}
+
+impl Unwrapper {
+    pub fn new(
+        unwrapping: Unwrapping,
+        sequence: &Sequence,
+        range: PhaseRange,
+    ) -> Result<Self, SequenceError> {
+        let levels = sequence.levels();
+        Ok(match unwrapping {
+            Unwrapping::Geometric => Self::Geometric(Geometric::new(levels, range)?),
+            _ => Self::About(About::new(unwrapping, levels).ok_or_else(|| {
+                SequenceError::Ratios(levels.iter().map(|level| level.ratio).collect())
+            })?),
+        })
+    }
 }
 
 /// One row of results, each slice as long as the row.
@@ -139,7 +165,7 @@ impl Decoder {
             levels: sequence
                 .levels()
                 .iter()
-                .map(|level| Level::new(level, bit_depth))
+                .map(|level| LevelPlan::new(level, bit_depth))
                 .collect(),
             unwrapper: Unwrapper::new(unwrapping, sequence, range)?,
             unwrapping,
@@ -299,4 +325,24 @@ impl Decoder {
     pub fn levels(&self) -> impl ExactSizeIterator<Item = &[usize]> {
         self.levels.iter().map(|level| &level.frames[..])
     }
+}
+
+/// Σ N_i r_i² (b_i/b_f)² over the levels that carry the result's accuracy: of geometric levels only
+/// the finest, because the coarser ones only give fringe orders; of dense levels all, because they
+/// are averaged. b_i/b_f is the fundamental of a level's waveform over that of the finest level,
+/// whose modulation is known.
+fn information(unwrapping: Unwrapping, sequence: &Sequence) -> f64 {
+    let levels = sequence.levels();
+    let accurate = match unwrapping {
+        Unwrapping::Geometric => &levels[levels.len() - 1..],
+        Unwrapping::DenseThree { .. } | Unwrapping::DenseTwo { .. } | Unwrapping::Single => levels,
+    };
+    let finest = levels[levels.len() - 1].waveform.fundamental();
+    accurate
+        .iter()
+        .map(|level| {
+            let share = level.waveform.fundamental() / finest;
+            level.shifts() as f64 * level.ratio * level.ratio * share * share
+        })
+        .sum()
 }

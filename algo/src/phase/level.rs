@@ -1,6 +1,6 @@
 //! The plan of a level's demodulation: samples → wrapped phase and modulation.
 //!
-//! [`super::terms`] has the equations of S and C, [`super::angle`] those of phase and length. This
+//! [`super::terms`] has the equations of S and C, [`super::fold`] those of phase and length. This
 //! file chooses, per number of shifts and bit depth, how S and C are computed, their scaling, and
 //! the threshold in their unit.
 //!
@@ -34,11 +34,11 @@ const LENGTH: [f64; 3] = [1.000_644, 0.484_927, -0.072_269];
 
 /// A level prepared for demodulation at one bit depth.
 #[derive(Clone, Debug)]
-pub(crate) struct Level {
+pub(crate) struct LevelPlan {
     /// Places of the level's frames in the sequence, in the order of their shifts.
     pub frames: Vec<usize>,
     /// How S and C come from the samples.
-    pub samples: Samples,
+    pub demodulation: Demodulation,
     /// The weights of the terms of S and of C, in pairs ([`pair`]).
     terms: [[i32; 2]; 2],
     /// The weights of the samples in S and in C, two samples at a time ([`pair`]).
@@ -84,7 +84,7 @@ struct LeastOfFour {
 
 /// How S and C come from the samples of a level ([`super::terms`]).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Samples {
+pub(crate) enum Demodulation {
     /// N = 4: differences of opposite shifts.
     Four,
     /// N = 4 with samples of more than 12 bits.
@@ -108,7 +108,7 @@ pub(crate) struct Demodulated<V: Lanes> {
     pub brightest: V::B,
 }
 
-impl Level {
+impl LevelPlan {
     pub fn new(level: &pattern::Level, bit_depth: u8) -> Self {
         let shifts = level.shifts();
         let mut frames: Vec<usize> = level.frames.iter().map(|&at| usize::from(at)).collect();
@@ -117,14 +117,14 @@ impl Level {
         let places = level.start * shifts as f64;
         let on_grid = libm::fabs(places - libm::rint(places)) < 1e-9;
         let wide = bit_depth > WORD_FORM_BITS;
-        let samples = match shifts {
-            4 if on_grid && wide => Samples::WideFour,
-            4 if on_grid => Samples::Four,
-            3 | 6 if on_grid && !wide => Samples::Thirds,
-            5 | 7..=9 if on_grid && !wide => Samples::Terms,
-            _ => Samples::Weighted,
+        let demodulation = match shifts {
+            4 if on_grid && wide => Demodulation::WideFour,
+            4 if on_grid => Demodulation::Four,
+            3 | 6 if on_grid && !wide => Demodulation::Thirds,
+            5 | 7..=9 if on_grid && !wide => Demodulation::Terms,
+            _ => Demodulation::Weighted,
         };
-        if samples != Samples::Weighted {
+        if demodulation != Demodulation::Weighted {
             let back = (shifts - libm::rint(places) as usize % shifts) % shifts;
             frames.rotate_left(back);
         }
@@ -132,19 +132,19 @@ impl Level {
         // `unit`: one count in the words of S and C.
         let (mut terms, mut weights) = ([[0; 2]; 2], Vec::new());
         let (mut lift, mut down) = (0, 0);
-        let unit = match samples {
-            Samples::WideFour => f64::from(1_u32 << to_16_bits) / 4.0,
-            Samples::Four | Samples::Thirds => {
+        let unit = match demodulation {
+            Demodulation::WideFour => f64::from(1_u32 << to_16_bits) / 4.0,
+            Demodulation::Four | Demodulation::Thirds => {
                 lift = lift_of(bit_depth, shifts);
                 f64::from(1_u32 << lift)
             }
-            Samples::Terms => {
+            Demodulation::Terms => {
                 down = bit_depth;
                 let scale = LARGEST / largest(shifts, 0.0);
                 terms = weights_of_terms(shifts, scale);
                 scale / f64::from(1_u32 << down)
             }
-            Samples::Weighted => {
+            Demodulation::Weighted => {
                 let scale = LARGEST / largest(shifts, level.start);
                 weights = weights_of_samples(level, scale);
                 scale / f64::from(1_u32 << bit_depth)
@@ -159,7 +159,7 @@ impl Level {
         }
         let mut planned = Self {
             frames,
-            samples,
+            demodulation,
             terms,
             weights,
             lift,
@@ -202,10 +202,10 @@ impl Level {
     }
 }
 
-/// [`Level`] with every constant in all lanes.
+/// [`LevelPlan`] with every constant in all lanes.
 #[derive(Clone, Copy)]
 pub(super) struct LevelLanes<'a, V: Lanes> {
-    pub plan: &'a Level,
+    pub plan: &'a LevelPlan,
     pub terms: [[V::D; 2]; 2],
     pub lift: V::Count,
     /// `lift` less one bit.
@@ -231,7 +231,7 @@ pub(super) struct LeastOfFourLanes<V: Lanes> {
 
 impl<'a, V: Lanes> LevelLanes<'a, V> {
     #[inline(always)]
-    pub fn new(v: V, plan: &'a Level) -> Self {
+    pub fn new(v: V, plan: &'a LevelPlan) -> Self {
         let [along, across] = plan.terms;
         Self {
             plan,

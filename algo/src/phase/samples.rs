@@ -31,7 +31,7 @@ pub(crate) trait BlockSample: Sample {
     fn lift<V: Lanes, const N: usize>(v: V, level: &LevelLanes<'_, V>) -> [V::Count; 2];
     /// The brighter of two samples.
     fn brighter<V: Lanes>(v: V, a: Self::Block<V>, b: Self::Block<V>) -> Self::Block<V>;
-    /// S or C from a sum of products ([`super::level::Samples::Terms`]).
+    /// S or C from a sum of products ([`super::level::Demodulation::Terms`]).
     fn rounded<V: Lanes>(v: V, level: &LevelLanes<'_, V>, sum: [V::D; 2]) -> V::W;
     /// 255 where the sample is at full scale or above, less elsewhere.
     fn saturated<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>) -> V::B;

@@ -33,7 +33,7 @@
 //! `every_number_of_shifts_is_within_the_bounds` and
 //! `any_number_of_steps_at_any_depth_agrees_with_the_definition`.
 
-use super::level::{FULL_TRUST_SHIFTS, LevelLanes, Samples};
+use super::level::{Demodulation, FULL_TRUST_SHIFTS, LevelLanes};
 use super::samples::BlockSample;
 use crate::simd::{Lanes, Rows};
 
@@ -53,7 +53,7 @@ pub(super) fn pointers<V: Lanes, T: BlockSample>(
     rows: &Rows<'_, T>,
     at: usize,
 ) -> Pointers<V> {
-    if level.plan.samples != Samples::Weighted {
+    if level.plan.demodulation != Demodulation::Weighted {
         match rows.count() {
             3 => return of_shifts::<V, T, 3>(v, level, &blocks(v, &rows.all(), at)),
             4 => return of_shifts::<V, T, 4>(v, level, &blocks(v, &rows.all(), at)),
@@ -140,7 +140,7 @@ fn four<V: Lanes, T: BlockSample>(
     a: T::Block<V>,
     b: T::Block<V>,
 ) -> [V::W; 2] {
-    if level.plan.samples != Samples::WideFour {
+    if level.plan.demodulation != Demodulation::WideFour {
         let [_, lift] = T::lift::<V, 4>(v, level);
         return up(v, T::difference(v, a, b), lift);
     }

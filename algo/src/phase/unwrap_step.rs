@@ -8,17 +8,17 @@
 //! **Equation** (Huntley & Saldner 1993; Zuo et al. 2016), with n = r_fine / r_coarse:
 //!
 //! ```text
-//! expected = n · Φ_coarse
-//! k        = round(expected − φ_fine)
-//! Φ_fine   = k + φ_fine
-//! residual = |expected − Φ_fine|          a pixel with more than 0.40 turn is rejected
+//! predicted = n · Φ_coarse
+//! k         = round(predicted − φ_fine)
+//! Φ_fine    = k + φ_fine
+//! residual  = |predicted − Φ_fine|        a pixel with more than 0.40 turn is rejected
 //! ```
 //!
 //! **Shapes and units.** Half a block of pixels in 16-bit words; phases in 1/65536 turn, so that
 //! the wrap of the word is the wrap of the phase. An absolute phase takes two words, its fringe
 //! order and its fraction ([`Turns`]).
 //!
-//! **Departure.** n · Φ does not fit a word, so it is computed twice ([`ExpectedPhase`]). Modulo
+//! **Departure.** n · Φ does not fit a word, so it is computed twice ([`PredictedPhase`]). Modulo
 //! one turn it is within 2/65536 turn; that gives the residual. Its whole turns are needed only
 //! within ± 0.1 turn, because a residual above 0.40 is rejected anyway; they come from a
 //! fixed-point product with as many fractional bits as fit beside the largest number of turns. The
@@ -170,7 +170,7 @@ impl<V: Lanes> Absolute<V> {
 
 /// The phases that half a block's coarse level predicts for the finer one: n·Φ.
 #[derive(Clone, Copy)]
-pub(super) struct ExpectedPhase<V: Lanes> {
+pub(super) struct PredictedPhase<V: Lanes> {
     /// n·Φ modulo one turn, 1/65536 turn.
     pub fraction: V::W,
     /// n·Φ + ½ in the step's fixed point, for its whole turns.
@@ -216,77 +216,56 @@ impl<V: Lanes> UnwrapStepLanes<V> {
         }
     }
 
-    /// The expected phases from coarse ones.
+    /// The predicted phases from coarse ones.
     #[inline(always)]
-    pub fn expected(&self, v: V, coarse: [Absolute<V>; 2]) -> [ExpectedPhase<V>; 2] {
-        let [low, high] = coarse;
-        let fraction = self.fractions(v, coarse);
-        [
-            ExpectedPhase {
-                fraction: fraction[0],
-                turns: self.turns(v, v.shl_by(low.word, self.coarse_left)),
-            },
-            ExpectedPhase {
-                fraction: fraction[1],
-                turns: self.turns(v, v.shl_by(high.word, self.coarse_left)),
-            },
-        ]
+    pub fn predicted(&self, v: V, coarse: Absolute<V>) -> PredictedPhase<V> {
+        PredictedPhase {
+            fraction: self.fraction(v, coarse),
+            turns: self.turns(v, v.shl_by(coarse.word, self.coarse_left)),
+        }
     }
 
-    /// Unwraps `wrapped`, the fine level's phases, by expected phases: the absolute phases, and the
+    /// Unwraps `wrapped`, the fine level's phases, by predicted phases: the absolute phases, and the
     /// residuals' magnitudes (unsigned, 1/65536 turn).
     #[inline(always)]
-    pub fn unwrap_expected(
+    pub fn unwrap_predicted(
         &self,
         v: V,
-        [low, high]: [ExpectedPhase<V>; 2],
-        wrapped: [V::W; 2],
-    ) -> [(Absolute<V>, V::W); 2] {
-        let residual = [
-            v.sub(wrapped[0], low.fraction),
-            v.sub(wrapped[1], high.fraction),
-        ];
-        [
-            self.settled(v, residual[0], low.turns, wrapped[0]),
-            self.settled(v, residual[1], high.turns, wrapped[1]),
-        ]
+        predicted: PredictedPhase<V>,
+        wrapped: V::W,
+    ) -> (Absolute<V>, V::W) {
+        let residual = v.sub(wrapped, predicted.fraction);
+        let part = v.shr_by(wrapped, self.fine_right);
+        let turns = v.sub(predicted.turns, part);
+        let phase = Absolute {
+            turns: Turns {
+                order: v.sar_by(turns, self.bits_right),
+                phase: wrapped,
+            },
+            word: v.merge(self.whole_turns, turns, part),
+        };
+        (phase, v.abs(residual))
     }
 
-    /// As [`Self::unwrap_expected`] by coarse phases, in one of the first two steps: there the
+    /// As [`Self::unwrap_predicted`] by coarse phases, in one of the first two steps: there the
     /// coarse word is not shifted.
     #[inline(always)]
-    pub fn unwrap(
-        &self,
-        v: V,
-        coarse: [Absolute<V>; 2],
-        wrapped: [V::W; 2],
-    ) -> [(Absolute<V>, V::W); 2] {
-        let [low, high] = coarse;
-        let fraction = self.fractions(v, coarse);
-        let residual = [
-            v.sub(wrapped[0], fraction[0]),
-            v.sub(wrapped[1], fraction[1]),
-        ];
-        [
-            self.settled(v, residual[0], self.turns(v, low.word), wrapped[0]),
-            self.settled(v, residual[1], self.turns(v, high.word), wrapped[1]),
-        ]
+    pub fn unwrap(&self, v: V, coarse: Absolute<V>, wrapped: V::W) -> (Absolute<V>, V::W) {
+        let predicted = PredictedPhase {
+            fraction: self.fraction(v, coarse),
+            turns: self.turns(v, coarse.word),
+        };
+        self.unwrap_predicted(v, predicted, wrapped)
     }
 
     /// n·Φ modulo one turn.
     #[inline(always)]
-    fn fractions(&self, v: V, [low, high]: [Absolute<V>; 2]) -> [V::W; 2] {
-        let fraction = [
-            v.add(v.mul_low(low.turns.phase, self.whole), self.origin),
-            v.add(v.mul_low(high.turns.phase, self.whole), self.origin),
-        ];
+    fn fraction(&self, v: V, coarse: Absolute<V>) -> V::W {
+        let fraction = v.add(v.mul_low(coarse.turns.phase, self.whole), self.origin);
         if self.integral {
             return fraction;
         }
-        [
-            v.add(fraction[0], self.part(v, low)),
-            v.add(fraction[1], self.part(v, high)),
-        ]
+        v.add(fraction, self.part(v, coarse))
     }
 
     /// (Fraction of n) · Φ modulo one turn.
@@ -305,19 +284,5 @@ impl<V: Lanes> UnwrapStepLanes<V> {
     #[inline(always)]
     fn turns(&self, v: V, coarse: V::W) -> V::W {
         v.add(v.mul_q15(coarse, self.gain), self.offset)
-    }
-
-    #[inline(always)]
-    fn settled(&self, v: V, residual: V::W, turns: V::W, wrapped: V::W) -> (Absolute<V>, V::W) {
-        let part = v.shr_by(wrapped, self.fine_right);
-        let turns = v.sub(turns, part);
-        let phase = Absolute {
-            turns: Turns {
-                order: v.sar_by(turns, self.bits_right),
-                phase: wrapped,
-            },
-            word: v.merge(self.whole_turns, turns, part),
-        };
-        (phase, v.abs(residual))
     }
 }

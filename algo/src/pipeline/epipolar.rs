@@ -7,8 +7,8 @@
 //! height, so it tests the models: the distance e of (ξ, η) from the line is noise where they are
 //! right. A head that was knocked leaves e = a + b·x + c·y over the frame, x and y from −1 to 1: a
 //! turn about the line of the centres leaves a = f·angle, one about an optical axis a gradient. A
-//! turn in the plane of both axes moves points along the lines and leaves next to nothing: it shows
-//! in the height of the reference plane only.
+//! turn in the plane of both axes moves points along the lines and changes e hardly at all: only the
+//! height of the reference plane shows it.
 
 use super::PhaseMap;
 use crate::geometry::{Pinhole, Vector};
@@ -19,9 +19,10 @@ use alloc::vec::Vec;
 /// Pixels more than this many times the RMS off the first fit are left out of the second: edges of
 /// the part, reflections.
 const OUTLIER: f64 = 4.0;
-/// Fewer pixels say nothing about a head.
+/// Least pixels of a fit.
 const LEAST: usize = 500;
-/// About so many pixels of the frame are looked at: a mean of them has a hundredth of their noise.
+/// About so many pixels of the frame are sampled: a mean of them has less than a hundredth of their
+/// noise.
 const MOST: usize = 40_000;
 /// Steps along the ray; ξ and η are nearly linear in z.
 const STEPS: usize = 4;
@@ -47,7 +48,8 @@ impl Epipolar {
     /// Compares the phases of vertical and horizontal fringes, of `pitch` projector pixels each,
     /// with the models. `None` if fewer than 500 of the pixels looked at are resolved under both.
     pub fn of(
-        (camera, projector): (&Pinhole, &Pinhole),
+        camera: &Pinhole,
+        projector: &Pinhole,
         [vertical, horizontal]: [&PhaseMap; 2],
         pitch: [f64; 2],
     ) -> Option<Self> {
@@ -60,12 +62,12 @@ impl Epipolar {
         let mut samples = Vec::new();
         for v in (0..height).step_by(every) {
             for u in (0..width).step_by(every) {
-                let at = v * width + u;
-                let of = |map: &PhaseMap| {
-                    let resolved = *map.trust.get(at)? == Trust::Resolved;
-                    resolved.then(|| map.phase[at].turns())
+                let pixel = v * width + u;
+                let turns = |map: &PhaseMap| {
+                    let resolved = *map.trust.get(pixel)? == Trust::Resolved;
+                    resolved.then(|| map.phase[pixel].turns())
                 };
-                let (Some(xi), Some(eta)) = (of(vertical), of(horizontal)) else {
+                let (Some(xi), Some(eta)) = (turns(vertical), turns(horizontal)) else {
                     continue;
                 };
                 let lit_by = (xi * pitch[0], eta * pitch[1]);
@@ -205,7 +207,7 @@ mod tests {
     fn seen(turn: [f64; 3]) -> Epipolar {
         let [vertical, horizontal] = phases(&head(turn));
         let (camera, projector) = head([0.0; 3]);
-        Epipolar::of((&camera, &projector), [&vertical, &horizontal], [PITCH; 2]).unwrap()
+        Epipolar::of(&camera, &projector, [&vertical, &horizontal], [PITCH; 2]).unwrap()
     }
 
     #[test]
@@ -234,7 +236,7 @@ mod tests {
         let (camera, projector) = head([0.0; 3]);
         let empty = PhaseMap::new(FRAME.0, FRAME.1);
         assert_eq!(
-            Epipolar::of((&camera, &projector), [&empty, &empty], [PITCH; 2]),
+            Epipolar::of(&camera, &projector, [&empty, &empty], [PITCH; 2]),
             None
         );
     }

@@ -1,17 +1,14 @@
-//! Whole frames: decoding, triangulation, heights about a known surface. Rows run serially or on a
-//! rayon pool, with the same bits.
+//! Whole frames: decoding, triangulation, heights about a known surface. Loops over rows run
+//! serially or on a rayon pool, with the same bits.
 
 mod cubic;
 mod epipolar;
 mod measure;
 mod noise;
 mod plate;
-mod rays;
-mod rows;
 mod signal;
 #[cfg(test)]
 mod slips;
-mod wrapped;
 
 pub(crate) use cubic::{
     COMPARED, CubicInput, CubicOutput, CubicRow, HeightTally, NO_OFFSET, SIGMA, SQUARE,
@@ -21,10 +18,105 @@ pub use cubic::{HeightCubics, KnownSurface};
 pub use epipolar::Epipolar;
 pub use measure::{
     HeightMap, PhaseMap, Window, arrive, arrive_rest, decode, triangulate, triangulate_with,
+    wrapped,
 };
-pub use noise::{off_sine, sample_noise, signal_by_modulation};
+pub use noise::{off_sine, sample_noise};
 pub use plate::{Plate, PlateError};
-pub use rows::{Done, Progress, for_each_row};
-pub(crate) use rows::{for_each, for_each_item, for_each_row_of_two, map_rows};
-pub use signal::{mean_signal, signal};
-pub use wrapped::wrapped;
+pub use signal::{mean_signal, signal, signal_by_modulation};
+
+use alloc::vec::Vec;
+use core::sync::atomic::{AtomicUsize, Ordering};
+#[cfg(feature = "parallel")]
+use rayon::prelude::*;
+
+/// Gets the share of a long computation that is done, from any of its threads and often; what it
+/// does changes nothing of the result.
+pub type Progress<'a> = &'a (dyn Fn(f64) + Sync);
+
+/// Counts the rows that are done, in whatever order.
+pub struct Done<'a> {
+    progress: Progress<'a>,
+    rows: usize,
+    done: AtomicUsize,
+}
+
+impl<'a> Done<'a> {
+    /// Of so many rows.
+    pub fn new(progress: Progress<'a>, rows: usize) -> Self {
+        Self {
+            progress,
+            rows,
+            done: AtomicUsize::new(0),
+        }
+    }
+
+    /// One row more is done.
+    pub fn row(&self) {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        (self.progress)(done as f64 / self.rows.max(1) as f64);
+    }
+}
+
+/// Calls `each` with every row of `map` (row-major, rows of `width`).
+pub fn for_each_row<T: Send>(
+    map: &mut [T],
+    width: usize,
+    each: impl Fn(usize, &mut [T]) + Sync + Send,
+) {
+    #[cfg(feature = "parallel")]
+    map.par_chunks_mut(width.max(1))
+        .enumerate()
+        .for_each(|(v, row)| each(v, row));
+    #[cfg(not(feature = "parallel"))]
+    for (v, row) in map.chunks_mut(width.max(1)).enumerate() {
+        each(v, row);
+    }
+}
+
+/// Calls `each` with every item.
+pub(crate) fn for_each_item<T: Send>(items: &mut [T], each: impl Fn(&mut T) + Sync + Send) {
+    for_each_row(items, 1, |_, item| item.iter_mut().for_each(&each));
+}
+
+/// Calls `each` with every row of two maps (row-major), each given with the length of its rows.
+pub(crate) fn for_each_row_of_two<T: Send, U: Send>(
+    (first, first_length): (&mut [T], usize),
+    (second, second_length): (&mut [U], usize),
+    each: impl Fn(usize, &mut [T], &mut [U]) + Sync + Send,
+) {
+    let (first_length, second_length) = (first_length.max(1), second_length.max(1));
+    #[cfg(feature = "parallel")]
+    first
+        .par_chunks_mut(first_length)
+        .zip(second.par_chunks_mut(second_length))
+        .enumerate()
+        .for_each(|(v, (first, second))| each(v, first, second));
+    #[cfg(not(feature = "parallel"))]
+    for (v, (first, second)) in first
+        .chunks_mut(first_length)
+        .zip(second.chunks_mut(second_length))
+        .enumerate()
+    {
+        each(v, first, second);
+    }
+}
+
+/// Calls `each` with the index of every row and the row.
+pub(crate) fn for_each<T: Send>(rows: Vec<T>, each: impl Fn(usize, T) + Sync + Send) {
+    #[cfg(feature = "parallel")]
+    rows.into_par_iter()
+        .enumerate()
+        .for_each(|(v, row)| each(v, row));
+    #[cfg(not(feature = "parallel"))]
+    for (v, row) in rows.into_iter().enumerate() {
+        each(v, row);
+    }
+}
+
+/// One value per row, in the order of the rows.
+pub(crate) fn map_rows<R: Send>(rows: usize, each: impl Fn(usize) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "parallel")]
+    return (0..rows).into_par_iter().map(each).collect();
+    #[cfg(not(feature = "parallel"))]
+    (0..rows).map(each).collect()
+}

@@ -1,6 +1,6 @@
 //! The noise of one sample, estimated from the redundancy of levels with 4 or more shifts.
 
-use super::{PhaseMap, map_rows};
+use super::map_rows;
 use crate::frame::{FrameView, Samples};
 use crate::math::complex::Complex;
 use crate::pattern::{Level, Sequence};
@@ -23,8 +23,8 @@ use core::f64::consts::TAU;
 /// are fitted by least squares and taken off, each with its degrees of freedom, and so is what the
 /// noise of φ and |X_1| adds.
 ///
-/// Harmonics of a *projected* waveform are large, and optics take of them what is not known; the
-/// places that they take are left out whole. The waveforms for 5, 7 and 9 shifts leave none, those
+/// Harmonics of a *projected* waveform are large, and optics attenuate them by an unknown factor;
+/// the places that they fall on are left out. The waveforms for 5, 7 and 9 shifts leave none, those
 /// for 6 and 8 shifts 2 and 3.
 ///
 /// **Accuracy.** A response of gamma 2, N = 4 to 12: within 6 %
@@ -43,15 +43,15 @@ pub fn off_sine(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) 
 
 /// Pixels of a row over which the harmonics of a response are the same shares of the modulation.
 const RUN: usize = 64;
-/// Two harmonics cannot be told apart where the squared sine between them, over the pixels of a
+/// Two harmonics cannot be separated where the squared sine between them, over the pixels of a
 /// run, is below this.
 const ALIKE: f64 = 1e-6;
-/// From here on their shares are known well one by one.
+/// From this squared sine on, the share of each harmonic is well determined by itself.
 const CLEARLY: f64 = 0.1;
 
 /// Sums of squares of what a sine leaves of the samples, counts².
 #[derive(Clone, Copy, Default)]
-struct Residuals {
+struct SineResiduals {
     /// Without harmonics, and the degrees of freedom in it.
     noise: f64,
     freedom: f64,
@@ -60,7 +60,7 @@ struct Residuals {
     samples: f64,
 }
 
-impl core::ops::Add for Residuals {
+impl core::ops::Add for SineResiduals {
     type Output = Self;
 
     fn add(self, other: Self) -> Self {
@@ -73,7 +73,11 @@ impl core::ops::Add for Residuals {
     }
 }
 
-fn residuals(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) -> Option<Residuals> {
+fn residuals(
+    sequence: &Sequence,
+    frames: &[FrameView<'_>],
+    trust: &[Trust],
+) -> Option<SineResiduals> {
     let levels: Vec<Transform> = sequence
         .levels()
         .iter()
@@ -82,7 +86,7 @@ fn residuals(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) -> 
     let width = frames.first()?.width();
     let rows = map_rows(frames[0].height(), |v| {
         let rows: Vec<Samples<'_>> = frames.iter().map(|frame| frame.row(v)).collect();
-        let mut sum = Residuals::default();
+        let mut sum = SineResiduals::default();
         for from in (0..width).step_by(RUN) {
             let run = from..width.min(from + RUN);
             let resolved = run.filter(|u| trust[v * width + u] == Trust::Resolved);
@@ -96,64 +100,8 @@ fn residuals(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) -> 
     // Summed in the order of the rows, so that the result does not depend on the number of threads.
     Some(
         rows.into_iter()
-            .fold(Residuals::default(), |sum, row| sum + row),
+            .fold(SineResiduals::default(), |sum, row| sum + row),
     )
-}
-
-/// The mean signal of a resolved pixel by its modulation, both of the finest level: offset in
-/// counts, and counts per count, neither below 0. It is the least-squares line, because not all
-/// light is modulated: light from elsewhere is not, nor what blur takes. Samples have `full_scale`
-/// counts at most.
-pub fn signal_by_modulation(
-    sequence: &Sequence,
-    (frames, full_scale): (&[FrameView<'_>], u16),
-    phases: &PhaseMap,
-) -> [f64; 2] {
-    let (Some(finest), Some(first)) = (sequence.levels().last(), frames.first()) else {
-        return [0.0, 1.0];
-    };
-    let width = first.width();
-    let finest = finest.frames.iter().map(|&at| frames[usize::from(at)]);
-    let finest: Vec<FrameView<'_>> = finest.collect();
-    let rows = map_rows(first.height(), |v| {
-        let rows: Vec<Samples<'_>> = finest.iter().map(|frame| frame.row(v)).collect();
-        // Whole numbers below 2⁶⁴: x is the modulation, y the sum of all samples.
-        let mut sums = [0_u64; 5];
-        for u in (0..width).filter(|u| phases.trust[v * width + u] == Trust::Resolved) {
-            let x = u64::from(phases.modulation[v * width + u].to_bits());
-            let y: u64 = rows.iter().map(|row| u64::from(count(row, u))).sum();
-            for (sum, term) in sums.iter_mut().zip([1, x, y, x * x, x * y]) {
-                *sum += term;
-            }
-        }
-        sums
-    });
-    let mut sums = [0_u64; 5];
-    for row in rows {
-        sums.iter_mut()
-            .zip(row)
-            .for_each(|(sum, here)| *sum += here);
-    }
-    let [n, x, y, xx, xy] = sums.map(|sum| sum as f64);
-    let slope = ((n * xy - x * y) / (n * xx - x * x)).max(0.0);
-    let (offset, slope) = match (y - slope * x) / n {
-        offset if offset > 0.0 => (offset, slope),
-        _ if xx > 0.0 => (0.0, xy / xx),
-        _ => return [0.0, 1.0],
-    };
-    let samples = finest.len() as f64;
-    [
-        offset / samples,
-        slope / samples * f64::from(u16::MAX) / f64::from(full_scale),
-    ]
-}
-
-/// A sample in counts.
-fn count(row: &Samples<'_>, u: usize) -> u16 {
-    match row {
-        Samples::Eight(row) => row[u].into(),
-        Samples::Sixteen(row) => row[u],
-    }
 }
 
 /// The places of a level's discrete Fourier transform that have noise and harmonics of the
@@ -170,7 +118,7 @@ struct Transform {
 /// Sums over the pixels of a run for one place: X is what is seen there, a and b what harmonics p
 /// and N − p of a share of 1 would show.
 #[derive(Clone, Copy, Default)]
-struct Normal {
+struct HarmonicSums {
     xx: f64,
     aa: f64,
     bb: f64,
@@ -179,7 +127,7 @@ struct Normal {
     bx: Complex,
 }
 
-impl Normal {
+impl HarmonicSums {
     fn add(&mut self, x: Complex, a: Complex, b: Complex) {
         self.xx += x.square();
         self.aa += a.square();
@@ -193,20 +141,20 @@ impl Normal {
     fn fitted(&self, place: usize, shifts: usize) -> Fitted {
         // By how much noise of |X_1| and φ turns and stretches harmonic h of a share of 1.
         let stirred = |order: usize| (1.0 + (order * order) as f64) / 2.0;
-        let one = if self.aa > 0.0 {
+        let by_one = if self.aa > 0.0 {
             self.ax.square() / self.aa
         } else {
             0.0
         };
         let real = if 2 * place == shifts { 0.5 } else { 1.0 };
-        let of_one = real * stirred(place) * one / self.aa.max(1.0);
+        let stirred_one = real * stirred(place) * by_one / self.aa.max(1.0);
         let determinant = self.aa * self.bb - self.ab.square();
         let apart = determinant / (self.aa * self.bb);
         if !(apart > ALIKE) {
             return Fitted {
-                left: self.xx - one,
+                left: self.xx - by_one,
                 coefficients: 1.0,
-                stirred: of_one,
+                stirred: stirred_one,
             };
         }
         let crossed = (self.ax * self.bx.conj()).dot(self.ab);
@@ -214,15 +162,15 @@ impl Normal {
         // a b* x and a* b x, the coefficients' numerators beside those of each alone.
         let across = self.bx * self.ab;
         let along = self.ax * self.ab.conj();
-        let of_a = (self.ax * self.bb - across).square();
-        let of_b = (self.bx * self.aa - along).square();
-        let of_both = stirred(place) * of_a + stirred(shifts - place) * of_b;
+        let numerator_a = (self.ax * self.bb - across).square();
+        let numerator_b = (self.bx * self.aa - along).square();
+        let stirred_both = stirred(place) * numerator_a + stirred(shifts - place) * numerator_b;
         Fitted {
             left: self.xx - explained / determinant,
             coefficients: 2.0,
             stirred: match apart > CLEARLY {
-                true => of_both / (determinant * determinant),
-                false => of_one,
+                true => stirred_both / (determinant * determinant),
+                false => stirred_one,
             },
         }
     }
@@ -234,8 +182,8 @@ struct Fitted {
     left: f64,
     /// How many complex coefficients explain it.
     coefficients: f64,
-    /// What the noise of the fundamental, of which harmonics are made here, adds to the place, as a
-    /// share of its own noise.
+    /// What the noise of the fundamental, from which the harmonics are computed, adds to the place,
+    /// as a share of its own noise.
     stirred: f64,
 }
 
@@ -266,9 +214,9 @@ impl Transform {
     }
 
     /// Of these pixels of a row.
-    fn residuals(&self, rows: &[Samples<'_>], pixels: &[usize]) -> Residuals {
+    fn residuals(&self, rows: &[Samples<'_>], pixels: &[usize]) -> SineResiduals {
         let shifts = self.frames.len();
-        let mut sums = alloc::vec![Normal::default(); self.places.len()];
+        let mut sums = alloc::vec![HarmonicSums::default(); self.places.len()];
         // What each harmonic of a share of 1 shows, from order 0.
         let mut harmonics = alloc::vec![Complex::default(); shifts - 1];
         for &u in pixels {
@@ -276,7 +224,7 @@ impl Transform {
             let seen = |taps: &[Complex]| {
                 let pairs = self.frames.iter().zip(taps);
                 pairs.fold(Complex::default(), |sum, (&frame, &tap)| {
-                    sum + tap.conj() * f64::from(count(&rows[frame], u))
+                    sum + tap.conj() * f64::from(rows[frame].at(u))
                 })
             };
             let fundamental = seen(&self.first);
@@ -294,15 +242,15 @@ impl Transform {
                 sum.add(seen(taps), own, mirrored.conj());
             }
         }
-        let mut found = Residuals::default();
+        let mut found = SineResiduals::default();
         let count = pixels.len() as f64;
         for (sum, (place, _)) in sums.iter().zip(&self.places) {
-            let of = sum.fitted(*place, shifts);
+            let fitted = sum.fitted(*place, shifts);
             // The mirror image has as much again; the place of half of all shifts is its own, and
             // real.
             let share = if 2 * place == shifts { 1.0 } else { 2.0 };
-            found.noise += share * of.left.max(0.0) / (1.0 + of.stirred) / shifts as f64;
-            found.freedom += share * (count - of.coefficients);
+            found.noise += share * fitted.left.max(0.0) / (1.0 + fitted.stirred) / shifts as f64;
+            found.freedom += share * (count - fitted.coefficients);
             found.all += share * sum.xx / shifts as f64;
         }
         found.samples = count * shifts as f64;
@@ -311,14 +259,13 @@ impl Transform {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::pattern::{Shot, Waveform};
-    use crate::units::Modulation;
 
     /// Frames of a scene with a side of so many pixels, from the sample of each pixel under each
     /// shot.
-    fn frames(
+    pub fn frames(
         side: usize,
         shots: &[Shot],
         mut light: impl FnMut(&Shot, usize) -> f64,
@@ -328,7 +275,7 @@ mod tests {
         shots.iter().map(frame).collect()
     }
 
-    fn views(side: usize, frames: &[Vec<u8>]) -> Vec<FrameView<'_>> {
+    pub fn views(side: usize, frames: &[Vec<u8>]) -> Vec<FrameView<'_>> {
         let frames = frames.iter();
         frames
             .map(|frame| FrameView::new(Samples::Eight(frame), side, side, side).unwrap())
@@ -350,7 +297,8 @@ mod tests {
         for (shifts, freedom) in [(3, 0), (4, 1), (5, 0), (6, 2), (7, 0), (8, 3), (9, 0)] {
             let shots: Vec<Shot> = Shot::level_as(1.0, shifts, Waveform::brightest).collect();
             let sequence = Sequence::from_frames(&shots).unwrap();
-            let places = Transform::new(&sequence.levels()[0]).map_or(Vec::new(), |of| of.places);
+            let places = Transform::new(&sequence.levels()[0])
+                .map_or(Vec::new(), |transform| transform.places);
             let free = places.iter().map(|(place, _)| match 2 * place == shifts {
                 true => 1,
                 false => 2,
@@ -413,48 +361,5 @@ mod tests {
                 );
             }
         }
-    }
-
-    /// A part of several shades in light from elsewhere: frames of two levels, and what is found in
-    /// them.
-    #[test]
-    fn the_signal_follows_from_the_modulation_with_light_from_elsewhere() {
-        const SIDE: usize = 64;
-        let shots: Vec<Shot> = [0.25, 1.0]
-            .iter()
-            .flat_map(|&r| Shot::level(r, 4))
-            .collect();
-        let sequence = Sequence::from_frames(&shots).unwrap();
-        for (elsewhere, shades) in [(12.0, 40), (0.0, 40), (30.0, 1)] {
-            let modulation = |at: usize| 50.0 + (at % shades) as f64;
-            // Blur takes a tenth of the modulation.
-            let frames = frames(SIDE, &shots, |shot, at| {
-                let turns = shot.ratio * at as f64 / 37.3 + shot.shift;
-                elsewhere + modulation(at) / 0.9 * (1.0 + 0.9 * libm::sin(TAU * turns))
-            });
-            let views = views(SIDE, &frames);
-            let mut phases = PhaseMap::new(SIDE, SIDE);
-            phases.trust.fill(Trust::Resolved);
-            for (at, here) in phases.modulation.iter_mut().enumerate() {
-                *here = Modulation::from_bits((modulation(at) * 257.0) as u16);
-            }
-            let [offset, slope] = signal_by_modulation(&sequence, (&views, 255), &phases);
-            let signal = |b: f64| offset + slope * b;
-            for b in [50.0, 50.0 + (shades - 1) as f64] {
-                let found = signal(b) - (elsewhere + b / 0.9);
-                assert!(
-                    found.abs() < 0.1,
-                    "{elsewhere}, {shades} shades, {b}: {found}"
-                );
-            }
-            // Beyond the shades only where there are several.
-            let dark = signal(0.0) - elsewhere;
-            assert_eq!(dark.abs() < 0.3, shades > 1, "{dark}");
-        }
-        let nothing = PhaseMap::new(SIDE, SIDE);
-        assert_eq!(
-            signal_by_modulation(&sequence, (&[], 255), &nothing),
-            [0.0, 1.0]
-        );
     }
 }

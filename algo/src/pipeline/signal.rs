@@ -1,16 +1,17 @@
-//! The signal of a part: the light of each pixel as it was demodulated, for measurements that need more
-//! than the phase.
+//! The signal of a part: the light of each pixel as it was demodulated, for measurements that need
+//! more than the phase, and the mean signal by the modulation.
 //!
-//! **Equation.** Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) = B e^{2πiφ} over the N shifts s_k of the
-//! finest level, in which samples are I_k = A + B sin 2π(φ + s_k) (`phase/fold.rs`). It is
+//! **Equation.** Z = (2/N) Σ I_k (sin 2πs_k + i cos 2πs_k) = B e^{2πiφ} over the N shifts s_k of
+//! the finest level, in which samples are I_k = A + B sin 2π(φ + s_k) (`phase/fold.rs`). It is
 //! linear in the light: where an edge cuts a pixel, Z is the mean of both sides.
 //!
 //! **Shape and unit.** Per pixel the real and the imaginary part behind each other, in 1/64 count
 //! of an 8-bit sample, whatever the camera's.
 
-use super::for_each_row;
+use super::{PhaseMap, for_each_row, map_rows};
 use crate::frame::{FrameView, Samples};
-use crate::pattern::Shot;
+use crate::pattern::{Sequence, Shot};
+use crate::phase::Trust;
 use alloc::vec;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
@@ -60,6 +61,55 @@ fn add<T: Copy + Into<f64>>(sums: &mut [[f64; 2]], samples: &[T], [sin, cos]: [f
     }
 }
 
+/// The mean signal of a resolved pixel by its modulation, both of the finest level: offset in
+/// counts, and counts per count, neither below 0. It is the least-squares line, because not all
+/// light is modulated: light from elsewhere is not, nor what blur takes. Samples have `full_scale`
+/// counts at most.
+pub fn signal_by_modulation(
+    sequence: &Sequence,
+    frames: &[FrameView<'_>],
+    full_scale: u16,
+    phases: &PhaseMap,
+) -> [f64; 2] {
+    let (Some(finest), Some(first)) = (sequence.levels().last(), frames.first()) else {
+        return [0.0, 1.0];
+    };
+    let width = first.width();
+    let finest = finest.frames.iter().map(|&at| frames[usize::from(at)]);
+    let finest: Vec<FrameView<'_>> = finest.collect();
+    let rows = map_rows(first.height(), |v| {
+        let rows: Vec<Samples<'_>> = finest.iter().map(|frame| frame.row(v)).collect();
+        // Whole numbers below 2⁶⁴: x is the modulation, y the sum of all samples.
+        let mut sums = [0_u64; 5];
+        for u in (0..width).filter(|u| phases.trust[v * width + u] == Trust::Resolved) {
+            let x = u64::from(phases.modulation[v * width + u].to_bits());
+            let y: u64 = rows.iter().map(|row| u64::from(row.at(u))).sum();
+            for (sum, term) in sums.iter_mut().zip([1, x, y, x * x, x * y]) {
+                *sum += term;
+            }
+        }
+        sums
+    });
+    let mut sums = [0_u64; 5];
+    for row in rows {
+        sums.iter_mut()
+            .zip(row)
+            .for_each(|(sum, here)| *sum += here);
+    }
+    let [n, x, y, xx, xy] = sums.map(|sum| sum as f64);
+    let slope = ((n * xy - x * y) / (n * xx - x * x)).max(0.0);
+    let (offset, slope) = match (y - slope * x) / n {
+        offset if offset > 0.0 => (offset, slope),
+        _ if xx > 0.0 => (0.0, xy / xx),
+        _ => return [0.0, 1.0],
+    };
+    let samples = finest.len() as f64;
+    [
+        offset / samples,
+        slope / samples * f64::from(u16::MAX) / f64::from(full_scale),
+    ]
+}
+
 /// The mean of two signals.
 pub fn mean_signal(first: &[i16], second: &[i16]) -> Vec<i16> {
     let pairs = first.iter().zip(second);
@@ -69,6 +119,8 @@ pub fn mean_signal(first: &[i16], second: &[i16]) -> Vec<i16> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::noise::tests::{frames, views};
+    use crate::units::Modulation;
 
     #[test]
     fn the_signal_is_the_modulation_at_the_phase_of_the_finest_level() {
@@ -99,5 +151,48 @@ mod tests {
             }
             assert_eq!(signal.len(), 4);
         }
+    }
+
+    /// A part of several shades in light from elsewhere: frames of two levels, and what is found in
+    /// them.
+    #[test]
+    fn the_signal_follows_from_the_modulation_with_light_from_elsewhere() {
+        const SIDE: usize = 64;
+        let shots: Vec<Shot> = [0.25, 1.0]
+            .iter()
+            .flat_map(|&r| Shot::level(r, 4))
+            .collect();
+        let sequence = Sequence::from_frames(&shots).unwrap();
+        for (elsewhere, shades) in [(12.0, 40), (0.0, 40), (30.0, 1)] {
+            let modulation = |at: usize| 50.0 + (at % shades) as f64;
+            // Blur takes a tenth of the modulation.
+            let frames = frames(SIDE, &shots, |shot, at| {
+                let turns = shot.ratio * at as f64 / 37.3 + shot.shift;
+                elsewhere + modulation(at) / 0.9 * (1.0 + 0.9 * libm::sin(TAU * turns))
+            });
+            let views = views(SIDE, &frames);
+            let mut phases = PhaseMap::new(SIDE, SIDE);
+            phases.trust.fill(Trust::Resolved);
+            for (at, here) in phases.modulation.iter_mut().enumerate() {
+                *here = Modulation::from_bits((modulation(at) * 257.0) as u16);
+            }
+            let [offset, slope] = signal_by_modulation(&sequence, &views, 255, &phases);
+            let signal = |b: f64| offset + slope * b;
+            for b in [50.0, 50.0 + (shades - 1) as f64] {
+                let found = signal(b) - (elsewhere + b / 0.9);
+                assert!(
+                    found.abs() < 0.1,
+                    "{elsewhere}, {shades} shades, {b}: {found}"
+                );
+            }
+            // Beyond the shades only where there are several.
+            let dark = signal(0.0) - elsewhere;
+            assert_eq!(dark.abs() < 0.3, shades > 1, "{dark}");
+        }
+        let nothing = PhaseMap::new(SIDE, SIDE);
+        assert_eq!(
+            signal_by_modulation(&sequence, &[], 255, &nothing),
+            [0.0, 1.0]
+        );
     }
 }

@@ -3,7 +3,7 @@
 
 use super::{PhaseMap, decode};
 use crate::frame::{FrameView, Samples};
-use crate::pattern::slips::tests::{PAPER, RANGE, slips, two};
+use crate::pattern::split::tests::{PAPER, RANGE, slips, two};
 use crate::pattern::{Sequence, Shot, Waveform};
 use crate::phase::{Decoder, Trust};
 use crate::units::AbsolutePhase;

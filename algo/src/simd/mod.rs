@@ -1,11 +1,17 @@
 //! Vector instructions behind one small trait, and the choice of the back-end that this machine
 //! has.
 //!
-//! The phase kernels are written in the operations of `Lanes`. `Portable` defines them as plain
-//! code; `Avx2`, `Ssse3` and `Neon` give the same results by vector instructions. A value of a
-//! back-end proves that its instructions are available, so its operations are safe to call. This is
-//! the only module with `unsafe`: intrinsics that the proof covers, and loads and stores inside
-//! slices whose length has been asserted.
+//! | file | what it has |
+//! |---|---|
+//! | `lanes` | `Lanes`, the operations on a block of pixels in which the kernels are written |
+//! | `ssse3`, `avx2` | the back-ends of x86-64; `x86` has what both share |
+//! | `neon` | the back-end of aarch64 |
+//! | `portable` | plain code: the definition of each operation, for tests and other processors |
+//! | `rows` | the rows that kernels read blocks from and write blocks to |
+//!
+//! All back-ends give the same bits. A value of a back-end proves that its instructions are
+//! available, so its operations are safe to call. This is the only module with `unsafe`: intrinsics
+//! that the proof covers, and loads and stores inside slices whose length has been asserted.
 //!
 //! Kernels are generic functions that are inlined into entry points compiled for the back-end's
 //! instructions (`back_end_entry!`). They contain no closures, because those would be compiled
@@ -13,8 +19,6 @@
 #![allow(unsafe_code)]
 
 mod lanes;
-pub(crate) mod plain;
-mod results;
 mod rows;
 #[cfg(test)]
 mod tests;
@@ -22,8 +26,7 @@ mod tests;
 mod x86;
 
 pub(crate) use lanes::{Lanes, MAX_PIXELS};
-pub(crate) use results::Results;
-pub(crate) use rows::Rows;
+pub(crate) use rows::{Results, Rows, phase_bits};
 
 /// A back-end of the phase kernels: the instructions that they are compiled for. All give the same
 /// bits.
@@ -59,8 +62,8 @@ macro_rules! back_ends {
 }
 
 back_ends! {
-    // Plain code: the judge of the others in tests, and for processors of which no vector
-    // instructions are known, or that cannot be asked for them.
+    // Plain code: the reference of the others in tests, and for processors without a back-end of
+    // their own, or whose features cannot be detected.
     #[cfg(any(test, not(any(target_arch = "aarch64", all(target_arch = "x86_64", feature = "std")))))]
     portable::Portable;
     #[cfg(target_arch = "x86_64")]
@@ -72,11 +75,11 @@ back_ends! {
 }
 
 impl Backend {
-    /// The judge of the others.
+    /// The reference of the others.
     #[cfg(test)]
     pub(crate) const PORTABLE: Self = Self(Proof::Portable(Portable));
 
-    /// The fastest that this machine has; none on an x86-64 processor older than SSSE3.
+    /// The fastest that this machine has; `None` on an x86-64 processor without SSSE3.
     pub fn best() -> Option<Self> {
         Self::available().next_back()
     }

@@ -1,9 +1,9 @@
 //! The back-end without any particular instructions: arrays, written so that each line can be
 //! checked against [`Lanes`].
 //!
-//! It is the judge of the other back-ends, and for machines of which no others are known. Its
-//! operations are not inlined, because kernels of hundreds of inlined loops take minutes to
-//! compile.
+//! It is compiled only for tests, as the reference of the other back-ends, and for processors
+//! without vector instructions. Its operations are not inlined, because kernels of hundreds of
+//! inlined loops take minutes to compile.
 
 use super::lanes::{Lanes, Scaled, operations, plain};
 use crate::math::nearest;

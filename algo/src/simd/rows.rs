@@ -1,4 +1,27 @@
-//! Rows of samples that are read block by block, with one bounds check for several rows.
+//! Rows of samples that are read block by block, with one bounds check for several rows, and rows
+//! of results that blocks are stored to.
+
+use super::Lanes;
+use crate::trust::Trust;
+use crate::units::{AbsolutePhase, Modulation};
+
+/// Phases as their bits.
+pub(crate) fn phase_bits(phases: &[AbsolutePhase]) -> &[i32] {
+    // SAFETY: `AbsolutePhase` is a transparent wrapper of `i32`.
+    unsafe { core::slice::from_raw_parts(phases.as_ptr().cast(), phases.len()) }
+}
+
+/// Phases as their bits.
+fn phase_bits_mut(phases: &mut [AbsolutePhase]) -> &mut [i32] {
+    // SAFETY: `AbsolutePhase` is a transparent wrapper of `i32`, and every `i32` is one.
+    unsafe { core::slice::from_raw_parts_mut(phases.as_mut_ptr().cast(), phases.len()) }
+}
+
+/// Modulations as their bits.
+fn modulation_bits_mut(modulations: &mut [Modulation]) -> &mut [u16] {
+    // SAFETY: `Modulation` is a transparent wrapper of `u16`, and every `u16` is one.
+    unsafe { core::slice::from_raw_parts_mut(modulations.as_mut_ptr().cast(), modulations.len()) }
+}
 
 /// Any number of rows that are read up to one length.
 #[derive(Clone, Copy, Debug)]
@@ -35,17 +58,17 @@ impl<'a, T> Rows<'a, T> {
         self.rows.len()
     }
 
-    /// The rows, of which there are N.
+    /// The N rows.
     ///
     /// # Panics
     /// If there are fewer.
     #[inline(always)]
     pub fn all<const N: usize>(&self) -> [&'a [T]; N] {
         let mut rows = [self.row(0); N];
-        let mut at = 1;
-        while at < N {
-            rows[at] = self.row(at);
-            at += 1;
+        let mut k = 1;
+        while k < N {
+            rows[k] = self.row(k);
+            k += 1;
         }
         rows
     }
@@ -85,4 +108,92 @@ pub(super) fn block_mut<T>(row: &mut [T], at: usize, pixels: usize) -> &mut [T] 
 #[inline(always)]
 fn assert_fits(at: usize, pixels: usize, length: usize) {
     assert!(length >= pixels && at <= length - pixels);
+}
+
+/// Phase, modulation and trust of a row as plain numbers, of equal length.
+pub(crate) struct Results<'a> {
+    /// Φ, 1/65536 turn.
+    pub phase: &'a mut [i32],
+    modulation: &'a mut [u16],
+    trust: &'a mut [Trust],
+}
+
+impl<'a> Results<'a> {
+    /// The first `length` of a row.
+    ///
+    /// # Panics
+    /// If the row ends before.
+    pub fn new(
+        phase: &'a mut [AbsolutePhase],
+        modulation: &'a mut [Modulation],
+        trust: &'a mut [Trust],
+        length: usize,
+    ) -> Self {
+        Self {
+            phase: &mut phase_bits_mut(phase)[..length],
+            modulation: &mut modulation_bits_mut(modulation)[..length],
+            trust: &mut trust[..length],
+        }
+    }
+
+    /// The first `length` of a row.
+    #[inline(always)]
+    pub fn first(&mut self, length: usize) -> Results<'_> {
+        Results {
+            phase: &mut self.phase[..length],
+            modulation: &mut self.modulation[..length],
+            trust: &mut self.trust[..length],
+        }
+    }
+
+    /// Stores a block. A byte above the largest number of [`Trust`] is stored as that number.
+    #[inline(always)]
+    pub fn store<V: Lanes>(
+        &mut self,
+        v: V,
+        at: usize,
+        phase: [[V::D; 2]; 2],
+        modulation: [V::W; 2],
+        trust: V::B,
+    ) {
+        v.claim_ahead(self.phase, at);
+        v.store32(self.phase, at, phase);
+        self.store_others(v, at, modulation, trust);
+    }
+
+    /// Stores a block, given by the fractions and the fringe orders of the phases.
+    #[inline(always)]
+    pub fn store_turns<V: Lanes>(
+        &mut self,
+        v: V,
+        at: usize,
+        [fraction, order]: [[V::W; 2]; 2],
+        modulation: [V::W; 2],
+        trust: V::B,
+    ) {
+        v.claim_ahead(self.phase, at);
+        v.store32_joined(self.phase, at, fraction, order);
+        self.store_others(v, at, modulation, trust);
+    }
+
+    #[inline(always)]
+    fn store_others<V: Lanes>(&mut self, v: V, at: usize, modulation: [V::W; 2], trust: V::B) {
+        v.claim_ahead(self.modulation, at);
+        v.claim_ahead(self.trust, at);
+        v.store16(self.modulation, at, modulation);
+        // SAFETY: `Trust` is one byte with the numbers 0 to `LAST`, and no byte above `LAST` is
+        // stored.
+        let bytes = unsafe {
+            core::slice::from_raw_parts_mut(self.trust.as_mut_ptr().cast(), self.trust.len())
+        };
+        v.store8(bytes, at, v.min8(trust, v.splat8(Trust::LAST)));
+    }
+
+    /// Stores a block without any phase; `reason` says why.
+    #[inline(always)]
+    pub fn store_unknown<V: Lanes>(&mut self, v: V, at: usize, reason: V::B) {
+        let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
+        let none = v.splat16(0);
+        self.store(v, at, [[unknown; 2]; 2], [none; 2], reason);
+    }
 }

@@ -58,10 +58,10 @@ macro_rules! proof {
             /// The proof, where this processor and its operating system have the instructions.
             pub fn detect() -> Option<Self> {
                 #[cfg(feature = "std")]
-                let there = std::is_x86_feature_detected!($feature);
+                let available = std::is_x86_feature_detected!($feature);
                 #[cfg(not(feature = "std"))]
-                let there = cfg!(target_feature = $feature);
-                there.then_some(Self(()))
+                let available = cfg!(target_feature = $feature);
+                available.then_some(Self(()))
             }
         }
     };

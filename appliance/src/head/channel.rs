@@ -3,7 +3,7 @@
 use super::code::Code;
 use super::scan::Scan;
 use super::seam;
-use algo::chain::{Cells, Chain, Edges, Seen};
+use algo::chain::{Cells, Chain, CodeWord, Edges};
 use algo::frame::FrameView;
 use algo::geometry::Triangulator;
 use algo::pattern::{self, Level, PhaseFunction, Shot};
@@ -216,7 +216,7 @@ impl<'a> Channel<'a> {
     ///
     /// # Errors
     /// In words: its pictures do not form a code.
-    pub fn seen(&self) -> Result<Option<Vec<Seen>>, String> {
+    pub fn seen(&self) -> Result<Option<Vec<CodeWord>>, String> {
         let seen = self.code.as_ref().map(|code| code.pictures.read());
         seen.transpose().map_err(words)
     }

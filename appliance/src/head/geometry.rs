@@ -6,8 +6,8 @@ use super::code::CodeAlone;
 use super::standing::Ground;
 use crate::error::{Exit, Failure, Result};
 use algo::calibration::{
-    Adjusted, Arrow, Board, CalibrationError, FoundBoard, Fringes, MeasuredBoard, Picture,
-    Prediction, Residuals, View, calibrate, look,
+    Adjusted, Arrow, Board, BoardView, CalibrationError, FoundBoard, FringeMaps, GreyPicture,
+    MeasuredBoard, Prediction, Residuals, calibrate, look,
 };
 use algo::geometry::Pinhole;
 use algo::phase::LeastModulation;
@@ -29,7 +29,7 @@ pub struct SeenPose {
     /// What tells its head apart, as [`Calibration::sizes`](super::calibration::Calibration::sizes).
     pub head: [u32; 5],
     /// Corners and projector points.
-    pub view: View,
+    pub view: BoardView,
 }
 
 impl SeenPose {
@@ -62,7 +62,7 @@ impl SeenPose {
         let (vertical_map, horizontal_map) = (decoded(vertical.0)?, decoded(horizontal.0)?);
         let projector = &recording.projector;
         let raster = (projector.width, projector.height);
-        let fringes = Fringes {
+        let fringes = FringeMaps {
             vertical: &vertical_map,
             horizontal: &horizontal_map,
             pitch: (
@@ -98,10 +98,10 @@ pub fn same_place(other: &str) -> String {
 fn decoded(
     recording: &Recording,
     pattern: usize,
-    levels: &mut Vec<Picture>,
+    levels: &mut Vec<GreyPicture>,
 ) -> Result<PhaseMap, String> {
     if let Some(code) = CodeAlone::of(recording, pattern)? {
-        levels.push(Picture::mean(&code.even()));
+        levels.push(GreyPicture::mean(&code.even()));
         return code.phases(LeastModulation::default());
     }
     // Not the least of the camera's noise: in black squares the light of bright ones around them
@@ -118,7 +118,7 @@ fn decoded(
     let scan = &channel.scan;
     for level in scan.sequence.levels() {
         let frames = level.frames.iter().map(|&at| scan.frames[usize::from(at)]);
-        levels.push(Picture::mean(&frames.collect::<Vec<_>>()));
+        levels.push(GreyPicture::mean(&frames.collect::<Vec<_>>()));
     }
     Ok(channel.decode(&unwrapping)?.absolute)
 }
@@ -199,7 +199,7 @@ impl Geometry {
         }
         let [width, height, _, columns, rows] = first.head.map(|size| size as usize);
         let (frame, raster) = ((width, height), (columns, rows));
-        let views: Vec<View> = poses.iter().map(|pose| pose.view.clone()).collect();
+        let views: Vec<BoardView> = poses.iter().map(|pose| pose.view.clone()).collect();
         let blame = |error: CalibrationError| match error.pose() {
             Some(pose) => format!("{}: {error}", poses[pose].recording),
             None => error.to_string(),

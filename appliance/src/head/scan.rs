@@ -141,11 +141,12 @@ impl<'a> Scan<'a> {
 
     /// The noise of a sample by the modulation of its pixel.
     pub fn noise(&self, calibration: &Calibration, phases: &PhaseMap) -> SampleNoise {
-        let frames = (&self.frames[..], self.decoder.full_scale());
-        let [offset, slope] = pipeline::signal_by_modulation(&self.sequence, frames, phases);
+        let own_scale = self.decoder.full_scale();
+        let [offset, slope] =
+            pipeline::signal_by_modulation(&self.sequence, &self.frames, own_scale, phases);
         // Means of frames have more bits than the camera's samples.
         let full_scale = (1_u32 << calibration.bit_depth) - 1;
-        let unit = f64::from(full_scale) / f64::from(self.decoder.full_scale());
+        let unit = f64::from(full_scale) / f64::from(own_scale);
         calibration.noise.by([offset * unit, slope])
     }
 

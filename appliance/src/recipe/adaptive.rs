@@ -6,7 +6,7 @@ use crate::head::calibration::Calibration;
 use crate::head::calibration::file::ContrastFile;
 use crate::head::scan::Scan;
 use algo::adaptive::noise::{self, Light};
-use algo::adaptive::{Blur, Optics, ProjectorMap, Spread};
+use algo::adaptive::{Blur, FringeOptics, ProjectorMap, Spread};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::Trust;
@@ -58,14 +58,15 @@ impl Preliminary {
         let slopes = map.slopes(noise::MAX_SLOPE);
         let blur = self.blur(part, calibration, &slopes)?;
         let light = Light::of(
-            (&part.phases, &part.decoder),
+            &part.phases,
+            &part.decoder,
             &slopes,
             1.0 / STRAIGHT_PITCH_PX,
             &blur,
             Some(calibration.noise_counts),
             &|share| progress(0.1 + 0.4 * share),
         );
-        let optics = Optics {
+        let optics = FringeOptics {
             blur,
             projector_pitch: noise::PROJECTOR_PITCH,
             image_pitch: noise::IMAGE_PITCH,

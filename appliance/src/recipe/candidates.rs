@@ -135,7 +135,7 @@ impl GoldenPart<'_> {
         let sequence = Sequence::from_frames(&sequence.frames).ok()?;
         let (least, full_scale) = (self.decoder.least_modulation(), self.decoder.full_scale());
         let taught = finest_waveform(self.full).fundamental();
-        let chance = sequence.chance_of_trust(least, (self.calibration.noise_counts, full_scale));
+        let chance = sequence.chance_of_trust(least, self.calibration.noise_counts, full_scale);
         let safe = |at: usize| reach.is_none_or(|reach| phase_reach[at] < reach);
         let resolved = |at: &usize| self.phases.trust[*at] == Trust::Resolved && safe(*at);
         let modulation = |at: usize| self.phases.modulation[at].counts(full_scale);

@@ -39,12 +39,12 @@ impl Preliminary {
         });
         let wanted: Vec<f64> = wanted.collect();
         let map = ProjectorMap::from_heights(&part.triangulator, &part.heights);
-        let size = (self.function.columns(), self.function.rows());
+        let (columns, rows) = (self.function.columns(), self.function.rows());
         let tolerance = naming.placement_tolerance_mm;
         let reach = reach(&part.triangulator, &part.heights, tolerance);
         Illumination {
             exposures,
-            amplitude: amplitude(&map, &wanted, size, reach),
+            amplitude: amplitude(&map, &wanted, columns, rows, reach),
         }
     }
 }

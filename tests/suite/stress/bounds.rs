@@ -12,7 +12,7 @@ use tests::oracle::unwrap::Form;
 use tests::oracle::{Level, PixelTwin, Reason};
 
 /// The arctangent: a polynomial of degree 5, with a reciprocal from one Newton iteration
-/// (`algo/src/phase/angle.rs`).
+/// (`algo/src/phase/fold.rs`).
 pub const ARCTANGENT: f64 = 2.5e-5;
 /// The arctangent of geometric levels below the finest, which give only orders: a cubic with a
 /// cubic reciprocal. Every pair of 8-bit differences is within this bound

@@ -3,7 +3,8 @@
 
 use super::Random;
 use crate::calibration::{
-    Board, CalibrationError, Corner, FoundBoard, Node, Pose, Rig, View, calibrate, estimate,
+    Board, BoardNode, BoardView, CalibrationError, Corner, FoundBoard, Pose, Rig, calibrate,
+    estimate,
 };
 use crate::geometry::{Lens, Vector};
 use std::string::ToString;
@@ -94,13 +95,13 @@ fn head(random: &mut Random, board: &Board, poses: usize, scale: f64) -> Rig {
 }
 
 /// What the head sees of the board, with noise.
-fn views(random: &mut Random, rig: &Rig) -> Vec<View> {
+fn views(random: &mut Random, rig: &Rig) -> Vec<BoardView> {
     let exact = vec![(0.0, 0.0); rig.board.corners()];
     printed(random, rig, &exact)
 }
 
 /// What the head sees, with noise, of a board whose corners are printed `off` their places, mm.
-fn printed(random: &mut Random, rig: &Rig, off: &[(f64, f64)]) -> Vec<View> {
+fn printed(random: &mut Random, rig: &Rig, off: &[(f64, f64)]) -> Vec<BoardView> {
     let board = &rig.board;
     let view = |pose: &Pose| {
         let mut noisy = |(a, b): (f64, f64), sigma: f64| {
@@ -123,14 +124,14 @@ fn printed(random: &mut Random, rig: &Rig, off: &[(f64, f64)]) -> Vec<View> {
                 let (a, b) = (corner(at), corner(at + board.columns + 1));
                 let middle = ((a.0 + b.0) / 2.0, (a.1 + b.1) / 2.0);
                 let lit_by = noisy(rig.node(pose, middle).unwrap(), NOISE.1);
-                nodes.push(Node {
+                nodes.push(BoardNode {
                     at: middle,
                     lit_by,
                     square,
                 });
             }
         }
-        View {
+        BoardView {
             found: FoundBoard {
                 corners,
                 step: 60.0,

@@ -2,7 +2,7 @@
 
 use super::Random;
 use crate::calibration::corner::locate;
-use crate::calibration::{Board, BoardError, Fringes, Picture, PoseError, look};
+use crate::calibration::{Board, BoardError, FringeMaps, GreyPicture, PoseError, look};
 use crate::pipeline::PhaseMap;
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;
@@ -43,7 +43,7 @@ fn place(shift: (f64, f64), u: f64, v: f64) -> (f64, f64) {
 }
 
 /// A picture of the board under light that falls off to a fifth, with noise of σ 1.5 counts.
-fn picture(shift: (f64, f64), seed: u64, blur: f64) -> Picture {
+fn picture(shift: (f64, f64), seed: u64, blur: f64) -> GreyPicture {
     let mut random = Random::new(seed);
     let side = |at: f64, corners: usize| at / BOARD.square + (corners as f64 - 1.0) / 2.0;
     let colour = |u: f64, v: f64| {
@@ -70,7 +70,7 @@ fn picture(shift: (f64, f64), seed: u64, blur: f64) -> Picture {
         let light = 1.0 - 0.8 * u as f64 / SIZE.0 as f64;
         (sum / (SUB * SUB) as f64 * light + 1.5 * random.normal()) as f32
     });
-    Picture {
+    GreyPicture {
         width: SIZE.0,
         height: SIZE.1,
         counts: counts.collect(),
@@ -97,9 +97,9 @@ fn phases(from: usize) -> [PhaseMap; 2] {
     ]
 }
 
-fn looked(levels: &[Picture], from: usize) -> Result<crate::calibration::View, PoseError> {
+fn looked(levels: &[GreyPicture], from: usize) -> Result<crate::calibration::BoardView, PoseError> {
     let [vertical, horizontal] = phases(from);
-    let fringes = Fringes {
+    let fringes = FringeMaps {
         vertical: &vertical,
         horizontal: &horizontal,
         pitch: (20.0, 20.0),
@@ -152,7 +152,7 @@ fn a_covered_corner_is_left_out_and_a_board_of_another_size_refused() {
         ),
         "{error}"
     );
-    let empty = Picture {
+    let empty = GreyPicture {
         counts: std::vec![9.0; SIZE.0 * SIZE.1],
         ..covered
     };
@@ -219,7 +219,7 @@ fn a_sharp_corner_of_small_squares_is_located_from_a_pixel_away() {
             };
             ((0..sub * sub).map(colour).sum::<f64>() / (sub * sub) as f64) as f32
         });
-        let picture = Picture {
+        let picture = GreyPicture {
             width,
             height,
             counts: pixels.collect(),

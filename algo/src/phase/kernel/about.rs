@@ -20,17 +20,15 @@
 //! **Accuracy.** As [`crate::phase::about`]; the same bits on every back-end
 //! (`every_back_end_gives_the_same_bits`).
 
-use super::known::{KnownBlock, store};
-use super::next_block;
-use super::quality::Quality;
-use super::temporal::of_bytes;
-use crate::phase::about::{About, AboutLanes, BlockLevels};
-use crate::phase::angle::AngleLanes;
+use super::{Frames, next_block, of_bytes};
+use crate::phase::about::{About, BlockLevels, DenseLanes, SingleLanes, Unwrapped};
 use crate::phase::arrived::{WrappedRow, WrappedRowMut};
-use crate::phase::level::{Level, LevelLanes};
+use crate::phase::fold::AngleLanes;
+use crate::phase::level::{LevelLanes, LevelPlan};
+use crate::phase::quality::{Quality, doubled, doubled_where, resolved_mask, trust};
 use crate::phase::samples::BlockSample;
-use crate::phase::source::Frames;
-use crate::simd::{Backend, Lanes, Results, Rows, back_end_entry, plain};
+use crate::phase::unwrap_step::Turns;
+use crate::simd::{Backend, Lanes, Results, Rows, back_end_entry, phase_bits};
 use crate::trust::Trust;
 use crate::units::AbsolutePhase;
 use core::ops::Range;
@@ -41,7 +39,7 @@ use core::ops::Range;
 pub(crate) fn finest_row<T: BlockSample>(
     backend: Backend,
     plan: &About,
-    level: &Level,
+    level: &LevelPlan,
     before: &[WrappedRow<'_>],
     rows: &[&[T]],
     map: &[AbsolutePhase],
@@ -68,7 +66,7 @@ back_end_entry! {
     /// A single level.
     fn single [S: Frames] = single_columns(
         plan: &About,
-        level: &Level,
+        level: &LevelPlan,
         frames: S,
         map: &[AbsolutePhase],
         columns: Range<usize>,
@@ -80,7 +78,7 @@ back_end_entry! {
     /// Two or three dense levels: one or two others beside the finest.
     fn dense [S: Frames, const OTHERS: usize] = dense_columns(
         plan: &About,
-        level: &Level,
+        level: &LevelPlan,
         others: [WrappedRow<'_>; OTHERS],
         finest: S,
         map: &[AbsolutePhase],
@@ -93,7 +91,7 @@ back_end_entry! {
 /// level.
 pub(crate) fn demodulate_row<T: BlockSample>(
     backend: Backend,
-    level: &Level,
+    level: &LevelPlan,
     rows: &[&[T]],
     coarsest: Option<WrappedRow<'_>>,
     columns: Range<usize>,
@@ -105,7 +103,7 @@ pub(crate) fn demodulate_row<T: BlockSample>(
 
 back_end_entry! {
     fn demodulate [S: Frames] = demodulate_columns(
-        level: &Level,
+        level: &LevelPlan,
         frames: S,
         coarsest: Option<WrappedRow<'_>>,
         columns: Range<usize>,
@@ -117,19 +115,17 @@ back_end_entry! {
 fn single_columns<V: Lanes, S: Frames>(
     v: V,
     plan: &About,
-    level: &Level,
+    level: &LevelPlan,
     frames: S,
     map: &[AbsolutePhase],
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
-    let Some(about) = AboutLanes::new::<1>(v, plan) else {
-        return;
-    };
+    let about = SingleLanes::new(v, plan);
     let level = LevelLanes::new(v, level);
     let angle = AngleLanes::new(v);
     let (frames, mut out) = (frames.first(columns.end), out.first(columns.end));
-    let map = &plain::phase_bits(map)[..columns.end];
+    let map = &phase_bits(map)[..columns.end];
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
@@ -147,14 +143,11 @@ fn single_columns<V: Lanes, S: Frames>(
         }
         quality.brightest = folded.brightest;
         let (finest, modulation) = level.fine(v, &angle, &folded, S::DOUBLED);
-        let block = BlockLevels {
-            coarse: finest,
-            middle: finest,
-            finest,
-        };
-        store(
-            v, &about, &known, &block, lit, quality, modulation, at, &mut out,
-        );
+        let unwrapped = [
+            about.unwrap(v, known.phase[0], known.turns[0], finest.phase[0]),
+            about.unwrap(v, known.phase[1], known.turns[1], finest.phase[1]),
+        ];
+        store(v, &known, unwrapped, lit, quality, modulation, at, &mut out);
     }
 }
 
@@ -163,7 +156,7 @@ fn single_columns<V: Lanes, S: Frames>(
 fn dense_columns<V: Lanes, S: Frames, const OTHERS: usize>(
     v: V,
     plan: &About,
-    level: &Level,
+    level: &LevelPlan,
     others: [WrappedRow<'_>; OTHERS],
     finest: S,
     map: &[AbsolutePhase],
@@ -171,11 +164,7 @@ fn dense_columns<V: Lanes, S: Frames, const OTHERS: usize>(
     out: &mut Results<'_>,
 ) {
     let three = OTHERS == 2;
-    let about = if three {
-        AboutLanes::new::<3>(v, plan)
-    } else {
-        AboutLanes::new::<2>(v, plan)
-    };
+    let about = DenseLanes::new(v, plan, three);
     // With two levels there is no middle one; `middle` is then a copy that is not used.
     let (Some(coarse), Some(middle), Some(about)) = (others.first(), others.last(), about) else {
         return;
@@ -184,7 +173,7 @@ fn dense_columns<V: Lanes, S: Frames, const OTHERS: usize>(
     let (level, finest) = (LevelLanes::new(v, level), finest.first(columns.end));
     let mut out = out.first(columns.end);
     let angle = AngleLanes::new(v);
-    let map = &plain::phase_bits(map)[..columns.end];
+    let map = &phase_bits(map)[..columns.end];
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
@@ -214,16 +203,18 @@ fn dense_columns<V: Lanes, S: Frames, const OTHERS: usize>(
         let modulation;
         (block.finest, modulation) = level.fine(v, &angle, &folded, S::DOUBLED);
         quality.add(v, block.finest.strong, block.finest.brightest);
-        store(
-            v, &about, &known, &block, lit, quality, modulation, at, &mut out,
-        );
+        let unwrapped = [
+            about.unwrap(v, known.phase[0], known.turns[0], &block, 0),
+            about.unwrap(v, known.phase[1], known.turns[1], &block, 1),
+        ];
+        store(v, &known, unwrapped, lit, quality, modulation, at, &mut out);
     }
 }
 
 #[inline(always)]
 fn demodulate_columns<V: Lanes, S: Frames>(
     v: V,
-    level: &Level,
+    level: &LevelPlan,
     frames: S,
     coarsest: Option<WrappedRow<'_>>,
     columns: Range<usize>,
@@ -244,4 +235,86 @@ fn demodulate_columns<V: Lanes, S: Frames>(
         let (block, _) = level.fine(v, &angle, &folded, S::DOUBLED);
         out.store(v, at, &block);
     }
+}
+
+/// A block of the known map.
+struct KnownBlock<V: Lanes> {
+    /// Φ₀, 1/65536 turn.
+    phase: [[V::D; 2]; 2],
+    /// Φ₀ as fringe orders and fractions.
+    turns: [Turns<V>; 2],
+    /// Mask: Φ₀ is not known.
+    unknown: V::B,
+}
+
+impl<V: Lanes> KnownBlock<V> {
+    #[inline(always)]
+    fn new(v: V, map: &[i32], at: usize) -> Self {
+        v.fetch(map, at, V::AHEAD);
+        let phase = v.load32(map, at);
+        // No known phase has this fringe order.
+        let order = v.splat16((AbsolutePhase::UNKNOWN.to_bits() >> 16) as i16);
+        let (low, high) = (Turns::split(v, phase[0]), Turns::split(v, phase[1]));
+        let unknown = v.narrow_mask([v.eq(low.order, order), v.eq(high.order, order)]);
+        Self {
+            phase,
+            turns: [low, high],
+            unknown,
+        }
+    }
+
+    /// `mask` where Φ₀ is known, 0 elsewhere.
+    #[inline(always)]
+    fn where_known(&self, v: V, mask: V::B) -> V::B {
+        v.pick8(self.unknown, v.splat8(0), mask)
+    }
+
+    /// The first reasons of a block: [`Trust::Unexpected`], then [`Trust::Dark`], then `reason`.
+    #[inline(always)]
+    fn first_reason(&self, v: V, lit: V::B, reason: V::B) -> V::B {
+        let reason = v.pick8(lit, reason, v.splat8(Trust::Dark as u8));
+        v.pick8(self.unknown, v.splat8(Trust::Unexpected as u8), reason)
+    }
+}
+
+/// Stores a block that was unwrapped about the map. `lit` is the mask of the coarsest level's
+/// modulation, `modulation` is the finest level's.
+#[inline(always)]
+#[allow(clippy::too_many_arguments)]
+fn store<V: Lanes>(
+    v: V,
+    known: &KnownBlock<V>,
+    [low, high]: [Unwrapped<V>; 2],
+    lit: V::B,
+    mut quality: Quality<V>,
+    modulation: [V::W; 2],
+    at: usize,
+    out: &mut Results<'_>,
+) {
+    quality.residual = [low.residual, high.residual];
+    if quality.all_resolved(v, quality.strong) {
+        let resolved = v.splat8(Trust::Resolved as u8);
+        let phase = [low.phase, high.phase];
+        out.store(v, at, phase, doubled(v, modulation), resolved);
+        return;
+    }
+    let reason = known.first_reason(v, lit, quality.first_reason(v));
+    let resolved = resolved_mask(v, reason);
+    let unknown = v.splat32(AbsolutePhase::UNKNOWN.to_bits());
+    let (masks_low, masks_high) = (
+        v.join(resolved[0], resolved[0]),
+        v.join(resolved[1], resolved[1]),
+    );
+    let phase = [
+        [
+            v.pick32(masks_low[0], low.phase[0], unknown),
+            v.pick32(masks_low[1], low.phase[1], unknown),
+        ],
+        [
+            v.pick32(masks_high[0], high.phase[0], unknown),
+            v.pick32(masks_high[1], high.phase[1], unknown),
+        ],
+    ];
+    let modulation = doubled_where(v, resolved, modulation);
+    out.store(v, at, phase, modulation, trust(v, reason));
 }

@@ -3,8 +3,8 @@
 //! **Idea.** The coarsest level spans at most one turn of the pattern, so it is absolute; each
 //! finer level takes its fringe order from the one before (temporal unwrapping, Huntley & Saldner
 //! 1993). A level is decoded when its frames have arrived, while those of the next are being
-//! exposed. Of it only the phase that it predicts for the next one is kept: expected fraction and
-//! turns, and the first reason against the pixel, 5 bytes. When the last frame arrives only the
+//! exposed. Only the phase that it predicts for the next one is kept: its fraction and turns, and
+//! the first reason against the pixel, 5 bytes. When the last frame arrives only the
 //! finest level is left to decode.
 //!
 //! **Equation**, for levels i = 1 (coarsest) to K with ratios r_i and n_i = r_i / r_{i−1}; Peng &
@@ -21,7 +21,7 @@
 //! ```
 //!
 //! **Shapes and units.** `rows[shift][u]` in counts, in the order of the level's shifts;
-//! [`ExpectedRow`], a row of the frame; results in 1/65536 turn, full scale / 65535 and [`Trust`],
+//! [`PredictedRow`], a row of the frame; results in 1/65536 turn, full scale / 65535 and [`Trust`],
 //! of the same columns.
 //!
 //! **Departures from the plain form.** Coarser levels have rough angles: they only choose a fringe
@@ -37,15 +37,13 @@
 //! `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`; the same bits on every back-end:
 //! `every_back_end_gives_the_same_bits`.
 
-use super::next_block;
-use super::quality::{Quality, dark_unless};
-use super::temporal::{ExpectedBlock, FinerLevel, GeometricLanes, of_bytes};
-use crate::phase::arrived::{ExpectedRow, ExpectedRowMut, NO_REASON};
-use crate::phase::geometric::Geometric;
-use crate::phase::level::{Level, LevelLanes};
+use super::{Frames, next_block, of_bytes};
+use crate::phase::arrived::{NO_REASON, PredictedRow, PredictedRowMut};
+use crate::phase::geometric::{Geometric, GeometricLanes};
+use crate::phase::level::{LevelLanes, LevelPlan};
+use crate::phase::quality::dark_unless;
 use crate::phase::samples::BlockSample;
-use crate::phase::source::Frames;
-use crate::phase::unwrap_step::{ExpectedPhase, UnwrapStep, UnwrapStepLanes};
+use crate::phase::unwrap_step::{PredictedPhase, UnwrapStep, UnwrapStepLanes};
 use crate::simd::{Backend, Lanes, Results, Rows, back_end_entry};
 use crate::trust::Trust;
 use core::ops::Range;
@@ -55,10 +53,10 @@ pub(crate) fn level_row<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
     at: usize,
-    level: &Level,
+    level: &LevelPlan,
     rows: &[&[T]],
     columns: Range<usize>,
-    out: ExpectedRowMut<'_>,
+    out: PredictedRowMut<'_>,
 ) {
     let rows = Rows::new(rows, columns.end);
     match (&plan.steps[..at], &plan.steps[at..]) {
@@ -73,9 +71,9 @@ pub(crate) fn level_row<T: BlockSample>(
 pub(crate) fn finest_row<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
-    level: &Level,
+    level: &LevelPlan,
     rows: &[&[T]],
-    before: ExpectedRow<'_>,
+    before: PredictedRow<'_>,
     columns: Range<usize>,
     mut out: Results<'_>,
 ) {
@@ -94,7 +92,7 @@ pub(crate) fn finest_row<T: BlockSample>(
 pub(crate) fn single_row<T: BlockSample>(
     backend: Backend,
     plan: &Geometric,
-    level: &Level,
+    level: &LevelPlan,
     rows: &[&[T]],
     columns: Range<usize>,
     mut out: Results<'_>,
@@ -110,10 +108,10 @@ back_end_entry! {
     fn coarsest [S: Frames] = coarsest_columns(
         plan: &Geometric,
         next: &UnwrapStep,
-        level: &Level,
+        level: &LevelPlan,
         frames: S,
         columns: Range<usize>,
-        out: ExpectedRowMut<'_>,
+        out: PredictedRowMut<'_>,
     )
 }
 
@@ -122,10 +120,10 @@ back_end_entry! {
     fn between [S: Frames] = between_columns(
         plan: &Geometric,
         steps: [&UnwrapStep; 2],
-        level: &Level,
+        level: &LevelPlan,
         frames: S,
         columns: Range<usize>,
-        out: ExpectedRowMut<'_>,
+        out: PredictedRowMut<'_>,
     )
 }
 
@@ -133,9 +131,9 @@ back_end_entry! {
     /// The finest level.
     fn finest [S: Frames] = finest_columns(
         plan: &Geometric,
-        level: &Level,
+        level: &LevelPlan,
         frames: S,
-        before: ExpectedRow<'_>,
+        before: PredictedRow<'_>,
         columns: Range<usize>,
         out: &mut Results<'_>,
     )
@@ -145,7 +143,7 @@ back_end_entry! {
     /// A level by itself.
     fn single [S: Frames] = single_columns(
         plan: &Geometric,
-        level: &Level,
+        level: &LevelPlan,
         frames: S,
         columns: Range<usize>,
         out: &mut Results<'_>,
@@ -157,10 +155,10 @@ fn coarsest_columns<V: Lanes, S: Frames>(
     v: V,
     plan: &Geometric,
     next: &UnwrapStep,
-    level: &Level,
+    level: &LevelPlan,
     frames: S,
     columns: Range<usize>,
-    mut out: ExpectedRowMut<'_>,
+    mut out: PredictedRowMut<'_>,
 ) {
     let lanes = GeometricLanes::new(v, plan);
     let next = UnwrapStepLanes::new(v, next);
@@ -179,7 +177,7 @@ fn coarsest_columns<V: Lanes, S: Frames>(
             dark_unless(v, folded.strong),
             unwrapped.quality.first_reason(v),
         );
-        out.store(v, at, &unwrapped.expected(v, &next), reason);
+        out.store(v, at, unwrapped.predicted(v, &next), reason);
     }
 }
 
@@ -188,33 +186,33 @@ fn between_columns<V: Lanes, S: Frames>(
     v: V,
     plan: &Geometric,
     [step, next]: [&UnwrapStep; 2],
-    level: &Level,
+    level: &LevelPlan,
     frames: S,
     columns: Range<usize>,
-    mut out: ExpectedRowMut<'_>,
+    mut out: PredictedRowMut<'_>,
 ) {
     let lanes = GeometricLanes::new(v, plan);
-    let finer = FinerLevel::new(v, step, level, frames);
-    let next = UnwrapStepLanes::new(v, next);
+    let (step, next) = (UnwrapStepLanes::new(v, step), UnwrapStepLanes::new(v, next));
+    let level = LevelLanes::new(v, level);
     // The last block may overlap the one before, whose prediction is for the next level by then.
     let last = columns.end - V::PIXELS;
     let before = out.row();
-    let end = (v.load8(before.reason, last), before.expected(v, last));
+    let end = (v.load8(before.reason, last), before.phases(v, last));
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
         let before = out.row();
-        let (mut reason, mut expected) = (v.load8(before.reason, at), before.expected(v, at));
+        let (mut reason, mut predicted) = (v.load8(before.reason, at), before.phases(v, at));
         if at == last {
-            (reason, expected) = end;
+            (reason, predicted) = end;
         }
         if all_dark(v, reason) {
             continue;
         }
-        let folded = finer.frames.fold(v, &finer.level, at);
-        let unwrapped = finer.rough(v, &lanes, &expected, &folded);
+        let folded = frames.fold(v, &level, at);
+        let unwrapped = lanes.finer(v, &step, predicted, lanes.rough(v, &folded), &folded);
         let reason = v.min8(reason, unwrapped.quality.first_reason(v));
-        out.store(v, at, &unwrapped.expected(v, &next), reason);
+        out.store(v, at, unwrapped.predicted(v, &next), reason);
     }
 }
 
@@ -222,17 +220,18 @@ fn between_columns<V: Lanes, S: Frames>(
 fn finest_columns<V: Lanes, S: Frames>(
     v: V,
     plan: &Geometric,
-    level: &Level,
+    level: &LevelPlan,
     frames: S,
-    before: ExpectedRow<'_>,
+    before: PredictedRow<'_>,
     columns: Range<usize>,
     out: &mut Results<'_>,
 ) {
     let Some(step) = plan.steps.last() else {
         return;
     };
-    let finest = FinerLevel::new(v, step, level, frames.first(columns.end));
     let lanes = GeometricLanes::new(v, plan);
+    let step = UnwrapStepLanes::new(v, step);
+    let (level, frames) = (LevelLanes::new(v, level), frames.first(columns.end));
     let (before, mut out) = (before.part(0..columns.end), out.first(columns.end));
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
@@ -242,9 +241,9 @@ fn finest_columns<V: Lanes, S: Frames>(
             out.store_unknown(v, at, reason);
             continue;
         }
-        let folded = finest.frames.fold(v, &finest.level, at);
-        let before = before.expected(v, at);
-        let (unwrapped, modulation) = finest.fine(v, &lanes, &before, &folded);
+        let folded = frames.fold(v, &level, at);
+        let (block, modulation) = level.fine(v, &lanes.angle, &folded, S::DOUBLED);
+        let unwrapped = lanes.finer(v, &step, before.phases(v, at), block.phase, &folded);
         let clear = v.eq8(reason, v.splat8(NO_REASON));
         lanes.store(v, &unwrapped, clear, reason, modulation, at, &mut out);
     }
@@ -254,7 +253,7 @@ fn finest_columns<V: Lanes, S: Frames>(
 fn single_columns<V: Lanes, S: Frames>(
     v: V,
     plan: &Geometric,
-    level: &Level,
+    level: &LevelPlan,
     frames: S,
     columns: Range<usize>,
     out: &mut Results<'_>,
@@ -278,32 +277,29 @@ fn all_dark<V: Lanes>(v: V, reason: V::B) -> bool {
     v.none8(v.xor8(reason, v.splat8(Trust::Dark as u8)))
 }
 
-impl ExpectedRow<'_> {
-    /// The block at `at`, without its reasons.
+impl PredictedRow<'_> {
+    /// The predicted phases of the block at `at`.
     #[inline(always)]
-    fn expected<V: Lanes>(&self, v: V, at: usize) -> ExpectedBlock<V> {
+    fn phases<V: Lanes>(&self, v: V, at: usize) -> [PredictedPhase<V>; 2] {
         let (fraction, turns) = (v.load16(self.fraction, at), v.load16(self.turns, at));
-        ExpectedBlock {
-            phase: [
-                ExpectedPhase {
-                    fraction: fraction[0],
-                    turns: turns[0],
-                },
-                ExpectedPhase {
-                    fraction: fraction[1],
-                    turns: turns[1],
-                },
-            ],
-            quality: Quality::new(v, v.splat8(u8::MAX)),
-        }
+        [
+            PredictedPhase {
+                fraction: fraction[0],
+                turns: turns[0],
+            },
+            PredictedPhase {
+                fraction: fraction[1],
+                turns: turns[1],
+            },
+        ]
     }
 }
 
-impl ExpectedRowMut<'_> {
+impl PredictedRowMut<'_> {
     /// Writes the block at `at`.
     #[inline(always)]
-    fn store<V: Lanes>(&mut self, v: V, at: usize, expected: &ExpectedBlock<V>, reason: V::B) {
-        let [low, high] = expected.phase;
+    fn store<V: Lanes>(&mut self, v: V, at: usize, phases: [PredictedPhase<V>; 2], reason: V::B) {
+        let [low, high] = phases;
         v.store16(self.fraction, at, [low.fraction, high.fraction]);
         v.store16(self.turns, at, [low.turns, high.turns]);
         v.store8(self.reason, at, reason);

@@ -89,7 +89,7 @@ fn every_rough_angle_is_within_the_bound() {
             .map(|row| FrameView::new(Samples::Eight(row), row.len(), 1, row.len()).unwrap());
         let mut arrived = decoder.arrived(511, 1);
         arrive(&decoder, &frames, &mut arrived);
-        let ArrivedRow::Expected(row) = arrived.row(0) else {
+        let ArrivedRow::Predicted(row) = arrived.row(0) else {
             panic!("not geometric")
         };
         for (u, c) in (-255..=255_i32).enumerate() {

@@ -1,10 +1,16 @@
-//! Fits the cubic of one pixel, by least squares to exact phases at heights around the known one.
+//! Fits the cubic of one pixel, by least squares to exact phases at heights around the known one,
+//! where a block of the frame lies near pixels of the known surface.
 
-use super::REACH_UNIT;
+use super::{KnownSurface, REACH_UNIT};
 use crate::geometry::{Sight, Triangulator};
+use crate::math;
 use crate::units::{AbsolutePhase, Height};
+use alloc::vec;
+use alloc::vec::Vec;
 use core::ops::Range;
 
+/// Side of a block in pixels: blocks decide which pixels get a cubic.
+const SIDE: usize = 16;
 /// Unit of the stored coefficients of y² and y³, nm: rounding is below 0.05 µm each.
 pub(super) const UNIT_NM: f64 = 100.0;
 /// The farthest a cubic is used from the known height, mm: offsets in nm are rounded in single
@@ -13,15 +19,60 @@ const MAX_RISE_MM: f64 = 4.1;
 /// Largest error of a cubic at its nodes, mm: a fifth of the largest error that is allowed
 /// anywhere, because between the nodes it may be larger. Its RMS is far smaller.
 const MAX_MISS_MM: f64 = 1e-3;
-/// Offsets to which the cubic is fitted, as shares of the offset that the slope at the known height
-/// predicts for the range. At no pitch above 4 px per turn do the pattern's samples lie closer
-/// together than these nodes.
-const NODES: [f64; 6] = [-1.06, -0.76, -0.34, 0.34, 0.76, 1.06];
-const LAST: usize = NODES.len() - 1;
 /// Step of the difference quotient of the slope at the known height, mm.
 const SLOPE_STEP: f64 = 0.05;
 /// How many times the range is halved at most until a cubic fits.
 const HALVINGS: usize = 4;
+/// Offsets to which the cubic is fitted, as shares of the offset that the slope at the known height
+/// predicts for the range. At no pitch above 4 px per turn do the pattern's samples lie closer
+/// together than these nodes.
+const NODES: [f64; 6] = [-1.06, -0.76, -0.34, 0.34, 0.76, 1.06];
+/// The place of the last node.
+const LAST: usize = NODES.len() - 1;
+
+/// Square blocks of pixels, each with whether it or a block near it contains a known pixel.
+pub(super) struct NearBlocks {
+    width: usize,
+    columns: usize,
+    blocks: Vec<bool>,
+}
+
+impl NearBlocks {
+    /// For a surface: every pixel within `around` pixels of a known one is in a near block.
+    pub fn new(surface: &KnownSurface, around: usize) -> Self {
+        let width = surface.width.max(1);
+        let columns = width.div_ceil(SIDE);
+        let height = surface.phase.len() / width;
+        let rows = height.div_ceil(SIDE);
+        let mut known = vec![false; columns * rows];
+        for (v, row) in surface.phase.chunks(width).enumerate() {
+            let blocks = known[v / SIDE * columns..].iter_mut();
+            for (block, phases) in blocks.zip(row.chunks(SIDE)) {
+                *block |= phases.iter().any(|phase| phase.is_known());
+            }
+        }
+        let reach = around.div_ceil(SIDE);
+        let near = |block: usize| {
+            let across = math::around(block % columns, reach, columns);
+            math::around(block / columns, reach, rows)
+                .any(|row| known[row * columns..][across.clone()].iter().any(|on| *on))
+        };
+        Self {
+            width,
+            columns,
+            blocks: (0..known.len()).map(near).collect(),
+        }
+    }
+
+    /// The columns of each block along row `v`, and whether the block is near.
+    pub fn row(&self, v: usize) -> impl Iterator<Item = (Range<usize>, bool)> {
+        let blocks = &self.blocks[v / SIDE * self.columns..][..self.columns];
+        let starts = (0..self.width).step_by(SIDE);
+        starts
+            .zip(blocks)
+            .map(|(start, near)| (start..(start + SIDE).min(self.width), *near))
+    }
+}
 
 /// A pixel's cubic as it is stored.
 pub(super) struct Cubic {
@@ -31,13 +82,13 @@ pub(super) struct Cubic {
     pub reach: u8,
 }
 
-/// What the fits of all pixels have in common.
-pub(super) struct Fitting<'a> {
+/// The fit of a pixel's cubic, prepared for all pixels.
+pub(super) struct CubicFit<'a> {
     triangulator: &'a Triangulator,
     range: f64,
 }
 
-impl<'a> Fitting<'a> {
+impl<'a> CubicFit<'a> {
     pub fn new(triangulator: &'a Triangulator, range: f64) -> Self {
         Self {
             triangulator,
@@ -55,7 +106,7 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Computes the phases of columns of row `v`, none of which is known: the outermost two from
+    /// Computes the unknown phases of columns of row `v`: the outermost two from
     /// their heights, the others by linear interpolation.
     pub fn between(
         &self,
@@ -195,4 +246,38 @@ fn least_squares(nodes: &[(f64, f64)]) -> Option<[f64; 3]> {
         let scale = 1.0 / determinant;
         rows.map(|row| (row[0] * right[0] + row[1] * right[1] + row[2] * right[2]) * scale)
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::{AbsolutePhase, Height};
+
+    #[test]
+    fn every_pixel_within_the_distance_of_a_known_one_is_near_and_most_others_are_not() {
+        let (width, height, around) = (150, 90, 20);
+        let mut surface = KnownSurface {
+            width,
+            phase: vec![AbsolutePhase::UNKNOWN; width * height],
+            height: vec![Height::from_nm(0); width * height],
+        };
+        let (column, row) = (70_usize, 40_usize);
+        surface.phase[row * width + column] = AbsolutePhase::from_turns(1.0);
+        let blocks = NearBlocks::new(&surface, around);
+        let mut far = 0;
+        for v in 0..height {
+            let mut next = 0;
+            for (columns, near) in blocks.row(v) {
+                assert_eq!(columns.start, next);
+                next = columns.end;
+                for u in columns {
+                    let close = u.abs_diff(column) <= around && v.abs_diff(row) <= around;
+                    assert!(near || !close, "({u}, {v})");
+                    far += usize::from(!near);
+                }
+            }
+            assert_eq!(next, width);
+        }
+        assert!(far > width * height / 3, "{far}");
+    }
 }

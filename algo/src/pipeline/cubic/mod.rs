@@ -7,7 +7,6 @@
 //! used. A pixel takes 9 bytes beside Φ₀ and z₀.
 
 mod fit;
-mod near;
 mod row;
 
 pub(crate) use row::{
@@ -22,8 +21,7 @@ use crate::simd::Backend;
 use crate::units::{AbsolutePhase, Height, Modulation};
 use alloc::vec;
 use alloc::vec::Vec;
-use fit::Fitting;
-use near::Near;
+use fit::{CubicFit, NearBlocks};
 
 /// A known surface, row-major: its phases and heights.
 #[derive(Clone, Debug, PartialEq)]
@@ -74,7 +72,7 @@ impl HeightCubics {
         let pixels = surface.phase.len();
         let width = surface.width.max(1);
         let range = range.clamp(REACH_UNIT, MAX_RANGE);
-        let near = Near::new(&surface, around);
+        let near = NearBlocks::new(&surface, around);
         let mut cubics = Self {
             surface,
             range,
@@ -83,7 +81,7 @@ impl HeightCubics {
             third: vec![0; pixels],
             reach: vec![0; pixels],
         };
-        let fitting = Fitting::new(triangulator, range);
+        let fitting = CubicFit::new(triangulator, range);
         let heights = &cubics.surface.height;
         let rows = cubics
             .surface

@@ -11,20 +11,21 @@ use crate::simd::{Lanes, back_end_entry};
 use crate::units::{AbsolutePhase, Height, Modulation};
 use core::ops::Range;
 
-/// The bit of a taught pixel that says that the part is compared there.
+/// Bit of [`CubicInput::taught`]: the part is compared at this pixel.
 pub(crate) const COMPARED: u16 = 1 << 15;
-/// The bit that says that the part is compared at the pixels to the right, below and right below as
-/// well.
+/// Bit of [`CubicInput::taught`]: the part is also compared at the pixels to the right, below, and
+/// below to the right.
 pub(crate) const SQUARE: u16 = 1 << 14;
-/// Bits of [`CubicInput::taught`]: σ of golden's height.
+/// Bits of [`CubicInput::taught`]: σ of golden's height in 32 nm.
 pub(crate) const SIGMA: u16 = SQUARE - 1;
 /// Variances are summed in units of the square of this many nm, each rounded to nearest.
 pub(crate) const VARIANCE_UNIT_NM: f64 = 512.0;
 /// Standard deviations of the known heights are given in 1/16 of [`VARIANCE_UNIT_NM`].
 const SIGMAS_PER_UNIT_BITS: u32 = 4;
-/// Half of the square of [`VARIANCE_UNIT_NM`], in squares of that sixteenth.
+/// Half of the square of [`VARIANCE_UNIT_NM`], in squares of a sixteenth of it, for rounding.
 const HALF: u32 = 1 << (2 * SIGMAS_PER_UNIT_BITS - 1);
-/// Larger variances count as this, about (1 mm)², so that no sum over a block exceeds 32 bits.
+/// Largest variance of a pixel, in squares of [`VARIANCE_UNIT_NM`], about (1 mm)²: a sum over a block
+/// then fits 32 bits.
 const MAX_VARIANCE: f32 = 4_000_000.0;
 /// Pixels per block: skipped together where none is resolved; sums over a block fit 32 bits.
 const BLOCK: usize = 128;
@@ -179,14 +180,14 @@ fn offset_columns<V: Lanes>(
         let reach = &plan.reach[start..end][..length];
         let phase = &seen.phase[start..end][..length];
         let taught = &seen.taught[start..end][..length];
-        let mut at = start;
-        while at < end {
-            v.fetch(plan.first, at, plan.first.len());
-            v.fetch(plan.second, at, plan.second.len());
-            v.fetch(plan.third, at, plan.third.len());
-            v.fetch(plan.reach, at, plan.reach.len());
-            v.fetch(seen.taught, at, seen.taught.len());
-            at += FETCHED;
+        let mut fetched = start;
+        while fetched < end {
+            v.fetch(plan.first, fetched, plan.first.len());
+            v.fetch(plan.second, fetched, plan.second.len());
+            v.fetch(plan.third, fetched, plan.third.len());
+            v.fetch(plan.reach, fetched, plan.reach.len());
+            v.fetch(seen.taught, fetched, seen.taught.len());
+            fetched += FETCHED;
         }
         let (mut measured, mut compared) = (0_u32, 0_u32);
         for i in 0..length {

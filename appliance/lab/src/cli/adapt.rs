@@ -2,7 +2,7 @@
 
 use crate::workbench::adapt::{AdaptOptions, Method, adapt};
 use crate::workbench::projected::Projected;
-use algo::adaptive::{Blur, Optics, noise, paper};
+use algo::adaptive::{Blur, FringeOptics, noise, paper};
 use algo::pattern::{Waveform, Waveforms};
 use appliance::cli::numbers::number;
 use appliance::cli::{Output, Threads, names};
@@ -131,7 +131,7 @@ impl Adapt {
         }
         Ok(AdaptOptions {
             method: self.method,
-            optics: Optics {
+            optics: FringeOptics {
                 blur: Blur {
                     projector: self.projector_blur,
                     camera: self.camera_blur,

@@ -1,7 +1,7 @@
 //! Makes a phase function for the part of a preliminary recording (`fringed-lab adapt`).
 
 use algo::adaptive::noise::Light;
-use algo::adaptive::{Optics, ProjectorMap, noise, paper};
+use algo::adaptive::{FringeOptics, ProjectorMap, noise, paper};
 use algo::pattern::PhaseFunction;
 use algo::units::AbsolutePhase;
 use appliance::error::Result;
@@ -19,7 +19,7 @@ pub struct AdaptOptions {
     pub method: Method,
     /// Blur and smallest pitches. The paper's method uses only the image pitch: its projector pitch
     /// is [`paper::PROJECTOR_PITCH`], and the blur only enters the prediction.
-    pub optics: Optics,
+    pub optics: FringeOptics,
 }
 
 /// A method of making a pattern for a part.
@@ -102,7 +102,8 @@ pub fn adapt(recording: &Recording, folder: &Path, options: &AdaptOptions) -> Re
         Method::Fringed => {
             let slopes = map.slopes(noise::MAX_SLOPE);
             let light = Light::of(
-                (&measurement.phases[measurement.primary], decoder),
+                &measurement.phases[measurement.primary],
+                decoder,
                 &slopes,
                 1.0 / before.pitches()[0],
                 &options.optics.blur,

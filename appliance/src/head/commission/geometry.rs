@@ -13,7 +13,7 @@ use crate::head::geometry::{Geometry, SeenPose, same_place};
 use crate::head::scale::{MAX_LENGTH_MM, MIN_LENGTH_MM, Scale};
 use crate::head::scan::take_loaded;
 use crate::head::seam;
-use algo::calibration::{Board, Picture};
+use algo::calibration::{Board, GreyPicture};
 use hal::bounded;
 use hal::bounds::{Bound as _, Fields, OutOfBounds};
 use hal::error::Error;
@@ -125,7 +125,7 @@ impl Commissioning {
                 // What there is of the board is shown with the reason.
                 let white = recording.white.as_ref();
                 let view = white.and_then(|white| seam::view(white).ok());
-                let found = view.and_then(|view| board.find(&Picture::mean(&[view])).ok());
+                let found = view.and_then(|view| board.find(&GreyPicture::mean(&[view])).ok());
                 PoseFile::of(found.as_ref(), &[], Some(failure.to_string()))
             }
         };

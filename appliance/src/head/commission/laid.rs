@@ -7,7 +7,7 @@ use super::pose::pose_name;
 use crate::head::board;
 use crate::head::seam;
 use crate::head::standing::Ground;
-use algo::calibration::{View, estimate};
+use algo::calibration::{BoardView, estimate};
 use serde_json::json;
 use std::collections::BTreeMap;
 
@@ -40,7 +40,7 @@ impl Commissioning {
     fn estimated(&self) -> Option<Laid> {
         let board = board::parse(self.board.as_deref()?).ok()?;
         let [columns, rows, ..] = self.head.map(|size| size as usize);
-        let (names, views): (Vec<String>, Vec<View>) = self
+        let (names, views): (Vec<String>, Vec<BoardView>) = self
             .usable(None)
             .map(|pose| (pose.recording, pose.view))
             .unzip();

@@ -1,7 +1,7 @@
 //! A pose of the board, as it is kept.
 
 use crate::head::geometry::SeenPose;
-use algo::calibration::{Corner, FoundBoard, Node, View};
+use algo::calibration::{BoardNode, BoardView, Corner, FoundBoard};
 use hal::bounds::{MAX_SIDE, length, within};
 use serde::{Deserialize, Serialize};
 
@@ -23,9 +23,13 @@ pub struct PoseFile {
 }
 
 impl PoseFile {
-    pub(super) fn of(found: Option<&FoundBoard>, nodes: &[Node], problem: Option<String>) -> Self {
+    pub(super) fn of(
+        found: Option<&FoundBoard>,
+        nodes: &[BoardNode],
+        problem: Option<String>,
+    ) -> Self {
         let corner = |corner: &Corner| [corner.u, corner.v, corner.blur];
-        let node = |node: &Node| {
+        let node = |node: &BoardNode| {
             let (column, row) = node.square;
             let ((u, v), (xi, eta)) = (node.at, node.lit_by);
             [u, v, xi, eta, column as f64, row as f64]
@@ -62,7 +66,7 @@ impl PoseFile {
 
     pub(super) fn seen(&self, number: u32, head: [u32; 5]) -> SeenPose {
         let corner = |[u, v, blur]: [f64; 3]| Corner { u, v, blur };
-        let node = |[u, v, xi, eta, column, row]: &[f64; 6]| Node {
+        let node = |[u, v, xi, eta, column, row]: &[f64; 6]| BoardNode {
             at: (*u, *v),
             lit_by: (*xi, *eta),
             square: (*column as usize, *row as usize),
@@ -70,7 +74,7 @@ impl PoseFile {
         SeenPose {
             recording: pose_name(number),
             head,
-            view: View {
+            view: BoardView {
                 found: FoundBoard {
                     corners: self.corners.iter().map(|found| found.map(corner)).collect(),
                     step: self.step,

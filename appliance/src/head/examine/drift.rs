@@ -61,8 +61,9 @@ impl CrossedFringes {
             let map = Scan::new(*range, shots, taken).and_then(|scan| scan.phases(None));
             map.map_err(|error| seam::small(PITCH, &error))
         };
-        let devices = (&calibration.camera, &calibration.projector);
+        let (camera, projector) = (&calibration.camera, &calibration.projector);
         let (vertical, horizontal) = (phases(0)?, phases(1)?);
-        Ok(Epipolar::of(devices, [&vertical, &horizontal], [PITCH; 2]))
+        let maps = [&vertical, &horizontal];
+        Ok(Epipolar::of(camera, projector, maps, [PITCH; 2]))
     }
 }

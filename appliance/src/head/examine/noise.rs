@@ -1,7 +1,7 @@
 //! The camera's noise, from two pictures of each of several grey levels.
 
 use super::pictures::{Lit, greys, pictures};
-use algo::frame::{Noise, PhotonTransfer};
+use algo::frame::{CameraNoise, PhotonTransfer};
 use hal::error::Error;
 use hal::head::Head;
 
@@ -13,7 +13,7 @@ const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
 ///
 /// # Errors
 /// The error of a device, or `Unsupported` if no level is clear of black and full scale.
-pub fn noise(head: &mut Head, settle: u32, lit: &Lit) -> Result<Noise, Error> {
+pub fn noise(head: &mut Head, settle: u32, lit: &Lit) -> Result<CameraNoise, Error> {
     let levels = GREYS.iter().flat_map(|grey| [*grey, *grey]);
     let full_scale = lit.full_scale();
     let mut sums = PhotonTransfer::new(full_scale);

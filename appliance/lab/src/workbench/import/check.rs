@@ -3,7 +3,7 @@
 
 use super::{code, shifts};
 use crate::workbench::layout::{Convention, Description, Shifts};
-use algo::chain::{Chain, Seen};
+use algo::chain::{Chain, CodeWord};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, WrappedPhase};
@@ -171,7 +171,7 @@ fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(Strin
 /// Every so many rows of the wrapped phases.
 struct Rows {
     levels: Vec<PhaseMap>,
-    code: Option<Vec<Seen>>,
+    code: Option<Vec<CodeWord>>,
 }
 
 /// How well the levels agree under a convention.
@@ -200,7 +200,7 @@ impl Agreement {
 }
 
 impl Rows {
-    fn of(levels: &[PhaseMap], code: Option<&[Seen]>) -> Self {
+    fn of(levels: &[PhaseMap], code: Option<&[CodeWord]>) -> Self {
         let width = levels[0].width.max(1);
         let height = levels[0].phase.len() / width;
         let step = height.div_ceil(ROWS).max(1);

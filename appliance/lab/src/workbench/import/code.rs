@@ -3,7 +3,7 @@
 
 use super::shifts::usual;
 use crate::workbench::layout::{BitOrder, Description, Direction, Gray, of_direction};
-use algo::chain::{Cells, Coding, EXPECTED_TURNS, Edges, Seen};
+use algo::chain::{Cells, CodeWord, Coding, EXPECTED_TURNS, Edges};
 use algo::pipeline::PhaseMap;
 use appliance::head::channel::Channel;
 use hal::replay::Recording;
@@ -129,16 +129,16 @@ pub(super) fn options(reversed: bool, coding: Coding, gray: &Gray) -> String {
 /// if there is one.
 fn coding(
     finest: &PhaseMap,
-    seen: &[Seen],
+    seen: &[CodeWord],
     cells: Cells,
     ratio: f64,
     stated: &Edges,
 ) -> Option<Reading> {
     let unused = u16::BITS - u32::from(cells.bits);
     let back = |word: u16| word.reverse_bits() >> unused;
-    let backwards: Vec<Seen> = seen
+    let backwards: Vec<CodeWord> = seen
         .iter()
-        .map(|seen| Seen {
+        .map(|seen| CodeWord {
             word: back(seen.word),
             decisive: back(seen.decisive),
         })

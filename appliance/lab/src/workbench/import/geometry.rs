@@ -216,7 +216,7 @@ fn distance(
     let camera: Pinhole =
         seam::pinhole("camera", camera, (recording.width, recording.height)).ok()?;
     let projector = seam::pinhole("projector", projector, raster).ok()?;
-    let found = Epipolar::of((&camera, &projector), maps, pitch)?;
+    let found = Epipolar::of(&camera, &projector, maps, pitch)?;
     let rms = found.rms.hypot(found.noise);
     rms.is_finite().then_some(rms)
 }

@@ -4,14 +4,16 @@
 //! So the smaller of two bytes is the reason that comes first, and levels are combined by a
 //! minimum.
 
-use crate::phase::arrived::NO_REASON;
-use crate::phase::unwrap::{MAX_RESIDUAL_BITS, too_large};
+use super::arrived::NO_REASON;
 use crate::simd::Lanes;
-use crate::trust::Trust;
+use crate::trust::{MAX_RESIDUAL, Trust};
 
-/// What decides about the pixels of a block, over all levels so far.
+/// [`MAX_RESIDUAL`] in 1/65536 turn.
+const MAX_RESIDUAL_BITS: i16 = (MAX_RESIDUAL * 65_536.0) as i16;
+
+/// What decides about the pixels of a block.
 #[derive(Clone, Copy)]
-pub(crate) struct Quality<V: Lanes> {
+pub(super) struct Quality<V: Lanes> {
     /// Mask: every level has at least the trusted modulation.
     pub strong: V::B,
     /// 255 where a sample is at full scale and its level does not tolerate that.
@@ -38,8 +40,8 @@ impl<V: Lanes> Quality<V> {
         self.brightest = v.max8(self.brightest, brightest);
     }
 
-    /// The first reason against each pixel. Does not tell [`Trust::Dark`] from
-    /// [`Trust::LowModulation`].
+    /// The first reason against each pixel. [`Trust::Dark`] is not
+    /// distinguished from [`Trust::LowModulation`].
     #[inline(always)]
     pub fn first_reason(&self, v: V) -> V::B {
         let residual = v.splat8(Trust::Residual as u8);
@@ -51,7 +53,7 @@ impl<V: Lanes> Quality<V> {
     /// Whether all pixels of the block are resolved: no reason here, and the mask `clear` is set.
     #[inline(always)]
     pub fn all_resolved(&self, v: V, clear: V::B) -> bool {
-        // Which pixel it is does not matter.
+        // All pixels of the block are decided together, so the halves may be merged.
         let residual = v.max_unsigned(self.residual[0], self.residual[1]);
         let ambiguous = v.excess(residual, v.splat16(MAX_RESIDUAL_BITS));
         // 255 less the brightest sample is 0 where that is at full scale.
@@ -74,23 +76,50 @@ impl<V: Lanes> Quality<V> {
     }
 }
 
-/// Reasons of a block of which only the mask of lit pixels is known: [`NO_REASON`] or
-/// [`Trust::Dark`].
+/// Mask: a residual's magnitude (unsigned, 1/65536 turn) is above the limit.
 #[inline(always)]
-pub(crate) fn dark_unless<V: Lanes>(v: V, lit: V::B) -> V::B {
+fn too_large<V: Lanes>(v: V, residual: V::W) -> V::W {
+    // With the sign bit inverted, signed comparison orders unsigned words.
+    let sign = v.splat16(i16::MIN);
+    v.gt(
+        v.xor(residual, sign),
+        v.splat16(MAX_RESIDUAL_BITS ^ i16::MIN),
+    )
+}
+
+/// Reasons of a block by the mask of lit pixels: [`NO_REASON`] or [`Trust::Dark`].
+#[inline(always)]
+pub(super) fn dark_unless<V: Lanes>(v: V, lit: V::B) -> V::B {
     v.max8(lit, v.splat8(Trust::Dark as u8))
 }
 
 /// Masks of words: there is no reason against the pixel.
 #[inline(always)]
-pub(crate) fn resolved_mask<V: Lanes>(v: V, reason: V::B) -> [V::W; 2] {
+pub(super) fn resolved_mask<V: Lanes>(v: V, reason: V::B) -> [V::W; 2] {
     let none = v.eq8(reason, v.splat8(NO_REASON));
     v.widen(none, none)
 }
 
 /// Reasons as numbers of [`Trust`].
 #[inline(always)]
-pub(crate) fn trust<V: Lanes>(v: V, reason: V::B) -> V::B {
+pub(super) fn trust<V: Lanes>(v: V, reason: V::B) -> V::B {
     // `NO_REASON` becomes 0, which is `Resolved`; every other number stays.
     v.xor8(reason, v.eq8(reason, v.splat8(NO_REASON)))
+}
+
+/// Twice the modulation of a block, which is in units of full scale / 32767.5 until it is stored
+/// ([`super::level`]).
+#[inline(always)]
+pub(super) fn doubled<V: Lanes>(v: V, modulation: [V::W; 2]) -> [V::W; 2] {
+    [
+        v.add(modulation[0], modulation[0]),
+        v.add(modulation[1], modulation[1]),
+    ]
+}
+
+/// [`doubled`] where the mask is set, 0 elsewhere.
+#[inline(always)]
+pub(super) fn doubled_where<V: Lanes>(v: V, mask: [V::W; 2], modulation: [V::W; 2]) -> [V::W; 2] {
+    let modulation = doubled(v, modulation);
+    [v.and(mask[0], modulation[0]), v.and(mask[1], modulation[1])]
 }
