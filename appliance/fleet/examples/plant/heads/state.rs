@@ -1,9 +1,8 @@
-//! State of a head: snapshot, metrics, recipes, in the shapes of the daemon's API, with what the
-//! programs of a plant read.
+//! State of a head: snapshot, metrics and recipes in the format of the daemon's API, as far as the
+//! programs of a plant read them.
 
-use super::gauge::mixed;
-use super::head::Head;
-use super::row::{fingerprint, recipe, row};
+use super::Head;
+use super::results::{fingerprint, mixed, recipe, row};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
 use std::io::{self, Cursor, Write as _};
@@ -19,7 +18,7 @@ const VERSION: &str = env!("CARGO_PKG_VERSION");
 const STEADY: f64 = 0.08;
 const DRIFTING: f64 = 0.6;
 /// What the metrics are.
-pub(super) const METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+pub const METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
 
 /// Results of a head's history: PASS, FAIL, INVALID. Works out what was made since the last call.
 fn counts(head: &Head) -> [u32; 3] {
@@ -47,7 +46,7 @@ fn drift(head: &Head) -> f64 {
 }
 
 /// `GET /api/snapshot`.
-pub(super) fn snapshot(head: &Head) -> Value {
+pub fn snapshot(head: &Head) -> Value {
     let number = recipe(head, head.last());
     json!({
         "identity": { "serial": head.serial(), "version": VERSION },
@@ -58,7 +57,7 @@ pub(super) fn snapshot(head: &Head) -> Value {
 }
 
 /// `GET /metrics`: the names, types and labels of the daemon's, with what a plant looks at.
-pub(super) fn metrics(head: &Head) -> String {
+pub fn metrics(head: &Head) -> String {
     let mut out = String::new();
     let mut family = |kind: &str, name: &str, samples: &[(&str, f64)]| {
         let end = match kind {
@@ -139,7 +138,7 @@ fn name(number: u16) -> String {
 }
 
 /// The numbers of a head's recipes.
-pub(super) fn numbers(head: &Head) -> RangeInclusive<u16> {
+pub fn numbers(head: &Head) -> RangeInclusive<u16> {
     1..=if head.number.is_multiple_of(4) { 2 } else { 1 }
 }
 
@@ -150,7 +149,7 @@ fn entry(head: &Head, number: u16) -> Value {
 }
 
 /// `GET /api/recipes`.
-pub(super) fn recipes(head: &Head) -> Value {
+pub fn recipes(head: &Head) -> Value {
     let rows: Vec<_> = numbers(head).map(|number| entry(head, number)).collect();
     json!({ "recipes": rows })
 }
@@ -160,7 +159,7 @@ pub(super) fn recipes(head: &Head) -> Value {
 ///
 /// # Errors
 /// If the archive cannot be made.
-pub(super) fn file(head: &Head, number: u16) -> io::Result<Vec<u8>> {
+pub fn file(head: &Head, number: u16) -> io::Result<Vec<u8>> {
     let seed = mixed(head.plant.options.seed) ^ u64::from(number);
     let golden = (0..12_500).flat_map(|place: u64| mixed(seed ^ place << 16).to_le_bytes());
     archive([
@@ -173,7 +172,7 @@ pub(super) fn file(head: &Head, number: u16) -> io::Result<Vec<u8>> {
 ///
 /// # Errors
 /// If the archive cannot be made.
-pub(super) fn diagnostics(head: &Head) -> io::Result<Vec<u8>> {
+pub fn diagnostics(head: &Head) -> io::Result<Vec<u8>> {
     let configuration = format!("# Head {}\n[http]\nlisten = \"0.0.0.0:80\"\n", head.number);
     let calibration = json!({ "format": "fringed calibration", "made_by": head.serial() });
     archive([

@@ -1,11 +1,7 @@
 //! The simulated heads as a collector sees them.
 
-use super::Simulate;
-use super::answer::answer;
-use super::fault::{Fault, PERIOD_MS};
-use super::gauge::Gauge;
-use super::head::Plant;
-use crate::now_ms;
+use super::answers::answer;
+use super::{FAULT_PERIOD_MS, Fault, Options, Plant, now_ms};
 use hyper::body::Body as _;
 use serde_json::Value;
 use std::collections::BTreeSet;
@@ -17,22 +13,16 @@ const HEADS: u32 = 40;
 
 /// A plant whose heads have made `results` each.
 fn plant(results: u32, faults: &[Fault]) -> Arc<Plant> {
-    let options = Simulate {
+    Plant::new(Options {
         heads: HEADS,
         rate: 10.0,
         listen: String::new(),
         seed: 7,
         faults: faults.to_vec(),
         gauges: 8,
-        backlog: 0,
+        backlog: results,
         results,
         kept: u32::MAX,
-    };
-    Arc::new(Plant {
-        start_ms: now_ms() - u64::from(results) * 100,
-        gauges: Gauge::table(options.gauges),
-        counted: Default::default(),
-        options,
     })
 }
 
@@ -164,11 +154,11 @@ fn the_csv_has_the_same_results_newest_first() {
 #[test]
 fn a_head_that_was_off_skips_the_results_that_were_due_and_keeps_its_history() {
     let plant = plant(1_000, &[Fault::Restart]);
-    let head = plant.head(1, plant.start_ms + PERIOD_MS - 1).unwrap();
+    let head = plant.head(1, plant.start_ms + FAULT_PERIOD_MS - 1).unwrap();
     let all: Vec<_> = head.results(1).collect();
     // All but six of 47 seconds at ten a second.
     assert!((405..=415).contains(&all.len()), "{}", all.len());
-    let later = plant.head(1, plant.start_ms + 2 * PERIOD_MS).unwrap();
+    let later = plant.head(1, plant.start_ms + 2 * FAULT_PERIOD_MS).unwrap();
     assert_eq!(later.history(), head.history());
     assert_eq!(later.results(1).take(all.len()).collect::<Vec<_>>(), all);
     assert_eq!(
@@ -181,12 +171,16 @@ fn a_head_that_was_off_skips_the_results_that_were_due_and_keeps_its_history() {
 fn a_history_that_is_made_anew_has_another_id_and_counts_from_1() {
     let plant = plant(1_000, &[Fault::Renew]);
     let seen: Vec<_> = (0..4)
-        .map(|times| plant.head(1, plant.start_ms + times * PERIOD_MS).unwrap())
+        .map(|times| {
+            plant
+                .head(1, plant.start_ms + times * FAULT_PERIOD_MS)
+                .unwrap()
+        })
         .collect();
     for pair in seen.windows(2) {
         assert_ne!(pair[0].history(), pair[1].history());
         assert_eq!(pair[1].results(1).next(), Some(1));
-        assert!(pair[1].last() <= 10 * PERIOD_MS as u32 / 1000);
+        assert!(pair[1].last() <= 10 * FAULT_PERIOD_MS as u32 / 1000);
     }
 }
 
@@ -219,7 +213,11 @@ fn what_is_hostile_is_hostile_while_the_fault_lasts() {
             let probe = plant.head(1, plant.start_ms + since);
             probe.is_some_and(|head| head.ails.is_some())
         };
-        let since = (0..2 * PERIOD_MS).step_by(1_000).find(failing).unwrap() + 1_000;
+        let since = (0..2 * FAULT_PERIOD_MS)
+            .step_by(1_000)
+            .find(failing)
+            .unwrap()
+            + 1_000;
         Arc::get_mut(&mut plant).unwrap().start_ms = now - since;
         let head = plant.head(1, now_ms()).unwrap();
         assert_eq!(head.ails, Some(fault));
@@ -269,7 +267,7 @@ fn metrics_in(text: &str) -> BTreeSet<&str> {
 
 #[test]
 fn every_metric_that_a_plant_looks_at_is_one_of_the_daemons() {
-    let daemons = include_str!("../../../src/web/metrics.rs");
+    let daemons = include_str!("../../../../src/web/metrics.rs");
     // A counter is written with the name of its family; its samples end with _total.
     let quoted = |name: &str| daemons.contains(&format!("\"{name}\""));
     let known = |name: &str| quoted(name) || name.strip_suffix("_total").is_some_and(quoted);
@@ -277,8 +275,8 @@ fn every_metric_that_a_plant_looks_at_is_one_of_the_daemons() {
     let (_, simulated, _) = get(&plant, "0003/metrics");
     let texts = [
         &*simulated,
-        include_str!("../../../../docs/fleet/health.json"),
-        include_str!("../../../../docs/fleet/alerts.yml"),
+        include_str!("../../../../../docs/fleet/health.json"),
+        include_str!("../../../../../docs/fleet/alerts.yml"),
     ];
     for text in texts {
         let names = metrics_in(text);

@@ -1,18 +1,18 @@
 //! The history of a head as CSV, in the format of the daemon's `GET /api/history.csv`.
 
-use super::head::Head;
-use super::row::row;
-use crate::answer::{Gauge, Row};
+use super::Head;
+use super::results::row;
+use fringed_fleet::answer::{Gauge, Row};
 use std::fmt::Write as _;
 
 /// The most results of one answer.
-pub(super) const MOST: u32 = 20_000;
+pub const MOST: u32 = 20_000;
 
 const COLUMNS: &str = "seq,time_utc,recipe,fingerprint,part_id,press_stroke,token,verdict,error_code,reason,flags,\
     valid_points,coverage_permille,temperature_c,height_noise_mm,fitness_permille,exposure_us,total_us,stages_us,recording,time_source";
 
 /// The newest results before SEQ `before`.
-pub(super) fn history(head: &Head, before: u32, limit: u32) -> String {
+pub fn history(head: &Head, before: u32, limit: u32) -> String {
     let shapes = head.plant.gauges.iter().map(|gauge| &gauge.shape);
     let titles: String = shapes.map(titles).collect();
     let found = head.newest().filter(|&seq| seq < before);
