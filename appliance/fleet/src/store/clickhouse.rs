@@ -4,8 +4,7 @@
 //! of them does not know are not set. Of several servers the first that answers is used, until it
 //! does not.
 
-use super::schema::{Kind, schema, statements};
-use super::{Batch, Complaint, Received};
+use super::{Batch, Complaint, Kind, Received, schema, statements};
 use crate::answer::{Gauge, Row};
 use crate::http::{Client, HttpError, Url};
 use hyper::body::Bytes;
