@@ -78,7 +78,7 @@ impl Bench {
         let wanted = |what| self.what.is_none_or(|asked| asked == what);
         let pool = self.threads.pool(0)?;
         let mut report = Report {
-            machine: Machine::this(&self.effort()),
+            machine: Machine::this(),
             kernel: None,
             accuracy: None,
             budget: None,
@@ -125,7 +125,9 @@ impl Bench {
 
     fn write_frames(&self, folder: &std::path::Path) -> Result<()> {
         let folder_of_frames = OutputFolder::create(folder)?;
-        for (name, bytes) in benchmark::frame_files(self.effort().size) {
+        let files = benchmark::frame_files(self.effort().size)
+            .map_err(Exit::Software.because("render the frames"))?;
+        for (name, bytes) in files {
             folder_of_frames.write(&name, &bytes)?;
         }
         self.output

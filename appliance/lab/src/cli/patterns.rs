@@ -1,9 +1,8 @@
 //! `fringed-lab patterns DIR`: the pictures to project, and the manifest of the recording that
 //! their frames will make.
 
-use super::described::Described;
-use super::numbers::{Size, size};
-use crate::workbench::layout::{Layout, Shown};
+use super::described::{Described, Size, size};
+use crate::layout::{Layout, Shown};
 use algo::chain::GrayCode;
 use algo::pattern::{Encoder, PhaseFunction, Shot};
 use appliance::cli::numbers::number;

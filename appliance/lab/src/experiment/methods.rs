@@ -1,6 +1,6 @@
 //! The methods that are compared, and the frames of each.
 
-use crate::workbench::projected::split;
+use crate::adapt::split;
 use algo::pattern::{PhaseFunction, Shot, Waveform, Waveforms};
 
 /// A way to measure a part.
@@ -28,6 +28,14 @@ pub struct BetterSequence {
     pub frames: usize,
     /// Whether all levels show sines instead of the brightest waveforms.
     pub sines: bool,
+}
+
+/// There is no better sequence of so many frames.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{frames} frames make no sequence")]
+pub struct NoSequence {
+    /// How many.
+    pub frames: usize,
 }
 
 /// The fixed pattern that pictures show.
@@ -70,7 +78,7 @@ impl Method {
     ///
     /// # Errors
     /// As [`BetterSequence::shots`].
-    pub fn shots(self, function: &PhaseFunction) -> Result<Vec<Shot>, String> {
+    pub fn shots(self, function: &PhaseFunction) -> Result<Vec<Shot>, NoSequence> {
         if let Self::Better(sequence) = self {
             return sequence.shots();
         }
@@ -110,15 +118,17 @@ impl BetterSequence {
     /// What each frame shows.
     ///
     /// # Errors
-    /// In words: there is no sequence of so many frames.
-    pub fn shots(self) -> Result<Vec<Shot>, String> {
+    /// If there is no sequence of so many frames.
+    pub fn shots(self) -> Result<Vec<Shot>, NoSequence> {
         let waveforms: Waveforms = match self.sines {
             true => Waveform::sine,
             false => Waveform::brightest,
         };
         split(self.frames, waveforms)
             .map(|split| split.shots(waveforms))
-            .ok_or_else(|| format!("{} frames make no sequence", self.frames))
+            .ok_or(NoSequence {
+                frames: self.frames,
+            })
     }
 }
 

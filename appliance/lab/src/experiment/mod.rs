@@ -2,7 +2,6 @@
 //! patterns (`fringed-lab experiment`).
 
 mod campaign;
-mod cylinder;
 mod judge;
 mod methods;
 mod runner;
@@ -10,7 +9,7 @@ mod scenes;
 mod table;
 
 pub use campaign::{Campaign, Results};
-pub use methods::{BetterSequence, Method};
+pub use methods::{BetterSequence, Method, NoSequence};
 pub use runner::{Run, Runner};
 pub use scenes::{Judged, OpticsKind, PARTS, Scene};
 pub use table::{HEADER, RunRow, Values, csv, means, table};

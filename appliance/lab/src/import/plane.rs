@@ -1,9 +1,13 @@
 //! The plane z = 0 of models that state none: the one that fits the measured points best.
 
-use super::phases::absolute;
+use crate::Failed;
 use algo::geometry::{Pinhole, Vector};
 use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
+use appliance::head::channel::Channel;
+use appliance::head::code::CodeAlone;
 use appliance::head::seam;
+use appliance::measure::least_modulation;
 use hal::model::DeviceModel;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
@@ -28,7 +32,7 @@ const FAR: f64 = 4.0;
 ///
 /// # Errors
 /// In words: there are no absolute phases or too few points in front of both devices.
-pub(super) fn fit(recording: &mut Recording) -> Result<String, String> {
+pub(super) fn fit(recording: &mut Recording) -> Result<String, Failed> {
     let remedy = "give the distance of the plane z = 0 from the camera with --plane-at";
     let points = points(recording).map_err(|error| {
         format!("the models state no plane z = 0, and none can be fitted to the measurement ({error}): {remedy}")
@@ -59,16 +63,16 @@ fn move_world(model: &mut DeviceModel, axes: [Vector; 3], origin: Vector) {
         let [x, y, z] = std::array::from_fn(|column| model.rotation[3 * row + column]);
         Vector::new(x, y, z)
     });
-    for (row, of) in rows.into_iter().enumerate() {
-        model.translation_mm[row] += of.dot(origin);
+    for (row, old) in rows.into_iter().enumerate() {
+        model.translation_mm[row] += old.dot(origin);
         for (column, axis) in axes.into_iter().enumerate() {
-            model.rotation[3 * row + column] = of.dot(axis);
+            model.rotation[3 * row + column] = old.dot(axis);
         }
     }
 }
 
 /// Measured points of the world.
-fn points(recording: &Recording) -> Result<Vec<Vector>, String> {
+fn points(recording: &Recording) -> Result<Vec<Vector>, Failed> {
     let raster = &recording.projector;
     let frames = (recording.width, recording.height);
     let models = recording.camera_model.as_ref().zip(raster.model.as_ref());
@@ -102,12 +106,30 @@ fn points(recording: &Recording) -> Result<Vec<Vector>, String> {
         found.extend(point(&camera, &projector, pixel, (vertical, place)));
     }
     match seen {
-        0..LEAST => Err(format!("only {seen} of the pixels looked at are resolved")),
+        0..LEAST => Err(format!("only {seen} of the pixels looked at are resolved").into()),
         _ if 2 * found.len() < seen => Err(format!(
             "{} of {seen} measured points would lie behind the camera: are R and T from the camera to the projector?",
             seen - found.len()
-        )),
+        )
+        .into()),
         _ => Ok(found),
+    }
+}
+
+/// The absolute phase of a pattern by its own levels or code.
+///
+/// # Errors
+/// In words: it has none, and what to add.
+pub(super) fn absolute(recording: &Recording, pattern: usize) -> Result<PhaseMap, Failed> {
+    let least = least_modulation(recording);
+    if let Some(code) = CodeAlone::of(recording, pattern)? {
+        return Ok(code.phases(least)?);
+    }
+    let channel = Channel::new(recording, pattern, least)?;
+    let by_itself = channel.unwrapping(None, &Err("there is no known map".into()))?;
+    match by_itself.missing() {
+        None => Ok(channel.decode(&by_itself)?.absolute),
+        Some(missing) => Err(missing.into()),
     }
 }
 
@@ -139,7 +161,7 @@ fn point(
 ) -> Option<Vector> {
     let (centre, ray) = (camera.centre(), camera.ray(u, v)?);
     let beside = (projector.centre() - centre).length();
-    let of = |depth: f64| {
+    let off = |depth: f64| {
         let (xi, eta) = projector.project(centre + ray * depth)?;
         Some(if vertical { xi } else { eta } - place)
     };
@@ -148,14 +170,14 @@ fn point(
     let mut near = 1.0 / (BASELINES * beside);
     for _ in 0..STEPS {
         let step = SHARE * near;
-        let (here, next) = (of(1.0 / near)?, of(1.0 / (near + step))?);
+        let (here, next) = (off(1.0 / near)?, off(1.0 / (near + step))?);
         near -= here * step / (next - here);
         if !(near > 0.0) {
             return None;
         }
     }
-    let off = of(1.0 / near)?;
-    (off.abs() < 1e-3).then(|| centre + ray * (1.0 / near))
+    let left = off(1.0 / near)?;
+    (left.abs() < 1e-3).then(|| centre + ray * (1.0 / near))
 }
 
 /// a, b, c of the plane z = a + b x + c y by least squares over the points that lie near it.
@@ -187,12 +209,12 @@ fn least_squares(points: &[Vector]) -> [f64; 3] {
     let mean = sum * share;
     let (mut xx, mut xy, mut yy, mut xz, mut yz) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for point in points {
-        let of = *point - mean;
-        xx += of.x * of.x;
-        xy += of.x * of.y;
-        yy += of.y * of.y;
-        xz += of.x * of.z;
-        yz += of.y * of.z;
+        let p = *point - mean;
+        xx += p.x * p.x;
+        xy += p.x * p.y;
+        yy += p.y * p.y;
+        xz += p.x * p.z;
+        yz += p.y * p.z;
     }
     let determinant = xx * yy - xy * xy;
     let (b, c) = match determinant > 1e-9 * (xx + yy) * (xx + yy) {

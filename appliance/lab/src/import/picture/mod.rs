@@ -1,9 +1,10 @@
 //! Pictures of other people's cameras: PNG, BMP, TIFF and JPEG, grey or colour, 8 or 16 bits.
 
 use embedded_graphics::pixelcolor::{Rgb888, RgbColor as _};
-use hal::bounds::{MAX_SIDE, shortened};
+use hal::bounds::MAX_SIDE;
+use std::fmt::Display;
 use std::fs::File;
-use std::io::{BufReader, Cursor, Read, Seek};
+use std::io::{self, BufReader, Cursor, Read, Seek};
 use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
@@ -33,6 +34,73 @@ pub enum Channel {
     Blue,
 }
 
+/// Why a picture cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PictureError {
+    /// The file cannot be read.
+    #[error(transparent)]
+    Read(#[from] io::Error),
+    /// The file is too long.
+    #[error("{0} bytes: name a picture of at most {MAX_BYTES}")]
+    Long(u64),
+    /// A file of another format.
+    #[error("neither PNG, BMP, TIFF nor JPEG: convert it to one of them")]
+    Format,
+    /// The decoder of its format refuses it.
+    #[error("the picture cannot be decoded ({0}): save it again, uncompressed if it is a BMP")]
+    Broken(String),
+    /// Other samples than its size has.
+    #[error(
+        "it has {found} samples of {expected}: it is cut off, or its colours are in separate planes: save it again"
+    )]
+    Incomplete {
+        /// Samples that were decoded.
+        found: usize,
+        /// Samples of its size.
+        expected: usize,
+    },
+    /// A side that is too long.
+    #[error("{width}×{height} pixels: frames have at most {MAX_SIDE} each way")]
+    Large {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+    },
+    /// More samples than memory can hold.
+    #[error("it is too large")]
+    TooLarge,
+    /// No size in the file.
+    #[error("it has no size: save it again")]
+    NoSize,
+    /// Several pictures in a PNG.
+    #[error("it is animated: save each of its pictures as a file")]
+    Animated,
+    /// Pixels that viewers turn or mirror.
+    #[error(
+        "its orientation is {0}, so viewers turn or mirror it, and it is not known which way its models were made: save it with its \
+         pixels as they are meant and orientation 1"
+    )]
+    Turned(u16),
+    /// Another colour space.
+    #[error("its colours are {0:?}: save it as grey or RGB")]
+    Colours(tiff::ColorType),
+    /// Samples of other than 8 or 16 bits.
+    #[error("its samples are not of 8 or 16 bits: save it with those")]
+    Depth,
+    /// A page that there is not.
+    #[error("it has no such page")]
+    NoPage,
+    /// Several pages where one is expected.
+    #[error("it has {0} pages: save the one that is meant")]
+    Pages(usize),
+    /// Too many pages.
+    #[error("it has more than {MAX_PAGES} pages: save one file for each part")]
+    ManyPages,
+}
+
+type Result<T> = std::result::Result<T, PictureError>;
+
 /// A decoded picture.
 pub struct Picture {
     /// Columns and rows.
@@ -50,8 +118,8 @@ impl Picture {
     /// How many pictures a file holds: the pages of a TIFF, of any other format one.
     ///
     /// # Errors
-    /// In words, with the remedy.
-    pub fn pages(path: &Path) -> Result<usize, String> {
+    /// [`PictureError`]
+    pub fn pages(path: &Path) -> Result<usize> {
         let mut file = open(path)?;
         match is_tiff(&mut file)? {
             true => Ok(pages(&mut tiff(file)?)?.len()),
@@ -62,58 +130,55 @@ impl Picture {
     /// Reads a page (from 0) of a file; the format is told by its first bytes.
     ///
     /// # Errors
-    /// In words, with the remedy.
-    pub fn read(path: &Path, page: usize) -> Result<Self, String> {
+    /// [`PictureError`]
+    pub fn read(path: &Path, page: usize) -> Result<Self> {
         let mut file = open(path)?;
         let picture = match is_tiff(&mut file)? {
             true => Self::tiff(file, page),
             false => {
                 let mut bytes = Vec::new();
-                let read = file.take(MAX_BYTES).read_to_end(&mut bytes);
-                read.map_err(|error| error.to_string())?;
+                file.take(MAX_BYTES).read_to_end(&mut bytes)?;
                 Self::decode(&bytes)
             }
         };
-        picture
-            .and_then(Self::complete)
-            .map_err(|problem| shortened(&problem))
+        picture.and_then(Self::complete)
     }
 
     /// Reads the only picture of a file.
     ///
     /// # Errors
-    /// In words, with the remedy.
-    pub fn single(path: &Path) -> Result<Self, String> {
+    /// [`PictureError`]
+    pub fn single(path: &Path) -> Result<Self> {
         match Self::pages(path)? {
             1 => Self::read(path, 0),
-            pages => Err(format!("it has {pages} pages: save the one that is meant")),
+            pages => Err(PictureError::Pages(pages)),
         }
     }
 
     /// Everything but TIFF.
-    fn decode(bytes: &[u8]) -> Result<Self, String> {
+    fn decode(bytes: &[u8]) -> Result<Self> {
         match bytes {
             [0x89, b'P', b'N', b'G', ..] => Self::png(bytes),
             [b'B', b'M', ..] => Self::bmp(bytes),
             [0xFF, 0xD8, ..] => Self::jpeg(bytes),
-            _ => Err("neither PNG, BMP, TIFF nor JPEG: convert it to one of them".into()),
+            _ => Err(PictureError::Format),
         }
     }
 
     /// This picture, if it has the samples of its size.
-    fn complete(self) -> Result<Self, String> {
+    fn complete(self) -> Result<Self> {
         let (width, height) = self.size;
         let expected = width as usize * height as usize * self.channels;
         match self.samples.len() == expected && expected > 0 {
             true => Ok(self),
-            false => Err(format!(
-                "it has {} samples of {expected}: it is cut off, or its colours are in separate planes: save it again",
-                self.samples.len()
-            )),
+            false => Err(PictureError::Incomplete {
+                found: self.samples.len(),
+                expected,
+            }),
         }
     }
 
-    fn png(bytes: &[u8]) -> Result<Self, String> {
+    fn png(bytes: &[u8]) -> Result<Self> {
         let limits = png::Limits {
             bytes: DECODER_BYTES,
         };
@@ -122,12 +187,12 @@ impl Picture {
         let mut reader = decoder.read_info().map_err(broken)?;
         let size = bounded(reader.info().size())?;
         if reader.info().is_animated() {
-            return Err("it is animated: save each of its pictures as a file".into());
+            return Err(PictureError::Animated);
         }
         let exif = reader.info().exif_metadata.as_deref();
         upright(exif.and_then(orientation))?;
         let (colour, depth) = reader.output_color_type();
-        let length = reader.output_buffer_size().ok_or("it is too large")?;
+        let length = reader.output_buffer_size().ok_or(PictureError::TooLarge)?;
         let mut raw = vec![0; length];
         reader.next_frame(&mut raw).map_err(broken)?;
         let wide = depth == png::BitDepth::Sixteen;
@@ -146,7 +211,7 @@ impl Picture {
         })
     }
 
-    fn bmp(bytes: &[u8]) -> Result<Self, String> {
+    fn bmp(bytes: &[u8]) -> Result<Self> {
         let wrong = |error| broken(format!("{error:?}"));
         let bmp = Bmp::<Rgb888>::from_slice(bytes).map_err(wrong)?;
         let size = bmp.as_raw().header().image_size;
@@ -163,7 +228,7 @@ impl Picture {
         })
     }
 
-    fn jpeg(bytes: &[u8]) -> Result<Self, String> {
+    fn jpeg(bytes: &[u8]) -> Result<Self> {
         let side = MAX_SIDE as usize;
         // A file that is cut off is refused, not filled with grey.
         let options = DecoderOptions::new_safe()
@@ -173,9 +238,7 @@ impl Picture {
         let mut decoder = JpegDecoder::new_with_options(Cursor::new(bytes), options);
         let samples = decoder.decode().map_err(broken)?;
         upright(decoder.exif().and_then(|exif| orientation(exif)))?;
-        let (width, height) = decoder
-            .dimensions()
-            .ok_or("it has no size: save it again")?;
+        let (width, height) = decoder.dimensions().ok_or(PictureError::NoSize)?;
         let colours = decoder
             .output_colorspace()
             .map_or(0, |space| space.num_components());
@@ -188,11 +251,9 @@ impl Picture {
         })
     }
 
-    fn tiff(file: impl Read + Seek, page: usize) -> Result<Self, String> {
+    fn tiff(file: impl Read + Seek, page: usize) -> Result<Self> {
         let mut decoder = tiff(file)?;
-        let directory = *pages(&mut decoder)?
-            .get(page)
-            .ok_or("it has no such page")?;
+        let directory = *pages(&mut decoder)?.get(page).ok_or(PictureError::NoPage)?;
         decoder.seek_to_image(directory).map_err(broken)?;
         let size = bounded(decoder.dimensions().map_err(broken)?)?;
         let turned = decoder.find_tag_unsigned(Tag::Orientation);
@@ -203,12 +264,12 @@ impl Picture {
             tiff::ColorType::GrayA(_) => 2,
             tiff::ColorType::RGB(_) => 3,
             tiff::ColorType::RGBA(_) => 4,
-            other => return Err(format!("its colours are {other:?}: save it as grey or RGB")),
+            other => return Err(PictureError::Colours(other)),
         };
         let (bits, samples) = match decoder.read_image().map_err(broken)? {
             DecodingResult::U8(samples) => (8, samples.into_iter().map(u16::from).collect()),
             DecodingResult::U16(samples) => (16, samples),
-            _ => return Err("its samples are not of 8 or 16 bits: save it with those".into()),
+            _ => return Err(PictureError::Depth),
         };
         Ok(Self {
             size,
@@ -277,44 +338,38 @@ fn orientation(exif: &[u8]) -> Option<u16> {
 }
 
 /// Refuses a picture that is to be turned before it is looked at.
-fn upright(orientation: Option<u16>) -> Result<(), String> {
+fn upright(orientation: Option<u16>) -> Result<()> {
     match orientation {
         None | Some(0 | 1) => Ok(()),
-        Some(turned) => Err(format!(
-            "its orientation is {turned}, so viewers turn or mirror it, and it is not known which way its models were made: save it with its \
-             pixels as they are meant and orientation 1"
-        )),
+        Some(turned) => Err(PictureError::Turned(turned)),
     }
 }
 
-fn open(path: &Path) -> Result<BufReader<File>, String> {
-    let file = File::open(path).map_err(|error| error.to_string())?;
-    let length = file.metadata().map_err(|error| error.to_string())?.len();
+fn open(path: &Path) -> Result<BufReader<File>> {
+    let file = File::open(path)?;
+    let length = file.metadata()?.len();
     match length <= MAX_BYTES {
         true => Ok(BufReader::new(file)),
-        false => Err(format!(
-            "{length} bytes: name a picture of at most {MAX_BYTES}"
-        )),
+        false => Err(PictureError::Long(length)),
     }
 }
 
 /// Whether a file begins as a TIFF does; it is at its beginning afterwards.
-fn is_tiff(file: &mut (impl Read + Seek)) -> Result<bool, String> {
+fn is_tiff(file: &mut (impl Read + Seek)) -> Result<bool> {
     let mut first = Vec::new();
-    let read = file.by_ref().take(2).read_to_end(&mut first);
-    read.and_then(|_| file.rewind())
-        .map_err(|error| error.to_string())?;
+    file.by_ref().take(2).read_to_end(&mut first)?;
+    file.rewind()?;
     Ok(first == b"II" || first == b"MM")
 }
 
-fn tiff<R: Read + Seek>(file: R) -> Result<Decoder<R>, String> {
+fn tiff<R: Read + Seek>(file: R) -> Result<Decoder<R>> {
     let mut limits = tiff::decoder::Limits::default();
     limits.intermediate_buffer_size = DECODER_BYTES;
     Ok(Decoder::new(file).map_err(broken)?.with_limits(limits))
 }
 
 /// The directories of a TIFF that are pages, without thumbnails and masks of other pages.
-fn pages<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Vec<usize>, String> {
+fn pages<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Vec<usize>> {
     /// Bits of the tag NewSubfileType: a smaller copy of another page, and a mask of one.
     const OF_ANOTHER: u32 = 1 | 4;
     let mut pages = Vec::new();
@@ -328,25 +383,21 @@ fn pages<R: Read + Seek>(decoder: &mut Decoder<R>) -> Result<Vec<usize>, String>
             break;
         }
         if directory >= MAX_PAGES {
-            return Err(format!(
-                "it has more than {MAX_PAGES} pages: save one file for each part"
-            ));
+            return Err(PictureError::ManyPages);
         }
         decoder.next_image().map_err(broken)?;
     }
     Ok(pages)
 }
 
-fn broken(error: impl std::fmt::Display) -> String {
-    format!("the picture cannot be decoded ({error}): save it again, uncompressed if it is a BMP")
+fn broken(error: impl Display) -> PictureError {
+    PictureError::Broken(error.to_string())
 }
 
-fn bounded((width, height): (u32, u32)) -> Result<(u32, u32), String> {
+fn bounded((width, height): (u32, u32)) -> Result<(u32, u32)> {
     match width.max(height) <= MAX_SIDE {
         true => Ok((width, height)),
-        false => Err(format!(
-            "{width}×{height} pixels: frames have at most {MAX_SIDE} each way"
-        )),
+        false => Err(PictureError::Large { width, height }),
     }
 }
 

@@ -1,8 +1,9 @@
 //! The models of an imported recording: whether heights can be measured with them, and whether they
 //! fit what was measured.
 
-use super::phases::absolute;
-use super::{content, plane};
+use super::content;
+use super::plane::{self, absolute};
+use crate::Failed;
 use algo::geometry::{Pinhole, RigError};
 use algo::phase::Trust;
 use algo::pipeline::{Epipolar, PhaseMap};
@@ -31,22 +32,19 @@ const MIDDLE: std::ops::Range<f64> = 0.3..0.7;
 /// # Errors
 /// If heights could not be measured with them.
 pub(super) fn add(recording: &mut Recording, models: Models, folder: &Path) -> Result<Vec<String>> {
-    let wrong = |words: String| content(folder, words);
     let mut notes = models.notes;
     recording.camera_model = Some(models.camera);
     recording.projector.model = Some(models.projector);
-    let contradiction = epipolar(recording).map_err(wrong)?;
+    let contradiction = epipolar(recording).map_err(|error| content(folder, error))?;
     let before = recording.clone();
     notes.extend(placed(recording, models.has_plane).map_err(|error| {
         // What is wrong with the models is said rather than what follows from it.
-        wrong(
-            contradiction
-                .clone()
-                .unwrap_or_else(|| match working(before, models.has_plane) {
-                    Some(words) => format!("{error}: {words}"),
-                    None => error,
-                }),
-        )
+        let words = contradiction.clone();
+        let words = words.unwrap_or_else(|| match working(before, models.has_plane) {
+            Some(words) => format!("{error}: {words}"),
+            None => error.to_string(),
+        });
+        content(folder, words)
     })?);
     notes.extend(aside(recording));
     notes.extend(contradiction);
@@ -54,7 +52,7 @@ pub(super) fn add(recording: &mut Recording, models: Models, folder: &Path) -> R
 }
 
 /// Gives the models the plane z = 0 unless they have it, and checks that `measure` can use them.
-fn placed(recording: &mut Recording, has_plane: bool) -> Result<Option<String>, String> {
+fn placed(recording: &mut Recording, has_plane: bool) -> Result<Option<String>, Failed> {
     let note = if has_plane {
         None
     } else {
@@ -79,7 +77,7 @@ fn working(mut recording: Recording, has_plane: bool) -> Option<String> {
 }
 
 /// Checks that `measure` can use the models.
-fn works(recording: &Recording) -> Result<(), String> {
+fn works(recording: &Recording) -> Result<(), Failed> {
     let error = match rig(recording)? {
         Ok(()) => return Ok(()),
         Err(error) => error,
@@ -92,16 +90,17 @@ fn works(recording: &Recording) -> Result<(), String> {
             row[1..].iter_mut().for_each(|element| *element *= -1.0);
         }
     }
-    Err(match (&error, rig(&turned)?) {
+    let words = match (&error, rig(&turned)?) {
         (RigError::NotAbove(_), Ok(())) => format!(
             "{error}: the plate's z points away, add --z-away (or leave it out if it is given)"
         ),
         _ => error.to_string(),
-    })
+    };
+    Err(words.into())
 }
 
 /// The outer error says that a model is absurd.
-fn rig(recording: &Recording) -> Result<Result<(), RigError>, String> {
+fn rig(recording: &Recording) -> Result<Result<(), RigError>, Failed> {
     let projector = &recording.projector;
     let (columns, rows) = (projector.width as usize, projector.height as usize);
     let geometry = Geometry::of(recording, None)?;
@@ -135,7 +134,7 @@ fn aside(recording: &Recording) -> Option<String> {
 type Pair = (DeviceModel, DeviceModel);
 
 /// Compares ξ and η with the models, where fringes of both directions have absolute phases.
-fn epipolar(recording: &Recording) -> Result<Option<String>, String> {
+fn epipolar(recording: &Recording) -> Result<Option<String>, Failed> {
     let [Some(vertical), Some(horizontal)] = [true, false].map(|vertical| {
         let mut patterns = recording.patterns.iter().enumerate();
         patterns.find_map(|(at, spec)| match spec {

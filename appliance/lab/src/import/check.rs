@@ -2,7 +2,8 @@
 //! other conventions, and the frames of each level are compared with a sine.
 
 use super::{code, shifts};
-use crate::workbench::layout::{Convention, Description, Shifts};
+use crate::Failed;
+use crate::layout::{Convention, Description, Shifts};
 use algo::chain::{Chain, Seen};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
@@ -45,7 +46,7 @@ const SATURATED: f64 = 0.05;
 pub(super) fn notes(
     recording: &Recording,
     description: &Description,
-) -> Result<Vec<String>, String> {
+) -> Result<Vec<String>, Failed> {
     let mut notes = Vec::new();
     same_pictures(recording, &mut notes);
     unused_bits(recording, &mut notes);
@@ -68,7 +69,8 @@ pub(super) fn notes(
                 let rows = Rows::of(&levels, seen.as_deref());
                 let along_rows = direction == "vertical";
                 let finest = &levels[levels.len() - 1];
-                let of_code = code::notes(recording, (pattern, &channel), finest, description)?;
+                let of_code =
+                    code::notes_beside(recording, (pattern, &channel), finest, description)?;
                 let named = match of_code {
                     // The code tells what a single level can.
                     Some(said) if !said.is_empty() || levels.len() == 1 => {

@@ -4,6 +4,7 @@
 use algo::chain::{Coding, GrayCode, MAX_CODE_BITS};
 use hal::bounds::MAX_FRINGES;
 use hal::replay::recording::PatternSpec;
+use thiserror::Error;
 
 /// How the sine of a level is written down.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -129,6 +130,61 @@ pub struct Description {
     pub function: Option<Vec<f64>>,
 }
 
+/// What is wrong with a description, and with which option.
+#[derive(Clone, Copy, Debug, PartialEq, Error)]
+pub enum LayoutError {
+    /// A section is not projected as often as it must be.
+    #[error(
+        "--order must name sine if there are --fringes or --pitch and else not, gray if there is --gray and else not, each \
+         once, or once for each direction; white and black at most once"
+    )]
+    Order,
+    /// A code without fringes, inverses, white and black.
+    #[error(
+        "a Gray code alone has nothing to compare its pictures with: give --gray-inverse, or white and black in --order"
+    )]
+    NothingToCompare,
+    /// Numbers of shifts neither for all levels nor for each.
+    #[error("--steps has {numbers} numbers for {levels} levels: give one for all, or one for each")]
+    Steps {
+        /// How many numbers there are.
+        numbers: usize,
+        /// How many levels.
+        levels: usize,
+    },
+    /// Two levels of the same fringes.
+    #[error("two levels have {0} fringes: give each level once")]
+    SameLevels(f64),
+    /// A code beside a phase function.
+    #[error("--gray numbers straight fringes: leave out --pattern")]
+    Curved,
+    /// A code that does not number the finest level's fringes, without the width of its cells.
+    #[error(
+        "{bits} bits of --gray do not number the {fringes} fringes of the finest level one by one: give \
+         the width of a cell with --gray-cell"
+    )]
+    NoCell {
+        /// Bits of the code.
+        bits: u8,
+        /// Fringes of the finest level.
+        fringes: f64,
+    },
+    /// A code of fewer numbers than cells.
+    #[error(
+        "{bits} bits of --gray number {} cells, but {cells} cells of {cell_px:.3} px are on the projector: correct \
+         --gray, --gray-cell or --gray-offset",
+        1_u32 << bits
+    )]
+    FewBits {
+        /// Bits of the code.
+        bits: u8,
+        /// Cells on the projector.
+        cells: f64,
+        /// Width of a cell.
+        cell_px: f64,
+    },
+}
+
 /// One projected picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shown {
@@ -227,8 +283,8 @@ impl Layout {
     /// The pictures that a description means.
     ///
     /// # Errors
-    /// In words that name the option: numbers of steps, bits or cells that do not fit the levels.
-    pub fn of(description: &Description) -> Result<Self, String> {
+    /// Numbers of steps, bits or cells that do not fit the levels.
+    pub fn of(description: &Description) -> Result<Self, LayoutError> {
         let (columns, rows) = description.projector;
         let directions: &[bool] = match &description.function {
             Some(_) => &[true],
@@ -330,7 +386,7 @@ impl Description {
 
     /// Checks that each section is projected as often as it must be, and that a code alone has
     /// something to be compared with.
-    fn check_order(&self, directions: usize) -> Result<(), String> {
+    fn check_order(&self, directions: usize) -> Result<(), LayoutError> {
         let sine = self.fringes != Fringes::None;
         let fits = |section, there: bool| match there {
             true => [1, directions].contains(&self.projected(section)),
@@ -341,18 +397,11 @@ impl Description {
             || !fits(Section::Gray, self.gray.is_some())
             || white.max(black) > 1
         {
-            return Err(
-                "--order must name sine if there are --fringes or --pitch and else not, gray if there is --gray and else not, each \
-                 once, or once for each direction; white and black at most once"
-                    .into(),
-            );
+            return Err(LayoutError::Order);
         }
         let against = self.gray.as_ref().is_some_and(|gray| gray.inverse) || white + black == 2;
         if !sine && !against {
-            return Err(
-                "a Gray code alone has nothing to compare its pictures with: give --gray-inverse, or white and black in --order"
-                    .into(),
-            );
+            return Err(LayoutError::NothingToCompare);
         }
         Ok(())
     }
@@ -363,24 +412,20 @@ impl Description {
         fringes: &[f64],
         finest: f64,
         vertical: bool,
-    ) -> Result<Vec<(f64, f64)>, String> {
+    ) -> Result<Vec<(f64, f64)>, LayoutError> {
         let steps = match *self.steps.of(vertical) {
             [all] => vec![all; fringes.len()],
             ref each => each.to_vec(),
         };
         if steps.len() != fringes.len() && !fringes.is_empty() {
-            return Err(format!(
-                "--steps has {} numbers for {} levels: give one for all, or one for each",
-                steps.len(),
-                fringes.len()
-            ));
+            return Err(LayoutError::Steps {
+                numbers: steps.len(),
+                levels: fringes.len(),
+            });
         }
         let repeated = (1..fringes.len()).find(|&at| fringes[..at].contains(&fringes[at]));
         if let Some(at) = repeated {
-            return Err(format!(
-                "two levels have {} fringes: give each level once",
-                fringes[at]
-            ));
+            return Err(LayoutError::SameLevels(fringes[at]));
         }
         let levels = fringes.iter().zip(steps);
         let frames = levels.flat_map(|(count, steps)| {
@@ -398,9 +443,9 @@ impl Gray {
         finest: f64,
         length: u32,
         curved: bool,
-    ) -> Result<GrayCode, String> {
+    ) -> Result<GrayCode, LayoutError> {
         if curved {
-            return Err("--gray numbers straight fringes: leave out --pattern".into());
+            return Err(LayoutError::Curved);
         }
         let bits = of_direction(&self.bits, vertical)
             .unwrap_or(1)
@@ -411,10 +456,10 @@ impl Gray {
             None if finest == 0.0 => 1.0,
             None if (finest - 1e-9).log2().ceil().max(1.0) == f64::from(bits) => length / finest,
             None => {
-                return Err(format!(
-                    "{bits} bits of --gray do not number the {finest} fringes of the finest level one by one: give \
-                     the width of a cell with --gray-cell"
-                ));
+                return Err(LayoutError::NoCell {
+                    bits,
+                    fringes: finest,
+                });
             }
         };
         let offset = of_direction(&self.offset_px, vertical).unwrap_or(0.0);
@@ -429,11 +474,11 @@ impl Gray {
                 offset,
                 coding,
             }),
-            false => Err(format!(
-                "{bits} bits of --gray number {} cells, but {cells} cells of {cell:.3} px are on the projector: correct \
-                 --gray, --gray-cell or --gray-offset",
-                1_u32 << bits
-            )),
+            false => Err(LayoutError::FewBits {
+                bits,
+                cells,
+                cell_px: cell,
+            }),
         }
     }
 }

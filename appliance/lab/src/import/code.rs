@@ -1,11 +1,16 @@
-//! What looks wrong with a Gray code: its cells end within the fringes where the options say, or an
-//! option is named with which they do.
+//! What looks wrong with a Gray code: beside fringes its cells end within them where the options say,
+//! and alone it numbers the picture from one side to the other; else an option is named with which
+//! it does.
 
 use super::shifts::usual;
-use crate::workbench::layout::{BitOrder, Description, Direction, Gray, of_direction};
+use crate::Failed;
+use crate::layout::{BitOrder, Description, Direction, Gray, of_direction};
 use algo::chain::{Cells, Coding, EXPECTED_TURNS, Edges, Seen};
+use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use appliance::head::channel::Channel;
+use appliance::head::code::CodeAlone;
+use appliance::measure::least_modulation;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 
@@ -30,12 +35,12 @@ const WITHIN_CELL: std::ops::Range<f64> = 0.1..0.9;
 ///
 /// # Errors
 /// In words: the pictures do not form a code.
-pub(super) fn notes(
+pub(super) fn notes_beside(
     recording: &Recording,
     (pattern, channel): (usize, &Channel<'_>),
     finest: &PhaseMap,
     description: &Description,
-) -> Result<Option<Vec<String>>, String> {
+) -> Result<Option<Vec<String>>, Failed> {
     let code = recording.codes.iter().find(|code| code.pattern == pattern);
     let (Some(code), Some(cells), Some(seen), Some(gray)) =
         (code, channel.cells(), channel.seen()?, &description.gray)
@@ -91,7 +96,7 @@ struct Reading {
 
 /// The other ways to read the pictures of a code: whether the order of its bits is reversed, and
 /// its coding. One change, then two, then all three.
-pub(super) fn otherwise(stated: Coding) -> impl Iterator<Item = (bool, Coding)> {
+fn otherwise(stated: Coding) -> impl Iterator<Item = (bool, Coding)> {
     [1_u8, 2, 4, 3, 5, 6, 7].into_iter().map(move |changes| {
         let coding = Coding {
             binary: stated.binary != (changes & 2 != 0),
@@ -102,7 +107,7 @@ pub(super) fn otherwise(stated: Coding) -> impl Iterator<Item = (bool, Coding)> 
 }
 
 /// The options of the command line that state this order and coding.
-pub(super) fn options(reversed: bool, coding: Coding, gray: &Gray) -> String {
+fn options(reversed: bool, coding: Coding, gray: &Gray) -> String {
     let mut options = Vec::new();
     if reversed {
         options.push(match gray.order {
@@ -310,4 +315,96 @@ impl Beside<'_> {
             None => own.to_string(),
         }
     }
+}
+
+/// Share of the pixels that must be lit.
+const LIT: f64 = 0.01;
+/// Share of the lit pixels that may be in doubt.
+const DOUBT: f64 = 0.4;
+/// Pixels that are compared lie this part of the frame apart: a sixteenth.
+const FRAME_PARTS: usize = 16;
+/// Least excess of pairs whose cells rise over those whose cells fall, or the other way round, as a
+/// share of both: a code that is read in another order or form has at most 0.4, a right one nearly
+/// 1, but for the edges of parts.
+const ONE_WAY: f64 = 0.7;
+
+/// The remedy where no other reading of the pictures fits.
+const REMEDY: &str = "check the order of the pictures, --gray, --gray-cell, --gray-order, --gray-binary, --gray-invert and --order";
+
+/// What looks wrong, in words with remedies: the options of another reading of the pictures, if one
+/// fits.
+///
+/// # Errors
+/// In words: the pictures form no code.
+pub(super) fn notes_alone(
+    recording: &Recording,
+    description: &Description,
+) -> Result<Vec<String>, Failed> {
+    let mut notes = Vec::new();
+    let least = least_modulation(recording);
+    for pattern in 0..recording.patterns.len() {
+        let (Some(code), Some(gray)) = (CodeAlone::of(recording, pattern)?, &description.gray)
+        else {
+            continue;
+        };
+        let Some(words) = problem(&code.phases(least)?) else {
+            continue;
+        };
+        let number = if code.vertical { "columns" } else { "rows" };
+        let fits = otherwise(code.cells.coding).find(|&(reversed, coding)| {
+            let read = code.read_as(reversed, coding).phases(least);
+            read.is_ok_and(|map| problem(&map).is_none())
+        });
+        let remedy = match fits {
+            Some((reversed, coding)) => format!("give {}", options(reversed, coding, gray)),
+            None => REMEDY.to_owned(),
+        };
+        notes.push(format!("Gray code of {number}: {words}{remedy}"));
+    }
+    Ok(notes)
+}
+
+/// What is wrong with the phases of a code, up to the remedy.
+fn problem(map: &PhaseMap) -> Option<String> {
+    let pixels = map.trust.len() as f64;
+    let (resolved, doubt) = (map.count(Trust::Resolved), map.count(Trust::Residual));
+    let lit = (resolved + doubt) as f64;
+    if lit < LIT * pixels {
+        return Some(format!(
+            "only {:.1} % of the pixels are lit: if the pictures are only dim, give the camera's noise with --noise; else ",
+            100.0 * lit / pixels
+        ));
+    }
+    if doubt as f64 > DOUBT * lit {
+        return Some(format!(
+            "{:.0} % of the lit pixels have two bits in doubt, or a cell beyond the projector's edge: ",
+            100.0 * doubt as f64 / lit
+        ));
+    }
+    let [right, down] = one_way(map);
+    (right.max(down) < ONE_WAY).then(|| {
+        "the cells rise and fall by turns along the rows and the columns of the picture: ".into()
+    })
+}
+
+/// The excess of pairs whose phase changes in one way, along rows and along columns.
+fn one_way(map: &PhaseMap) -> [f64; 2] {
+    let width = map.width.max(1);
+    let height = map.phase.len() / width;
+    [(width, 1), (height, width)].map(|(length, step)| {
+        let apart = (length / FRAME_PARTS).max(1);
+        let (mut rising, mut falling) = (0_usize, 0_usize);
+        for (at, here) in map.phase.iter().enumerate() {
+            if (at / step) % length + apart >= length {
+                continue;
+            }
+            let next = map.phase[at + apart * step];
+            if here.is_known() && next.is_known() {
+                let turns = (next - *here).turns();
+                rising += usize::from(turns > 0.0);
+                falling += usize::from(turns < 0.0);
+            }
+        }
+        rising.abs_diff(falling) as f64 / (rising + falling).max(1) as f64
+    })
 }

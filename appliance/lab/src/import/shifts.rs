@@ -1,7 +1,7 @@
 //! The convention of the shifts in the words of the options, and what a response that is not linear
 //! does to levels.
 
-use crate::workbench::layout::{Convention, ShiftSign, Shifts};
+use crate::layout::{Convention, ShiftSign, Shifts};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use std::f64::consts::TAU;

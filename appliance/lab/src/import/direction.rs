@@ -1,8 +1,11 @@
 //! Whether fringes run the way that they are said to: pictures whose names begin with H and V lie
 //! in the other order than pictures of columns and rows.
 
-use super::phases::coarsest;
+use crate::Failed;
 use algo::pipeline::PhaseMap;
+use appliance::head::channel::Channel;
+use appliance::head::code::CodeAlone;
+use appliance::measure::least_modulation;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 
@@ -54,6 +57,19 @@ pub(super) fn notes(recording: &Recording) -> Option<String> {
     Some(format!(
         "{seen}: {remedy}; it is right where the camera is turned by 90° against the projector"
     ))
+}
+
+/// The wrapped phase of a pattern's coarsest level, or the absolute one of a Gray code alone.
+///
+/// # Errors
+/// In words: the frames make no levels.
+fn coarsest(recording: &Recording, pattern: usize) -> Result<PhaseMap, Failed> {
+    let least = least_modulation(recording);
+    if let Some(code) = CodeAlone::of(recording, pattern)? {
+        return Ok(code.phases(least)?);
+    }
+    let channel = Channel::new(recording, pattern, least)?;
+    Ok(channel.wrapped_levels()?.swap_remove(0))
 }
 
 /// Mean change of the phase from column to column and from row to row, in turns, without its sign;

@@ -1,8 +1,33 @@
-//! What the samples of a camera's pictures mean: how many bits they have, and above what they are
-//! clipped.
+//! Makes a recording of other people's pictures (`fringed-lab import`), and says what looks wrong.
+//!
+//! `folder` and `picture` read the pictures, and here their samples are brought to their bits;
+//! `plane` places models without a plate, `geometry` compares models with the fringes, `check`,
+//! `code` and `direction` find what looks wrong.
 
-use crate::workbench::layout::Shown;
-use hal::frame::FrameFormat;
+mod check;
+mod code;
+mod direction;
+mod folder;
+mod geometry;
+mod picture;
+mod plane;
+mod shifts;
+
+pub use picture::{Channel, Picture};
+
+use crate::Failed;
+use crate::layout::{Description, Layout, Shown};
+use appliance::error::{Exit, Failure, Result};
+use appliance::head::calibration::opencv::Models;
+use appliance::measure::measure;
+use folder::Place;
+use hal::bounds::shortened;
+use hal::frame::{Frame, FrameFormat, Pixels};
+use hal::replay::Recording;
+use hal::units::Timestamp;
+use rayon::prelude::*;
+use std::path::Path;
+use std::sync::Arc;
 
 /// How many times as often as any other bright sample the largest one must occur: the crest of a
 /// sine alone makes it 2.4 times as often at most, where noise does not smooth it.
@@ -14,10 +39,120 @@ const AS_BRIGHT: u16 = 32;
 const FEWEST: usize = 8;
 const SPARSE: usize = 512;
 
+/// What the user says about the pictures.
+#[derive(Clone, Debug)]
+pub struct Taken {
+    /// What was projected.
+    pub description: Description,
+    /// What of colour pictures is taken.
+    pub channel: Channel,
+    /// Significant bits of a sample; without it those of the files.
+    pub bit_depth: Option<u8>,
+    /// Beginning of the names of the pictures that are taken, or a pattern of them with * and ?.
+    pub name: String,
+    /// σ of a sample in counts, if it is known.
+    pub noise_counts: Option<f64>,
+    /// Lowest and highest z of the working range, mm.
+    pub range_mm: Option<[f64; 2]>,
+}
+
+/// Reads the pictures of a folder in the order of the numbers in their names. `models` gives the
+/// models for frames of this size. The recording's notes say what looks wrong with it, in words
+/// with remedies.
+///
+/// # Errors
+/// If the folder is missing (66), the description contradicts itself (64), or a picture is missing
+/// or wrong (65).
+pub fn import(
+    folder: &Path,
+    taken: &Taken,
+    models: impl FnOnce((u32, u32)) -> Result<Option<Models>>,
+) -> Result<Recording> {
+    let layout = Layout::of(&taken.description);
+    let layout = layout.map_err(Exit::Usage.because("import"))?;
+    let places = folder::pictures(folder, &taken.name, layout.shown.len())?;
+    let read = |place: &Place| {
+        let read = Picture::read(&place.file, place.page.unwrap_or(0));
+        read.map_err(|problem| place.wrong(shortened(&problem.to_string())))
+    };
+    let pictures: Vec<Picture> = places.par_iter().map(read).collect::<Result<_, _>>()?;
+    let mut notes = Vec::new();
+    let first = &pictures[0];
+    let unlike = pictures
+        .iter()
+        .position(|other| (other.size, other.bits) != (first.size, first.bits));
+    if let Some(at) = unlike {
+        let describe = |picture: &Picture| {
+            let (width, height) = picture.size;
+            format!("{width}×{height} pixels of {} bits", picture.bits)
+        };
+        let words = format!(
+            "{} where {} has {}: all must come from one camera, choose its pictures with --name",
+            describe(&pictures[at]),
+            places[0].name(),
+            describe(first)
+        );
+        return Err(places[at].wrong(words));
+    }
+    if pictures.iter().any(|picture| picture.lossy) {
+        notes.push(
+            "the pictures are JPEG, which alters samples in blocks of 8×8 pixels, by some counts at fine fringes and edges, and no \
+             number of shifts averages that out: save the pictures as PNG or TIFF"
+                .into(),
+        );
+    }
+    if taken.channel == Channel::Luminance && pictures.iter().any(Picture::is_colour) {
+        notes.push(
+            "the pictures are in colour and their luminance is taken: a camera that projects one colour is better read with \
+             --channel red, green or blue"
+                .into(),
+        );
+    }
+    let ((width, height), file_bits) = (first.size, first.bits);
+    let grey = pictures
+        .par_iter()
+        .map(|picture| picture.grey(taken.channel));
+    let mut samples: Vec<Vec<u16>> = grey.collect();
+    drop(pictures);
+    let bit_depth = right_justify(&mut samples, taken.bit_depth, file_bits);
+    let format = FrameFormat::packed(width, height, bit_depth);
+    notes.extend(mark_clipped(&mut samples, &layout.shown, format));
+    let frame =
+        |(at, samples)| frame(format, samples, at).map_err(|problem| places[at].wrong(problem));
+    let frames: Vec<Frame> = samples
+        .into_par_iter()
+        .enumerate()
+        .map(frame)
+        .collect::<Result<_, _>>()?;
+    let models = models((format.width, format.height))?;
+    let mut recording = layout.recording(taken.description.projector, format, frames);
+    recording.description = format!("imported from {}", name(folder));
+    recording.noise_counts = taken.noise_counts;
+    recording.range_mm = taken.range_mm;
+    if let Some(models) = models {
+        notes.extend(geometry::add(&mut recording, models, folder)?);
+    }
+    notes.extend(
+        check::notes(&recording, &taken.description).map_err(|problem| content(folder, problem))?,
+    );
+    notes.extend(
+        code::notes_alone(&recording, &taken.description)
+            .map_err(|problem| content(folder, problem))?,
+    );
+    notes.extend(direction::notes(&recording));
+    if recording.camera_model.is_some() {
+        // Levels that cannot be measured were named above.
+        let measured = measure(&recording, folder).ok();
+        notes.extend(measured.and_then(|measured| measured.report.advice));
+    }
+    recording.notes = notes;
+    Ok(recording)
+}
+
 /// Brings samples of 16 bits that stand in the upper bits, as some cameras write 10 and 12 bits, to
 /// the lower ones, and returns how many bits they have: those that are stated, else those of the
 /// files.
-pub(super) fn right_justify(pictures: &mut [Vec<u16>], stated: Option<u8>, file: u8) -> u8 {
+fn right_justify(pictures: &mut [Vec<u16>], stated: Option<u8>, file: u8) -> u8 {
     let used = pictures
         .iter()
         .flatten()
@@ -40,11 +175,7 @@ pub(super) fn right_justify(pictures: &mut [Vec<u16>], stated: Option<u8>, file:
 /// Finds samples of fringes that are clipped below full scale, as where the range of a picture is
 /// limited to 235, and sets them to full scale, so that their pixels count as saturated. Returns
 /// the remedy in words if there are any.
-pub(super) fn mark_clipped(
-    pictures: &mut [Vec<u16>],
-    shown: &[Shown],
-    format: FrameFormat,
-) -> Option<String> {
+fn mark_clipped(pictures: &mut [Vec<u16>], shown: &[Shown], format: FrameFormat) -> Option<String> {
     let levels = levels(shown);
     let sines = || levels.iter().flatten();
     let full_scale = format.full_scale();
@@ -108,6 +239,35 @@ fn levels(shown: &[Shown]) -> Vec<Vec<usize>> {
         }
     }
     levels.into_iter().map(|(_, frames)| frames).collect()
+}
+
+/// A frame of samples that must lie within its bits.
+fn frame(format: FrameFormat, samples: Vec<u16>, count: usize) -> Result<Frame, Failed> {
+    let full_scale = format.full_scale();
+    let largest = samples.iter().copied().max().unwrap_or(0);
+    if largest > full_scale {
+        let bits = format.bit_depth;
+        return Err(format!("a sample of {largest}, where {bits} bits have at most {full_scale}: correct --bit-depth").into());
+    }
+    let pixels = match format.bit_depth {
+        8 => Pixels::Eight(samples.into_iter().map(|sample| sample as u8).collect()),
+        _ => Pixels::Sixteen(samples),
+    };
+    Ok(Frame::new(
+        format,
+        Arc::new(pixels),
+        Timestamp(0),
+        count as u64,
+    )?)
+}
+
+fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+fn content(path: &Path, problem: impl std::fmt::Display) -> Failure {
+    Failure::because(Exit::Content, format!("import {}", path.display()), problem)
 }
 
 #[cfg(test)]
