@@ -4,10 +4,10 @@
 pub mod adapt;
 pub mod benchmark;
 pub mod cli;
+pub mod description;
 pub mod experiment;
 pub mod import;
 pub mod layout;
-mod outline;
 
 /// Why a benchmark failed: an error of what it times. Only a person reads it.
 pub type Failed = Box<dyn std::error::Error + Send + Sync>;

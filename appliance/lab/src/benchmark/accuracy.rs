@@ -1,7 +1,7 @@
 //! Run time against error: processor time and height error of each implementation, sequence and bit
 //! depth on the simulated parts.
 
-use super::decoding::{Decoding, decoders};
+use super::kernel::{Decoding, decoders};
 use super::timing::{Effort, Floor, FrameSet, FrameSets, Kernel, Round, interleaved, median};
 use crate::Failed;
 use crate::experiment::{BetterSequence, Method, OpticsKind, Runner, Scene};
@@ -324,8 +324,8 @@ pub fn means(points: &[Point]) -> Vec<Point> {
             continue;
         }
         let all: Vec<&Point> = points.iter().filter(|point| same(point)).collect();
-        let mean = |of: fn(&Point) -> f64| {
-            all.iter().map(|point| of(point)).sum::<f64>() / all.len() as f64
+        let mean = |figure: fn(&Point) -> f64| {
+            all.iter().map(|point| figure(point)).sum::<f64>() / all.len() as f64
         };
         means.push(Point {
             part: "mean",

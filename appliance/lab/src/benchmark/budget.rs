@@ -1,7 +1,7 @@
 //! From trigger to verdict: how long each stage takes on a simulated head with a taught recipe.
 
-use super::decoding::{Decoding, Inspecting};
 use super::gauges::Gauges;
+use super::kernel::{Decoding, Inspecting};
 use super::timing::{Effort, FrameSet, FrameSets, Kernel, alone, median, ns_per_px};
 use crate::Failed;
 use appliance::head::calibration::Calibration;

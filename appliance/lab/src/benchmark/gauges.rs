@@ -70,8 +70,8 @@ impl Gauges {
         let rows = count.div_ceil(COLUMNS);
         let region = |at: usize| {
             let corner = |right: usize, down: usize| {
-                let share = |axis: usize, at: usize, of: usize| {
-                    BOX[0][axis] + (BOX[1][axis] - BOX[0][axis]) * at as f64 / of as f64
+                let share = |axis: usize, step: usize, steps: usize| {
+                    BOX[0][axis] + (BOX[1][axis] - BOX[0][axis]) * step as f64 / steps as f64
                 };
                 let (column, row) = (at % COLUMNS + right, at / COLUMNS + down);
                 [
@@ -89,9 +89,9 @@ impl Gauges {
             .iter()
             .flat_map(|kind| (0..count).map(move |at| (kind, at)));
         for (slot, (measures, at)) in (1..).zip(all) {
-            let of = (0..measures.facts().takes.len()).map(|place| name(at + place));
+            let features = measures.facts().takes.len();
             file.gauges.push(GaugeFile {
-                of: of.collect(),
+                of: (0..features).map(|next| name(at + next)).collect(),
                 ..GaugeFile::new(slot, &format!("gauge {slot}"), measures.clone(), &[])
             });
         }
@@ -137,13 +137,15 @@ fn planes(features: &[usize]) -> Vec<Measure> {
 
 /// The first kind in the table that is worked out from this, of features of this kind, for each of
 /// these numbers of features.
-fn kinds(basis: Basis, of: FeatureKind, features: &[usize]) -> Vec<Measure> {
+fn kinds(basis: Basis, kind: FeatureKind, features: &[usize]) -> Vec<Measure> {
     let first = |&count: &usize| {
         let mut all = Measure::examples().into_iter();
-        all.find(|kind| {
-            let facts = kind.facts();
+        all.find(|measure| {
+            let facts = measure.facts();
             let takes = facts.takes;
-            facts.basis == basis && takes.len() == count && takes.iter().all(|at| at.contains(&of))
+            facts.basis == basis
+                && takes.len() == count
+                && takes.iter().all(|at| at.contains(&kind))
         })
     };
     features.iter().filter_map(first).collect()

@@ -2,7 +2,6 @@
 
 mod accuracy;
 mod budget;
-mod decoding;
 mod gauges;
 mod kernel;
 mod report;

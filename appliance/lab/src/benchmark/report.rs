@@ -158,7 +158,7 @@ fn by_size<S: Serializer>(budgets: &Option<Vec<Budget>>, out: S) -> Result<S::Ok
         }
         let per_px =
             |ms: f64| json!(ms * 1e6 / (f64::from(budget.width) * f64::from(budget.height)));
-        let key = |of: &str| format!("{of}_golden_{}", budget.frames);
+        let key = |timed: &str| format!("{timed}_golden_{}", budget.frames);
         let cycle = match budget.lies {
             Lies::AsTaught => "production",
             Lies::Aligned => "aligned",

@@ -5,6 +5,7 @@ use crate::benchmark::{self, Effort, Machine, Report, Study};
 use appliance::cli::{Output, Threads, names};
 use appliance::error::{Exit, Result};
 use appliance::storage::folder::OutputFolder;
+use appliance::system::memory::give_back;
 use std::path::PathBuf;
 
 /// Time the kernels, time against error, and trigger to verdict.
@@ -77,6 +78,8 @@ impl Bench {
     fn measure(&self, on_progress: &(dyn Fn(f64, &str) + Sync)) -> Result<Report> {
         let wanted = |what| self.what.is_none_or(|asked| asked == what);
         let pool = self.threads.pool(0)?;
+        // So that each frame that is timed lies in a mapping of its own.
+        give_back();
         let mut report = Report {
             machine: Machine::this(),
             kernel: None,

@@ -1,7 +1,7 @@
 //! Options that describe projected pictures, for `import` and `patterns`; lists, ranges and sizes in
 //! them, each number of which has bounds that a refusal names.
 
-use crate::layout::{
+use crate::description::{
     BitOrder, Convention, Description, Direction, Fringes, Gray, PerDirection, Section, ShiftSign,
     Shifts,
 };

@@ -77,8 +77,13 @@ impl Patterns {
         let format = FrameFormat::packed(width, height, self.bit_depth);
         // Frames that are yet to be taken: only their places are written.
         let frame = |at: usize| {
-            let one = FrameFormat::packed(1, 1, 8);
-            Frame::new(one, Arc::new(Pixels::zeroed(&one)), Timestamp(0), at as u64)
+            let pixel = FrameFormat::packed(1, 1, 8);
+            Frame::new(
+                pixel,
+                Arc::new(Pixels::zeroed(&pixel)),
+                Timestamp(0),
+                at as u64,
+            )
         };
         let frames: Vec<Frame> = (0..layout.shown.len())
             .map(frame)

@@ -1,6 +1,6 @@
 //! Judges a run: errors against truth, coverage, and the fit of a cylinder.
 
-use super::scenes::Judged;
+use super::compared::Judged;
 use super::table::Values;
 use algo::math::solve::Normal;
 use algo::phase::Trust;

@@ -1,9 +1,9 @@
 //! What looks wrong with an imported recording: its levels are unwrapped as stated and under the
 //! other conventions, and the frames of each level are compared with a sine.
 
-use super::{code, shifts};
+use super::code;
 use crate::Failed;
-use crate::layout::{Convention, Description, Shifts};
+use crate::description::{Convention, Description, Shifts};
 use algo::chain::{Chain, Seen};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
@@ -13,6 +13,7 @@ use appliance::measure::least_modulation;
 use hal::frame::Samples;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
+use std::f64::consts::TAU;
 
 /// Rows that conventions are compared on.
 const ROWS: usize = 128;
@@ -26,6 +27,12 @@ const BETTER: f64 = 0.3;
 /// Half the height of a ripple of two levels' difference that is named, turns: most of what may be
 /// between levels that agree.
 const RIPPLE: f64 = 0.1;
+/// Parts into which the period of a ripple is divided.
+const BINS: usize = 32;
+/// Least concentration of the difference of two levels within a part, 0 to 1: below it is noise.
+const CONCENTRATED: f64 = 0.7;
+/// Largest mean of a ripple, turns: a wrong convention moves it by a quarter of a turn.
+const LARGEST_MEAN: f64 = 0.125;
 /// Share of the rows in which a convention may jump by most of a turn of its coarsest level.
 const JUMPS: f64 = 0.5;
 /// Share of the pattern that is a jump.
@@ -382,8 +389,44 @@ fn response(channel: &Channel<'_>, rows: &Rows) -> Option<(f64, usize)> {
         // Else the difference depends on the fringe's order.
         let alone = pair[0].ratio * span <= 1.0 || (factor - factor.round()).abs() < 1e-6;
         let shifts = pair[0].shifts();
-        let height = shifts::ripple(&maps[0], &maps[1], factor, shifts)?;
+        let height = ripple(&maps[0], &maps[1], factor, shifts)?;
         (alone && height > RIPPLE).then_some((height, shifts))
     });
     ripples.max_by(|a, b| a.0.total_cmp(&b.0))
+}
+
+/// The ripple of the difference of two levels, `factor` φ_coarse − φ_fine, that a response which is
+/// not linear makes: of so many periods per fringe as there are shifts. Half its height in turns,
+/// if the difference is nothing but that.
+fn ripple(coarse: &PhaseMap, fine: &PhaseMap, factor: f64, shifts: usize) -> Option<f64> {
+    let mut sums = [[0.0_f64; 2]; BINS];
+    let mut count = 0_usize;
+    for at in 0..coarse.phase.len() {
+        if coarse.trust[at] != Trust::Resolved || fine.trust[at] != Trust::Resolved {
+            continue;
+        }
+        let phase = coarse.phase[at].turns();
+        let (sin, cos) = (TAU * (factor * phase - fine.phase[at].turns())).sin_cos();
+        let part = (shifts as f64 * phase).rem_euclid(1.0) * BINS as f64;
+        let sum = &mut sums[part as usize % BINS];
+        *sum = [sum[0] + cos, sum[1] + sin];
+        count += 1;
+    }
+    let size: f64 = sums.iter().map(|[cos, sin]| cos.hypot(*sin)).sum();
+    if count == 0 || size < CONCENTRATED * count as f64 {
+        return None;
+    }
+    let means = sums.map(|[cos, sin]| sin.atan2(cos) / TAU);
+    let mut course = vec![means[0]];
+    for next in means.into_iter().skip(1).chain([means[0]]) {
+        let here = course[course.len() - 1];
+        course.push(here + (next - here) - (next - here).round());
+    }
+    // A difference that turns round and round is one of orders or signs.
+    let closed = course.pop()?;
+    let mean = course.iter().sum::<f64>() / BINS as f64;
+    let high = course.iter().copied().fold(f64::MIN, f64::max);
+    let low = course.iter().copied().fold(f64::MAX, f64::min);
+    let plain = (closed - course[0]).abs() < 0.5 && (mean - mean.round()).abs() < LARGEST_MEAN;
+    plain.then_some((high - low) / 2.0)
 }

@@ -2,9 +2,8 @@
 //! and alone it numbers the picture from one side to the other; else an option is named with which
 //! it does.
 
-use super::shifts::usual;
 use crate::Failed;
-use crate::layout::{BitOrder, Description, Direction, Gray, of_direction};
+use crate::description::{BitOrder, Description, Direction, Gray, of_direction, usual};
 use algo::chain::{Cells, Coding, EXPECTED_TURNS, Edges, Seen};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
@@ -29,6 +28,18 @@ const NEAR_QUARTER: f64 = 0.0625;
 /// Share of a cell by which a code may begin before the raster, so that it is not a matter of the
 /// shifts.
 const WITHIN_CELL: std::ops::Range<f64> = 0.1..0.9;
+/// Share of the pixels that a code alone must light.
+const LIT: f64 = 0.01;
+/// Share of its lit pixels that may be in doubt.
+const DOUBT: f64 = 0.4;
+/// Pixels that are compared lie this part of the frame apart: a sixteenth.
+const FRAME_PARTS: usize = 16;
+/// Least excess of pairs whose cells rise over those whose cells fall, or the other way round, as a
+/// share of both: a code that is read in another order or form has at most 0.4, a right one nearly
+/// 1, but for the edges of parts.
+const ONE_WAY: f64 = 0.7;
+/// The remedy where no other reading of the pictures fits.
+const REMEDY: &str = "check the order of the pictures, --gray, --gray-cell, --gray-order, --gray-binary, --gray-invert and --order";
 
 /// What is wrong with the code beside the finest level of a pattern, in words with remedies; `None`
 /// where there is too little to tell.
@@ -317,22 +328,8 @@ impl Beside<'_> {
     }
 }
 
-/// Share of the pixels that must be lit.
-const LIT: f64 = 0.01;
-/// Share of the lit pixels that may be in doubt.
-const DOUBT: f64 = 0.4;
-/// Pixels that are compared lie this part of the frame apart: a sixteenth.
-const FRAME_PARTS: usize = 16;
-/// Least excess of pairs whose cells rise over those whose cells fall, or the other way round, as a
-/// share of both: a code that is read in another order or form has at most 0.4, a right one nearly
-/// 1, but for the edges of parts.
-const ONE_WAY: f64 = 0.7;
-
-/// The remedy where no other reading of the pictures fits.
-const REMEDY: &str = "check the order of the pictures, --gray, --gray-cell, --gray-order, --gray-binary, --gray-invert and --order";
-
-/// What looks wrong, in words with remedies: the options of another reading of the pictures, if one
-/// fits.
+/// What looks wrong with codes without fringes, in words with remedies: the options of another
+/// reading of the pictures, if one fits.
 ///
 /// # Errors
 /// In words: the pictures form no code.

@@ -254,8 +254,9 @@ fn readings((camera, projector): &Pair) -> Vec<(String, Pair)> {
         }
     }
     let (from_one, to_one) = (moved(camera, -1.0), moved(projector, -1.0));
-    let words =
-        |of: &str| format!("{of} from 1: take 1 off cx and cy, the first pixel's middle is 0");
+    let words = |counted: &str| {
+        format!("{counted} from 1: take 1 off cx and cy, the first pixel's middle is 0")
+    };
     readings.push((
         words("the camera's pixels are counted"),
         (from_one.clone(), projector.clone()),

@@ -11,12 +11,12 @@ mod folder;
 mod geometry;
 mod picture;
 mod plane;
-mod shifts;
 
 pub use picture::{Channel, Picture};
 
 use crate::Failed;
-use crate::layout::{Description, Layout, Shown};
+use crate::description::Description;
+use crate::layout::{Layout, Shown};
 use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibration::opencv::Models;
 use appliance::measure::measure;

@@ -3,7 +3,7 @@
 
 use super::super::described::{Series as Numbers, Size};
 use super::Arguments;
-use crate::layout::PerDirection;
+use crate::description::PerDirection;
 use clap::error::ErrorKind;
 use clap::{Arg, ArgMatches, CommandFactory as _};
 use std::any::TypeId;
