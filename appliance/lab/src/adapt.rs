@@ -233,7 +233,7 @@ const VERSION: u32 = 1;
 const PHASE_FUNCTION: &str = "phase_function.npy";
 const EXPECTED_PHASE: &str = "expected_phase.npy";
 
-/// The most accurate split of so many frames about an expected phase.
+/// The most accurate split of `frames` frames about an expected phase.
 pub fn split(frames: usize, waveforms: Waveforms) -> Option<Split> {
     Split::best(frames, REACH, waveforms).or_else(|| Split::best(frames, REACH_OF_ONE, waveforms))
 }
@@ -271,11 +271,11 @@ struct FrameFile {
 }
 
 impl<'a> Projected<'a> {
-    /// The most accurate sequence of so many frames for the pattern, about the phase that is
+    /// The most accurate sequence of `frames` frames for the pattern, about the phase that is
     /// expected of a camera with rows of `width` pixels.
     ///
     /// # Errors
-    /// If there is no sequence of so many frames (64).
+    /// If there is no sequence of this many frames (64).
     pub fn new(
         adapted: &'a Adapted,
         width: usize,

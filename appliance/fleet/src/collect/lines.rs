@@ -1,5 +1,4 @@
-//! The lines of an answer, each of which is bounded in length and time, and what can be wrong with
-//! an answer.
+//! The lines of an answer, each bounded in length and time, and the ways in which reading them fails.
 
 use crate::answer::{MOST_LINE, Wrong};
 use crate::http::{ANSWERING, HttpError, next, within};

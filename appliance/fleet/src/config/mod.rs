@@ -61,7 +61,7 @@ pub struct Config {
     pub poll: Duration,
     /// Pause between two questions for the state.
     pub state: Duration,
-    /// How long results are kept, if not for ever.
+    /// How long results are kept; `None`: never deleted.
     pub keep: Option<Duration>,
     /// Whom connections trust, with https.
     pub tls: Option<Arc<ClientConfig>>,
@@ -205,10 +205,10 @@ impl Config {
         }
     }
 
-    /// The heads, of which there is at least one.
+    /// The heads, at least one.
     ///
     /// # Errors
-    /// If there is none.
+    /// If no heads are named.
     pub fn heads(&self) -> Result<&[HeadConfig]> {
         if self.heads.is_empty() {
             let words = "no heads are named: add --heads URL, or write fleet.toml";

@@ -285,8 +285,7 @@ pub fn shortened(text: &str) -> String {
     }
 }
 
-/// Whom an encrypted connection trusts: the authorities of a file of certificates as PEM, nobody
-/// else.
+/// A client configuration that trusts only the authorities in a PEM file of certificates.
 ///
 /// # Errors
 /// If the file cannot be read, or holds no certificate.

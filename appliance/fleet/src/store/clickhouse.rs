@@ -70,7 +70,7 @@ impl ClickHouse {
         for statement in statements(&schema(Kind::ClickHouse)) {
             self.post(self.of_database(), statement.into()).await?;
         }
-        // A store of a version before has results of which this table knows nothing.
+        // A store of an earlier version has results that this table lacks.
         let known = self
             .lines("SELECT 1 AS known FROM result_at LIMIT 1")
             .await?;

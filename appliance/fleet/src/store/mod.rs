@@ -260,10 +260,10 @@ impl Store {
         [sqlite, clickhouse]: [&str; 2],
         since: u64,
     ) -> Result<Vec<T>, Complaint> {
-        let of = |sql: &str| sql.replace("$since", &since.to_string());
+        let filled = |sql: &str| sql.replace("$since", &since.to_string());
         let lines = match self {
-            Self::Sqlite(store) => store.lines(&of(sqlite)),
-            Self::ClickHouse(store) => store.lines(&of(clickhouse)).await,
+            Self::Sqlite(store) => store.lines(&filled(sqlite)),
+            Self::ClickHouse(store) => store.lines(&filled(clickhouse)).await,
         }?;
         let read = |line: &str| serde_json::from_str(line);
         let rows = lines.lines().map(read).collect::<Result<_, _>>();

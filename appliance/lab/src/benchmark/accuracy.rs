@@ -81,7 +81,7 @@ enum Pattern {
     Better,
 }
 
-/// A sequence that is compared, of so many frames.
+/// A sequence that is compared: its pattern and its number of frames.
 struct Compared(Pattern, usize);
 
 /// The noise of all measurements.

@@ -15,13 +15,13 @@ const COLUMNS: usize = 8;
 pub enum Gauges {
     /// The gauges that teaching proposes.
     Taught,
-    /// The mean height of each of so many regions.
+    /// The mean height of each region; how many regions.
     Means(usize),
-    /// The height of the plane of each of so many regions.
+    /// The height of the plane of each region; how many regions.
     Planes(usize),
     /// The same, and the distance of each plane from the next.
     Distances(usize),
-    /// The diameter of so many holes, those of the part again and again.
+    /// The diameter of holes, those of the part again and again; how many.
     Holes(usize),
 }
 
@@ -105,7 +105,7 @@ const PLATE_MM: f64 = 8.0;
 /// A region reaches so far beyond a hole, mm.
 const AROUND_MM: f64 = 2.5;
 
-/// Gives a recipe of the default part the diameters of so many holes. A head that cannot be modelled
+/// Gives a recipe of the default part the diameters of `count` holes. A head that cannot be modelled
 /// has none.
 fn holes(file: &mut RecipeFile, count: usize) {
     let Ok(head) = file.head() else { return };
@@ -130,13 +130,13 @@ fn holes(file: &mut RecipeFile, count: usize) {
     file.judges_nothing = true;
 }
 
-/// The first kinds of geometry that are of so many planes.
+/// For each number of planes, the first geometric kind that takes as many.
 fn planes(features: &[usize]) -> Vec<Measure> {
     kinds(Basis::Geometry, FeatureKind::Plane, features)
 }
 
-/// The first kind in the table that is worked out from this, of features of this kind, for each of
-/// these numbers of features.
+/// For each number of features, the first kind in the table on this basis that takes as many
+/// features of this kind.
 fn kinds(basis: Basis, kind: FeatureKind, features: &[usize]) -> Vec<Measure> {
     let first = |&count: &usize| {
         let mut all = Measure::examples().into_iter();

@@ -1,5 +1,5 @@
-//! Options that describe projected pictures, for `import` and `patterns`; lists, ranges and sizes in
-//! them, each number of which has bounds that a refusal names.
+//! Options that describe projected pictures, for `import` and `patterns`; the lists, ranges
+//! and sizes in them have bounds, which a refusal names.
 
 use crate::description::{
     BitOrder, Convention, Description, Direction, Fringes, Gray, PerDirection, Section, ShiftSign,

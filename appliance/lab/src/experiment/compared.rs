@@ -198,7 +198,7 @@ pub struct BetterSequence {
     pub sines: bool,
 }
 
-/// There is no better sequence of so many frames.
+/// There is no better sequence of this number of frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{frames} frames make no sequence")]
 pub struct NoSequence {
@@ -267,7 +267,7 @@ impl BetterSequence {
     /// 4 frames.
     pub const FOUR: Self = Self::new(4);
 
-    /// The sequence of so many frames, with the brightest waveforms.
+    /// The sequence of `frames` frames, with the brightest waveforms.
     pub const fn new(frames: usize) -> Self {
         let sines = false;
         Self { frames, sines }
@@ -287,7 +287,7 @@ impl BetterSequence {
     /// What each frame shows.
     ///
     /// # Errors
-    /// If there is no sequence of so many frames.
+    /// [`NoSequence`]
     pub fn shots(self) -> Result<Vec<Shot>, NoSequence> {
         let waveforms: Waveforms = match self.sines {
             true => Waveform::sine,

@@ -79,7 +79,7 @@ pub(super) fn notes(
                 let of_code =
                     code::notes_beside(recording, (pattern, &channel), finest, description)?;
                 let named = match of_code {
-                    // The code tells what a single level can.
+                    // With a code, a single level needs no other check.
                     Some(said) if !said.is_empty() || levels.len() == 1 => {
                         let named = !said.is_empty();
                         said.into_iter().for_each(&mut note);
@@ -177,7 +177,7 @@ fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(Strin
     }
 }
 
-/// Every so many rows of the wrapped phases.
+/// A sample of the rows of the wrapped phases.
 struct Rows {
     levels: Vec<PhaseMap>,
     code: Option<Vec<Seen>>,
@@ -396,7 +396,7 @@ fn response(channel: &Channel<'_>, rows: &Rows) -> Option<(f64, usize)> {
 }
 
 /// The ripple of the difference of two levels, `factor` φ_coarse − φ_fine, that a response which is
-/// not linear makes: of so many periods per fringe as there are shifts. Half its height in turns,
+/// not linear makes: with as many periods per fringe as there are shifts. Half its height in turns,
 /// if the difference is nothing but that.
 fn ripple(coarse: &PhaseMap, fine: &PhaseMap, factor: f64, shifts: usize) -> Option<f64> {
     let mut sums = [[0.0_f64; 2]; BINS];

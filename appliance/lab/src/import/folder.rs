@@ -86,7 +86,7 @@ fn files(folder: &Path, pattern: &str) -> Result<Vec<PathBuf>> {
             known.any(|known| known.eq_ignore_ascii_case(ending))
         });
         let name = name(path);
-        // Hidden files are none of the camera's: macOS puts a "._" companion beside each picture
+        // Hidden files do not come from the camera: macOS puts a "._" companion beside each picture
         // that it copies.
         known && !name.starts_with('.') && fits(&name, pattern) && path.is_file()
     };
@@ -146,7 +146,7 @@ fn matches(name: &str, pattern: &str) -> bool {
     pattern[next..].iter().all(|letter| *letter == '*')
 }
 
-/// Most cameras that are told apart by names.
+/// Most cameras whose pictures are distinguished by their names.
 const MAX_CAMERAS: usize = 8;
 
 /// Patterns that divide the names into cameras of `expected` pictures each: names that differ in

@@ -194,7 +194,7 @@ fn epipolar(recording: &Recording) -> Result<Option<String>, Failed> {
     )))
 }
 
-/// Marks what lies near the ends of the raster, of so many fringes, as out of range.
+/// Marks pixels near the ends of a raster of `fringes` fringes as out of range.
 fn leave_out_edges(map: &mut PhaseMap, fringes: f64) {
     for (phase, trust) in map.phase.iter().zip(&mut map.trust) {
         let share = phase.turns() / fringes;

@@ -12,7 +12,7 @@ use hal::model::DeviceModel;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
 
-/// About so many pixels are looked at.
+/// Most pixels that are used, about.
 const MOST: usize = 40_000;
 /// Fewer points make no plane.
 const LEAST: usize = 100;
@@ -24,7 +24,7 @@ const STEPS: usize = 6;
 const SHARE: f64 = 1e-5;
 /// Fits of the plane; each leaves out the points that were far off the one before.
 const FITS: usize = 12;
-/// Points are far off if their distance is so many times the median distance.
+/// A point is far off if its distance is more than this many times the median distance.
 const FAR: f64 = 4.0;
 
 /// Moves the world of a recording's models, whose camera stands at the origin and looks along −z,

@@ -21,6 +21,24 @@ use tokio_stream::wrappers::ReceiverStream;
 
 /// Pause after a connection that could not be accepted, because no file descriptor is left.
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+/// The most results of one answer.
+const MOST_RESULTS: u32 = 10_000;
+/// Bytes of a line that is too long for any collector.
+const LINE: usize = 1 << 30;
+/// Bytes of a piece.
+const PIECE: usize = 64 << 10;
+/// Bytes that a slow head sends before each pause: 10 kB/s.
+const SLOW: usize = 1000;
+/// Pause of a slow head.
+const PAUSE: Duration = Duration::from_millis(100);
+/// Bytes after which a head breaks off: the header and part of a result.
+const CUT: usize = 700;
+
+/// The body of an answer, made while it is sent.
+type Body = StreamBody<ReceiverStream<Result<Frame<Bytes>, io::Error>>>;
+type Answer = Response<Body>;
+/// The lines of an answer.
+type Lines = Box<dyn Iterator<Item = Vec<u8>> + Send>;
 
 /// Answers until the program is stopped.
 pub async fn serve(listener: TcpListener, plant: Arc<Plant>) -> ! {
@@ -46,11 +64,6 @@ async fn connection(stream: TokioIo<TcpStream>, plant: Arc<Plant>) {
         .serve_connection(stream, service)
         .await;
 }
-
-/// The most results of one answer.
-const MOST_RESULTS: u32 = 10_000;
-
-type Answer = Response<Body>;
 
 /// The answer to a request of the path and query `uri`.
 ///
@@ -141,12 +154,6 @@ fn results(head: &Head, after: u32, limit: u32) -> Lines {
     Box::new(once(header).chain(found.map(move |seq| line(&row(&head, seq)))))
 }
 
-/// Bytes of a line that is too long for anyone.
-const LINE: usize = 1 << 30;
-
-/// The lines of an answer.
-type Lines = Box<dyn Iterator<Item = Vec<u8>> + Send>;
-
 /// The hostile answer to a request for results behind `after`, if the fault is one of that kind.
 fn hostile(head: &Head, fault: Fault, after: u32) -> Option<Lines> {
     let mut head = head.clone();
@@ -170,17 +177,6 @@ fn hostile(head: &Head, fault: Fault, after: u32) -> Option<Lines> {
     };
     Some(Box::new(once(header).chain(rows)))
 }
-
-/// Bytes of a piece.
-const PIECE: usize = 64 << 10;
-/// A slow head sends so many bytes, then pauses: 10 kB/s.
-const SLOW: usize = 1000;
-const PAUSE: Duration = Duration::from_millis(100);
-/// A head that breaks off has sent so many bytes: the header and some of a result.
-const CUT: usize = 700;
-
-/// What is sent.
-type Body = StreamBody<ReceiverStream<Result<Frame<Bytes>, io::Error>>>;
 
 /// A body of lines, on a head with a fault or without one.
 fn body(mut lines: impl Iterator<Item = Vec<u8>> + Send + 'static, fault: Option<Fault>) -> Body {

@@ -46,7 +46,7 @@ fn titles(gauge: &Gauge) -> String {
     columns.map(quoted).concat()
 }
 
-/// One result, with the columns of so many gauges.
+/// One result, with columns for this many gauges.
 fn line(row: &Row, gauges: usize) -> String {
     let time = row.at_unix_ms.map_or(String::new(), utc);
     let source = match &*row.clock {

@@ -23,6 +23,18 @@ const DRIFT: i64 = 3600;
 /// Standard deviation of [`bell`]: √(4 · 65536² / 12).
 const SPREAD: i64 = 37_837;
 
+/// One result in this many has a gauge without a value.
+const UNSEEN: u64 = 500;
+/// One result in this many has no measurement.
+const FAILED: u64 = 3000;
+/// Results after which the recipe of a head that makes two parts changes.
+const CHANGEOVER: u32 = 500;
+/// ERROR_CODE of a result without a measurement: frames that fit no pattern.
+const NO_MEASUREMENT: u16 = 302;
+/// RESULT flags: the full sequence and a simulated head; a doubtful decision.
+const FLAGS: u16 = 1 << 3 | 1 << 5;
+const IS_DOUBTFUL: u16 = 1 << 7;
+
 /// Name, unit, centre, standard deviation of the scatter, lower and upper limit.
 type Shape = (
     &'static str,
@@ -160,17 +172,6 @@ fn bell(number: u64) -> i64 {
     let parts = [0, 16, 32, 48].map(|shift| number >> shift & 0xffff);
     parts.iter().sum::<u64>() as i64 - 131_070
 }
-
-/// Of so many results one has a gauge without a value, or cannot be judged at all.
-const UNSEEN: u64 = 500;
-const FAILED: u64 = 3000;
-/// Results after which the recipe of a head that makes two parts changes.
-const CHANGEOVER: u32 = 500;
-/// ERROR_CODE of a result without a measurement: frames that fit no pattern.
-const NO_MEASUREMENT: u16 = 302;
-/// RESULT flags: the full sequence, a simulated head, a doubtful decision.
-const FLAGS: u16 = 1 << 3 | 1 << 5;
-const IS_DOUBTFUL: u16 = 1 << 7;
 
 /// Result `seq` of a head.
 pub fn row(head: &Head, seq: u32) -> Row {

@@ -127,7 +127,7 @@ impl Picture {
         }
     }
 
-    /// Reads a page (from 0) of a file; the format is told by its first bytes.
+    /// Reads a page (from 0) of a file; its first bytes say the format.
     ///
     /// # Errors
     /// [`PictureError`]
