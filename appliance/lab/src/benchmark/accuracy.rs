@@ -72,53 +72,55 @@ impl Point {
     }
 }
 
-/// The patterns that are compared.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Pattern {
+/// A sequence that is compared, by its number of frames.
+#[derive(Clone, Copy)]
+enum Compared {
     /// 100 fringes, three geometric levels of sines.
-    Fixed,
-    /// Made for the part, with the sequences of the experiments.
-    Better,
+    Fixed(usize),
+    /// A pattern made for the part, with a sequence of the experiments.
+    Better(usize),
 }
-
-/// A sequence that is compared: its pattern and its number of frames.
-struct Compared(Pattern, usize);
 
 /// The noise of all measurements.
 const SEED: u64 = 1;
 
 const SEQUENCES: [Compared; 10] = [
-    Compared(Pattern::Fixed, 9),
-    Compared(Pattern::Fixed, 12),
-    Compared(Pattern::Fixed, 24),
-    Compared(Pattern::Better, 24),
-    Compared(Pattern::Better, 12),
-    Compared(Pattern::Better, 9),
-    Compared(Pattern::Better, 6),
-    Compared(Pattern::Better, 5),
-    Compared(Pattern::Better, 4),
-    Compared(Pattern::Better, 3),
+    Compared::Fixed(9),
+    Compared::Fixed(12),
+    Compared::Fixed(24),
+    Compared::Better(24),
+    Compared::Better(12),
+    Compared::Better(9),
+    Compared::Better(6),
+    Compared::Better(5),
+    Compared::Better(4),
+    Compared::Better(3),
 ];
 
 impl Compared {
-    fn name(&self) -> &'static str {
-        match self.0 {
-            Pattern::Fixed => "fixed",
-            Pattern::Better => "better",
+    fn name(self) -> &'static str {
+        match self {
+            Self::Fixed(_) => "fixed",
+            Self::Better(_) => "better",
         }
     }
 
-    fn method(&self) -> Method {
-        match self.0 {
-            Pattern::Fixed => Method::Fixed { fringes: 100 },
-            Pattern::Better => Method::Better(BetterSequence::new(self.1)),
+    fn frames(self) -> usize {
+        let (Self::Fixed(frames) | Self::Better(frames)) = self;
+        frames
+    }
+
+    fn method(self) -> Method {
+        match self {
+            Self::Fixed(_) => Method::Fixed { fringes: 100 },
+            Self::Better(frames) => Method::Better(BetterSequence::new(frames)),
         }
     }
 
-    fn shots(&self, range: PhaseRange) -> Result<Vec<Shot>, Failed> {
-        match self.0 {
-            Pattern::Fixed => Ok(Sequence::geometric(range, 3, self.1 / 3)),
-            Pattern::Better => Ok(BetterSequence::new(self.1).shots()?),
+    fn shots(self, range: PhaseRange) -> Result<Vec<Shot>, Failed> {
+        match self {
+            Self::Fixed(frames) => Ok(Sequence::geometric(range, 3, frames / 3)),
+            Self::Better(frames) => Ok(BetterSequence::new(frames).shots()?),
         }
     }
 }
@@ -168,11 +170,11 @@ impl Study {
                     ..scene
                 };
                 let mut runner = Runner::new(&scene, OpticsKind::Sharp)?;
-                for compared in &SEQUENCES {
+                for compared in SEQUENCES {
                     let words = format!(
                         "{part}, {bit_depth} bit, {}-{}",
                         compared.name(),
-                        compared.1
+                        compared.frames()
                     );
                     progress(done / total, &words);
                     points.extend(self.compare(
@@ -192,7 +194,7 @@ impl Study {
     fn compare(
         &self,
         runner: &mut Runner,
-        compared: &Compared,
+        compared: Compared,
         part: &'static str,
         bits: u8,
         floor: &mut Floor,
@@ -226,7 +228,7 @@ impl Study {
                 part,
                 implementation,
                 sequence: compared.name(),
-                frames: compared.1,
+                frames: compared.frames(),
                 shifts: sequence.levels().last().map_or(0, Level::shifts),
                 bits,
                 skipping,
