@@ -1,6 +1,6 @@
 //! A plant to try the collector on: answers as many heads would, from one process, without light.
 //!
-//! ```sh
+//! ```text
 //! cargo run --release -p fringed-fleet --example plant -- --heads 30 --rate 1
 //! ```
 //!
