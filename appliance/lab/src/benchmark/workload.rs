@@ -185,7 +185,7 @@ impl Workload {
 /// ratio and shift of each frame and the fringes of the finest level.
 ///
 /// # Errors
-/// As [`Workload::render`].
+/// If there are no frames of this size.
 pub fn frame_files((width, height): (usize, usize)) -> Result<Vec<(String, Vec<u8>)>, Failed> {
     let workload = Workload::geometric();
     let set = workload.render((width, height))?;

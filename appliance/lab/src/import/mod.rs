@@ -12,7 +12,7 @@ mod geometry;
 mod picture;
 mod plane;
 
-pub use picture::{Channel, Picture};
+pub use picture::{Channel, Picture, PictureError};
 
 use crate::Failed;
 use crate::description::Description;
