@@ -1,4 +1,4 @@
-"""What the heads of `fringed-fleet simulate` have made, worked out without it.
+"""What the heads of the example `plant` of `fringed-fleet` have made, worked out without it.
 
 A result is a function of (seed, head, history, seq); values are whole millionths of their unit.
 """

@@ -212,11 +212,11 @@ class ZooKeeper(Process):
 
 
 class Plant(Process):
-    """`fringed-fleet simulate`; `said` is its first line."""
+    """The example `plant` of the package fringed-fleet, which Cargo puts beside the program; `said` is its first line."""
 
     def __init__(self, folder, fleet, name="plant", **options):
         words = [f"--{key}={value}" for key, value in {"listen": "127.0.0.1:0", **options}.items()]
-        super().__init__(folder, name, [fleet, "simulate", *words])
+        super().__init__(folder, name, [pathlib.Path(fleet).parent / "examples" / "plant", *words])
         self.said = json.loads(wait_for("the simulated heads answer", 20, lambda: self.log.read_text().partition("\n")[0]))
         self.url = f"http://{self.said['listen']}/h"
         self.heads = f"{self.url}/{{0001..{self.said['heads']:04}}}"

@@ -1,4 +1,4 @@
-//! What a head answers, line by line, and what of it is believed.
+//! What a head answers, line by line, and which lines are accepted.
 //!
 //! The format is that of `GET /api/results` (docs/api.md). A head that sends anything else is
 //! named and left alone for a while; nothing that it sends is stored unless it could be a result.
@@ -104,7 +104,7 @@ pub enum Wrong {
     /// It is JSON of the right form, with a value of this key that no head has.
     #[error("{0} of result {1} cannot be")]
     Value(&'static str, u32),
-    /// The first and the last of the header contradict each other, or an id is none.
+    /// The first and the last of the header contradict each other, or an id is not valid.
     #[error("its header cannot be: first {}, last {}", number(*.0), number(*.1))]
     Header(Option<u32>, Option<u32>),
     /// A head with this serial answers in place of the one with the second.
@@ -126,7 +126,7 @@ pub enum Wrong {
     More(u32),
 }
 
-/// A number of a result, in words where there is none.
+/// A number of a result, or the word "none".
 fn number(seq: Option<u32>) -> String {
     seq.map_or("none".to_owned(), |seq| seq.to_string())
 }

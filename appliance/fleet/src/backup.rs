@@ -39,7 +39,7 @@ pub struct Backup {
     json: bool,
 }
 
-/// What of a recipe in `GET /api/recipes` is read.
+/// The keys of a recipe in `GET /api/recipes` that are read.
 #[derive(Deserialize, Serialize)]
 struct Recipe {
     number: u16,

@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::mechanics::{Dice, Event, FreeRunning, Mechanics};
+use super::mechanics::{Dice, FreeRunning, Mechanics, Mishap};
 use super::{Bench, Scene, VirtualDevice, lock};
 use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::error::{DeviceKind, Error};
@@ -62,12 +62,12 @@ impl Sensor {
             || mechanics.camera().starts != Starts::OnTrigger
             || now < self.busy_until
             || faults.wire_open
-            || dice.happens(Event::LostTrigger, self.count ^ now.0, faults.lost_trigger);
+            || dice.happens(Mishap::LostTrigger, self.count ^ now.0, faults.lost_trigger);
         if lost {
             return;
         }
         let jitter = Duration::from_micros(faults.trigger_jitter_us);
-        let start = now + dice.up_to(Event::TriggerJitter, self.count, 1.0, jitter);
+        let start = now + dice.up_to(Mishap::TriggerJitter, self.count, 1.0, jitter);
         let longer = length.saturating_sub(mechanics.exposure);
         self.busy_until = now + (mechanics.camera().period + mechanics.dead + longer);
         self.expose(start, length, mechanics, dice);
@@ -80,13 +80,13 @@ impl Sensor {
             return;
         }
         self.count += 1;
-        if dice.happens(Event::Dropped, n, faults.dropped) {
+        if dice.happens(Mishap::Dropped, n, faults.dropped) {
             return;
         }
         let late = Duration::from_micros(faults.late_frame_us);
-        let late = dice.up_to(Event::LateFrame, n, faults.late_frame, late);
+        let late = dice.up_to(Mishap::LateFrame, n, faults.late_frame, late);
         let mut ready = start + (length + mechanics.readout + late);
-        if dice.happens(Event::Swapped, n, faults.swapped) {
+        if dice.happens(Mishap::Swapped, n, faults.swapped) {
             ready = ready + (mechanics.camera().period + mechanics.exposure / 4);
         }
         if !mechanics.copy.is_zero() {
@@ -98,7 +98,7 @@ impl Sensor {
             length,
             count: n,
             ready,
-            twice: dice.happens(Event::Duplicated, n, faults.duplicated),
+            twice: dice.happens(Mishap::Duplicated, n, faults.duplicated),
         };
         let place = self
             .exposures
@@ -132,7 +132,7 @@ impl Sensor {
             .filter(|start| *start + jitter <= now)
         {
             self.since += 1;
-            let off = dice.up_to(Event::TriggerJitter, self.count, 1.0, jitter);
+            let off = dice.up_to(Mishap::TriggerJitter, self.count, 1.0, jitter);
             self.expose(start + off, mechanics.exposure, mechanics, dice);
             let busy = mechanics.exposure + mechanics.readout + mechanics.dead;
             self.busy_until = start + off + busy;
@@ -199,7 +199,7 @@ impl<S: Scene> Bench<S> {
         let jitter = Duration::from_micros(mechanics.faults.stamp_jitter_us);
         let off = self
             .dice
-            .up_to(Event::StampJitter, exposure.count, 1.0, 2 * jitter);
+            .up_to(Mishap::StampJitter, exposure.count, 1.0, 2 * jitter);
         let frame = self.scene.expose(
             seen,
             marked + (mechanics.stamp_late + off) - jitter,

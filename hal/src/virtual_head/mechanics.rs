@@ -185,7 +185,7 @@ bounded! {
 
 /// A random event; each has random numbers of its own.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Event {
+pub(super) enum Mishap {
     LateFlip = 1,
     FlipJitter,
     LateNews,
@@ -213,7 +213,7 @@ impl Dice {
     }
 
     /// Two independent numbers, 0 ≤ x < 1.
-    fn throw(self, kind: Event, n: u64) -> (f64, f64) {
+    fn throw(self, kind: Mishap, n: u64) -> (f64, f64) {
         let seed = self
             .seed
             .wrapping_add((kind as u64) << 56)
@@ -224,12 +224,12 @@ impl Dice {
     }
 
     /// Whether the n-th event of a kind happens.
-    pub fn happens(self, kind: Event, n: u64, chance: f64) -> bool {
+    pub fn happens(self, kind: Mishap, n: u64, chance: f64) -> bool {
         chance > 0.0 && self.throw(kind, n).0 < chance
     }
 
     /// A random time up to `most` if the n-th event of a kind happens, else zero.
-    pub fn up_to(self, kind: Event, n: u64, chance: f64, most: Duration) -> Duration {
+    pub fn up_to(self, kind: Mishap, n: u64, chance: f64, most: Duration) -> Duration {
         if chance <= 0.0 || most.is_zero() {
             return Duration::ZERO;
         }

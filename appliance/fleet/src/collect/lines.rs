@@ -1,9 +1,22 @@
-//! The lines of an answer, each of which is bounded in length and time.
+//! The lines of an answer, each bounded in length and time, and the ways in which reading them fails.
 
-use super::trouble::Trouble;
 use crate::answer::{MOST_LINE, Wrong};
-use crate::http::{ANSWERING, next, within};
+use crate::http::{ANSWERING, HttpError, next, within};
 use hyper::body::Incoming;
+
+/// Why a question failed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Trouble {
+    /// No answer, or none that says 200.
+    #[error(transparent)]
+    Http(#[from] HttpError),
+    /// An answer that no head gives.
+    #[error(transparent)]
+    Wrong(#[from] Wrong),
+    /// An answer without its end.
+    #[error("the answer ends in the middle of a line")]
+    Cut,
+}
 
 /// Reads a body line by line.
 pub(super) struct Lines {

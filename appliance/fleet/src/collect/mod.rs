@@ -8,8 +8,6 @@
 
 mod lines;
 mod poll;
-mod tally;
-mod trouble;
 mod writer;
 
 use crate::config::Fleet;
@@ -18,20 +16,26 @@ use crate::log::{self, Severity};
 use crate::part::Part;
 use crate::store::Store;
 use poll::{Plant, Poll};
+use serde_json::json;
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
-use tally::Tally;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::mpsc;
 use tokio::task::JoinSet;
-use tokio::time::timeout;
+use tokio::time::{Instant, interval, timeout};
 use writer::until_it_works;
 
 /// Pieces that wait for the writer.
 const WAITING: usize = 32;
 /// Longest time for the last batch after a stop.
 const STOPPING: Duration = Duration::from_secs(5);
+
+/// Time between two lines about how it goes.
+const TELLING: Duration = Duration::from_secs(10);
+/// People get one line in this many, programs all.
+const FEWER: u64 = 6;
 
 /// Fetch the results of every head and write them to the store, until it is stopped.
 #[derive(Debug, clap::Args)]
@@ -115,5 +119,61 @@ impl Collect {
             }
         }
         Ok(())
+    }
+}
+
+/// How the collecting goes.
+#[derive(Debug, Default)]
+struct Tally {
+    /// Results that were written, those that the store had already included.
+    rows: AtomicU64,
+    /// Whether the head of each address answered the last question.
+    answers: Mutex<HashMap<String, bool>>,
+}
+
+impl Tally {
+    /// Counts a head among those that answer, those that do not, or neither; answers whether that is
+    /// new.
+    fn note(&self, url: &str, now: Option<bool>) -> bool {
+        let mut answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
+        now != match now {
+            Some(now) => answers.insert(url.to_owned(), now),
+            None => answers.remove(url),
+        }
+    }
+
+    /// How many heads answer, and how many do not.
+    fn heads(&self) -> (usize, usize) {
+        let answers = self.answers.lock().unwrap_or_else(PoisonError::into_inner);
+        let answering = answers.values().filter(|answers| **answers).count();
+        (answering, answers.len() - answering)
+    }
+
+    /// Tells how it goes for as long as the program runs: as a line of JSON on stdout, or now and
+    /// then in words.
+    async fn tell(&self, as_json: bool) {
+        let mut ticks = interval(TELLING);
+        let (mut before, mut since) = (0, Instant::now());
+        for tick in 0u64.. {
+            ticks.tick().await;
+            if tick == 0 || !(as_json || tick.is_multiple_of(FEWER)) {
+                continue;
+            }
+            let (rows, (answering, failing)) = (self.rows.load(Relaxed), self.heads());
+            let per_s = (rows - before) as f64 / since.elapsed().as_secs_f64();
+            (before, since) = (rows, Instant::now());
+            if as_json {
+                let rate = (per_s * 10.0).round() / 10.0;
+                let counts = json!({ "answering": answering, "failing": failing, "rows": rows, "rows_per_s": rate });
+                say!("{counts}");
+            } else {
+                log::write(
+                    Severity::Info,
+                    format_args!(
+                        "{answering} heads answer, {failing} do not; {rows} results, {per_s:.0} per s"
+                    ),
+                );
+            }
+        }
     }
 }

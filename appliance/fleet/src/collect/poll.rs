@@ -1,8 +1,7 @@
 //! Asks one head for its results and its state, again and again.
 
-use super::lines::Lines;
-use super::tally::Tally;
-use super::trouble::Trouble;
+use super::Tally;
+use super::lines::{Lines, Trouble};
 use crate::answer::{Header, LIFE, Row, Wrong};
 use crate::config::{Config, HeadConfig};
 use crate::http::{Client, shortened};

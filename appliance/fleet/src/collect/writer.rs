@@ -1,7 +1,7 @@
 //! Puts what the heads bring into batches, and writes each until it is written.
 
+use super::Tally;
 use super::poll::PIECE;
-use super::tally::Tally;
 use crate::error::{Exit, Failure};
 use crate::log::{self, Severity};
 use crate::now_ms;

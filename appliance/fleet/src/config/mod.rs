@@ -1,8 +1,6 @@
 //! `fleet.toml`: which heads there are, and where their results go. A key is described in
 //! docs/fleet.md, whose table the tests compare with the structs.
 
-mod range;
-
 use crate::error::{Exit, Result};
 use crate::http::{Url, trusting};
 use rustls::ClientConfig;
@@ -60,7 +58,7 @@ pub struct Config {
     pub poll: Duration,
     /// Pause between two questions for the state.
     pub state: Duration,
-    /// How long results are kept, if not for ever.
+    /// How long results are kept; `None`: never deleted.
     pub keep: Option<Duration>,
     /// Whom connections trust, with https.
     pub tls: Option<Arc<ClientConfig>>,
@@ -129,7 +127,7 @@ fn checked(written: Written, store: Option<String>) -> Result<Config> {
     let mut known = BTreeSet::new();
     for row in written.heads {
         let wrong = Exit::Configuration.because(format!("heads.url = {:?}", row.url));
-        let urls = range::expanded(&row.url, MOST_HEADS).map_err(&wrong)?;
+        let urls = expanded(&row.url, MOST_HEADS).map_err(&wrong)?;
         if row.serial.is_some() && urls.len() > 1 {
             let words = format!("{}: a serial is of one head: give each a table", row.url);
             return Exit::Configuration.fail(words);
@@ -160,6 +158,38 @@ fn checked(written: Written, store: Option<String>) -> Result<Config> {
     })
 }
 
+/// Every text that `text` stands for, at most `most`: `{0001..0030}` stands for 30 numbers with four
+/// digits.
+///
+/// # Errors
+/// If a range is wrong or there are too many, in words.
+fn expanded(text: &str, most: usize) -> Result<Vec<String>, String> {
+    let mut all = vec![String::new()];
+    let mut rest = text;
+    while let Some((before, behind)) = rest.split_once('{') {
+        let (range, after) = behind.split_once('}').ok_or("close the range with }")?;
+        let wrong = || format!("{{{range}}}: write a range as {{01..12}}");
+        let (first, last) = range.split_once("..").ok_or_else(wrong)?;
+        let number = |text: &str| text.parse::<u32>().map_err(|_| wrong());
+        let (from, to) = (number(first)?, number(last)?);
+        let count = to.checked_sub(from).ok_or_else(wrong)? as usize + 1;
+        if count.saturating_mul(all.len()) > most {
+            return Err(format!("it stands for more than {most}"));
+        }
+        let width = first.len();
+        let longer = |start: &String| {
+            let start = format!("{start}{before}");
+            (from..=to).map(move |number| format!("{start}{number:0width$}"))
+        };
+        all = all.iter().flat_map(longer).collect();
+        rest = after;
+    }
+    for text in &mut all {
+        text.push_str(rest);
+    }
+    Ok(all)
+}
+
 impl Config {
     /// The URL of the store.
     ///
@@ -172,10 +202,10 @@ impl Config {
         }
     }
 
-    /// The heads, of which there is at least one.
+    /// The heads, at least one.
     ///
     /// # Errors
-    /// If there is none.
+    /// If no heads are named.
     pub fn heads(&self) -> Result<&[HeadConfig]> {
         if self.heads.is_empty() {
             let words = "no heads are named: add --heads URL, or write fleet.toml";
@@ -186,4 +216,72 @@ impl Config {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<Config> {
+        let wrong = Exit::Configuration.because("text");
+        checked(toml::from_str(text).map_err(wrong)?, None)
+    }
+
+    #[test]
+    fn a_range_stands_for_addresses_with_as_many_digits() {
+        let urls = |text| expanded(text, 1000);
+        assert_eq!(urls("http://a/").unwrap(), ["http://a/"]);
+        let three = ["x/08/", "x/09/", "x/10/"];
+        assert_eq!(urls("x/{08..10}/").unwrap(), three);
+        assert_eq!(urls("{1..2}.{3..4}").unwrap(), ["1.3", "1.4", "2.3", "2.4"]);
+        for wrong in ["{1..", "{a..b}", "{3..1}", "{1-3}", "{0..1000}"] {
+            assert!(urls(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn the_table_has_every_key_and_no_other() {
+        let document = include_str!("../../../../docs/fleet.md");
+        let (_, section) = document.split_once("\n## Keys of fleet.toml\n").unwrap();
+        let (section, _) = section.split_once("\n## ").unwrap();
+        let documented = section.lines().filter_map(|row| row.strip_prefix("| `"));
+        let documented: Vec<_> = documented.filter_map(|row| row.split('`').next()).collect();
+        // What the error about an unknown key lists is what the code knows.
+        let known = |text: &str| {
+            let error = toml::from_str::<Written>(text).unwrap_err().to_string();
+            let list = error.split("expected one of ").nth(1).unwrap().to_owned();
+            list.split('`')
+                .skip(1)
+                .step_by(2)
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        let mut keys = known("unknown = 1");
+        let inner = known("[[heads]]\nunknown = 1");
+        keys.extend(inner.iter().map(|key| format!("heads.{key}")));
+        assert_eq!(documented, keys);
+    }
+
+    #[test]
+    fn a_wrong_configuration_is_refused_by_its_key() {
+        let head = "[[heads]]\nurl = \"http://a/{1..2}\"\n";
+        assert_eq!(read(head).unwrap().heads.len(), 2);
+        for (text, named) in [
+            ("poll_s = 0.01", "poll_s"),
+            ("state_s = nan", "state_s"),
+            ("keep_days = 0", "keep_days"),
+            ("pol_s = 1", "pol_s"),
+            ("[[heads]]\nurl = \"ftp://a\"", "ftp://a"),
+            (&*format!("{head}serial = \"x\""), "serial"),
+            (&*format!("{head}{head}"), "twice"),
+        ] {
+            let failure = read(text).unwrap_err();
+            assert_eq!(failure.exit, Exit::Configuration);
+            assert!(failure.message.contains(named), "{failure}");
+        }
+    }
+
+    #[test]
+    fn the_example_is_a_configuration() {
+        let example = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/fleet/fleet.toml");
+        let config = read(&fs::read_to_string(example).unwrap()).unwrap();
+        assert!(config.heads.len() > 5);
+    }
+}

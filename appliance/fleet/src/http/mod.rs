@@ -6,20 +6,22 @@
 //! followed: a head is where the configuration says. Encryption is `rustls` with `ring`, which
 //! needs no library of the system.
 
-mod tls;
 mod url;
 
-pub use tls::trusting;
 pub use url::Url;
 
+use crate::error::{Exit, Result};
 use http_body_util::{BodyExt as _, Full};
 use hyper::body::{Bytes, Incoming};
 use hyper::client::conn::http1::{self, SendRequest};
 use hyper::{Method, Request, Response, header};
 use hyper_util::rt::TokioIo;
-use rustls::ClientConfig;
-use rustls::pki_types::ServerName;
+use rustls::pki_types::pem::PemObject as _;
+use rustls::pki_types::{CertificateDer, ServerName};
+use rustls::{ClientConfig, RootCertStore};
+use std::error::Error;
 use std::io;
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::io::{AsyncRead, AsyncWrite};
@@ -281,4 +283,25 @@ pub fn shortened(text: &str) -> String {
         Some((at, _)) => format!("{}…", &text[..at]),
         None => text.to_owned(),
     }
+}
+
+/// A client configuration that trusts only the authorities in a PEM file of certificates.
+///
+/// # Errors
+/// If the file cannot be read, or holds no certificate.
+pub fn trusting(file: &Path) -> Result<Arc<ClientConfig>> {
+    let wrong = Exit::Configuration.because(format!("read certificates of {}", file.display()));
+    let config = ClientConfig::builder().with_root_certificates(roots(file).map_err(wrong)?);
+    Ok(Arc::new(config.with_no_client_auth()))
+}
+
+fn roots(file: &Path) -> Result<RootCertStore, Box<dyn Error>> {
+    let mut roots = RootCertStore::empty();
+    for certificate in CertificateDer::pem_file_iter(file)? {
+        roots.add(certificate?)?;
+    }
+    if roots.is_empty() {
+        return Err("there is none: write them as PEM".into());
+    }
+    Ok(roots)
 }

@@ -4,8 +4,7 @@
 //! of them does not know are not set. Of several servers the first that answers is used, until it
 //! does not.
 
-use super::schema::{Kind, schema, statements};
-use super::{Batch, Complaint, Received};
+use super::{Batch, Complaint, Kind, Received, schema, statements};
 use crate::answer::{Gauge, Row};
 use crate::http::{Client, HttpError, Url};
 use hyper::body::Bytes;
@@ -71,7 +70,7 @@ impl ClickHouse {
         for statement in statements(&schema(Kind::ClickHouse)) {
             self.post(self.of_database(), statement.into()).await?;
         }
-        // A store of a version before has results of which this table knows nothing.
+        // A store of an earlier version has results that this table lacks.
         let known = self
             .lines("SELECT 1 AS known FROM result_at LIMIT 1")
             .await?;

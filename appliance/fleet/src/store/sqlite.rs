@@ -4,8 +4,7 @@
 //! log is synced only when it is brought into the database: what a loss of power takes is asked for
 //! again.
 
-use super::schema::{Kind, schema};
-use super::{Batch, Complaint};
+use super::{Batch, Complaint, Kind, schema};
 use rusqlite::types::Value as Sql;
 use rusqlite::{Connection, Transaction, params_from_iter};
 use serde_json::{Value, json};

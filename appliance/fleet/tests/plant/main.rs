@@ -6,6 +6,8 @@
 mod clickhouse;
 mod commands;
 mod embedded;
+#[path = "../../examples/plant/heads/mod.rs"]
+mod heads;
 mod hostile;
 mod impostor;
 mod program;

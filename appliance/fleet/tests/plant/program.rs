@@ -1,12 +1,14 @@
 //! Runs the program, as often and as long as a test needs it.
 
-use serde_json::Value;
+use super::heads::{self, Options, serve};
+use clap::Parser as _;
 use std::fs::{self, File};
-use std::io::{BufRead as _, BufReader};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
+use tokio::net::TcpListener;
+use tokio::sync::oneshot;
 
 /// Longest wait for what must happen at last.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -33,12 +35,12 @@ impl Running {
         self.0.wait().unwrap();
     }
 
-    /// SIGTERM; the exit code.
     /// Its exit code, once it has ended by itself.
     pub fn ended(mut self) -> Option<i32> {
         self.0.wait().unwrap().code()
     }
 
+    /// SIGTERM; the exit code.
     pub fn terminate(mut self) -> Option<i32> {
         let id = self.0.id().to_string();
         assert!(Command::new("kill").arg(id).status().unwrap().success());
@@ -54,32 +56,38 @@ impl Drop for Running {
     }
 }
 
-/// Simulated heads.
+/// Heads of the example `plant`, in a thread of their own until this is dropped.
 pub struct Plant {
     /// `127.0.0.1:PORT`.
     pub address: String,
     count: u32,
-    _process: Running,
+    _stop: oneshot::Sender<()>,
 }
 
 impl Plant {
     /// So many heads with these options.
     pub fn of(count: u32, options: &[&str]) -> Self {
         let heads = count.to_string();
-        let mut command = fleet(&["simulate", "--listen", "127.0.0.1:0", "--heads", &heads]);
-        let mut child = command
-            .args(options)
-            .stdout(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut first = String::new();
-        let stdout = child.stdout.take().unwrap();
-        BufReader::new(stdout).read_line(&mut first).unwrap();
-        let said: Value = serde_json::from_str(&first).unwrap();
+        let fixed = ["plant", "--listen", "127.0.0.1:0", "--heads", &heads];
+        let options = Options::try_parse_from(fixed.iter().chain(options)).unwrap();
+        let (stop, stopped) = oneshot::channel();
+        let (bound, address) = std::sync::mpsc::channel();
+        let answering = async move {
+            let listener = TcpListener::bind(&options.listen).await.unwrap();
+            bound.send(listener.local_addr().unwrap()).unwrap();
+            tokio::select! {
+                _ = stopped => (),
+                never = serve(listener, heads::Plant::new(options)) => never,
+            }
+        };
+        std::thread::spawn(|| {
+            let mut runtime = tokio::runtime::Builder::new_current_thread();
+            runtime.enable_all().build().unwrap().block_on(answering);
+        });
         Self {
-            address: said["listen"].as_str().unwrap().to_owned(),
+            address: address.recv().unwrap().to_string(),
             count,
-            _process: Running(child),
+            _stop: stop,
         }
     }
 

@@ -1,15 +1,9 @@
 //! Run time against error: processor time and height error of each implementation, sequence and bit
 //! depth on the simulated parts.
 
-use super::decoding::Decoding;
-use super::effort::Effort;
-use super::floor::FloorSets;
-use super::frames::{FrameSet, Rotation};
-use super::median::median;
-use super::point::Point;
-use super::timing::{Contender, Round, interleaved};
-use super::variants::{decoders, references};
-use super::words;
+use super::kernel::{Decoding, decoders};
+use super::timing::{Effort, Floor, FrameSet, FrameSets, Kernel, Round, interleaved, median};
+use crate::Failed;
 use crate::experiment::{BetterSequence, Method, OpticsKind, Runner, Scene};
 use algo::pattern::{Level, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
@@ -17,6 +11,11 @@ use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
 use appliance::head::calibrated::Measured;
 use appliance::measure::{Score, Truth};
+use appliance::production::stopwatch::timed;
+use hal::frame::Frame;
+use scenes::oracle::unwrap::recognise;
+use scenes::oracle::{PixelTwin, Scale, levels_from};
+use serde::Serialize;
 use std::ops::Range;
 use std::time::Duration;
 
@@ -33,53 +32,95 @@ pub struct Study {
     pub effort: Effort,
 }
 
-/// The patterns that are compared.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Pattern {
-    /// 100 fringes, three geometric levels of sines.
-    Fixed,
-    /// Made for the part, with the sequences of the experiments.
-    Better,
+/// One implementation on one sequence, or the mean over the parts.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Point {
+    /// The part; `mean` over all.
+    pub part: &'static str,
+    /// `f64`, the textbook, or the back-end of the decoder.
+    pub implementation: &'static str,
+    /// `fixed` with geometric levels, or `better` with dense ones or a single one.
+    pub sequence: &'static str,
+    /// Frames of a set.
+    pub frames: usize,
+    /// Shifts of the finest level, N.
+    #[serde(rename = "steps")]
+    pub shifts: usize,
+    /// Bits of a sample.
+    pub bits: u8,
+    /// Whether rows in which the part is not seen are skipped.
+    pub skipping: bool,
+    /// Processor time of the decoding per pixel of a frame.
+    pub ns_per_px: f64,
+    /// Processor time of the decoding, in floors.
+    pub x_floor: f64,
+    /// Processor time of the decoding of a set, ms.
+    pub ms_per_set: f64,
+    /// RMS error of the height without gross errors, mm.
+    pub rms_mm: f64,
+    /// Wholly lit pixels that are not resolved.
+    pub unresolved_px: f64,
+    /// Errors above 1 mm.
+    pub gross_px: f64,
 }
 
-/// A sequence that is compared, of so many frames.
-struct Compared(Pattern, usize);
+impl Point {
+    /// Whether both points are of the same pattern, frames and depth.
+    pub fn same_frames(&self, other: &Self) -> bool {
+        (self.sequence, self.frames, self.shifts, self.bits)
+            == (other.sequence, other.frames, other.shifts, other.bits)
+    }
+}
+
+/// A sequence that is compared, by its number of frames.
+#[derive(Clone, Copy)]
+enum Compared {
+    /// 100 fringes, three geometric levels of sines.
+    Fixed(usize),
+    /// A pattern made for the part, with a sequence of the experiments.
+    Better(usize),
+}
 
 /// The noise of all measurements.
 const SEED: u64 = 1;
 
 const SEQUENCES: [Compared; 10] = [
-    Compared(Pattern::Fixed, 9),
-    Compared(Pattern::Fixed, 12),
-    Compared(Pattern::Fixed, 24),
-    Compared(Pattern::Better, 24),
-    Compared(Pattern::Better, 12),
-    Compared(Pattern::Better, 9),
-    Compared(Pattern::Better, 6),
-    Compared(Pattern::Better, 5),
-    Compared(Pattern::Better, 4),
-    Compared(Pattern::Better, 3),
+    Compared::Fixed(9),
+    Compared::Fixed(12),
+    Compared::Fixed(24),
+    Compared::Better(24),
+    Compared::Better(12),
+    Compared::Better(9),
+    Compared::Better(6),
+    Compared::Better(5),
+    Compared::Better(4),
+    Compared::Better(3),
 ];
 
 impl Compared {
-    fn name(&self) -> &'static str {
-        match self.0 {
-            Pattern::Fixed => "fixed",
-            Pattern::Better => "better",
+    fn name(self) -> &'static str {
+        match self {
+            Self::Fixed(_) => "fixed",
+            Self::Better(_) => "better",
         }
     }
 
-    fn method(&self) -> Method {
-        match self.0 {
-            Pattern::Fixed => Method::Fixed { fringes: 100 },
-            Pattern::Better => Method::Better(BetterSequence::new(self.1)),
+    fn frames(self) -> usize {
+        let (Self::Fixed(frames) | Self::Better(frames)) = self;
+        frames
+    }
+
+    fn method(self) -> Method {
+        match self {
+            Self::Fixed(_) => Method::Fixed { fringes: 100 },
+            Self::Better(frames) => Method::Better(BetterSequence::new(frames)),
         }
     }
 
-    fn shots(&self, range: PhaseRange) -> Result<Vec<Shot>, String> {
-        match self.0 {
-            Pattern::Fixed => Ok(Sequence::geometric(range, 3, self.1 / 3)),
-            Pattern::Better => BetterSequence::new(self.1).shots(),
+    fn shots(self, range: PhaseRange) -> Result<Vec<Shot>, Failed> {
+        match self {
+            Self::Fixed(frames) => Ok(Sequence::geometric(range, 3, frames / 3)),
+            Self::Better(frames) => Ok(BetterSequence::new(frames).shots()?),
         }
     }
 }
@@ -115,8 +156,8 @@ impl Study {
     ///
     /// # Errors
     /// If something cannot be simulated or decoded.
-    pub fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Vec<Point>, String> {
-        let mut base = FloorSets::new(&self.effort);
+    pub fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Vec<Point>, Failed> {
+        let mut floor = Floor::new(&self.effort);
         let mut points = Vec::new();
         let total = (self.parts.len() * self.bit_depths.len() * SEQUENCES.len()) as f64;
         let mut done = 0.0;
@@ -128,12 +169,12 @@ impl Study {
                     bit_depth,
                     ..scene
                 };
-                let mut runner = Runner::new(&scene, OpticsKind::Sharp).map_err(words)?;
-                for compared in &SEQUENCES {
+                let mut runner = Runner::new(&scene, OpticsKind::Sharp)?;
+                for compared in SEQUENCES {
                     let words = format!(
                         "{part}, {bit_depth} bit, {}-{}",
                         compared.name(),
-                        compared.1
+                        compared.frames()
                     );
                     progress(done / total, &words);
                     points.extend(self.compare(
@@ -141,7 +182,7 @@ impl Study {
                         compared,
                         part,
                         bit_depth,
-                        &mut base,
+                        &mut floor,
                     )?);
                     done += 1.0;
                 }
@@ -153,65 +194,90 @@ impl Study {
     fn compare(
         &self,
         runner: &mut Runner,
-        compared: &Compared,
+        compared: Compared,
         part: &'static str,
         bits: u8,
-        base: &mut FloorSets,
-    ) -> Result<Vec<Point>, String> {
+        floor: &mut Floor,
+    ) -> Result<Vec<Point>, Failed> {
         let shots = |range| compared.shots(range).unwrap_or_default();
-        let (measured, map) = runner
-            .measure_with(compared.method(), shots, SEED)
-            .map_err(words)?;
+        let (measured, map) = runner.measure_with(compared.method(), shots, SEED)?;
         let range = measured.triangulator.function().range();
-        let sequence = Sequence::from_frames(&compared.shots(range)?).map_err(words)?;
-        let set = FrameSet::of(&measured.frames, map);
+        let shots = compared.shots(range)?;
+        let sequence = Sequence::from_frames(&shots)?;
+        let set = FrameSet::new(measured.frames.clone(), map);
         let truth = runner.truth();
-        let lit = Truth::from(truth).whole_pixels().count();
-        let pixels = set.pixels();
-        let mut contenders = Vec::new();
-        let mut named = Vec::new();
-        for (name, kernel) in references(&sequence, range, bits, pixels)? {
-            contenders.push(Contender::cold(kernel));
-            named.push((name, false));
-        }
+        let (pixels, width) = (set.pixels(), set.out.width);
+        let mut turns = Vec::new();
+        let taken = timed(|| turns = textbook(&set, &shots, range, bits).unwrap_or_default());
+        let textbook_ns = taken.as_secs_f64() * 1e9 / pixels.max(1) as f64;
+        let mut variants = Vec::new();
+        let mut kernels: Vec<Box<dyn Kernel>> = Vec::new();
         for (name, decoder) in decoders(&sequence, range, bits)? {
-            let window = rows_seen(truth, set.width());
-            for window in [None, Some(window)] {
-                let decoding = Decoding::new(decoder.clone(), window);
-                contenders.push(Contender::cold(Box::new(decoding)));
+            for window in [None, Some(rows_seen(truth, width))] {
+                variants.push((name, window.is_some()));
+                kernels.push(Box::new(Decoding::new(decoder.clone(), window)));
             }
-            named.extend([(name, false), (name, true)]);
         }
-        let mut sets = [Rotation::of(set, self.effort.bytes)];
-        let rounds = interleaved(&mut contenders, &mut sets, base, &self.effort)?;
-        let mut points = Vec::new();
-        for (((implementation, skipping), contender), rounds) in
-            named.into_iter().zip(&mut contenders).zip(rounds)
-        {
-            let set = sets[0].next();
-            contender.kernel.run(set);
-            let score = score(&measured, truth, &contender.kernel.turns(set));
-            let ns_per_px = median(rounds.iter().map(|round| round.cold.ns).collect());
-            points.push(Point {
+        let mut sets = FrameSets::of(set, self.effort.bytes);
+        let rounds = interleaved(&mut kernels, &mut sets, floor, &self.effort)?;
+        let lit = Truth::from(truth).whole_pixels().count();
+        let point = |(implementation, skipping), turns: &[f64], ns_per_px, x_floor| {
+            let score = score(&measured, truth, turns);
+            let figure = |figure: &dyn Fn(&Score) -> f64| score.as_ref().map_or(f64::NAN, figure);
+            Point {
                 part,
                 implementation,
                 sequence: compared.name(),
-                frames: compared.1,
+                frames: compared.frames(),
                 shifts: sequence.levels().last().map_or(0, Level::shifts),
                 bits,
                 skipping,
                 ns_per_px,
-                x_floor: median(rounds.iter().map(Round::x_floor).collect()),
+                x_floor,
                 ms_per_set: ns_per_px * pixels as f64 / 1e6,
-                rms_mm: score.as_ref().map_or(f64::NAN, |score| score.rms_mm),
-                unresolved_px: score
-                    .as_ref()
-                    .map_or(f64::NAN, |score| (lit - score.scored) as f64),
-                gross_px: score.map_or(f64::NAN, |score| score.gross as f64),
-            });
+                rms_mm: figure(&|score| score.rms_mm),
+                unresolved_px: figure(&|score| (lit - score.scored) as f64),
+                gross_px: figure(&|score| score.gross as f64),
+            }
+        };
+        let floors = rounds.iter().take(1).flatten().map(|round| round.floor);
+        let x_floor = textbook_ns / median(floors.collect());
+        let mut points = vec![point(("f64", false), &turns, textbook_ns, x_floor)];
+        for ((variant, kernel), rounds) in variants.into_iter().zip(&mut kernels).zip(rounds) {
+            let set = sets.next();
+            kernel.run(set);
+            let ns_per_px = median(rounds.iter().map(|round| round.kernel).collect());
+            let x_floor = median(rounds.iter().map(Round::x_floor).collect());
+            points.push(point(variant, &set.turns(), ns_per_px, x_floor));
         }
         Ok(points)
     }
+}
+
+/// Φ of every pixel in turns as the textbook decodes it in `f64`, NaN where it is rejected; `None` if
+/// the levels have no known form.
+fn textbook(set: &FrameSet, shots: &[Shot], range: PhaseRange, bits: u8) -> Option<Vec<f64>> {
+    let shots = shots.iter().enumerate();
+    let levels = levels_from(shots.map(|(frame, shot)| (frame, shot.ratio, shot.shift)));
+    let ratios: Vec<f64> = levels.iter().map(|level| level.ratio).collect();
+    let form = recognise(&ratios, (range.min, range.max))?;
+    let scale = Scale::of(bits, None);
+    let frames: Vec<Vec<f32>> = set.frames.iter().map(Frame::counts).collect();
+    let decode = |pixel: usize| {
+        let samples = levels.iter().map(|level| {
+            let samples = level.frames.iter();
+            samples
+                .map(|&frame| f64::from(frames[frame][pixel]))
+                .collect()
+        });
+        let samples: Vec<Vec<f64>> = samples.collect();
+        let map = || match &set.map {
+            Some(map) if map[pixel].is_known() => map[pixel].turns(),
+            _ => f64::NAN,
+        };
+        PixelTwin::of(form, &levels, &samples, scale, map).phase
+    };
+    Some((0..set.pixels()).map(decode).collect())
 }
 
 /// The columns of each row to decode: all where the part is seen, none elsewhere.
@@ -245,4 +311,34 @@ fn score(measured: &Measured, truth: &sim::Truth, turns: &[f64]) -> Option<Score
     let (triangulator, decoder) = (&measured.triangulator, &measured.decoder);
     let heights = pipeline::triangulate(triangulator, decoder, None, &mut phases, &|_| ());
     Truth::from(truth).score(&phases, &heights)
+}
+
+/// The means over the parts, in the order of the first part's points.
+pub fn means(points: &[Point]) -> Vec<Point> {
+    let mut means: Vec<Point> = Vec::new();
+    for first in points {
+        let same = |other: &Point| {
+            other.same_frames(first)
+                && other.implementation == first.implementation
+                && other.skipping == first.skipping
+        };
+        if means.iter().any(same) {
+            continue;
+        }
+        let all: Vec<&Point> = points.iter().filter(|point| same(point)).collect();
+        let mean = |figure: fn(&Point) -> f64| {
+            all.iter().map(|point| figure(point)).sum::<f64>() / all.len() as f64
+        };
+        means.push(Point {
+            part: "mean",
+            ns_per_px: mean(|point| point.ns_per_px),
+            x_floor: mean(|point| point.x_floor),
+            ms_per_set: mean(|point| point.ms_per_set),
+            rms_mm: mean(|point| point.rms_mm),
+            unresolved_px: mean(|point| point.unresolved_px),
+            gross_px: mean(|point| point.gross_px),
+            ..first.clone()
+        });
+    }
+    means
 }

@@ -1,12 +1,9 @@
 //! From trigger to verdict: how long each stage takes on a simulated head with a taught recipe.
 
-use super::decoding::{Decoding, Inspecting};
-use super::effort::Effort;
-use super::frames::{FrameSet, Rotation};
 use super::gauges::Gauges;
-use super::median::median;
-use super::timing::{Kernel, alone, rotate};
-use super::words;
+use super::kernel::{Decoding, Inspecting};
+use super::timing::{Effort, FrameSet, FrameSets, Kernel, alone, median, ns_per_px};
+use crate::Failed;
 use appliance::head::calibration::Calibration;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, teach};
@@ -111,14 +108,14 @@ pub fn budgets(
     (width, height): (u32, u32),
     effort: &Effort,
     progress: &dyn Fn(f64, &str),
-) -> Result<Vec<Budget>, String> {
+) -> Result<Vec<Budget>, Failed> {
     let mut scenario = Scenario::default();
     let camera = &mut scenario.rig.camera;
     (camera.width, camera.height, camera.fov_deg) = (width, height, FOV_DEG);
     scenario.timing.start_up_us = START_UP_US;
     let about = format!("{width}x{height}");
     progress(0.0, &format!("{about}: light of the scene"));
-    let (mut head, stage) = sim::head(&scenario).map_err(words)?;
+    let (mut head, stage) = sim::head(&scenario)?;
     let calibration = Calibration::of_scenario(stage.scenario())?;
     let naming = Naming {
         number: 1,
@@ -134,7 +131,7 @@ pub fn budgets(
     };
     progress(0.3, &format!("{about}: teaching"));
     let headway = Headway::silent();
-    let taught = teach(&mut head, &calibration, &naming, TIMEOUT, headway).map_err(words)?;
+    let taught = teach(&mut head, &calibration, &naming, TIMEOUT, headway)?;
     let taught = taught.seal()?;
     let sequences = &taught.manifest.sequences;
     let full = sequences.len().saturating_sub(1);
@@ -159,8 +156,8 @@ pub fn budgets(
         gauges.replace(&mut file, (width, height));
         let (bytes, _) = archive::pack(&file, &taught.recipe.arrays)?;
         let recipe = Recipe::from_bytes(&bytes)?;
-        let plan = Plan::new(recipe, &calibration, true).map_err(words)?;
-        stage.place(&part, &lies.placement()).map_err(words)?;
+        let plan = Plan::new(recipe, &calibration, true)?;
+        stage.place(&part, &lies.placement())?;
         found.push(Budget {
             lies,
             gauges,
@@ -182,16 +179,13 @@ fn budget(
     calibration: &Calibration,
     refresh: Duration,
     effort: &Effort,
-) -> Result<Budget, String> {
-    plan.load(head, calibration).map_err(words)?;
+) -> Result<Budget, Failed> {
+    plan.load(head, calibration)?;
     let indices = plan.indices(0);
     let mut frames = Vec::new();
     // The first cycle after a pause starts the camera; all others find it on.
-    head.acquire(indices, TIMEOUT, &mut |_, _| ())
-        .map_err(words)?;
-    let exposure = head
-        .acquire(indices, TIMEOUT, &mut |_, frame| frames.push(frame))
-        .map_err(words)?;
+    head.acquire(indices, TIMEOUT, &mut |_, _| ())?;
+    let exposure = head.acquire(indices, TIMEOUT, &mut |_, frame| frames.push(frame))?;
     let start_ms = ms(exposure.start_up);
     // The last exposure lasts a refresh, and the trigger waits for up to one before the first.
     let shown = Duration::from_nanos(exposure.done.0.saturating_sub(exposure.started.0));
@@ -241,9 +235,9 @@ fn budget(
 
 /// Processor time of frames → verdict and of the phase kernel alone, ms, and their ratio. The two
 /// are timed in turn, each on more frame sets than fit into any cache.
-fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64; 3], String> {
+fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64; 3], Failed> {
     let map = plan.production().map().to_vec();
-    let mut sets = Rotation::of(FrameSet::of(frames, Some(map)), effort.bytes);
+    let mut sets = FrameSets::of(FrameSet::new(frames.to_vec(), Some(map)), effort.bytes);
     let pixels = sets.next().pixels() as f64;
     let decoder = plan.production().decoder().clone();
     let mut kernel = Decoding::new(decoder, Some(plan.production().window().to_vec()));
@@ -253,7 +247,7 @@ fn on_one_thread(plan: &Plan, frames: &[Frame], effort: &Effort) -> Result<[f64;
     for _ in 0..effort.rounds {
         let [inspection, phase] = alone.install(|| {
             [&mut whole as &mut dyn Kernel, &mut kernel]
-                .map(|kernel| rotate(kernel, &mut sets, effort.patience).ns)
+                .map(|kernel| ns_per_px(kernel, &mut sets, effort.patience))
         });
         inspected.push(inspection * pixels / 1e6);
         decoded.push(phase * pixels / 1e6);

@@ -15,13 +15,13 @@ const COLUMNS: usize = 8;
 pub enum Gauges {
     /// The gauges that teaching proposes.
     Taught,
-    /// The mean height of each of so many regions.
+    /// The mean height of each region; how many regions.
     Means(usize),
-    /// The height of the plane of each of so many regions.
+    /// The height of the plane of each region; how many regions.
     Planes(usize),
     /// The same, and the distance of each plane from the next.
     Distances(usize),
-    /// The diameter of so many holes, those of the part again and again.
+    /// The diameter of holes, those of the part again and again; how many.
     Holes(usize),
 }
 
@@ -70,8 +70,8 @@ impl Gauges {
         let rows = count.div_ceil(COLUMNS);
         let region = |at: usize| {
             let corner = |right: usize, down: usize| {
-                let share = |axis: usize, at: usize, of: usize| {
-                    BOX[0][axis] + (BOX[1][axis] - BOX[0][axis]) * at as f64 / of as f64
+                let share = |axis: usize, step: usize, steps: usize| {
+                    BOX[0][axis] + (BOX[1][axis] - BOX[0][axis]) * step as f64 / steps as f64
                 };
                 let (column, row) = (at % COLUMNS + right, at / COLUMNS + down);
                 [
@@ -89,9 +89,9 @@ impl Gauges {
             .iter()
             .flat_map(|kind| (0..count).map(move |at| (kind, at)));
         for (slot, (measures, at)) in (1..).zip(all) {
-            let of = (0..measures.facts().takes.len()).map(|place| name(at + place));
+            let features = measures.facts().takes.len();
             file.gauges.push(GaugeFile {
-                of: of.collect(),
+                of: (0..features).map(|next| name(at + next)).collect(),
                 ..GaugeFile::new(slot, &format!("gauge {slot}"), measures.clone(), &[])
             });
         }
@@ -105,7 +105,7 @@ const PLATE_MM: f64 = 8.0;
 /// A region reaches so far beyond a hole, mm.
 const AROUND_MM: f64 = 2.5;
 
-/// Gives a recipe of the default part the diameters of so many holes. A head that cannot be modelled
+/// Gives a recipe of the default part the diameters of `count` holes. A head that cannot be modelled
 /// has none.
 fn holes(file: &mut RecipeFile, count: usize) {
     let Ok(head) = file.head() else { return };
@@ -130,20 +130,22 @@ fn holes(file: &mut RecipeFile, count: usize) {
     file.judges_nothing = true;
 }
 
-/// The first kinds of geometry that are of so many planes.
+/// For each number of planes, the first geometric kind that takes as many.
 fn planes(features: &[usize]) -> Vec<Measure> {
     kinds(Basis::Geometry, FeatureKind::Plane, features)
 }
 
-/// The first kind in the table that is worked out from this, of features of this kind, for each of
-/// these numbers of features.
-fn kinds(basis: Basis, of: FeatureKind, features: &[usize]) -> Vec<Measure> {
+/// For each number of features, the first kind in the table on this basis that takes as many
+/// features of this kind.
+fn kinds(basis: Basis, kind: FeatureKind, features: &[usize]) -> Vec<Measure> {
     let first = |&count: &usize| {
         let mut all = Measure::examples().into_iter();
-        all.find(|kind| {
-            let facts = kind.facts();
+        all.find(|measure| {
+            let facts = measure.facts();
             let takes = facts.takes;
-            facts.basis == basis && takes.len() == count && takes.iter().all(|at| at.contains(&of))
+            facts.basis == basis
+                && takes.len() == count
+                && takes.iter().all(|at| at.contains(&kind))
         })
     };
     features.iter().filter_map(first).collect()

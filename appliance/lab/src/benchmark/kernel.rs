@@ -1,21 +1,173 @@
-//! The kernel table: what a pixel costs in every variant, in ns, in instructions and in multiples
-//! of the floor.
+//! The kernels that are timed: the decoder, and all of production from frames to readings; and the
+//! kernel table: what a pixel costs every decoder on every workload, in ns and in multiples of the
+//! floor.
 
-use super::effort::Effort;
-use super::floor::FloorSets;
-use super::frames::{FrameSet, Rotation};
-use super::median::median;
-use super::timing::{Contender, Kernel, Round, interleaved};
-use super::variants;
-use super::workload::Workload;
-use appliance::system::memory::give_back;
+use super::timing::{
+    Effort, Floor, FrameSet, FrameSets, Kernel, Round, interleaved, median, views,
+};
+use super::workload::{RANGE, Workload};
+use crate::Failed;
+use algo::inspect::{Input, Maps, Production, Signal, Strips};
+use algo::pattern::{PhaseRange, Sequence};
+use algo::phase::{Arrived, DecodeError, Decoder, LeastModulation, PhaseRow};
+use algo::pipeline::{PhaseMap, arrive_rest};
+use algo::simd::Backend;
+use appliance::production::stopwatch::timed;
+use appliance::recipe::plan::STRIPS;
 use serde::{Serialize, Serializer};
+use std::collections::VecDeque;
+use std::hint::black_box;
+use std::ops::Range;
+use std::time::Duration;
 
-/// One row of the table. Figures that a variant does not have, or that the machine does not offer,
-/// are left out of the JSON.
+/// A decoder that writes into memory allocated before.
+pub struct Decoding {
+    decoder: Decoder,
+    /// The columns of each row whose finest level is decoded; `None` for all.
+    window: Option<Vec<Range<usize>>>,
+    /// Whether only the last level is timed.
+    only_last: bool,
+    /// How many frame sets are decoded in turn with coarser levels of their own.
+    copies: usize,
+    /// The coarser levels, with those of the current set in front.
+    levels: VecDeque<Arrived>,
+}
+
+impl Decoding {
+    /// Decoding of all levels, one after the other; of the finest, rows without a column in
+    /// `window` are left out.
+    pub fn new(decoder: Decoder, window: Option<Vec<Range<usize>>>) -> Self {
+        Self {
+            decoder,
+            window,
+            only_last: false,
+            copies: 1,
+            levels: VecDeque::new(),
+        }
+    }
+
+    /// Decoding that is timed on the last level only, for `copies` frame sets with the same samples.
+    /// Every set has its own decoded levels: they were last used as long ago as the frames, so that
+    /// they come from no cache either.
+    pub fn after_the_last(decoder: Decoder, copies: usize) -> Self {
+        Self {
+            only_last: true,
+            copies,
+            ..Self::new(decoder, None)
+        }
+    }
+
+    /// Memory for the levels of a set, decoded if only the last is timed.
+    fn arrived(&self, set: &FrameSet) -> Arrived {
+        let width = set.out.width;
+        let mut arrived = self.decoder.arrived(width, set.pixels() / width.max(1));
+        if self.only_last {
+            // The frames are those that the decoder was made for.
+            let _ = arrive_rest(&self.decoder, &views(&set.frames), &mut arrived);
+        }
+        arrived
+    }
+
+    fn decode(&mut self, set: &mut FrameSet) -> Result<(), DecodeError> {
+        let Some(arrived) = self.levels.front_mut() else {
+            return Ok(());
+        };
+        if !self.only_last {
+            arrived.restart();
+        }
+        let last = arrive_rest(&self.decoder, &views(&set.frames), arrived)?;
+        let PhaseMap {
+            width,
+            phase,
+            modulation,
+            trust,
+        } = &mut set.out;
+        let width = (*width).max(1);
+        let rows = phase
+            .chunks_mut(width)
+            .zip(modulation.chunks_mut(width))
+            .zip(trust.chunks_mut(width));
+        for (v, ((phase, modulation), trust)) in rows.enumerate() {
+            let columns = match &self.window {
+                Some(window) => window[v].clone(),
+                None => 0..width,
+            };
+            let row = PhaseRow {
+                phase,
+                modulation,
+                trust,
+            };
+            let map = set.map.as_deref();
+            let map = map.map_or(&[][..], |map| &map[v * width..(v + 1) * width]);
+            self.decoder.row(arrived, &last, v, map, columns, row);
+        }
+        Ok(())
+    }
+}
+
+impl Kernel for Decoding {
+    /// Takes the levels that were used least recently; the first time, makes those of all sets.
+    fn run(&mut self, set: &mut FrameSet) -> Duration {
+        if self.levels.is_empty() {
+            self.levels = (0..self.copies).map(|_| self.arrived(set)).collect();
+        } else {
+            self.levels.rotate_left(1);
+        }
+        timed(|| {
+            // The frames are those that the decoder was made for.
+            let _ = self.decode(set);
+        })
+    }
+}
+
+/// Production from frames to the readings of gauges, on all threads of the current pool.
+pub struct Inspecting<'a> {
+    production: &'a Production,
+    arrived: Arrived,
+    strips: Strips,
+}
+
+impl<'a> Inspecting<'a> {
+    /// Production with strips as high as those of a plan.
+    pub fn new(production: &'a Production) -> Self {
+        let rows = production.window().len();
+        let width = production.cubics().surface().width;
+        Self {
+            arrived: production.decoder().arrived(width, rows),
+            strips: production.strips(rows.div_ceil(STRIPS)),
+            production,
+        }
+    }
+
+    fn inspect(&mut self, set: &FrameSet) -> Result<(), DecodeError> {
+        let frames = views(&set.frames);
+        self.arrived.restart();
+        let last = arrive_rest(self.production.decoder(), &frames, &mut self.arrived)?;
+        let input = Input::Finest(&self.arrived, &last);
+        let placed = self.production.place(input, &mut self.strips)?;
+        let input = (input, Signal::Frames(&frames));
+        let maps = Maps::default();
+        let found = self
+            .production
+            .inspect_placed(input, &mut self.strips, placed, maps)?;
+        black_box(found);
+        Ok(())
+    }
+}
+
+impl Kernel for Inspecting<'_> {
+    fn run(&mut self, set: &mut FrameSet) -> Duration {
+        timed(|| {
+            // The frames are those that production was made for.
+            let _ = self.inspect(set);
+        })
+    }
+}
+
+/// One row of the table.
 #[derive(Clone, Debug, Serialize)]
 pub struct Timing {
-    /// Implementation and workload, `f32_geometric_12`.
+    /// Implementation and workload, `avx2_geometric_12`.
     #[serde(skip)]
     pub name: String,
     /// Frames of a set.
@@ -24,16 +176,6 @@ pub struct Timing {
     pub ns_per_px: f64,
     /// Processor time per pixel of one frame, least.
     pub least_ns_per_px: f64,
-    /// Processor time per pixel for 8 rows that are in the cache, median.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub hot_ns_per_px: Option<f64>,
-    /// What a row costs beside its pixels, ns, median: from hot frames of two widths and equal
-    /// pixels, none of which is dark.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub ns_per_row: Option<f64>,
-    /// Instructions per pixel of one frame, median.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub instructions_per_px: Option<f64>,
     /// Median of the ratios to the floor of the same round.
     pub x_floor: f64,
     /// The least and the most of these ratios.
@@ -59,150 +201,120 @@ fn by_name<S: Serializer>(rows: &[Timing], out: S) -> Result<S::Ok, S::Error> {
     out.collect_map(rows.iter().map(|row| (&row.name, row)))
 }
 
-/// Makes variants of a workload for so many frame sets.
-type Variants = fn(&Workload, usize) -> Result<Vec<variants::Named<String>>, String>;
-
 /// A phase is right within this many turns: seven σ of the noise that the frames have.
 const RIGHT: f64 = 0.05;
-/// A kernel is bound by memory if frames that are in no cache take it at least this many times as
-/// long as those that are.
-const BOUND_BY_MEMORY: f64 = 1.15;
-
-impl Timing {
-    /// Whether memory limits the variant, so that the floor says how much faster it could become.
-    pub fn bound_by_memory(&self) -> bool {
-        self.hot_ns_per_px
-            .is_some_and(|hot| self.ns_per_px >= BOUND_BY_MEMORY * hot)
-    }
-}
+/// The least modulation that a quiet head trusts, counts of 8 bits: 4.3 σ of a noise of 1.2 counts.
+const QUIET_COUNTS: f64 = 5.0;
 
 /// Times every variant on every workload. Frames of one workload at a time are in memory, beside
 /// those of the floor.
 ///
 /// # Errors
 /// If a sequence cannot be decoded.
-pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<KernelTable, String> {
-    // So that the frames of the aligned sets lie in mappings of their own.
-    give_back();
+pub fn kernel_table(effort: &Effort, progress: &dyn Fn(f64, &str)) -> Result<KernelTable, Failed> {
     let workloads = Workload::all();
-    let mut base = FloorSets::new(effort);
+    let mut floor = Floor::new(effort);
     let (mut floors, mut rows) = (Vec::new(), Vec::new());
-    for (at, workload) in workloads.iter().enumerate() {
-        progress(at as f64 / workloads.len() as f64, &workload.name);
-        let packed = workload.render(effort.size);
-        let aligned = workload.has_aligned.then(|| packed.aligned());
-        let sets = [packed].into_iter().chain(aligned);
-        let mut rotations: Vec<_> = sets.map(|set| Rotation::of(set, effort.bytes)).collect();
-        let (names, mut contenders) = contenders(workload, effort, &rotations)?;
-        let rounds = interleaved(&mut contenders, &mut rotations, &mut base, effort)?;
-        floors.extend(
-            rounds
-                .first()
-                .into_iter()
-                .flatten()
-                .map(|round| round.floor),
-        );
-        for ((name, contender), rounds) in names.into_iter().zip(&mut contenders).zip(&rounds) {
-            let set = rotations[contender.rotation].next();
-            let right = share_right(&mut *contender.kernel, workload, effort.size, set);
-            rows.push(row(name, workload, right, rounds, effort));
+    for (done, workload) in workloads.iter().enumerate() {
+        progress(done as f64 / workloads.len() as f64, &workload.name);
+        let mut sets = FrameSets::of(workload.render(effort.size)?, effort.bytes);
+        let variants = variants(workload, sets.copies())?;
+        let (names, mut kernels): (Vec<_>, Vec<_>) = variants.into_iter().unzip();
+        let rounds = interleaved(&mut kernels, &mut sets, &mut floor, effort)?;
+        floors.extend(rounds.iter().take(1).flatten().map(|round| round.floor));
+        for ((name, kernel), rounds) in names.into_iter().zip(&mut kernels).zip(&rounds) {
+            let set = sets.next();
+            kernel.run(set);
+            let right = share_right(&set.turns(), workload, effort.size);
+            rows.push(row(name, workload, right, rounds));
         }
     }
-    floors.sort_by(f64::total_cmp);
     Ok(KernelTable {
-        floor_ns_per_px: median(floors.clone()),
         floor_range: ends(&floors),
+        floor_ns_per_px: median(floors),
         rows,
     })
 }
 
-/// Every variant of a workload: the decoders on each rotation, the first of which is packed and the
-/// second aligned; the decoder of a quiet head and the references on the first.
-fn contenders(
-    workload: &Workload,
-    effort: &Effort,
-    rotations: &[Rotation],
-) -> Result<(Vec<String>, Vec<Contender>), String> {
-    let mut kinds: Vec<(usize, &str, Variants)> = vec![(0, "", variants::decoding)];
+/// The decoder on each back-end of this machine, with the back-end's name.
+///
+/// # Errors
+/// If the sequence cannot be decoded.
+pub fn decoders(
+    sequence: &Sequence,
+    range: PhaseRange,
+    bit_depth: u8,
+) -> Result<Vec<(&'static str, Decoder)>, Failed> {
+    let decoder = Decoder::new(sequence, range, bit_depth)?;
+    Ok(Backend::available()
+        .map(|backend| (backend.name(), decoder.clone().with_backend(backend)))
+        .collect())
+}
+
+/// An implementation by its name.
+type Named = (String, Box<dyn Kernel>);
+
+/// The decoders of a workload, by implementation and workload: `avx2_geometric_12`, and where a
+/// quiet head is timed as well the fastest with its least modulation, `avx2_geometric_12_quiet`.
+/// Where the clock starts after the coarser levels were decoded, these are kept for `copies` frame
+/// sets in turn.
+fn variants(workload: &Workload, copies: usize) -> Result<Vec<Named>, Failed> {
+    let sequence = Sequence::from_frames(&workload.frames)?;
+    let mut named: Vec<(&str, Decoder, &str)> = Vec::new();
+    for (name, decoder) in decoders(&sequence, RANGE, workload.bit_depth)? {
+        named.push((name, decoder, ""));
+    }
     if workload.has_quiet {
-        kinds.push((0, "", variants::quiet));
+        let decoder = Decoder::new(&sequence, RANGE, workload.bit_depth)?;
+        let least =
+            LeastModulation::new(QUIET_COUNTS).ok_or("no least modulation of a quiet head")?;
+        let decoder = decoder.with_least_modulation(least);
+        named.push((decoder.backend().name(), decoder, "_quiet"));
     }
-    if rotations.len() > 1 {
-        kinds.push((1, "_aligned", variants::decoding));
-    }
-    let mut all = Vec::new();
-    for (rotation, suffix, variants) in kinds {
-        let hot = |size| {
-            let set = workload.render(size);
-            let set = if rotation > 0 { set.aligned() } else { set };
-            let kernels = variants(workload, 1)?.into_iter();
-            Ok::<_, String>(kernels.map(move |(_, kernel)| (kernel, set.clone())))
-        };
-        let [wide, narrow] = effort.hot_sizes().map(hot);
-        let cold = variants(workload, rotations[rotation].copies())?.into_iter();
-        for (((name, kernel), wide), narrow) in cold.zip(wide?).zip(narrow?) {
-            let contender = Contender {
-                kernel,
-                rotation,
-                hot: Some([wide, narrow]),
-            };
-            all.push((name + suffix, contender));
+    let mut variants: Vec<Named> = Vec::new();
+    for (name, decoder, suffix) in named {
+        let sequence = &workload.name;
+        if workload.has_last {
+            let last = Decoding::after_the_last(decoder.clone(), copies);
+            variants.push((
+                format!("{name}_last_frames_of_{sequence}{suffix}"),
+                Box::new(last),
+            ));
         }
+        let whole = Decoding::new(decoder, None);
+        variants.push((format!("{name}_{sequence}{suffix}"), Box::new(whole)));
     }
-    let textbooks = variants::textbooks(workload, effort.size)?.into_iter();
-    all.extend(textbooks.map(|(name, kernel)| (name, Contender::cold(kernel))));
-    Ok(all.into_iter().unzip())
+    Ok(variants)
 }
 
 /// The medians of the rounds of a variant.
-fn row(name: String, workload: &Workload, right: f64, rounds: &[Round], effort: &Effort) -> Timing {
-    let sorted = |of: &dyn Fn(&Round) -> f64| {
-        let mut all: Vec<f64> = rounds.iter().map(of).collect();
-        all.sort_by(f64::total_cmp);
-        all
-    };
-    let where_had = |of: &dyn Fn(&Round) -> Option<f64>| {
-        let all: Option<Vec<f64>> = rounds.iter().map(of).collect();
-        all.map(median)
-    };
-    let cold = sorted(&|round| round.cold.ns);
-    let ratios = sorted(&Round::x_floor);
-    // Rows per pixel of the narrow frames and of the wide ones.
-    let [wide, narrow] = effort.hot_sizes().map(|(width, _)| 1.0 / width as f64);
-    let of_a_row = |[of_wide, of_narrow]: [f64; 2]| (of_narrow - of_wide) / (narrow - wide);
-    // Where the part ends, a narrow row is not what a wide one is: other blocks of pixels are
-    // skipped.
-    let all_lit = workload.lit == 1.0;
+fn row(name: String, workload: &Workload, right: f64, rounds: &[Round]) -> Timing {
+    let times: Vec<f64> = rounds.iter().map(|round| round.kernel).collect();
+    let ratios: Vec<f64> = rounds.iter().map(Round::x_floor).collect();
     Timing {
         name,
         frames: workload.frames.len(),
-        least_ns_per_px: ends(&cold)[0],
-        ns_per_px: median(cold),
-        hot_ns_per_px: where_had(&|round| round.hot.map(|[wide, _]| wide)),
-        ns_per_row: where_had(&|round| round.hot.filter(|_| all_lit).map(of_a_row)),
-        instructions_per_px: where_had(&|round| round.cold.instructions),
+        least_ns_per_px: ends(&times)[0],
+        ns_per_px: median(times),
         x_floor_range: ends(&ratios),
         x_floor: median(ratios),
         right,
     }
 }
 
-fn ends(sorted: &[f64]) -> [f64; 2] {
-    [sorted.first(), sorted.last()].map(|end| end.copied().unwrap_or(f64::NAN))
+/// The least and the most; NaN of none.
+fn ends(values: &[f64]) -> [f64; 2] {
+    let values = values.iter().copied();
+    [
+        values.clone().fold(f64::NAN, f64::min),
+        values.fold(f64::NAN, f64::max),
+    ]
 }
 
-/// Share of the pixels that a kernel gets right.
-fn share_right(
-    kernel: &mut dyn Kernel,
-    workload: &Workload,
-    size: (usize, usize),
-    set: &mut FrameSet,
-) -> f64 {
-    kernel.prepare(set);
-    kernel.run(set);
-    let found = kernel.turns(set);
-    let right = found.iter().enumerate().filter(|&(at, found)| {
-        let phase = workload.phase(at, size);
+/// Share of the pixels whose phase in turns is right.
+fn share_right(found: &[f64], workload: &Workload, size: (usize, usize)) -> f64 {
+    let right = found.iter().enumerate().filter(|&(pixel, found)| {
+        let phase = workload.phase(pixel, size);
         (phase.is_nan() && found.is_nan()) || (found - phase).abs() <= RIGHT
     });
     right.count() as f64 / found.len().max(1) as f64

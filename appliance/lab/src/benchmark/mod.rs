@@ -2,36 +2,15 @@
 
 mod accuracy;
 mod budget;
-mod counter;
-mod decoding;
-mod effort;
-mod export;
-mod floor;
-mod frames;
 mod gauges;
 mod kernel;
-mod machine;
-mod median;
-mod placed;
-mod point;
-mod real;
-mod reference;
 mod report;
 mod timing;
-mod variants;
 mod workload;
 
-pub use accuracy::Study;
+pub use accuracy::{Point, Study, means};
 pub use budget::{Budget, budgets};
-pub use effort::Effort;
-pub use export::frame_files;
 pub use kernel::{KernelTable, Timing, kernel_table};
-pub use machine::Machine;
-pub use median::median;
-pub use point::{Point, means};
-pub use report::{HEADER, Report};
-
-/// An error in words.
-fn words(error: impl std::fmt::Display) -> String {
-    error.to_string()
-}
+pub use report::{HEADER, Machine, Report};
+pub use timing::{Effort, median};
+pub use workload::frame_files;

@@ -2,11 +2,9 @@
 //!
 //! | key of the object | meaning |
 //! |---|---|
-//! | `machine` | where: processor, cores, architecture, clock, latency of memory, speed of a copy |
+//! | `machine` | where: processor, cores, architecture |
 //! | `kernel.floor_ns_per_px`, `.floor_range` | a loop that only reads 12 frames of 8 bits and writes one map of 32 bits, 1456 × 1088 |
 //! | `kernel.<variant>.ns_per_px`, `.least_ns_per_px` | processor time of a set, per pixel of one frame: median, least |
-//! | `….hot_ns_per_px`, `.ns_per_row` | of eight rows again and again; of a row beside its pixels |
-//! | `….instructions_per_px` | absent where the processor's counters cannot be read |
 //! | `….x_floor`, `.x_floor_range` | in floors of the same round: median, least and most |
 //! | `….right` | share of pixels within 0.05 turn, or rejected where it is dark |
 //! | `accuracy[]` | what decoded which sequence, its time, and error, unresolved and gross pixels: means over the parts |
@@ -15,14 +13,51 @@
 //!
 //! A variant is the implementation and the workload, which [`super::workload`] names.
 
+use super::accuracy::{Point, means};
 use super::budget::{Budget, Lies};
 use super::gauges::Gauges;
 use super::kernel::KernelTable;
-use super::machine::Machine;
-use super::point::{Point, means};
 use serde::{Serialize, Serializer};
 use serde_json::{Map, json};
+use std::env::consts::ARCH;
 use std::fmt::Write as _;
+use std::fs;
+
+/// The machine on which times are measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct Machine {
+    /// The board, or the processor's model, or its architecture if the system names neither.
+    pub processor: String,
+    /// Cores that this program may use.
+    pub cores: usize,
+    /// Architecture, `x86_64` or `aarch64`.
+    pub architecture: &'static str,
+}
+
+impl Machine {
+    /// This machine.
+    pub fn this() -> Self {
+        let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+        let board = fs::read_to_string("/proc/device-tree/model").unwrap_or_default();
+        let board = board.trim_end_matches('\0').trim();
+        let processor = match board {
+            "" => model(&cpuinfo).unwrap_or(ARCH),
+            board => board,
+        };
+        Self {
+            processor: processor.to_owned(),
+            cores: std::thread::available_parallelism().map_or(1, usize::from),
+            architecture: ARCH,
+        }
+    }
+}
+
+/// The processor's name in `/proc/cpuinfo`; on ARM only the board has one.
+fn model(cpuinfo: &str) -> Option<&str> {
+    let mut lines = cpuinfo.lines();
+    let line = lines.find(|line| line.starts_with("model name"))?;
+    line.split(':').nth(1).map(str::trim)
+}
 
 /// What was measured; `None` where it was not asked for.
 #[derive(Debug, Serialize)]
@@ -85,14 +120,8 @@ impl Report {
             processor,
             cores,
             architecture,
-            clock_ghz,
-            memory_latency_ns,
-            copy_gb_per_s,
         } = &self.machine;
-        let mut text = format!(
-            "Machine: {processor}, {cores} cores, {architecture}; clock {clock_ghz:.2} GHz, memory latency {memory_latency_ns:.0} ns, \
-             copy {copy_gb_per_s:.1} GB/s.\n"
-        );
+        let mut text = format!("Machine: {processor}, {cores} cores, {architecture}.\n");
         if let Some(table) = &self.kernel {
             kernel_table(&mut text, table);
         }
@@ -129,7 +158,7 @@ fn by_size<S: Serializer>(budgets: &Option<Vec<Budget>>, out: S) -> Result<S::Ok
         }
         let per_px =
             |ms: f64| json!(ms * 1e6 / (f64::from(budget.width) * f64::from(budget.height)));
-        let key = |of: &str| format!("{of}_golden_{}", budget.frames);
+        let key = |timed: &str| format!("{timed}_golden_{}", budget.frames);
         let cycle = match budget.lies {
             Lies::AsTaught => "production",
             Lies::Aligned => "aligned",
@@ -151,25 +180,14 @@ fn kernel_table(text: &mut String, table: &KernelTable) {
     let _ = write!(
         text,
         "\n### Kernels\n\nFloor {:.3} ns/px ({least:.3} to {most:.3}).\n\n\
-         | variant | frames | ns/px | least | hot | × floor | instructions/px | ns/row |\n\
-         |---|---:|---:|---:|---:|---:|---:|---:|\n",
+         | variant | frames | ns/px | least | × floor |\n|---|---:|---:|---:|---:|\n",
         table.floor_ns_per_px
     );
     for row in &table.rows {
-        let figure = |figure: Option<f64>, decimals| {
-            figure.map_or(String::new(), |figure| format!("{figure:.decimals$}"))
-        };
         let _ = writeln!(
             text,
-            "| {} | {} | {:.2} | {:.2} | {} | {} | {} | {} |",
-            row.name,
-            row.frames,
-            row.ns_per_px,
-            row.least_ns_per_px,
-            figure(row.hot_ns_per_px, 2),
-            figure(row.bound_by_memory().then_some(row.x_floor), 2),
-            figure(row.instructions_per_px, 1),
-            figure(row.ns_per_row, 0),
+            "| {} | {} | {:.2} | {:.2} | {:.2} |",
+            row.name, row.frames, row.ns_per_px, row.least_ns_per_px, row.x_floor,
         );
     }
 }
@@ -268,5 +286,15 @@ fn budget_table(text: &mut String, budgets: &[Budget]) {
             "\nStart of the camera: {:.0} ms in each cycle, 500 ms in the first one after a pause. The camera stays on between cycles.",
             budget.start_ms
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_processors_name_is_found() {
+        let cpuinfo = "processor\t: 0\nmodel name\t: Some CPU @ 2 GHz\nflags\t: a b\n";
+        assert_eq!(super::model(cpuinfo), Some("Some CPU @ 2 GHz"));
+        assert_eq!(super::model("processor : 0\nBogoMIPS : 108"), None);
     }
 }

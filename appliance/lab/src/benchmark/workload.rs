@@ -1,13 +1,18 @@
-//! The input of the kernels: synthetic frames of every kind of sequence, and their true phase.
+//! The input of the kernels: synthetic frames of every kind of sequence, and their true phase; also
+//! as files for other programs.
 
-use super::frames::{Buffer, FrameSet};
-use super::placed::Placed;
+use super::timing::FrameSet;
+use crate::Failed;
 use algo::pattern::{PhaseRange, Sequence, Shot};
 use algo::units::AbsolutePhase;
+use hal::frame::{Frame, FrameFormat, Pixels, Samples};
+use hal::npy;
+use hal::units::Timestamp;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::f64::consts::TAU;
 use std::ops::RangeInclusive;
+use std::sync::Arc;
 
 /// A kind of sequence, and how much of its frames is lit.
 #[derive(Clone, Debug)]
@@ -22,10 +27,8 @@ pub struct Workload {
     pub bit_depth: u8,
     /// Whether it is unwrapped about a map.
     pub about_map: bool,
-    /// Whether the references are timed on it as well.
-    pub has_references: bool,
-    /// Whether the decoders are timed on frames in mappings of their own as well.
-    pub has_aligned: bool,
+    /// Whether decoding behind the last frame is timed as well.
+    pub has_last: bool,
     /// Whether the fastest decoder is timed with the least modulation of a quiet head as well.
     pub has_quiet: bool,
 }
@@ -58,8 +61,7 @@ impl Workload {
             lit: 1.0,
             bit_depth: 8,
             about_map: false,
-            has_references: false,
-            has_aligned: true,
+            has_last: false,
             has_quiet: shifts <= 4,
         }
     }
@@ -67,7 +69,7 @@ impl Workload {
     /// The first workload: twelve frames of three geometric levels, all pixels lit.
     pub fn geometric() -> Self {
         Self {
-            has_references: true,
+            has_last: true,
             ..Self::geometric_of(4)
         }
     }
@@ -76,7 +78,6 @@ impl Workload {
     pub fn all() -> Vec<Self> {
         let twelve = |name: &str| Self {
             name: name.to_owned(),
-            has_aligned: false,
             has_quiet: false,
             ..Self::geometric_of(4)
         };
@@ -93,10 +94,6 @@ impl Workload {
             about_map: true,
             ..twelve(name)
         };
-        let compared = |workload| Self {
-            has_references: true,
-            ..workload
-        };
         let quiet = |workload| Self {
             has_quiet: true,
             ..workload
@@ -112,8 +109,11 @@ impl Workload {
             lit("background_75", 0.25),
             bits("bits_10", 10),
             bits("bits_12", 12),
-            quiet(compared(about("dense_12", Sequence::dense(DENSE_N, 4)))),
-            quiet(compared(about("golden_4", Shot::level(1.0, 4).collect()))),
+            quiet(Self {
+                has_last: true,
+                ..about("dense_12", Sequence::dense(DENSE_N, 4))
+            }),
+            quiet(about("golden_4", Shot::level(1.0, 4).collect())),
             quiet(about("golden_3", Shot::level(1.0, 3).collect())),
         ];
         all.extend(SHIFTS.filter(|&shifts| shifts != 4).map(Self::geometric_of));
@@ -122,34 +122,39 @@ impl Workload {
     }
 
     /// Its frames.
-    pub fn render(&self, (width, height): (usize, usize)) -> FrameSet {
-        let full = f64::from((1_u32 << self.bit_depth) - 1);
+    ///
+    /// # Errors
+    /// If there are no frames of this size and depth.
+    pub fn render(&self, (width, height): (usize, usize)) -> Result<FrameSet, Failed> {
+        let format = FrameFormat::packed(width as u32, height as u32, self.bit_depth);
+        let full = f64::from(format.full_scale());
         let sine: Vec<f64> = (0..65_536)
             .map(|bits| full * (OFFSET + MODULATION * (TAU * f64::from(bits) / 65_536.0).sin()))
             .collect();
         let size = (width, height);
         let phases: Vec<f64> = (0..width * height).map(|at| self.phase(at, size)).collect();
         let mut random = SplitMix64::seed_from_u64(0);
-        let mut samples = Vec::with_capacity(self.frames.len() * phases.len());
-        for &Shot { ratio, shift, .. } in &self.frames {
-            samples.extend(phases.iter().map(|phase| {
-                let light = if phase.is_nan() {
-                    DARK * full
-                } else {
-                    let turns = ratio * phase + shift;
-                    sine[((turns - turns.floor()) * 65_536.0) as usize & 0xFFFF]
-                };
-                let share = (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
-                let noise = (2.0 * share - 1.0) * NOISE * full;
-                (light + noise).round().clamp(0.0, full) as u16
-            }));
-        }
-        let samples = if self.bit_depth == 8 {
-            let bytes = samples.into_iter().map(|sample| sample as u8);
-            Buffer::Eight(Placed::Packed(bytes.collect()))
-        } else {
-            Buffer::Sixteen(Placed::Packed(samples))
+        let mut sample = |phase: &f64, shot: &Shot| {
+            let light = if phase.is_nan() {
+                DARK * full
+            } else {
+                let turns = shot.ratio * phase + shot.shift;
+                sine[((turns - turns.floor()) * 65_536.0) as usize & 0xFFFF]
+            };
+            let share = (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+            let noise = (2.0 * share - 1.0) * NOISE * full;
+            (light + noise).round().clamp(0.0, full) as u16
         };
+        let mut frames = Vec::new();
+        for shot in &self.frames {
+            let samples = phases.iter().map(|phase| sample(phase, shot));
+            let pixels = if self.bit_depth == 8 {
+                Pixels::Eight(samples.map(|sample| sample as u8).collect())
+            } else {
+                Pixels::Sixteen(samples.collect())
+            };
+            frames.push(Frame::new(format, Arc::new(pixels), Timestamp(0), 0)?);
+        }
         let map = self.about_map.then(|| {
             let near = |(at, phase): (usize, &f64)| {
                 let offset = MAP_OFFSET * (at as f64 / 997.0).sin();
@@ -157,7 +162,7 @@ impl Workload {
             };
             phases.iter().enumerate().map(near).collect()
         });
-        FrameSet::new(size, samples, map)
+        Ok(FrameSet::new(frames, map))
     }
 
     /// Φ of a pixel in turns, NaN where it is dark. The part is an ellipse in the middle of the
@@ -173,4 +178,31 @@ impl Workload {
         }
         0.5 + (RANGE.span() - 1.0) * x + 0.4 * (3.0 * TAU * y).sin()
     }
+}
+
+/// The twelve frames of the first workload as files for other programs, by their names:
+/// `frame-00.npy` and so on (8 bits), `phase.npy` (the true Φ in turns), and `sequence.json` with
+/// ratio and shift of each frame and the fringes of the finest level.
+///
+/// # Errors
+/// If there are no frames of this size.
+pub fn frame_files((width, height): (usize, usize)) -> Result<Vec<(String, Vec<u8>)>, Failed> {
+    let workload = Workload::geometric();
+    let set = workload.render((width, height))?;
+    let mut files = Vec::new();
+    for (number, frame) in set.frames.iter().enumerate() {
+        if let Samples::Eight(samples) = frame.samples() {
+            files.push((format!("frame-{number:02}.npy"), npy::write(width, samples)));
+        }
+    }
+    let phases: Vec<f64> = (0..set.pixels())
+        .map(|at| workload.phase(at, (width, height)))
+        .collect();
+    files.push(("phase.npy".into(), npy::write(width, &phases)));
+    let sequence = serde_json::json!({
+        "fringes": RANGE.span(),
+        "frames": workload.frames.iter().map(|shot| serde_json::json!({"ratio": shot.ratio, "shift": shot.shift})).collect::<Vec<_>>(),
+    });
+    files.push(("sequence.json".into(), format!("{sequence:#}\n").into()));
+    Ok(files)
 }

@@ -1,7 +1,6 @@
 //! `fringed-lab adapt RECORDING --method paper|fringed --out phase.npy [--patterns DIR]`.
 
-use crate::workbench::adapt::{AdaptOptions, Method, adapt};
-use crate::workbench::projected::Projected;
+use crate::adapt::{AdaptOptions, PatternMethod, Projected, adapt};
 use algo::adaptive::{Blur, FringeOptics, noise, paper};
 use algo::pattern::{Waveform, Waveforms};
 use appliance::cli::numbers::number;
@@ -45,7 +44,7 @@ pub struct Adapt {
     recording: PathBuf,
     /// How it is made.
     #[arg(long, value_enum)]
-    method: Method,
+    method: PatternMethod,
     /// The file for it: f64 turns, projector rows x columns.
     #[arg(long, value_name = "FILE.npy", value_parser = names::file("npy"))]
     out: PathBuf,
@@ -100,8 +99,7 @@ impl Adapt {
         let mut frames = None;
         if let Some(patterns) = &self.patterns {
             let width = recording.width as usize;
-            let projected = Projected::new(&adapted, width, self.frames, self.waveform.choice())
-                .map_err(Exit::Usage.because("--frames"))?;
+            let projected = Projected::new(&adapted, width, self.frames, self.waveform.choice())?;
             pool.install(|| projected.write(patterns))?;
             frames = Some(projected.words());
         }
@@ -116,14 +114,14 @@ impl Adapt {
 
     fn options(&self) -> Result<AdaptOptions> {
         let (projector_pitch, image_pitch) = match self.method {
-            Method::Fringed => (noise::PROJECTOR_PITCH, noise::IMAGE_PITCH),
-            Method::Paper => (paper::PROJECTOR_PITCH, paper::IMAGE_PITCH),
+            PatternMethod::Fringed => (noise::PROJECTOR_PITCH, noise::IMAGE_PITCH),
+            PatternMethod::Paper => (paper::PROJECTOR_PITCH, paper::IMAGE_PITCH),
         };
-        if self.method == Method::Paper && self.patterns.is_some() {
+        if self.method == PatternMethod::Paper && self.patterns.is_some() {
             return Exit::Usage.fail("--patterns: the sequences are those of --method fringed; the paper's is three geometric levels of four \
                  sines each, which patterns makes of the phase function");
         }
-        if self.method == Method::Paper && self.projector_pitch.is_some() {
+        if self.method == PatternMethod::Paper && self.projector_pitch.is_some() {
             return Exit::Usage.fail(format!(
                     "--projector-pitch: the paper's method has {projector_pitch} px: leave it out, or use \
                      --method fringed"

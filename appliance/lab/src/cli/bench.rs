@@ -5,6 +5,7 @@ use crate::benchmark::{self, Effort, Machine, Report, Study};
 use appliance::cli::{Output, Threads, names};
 use appliance::error::{Exit, Result};
 use appliance::storage::folder::OutputFolder;
+use appliance::system::memory::give_back;
 use std::path::PathBuf;
 
 /// Time the kernels, time against error, and trigger to verdict.
@@ -77,8 +78,10 @@ impl Bench {
     fn measure(&self, on_progress: &(dyn Fn(f64, &str) + Sync)) -> Result<Report> {
         let wanted = |what| self.what.is_none_or(|asked| asked == what);
         let pool = self.threads.pool(0)?;
+        // So that each frame that is timed lies in a mapping of its own.
+        give_back();
         let mut report = Report {
-            machine: Machine::this(&self.effort()),
+            machine: Machine::this(),
             kernel: None,
             accuracy: None,
             budget: None,
@@ -125,7 +128,9 @@ impl Bench {
 
     fn write_frames(&self, folder: &std::path::Path) -> Result<()> {
         let folder_of_frames = OutputFolder::create(folder)?;
-        for (name, bytes) in benchmark::frame_files(self.effort().size) {
+        let files = benchmark::frame_files(self.effort().size)
+            .map_err(Exit::Software.because("render the frames"))?;
+        for (name, bytes) in files {
             folder_of_frames.write(&name, &bytes)?;
         }
         self.output

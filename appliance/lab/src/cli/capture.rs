@@ -1,7 +1,7 @@
 //! `fringed-lab capture DIR`: pictures of white, black, fringes or files, with a head that need not
 //! be calibrated.
 
-use crate::workbench::import::{Channel, Picture};
+use crate::import::{Channel, Picture};
 use appliance::cli::numbers::number;
 use appliance::cli::{Files, Quiet, Threads, names};
 use appliance::error::{Exit, Failure, Result};
@@ -9,7 +9,7 @@ use appliance::head::calibration::Calibration;
 use appliance::head::capture::Shown;
 use appliance::head::scan::take_loaded;
 use appliance::production::backend::{self, Opened};
-use hal::bounds::MAX_FRINGES;
+use hal::bounds::{MAX_FRINGES, shortened};
 use hal::frame::Frame;
 use hal::projector::Raster;
 use hal::replay::recorder;
@@ -201,7 +201,7 @@ fn raster_of(path: &Path, (columns, rows): (u32, u32)) -> Result<Raster> {
         return Exit::Missing.fail(words);
     }
     let wrong = |problem: String| Failure::because(Exit::Content, format!("show {name}"), problem);
-    let picture = Picture::single(path).map_err(wrong)?;
+    let picture = Picture::single(path).map_err(|error| wrong(shortened(&error.to_string())))?;
     let (width, height) = picture.size;
     if picture.size != (columns, rows) || picture.bits != 8 {
         return Err(wrong(format!(

@@ -1,11 +1,19 @@
-//! `fringed-lab experiment --out DIR`: the paper's experiments as tables, arrays and pictures.
-//! `tests/peers/plots.py` draws them.
+//! `fringed-lab experiment --out DIR`: the paper's experiments as tables, arrays and pictures, of all
+//! runs of the chosen parts: parts × optics × seeds × methods. `tests/peers/plots.py` draws them.
 
 use super::adapt::Form;
-use crate::experiment::{Campaign, OpticsKind, PARTS, Results, RunRow, Scene, csv, means};
+use crate::experiment::{
+    OpticsKind, PARTS, Run, RunRow, Runner, SHOWN, Scene, csv, means, set_ratios, table,
+};
+use algo::pattern::{Encoder, Shot};
+use algo::phase::Trust;
 use appliance::cli::{Output, Threads, names, numbers};
 use appliance::error::{Exit, Failure, Result};
+use appliance::head::calibrated::MeasureError;
+use appliance::output::canvas::grey_png;
 use appliance::storage::folder::OutputFolder;
+use hal::frame::Samples;
+use hal::npy;
 use std::path::PathBuf;
 
 /// Repeat the paper's experiments on the simulated head.
@@ -83,6 +91,110 @@ impl Experiment {
     }
 }
 
+/// What is to be run.
+#[derive(Clone, Debug)]
+struct Campaign {
+    /// The parts.
+    scenes: Vec<Scene>,
+    /// The optics that are asked for; a part's figure may show others as well.
+    optics: OpticsKind,
+    /// Noise seeds 1…seeds.
+    seeds: u64,
+    /// Whether the better sequences show sines instead of the brightest waveforms.
+    sines: bool,
+}
+
+/// The results of all runs.
+#[derive(Debug, Default)]
+struct Results {
+    /// One row per run.
+    rows: Vec<RunRow>,
+    /// File names and contents of what some methods showed, saw and measured.
+    shown: Vec<(String, Vec<u8>)>,
+}
+
+impl Campaign {
+    /// Runs everything. `progress` is called with the share done, 0…1, and with the run that
+    /// begins.
+    ///
+    /// # Errors
+    /// If the simulated head or a pattern fails.
+    fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Results, MeasureError> {
+        let mut results = Results::default();
+        let settings = self.scenes.iter().flat_map(|scene| {
+            let kinds = scene.optics(self.optics);
+            kinds.into_iter().map(move |optics| (scene, optics))
+        });
+        let settings: Vec<_> = settings.collect();
+        let count = |(scene, _): &(&Scene, _)| scene.methods(self.sines).len() as u64 * self.seeds;
+        let total = settings.iter().map(count).sum::<u64>().max(1) as f64;
+        for (scene, optics) in settings {
+            let about = format!("{}, {} optics", scene.name, optics.word());
+            let done = results.rows.len() as f64;
+            progress(done / total, &format!("{about}: light of the scene"));
+            let mut runner = Runner::new(scene, optics)?;
+            for seed in 1..=self.seeds {
+                for method in scene.methods(self.sines) {
+                    let done = results.rows.len() as f64;
+                    let words = format!("{about}, seed {seed}: {}", method.name());
+                    progress(done / total, &words);
+                    let run = runner.run(method, seed)?;
+                    let row = RunRow::new(scene, optics, method, seed, run.values);
+                    results.rows.push(row);
+                    if seed == 1 && SHOWN.contains(&method) {
+                        let name = format!("{}-{}-{}", scene.name, optics.word(), method.name());
+                        results.shown.extend(shown(&name, &run));
+                    }
+                }
+            }
+        }
+        set_ratios(&mut results.rows);
+        Ok(results)
+    }
+}
+
+/// The finest pattern and its frame as pictures, and the measured heights in mm as an array of the
+/// frame's size, NaN where a pixel is not resolved.
+fn shown(name: &str, run: &Run) -> [(String, Vec<u8>); 3] {
+    let raster = Encoder::new(None, &[]).raster(&run.function, Shot::sine(1.0, 0.0));
+    let frame = &run.measured.frames[run.finest];
+    let format = frame.format();
+    let bytes: Vec<u8> = match frame.samples() {
+        Samples::Eight(samples) => samples.to_vec(),
+        Samples::Sixteen(samples) => {
+            let shift = format.bit_depth.saturating_sub(8);
+            samples.iter().map(|s| (s >> shift) as u8).collect()
+        }
+    };
+    let rows = bytes.chunks(format.stride);
+    let seen: Vec<u8> = rows
+        .flat_map(|row| &row[..format.width as usize])
+        .copied()
+        .collect();
+    let measured = &run.measured;
+    let heights = measured.heights.height.iter().zip(&measured.phases.trust);
+    let heights: Vec<f32> = heights
+        .map(|(height, trust)| match trust {
+            Trust::Resolved => height.mm() as f32,
+            _ => f32::NAN,
+        })
+        .collect();
+    [
+        (
+            format!("{name}-pattern.png"),
+            grey_png(raster.width, &raster.pixels),
+        ),
+        (
+            format!("{name}-frame.png"),
+            grey_png(format.width as usize, &seen),
+        ),
+        (
+            format!("{name}-height.npy"),
+            npy::write(measured.heights.width, &heights),
+        ),
+    ]
+}
+
 fn write(folder: &OutputFolder, results: &Results) -> Result<()> {
     folder.write("experiments.csv", csv(&results.rows).as_bytes())?;
     for (name, content) in &results.shown {
@@ -98,7 +210,7 @@ fn tables(campaign: &Campaign, means: &[RunRow]) -> String {
         for optics in scene.optics(campaign.optics) {
             let same = |row: &&RunRow| row.part == scene.name && row.optics == optics.word();
             let rows: Vec<&RunRow> = means.iter().filter(same).collect();
-            tables.push(crate::experiment::table(scene, &rows));
+            tables.push(table(scene, &rows));
         }
     }
     tables.join("\n")

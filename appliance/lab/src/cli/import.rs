@@ -1,8 +1,7 @@
 //! `fringed-lab import DIR --out RECORDING`: a recording of other people's pictures.
 
-use super::described::Described;
-use super::numbers::range;
-use crate::workbench::import::{Channel, Taken, import};
+use super::described::{Described, range};
+use crate::import::{Channel, Taken, import};
 use appliance::cli::numbers::number;
 use appliance::cli::{Output, Threads, model_files, names};
 use appliance::error::{Exit, Result};

@@ -7,7 +7,6 @@ mod capture;
 mod described;
 mod experiment;
 mod import;
-mod numbers;
 mod patterns;
 
 use appliance::VERSION;

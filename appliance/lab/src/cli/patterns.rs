@@ -1,9 +1,8 @@
 //! `fringed-lab patterns DIR`: the pictures to project, and the manifest of the recording that
 //! their frames will make.
 
-use super::described::Described;
-use super::numbers::{Size, size};
-use crate::workbench::layout::{Layout, Shown};
+use super::described::{Described, Size, size};
+use crate::layout::{Layout, Shown};
 use algo::chain::GrayCode;
 use algo::pattern::{Encoder, PhaseFunction, Shot};
 use appliance::cli::numbers::number;
@@ -78,8 +77,13 @@ impl Patterns {
         let format = FrameFormat::packed(width, height, self.bit_depth);
         // Frames that are yet to be taken: only their places are written.
         let frame = |at: usize| {
-            let one = FrameFormat::packed(1, 1, 8);
-            Frame::new(one, Arc::new(Pixels::zeroed(&one)), Timestamp(0), at as u64)
+            let pixel = FrameFormat::packed(1, 1, 8);
+            Frame::new(
+                pixel,
+                Arc::new(Pixels::zeroed(&pixel)),
+                Timestamp(0),
+                at as u64,
+            )
         };
         let frames: Vec<Frame> = (0..layout.shown.len())
             .map(frame)

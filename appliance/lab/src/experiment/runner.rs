@@ -3,9 +3,8 @@
 //! Preliminary maps, patterns and the golden map of the part are measured once per noise seed, and
 //! shared by the runs that need them.
 
+use super::compared::{BetterSequence, Judged, Method, OpticsKind, Scene, finest};
 use super::judge::judge;
-use super::methods::{self, BetterSequence, Method};
-use super::scenes::{Judged, OpticsKind, Scene};
 use super::table::Values;
 use algo::adaptive::{ProjectorMap, paper};
 use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
@@ -108,7 +107,7 @@ impl Runner {
             values: judge(&self.truth, &measured, self.judged),
             measured,
             function,
-            finest: methods::finest(&shots),
+            finest: finest(&shots),
         })
     }
 

@@ -1,7 +1,6 @@
 //! The results of the runs: one row per run as CSV, and their means over the noise seeds.
 
-use super::methods::{Method, PAPER};
-use super::scenes::{Judged, OpticsKind, Scene};
+use super::compared::{Judged, Method, OpticsKind, PAPER, Scene};
 use serde::Serialize;
 use std::fmt::Write as _;
 
