@@ -3,11 +3,11 @@
 use super::names;
 use super::numbers::number;
 use super::options::Measuring;
-use super::part::SimulatedPart;
+use super::options::SimulatedPart;
 use crate::config::Config;
 use crate::error::{Exit, Failure, Result};
+use crate::head::calibrated::EmptyStation;
 use crate::head::calibration::Calibration;
-use crate::head::empty::EmptyStation;
 use crate::head::rasters::Illumination;
 use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, Opened};

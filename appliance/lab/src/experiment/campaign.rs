@@ -7,7 +7,7 @@ use super::table::{self, RunRow};
 use algo::pattern::{Encoder, Shot};
 use algo::phase::Trust;
 use appliance::head::calibrated::MeasureError;
-use appliance::output::canvas::grey_png;
+use appliance::output::grey_png;
 use hal::frame::Samples;
 use hal::npy;
 

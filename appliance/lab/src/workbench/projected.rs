@@ -5,7 +5,7 @@ use super::adapt::Adapted;
 use algo::pattern::{Encoder, PhaseFunction, Shot, Split, Waveforms};
 use algo::units::AbsolutePhase;
 use appliance::error::{Exit, Result};
-use appliance::output::canvas::grey_png;
+use appliance::output::grey_png;
 use appliance::storage::folder::OutputFolder;
 use hal::npy;
 use rayon::prelude::*;

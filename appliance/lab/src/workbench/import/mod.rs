@@ -20,7 +20,7 @@ pub use picture::{Channel, Picture};
 
 use super::layout::{Description, Layout};
 use appliance::error::{Exit, Failure, Result};
-use appliance::head::calibration::opencv::Models;
+use appliance::head::calibration::opencv::ImportedModels;
 use appliance::measure::measure;
 use folder::Place;
 use hal::frame::{Frame, FrameFormat, Pixels};
@@ -57,7 +57,7 @@ pub struct Taken {
 pub fn import(
     folder: &Path,
     taken: &Taken,
-    models: impl FnOnce((u32, u32)) -> Result<Option<Models>>,
+    models: impl FnOnce((u32, u32)) -> Result<Option<ImportedModels>>,
 ) -> Result<Recording> {
     let layout = Layout::of(&taken.description);
     let layout = layout.map_err(Exit::Usage.because("import"))?;

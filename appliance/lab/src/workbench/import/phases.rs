@@ -13,7 +13,7 @@ use hal::replay::Recording;
 pub(super) fn absolute(recording: &Recording, pattern: usize) -> Result<PhaseMap, String> {
     let least = least_modulation(recording);
     if let Some(code) = CodeAlone::of(recording, pattern)? {
-        return code.phases(least);
+        return Ok(code.phases(least)?);
     }
     let channel = Channel::new(recording, pattern, least)?;
     let by_itself = channel.unwrapping(None, &Err("there is no known map".into()))?;
@@ -30,7 +30,7 @@ pub(super) fn absolute(recording: &Recording, pattern: usize) -> Result<PhaseMap
 pub(super) fn coarsest(recording: &Recording, pattern: usize) -> Result<PhaseMap, String> {
     let least = least_modulation(recording);
     if let Some(code) = CodeAlone::of(recording, pattern)? {
-        return code.phases(least);
+        return Ok(code.phases(least)?);
     }
     let channel = Channel::new(recording, pattern, least)?;
     Ok(channel.wrapped_levels()?.swap_remove(0))
