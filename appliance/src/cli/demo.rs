@@ -247,7 +247,7 @@ impl PlcResult {
     }
 
     fn from_words(words: &[u16]) -> Self {
-        let long = |at: usize| u32::from(words[at]) << 16 | u32::from(words[at + 1]);
+        let long = |first: usize| u32::from(words[first]) << 16 | u32::from(words[first + 1]);
         let gauges = usize::from(words[27]).min(16);
         Self {
             seq: long(0),

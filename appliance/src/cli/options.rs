@@ -15,6 +15,7 @@ use serde::Serialize;
 use sim::parts::Board;
 use sim::{Ground, Material};
 use std::ffi::OsString;
+use std::fmt::Display;
 use std::net::SocketAddr;
 use std::path::PathBuf;
 
@@ -326,16 +327,17 @@ impl SimulatedPart {
         if *self == Self::default() {
             return Ok(None);
         }
-        let usage =
-            |words: String| Failure::because(Exit::Usage, "put a part in front of the head", words);
+        let usage = |words: &dyn Display| {
+            Failure::because(Exit::Usage, "put a part in front of the head", words)
+        };
         if head.backend != Backend::Sim {
             return Err(usage(
-                "the configured head is not simulated: leave out --part, --defect, --material, --floor, --pose, --shift, --tilt and --rotate".into(),
+                &"the configured head is not simulated: leave out --part, --defect, --material, --floor, --pose, --shift, --tilt and --rotate",
             ));
         }
         let scenario = backend::scenario(head.scenario.as_deref())?;
         let mut placed = match &self.part {
-            Some(kind) => Placed::stock(kind).map_err(usage)?,
+            Some(kind) => Placed::stock(kind).map_err(|error| usage(&error))?,
             None => Placed {
                 part: scenario.part,
                 material: scenario.material,
@@ -347,17 +349,17 @@ impl SimulatedPart {
         placed.floor = self.floor.clone().map(|lies| lies.0);
         for defect in &self.defect {
             let added = placed.add_defect(defect).and_then(|()| placed.check());
-            added.map_err(|words| usage(format!("--defect {}: {words}", clipped(defect))))?;
+            added.map_err(|words| usage(&format_args!("--defect {}: {words}", clipped(defect))))?;
         }
         if let Some(pose) = self.pose {
             let posed = placed.pose(pose);
-            posed.map_err(|words| usage(format!("--pose: {words}")))?;
+            posed.map_err(|words| usage(&format_args!("--pose: {words}")))?;
         }
         let place = &mut placed.placement;
         place.shift_mm = self.shift.unwrap_or(place.shift_mm);
         place.tilt_deg = self.tilt.unwrap_or(place.tilt_deg);
         place.rotation_deg = self.rotate.unwrap_or(place.rotation_deg);
-        placed.check().map_err(usage)?;
+        placed.check().map_err(|error| usage(&error))?;
         Ok(Some(placed))
     }
 }

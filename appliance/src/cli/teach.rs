@@ -319,9 +319,10 @@ impl Teach {
             decoder.ok_or_else(|| wrong(&"it has no fringes, which a recipe projects"))?;
         let phases = &measured.phases[measured.primary];
         crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
-        let at = measured.primary;
+        let primary = measured.primary;
         let full = &measured.shots;
-        let signal = captures::recorded_signal(&recording, at).map_err(|error| wrong(&error))?;
+        let signal =
+            captures::recorded_signal(&recording, primary).map_err(|error| wrong(&error))?;
         let (mut phases, mut heights) = (phases.clone(), surface.map.clone());
         let found = surroundings::of(&heights, &surface.triangulator, naming.told());
         let found = found.map_err(|error| wrong(&error))?;
@@ -330,7 +331,7 @@ impl Teach {
         }
         let part = GoldenPart {
             calibration: &calibration,
-            pattern: PatternFile::of(&recording.patterns[at]),
+            pattern: PatternFile::of(&recording.patterns[primary]),
             // Recordings cannot be exposed anew.
             illumination: Illumination::default(),
             full,
@@ -353,7 +354,7 @@ impl Teach {
             < recording
                 .frames
                 .iter()
-                .filter(|frame| frame.pattern == at)
+                .filter(|frame| frame.pattern == primary)
                 .count()
         {
             let words = "levels that are unwrapped by beats are for teaching alone: cycles take the finest one, about the golden phase";

@@ -130,16 +130,16 @@ impl<'a> CodeAlone<'a> {
     /// coding.
     #[must_use]
     pub fn read_as(&self, reversed: bool, coding: Coding) -> Self {
-        let mut other = self.clone();
-        other.cells.coding = coding;
-        let CodePictures { bits, against } = &mut other.pictures;
+        let mut reading = self.clone();
+        reading.cells.coding = coding;
+        let CodePictures { bits, against } = &mut reading.pictures;
         if reversed {
             if against.len() == bits.len() {
                 against.reverse();
             }
             bits.reverse();
         }
-        other
+        reading
     }
 
     /// The absolute phase of every pixel, trusted from a modulation of `least` on.

@@ -156,12 +156,17 @@ impl MeasurementReport {
     }
 
     /// With the fringes that heights are by, of several, and what these tell of them.
-    pub(super) fn by(self, recording: &Recording, primary: usize, of: Option<Sensitivity>) -> Self {
+    pub(super) fn by(
+        self,
+        recording: &Recording,
+        primary: usize,
+        sensitivity: Option<Sensitivity>,
+    ) -> Self {
         let several = self.no_height.is_none() && recording.patterns.len() > 1;
         Self {
             heights_by: several.then(|| direction::word(&recording.patterns[primary])),
-            poor_heights: of
-                .and_then(|of| of.poor())
+            poor_heights: sensitivity
+                .and_then(|sensitivity| sensitivity.poor())
                 .map(|poor| format!("{poor}: project fringes of the other direction")),
             ..self
         }

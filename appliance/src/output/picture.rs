@@ -176,10 +176,10 @@ pub fn arrows_png(device: &str, size: (usize, usize), poses: &[&[Arrow]]) -> Vec
 /// of `cells` columns and rows without any are lighter.
 pub fn coverage_png(size: (usize, usize), cells: (usize, usize), poses: &[&[Arrow]]) -> Vec<u8> {
     let cell = |(x, y): (f64, f64)| {
-        let of = |at: f64, size: usize, cells: usize| {
-            ((at.max(0.0) as usize) * cells / size.max(1)).min(cells - 1)
+        let index = |place: f64, size: usize, cells: usize| {
+            ((place.max(0.0) as usize) * cells / size.max(1)).min(cells - 1)
         };
-        (of(x, size.0, cells.0), of(y, size.1, cells.1))
+        (index(x, size.0, cells.0), index(y, size.1, cells.1))
     };
     let mut seen = vec![false; cells.0 * cells.1];
     for arrow in poses.iter().flat_map(|arrows| arrows.iter()) {

@@ -237,8 +237,8 @@ impl PosesReport<'_> {
                 "flatness_mm": measured.map(|board| board.flatness),
             })
         });
-        let corner = |at: usize| {
-            let corner = geometry.prediction.volume[at];
+        let corner = |end: usize| {
+            let corner = geometry.prediction.volume[end];
             [corner.x, corner.y, corner.z]
         };
         json!({

@@ -191,7 +191,7 @@ impl ContrastFile {
     pub fn words(&self) -> String {
         let pitches = self.pitches.iter();
         let pitches: Vec<String> = pitches
-            .map(|of| format!("{:.0} % at {} px", of.contrast * 100.0, of.pitch_px))
+            .map(|pitch| format!("{:.0} % at {} px", pitch.contrast * 100.0, pitch.pitch_px))
             .collect();
         pitches.join(", ")
     }

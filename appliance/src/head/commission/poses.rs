@@ -135,10 +135,10 @@ impl Commissioning {
             "pose": number, "corners": pose.located(), "of": board.columns * board.rows,
         });
         let name = board::name(board);
-        let other = self.board.as_ref() != Some(&name);
+        let is_another = self.board.as_ref() != Some(&name);
         // PoseAction of another board are forgotten when there is one of this board.
-        if !other || seen.is_ok() || self.poses.is_empty() {
-            if other {
+        if !is_another || seen.is_ok() || self.poses.is_empty() {
+            if is_another {
                 self.poses.clear();
                 self.board = Some(name);
             }

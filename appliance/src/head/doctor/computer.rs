@@ -87,9 +87,9 @@ fn pulses(prompt: Prompt) -> Check {
 /// without voltage loses its card.
 fn power(power: Power) -> Check {
     let (now, since) = (power.now(), power.since_start());
-    let words = |of: &[&str]| match of {
+    let words = |conditions: &[&str]| match conditions {
         [] => "nothing".to_owned(),
-        of => of.join(", "),
+        conditions => conditions.join(", "),
     };
     let found = format!(
         "the firmware reports {}; since the computer's start {}",
@@ -114,11 +114,11 @@ fn versions(host: &Host) -> Check {
     let (kernel, libcamera) = (host.kernel(), host.libcamera());
     let shown = |version: &Option<String>| version.clone().unwrap_or_else(|| "not known".into());
     let found = format!("kernel {}, libcamera {}", shown(&kernel), shown(&libcamera));
-    let of = |version: &Option<String>| major_minor(version.as_deref()?);
+    let parsed = |version: &Option<String>| major_minor(version.as_deref()?);
     let [oldest, newest] = LIBCAMERA;
-    let remedy = if of(&kernel).is_some_and(|is| is < OLDEST_KERNEL) {
+    let remedy = if parsed(&kernel).is_some_and(|is| is < OLDEST_KERNEL) {
         Some("use a kernel of 5.7 or newer: older ones stamp the edges of lines on another clock")
-    } else if of(&libcamera).is_some_and(|is| !(oldest..=newest).contains(&is)) {
+    } else if parsed(&libcamera).is_some_and(|is| !(oldest..=newest).contains(&is)) {
         Some("install libcamera 0.4 to 0.7, for which this program is built")
     } else {
         None

@@ -92,8 +92,8 @@ pub(super) fn contrast(examination: &mut Examination<'_>) -> CheckResult {
         "modulation_counts": found.modulation_counts, "contrast_by_pitch": examine::by_pitch(&found),
     });
     let mut pitches = found.pitches.iter();
-    let sharp = pitches.find(|of| of.pitch_px == SHARP_PITCH);
-    let blurred = sharp.is_none_or(|of| of.contrast < LEAST_CONTRAST);
+    let sharp = pitches.find(|pitch| pitch.pitch_px == SHARP_PITCH);
+    let blurred = sharp.is_none_or(|pitch| pitch.contrast < LEAST_CONTRAST);
     let found = format!(
         "contrast of the coarsest pitch is kept to {}",
         found.words()

@@ -147,7 +147,7 @@ pub fn noise(head: &mut Head, settle: u32, lit: &Lit) -> Result<Noise, Error> {
 pub fn by_pitch(contrast: &ContrastFile) -> Map<String, Value> {
     let pitches = contrast.pitches.iter();
     pitches
-        .map(|of| (of.pitch_px.to_string(), of.contrast.into()))
+        .map(|pitch| (pitch.pitch_px.to_string(), pitch.contrast.into()))
         .collect()
 }
 
@@ -169,9 +169,9 @@ pub fn contrast(
             shots.push(counts);
         })?;
         let shot = |shift: usize, at: usize| f64::from(shots[shift][at]);
-        let one =
+        let modulation =
             |at: &usize| (shot(0, *at) - shot(2, *at)).hypot(shot(1, *at) - shot(3, *at)) / 2.0;
-        measured.push((pitch, median(lit.places().iter().map(one).collect())));
+        measured.push((pitch, median(lit.places().iter().map(modulation).collect())));
     }
     let modulation_counts = measured.first().map_or(0.0, |(_, coarsest)| *coarsest);
     let relative = |(pitch_px, modulation)| PitchFile {

@@ -49,103 +49,6 @@ const LIT: f64 = 0.05;
 /// of the head, no light comes back at all.
 pub const LONGEST_DARK: Duration = Duration::from_secs(15);
 
-/// How many refreshes of the projector a time takes, rounded up.
-pub fn refreshes(head: &Head, time: Duration) -> u32 {
-    let whole = time.as_nanos().div_ceil(head.refresh().as_nanos().max(1));
-    u32::try_from(whole).unwrap_or(u32::MAX)
-}
-
-/// Shows each pattern, waits `settle` refreshes for its light, and hands a picture of it to `keep`,
-/// in order, in counts.
-///
-/// # Errors
-/// The error of a device, or `Timeout` if the picture of a pattern did not come.
-pub fn pictures(
-    head: &mut Head,
-    settle: u32,
-    patterns: impl IntoIterator<Item = Result<Raster, Error>>,
-    keep: &mut dyn FnMut(Vec<f32>),
-) -> Result<(), Error> {
-    let mut patterns = patterns.into_iter();
-    loop {
-        let batch = patterns
-            .by_ref()
-            .take(BATCH)
-            .collect::<Result<Vec<_>, _>>()?;
-        if batch.is_empty() {
-            return Ok(());
-        }
-        take(head, settle, batch, keep)?;
-    }
-}
-
-fn take(
-    head: &mut Head,
-    settle: u32,
-    patterns: Vec<Raster>,
-    keep: &mut dyn FnMut(Vec<f32>),
-) -> Result<(), Error> {
-    let count = patterns.len();
-    head.load(patterns)?;
-    let showings: Vec<Showing> = (0..count).map(|at| showing(head, at, settle)).collect();
-    for _ in 0..ATTEMPTS {
-        let seen = head.watch(&showings, PATIENCE, &mut |frame| frame.clone())?;
-        let picture = |at: usize| settled(head, &seen, at, settle);
-        let taken: Option<Vec<_>> = (0..count).map(picture).collect();
-        if let Some(taken) = taken {
-            taken.into_iter().for_each(|frame| keep(frame.counts()));
-            return Ok(());
-        }
-    }
-    Err(Error::timeout(
-        "taking a picture of a pattern",
-        PATIENCE,
-        "check the cables of camera and projector, and the load of the computer",
-    ))
-}
-
-/// One picture of a loaded pattern; none if the frame was lost. It ends as soon as the frame of a
-/// triggered camera has arrived.
-///
-/// # Errors
-/// The error of a device.
-pub fn picture(head: &mut Head, index: usize, settle: u32) -> Result<Option<Frame>, Error> {
-    // A camera that runs by itself has frames of before the light has settled.
-    let triggered = head.camera_timing().starts == Starts::OnTrigger;
-    let there = Cell::new(false);
-    let showings = [showing(head, index, settle)];
-    let mut measure = |frame: &Frame| {
-        there.set(true);
-        frame.clone()
-    };
-    let still = || !(triggered && there.get());
-    let seen = head.watch_while(&showings, PATIENCE, &mut measure, &still)?;
-    Ok(settled(head, &seen, 0, settle).cloned())
-}
-
-/// A pattern, shown long enough for one whole exposure of settled light, whatever the phase of a
-/// free-running camera.
-fn showing(head: &Head, index: usize, settle: u32) -> Showing {
-    let camera = head.camera_timing();
-    let room = refreshes(head, camera.exposure + camera.period);
-    Showing {
-        index,
-        refreshes: settle + 1 + room.min(u32::MAX / 64),
-        settle,
-    }
-}
-
-/// The first frame that was exposed whole to the settled light of a showing.
-fn settled<'a>(head: &Head, seen: &'a Watched<Frame>, at: usize, settle: u32) -> Option<&'a Frame> {
-    let exposure = head.camera_timing().exposure;
-    let from = seen.flips.get(at)?.timestamp + head.refresh() * settle;
-    let until = seen.flips.get(at + 1).map(|next| next.timestamp);
-    let inside = |start| start >= from && until.is_none_or(|until| start + exposure <= until);
-    let fits = |start| inside(start) && !seen.spoiled_near(start);
-    let frame = seen.frames.iter().find(|frame| fits(frame.start))?;
-    Some(&frame.measured)
-}
-
 /// The pixels that the projector lights, and their samples of black and white.
 #[derive(Clone, Debug)]
 pub struct Lit {
@@ -244,6 +147,103 @@ impl Lit {
     pub fn share_of_white(&self, mean: f64) -> f64 {
         (mean - self.black_mean) / (self.white_mean - self.black_mean)
     }
+}
+
+/// How many refreshes of the projector a time takes, rounded up.
+pub fn refreshes(head: &Head, time: Duration) -> u32 {
+    let whole = time.as_nanos().div_ceil(head.refresh().as_nanos().max(1));
+    u32::try_from(whole).unwrap_or(u32::MAX)
+}
+
+/// Shows each pattern, waits `settle` refreshes for its light, and hands a picture of it to `keep`,
+/// in order, in counts.
+///
+/// # Errors
+/// The error of a device, or `Timeout` if the picture of a pattern did not come.
+pub fn pictures(
+    head: &mut Head,
+    settle: u32,
+    patterns: impl IntoIterator<Item = Result<Raster, Error>>,
+    keep: &mut dyn FnMut(Vec<f32>),
+) -> Result<(), Error> {
+    let mut patterns = patterns.into_iter();
+    loop {
+        let batch = patterns
+            .by_ref()
+            .take(BATCH)
+            .collect::<Result<Vec<_>, _>>()?;
+        if batch.is_empty() {
+            return Ok(());
+        }
+        take(head, settle, batch, keep)?;
+    }
+}
+
+fn take(
+    head: &mut Head,
+    settle: u32,
+    patterns: Vec<Raster>,
+    keep: &mut dyn FnMut(Vec<f32>),
+) -> Result<(), Error> {
+    let count = patterns.len();
+    head.load(patterns)?;
+    let showings: Vec<Showing> = (0..count).map(|at| showing(head, at, settle)).collect();
+    for _ in 0..ATTEMPTS {
+        let seen = head.watch(&showings, PATIENCE, &mut |frame| frame.clone())?;
+        let picture = |at: usize| settled(head, &seen, at, settle);
+        let taken: Option<Vec<_>> = (0..count).map(picture).collect();
+        if let Some(taken) = taken {
+            taken.into_iter().for_each(|frame| keep(frame.counts()));
+            return Ok(());
+        }
+    }
+    Err(Error::timeout(
+        "taking a picture of a pattern",
+        PATIENCE,
+        "check the cables of camera and projector, and the load of the computer",
+    ))
+}
+
+/// One picture of a loaded pattern; none if the frame was lost. It ends as soon as the frame of a
+/// triggered camera has arrived.
+///
+/// # Errors
+/// The error of a device.
+pub fn picture(head: &mut Head, index: usize, settle: u32) -> Result<Option<Frame>, Error> {
+    // A camera that runs by itself has frames of before the light has settled.
+    let triggered = head.camera_timing().starts == Starts::OnTrigger;
+    let there = Cell::new(false);
+    let showings = [showing(head, index, settle)];
+    let mut measure = |frame: &Frame| {
+        there.set(true);
+        frame.clone()
+    };
+    let still = || !(triggered && there.get());
+    let seen = head.watch_while(&showings, PATIENCE, &mut measure, &still)?;
+    Ok(settled(head, &seen, 0, settle).cloned())
+}
+
+/// A pattern, shown long enough for one whole exposure of settled light, whatever the phase of a
+/// free-running camera.
+fn showing(head: &Head, index: usize, settle: u32) -> Showing {
+    let camera = head.camera_timing();
+    let room = refreshes(head, camera.exposure + camera.period);
+    Showing {
+        index,
+        refreshes: settle + 1 + room.min(u32::MAX / 64),
+        settle,
+    }
+}
+
+/// The first frame that was exposed whole to the settled light of a showing.
+fn settled<'a>(head: &Head, seen: &'a Watched<Frame>, at: usize, settle: u32) -> Option<&'a Frame> {
+    let exposure = head.camera_timing().exposure;
+    let from = seen.flips.get(at)?.timestamp + head.refresh() * settle;
+    let until = seen.flips.get(at + 1).map(|next| next.timestamp);
+    let inside = |start| start >= from && until.is_none_or(|until| start + exposure <= until);
+    let fits = |start| inside(start) && !seen.spoiled_near(start);
+    let frame = seen.frames.iter().find(|frame| fits(frame.start))?;
+    Some(&frame.measured)
 }
 
 /// Loads black and white, in this order.

@@ -299,7 +299,7 @@ fn shown(name: &str, state: &str, outcome: Option<&StepOutcome>) -> Value {
 fn geometry(inside: &CommissionState, head: &OpenHead) -> Value {
     let (kept, laid) = (&inside.kept, &inside.laid);
     let models = kept.models.as_ref();
-    let of = kept.board.as_deref().and_then(corners_of).unwrap_or(0);
+    let corners = kept.board.as_deref().and_then(corners_of).unwrap_or(0);
     let poses: Vec<Value> = kept
         .poses
         .iter()
@@ -310,7 +310,7 @@ fn geometry(inside: &CommissionState, head: &OpenHead) -> Value {
                 poses.find(|fitted| fitted.recording == name)
             });
             json!({
-                "number": number, "corners": pose.located(), "of": of, "usable": pose.problem.is_none(), "problem": pose.problem,
+                "number": number, "corners": pose.located(), "of": corners, "usable": pose.problem.is_none(), "problem": pose.problem,
                 "tilt_degrees": laid.tilt(*number), "camera_px": fitted.map(|pose| pose.camera_px),
                 "projector_px": fitted.map(|pose| pose.projector_px),
             })

@@ -91,7 +91,7 @@ pub fn from_two(
     declared: Declared,
 ) -> Result<ImportedModels> {
     let mut notes = Vec::new();
-    let mut one = |path: &Path, device: &Device, size, pose_needed: bool| {
+    let mut imported = |path: &Path, device: &Device, size, pose_needed: bool| {
         read(path, |tree| {
             let own = nodes::nested(tree, device).unwrap_or(tree);
             right_size(own, size)?;
@@ -104,10 +104,10 @@ pub fn from_two(
         })
     };
     // A camera without a pose is the world that the projector's is in.
-    let (camera_lens, own_pose) = one(camera, &CAMERA, sizes.camera, false)?;
+    let (camera_lens, own_pose) = imported(camera, &CAMERA, sizes.camera, false)?;
     // One that is the world's origin says no more.
     let own_pose = own_pose.filter(|pose| *pose != OWN);
-    let (projector_lens, pose) = one(projector, &PROJECTOR, sizes.projector, true)?;
+    let (projector_lens, pose) = imported(projector, &PROJECTOR, sizes.projector, true)?;
     let pose = pose.unwrap_or(OWN);
     let world = World::of(own_pose, declared).map_err(failed(camera))?;
     let projector_pose = match world.is_stated {

@@ -174,14 +174,14 @@ pub fn refuse_other_models(tree: &Node) -> Result<()> {
         };
         let is_off = ["0", "false", "no", "off"].contains(&&*word);
         let is_other = |word: &str| {
-            OTHER_WORDS.contains(&word) || OTHER_MODELS.iter().any(|other| word.contains(other))
+            OTHER_WORDS.contains(&word) || OTHER_MODELS.iter().any(|model| word.contains(model))
         };
         let names_a_model = ["model", "type", "projection"]
             .iter()
-            .any(|of| key.contains(of));
+            .any(|word| key.contains(word));
         let of_distortion = names_a_model && key.contains("distortion");
         let is_wrong = key == "xi"
-            || (OTHER_MODELS[..6].iter().any(|other| key.contains(other)) && !is_off)
+            || (OTHER_MODELS[..6].iter().any(|model| key.contains(model)) && !is_off)
             || (names_a_model && !is_off && is_other(&word))
             || (of_distortion && !word.is_empty() && !OWN_DISTORTIONS.contains(&&*word));
         if is_wrong {
