@@ -1,7 +1,8 @@
 //! The checkerboard: its name (`checker:9x13:10` has 9 × 13 inner corners and squares of 10 mm), how the
 //! scale that it gives the models is checked, and which pose of it is z = 0.
 
-use super::calibration::file::{CalibrationFile, UnusableCalibration};
+use super::calibration::UnusableCalibration;
+use super::calibration::file::CalibrationFile;
 use super::calibration::geometry::{GeometryFile, MAX_CORNERS, MAX_SQUARE_MM};
 use algo::calibration::{Board, Standing};
 use algo::geometry::{Pinhole, Vector};
@@ -61,6 +62,18 @@ pub fn parse(text: &str) -> Result<Board, BoardNameError> {
 /// The name of a board.
 pub fn name(board: &Board) -> String {
     format!("checker:{}x{}:{}", board.columns, board.rows, board.square)
+}
+
+impl GeometryFile {
+    /// Where models come from that were made of these poses.
+    pub fn source(&self) -> String {
+        let board = Board {
+            columns: self.board.columns,
+            rows: self.board.rows,
+            square: self.board.square_mm,
+        };
+        format!("{} poses of {}", self.poses.len(), name(&board))
+    }
 }
 
 /// Why the scale of the models must be wrong.

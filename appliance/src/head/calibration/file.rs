@@ -2,14 +2,13 @@
 
 use super::CalibrationSigma;
 use super::geometry::{GeometryFile, ReferenceFile};
-use super::{Calibration, HeightsBy, size};
+use super::{Calibration, HeightsBy, UnusableCalibration, inverted, size};
 use crate::head::exposing::Exposing;
-use crate::head::seam::{self, AbsurdModel};
+use crate::head::seam;
 use crate::storage::hex;
 use crate::system::clock;
 use algo::frame::SampleNoise;
 use algo::geometry::Pinhole;
-use algo::pattern::{GreyResponse, ResponseError};
 use hal::bounded;
 use hal::bounds::{
     Bound as _, Fields, LAST_SECOND, Longest, MAX_NAME, MAX_NOISE_COUNTS, MAX_SIDE,
@@ -207,70 +206,6 @@ bounded! {
     }
 }
 
-/// Why a calibration cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum UnusableCalibration {
-    /// The file cannot be read.
-    #[error("{0}: make it readable, or calibrate anew")]
-    Unreadable(String),
-    /// It is no JSON of this form.
-    #[error("it is damaged: {0}: calibrate anew")]
-    Damaged(String),
-    /// It is another kind of file.
-    #[error("its format is {found:?}, expected {:?}", FORMAT)]
-    Format {
-        /// The format that it names.
-        found: String,
-    },
-    /// It is of another version.
-    #[error(
-        "it has version {found}, this program reads {}: calibrate anew",
-        VERSION
-    )]
-    Version {
-        /// Its version.
-        found: u32,
-    },
-    /// It was changed.
-    #[error("it does not agree with its checksum: it is damaged, or was edited; calibrate anew")]
-    Checksum,
-    /// Heights go by a plane that was not measured.
-    #[error("heights_by is \"measured\", and reference is missing: calibrate anew with a plate")]
-    NoReference,
-    /// It was made by a program with another fingerprint.
-    #[error("its fingerprint is not that of its content: calibrate anew")]
-    Fingerprint,
-    /// A value is out of its bounds.
-    #[error("{0}: calibrate anew")]
-    Bounds(String),
-    /// A model is absurd.
-    #[error(transparent)]
-    Model(#[from] AbsurdModel),
-    /// The response cannot be inverted.
-    #[error(transparent)]
-    Response(#[from] UnusableResponse),
-    /// A number is not finite.
-    #[error("{0}")]
-    Unwritable(String),
-}
-
-impl From<UnusableCalibration> for String {
-    fn from(error: UnusableCalibration) -> Self {
-        error.to_string()
-    }
-}
-
-/// Why a grey response cannot be inverted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum UnusableResponse {
-    /// It has not one light for each grey level.
-    #[error("response has {0} levels, expected 256")]
-    Levels(usize),
-    /// It falls, or does not rise.
-    #[error(transparent)]
-    Falls(#[from] ResponseError),
-}
-
 impl CalibrationFile {
     /// A file that is made now and has models only. It gets its fingerprint and its checksum when
     /// it is [sealed](Self::sealed).
@@ -460,17 +395,4 @@ impl CalibrationFile {
             serde_json::to_vec(&bare).unwrap_or_default(),
         ))
     }
-}
-
-/// The inverse of a response; none if it is linear already.
-///
-/// # Errors
-/// If it has not 256 levels, or falls.
-pub fn inverted(response: &[f64]) -> Result<Option<GreyResponse>, UnusableResponse> {
-    let levels: &[f64; 256] = response
-        .try_into()
-        .map_err(|_| UnusableResponse::Levels(response.len()))?;
-    let inverse = GreyResponse::new(levels)?;
-    let linear = (0..=u8::MAX).all(|level| inverse.level_for(level) == level);
-    Ok((!linear).then_some(inverse))
 }

@@ -1,8 +1,6 @@
 //! The keys `geometry` and `reference` of `calibration.json`: the board and the poses that the models
 //! were made with, and the reference phase maps of a plate.
 
-use crate::head::board;
-use algo::calibration::Board;
 use hal::bounded;
 use hal::bounds::{Bound, Fields, Longest, MAX_FRINGES, MAX_NAME, MAX_SIDE, fingerprint, length};
 use hal::model::PlaneModel;
@@ -99,16 +97,6 @@ bounded! {
 }
 
 impl GeometryFile {
-    /// Where models come from that were made in this way.
-    pub fn source(&self) -> String {
-        let board = Board {
-            columns: self.board.columns,
-            rows: self.board.rows,
-            square: self.board.square_mm,
-        };
-        format!("{} poses of {}", self.poses.len(), board::name(&board))
-    }
-
     /// Checks each value by itself.
     ///
     /// # Errors

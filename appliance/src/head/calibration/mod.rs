@@ -11,7 +11,7 @@ use crate::head::seam::{self, AbsurdModel};
 use crate::storage::hex;
 use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
-use algo::pattern::{GreyResponse, PhaseFunction, Waveform, Waveforms};
+use algo::pattern::{GreyResponse, PhaseFunction, ResponseError, Waveform, Waveforms};
 use algo::phase::LeastModulation;
 use file::ContrastFile;
 use hal::bounded;
@@ -24,6 +24,70 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use sim::Scenario;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Why a calibration cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnusableCalibration {
+    /// The file cannot be read.
+    #[error("{0}: make it readable, or calibrate anew")]
+    Unreadable(String),
+    /// It is no JSON of this form.
+    #[error("it is damaged: {0}: calibrate anew")]
+    Damaged(String),
+    /// It is another kind of file.
+    #[error("its format is {found:?}, expected {:?}", file::FORMAT)]
+    Format {
+        /// The format that it names.
+        found: String,
+    },
+    /// It is of another version.
+    #[error(
+        "it has version {found}, this program reads {}: calibrate anew",
+        file::VERSION
+    )]
+    Version {
+        /// Its version.
+        found: u32,
+    },
+    /// It was changed.
+    #[error("it does not agree with its checksum: it is damaged, or was edited; calibrate anew")]
+    Checksum,
+    /// Heights go by a plane that was not measured.
+    #[error("heights_by is \"measured\", and reference is missing: calibrate anew with a plate")]
+    NoReference,
+    /// It was made by a program with another fingerprint.
+    #[error("its fingerprint is not that of its content: calibrate anew")]
+    Fingerprint,
+    /// A value is out of its bounds.
+    #[error("{0}: calibrate anew")]
+    Bounds(String),
+    /// A model is absurd.
+    #[error(transparent)]
+    Model(#[from] AbsurdModel),
+    /// The response cannot be inverted.
+    #[error(transparent)]
+    Response(#[from] UnusableResponse),
+    /// A number is not finite.
+    #[error("{0}")]
+    Unwritable(String),
+}
+
+impl From<UnusableCalibration> for String {
+    fn from(error: UnusableCalibration) -> Self {
+        error.to_string()
+    }
+}
+
+/// Why a grey response cannot be inverted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnusableResponse {
+    /// It has not one light for each grey level.
+    #[error("response has {0} levels, expected 256")]
+    Levels(usize),
+    /// It falls, or does not rise.
+    #[error(transparent)]
+    Falls(#[from] ResponseError),
+}
 
 /// What a recording lacks for a calibration, as a predicate.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -332,4 +396,17 @@ impl Current {
         let current = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         current.clone()
     }
+}
+
+/// The inverse of a response; none if it is linear already.
+///
+/// # Errors
+/// If it has not 256 levels, or falls.
+pub fn inverted(response: &[f64]) -> Result<Option<GreyResponse>, UnusableResponse> {
+    let levels: &[f64; 256] = response
+        .try_into()
+        .map_err(|_| UnusableResponse::Levels(response.len()))?;
+    let inverse = GreyResponse::new(levels)?;
+    let linear = (0..=u8::MAX).all(|level| inverse.level_for(level) == level);
+    Ok((!linear).then_some(inverse))
 }

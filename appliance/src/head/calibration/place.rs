@@ -1,7 +1,8 @@
 //! The files of a calibration: `calibration.json`, its previous generation, and the phase maps
 //! beside them.
 
-use super::file::{CalibrationFile, UnusableCalibration};
+use super::UnusableCalibration;
+use super::file::CalibrationFile;
 use crate::error::{Exit, Result};
 use crate::storage::folder::{name_also, read_whole, sync_folder_of, write_whole};
 use crate::storage::hex;

@@ -68,7 +68,7 @@ pub static STEPS: [Step; 7] = [
     },
     Step {
         name: TIMING,
-        measure: timing::measure,
+        measure: |subject, kept| timing::measure(subject, &mut kept.measured),
     },
     Step {
         name: GEOMETRY,

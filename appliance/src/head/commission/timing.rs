@@ -1,13 +1,12 @@
 //! The step `timing`: what is measured on a head whatever its geometry, time stamps, pace, flip-to-light
 //! delay, grey response, noise and contrast.
 
-use super::kept::Commissioning;
 use super::{StepOutcome, Subject};
 use crate::error::{Exit, Failure, Result};
-use crate::head::calibration::Calibration;
 use crate::head::calibration::file::{
-    CalibrationFile, ContrastFile, LevelFile, NoiseFile, TimingFile, UnusableResponse, inverted,
+    CalibrationFile, ContrastFile, LevelFile, NoiseFile, TimingFile,
 };
+use crate::head::calibration::{Calibration, UnusableResponse, inverted};
 use crate::head::doctor::light::{alike, exposed, lit_enough};
 use crate::head::doctor::{Check, CheckVerdict};
 use crate::head::examine::{
@@ -249,11 +248,12 @@ impl Characteristics {
     }
 }
 
+/// Measures what does not depend on the geometry, and replaces what was measured before by it.
 pub(super) fn measure(
     subject: &mut Subject<'_>,
-    kept: &mut Commissioning,
+    known: &mut Option<Characteristics>,
 ) -> Result<Option<StepOutcome>> {
-    let response = kept.measured.as_ref().map(|known| known.response.clone());
+    let response = known.as_ref().map(|known| known.response.clone());
     let before = || subject.before.as_ref()?.response.clone();
     let response = response.or_else(before);
     let measured = characterise(subject, response)?;
@@ -265,6 +265,6 @@ pub(super) fn measure(
     let words = measured.words().into_iter();
     let said = words.map(|(name, found)| format!("{name}: {found}"));
     let outcome = StepOutcome::passed(said, figures);
-    kept.measured = Some(measured);
+    *known = Some(measured);
     Ok(Some(outcome))
 }
