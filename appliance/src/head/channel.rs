@@ -72,7 +72,7 @@ pub struct Phases {
 }
 
 impl<'a> Channel<'a> {
-    /// The frames of a pattern, of which modulations are trusted from `least` on.
+    /// The frames of a pattern; modulations are trusted from `least` on.
     ///
     /// # Errors
     /// The frames make no levels, or are not of one format.
@@ -164,7 +164,7 @@ impl<'a> Channel<'a> {
     /// The chain of the levels, from the code if there is one.
     ///
     /// # Errors
-    /// There is none, and what to add.
+    /// The levels form no chain; what to add.
     pub fn chain(&self) -> Result<Chain, PhasesError> {
         let cells = self.code.as_ref().map(|code| code.cells);
         let (levels, range) = (self.scan.sequence.levels(), self.function.range());

@@ -263,7 +263,7 @@ fn look_down(calibration: &Calibration, failed: &dyn Fn(&dyn Display) -> Failure
     }
 }
 
-/// Puts a flat plate in front of a simulated head, where nobody can lay one.
+/// Puts a flat plate in front of a simulated head.
 fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<()> {
     let Some(stage) = stage else {
         return Ok(());

@@ -164,7 +164,7 @@ impl BoardOptions {
             SeenPose::of(&recording, &name, board)
                 .map_err(|error| content(format!("{}: {error}", path.display())))
         };
-        // The first pose that fails is named, in whatever order they end.
+        // The first pose that fails is named, whichever thread ends first.
         let each: Vec<Result<SeenPose>> = self.poses.par_iter().map(seen).collect();
         each.into_iter().collect()
     }

@@ -33,7 +33,7 @@ pub struct Loaded {
     pub fallback: Option<String>,
 }
 
-/// A `calibration.json` of which no generation can be used.
+/// A `calibration.json` without a generation that can be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("calibration {}: {reason}", path.display())]
 pub struct UnusablePlace {

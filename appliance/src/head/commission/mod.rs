@@ -42,7 +42,7 @@ pub struct Step {
 pub const EXPOSURE: &str = "exposure";
 /// The step in which poses are taken, and models made of them.
 pub const GEOMETRY: &str = "geometry";
-/// The step that measures the head whatever its geometry.
+/// The step that measures what does not depend on the geometry.
 pub const TIMING: &str = "timing";
 /// The step that stores the calibration.
 pub const PLANE: &str = "plane";

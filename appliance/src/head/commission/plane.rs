@@ -84,7 +84,7 @@ impl Subject<'_> {
         })
     }
 
-    /// What was measured whatever the geometry: by the step timing, else in the calibration before.
+    /// What was measured by the step timing, else what the calibration before has.
     fn characteristics(&self, kept: &Commissioning) -> Result<Characteristics> {
         let before = || Characteristics::of(self.before.as_ref()?);
         let measured = kept.measured.clone().or_else(before).ok_or_else(|| {

@@ -1,5 +1,5 @@
-//! The step `timing`: what is measured on a head whatever its geometry, time stamps, pace, flip-to-light
-//! delay, grey response, noise and contrast.
+//! The step `timing`: measures what does not depend on the geometry of a head: time stamps, pace,
+//! flip-to-light delay, grey response, noise and contrast.
 
 use super::{StepOutcome, Subject};
 use crate::error::{Exit, Failure, Result};
@@ -29,7 +29,7 @@ const BEYOND: u32 = 2;
 /// recipes stay valid.
 const SAME_RESPONSE: f64 = 1.0;
 
-/// What is measured on a head whatever its geometry.
+/// What is measured on a head and does not depend on its geometry.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Characteristics {

@@ -117,7 +117,7 @@ pub(super) fn content(examination: &mut Examination<'_>) -> CheckResult {
     Ok(alike(off))
 }
 
-/// Judges whether a grey gives the same light whatever surrounds it; between white stripes it gives
+/// Judges whether the light of a grey is independent of its surroundings; between white stripes it gives
 /// more than between black ones by the share `off`.
 pub fn alike(off: f64) -> Check {
     Check::new(

@@ -1,5 +1,5 @@
-//! The times of a camera that nobody states reliably: which moment its time stamps mark, and how
-//! many refreshes it needs for each pattern.
+//! The times of a camera that data sheets and drivers do not state reliably: which moment its time
+//! stamps mark, and how many refreshes it needs for each pattern.
 //!
 //! The stamps mark the start of the exposure, its end, or the end of the readout. For a triggered
 //! camera it follows from the time between trigger and stamp. Drivers stamp in an interrupt, so

@@ -22,7 +22,7 @@ use serde_json::{Map, Value};
 
 /// Largest decrease of the response that noise can explain, share of white.
 const MOST_FALL: f64 = 0.02;
-/// Grey levels of which two pictures are taken.
+/// Grey levels; two pictures are taken of each.
 const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
 /// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are
 /// relative to it.

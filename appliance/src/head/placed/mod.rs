@@ -136,7 +136,7 @@ struct PlacedFile {
     floor: Option<Option<Ground>>,
 }
 
-/// A value that is given, also one that says that there is none.
+/// A value whose key is given, also if it is `null`.
 fn given<'a, T: Deserialize<'a>, D: Deserializer<'a>>(from: D) -> Result<Option<T>, D::Error> {
     T::deserialize(from).map(Some)
 }

@@ -213,7 +213,7 @@ pub fn has(tree: &Node, rows: &[NamePair]) -> bool {
 /// The first of the rows' nodes that the tree has, and the names of the one beside it.
 ///
 /// # Errors
-/// In words: there is none.
+/// The tree has none of them.
 pub fn first<'a>(
     tree: &'a Node,
     rows: &[NamePair],
@@ -230,7 +230,7 @@ pub fn first<'a>(
 /// The first of the nodes that the tree has.
 ///
 /// # Errors
-/// In words: there is none.
+/// The tree has none of them.
 pub fn one<'a>(tree: &'a Node, names: &[&'static str]) -> Result<(&'static str, &'a Node)> {
     let found = names.iter().find_map(|name| Some((*name, tree.get(name)?)));
     found.ok_or_else(|| none_of(names))
