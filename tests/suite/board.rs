@@ -2,7 +2,7 @@
 //! is refused.
 
 use crate::written::{FRINGED, program};
-use appliance::head::calibration::place::Place;
+use appliance::head::calibration::place::CalibrationPlace;
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -127,7 +127,7 @@ fn models_from_a_rendered_board_are_those_of_the_scene_and_need_the_head_before_
     assert_eq!(report["scale"], "unchecked");
     let missing = ["timing", "noise", "response", "contrast"];
     assert_eq!(report["missing"], serde_json::json!(missing));
-    let loaded = Place::at(&poses.out()).load().unwrap().unwrap();
+    let loaded = CalibrationPlace::at(&poses.out()).load().unwrap().unwrap();
     assert_eq!(loaded.file.version, 2);
     // Again: the baseline confirms the scale, and squares of another size contradict it.
     let run = poses.calibrate(CHECKER, &[]).succeeded();
@@ -135,7 +135,7 @@ fn models_from_a_rendered_board_are_those_of_the_scene_and_need_the_head_before_
     assert_eq!(again["scale"], "baseline");
     poses.refused("checker:6x8:10.2", &[], &["mm apart", "--board"]);
     assert_eq!(
-        Place::at(&poses.out())
+        CalibrationPlace::at(&poses.out())
             .load()
             .unwrap()
             .unwrap()
@@ -244,7 +244,11 @@ fn models_of_another_head_are_refused_for_a_recording() {
     let garbage = folder.join("garbage.json");
     fs::write(&garbage, "{}").unwrap();
     assert_eq!(measure(&garbage).code, 65);
-    let mut file = Place::at(&poses.out()).load().unwrap().unwrap().file;
+    let mut file = CalibrationPlace::at(&poses.out())
+        .load()
+        .unwrap()
+        .unwrap()
+        .file;
     file.camera.width *= 2;
     let (_, bytes) = file.sealed().unwrap();
     fs::write(&garbage, bytes).unwrap();

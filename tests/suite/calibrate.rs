@@ -2,7 +2,7 @@
 //! survive a kill.
 
 use crate::written::{FRINGED, program};
-use appliance::head::calibration::place::Place;
+use appliance::head::calibration::place::{CalibrationPlace, NamedMap};
 use serde_json::Value;
 use sim::Scenario;
 use std::fs;
@@ -281,13 +281,16 @@ fn models_made_with_opencv_are_imported_and_stay() {
 /// the newest.
 fn whole(folder: &Path) -> String {
     let json = folder.join("state/calibration/calibration.json");
-    let loaded = Place::at(&json).load().unwrap().expect("a calibration");
+    let loaded = CalibrationPlace::at(&json)
+        .load()
+        .unwrap()
+        .expect("a calibration");
     assert_eq!(loaded.fallback, None);
     let maps = loaded.file.reference.as_ref().expect("a plate");
     for map in [&maps.vertical, &maps.horizontal] {
         let bytes = fs::read(json.with_file_name(&map.file)).unwrap();
-        let (name, sum) = Place::name_of_map(map.file.rsplit_once('-').unwrap().0, &bytes);
-        assert_eq!((&name, &sum), (&map.file, &map.sha256));
+        let named = NamedMap::new(map.file.rsplit_once('-').unwrap().0, bytes);
+        assert_eq!((&named.file, &named.sha256), (&map.file, &map.sha256));
     }
     loaded.file.checksum
 }
@@ -366,7 +369,7 @@ fn a_damaged_calibration_gives_way_to_the_one_before_and_is_never_guessed() {
     let text = fs::read_to_string(&json).unwrap();
     let load = |text: &str| {
         fs::write(&json, text).unwrap();
-        Place::at(&json).load()
+        CalibrationPlace::at(&json).load()
     };
     let digit = text.replacen("\"counts\": ", "\"counts\": 1", 1);
     let [older, newer] =
@@ -391,7 +394,7 @@ fn a_damaged_calibration_gives_way_to_the_one_before_and_is_never_guessed() {
         );
     }
     fs::write(json.with_extension("json.previous"), "neither").unwrap();
-    let problem = load(&digit).unwrap_err();
+    let problem = load(&digit).unwrap_err().to_string();
     assert!(
         problem.contains("calibrate anew") && problem.contains("calibration.json"),
         "{problem}"

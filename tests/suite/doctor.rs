@@ -3,7 +3,7 @@
 
 use crate::written::program;
 use appliance::head::calibration::Calibration;
-use appliance::head::doctor::{Verdict, examine};
+use appliance::head::doctor::{CheckVerdict, examine};
 use hal::head::Timing;
 use serde_json::Value;
 use sim::Scenario;
@@ -157,7 +157,9 @@ fn a_head_that_nobody_has_calibrated_fails_in_nothing_but_what_calibration_measu
         head.set_timing(Timing::default());
         let known = Calibration::of_scenario(stage.scenario()).unwrap();
         let steps = examine(&mut head, &known, calibrated, &|_, _| ());
-        let failed = steps.iter().filter(|step| step.verdict == Verdict::Fail);
+        let failed = steps
+            .iter()
+            .filter(|step| step.verdict == CheckVerdict::Fail);
         let failed: Vec<&str> = failed.map(|step| step.name).collect();
         // If the head is said to be calibrated with these values, its stamps are wrong.
         let wrong = if calibrated { "trigger" } else { "delay" };

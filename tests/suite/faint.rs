@@ -5,7 +5,7 @@ use super::gauges::{frames, plan};
 use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
-use appliance::head::calibrated::{CalibratedHead, Measured};
+use appliance::head::calibrated::{CalibratedHead, MeasuredPart};
 use appliance::head::scan::Scan;
 use appliance::recipe::RecipeFile;
 use appliance::recipe::teach::TaughtRecipe;
@@ -39,7 +39,7 @@ fn full(taught: &TaughtRecipe) -> &[algo::pattern::Shot] {
 }
 
 /// Measures the part with the recipe's full sequence about its golden map.
-fn measured(bed: &mut Bed, taught: &TaughtRecipe) -> (Measured, Vec<AbsolutePhase>) {
+fn measured(bed: &mut Bed, taught: &TaughtRecipe) -> (MeasuredPart, Vec<AbsolutePhase>) {
     let golden = taught.recipe.arrays.golden_phase.iter();
     let golden: Vec<_> = golden
         .map(|&turns| AbsolutePhase::from_turns(turns))

@@ -1,6 +1,6 @@
 //! Recordings that are measured in this process; each shared recording once for all tests.
 
-use appliance::measure::{Measurement, measure};
+use appliance::measure::{MeasuredRecording, measure};
 use hal::replay::Recording;
 use std::path::Path;
 use std::sync::OnceLock;
@@ -9,7 +9,7 @@ use tests::shared;
 /// A recording, and the results of the program's code for it.
 pub struct Measured {
     pub recording: Recording,
-    pub result: Measurement,
+    pub result: MeasuredRecording,
 }
 
 impl Measured {

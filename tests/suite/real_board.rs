@@ -6,7 +6,7 @@ use algo::calibration::{Board, Corner};
 use algo::pipeline::{Epipolar, PhaseMap};
 use algo::trust::Trust;
 use algo::units::AbsolutePhase;
-use appliance::head::calibration::place::Place;
+use appliance::head::calibration::place::CalibrationPlace;
 use appliance::head::examine::MOST_DRIFT_PX;
 use appliance::head::geometry::SeenPose;
 use hal::replay::Recording;
@@ -100,7 +100,9 @@ fn left_out(poses: &[PathBuf], at: usize) -> LeftOut {
     ];
     program().run(&arguments).succeeded();
     let heights = files::array(&path("measured/height.npy"));
-    let found = Place::at(&path("calibration.json")).load().unwrap();
+    let found = CalibrationPlace::at(&path("calibration.json"))
+        .load()
+        .unwrap();
     let models = found.unwrap().file.calibration().unwrap();
     let (camera, projector) = (&models.camera, &models.projector);
     let recording = Recording::open(&pose).unwrap();

@@ -8,7 +8,7 @@ use algo::units::AbsolutePhase;
 use appliance::error::{Exit, Failure, Result};
 use appliance::head::{direction, seam};
 use appliance::measure::{measure, wrong};
-use appliance::output::canvas::grey_png;
+use appliance::output::grey_png;
 use appliance::storage::folder::OutputFolder;
 use hal::npy;
 use hal::replay::Recording;

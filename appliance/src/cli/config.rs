@@ -3,7 +3,7 @@
 use super::options::{Json, Output};
 use crate::config::{Backend, Config, keys, table};
 use crate::error::{Exit, Result};
-use crate::head::calibration::place::Place;
+use crate::head::calibration::place::CalibrationPlace;
 use crate::production::backend;
 use hal::replay::Recording;
 use std::path::PathBuf;
@@ -62,7 +62,7 @@ fn check_named_files(config: &Config) -> Result<()> {
     if let Some(calibration) = &config.head.calibration {
         let wrong = Exit::Content.failure();
         // The file need not exist yet.
-        Place::at(calibration).load().map_err(wrong)?;
+        CalibrationPlace::at(calibration).load().map_err(wrong)?;
     }
     match config.head.backend {
         Backend::Sim => drop(backend::scenario(config.head.scenario.as_deref())?),

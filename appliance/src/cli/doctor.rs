@@ -3,7 +3,7 @@
 use super::options::Measuring;
 use crate::config::Backend;
 use crate::error::{Exit, Result};
-use crate::head::doctor::{Check, Verdict, computer, controller, examine};
+use crate::head::doctor::{Check, CheckVerdict, computer, examine};
 use crate::production::backend;
 use crate::system::host::Host;
 use crate::system::priority;
@@ -56,9 +56,11 @@ impl Doctor {
             )
         }));
         let state = opened.head.controller();
-        checks.extend(state.as_ref().map(controller::examine));
+        checks.extend(state.as_ref().map(computer::controller));
         progress.clear();
-        let failed = checks.iter().filter(|check| check.verdict == Verdict::Fail);
+        let failed = checks
+            .iter()
+            .filter(|check| check.verdict == CheckVerdict::Fail);
         let failed: Vec<&str> = failed.map(|check| check.name).collect();
         let document = json!({ "healthy": failed.is_empty(), "steps": checks });
         options.output.answer(&document, || table(&checks))?;

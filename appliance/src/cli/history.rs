@@ -13,7 +13,7 @@ use std::io::{self, BufWriter, StdoutLock, Write};
 
 /// Show or export stored results, newest first.
 #[derive(Debug, clap::Args)]
-pub struct History {
+pub struct HistoryOptions {
     /// As CSV: a line per result, all gauges in columns.
     #[arg(long, conflicts_with = "json")]
     csv: bool,
@@ -48,7 +48,7 @@ fn verdict(word: &str) -> Result<Verdict, String> {
     Verdict::of_word(&word.to_ascii_uppercase()).ok_or_else(|| "write pass, fail or invalid".into())
 }
 
-impl History {
+impl HistoryOptions {
     /// Prints the results.
     ///
     /// # Errors

@@ -4,9 +4,9 @@ use super::names;
 use super::options::{Output, Threads};
 use crate::error::{Exit, Result};
 use crate::history::kept;
-use crate::measure::{Measurement, measure_about_map, measure_with, models};
+use crate::measure::{MeasuredRecording, measure_about_map, measure_with, models};
 use crate::output::cloud::Axes;
-use crate::output::{canvas, picture};
+use crate::output::{grey_png, picture};
 use crate::storage::folder::OutputFolder;
 use crate::storage::unpack::Unpacked;
 use algo::pipeline::PhaseMap;
@@ -99,7 +99,7 @@ const PLACES: [&str; 2] = ["column", "row"];
 /// Files of each pattern, by the beginning of their names.
 const OF_PATTERN: [&str; 4] = ["phase", "wrapped", "modulation", "mask"];
 
-fn write(folder: &OutputFolder, measurement: &Measurement, axes: Axes) -> Result<()> {
+fn write(folder: &OutputFolder, measurement: &MeasuredRecording, axes: Axes) -> Result<()> {
     let array = |name: &str, width, values: &[f32]| folder.write(name, &npy::write(width, values));
     let patterns = measurement.phases.len();
     write_pattern(folder, measurement, measurement.primary, "")?;
@@ -123,7 +123,7 @@ fn write(folder: &OutputFolder, measurement: &Measurement, axes: Axes) -> Result
         let places: Vec<f32> = places.map(|turns| turns * *pitch as f32).collect();
         array(&format!("{name}.npy"), width, &places)?;
     }
-    let picture = canvas::grey_png(width, &measurement.intensity);
+    let picture = grey_png(width, &measurement.intensity);
     folder.write("picture.png", &picture)?;
     if measurement.heights.is_err() {
         for name in SURFACE {
@@ -147,7 +147,7 @@ fn write(folder: &OutputFolder, measurement: &Measurement, axes: Axes) -> Result
 /// The phases, the modulation and the mask of one pattern, in files whose names end in `suffix`.
 fn write_pattern(
     folder: &OutputFolder,
-    measurement: &Measurement,
+    measurement: &MeasuredRecording,
     pattern: usize,
     suffix: &str,
 ) -> Result<()> {

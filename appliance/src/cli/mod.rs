@@ -10,20 +10,15 @@ macro_rules! say {
     }};
 }
 
-mod board;
 mod calibrate;
-mod completions;
 mod config;
 mod demo;
 mod doctor;
-mod gauges;
 mod history;
-mod idle;
 mod measure;
 pub mod names;
 pub mod numbers;
 mod options;
-mod part;
 mod recipe;
 mod record;
 mod registers;
@@ -32,7 +27,6 @@ mod serve;
 mod teach;
 
 pub use calibrate::model_files;
-pub use completions::Completions;
 pub use options::{Files, Output, Quiet, Threads};
 
 use crate::VERSION;
@@ -43,6 +37,7 @@ use algo::phase::DecodeError;
 use algo::simd::Backend;
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, Parser, Subcommand};
+use clap_complete::{Shell, generate};
 use std::process::ExitCode;
 
 /// The open 3-D smart sensor.
@@ -93,13 +88,13 @@ commands! {
     /// Calibrate the head: make models from a board or import them, measure the rest.
     Calibrate(calibrate::Calibrate);
     /// Draw a checkerboard to print, for `calibrate --board`.
-    Board(board::Print);
+    Board(calibrate::Print);
     /// Record a sequence from the configured head.
     Record(record::Record);
     /// Make a recipe from a good part in front of the head, or from recordings.
     Teach(teach::Teach);
     /// Show or export stored results.
-    History(history::History);
+    History(history::HistoryOptions);
     /// Judge a part that did not pass again and compare with the history.
     Replay(replay::Replay);
     /// List, export, import or delete recipes, undo that, or change the gauges of one.
@@ -109,9 +104,31 @@ commands! {
     #[command(subcommand)]
     Config(config::ConfigCommand);
     /// Leave the output lines at their idle levels: no trigger pulse, busy and ok off, fault on.
-    Idle(idle::Idle);
+    Idle(serve::Idle);
     /// Print the register map as CSV (or JSON with --json), or as tags to import.
     Registers(registers::Registers);
+}
+
+/// Print what makes a shell complete the command line.
+#[derive(Debug, clap::Args)]
+pub struct Completions {
+    /// The shell that the script is for.
+    #[arg(value_enum)]
+    shell: Shell,
+}
+
+impl Completions {
+    /// Prints the script for all commands and options of `program`.
+    ///
+    /// # Errors
+    /// None.
+    pub fn run(&self, mut program: clap::Command) -> Result<()> {
+        let name = program.get_name().to_owned();
+        let mut script = Vec::new();
+        generate(self.shell, &mut program, name, &mut script);
+        say!("{}", String::from_utf8_lossy(&script).trim_end());
+        Ok(())
+    }
 }
 
 /// Commands of `fringed-lab` that `fringed` once had.

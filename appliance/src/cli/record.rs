@@ -2,8 +2,8 @@
 
 use super::names;
 use super::numbers::number;
+use super::options::SimulatedPart;
 use super::options::{Files, Quiet, Threads};
-use super::part::SimulatedPart;
 use crate::error::{Exit, Result};
 use crate::head::scan::take;
 use crate::head::seam;

@@ -63,12 +63,12 @@ impl Replay {
         let configured = options.files.configuration()?.threads;
         let judged = options.threads.pool(configured)?.install(|| {
             let plan = kept.plan(recipe, flags & SIMULATED != 0)?;
-            let of = kept.sequence(&plan);
+            let taken = kept.sequence(&plan);
             let look = |(sequence, frames): (_, Vec<_>)| {
                 let (inspection, features) = plan.look(sequence, &frames);
                 (inspection, serde_json::json!(features))
             };
-            Ok::<_, PlanError>(of.map(look))
+            Ok::<_, PlanError>(taken.map(look))
         });
         let judged = judged.map_err(Exit::Content.failure())?;
         let (inspection, features) = judged.ok_or_else(|| {
@@ -213,8 +213,8 @@ fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {
 fn detailed(entry: &Entry, outline: &Outline, features: Value) -> Result<Value> {
     let shown = serde_json::to_value(entry);
     let mut shown = shown.map_err(Exit::Software.because("write the result"))?;
-    for (gauge, of) in entry.gauges.iter().enumerate() {
-        shown["gauges"][gauge]["kind"] = outline.kind(of.slot).into();
+    for (gauge, value) in entry.gauges.iter().enumerate() {
+        shown["gauges"][gauge]["kind"] = outline.kind(value.slot).into();
     }
     shown["features"] = features;
     Ok(shown)

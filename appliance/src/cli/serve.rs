@@ -1,8 +1,11 @@
-//! `fringed serve`: the station, until the stop signal.
+//! `fringed serve`: the station, until the stop signal. `fringed idle`: the output lines at their idle
+//! levels, for the service manager after the daemon was killed.
 
+use super::options::SimulatedPart;
 use super::options::{Quiet, Serving};
-use super::part::SimulatedPart;
+use crate::config::Config;
 use crate::error::Result;
+use crate::production::backend;
 use crate::service::{Caller, Daemon};
 use crate::station::Snapshot;
 use crate::station::refusal::reject;
@@ -12,6 +15,7 @@ use crate::system::notify::Notify;
 use crate::system::progress::Progress;
 use crate::system::runtime;
 use crate::system::stop_signal::StopSignal;
+use std::path::PathBuf;
 use std::time::Duration;
 
 /// How long the start waits for devices that are switched on together with the computer.
@@ -116,5 +120,25 @@ fn status_line(snapshot: &Snapshot) -> String {
             "the head is not calibrated: calibrate it with `fringed calibrate`".into()
         }
         (None, None) => "no recipe: load or teach one".into(),
+    }
+}
+
+/// Leave the output lines at their idle levels: no trigger pulse, busy and ok off, fault on.
+#[derive(Debug, clap::Args)]
+pub struct Idle {
+    /// Configuration file (TOML), which names the lines.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+}
+
+impl Idle {
+    /// Opens each line at its idle level and releases it.
+    ///
+    /// # Errors
+    /// If the configuration is wrong, or a line cannot be used, for example because a running
+    /// station holds it (69).
+    pub fn run(&self) -> Result<()> {
+        let config = self.config.as_deref().map(Config::read).transpose()?;
+        backend::leave_lines_idle(&config.unwrap_or_default())
     }
 }

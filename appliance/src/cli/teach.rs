@@ -3,11 +3,11 @@
 use super::names;
 use super::numbers::number;
 use super::options::Measuring;
-use super::part::SimulatedPart;
+use super::options::SimulatedPart;
 use crate::config::Config;
 use crate::error::{Exit, Failure, Result};
+use crate::head::calibrated::EmptyStation;
 use crate::head::calibration::Calibration;
-use crate::head::empty::EmptyStation;
 use crate::head::rasters::Illumination;
 use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, Opened};
@@ -320,9 +320,10 @@ impl Teach {
             decoder.ok_or_else(|| wrong(&"it has no fringes, which a recipe projects"))?;
         let phases = &measured.phases[measured.primary];
         crate::recipe::teach::refuse_empty(phases).map_err(|error| wrong(&error))?;
-        let at = measured.primary;
+        let primary = measured.primary;
         let full = &measured.shots;
-        let signal = captures::recorded_signal(&recording, at).map_err(|error| wrong(&error))?;
+        let signal =
+            captures::recorded_signal(&recording, primary).map_err(|error| wrong(&error))?;
         let (mut phases, mut heights) = (phases.clone(), surface.map.clone());
         let found = surroundings::of(&heights, &surface.triangulator, naming.told());
         let found = found.map_err(|error| wrong(&error))?;
@@ -331,7 +332,7 @@ impl Teach {
         }
         let part = GoldenPart {
             calibration: &calibration,
-            pattern: PatternFile::of(&recording.patterns[at]),
+            pattern: PatternFile::of(&recording.patterns[primary]),
             // Recordings cannot be exposed anew.
             illumination: Illumination::default(),
             full,
@@ -354,7 +355,7 @@ impl Teach {
             < recording
                 .frames
                 .iter()
-                .filter(|frame| frame.pattern == at)
+                .filter(|frame| frame.pattern == primary)
                 .count()
         {
             let words = "levels that are unwrapped by beats are for teaching alone: cycles take the finest one, about the golden phase";

@@ -1,9 +1,11 @@
-//! Measures a part with a pattern of the caller's choice, where no recipe describes the
-//! measurement: for teaching and experiments.
+//! Measures what stands in front of a calibrated head where no recipe describes the measurement: a part
+//! with a pattern of the caller's choice, and the station without a part.
 
+use crate::error::Exit;
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::head::scan::{self, Scan};
+use crate::storage::folder::{read_whole, write_whole};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Sequence, Shot};
 use algo::phase::Decoder;
@@ -11,17 +13,28 @@ use algo::pipeline::{HeightMap, PhaseMap, Progress};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
 use hal::head::Head;
+use hal::npy;
+use std::fs;
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// The share of a measurement's time in which its frames are taken.
 const TAKEN: f64 = 0.7;
-
 /// Pitch of straight fringes, projector pixels, and shifts of each of their levels.
 pub const STRAIGHT_PITCH_PX: f64 = 20.0;
 /// See above.
 pub const STRAIGHT_SHIFTS: usize = 4;
 /// Levels of straight fringes.
 const STRAIGHT_LEVELS: usize = 3;
+/// Longest wait for a frame.
+const TIMEOUT: Duration = Duration::from_secs(5);
+/// Begin and end of the name of its file beside the calibration; between them are the first digits of the
+/// calibration's fingerprint: heights of another calibration are of no use.
+const NAME: [&str; 2] = ["empty-", ".npy"];
+const DIGITS: usize = 16;
+/// Largest file, bytes.
+const MAX_BYTES: u64 = 256 << 20;
 
 /// What is projected where nothing is known of what is seen: straight vertical fringes for a projector of so many columns and
 /// rows, and what each frame shows.
@@ -50,7 +63,7 @@ pub struct CalibratedHead<'a> {
 
 /// A measured part.
 #[derive(Debug)]
-pub struct Measured {
+pub struct MeasuredPart {
     /// Phase, modulation and trust.
     pub phases: PhaseMap,
     /// Height and σ_z.
@@ -95,7 +108,7 @@ impl CalibratedHead<'_> {
         shots: &[Shot],
         map: Option<&[AbsolutePhase]>,
         progress: Progress<'_>,
-    ) -> Result<Measured, MeasureError> {
+    ) -> Result<MeasuredPart, MeasureError> {
         self.measure_lit(&Illumination::default(), function, shots, map, progress)
     }
 
@@ -110,7 +123,7 @@ impl CalibratedHead<'_> {
         shots: &[Shot],
         map: Option<&[AbsolutePhase]>,
         progress: Progress<'_>,
-    ) -> Result<Measured, MeasureError> {
+    ) -> Result<MeasuredPart, MeasureError> {
         let (calibration, timeout) = (self.calibration, self.timeout);
         let triangulator = calibration.triangulator(function.clone(), None);
         let triangulator = triangulator.map_err(MeasureError::impossible)?;
@@ -133,7 +146,7 @@ impl CalibratedHead<'_> {
         let heights = scan.heights(&triangulator, Some(noise), &mut phases, &|share| {
             progress(TAKEN + (1.0 - TAKEN) * share);
         });
-        Ok(Measured {
+        Ok(MeasuredPart {
             phases,
             heights,
             decoder: scan.decoder,
@@ -141,4 +154,102 @@ impl CalibratedHead<'_> {
             frames,
         })
     }
+}
+
+/// The heights that are seen without a part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EmptyStation {
+    /// z of each pixel in mm, row by row; not a number where nothing is seen.
+    pub heights: Vec<f32>,
+}
+
+impl EmptyStation {
+    /// Measures it with straight fringes.
+    ///
+    /// # Errors
+    /// As [`CalibratedHead::measure`].
+    pub fn measure(
+        head: &mut Head,
+        calibration: &Calibration,
+        progress: Progress<'_>,
+    ) -> Result<Self, MeasureError> {
+        let calibration = &calibration.clone().with_rays();
+        let (columns, rows) = (
+            calibration.projector.width(),
+            calibration.projector.height(),
+        );
+        let (function, shots) = straight_fringes((columns, rows))?;
+        let mut head = CalibratedHead {
+            head,
+            calibration,
+            timeout: TIMEOUT,
+        };
+        let measured = head.measure(&function, &shots, None, progress)?;
+        let heights = measured.heights.height.iter();
+        let mm = heights.map(|height| match height.is_known() {
+            true => height.mm() as f32,
+            false => f32::NAN,
+        });
+        Ok(Self {
+            heights: mm.collect(),
+        })
+    }
+
+    /// The share of the picture where something is seen.
+    pub fn seen(&self) -> f64 {
+        let seen = self.heights.iter().filter(|height| height.is_finite());
+        seen.count() as f64 / self.heights.len().max(1) as f64
+    }
+
+    /// Stores it beside the calibration's file, in place of another one.
+    ///
+    /// # Errors
+    /// If it cannot be stored (73).
+    pub fn store(&self, place: &Path, calibration: &Calibration) -> crate::error::Result<()> {
+        let file = file(place, calibration);
+        let bytes = npy::write(calibration.camera.width(), &self.heights);
+        let folder = file.parent().unwrap_or(Path::new("."));
+        let written = fs::create_dir_all(folder).and_then(|()| write_whole(&file, &bytes));
+        written.map_err(Exit::CannotCreate.because(format!("store {}", file.display())))?;
+        let others = fs::read_dir(folder).into_iter().flatten().flatten();
+        for other in others
+            .map(|entry| entry.path())
+            .filter(|other| *other != file)
+        {
+            let name = other.file_name().and_then(|name| name.to_str());
+            if name.is_some_and(|name| name.starts_with(NAME[0]) && name.ends_with(NAME[1])) {
+                // One that stays is of another calibration, and of no use.
+                let _ = fs::remove_file(other);
+            }
+        }
+        Ok(())
+    }
+
+    /// What was recorded with this calibration, if it was.
+    ///
+    /// # Errors
+    /// If there is a file that cannot be used (65).
+    pub fn load(place: &Path, calibration: &Calibration) -> crate::error::Result<Option<Self>> {
+        let file = file(place, calibration);
+        let what = format!("read {}", file.display());
+        let wrong = Exit::Content.advising(what, "record the empty station again");
+        let bytes = match read_whole(&file, MAX_BYTES) {
+            Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+            read => read.map_err(|error| wrong(error.to_string()))?,
+        };
+        let heights = npy::read::<f32>(&bytes).map_err(|error| wrong(error.to_string()))?;
+        let (width, rows, _) = calibration.frames();
+        match (heights.columns, heights.rows) == (width as usize, rows as usize) {
+            true => Ok(Some(Self {
+                heights: heights.elements,
+            })),
+            false => Err(wrong("it is of another camera".into())),
+        }
+    }
+}
+
+fn file(place: &Path, calibration: &Calibration) -> PathBuf {
+    let fingerprint = calibration.fingerprint();
+    let digits: String = fingerprint.chars().take(DIGITS).collect();
+    place.with_file_name(format!("{}{digits}{}", NAME[0], NAME[1]))
 }

@@ -1,7 +1,7 @@
 //! The frames of one pattern of a recording: how its levels can be unwrapped, and its phases.
 
 use super::code::Code;
-use super::scan::Scan;
+use super::scan::{PhasesError, Scan};
 use super::seam;
 use algo::chain::{Cells, Chain, CodeWord, Edges};
 use algo::frame::FrameView;
@@ -40,6 +40,17 @@ pub trait Expected {
     fn within(&self, turns: f64) -> Vec<AbsolutePhase>;
 }
 
+/// Why there are no heights, as the rest of a sentence about them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct NoHeights(&'static str);
+
+impl From<&'static str> for NoHeights {
+    fn from(words: &'static str) -> Self {
+        Self(words)
+    }
+}
+
 /// How the levels of a pattern become an absolute phase.
 pub enum Unwrapping {
     /// By the production kernels, about a map with this name where they need one.
@@ -61,19 +72,19 @@ pub struct Phases {
 }
 
 impl<'a> Channel<'a> {
-    /// The frames of a pattern, of which modulations are trusted from `least` on.
+    /// The frames of a pattern; modulations are trusted from `least` on.
     ///
     /// # Errors
-    /// In words: the frames make no levels, or are not of one format.
+    /// The frames make no levels, or are not of one format.
     pub fn new(
         recording: &'a Recording,
         pattern: usize,
         least: LeastModulation,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, PhasesError> {
         let projector = &recording.projector;
         let spec = &recording.patterns[pattern];
         let (columns, rows) = (projector.width as usize, projector.height as usize);
-        let function = seam::phase_function(spec, columns, rows).map_err(words)?;
+        let function = seam::phase_function(spec, columns, rows)?;
         let taken = recording.frames.iter();
         let recorded: Vec<_> = taken.filter(|frame| frame.pattern == pattern).collect();
         let shots: Vec<_> = recorded.iter().map(|frame| seam::shot(frame)).collect();
@@ -107,12 +118,12 @@ impl<'a> Channel<'a> {
     /// do, else by beats; about `known` or the reference map where they need a map.
     ///
     /// # Errors
-    /// In words: there is a code, and levels and code do not fit each other.
+    /// There is a code, and levels and code do not fit each other.
     pub fn unwrapping(
         &self,
         known: Option<&dyn Expected>,
-        geometry: &Result<Triangulator, String>,
-    ) -> Result<Unwrapping, String> {
+        geometry: &Result<Triangulator, NoHeights>,
+    ) -> Result<Unwrapping, PhasesError> {
         if self.code.is_some() {
             return self.chain().map(Unwrapping::Chain);
         }
@@ -127,7 +138,7 @@ impl<'a> Channel<'a> {
                 Ok(chain) => Unwrapping::Chain(chain),
                 Err(alone) => match about(&|known| known.within(MARGIN * levels.reach())) {
                     Ok(map) => Unwrapping::About(levels, map),
-                    Err(_) => Unwrapping::Missing(alone),
+                    Err(_) => Unwrapping::Missing(alone.to_string()),
                 },
             });
         }
@@ -153,17 +164,18 @@ impl<'a> Channel<'a> {
     /// The chain of the levels, from the code if there is one.
     ///
     /// # Errors
-    /// In words: there is none, and what to add.
-    pub fn chain(&self) -> Result<Chain, String> {
+    /// The levels form no chain; what to add.
+    pub fn chain(&self) -> Result<Chain, PhasesError> {
         let cells = self.code.as_ref().map(|code| code.cells);
-        Chain::new(self.scan.sequence.levels(), self.function.range(), cells).map_err(words)
+        let (levels, range) = (self.scan.sequence.levels(), self.function.range());
+        Ok(Chain::new(levels, range, cells)?)
     }
 
     /// The phases of every pixel.
     ///
     /// # Errors
-    /// In words: frames and map, or frames and code, do not fit each other.
-    pub fn decode(&self, unwrapping: &Unwrapping) -> Result<Phases, String> {
+    /// Frames and map, or frames and code, do not fit each other.
+    pub fn decode(&self, unwrapping: &Unwrapping) -> Result<Phases, PhasesError> {
         if let Unwrapping::Chain(chain) = unwrapping {
             let (mut maps, seen) = (self.wrapped_levels()?, self.seen()?);
             let chain = match (&self.code, &seen, maps.last()) {
@@ -198,16 +210,17 @@ impl<'a> Channel<'a> {
         Ok(Phases { absolute, wrapped })
     }
 
-    fn wrapped(&self, level: &Level) -> Result<PhaseMap, String> {
+    fn wrapped(&self, level: &Level) -> Result<PhaseMap, PhasesError> {
         let least = self.scan.decoder.least_modulation();
-        pipeline::wrapped(level, &self.scan.frames, self.bit_depth, least).map_err(words)
+        let frames = &self.scan.frames;
+        Ok(pipeline::wrapped(level, frames, self.bit_depth, least)?)
     }
 
     /// The wrapped phases of all levels, from coarse to fine.
     ///
     /// # Errors
-    /// In words: frames and levels do not fit each other.
-    pub fn wrapped_levels(&self) -> Result<Vec<PhaseMap>, String> {
+    /// Frames and levels do not fit each other.
+    pub fn wrapped_levels(&self) -> Result<Vec<PhaseMap>, PhasesError> {
         let levels = self.scan.sequence.levels().iter();
         levels.map(|level| self.wrapped(level)).collect()
     }
@@ -215,10 +228,10 @@ impl<'a> Channel<'a> {
     /// What each pixel sees of the code, if there is one.
     ///
     /// # Errors
-    /// In words: its pictures do not form a code.
-    pub fn seen(&self) -> Result<Option<Vec<CodeWord>>, String> {
+    /// Its pictures do not form a code.
+    pub fn seen(&self) -> Result<Option<Vec<CodeWord>>, PhasesError> {
         let seen = self.code.as_ref().map(|code| code.pictures.read());
-        seen.transpose().map_err(words)
+        Ok(seen.transpose()?)
     }
 
     /// The cells of the code, if there is one.
@@ -281,7 +294,7 @@ impl Unwrapping {
     pub fn ambiguity(
         &self,
         channel: &Channel<'_>,
-        geometry: &Result<Triangulator, String>,
+        geometry: &Result<Triangulator, NoHeights>,
     ) -> Option<String> {
         let triangulator = geometry.as_ref().ok()?;
         let reach = match self {
@@ -341,8 +354,4 @@ fn finest_frames<'a>(scan: &Scan<'a>) -> Vec<FrameView<'a>> {
     let levels = scan.sequence.levels();
     let finest = levels[levels.len() - 1].frames.iter();
     finest.map(|&at| scan.frames[usize::from(at)]).collect()
-}
-
-fn words(error: impl std::fmt::Display) -> String {
-    error.to_string()
 }

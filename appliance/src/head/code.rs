@@ -1,6 +1,7 @@
 //! A recording's Gray code, ready to be decoded: beside the fringes that it numbers, or without
 //! any.
 
+use super::scan::PhasesError;
 use super::seam;
 use algo::chain::{Cells, CodePhases, CodePictures, Coding, GrayCode};
 use algo::frame::FrameView;
@@ -28,31 +29,29 @@ impl<'a> Code<'a> {
     /// black, else with the mean of these frames `beside` it.
     ///
     /// # Errors
-    /// In words: the code has nothing to be compared with, numbers no straight fringes, or a frame
+    /// The code has nothing to be compared with, numbers no straight fringes, or a frame
     /// is not one of its format.
     pub fn new(
         code: &'a RecordedCode,
         recording: &'a Recording,
         beside: Vec<FrameView<'a>>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, PhasesError> {
         let raster = &recording.projector;
         let (vertical, fringes, length) = match &recording.patterns[code.pattern] {
             PatternSpec::Vertical { fringes } => (true, *fringes, raster.width),
             PatternSpec::Horizontal { fringes } => (false, *fringes, raster.height),
-            PatternSpec::File { .. } => return Err("a Gray code numbers straight fringes".into()),
+            PatternSpec::File { .. } => return Err(PhasesError::CurvedFringes),
         };
-        let view = |frame: &'a Frame| seam::view(frame).map_err(|error| error.to_string());
-        let views = |frames: &'a [Frame]| frames.iter().map(view).collect::<Result<Vec<_>, _>>();
+        let views =
+            |frames: &'a [Frame]| frames.iter().map(seam::view).collect::<Result<Vec<_>, _>>();
         let against = match (&recording.white, &recording.black) {
             _ if !code.inverse.is_empty() => {
                 let inverse = views(&code.inverse)?.into_iter();
                 inverse.map(|inverse| vec![inverse]).collect()
             }
-            (Some(white), Some(black)) => vec![vec![view(white)?, view(black)?]],
+            (Some(white), Some(black)) => vec![vec![seam::view(white)?, seam::view(black)?]],
             _ if beside.is_empty() => {
-                return Err(
-                    "a Gray code alone has nothing to be compared with: add its inverse pictures, or white and black".into(),
-                );
+                return Err(PhasesError::NothingToCompare);
             }
             _ => vec![beside],
         };
@@ -103,7 +102,7 @@ impl<'a> CodeAlone<'a> {
     ///
     /// # Errors
     /// As for [`Code::new`].
-    pub fn of(recording: &'a Recording, pattern: usize) -> Result<Option<Self>, String> {
+    pub fn of(recording: &'a Recording, pattern: usize) -> Result<Option<Self>, PhasesError> {
         let has_fringes = recording
             .frames
             .iter()
@@ -131,35 +130,35 @@ impl<'a> CodeAlone<'a> {
     /// coding.
     #[must_use]
     pub fn read_as(&self, reversed: bool, coding: Coding) -> Self {
-        let mut other = self.clone();
-        other.cells.coding = coding;
-        let CodePictures { bits, against } = &mut other.pictures;
+        let mut reading = self.clone();
+        reading.cells.coding = coding;
+        let CodePictures { bits, against } = &mut reading.pictures;
         if reversed {
             if against.len() == bits.len() {
                 against.reverse();
             }
             bits.reverse();
         }
-        other
+        reading
     }
 
     /// The absolute phase of every pixel, trusted from a modulation of `least` on.
     ///
     /// # Errors
-    /// In words: its pictures form no code.
-    pub fn phases(&self, least: LeastModulation) -> Result<PhaseMap, String> {
+    /// Its pictures form no code.
+    pub fn phases(&self, least: LeastModulation) -> Result<PhaseMap, PhasesError> {
         self.read(least).map(|phases| phases.map)
     }
 
     /// As [`Self::phases`], with the bits that each was found without.
     ///
     /// # Errors
-    /// In words: its pictures form no code.
-    pub fn read(&self, least: LeastModulation) -> Result<CodePhases, String> {
+    /// Its pictures form no code.
+    pub fn read(&self, least: LeastModulation) -> Result<CodePhases, PhasesError> {
         let phases = self
             .pictures
             .phases(&self.cells, self.vertical, least, self.full_scale);
-        phases.map_err(|error| error.to_string())
+        Ok(phases?)
     }
 
     /// Pictures whose mean is what the camera sees under even light: each bit with its inverse, or

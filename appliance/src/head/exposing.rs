@@ -27,15 +27,15 @@ pub struct Exposing {
 }
 
 impl Bound<Exposing> for Fields {
-    fn check(&self, key: &str, of: &Exposing) -> Result<(), OutOfBounds> {
-        let exposure = f64::from(of.exposure_us);
+    fn check(&self, key: &str, exposing: &Exposing) -> Result<(), OutOfBounds> {
+        let exposure = f64::from(exposing.exposure_us);
         within(
             &format!("{key}.exposure_us"),
             exposure,
             0.0,
             MAX_EXPOSURE_US,
         )?;
-        within(&format!("{key}.gain"), of.gain, 0.0, MAX_GAIN)
+        within(&format!("{key}.gain"), exposing.gain, 0.0, MAX_GAIN)
     }
 }
 

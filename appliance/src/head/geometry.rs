@@ -1,9 +1,10 @@
 //! The geometry of a head from recordings of a checkerboard: one pose at a time, then all together.
 
+use super::board::Ground;
 use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use super::channel::Channel;
 use super::code::CodeAlone;
-use super::standing::Ground;
+use super::seam::AbsurdModel;
 use crate::error::{Exit, Failure, Result};
 use algo::calibration::{
     Adjusted, Arrow, Board, BoardView, CalibrationError, FoundBoard, FringeMaps, GreyPicture,
@@ -57,8 +58,7 @@ impl SeenPose {
         };
         let (vertical, horizontal) = (fringes(true)?, fringes(false)?);
         let mut levels = Vec::new();
-        let mut decoded =
-            |pattern| decoded(recording, pattern, &mut levels).map_err(Exit::Content.failure());
+        let mut decoded = |pattern| decoded(recording, pattern, &mut levels);
         let (vertical_map, horizontal_map) = (decoded(vertical.0)?, decoded(horizontal.0)?);
         let projector = &recording.projector;
         let raster = (projector.width, projector.height);
@@ -99,17 +99,19 @@ fn decoded(
     recording: &Recording,
     pattern: usize,
     levels: &mut Vec<GreyPicture>,
-) -> Result<PhaseMap, String> {
-    if let Some(code) = CodeAlone::of(recording, pattern)? {
+) -> Result<PhaseMap> {
+    let content = Exit::Content.failure();
+    if let Some(code) = CodeAlone::of(recording, pattern).map_err(content)? {
         levels.push(GreyPicture::mean(&code.even()));
-        return code.phases(LeastModulation::default());
+        return code.phases(LeastModulation::default()).map_err(content);
     }
     // Not the least of the camera's noise: in black squares the light of bright ones around them
     // would have a phase, which is not the place's.
-    let channel = Channel::new(recording, pattern, LeastModulation::default())?;
-    let unwrapping = channel.unwrapping(None, &Err("the models are to be made".into()))?;
+    let channel = Channel::new(recording, pattern, LeastModulation::default()).map_err(content)?;
+    let none = Err("the models are to be made".into());
+    let unwrapping = channel.unwrapping(None, &none).map_err(content)?;
     if unwrapping.missing().is_some() {
-        return Err(format!(
+        return Exit::Content.fail(format!(
             "levels of ratios {:?} have no absolute phase by themselves: take geometric ones, the coarsest of at most one fringe, \
              levels with a chain of beats, or a Gray code",
             channel.ratios()
@@ -120,7 +122,8 @@ fn decoded(
         let frames = level.frames.iter().map(|&at| scan.frames[usize::from(at)]);
         levels.push(GreyPicture::mean(&frames.collect::<Vec<_>>()));
     }
-    Ok(channel.decode(&unwrapping)?.absolute)
+    let decoded = channel.decode(&unwrapping).map_err(content)?;
+    Ok(decoded.absolute)
 }
 
 /// Checks that a board of such squares can lie in front of a head.
@@ -145,6 +148,51 @@ fn sized(board: &Board, found: &FoundBoard, columns: u32) -> Result<()> {
             square * factor
         ),
     ))
+}
+
+/// Why poses give no models.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum GeometryError {
+    /// A pose is of another head.
+    #[error(
+        "{pose}: its frames or its projector's raster have another size than those of {first}: calibrate with recordings of one head"
+    )]
+    OtherHead {
+        /// The pose to blame.
+        pose: String,
+        /// The first pose.
+        first: String,
+    },
+    /// The board did not move.
+    #[error(
+        "{pose}: {}: leave it out, or take it again with the board elsewhere and tilted",
+        same_place(before)
+    )]
+    SamePlace {
+        /// The pose to blame.
+        pose: String,
+        /// The pose in which it lies in the same place.
+        before: String,
+    },
+    /// A pose does not fit the others.
+    #[error("{pose}: {error}")]
+    Pose {
+        /// The pose to blame.
+        pose: String,
+        /// What is wrong with it.
+        error: CalibrationError,
+    },
+    /// The poses do not determine the models.
+    #[error(transparent)]
+    Poses(#[from] CalibrationError),
+    /// A model that was found is absurd.
+    #[error(transparent)]
+    Model(#[from] AbsurdModel),
+    /// No place is seen by both devices.
+    #[error(
+        "camera and projector see no part of the volume of all poses together: place the board where both see it"
+    )]
+    NothingInCommon,
 }
 
 /// Models of camera and projector from poses of a board.
@@ -175,48 +223,50 @@ impl Geometry {
     /// Adjusts all poses together. `sigma_ppm` is σ of the board's scale.
     ///
     /// # Errors
-    /// In words, with the recording to blame: the poses are of different heads, do not determine
+    /// The poses are of different heads, do not determine
     /// the models, or do not fit each other.
-    pub fn of(board: &Board, sigma_ppm: f64, poses: &[SeenPose]) -> Result<Self, String> {
+    pub fn of(board: &Board, sigma_ppm: f64, poses: &[SeenPose]) -> Result<Self, GeometryError> {
         let Some(first) = poses.first() else {
-            return Err(CalibrationError::Few { given: 0 }.to_string());
+            return Err(CalibrationError::Few { given: 0 }.into());
         };
         let other = |pose: &&SeenPose| pose.head != first.head;
         if let Some(other) = poses.iter().find(other) {
-            return Err(format!(
-                "{}: its frames or its projector's raster have another size than those of {}: calibrate with recordings of one head",
-                other.recording, first.recording
-            ));
+            return Err(GeometryError::OtherHead {
+                pose: other.recording.clone(),
+                first: first.recording.clone(),
+            });
         }
         let places = poses.iter().enumerate();
         let again = places.filter_map(|(at, pose)| Some((pose.again_in(&poses[..at])?, pose)));
         if let Some((before, pose)) = again.into_iter().next() {
-            return Err(format!(
-                "{}: {}: leave it out, or take it again with the board elsewhere and tilted",
-                pose.recording,
-                same_place(&before.recording)
-            ));
+            return Err(GeometryError::SamePlace {
+                pose: pose.recording.clone(),
+                before: before.recording.clone(),
+            });
         }
         let [width, height, _, columns, rows] = first.head.map(|size| size as usize);
         let (frame, raster) = ((width, height), (columns, rows));
         let views: Vec<BoardView> = poses.iter().map(|pose| pose.view.clone()).collect();
         let blame = |error: CalibrationError| match error.pose() {
-            Some(pose) => format!("{}: {error}", poses[pose].recording),
-            None => error.to_string(),
+            Some(pose) => GeometryError::Pose {
+                pose: poses[pose].recording.clone(),
+                error,
+            },
+            None => error.into(),
         };
         let adjusted = calibrate(board, frame, &views).map_err(blame)?;
         let last = poses.len() - 1;
         let (camera, projector) = adjusted.rig.models(last);
-        let checked = |what, model, (columns, rows)| {
+        let checked = |device, model, (columns, rows)| {
             let checked = Pinhole::new(model, columns, rows);
-            checked.map_err(|error| format!("the {what}'s model: {error}"))
+            checked.map_err(|error| AbsurdModel { device, error })
         };
         let camera = checked("camera", camera, frame)?;
         let projector = checked("projector", projector, raster)?;
         let baseline = (projector.centre() - camera.centre()).length();
         let prediction = adjusted
             .prediction(frame, raster, sigma_ppm * 1e-6)
-            .ok_or_else(|| "camera and projector see no part of the volume of all poses together: place the board where both see it".to_owned())?;
+            .ok_or(GeometryError::NothingInCommon)?;
         let file = file(board, sigma_ppm, poses, &adjusted, &prediction, baseline);
         Ok(Self {
             ground: Ground {

@@ -1,16 +1,20 @@
-//! One sequence of a pattern: takes its frames with the head, and turns them into phases and
-//! heights. Everything but production, which measures in strips, measures in this way.
+//! One sequence of a pattern: takes its frames with the head, one of each or the mean of several, and
+//! turns them into phases and heights. Everything but production, which measures in strips, measures
+//! in this way.
 
 use super::calibration::Calibration;
 use super::rasters::rasters;
 use super::seam;
-use algo::frame::{FrameView, SampleNoise};
+use algo::chain::{ChainError, CodeError};
+use algo::frame::{FrameError, FrameView, SampleNoise};
 use algo::geometry::Triangulator;
-use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
-use algo::phase::{Decoder, LeastModulation};
+use algo::pattern::{PhaseFunction, PhaseFunctionError, PhaseRange, Sequence, SequenceError, Shot};
+use algo::phase::{DecodeError, Decoder, LeastModulation};
 use algo::pipeline::{self, HeightMap, PhaseMap, Progress};
 use algo::units::AbsolutePhase;
+use hal::error::Error;
 use hal::frame::Frame;
+use hal::frame::FrameSum;
 use hal::head::Head;
 use std::time::Duration;
 
@@ -26,7 +30,7 @@ pub fn take(
     shots: &[Shot],
     timeout: Duration,
     progress: &dyn Fn(f64),
-) -> Result<Vec<Frame>, hal::error::Error> {
+) -> Result<Vec<Frame>, Error> {
     head.load(rasters(function, shots, calibration)?)?;
     take_loaded(head, shots.len(), timeout, progress)
 }
@@ -41,7 +45,7 @@ pub fn take_loaded(
     patterns: usize,
     timeout: Duration,
     progress: &dyn Fn(f64),
-) -> Result<Vec<Frame>, hal::error::Error> {
+) -> Result<Vec<Frame>, Error> {
     let mut taken = Vec::with_capacity(patterns);
     let indices: Vec<usize> = (0..patterns).collect();
     head.acquire(&indices, timeout, &mut |_, frame| {
@@ -49,6 +53,43 @@ pub fn take_loaded(
         progress(taken.len() as f64 / patterns as f64);
     })?;
     Ok(taken)
+}
+
+/// Why frames have no phases.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PhasesError {
+    /// No projector of this size can show the pattern.
+    #[error(transparent)]
+    Function(#[from] PhaseFunctionError),
+    /// The frames make no levels.
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
+    /// The levels cannot be decoded, or frames, levels and map do not fit each other.
+    #[error(transparent)]
+    Decode(#[from] DecodeError),
+    /// A frame is not one of its format.
+    #[error(transparent)]
+    Frame(#[from] FrameError),
+    /// The levels form no chain.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// The pictures form no code.
+    #[error(transparent)]
+    Code(#[from] CodeError),
+    /// A code of curved fringes.
+    #[error("a Gray code numbers straight fringes")]
+    CurvedFringes,
+    /// A code whose pictures cannot be told dark from bright.
+    #[error(
+        "a Gray code alone has nothing to be compared with: add its inverse pictures, or white and black"
+    )]
+    NothingToCompare,
+}
+
+impl From<PhasesError> for String {
+    fn from(error: PhasesError) -> Self {
+        error.to_string()
+    }
 }
 
 /// The frames of one sequence, ready to be decoded.
@@ -66,13 +107,13 @@ impl<'a> Scan<'a> {
     /// The frames of `shots`, in their order, of a phase function of `range`.
     ///
     /// # Errors
-    /// In words: the shots make no sequence that can be decoded, or a frame is not one of its
+    /// the shots make no sequence that can be decoded, or a frame is not one of its
     /// format.
     pub fn new(
         range: PhaseRange,
         shots: &[Shot],
         frames: impl IntoIterator<Item = &'a Frame>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, PhasesError> {
         Self::with(range, shots, shots, frames)
     }
 
@@ -81,14 +122,14 @@ impl<'a> Scan<'a> {
     /// ([`algo::chain`]).
     ///
     /// # Errors
-    /// In words: the shots are no levels, the finest is too fine or too coarse, or a frame is not
+    /// the shots are no levels, the finest is too fine or too coarse, or a frame is not
     /// one of its format.
     pub fn of_levels(
         range: PhaseRange,
         shots: &[Shot],
         frames: impl IntoIterator<Item = &'a Frame>,
-    ) -> Result<Self, String> {
-        let sequence = Sequence::from_frames(shots).map_err(words)?;
+    ) -> Result<Self, PhasesError> {
+        let sequence = Sequence::from_frames(shots)?;
         let levels = sequence.levels();
         let finest = levels[levels.len() - 1].ratio;
         let alone: Vec<Shot> = shots
@@ -105,16 +146,16 @@ impl<'a> Scan<'a> {
         shots: &[Shot],
         decoded: &[Shot],
         frames: impl IntoIterator<Item = &'a Frame>,
-    ) -> Result<Self, String> {
-        let sequence = Sequence::from_frames(shots).map_err(words)?;
-        let decoded = Sequence::from_frames(decoded).map_err(words)?;
+    ) -> Result<Self, PhasesError> {
+        let sequence = Sequence::from_frames(shots)?;
+        let decoded = Sequence::from_frames(decoded)?;
         let frames: Vec<&Frame> = frames.into_iter().collect();
-        let decoder = Decoder::new(&decoded, range, bit_depth(&frames)).map_err(words)?;
-        let frames: Result<_, _> = frames.into_iter().map(seam::view).collect();
+        let decoder = Decoder::new(&decoded, range, bit_depth(&frames))?;
+        let frames: Result<_, FrameError> = frames.into_iter().map(seam::view).collect();
         Ok(Self {
             sequence,
             decoder,
-            frames: frames.map_err(words)?,
+            frames: frames?,
         })
     }
 
@@ -134,9 +175,9 @@ impl<'a> Scan<'a> {
     /// The phases, unwrapped about `map` (row-major) where one is needed.
     ///
     /// # Errors
-    /// In words: frames and map do not fit each other.
-    pub fn phases(&self, map: Option<&[AbsolutePhase]>) -> Result<PhaseMap, String> {
-        pipeline::decode(&self.decoder, &self.frames, map, None).map_err(words)
+    /// frames and map do not fit each other.
+    pub fn phases(&self, map: Option<&[AbsolutePhase]>) -> Result<PhaseMap, PhasesError> {
+        Ok(pipeline::decode(&self.decoder, &self.frames, map, None)?)
     }
 
     /// The noise of a sample by the modulation of its pixel.
@@ -167,6 +208,38 @@ fn bit_depth(frames: &[&Frame]) -> u8 {
     frames.first().map_or(0, |first| first.format().bit_depth)
 }
 
-fn words(error: impl std::fmt::Display) -> String {
-    error.to_string()
+/// Takes [`FrameSum::CAPTURES`] frames of each of the loaded patterns, and gives their means. Where one of
+/// the samples of a pixel was at full scale, so is its mean. `progress` gets the share of the
+/// frames taken; it may end the captures by `false`, and then there are no means.
+///
+/// # Errors
+/// The error of the device that failed.
+pub fn mean_frames(
+    head: &mut Head,
+    patterns: usize,
+    timeout: Duration,
+    progress: &dyn Fn(f64) -> bool,
+) -> Result<Option<Vec<Frame>>, Error> {
+    let indices: Vec<usize> = (0..patterns).collect();
+    let mut sums: Vec<FrameSum> = Vec::with_capacity(patterns);
+    let mut taken = 0;
+    let mut goes_on = progress(0.0);
+    for _ in 0..FrameSum::CAPTURES {
+        if !goes_on {
+            return Ok(None);
+        }
+        head.acquire(&indices, timeout, &mut |at, frame| {
+            if at == sums.len() {
+                sums.push(FrameSum::new(&frame));
+            }
+            if let Some(sum) = sums.get_mut(at) {
+                sum.add(&frame);
+            }
+            taken += 1;
+            // A sequence is not interrupted.
+            goes_on = progress(taken as f64 / (FrameSum::CAPTURES * patterns) as f64);
+        })?;
+    }
+    let means: Result<_, _> = sums.into_iter().map(FrameSum::mean).collect();
+    means.map(Some)
 }

@@ -2,7 +2,7 @@
 //! `algo`.
 
 use algo::frame::{FrameError, FrameView, Samples};
-use algo::geometry::{FittedMap, Pinhole, PinholeModel, Reference};
+use algo::geometry::{FittedMap, ModelError, Pinhole, PinholeModel, Reference};
 use algo::pattern::{PhaseFunction, PhaseFunctionError, Shot, Waveform};
 use hal::error::Error;
 use hal::frame::Frame;
@@ -27,17 +27,33 @@ pub fn view(frame: &Frame) -> Result<FrameView<'_>, FrameError> {
     )
 }
 
+/// A device whose model has an absurd number.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("the {device}'s model: {error}")]
+pub struct AbsurdModel {
+    /// Camera or projector.
+    pub device: &'static str,
+    /// What is absurd.
+    pub error: ModelError,
+}
+
+impl From<AbsurdModel> for String {
+    fn from(error: AbsurdModel) -> Self {
+        error.to_string()
+    }
+}
+
 /// A device with frames or rasters of `(columns, rows)`, its model checked: each pixel has one ray.
 ///
 /// # Errors
-/// In words that name the `device`: a number of its model is absurd.
+/// A number of the model is absurd.
 pub fn pinhole(
-    device: &str,
+    device: &'static str,
     model: &DeviceModel,
     (columns, rows): (u32, u32),
-) -> Result<Pinhole, String> {
+) -> Result<Pinhole, AbsurdModel> {
     Pinhole::new(pinhole_model(model), columns as usize, rows as usize)
-        .map_err(|error| format!("the {device}'s model: {error}"))
+        .map_err(|error| AbsurdModel { device, error })
 }
 
 /// A device model as geometry takes it.

@@ -61,8 +61,8 @@ impl Kept {
         let remedy = "replay one that the station kept, or add what is missing";
         let noise = recording.noise_counts.or(noise);
         let noise = noise.ok_or_else(|| wrong(folder, "has no camera.noise_counts", remedy))?;
-        let calibration =
-            Calibration::of(&recording, noise).map_err(|lacks| wrong(folder, &lacks, remedy))?;
+        let calibration = Calibration::of(&recording, noise)
+            .map_err(|lacks| wrong(folder, &lacks.to_string(), remedy))?;
         let own = folder.join(RECIPE);
         Ok(Self {
             reference: recording.recipe.take(),

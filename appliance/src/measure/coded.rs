@@ -1,8 +1,12 @@
 //! Measures a recording of Gray codes without fringes.
 
-use super::{Geometry, Manner, Measurement, Report, Stages, Truth, least_modulation, primary_of};
+use super::{
+    Manner, MeasuredRecording, MeasurementReport, RecordedRig, StageTimes, Truth,
+    UnmeasurableRecording, least_modulation, primary_of,
+};
 use crate::head::code::CodeAlone;
 use crate::head::direction::Sensitivity;
+use crate::head::scan::PhasesError;
 use crate::head::seam;
 use crate::output::cloud::Surface;
 use algo::chain::{CodePhases, SIGMA_CELLS};
@@ -13,39 +17,37 @@ use hal::replay::Recording;
 /// Measures every code; the one whose place changes most with the height gives it.
 ///
 /// # Errors
-/// In words: a code cannot be decoded, or a model is absurd.
-pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
+/// A code cannot be decoded, or a model is absurd.
+pub(super) fn measure(recording: &Recording) -> Result<MeasuredRecording, UnmeasurableRecording> {
     let least = least_modulation(recording);
-    let mut stages = Stages::default();
+    let mut stages = StageTimes::default();
     let mut codes = Vec::new();
     let read = stages.time("phase", || {
         for pattern in 0..recording.patterns.len() {
             let code = CodeAlone::of(recording, pattern)?;
-            codes.push(code.ok_or("it has neither fringes nor a Gray code: record one of both")?);
+            codes.push(code.ok_or(UnmeasurableRecording::NothingShown)?);
         }
         let phases = codes.iter().map(|code| code.read(least));
-        phases.collect::<Result<Vec<_>, String>>()
+        Ok::<_, UnmeasurableRecording>(phases.collect::<Result<Vec<_>, _>>()?)
     })?;
     let (mut phases, missing): (Vec<PhaseMap>, Vec<Vec<u8>>) = read
         .into_iter()
         .map(|CodePhases { map, missing }| (map, missing))
         .unzip();
-    let devices = Geometry::of(recording, None)?;
+    let devices = RecordedRig::of(recording, None)?;
     let raster = &recording.projector;
     let (columns, rows) = (raster.width as usize, raster.height as usize);
     let geometries = recording.patterns.iter().map(|spec| {
-        let function = seam::phase_function(spec, columns, rows);
-        let function = function.map_err(|error| error.to_string())?;
-        let geometry = devices.triangulator(&function);
-        geometry.map_err(|error| error.to_string())
+        let function = seam::phase_function(spec, columns, rows).map_err(PhasesError::from)?;
+        Ok::<_, UnmeasurableRecording>(devices.triangulator(&function)?)
     });
-    let mut geometries: Vec<_> = geometries.collect::<Result<_, String>>()?;
+    let mut geometries: Vec<_> = geometries.collect::<Result<_, _>>()?;
     let sensitivities: Vec<_> = geometries
         .iter()
         .map(|geometry| Sensitivity::of(geometry.as_ref().ok()?))
         .collect();
     let primary = primary_of(recording, &sensitivities);
-    let code = codes.get(primary).ok_or("the recording has no pattern")?;
+    let code = codes.get(primary).ok_or(UnmeasurableRecording::NoPattern)?;
     let geometry = geometries.swap_remove(primary);
     let sigma = SIGMA_CELLS * code.cells.width;
     let heights = stages.time("height", || {
@@ -58,7 +60,7 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
             Surface { map, triangulator }
         })
     });
-    let report = Report::new(
+    let report = MeasurementReport::new(
         &phases[primary],
         &heights,
         Manner {
@@ -73,7 +75,7 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
         stages.0,
     );
     let full_scale = recording.format().full_scale();
-    Ok(Measurement {
+    Ok(MeasuredRecording {
         wrapped: phases.iter().map(wrapped).collect(),
         wrapped_only: vec![None; phases.len()],
         phases,
@@ -87,7 +89,7 @@ pub(super) fn measure(recording: &Recording) -> Result<Measurement, String> {
             .map(|code| (if code.vertical { "column" } else { "row" }, code.pitch))
             .collect(),
         // σ follows from the cells, not from the noise.
-        report: Report {
+        report: MeasurementReport {
             no_sigma: None,
             notes: recording.notes.clone(),
             ..report.by(recording, primary, sensitivities[primary])

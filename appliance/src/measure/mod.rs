@@ -4,21 +4,19 @@ mod coded;
 mod known;
 pub mod models;
 mod report;
-mod score;
 
-pub use report::{Manner, Report};
-pub use score::{GROSS_MM, Score, Truth};
+pub use report::{GROSS_MM, Manner, MeasurementReport, Score, Truth};
 
 use crate::error::{Exit, Failure, Result};
-use crate::head::channel::{Channel, Expected, Unwrapping};
+use crate::head::channel::{Channel, Expected, NoHeights, Unwrapping};
 use crate::head::direction::Sensitivity;
-use crate::head::scan::Scan;
-use crate::head::seam;
+use crate::head::scan::{PhasesError, Scan};
+use crate::head::seam::{self, AbsurdModel};
 use crate::output::cloud::Surface;
 use crate::recipe::Recipe;
 use algo::adaptive::ProjectorMap;
 use algo::frame::SampleNoise;
-use algo::geometry::{HeightRange, Pinhole, Reference, Triangulator};
+use algo::geometry::{HeightRange, Pinhole, Reference, RigError, Triangulator};
 use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::{Decoder, LeastModulation};
 use algo::pipeline::{self, PhaseMap};
@@ -31,11 +29,59 @@ use std::fmt::Display;
 use std::path::Path;
 use std::time::Instant;
 
-type AnyError = Box<dyn std::error::Error>;
+/// Why a recording cannot be measured.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub(crate) enum UnmeasurableRecording {
+    /// A pattern has no phases.
+    #[error(transparent)]
+    Phases(#[from] PhasesError),
+    /// A model is absurd.
+    #[error(transparent)]
+    Model(#[from] AbsurdModel),
+    /// Camera and projector do not look down at the plane.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The recipe is of another pattern, or of frames of another size.
+    #[error("{0}")]
+    Recipe(String),
+    /// There is nothing to be decoded.
+    #[error("it has neither fringes nor a Gray code: record one of both")]
+    NothingShown,
+    /// There is no pattern.
+    #[error("the recording has no pattern")]
+    NoPattern,
+    /// A code is absolute by itself.
+    #[error(
+        "it has a Gray code without fringes, which needs no expected phase: measure without one"
+    )]
+    NoMapNeeded,
+    /// The preliminary recording has frames of another size.
+    #[error(
+        "the preliminary recording has frames of {}x{}, this one of {}x{}: both must come from one camera",
+        preliminary.0, preliminary.1, frames.0, frames.1
+    )]
+    OtherCamera {
+        /// Columns and rows of the preliminary recording.
+        preliminary: (usize, usize),
+        /// Columns and rows of this one.
+        frames: (usize, usize),
+    },
+    /// The expected phase is of frames of another size.
+    #[error(
+        "the expected phase has {}x{} pixels, the recording {}x{}: name the expected phase that was made with this camera",
+        map.0, map.1, frames.0, frames.1
+    )]
+    OtherMap {
+        /// Columns and rows of the map.
+        map: (usize, usize),
+        /// Columns and rows of the recording.
+        frames: (usize, usize),
+    },
+}
 
 /// A measured recording.
 #[derive(Debug)]
-pub struct Measurement {
+pub struct MeasuredRecording {
     /// The absolute phase of each pattern of the recording; without any phase where `wrapped_only`
     /// says why.
     pub phases: Vec<PhaseMap>,
@@ -47,7 +93,7 @@ pub struct Measurement {
     /// Which of the patterns the height comes from.
     pub primary: usize,
     /// Height and σ_z, or why there is none.
-    pub heights: Result<Surface, String>,
+    pub heights: Result<Surface, NoHeights>,
     /// How the primary pattern was decoded; none of a Gray code alone.
     pub decoder: Option<Decoder>,
     /// What the frames of the primary pattern show that this decoder takes.
@@ -58,7 +104,7 @@ pub struct Measurement {
     /// pixels per turn.
     pub places: Vec<(&'static str, f64)>,
     /// The summary.
-    pub report: Report,
+    pub report: MeasurementReport,
     /// Mean of the finest level's frames of the primary pattern, scaled to 8 bits.
     pub intensity: Vec<u8>,
 }
@@ -68,7 +114,7 @@ pub struct Measurement {
 ///
 /// # Errors
 /// If levels cannot be unwrapped or a model is absurd; the message names `folder`.
-pub fn measure(recording: &Recording, folder: &Path) -> Result<Measurement> {
+pub fn measure(recording: &Recording, folder: &Path) -> Result<MeasuredRecording> {
     measure_with(recording, folder, None)
 }
 
@@ -81,7 +127,7 @@ pub fn measure_after(
     recording: &Recording,
     folder: &Path,
     preliminary: &ProjectorMap,
-) -> Result<Measurement> {
+) -> Result<MeasuredRecording> {
     let known = Known::expected(preliminary, recording).map_err(wrong(folder))?;
     measure_about(recording, folder, None, Some(known))
 }
@@ -95,7 +141,7 @@ pub fn measure_about_map(
     recording: &Recording,
     folder: &Path,
     map: &Array<f64>,
-) -> Result<Measurement> {
+) -> Result<MeasuredRecording> {
     let known = Known::given(map, recording).map_err(wrong(folder))?;
     measure_about(recording, folder, None, Some(known))
 }
@@ -110,7 +156,7 @@ pub fn measure_with(
     recording: &Recording,
     folder: &Path,
     recipe: Option<&Recipe>,
-) -> Result<Measurement> {
+) -> Result<MeasuredRecording> {
     let known = recipe.map(|recipe| Known::of(recipe, recording));
     let known = known.transpose().map_err(wrong(folder))?;
     measure_about(recording, folder, recipe, known)
@@ -127,22 +173,20 @@ fn measure_about(
     folder: &Path,
     recipe: Option<&Recipe>,
     known: Option<Known>,
-) -> Result<Measurement> {
+) -> Result<MeasuredRecording> {
     let measured = match (recording.frames.is_empty(), &known) {
         (false, _) => of_fringes(recording, recipe, known.as_ref()),
-        (true, None) => coded::measure(recording).map_err(AnyError::from),
-        (true, Some(_)) => Err(
-            "it has a Gray code without fringes, which needs no expected phase: measure without one".into(),
-        ),
+        (true, None) => coded::measure(recording),
+        (true, Some(_)) => Err(UnmeasurableRecording::NoMapNeeded),
     };
     measured.map_err(wrong(folder))
 }
 
 /// How long the stages of a measurement take, µs.
 #[derive(Default)]
-struct Stages(BTreeMap<&'static str, u64>);
+struct StageTimes(BTreeMap<&'static str, u64>);
 
-impl Stages {
+impl StageTimes {
     /// Carries out one part of a stage.
     fn time<T>(&mut self, stage: &'static str, part: impl FnOnce() -> T) -> T {
         let started = Instant::now();
@@ -156,16 +200,16 @@ impl Stages {
 /// One pattern of a recording: its frames, what makes heights of it, and how it is unwrapped.
 struct Pattern<'a> {
     channel: Channel<'a>,
-    geometry: Result<Triangulator, String>,
+    geometry: Result<Triangulator, NoHeights>,
     unwrapping: Unwrapping,
 }
 
 impl<'a> Pattern<'a> {
     fn new(
         channel: Channel<'a>,
-        devices: &Geometry,
+        devices: &RecordedRig,
         known: Option<&Known>,
-    ) -> Result<Self, AnyError> {
+    ) -> Result<Self, UnmeasurableRecording> {
         let geometry = devices.triangulator(&channel.function)?;
         let known = known.map(|known| known as &dyn Expected);
         let unwrapping = channel.unwrapping(known, &geometry)?;
@@ -211,9 +255,9 @@ fn of_fringes(
     recording: &Recording,
     recipe: Option<&Recipe>,
     known: Option<&Known>,
-) -> Result<Measurement, AnyError> {
-    let devices = Geometry::of(recording, recipe)?;
-    let mut stages = Stages::default();
+) -> Result<MeasuredRecording, UnmeasurableRecording> {
+    let devices = RecordedRig::of(recording, recipe)?;
+    let mut stages = StageTimes::default();
     let least = recipe.map(|recipe| recipe.conditions.least_modulation);
     let least = least.unwrap_or_else(|| least_modulation(recording));
     let (mut patterns, mut phases, mut wrapped) = (Vec::new(), Vec::new(), Vec::new());
@@ -234,7 +278,7 @@ fn of_fringes(
         None => primary_of(recording, &sensitivities),
     };
     if patterns.len() <= primary {
-        return Err("the recording has no pattern".into());
+        return Err(UnmeasurableRecording::NoPattern);
     }
     let pattern = patterns.swap_remove(primary);
     let map = &mut phases[primary];
@@ -255,7 +299,7 @@ fn of_fringes(
             triangulator,
         })
     });
-    let report = Report::new(
+    let report = MeasurementReport::new(
         map,
         &heights,
         Manner {
@@ -272,13 +316,13 @@ fn of_fringes(
         &Truth::of(recording),
         stages.0,
     );
-    let report = Report {
+    let report = MeasurementReport {
         no_phase: wrapped_only[primary].clone(),
         notes: recording.notes.clone(),
         ambiguous,
         ..report.by(recording, primary, sensitivities[primary])
     };
-    Ok(Measurement {
+    Ok(MeasuredRecording {
         intensity: channel.intensity(),
         phases,
         wrapped,
@@ -319,18 +363,18 @@ fn vertical_of(recording: &Recording) -> usize {
 }
 
 /// The devices of a recording, where it has models of them, and its working range.
-pub struct Geometry {
-    devices: Result<(Pinhole, Pinhole, Reference), String>,
+pub struct RecordedRig {
+    devices: Result<(Pinhole, Pinhole, Reference), NoHeights>,
     range: Option<HeightRange>,
 }
 
-impl Geometry {
+impl RecordedRig {
     /// The devices of this recording; the working range is the recipe's where the recording has
     /// none.
     ///
     /// # Errors
-    /// In words: a model is absurd.
-    pub fn of(recording: &Recording, recipe: Option<&Recipe>) -> Result<Self, String> {
+    /// A model is absurd.
+    pub fn of(recording: &Recording, recipe: Option<&Recipe>) -> Result<Self, AbsurdModel> {
         let projector = &recording.projector;
         let frames = (recording.width, recording.height);
         let raster = (projector.width, projector.height);
@@ -346,7 +390,7 @@ impl Geometry {
             (_, None) => Err("the recording has no model of the projector"),
         };
         Ok(Self {
-            devices: devices.map_err(String::from),
+            devices: devices.map_err(NoHeights::from),
             range: recording
                 .range_mm
                 .or_else(|| recipe.map(|recipe| recipe.conditions.range_mm))
@@ -362,9 +406,9 @@ impl Geometry {
     pub fn triangulator(
         &self,
         function: &PhaseFunction,
-    ) -> Result<Result<Triangulator, String>, algo::geometry::RigError> {
+    ) -> Result<Result<Triangulator, NoHeights>, RigError> {
         match &self.devices {
-            Err(missing) => Ok(Err(missing.clone())),
+            Err(missing) => Ok(Err(*missing)),
             Ok((camera, projector, reference)) => Triangulator::new(
                 camera.clone(),
                 projector.clone(),

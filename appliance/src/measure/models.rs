@@ -2,7 +2,7 @@
 
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::file::CalibrationFile;
-use crate::head::seam;
+use crate::head::seam::{self, AbsurdModel};
 use hal::replay::Recording;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -20,14 +20,13 @@ const REACH: f64 = 0.5;
 /// another size (65).
 pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>> {
     let place = path.display();
-    let wrong = Exit::Content.because(&place);
     let bytes = std::fs::read(path).map_err(|error| match error.kind() {
         ErrorKind::NotFound => {
             Failure::because(Exit::Missing, &place, "there is no such calibration")
         }
-        _ => wrong(error.to_string()),
+        _ => Failure::because(Exit::Content, &place, error),
     })?;
-    let file = CalibrationFile::read(&bytes).map_err(&wrong)?;
+    let file = CalibrationFile::read(&bytes).map_err(Exit::Content.because(&place))?;
     let (camera, projector) = (&file.camera, &file.projector);
     let frames = [
         (camera.width, camera.height),
@@ -44,7 +43,7 @@ pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>> {
                 "the calibration is of a head with {of} of {} × {} pixels, and the recording has {} × {}: name the calibration of the head that took it",
                 calibrated.0, calibrated.1, recorded.0, recorded.1
             );
-            return Err(wrong(words));
+            return Err(Failure::because(Exit::Content, &place, words));
         }
     }
     let lowest = [
@@ -53,12 +52,12 @@ pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>> {
     ]
     .into_iter()
     .map(|(device, model, size)| Ok(seam::pinhole(device, model, size)?.centre().z))
-    .collect::<Result<Vec<f64>, String>>()
-    .map_err(&wrong)?
+    .collect::<Result<Vec<f64>, AbsurdModel>>()
+    .map_err(Exit::Content.because(&place))?
     .into_iter()
     .fold(f64::INFINITY, f64::min);
     let calibration = file.calibration();
-    let calibration = calibration.map_err(&wrong)?;
+    let calibration = calibration.map_err(Exit::Content.because(&place))?;
     recording.range_mm = Some([-REACH * lowest, REACH * lowest]);
     recording.camera_model = Some(file.camera.model);
     recording.projector.model = Some(file.projector.model);

@@ -31,11 +31,24 @@ pub struct Sheet {
     pub pdf: Vec<u8>,
 }
 
+/// A board whose squares and margin are larger than every paper.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the squares cover {width} × {height} mm, with a margin of {} mm more than A0: take smaller or fewer squares",
+    MARGIN
+)]
+pub struct NoPaper {
+    /// Width of all squares, mm.
+    pub width: f64,
+    /// Height of all squares, mm.
+    pub height: f64,
+}
+
 /// Draws a board on the smallest paper that holds it, upright or lying.
 ///
 /// # Errors
-/// In words: no paper holds it.
-pub fn sheet(board: &Board) -> Result<Sheet, String> {
+/// No paper holds it.
+pub fn sheet(board: &Board) -> Result<Sheet, NoPaper> {
     let side = |corners: usize| (corners + 1) as f64 * board.square;
     let (width, height) = (side(board.columns), side(board.rows));
     let fits =
@@ -44,9 +57,7 @@ pub fn sheet(board: &Board) -> Result<Sheet, String> {
         let sizes = [(short, long), (long, short)];
         Some((paper, sizes.into_iter().find(|&size| fits(size))?))
     });
-    let (paper, (wide, high)) = sized.ok_or_else(|| {
-        format!("the squares cover {width} × {height} mm, with a margin of {MARGIN} mm more than A0: take smaller or fewer squares")
-    })?;
+    let (paper, (wide, high)) = sized.ok_or(NoPaper { width, height })?;
     let (left, bottom) = ((wide - width) / 2.0, (high - height) / 2.0);
     let mut drawing = String::from("0 g\n");
     for row in 0..=board.rows {
@@ -169,7 +180,7 @@ mod tests {
         };
         assert_eq!(sheet(&board(13, 9, 10.0)).unwrap().paper, "A4");
         assert_eq!(sheet(&board(9, 13, 20.0)).unwrap().paper, "A3");
-        let error = sheet(&board(9, 13, 100.0)).unwrap_err();
+        let error = sheet(&board(9, 13, 100.0)).unwrap_err().to_string();
         assert!(error.contains("1000 × 1400 mm"), "{error}");
     }
 }

@@ -3,7 +3,7 @@
 
 use super::telling::Telling;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, recovery};
-use crate::head::empty::EmptyStation;
+use crate::head::calibrated::EmptyStation;
 use crate::recipe::teach::{TaughtRecipe, TeachError, teach_showing};
 use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, Teaching, error_code};
@@ -132,7 +132,7 @@ impl Worker {
     fn empty_station(&self) -> Option<Arc<EmptyStation>> {
         let place = self.config.calibration.as_deref()?;
         let loaded = EmptyStation::load(place, &self.opened.calibration);
-        let loaded = loaded.map_err(|words| self.progress.warn(&words));
+        let loaded = loaded.map_err(|failure| self.progress.warn(&failure.to_string()));
         loaded.ok()?.map(Arc::new)
     }
 

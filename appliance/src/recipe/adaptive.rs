@@ -1,7 +1,7 @@
 //! The adaptive pattern of a part, from its preliminary measurement.
 
 use super::failure::TeachError;
-use crate::head::calibrated::{Measured, STRAIGHT_PITCH_PX, STRAIGHT_SHIFTS, straight_fringes};
+use crate::head::calibrated::{MeasuredPart, STRAIGHT_PITCH_PX, STRAIGHT_SHIFTS, straight_fringes};
 use crate::head::calibration::Calibration;
 use crate::head::calibration::file::ContrastFile;
 use crate::head::scan::Scan;
@@ -49,7 +49,7 @@ impl Preliminary {
     /// If nothing of the part is known, or its pattern cannot be shown.
     pub fn adapt(
         &self,
-        part: &Measured,
+        part: &MeasuredPart,
         calibration: &Calibration,
         progress: Progress<'_>,
     ) -> Result<AdaptivePattern, TeachError> {
@@ -87,7 +87,7 @@ impl Preliminary {
     /// contrast that was calibrated.
     fn blur(
         &self,
-        part: &Measured,
+        part: &MeasuredPart,
         calibration: &Calibration,
         slopes: &[[f64; 2]],
     ) -> Result<Blur, TeachError> {
@@ -99,7 +99,7 @@ impl Preliminary {
         )
         .map(|coarse| coarse.trusting(part.decoder.least_modulation()))
         .and_then(|coarse| coarse.phases(None))
-        .map_err(TeachError::Rig)?;
+        .map_err(TeachError::rig)?;
         let fine = 1.0 / STRAIGHT_PITCH_PX;
         let frequencies = [fine, fine * self.shots[0].ratio];
         let resolved = (0..slopes.len()).filter(|&at| part.phases.trust[at] == Trust::Resolved);
@@ -160,7 +160,7 @@ mod tests {
 
     /// A sphere in front of a small head with these σ of both lenses: what is projected, and its
     /// measurement.
-    fn sphere(projector: f64, camera: f64) -> (Preliminary, Measured, Calibration) {
+    fn sphere(projector: f64, camera: f64) -> (Preliminary, MeasuredPart, Calibration) {
         let mut scenario = Scenario {
             part: Part::Sphere(Sphere::default()),
             sub_rays: 2,

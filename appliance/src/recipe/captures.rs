@@ -11,9 +11,9 @@
 use super::failure::TeachError;
 use super::light;
 use crate::head::calibrated::CalibratedHead;
-use crate::head::means;
 use crate::head::rasters::Illumination;
-use crate::head::scan::Scan;
+use crate::head::scan::mean_frames;
+use crate::head::scan::{PhasesError, Scan};
 use crate::head::seam;
 use crate::system::headway::Headway;
 use algo::frame::{FrameError, SampleNoise};
@@ -87,7 +87,7 @@ impl Captured {
             // Means of frames have more bits than the camera's samples.
             let unit = full_scale / f64::from(scan.decoder.full_scale());
             let offset = counts.map(|counts| counts * unit);
-            Ok::<_, String>((scan.noise(calibration, &phases), offset, phases))
+            Ok::<_, PhasesError>((scan.noise(calibration, &phases), offset, phases))
         };
         illumination.load(head, function, &shots, calibration)?;
         let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
@@ -96,7 +96,7 @@ impl Captured {
         for mean in 0..MEANS {
             let taking = headway.part(0.45 * mean as f64, 0.45 * (mean + 1) as f64);
             let taken = |share: f64| taking.tell(0.8 * share);
-            let means = means::take(head, shots.len(), *timeout, &taken)?;
+            let means = mean_frames(head, shots.len(), *timeout, &taken)?;
             let means = means.ok_or(TeachError::Ended)?;
             let (by_modulation, offset, phases) =
                 decode(full, &means, expected).map_err(TeachError::rig)?;
@@ -157,7 +157,7 @@ fn scan<'a>(
     function: &PhaseFunction,
     (shots, shown): (&[Shot], &[Shot]),
     means: &'a [Frame],
-) -> Result<Scan<'a>, String> {
+) -> Result<Scan<'a>, PhasesError> {
     let frame = |shot| shots.iter().position(|other| other == shot);
     let frames = shown.iter().filter_map(frame).map(|at| &means[at]);
     Scan::new(function.range(), shown, frames)

@@ -3,7 +3,7 @@
 
 use super::adaptive::Preliminary;
 use super::golden::Naming;
-use crate::head::calibrated::{Measured, STRAIGHT_SHIFTS};
+use crate::head::calibrated::{MeasuredPart, STRAIGHT_SHIFTS};
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use algo::adaptive::ProjectorMap;
@@ -21,7 +21,7 @@ impl Preliminary {
     /// light.
     pub(super) fn illumination(
         &self,
-        part: &Measured,
+        part: &MeasuredPart,
         calibration: &Calibration,
         naming: &Naming,
     ) -> Illumination {

@@ -2,7 +2,7 @@
 
 use super::failure::TeachError;
 use super::plan::window;
-use crate::head::empty::EmptyStation;
+use crate::head::calibrated::EmptyStation;
 use algo::geometry::Triangulator;
 use algo::inspect::{self, Marking, Surroundings};
 use algo::phase::Trust;

@@ -15,10 +15,10 @@ use super::query::{Path, Query};
 use super::site::{Site, alone};
 use crate::head::board;
 use crate::head::calibration::geometry::MAX_POSES;
-use crate::head::commission::{EXPOSURE, GEOMETRY, Poses, STEPS, Solving, Step};
+use crate::head::commission::{EXPOSURE, GEOMETRY, PoseAction, STEPS, Solving, Step};
 use crate::head::exposing::Exposing;
 use crate::head::live::Show;
-use crate::production::commissioning::Asked;
+use crate::production::commissioning::StepRequest;
 use crate::station::{Event, Request as Command};
 use crate::system::priority;
 
@@ -86,7 +86,7 @@ pub(super) async fn end(site: Site, Path(name): Path<String>) -> Result<Accepted
     Ok(accepted())
 }
 
-async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked> {
+async fn asked(site: &Site, name: &str, body: Body) -> Result<StepRequest> {
     let step = Step::of(name).ok_or_else(|| {
         let [before @ .., last] = STEPS.each_ref().map(|step| step.name);
         let before = before.join(", ");
@@ -103,7 +103,7 @@ async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked> {
             let Nothing {} = body::json_if_any(body).await?;
         }
     }
-    Ok(Asked {
+    Ok(StepRequest {
         step,
         poses,
         exposing,
@@ -132,7 +132,7 @@ fn exposure(site: &Site, wanted: Exposure) -> Result<Option<(Exposing, bool)>> {
     Ok(given.then_some((exposing, wanted.keep)))
 }
 
-fn geometry(site: &Site, wanted: Action) -> Result<Poses, String> {
+fn geometry(site: &Site, wanted: Action) -> Result<PoseAction, String> {
     let most = MAX_POSES as u32;
     let within = |pose: u32| match (1..=most).contains(&pose) {
         true => Ok(pose),
@@ -142,12 +142,12 @@ fn geometry(site: &Site, wanted: Action) -> Result<Poses, String> {
         Action::Pose { board, pose } => {
             let board = board::parse(&board).map_err(|error| format!("board: {error}"))?;
             let number = pose.unwrap_or_else(|| site.commission.free_pose());
-            Poses::Pose(board, within(number)?)
+            PoseAction::Pose(board, within(number)?)
         }
-        Action::Forget { pose } => Poses::Forget(pose.map(within).transpose()?),
+        Action::Forget { pose } => PoseAction::Forget(pose.map(within).transpose()?),
         Action::Solve(solving) => {
             solving.check()?;
-            Poses::Solve(solving)
+            PoseAction::Solve(solving)
         }
     })
 }

@@ -24,7 +24,7 @@ use crate::projector::Raster;
 use crate::trigger::{Edges, Spoiled, SpoiledPulses, Trigger, keep_latest};
 use crate::units::Timestamp;
 use camera::Sensor;
-use mechanics::{Dice, Event};
+use mechanics::{Dice, Mishap};
 pub use mechanics::{Faults, FreeRunning, Mechanics};
 use projector::{LightHistory, Screen};
 
@@ -250,7 +250,7 @@ impl<S: Scene> Clock for VirtualDevice<S> {
             .fold(until, Timestamp::min);
         bench.waits += 1;
         let stall = bench.dice.up_to(
-            Event::Stall,
+            Mishap::Stall,
             bench.waits,
             bench.mechanics.faults.stall,
             Duration::from_micros(bench.mechanics.faults.stall_us),
@@ -284,7 +284,7 @@ impl Pulses {
         self.begun += 1;
         let faults = &mechanics.faults;
         let longest = Duration::from_micros(faults.long_pulse_us);
-        let longer = dice.up_to(Event::LongPulse, self.begun, faults.long_pulse, longest);
+        let longer = dice.up_to(Mishap::LongPulse, self.begun, faults.long_pulse, longest);
         if longer.is_zero() {
             return Some(mechanics.exposure);
         }

@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-use super::mechanics::Event;
+use super::mechanics::Mishap;
 use super::{Bench, InView, Scene, VirtualDevice, lock};
 use crate::error::{DeviceKind, Error};
 use crate::projector::{Flip, Projector, Raster, all_kept, all_of_size};
@@ -120,9 +120,9 @@ impl<S: Scene> Bench<S> {
             .unwrap_or(u64::MAX)
             .max(1);
         let mut count = self.now.0 / period + 1;
-        if dice.happens(Event::LateFlip, n, faults.late_flip) {
+        if dice.happens(Mishap::LateFlip, n, faults.late_flip) {
             let more = dice.up_to(
-                Event::LateFlip,
+                Mishap::LateFlip,
                 n ^ 1 << 40,
                 1.0,
                 Duration::from_nanos(1 << 20),
@@ -131,14 +131,14 @@ impl<S: Scene> Bench<S> {
         }
         let at = Timestamp(count.saturating_mul(period));
         let news = dice.up_to(
-            Event::LateNews,
+            Mishap::LateNews,
             n,
             faults.late_news,
             Duration::from_micros(faults.late_news_us),
         );
         let jitter = Duration::from_micros(faults.flip_jitter_us);
-        let mut timestamp = at + dice.up_to(Event::FlipJitter, n, 1.0, 2 * jitter) - jitter;
-        let wrong = |n| dice.happens(Event::WrongStamp, n, faults.wrong_stamp);
+        let mut timestamp = at + dice.up_to(Mishap::FlipJitter, n, 1.0, 2 * jitter) - jitter;
+        let wrong = |n| dice.happens(Mishap::WrongStamp, n, faults.wrong_stamp);
         if wrong(n) && !wrong(n - 1) {
             timestamp = timestamp + self.mechanics.refresh;
         }

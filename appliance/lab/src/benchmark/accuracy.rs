@@ -9,7 +9,7 @@ use algo::pattern::{Level, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
-use appliance::head::calibrated::Measured;
+use appliance::head::calibrated::MeasuredPart;
 use appliance::measure::{Score, Truth};
 use appliance::production::stopwatch::timed;
 use hal::frame::Frame;
@@ -289,7 +289,7 @@ fn rows_seen(truth: &sim::Truth, width: usize) -> Vec<Range<usize>> {
 }
 
 /// The heights of an implementation's phases, by exact triangulation, against the truth.
-fn score(measured: &Measured, truth: &sim::Truth, turns: &[f64]) -> Option<Score> {
+fn score(measured: &MeasuredPart, truth: &sim::Truth, turns: &[f64]) -> Option<Score> {
     let mut phases = PhaseMap {
         width: measured.phases.width,
         phase: turns

@@ -6,7 +6,7 @@ use appliance::cli::numbers::number;
 use appliance::cli::{Files, Quiet, Threads, names};
 use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibration::Calibration;
-use appliance::head::capture::Shown;
+use appliance::head::rasters::ShownPictures;
 use appliance::head::scan::take_loaded;
 use appliance::production::backend::{self, Opened};
 use hal::bounds::{MAX_FRINGES, shortened};
@@ -80,7 +80,7 @@ const TIMEOUT: Duration = Duration::from_secs(5);
 
 /// Everything that is shown in a pose: fringes, white and black, then files.
 struct Plan {
-    shown: Shown,
+    shown: ShownPictures,
     rasters: Vec<Raster>,
     /// Names of the files' frames.
     files: Vec<String>,
@@ -153,7 +153,7 @@ impl Capture {
         let shows =
             |one: &Showing| self.patterns.contains(one) || self.patterns.contains(&Showing::All);
         let (levels, steps) = (usize::from(self.levels), usize::from(self.steps));
-        let mut shown = Shown::default();
+        let mut shown = ShownPictures::default();
         for (showing, vertical) in [(Showing::Vertical, true), (Showing::Horizontal, false)] {
             if shows(&showing) {
                 shown

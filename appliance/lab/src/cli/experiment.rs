@@ -10,7 +10,7 @@ use algo::phase::Trust;
 use appliance::cli::{Output, Threads, names, numbers};
 use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibrated::MeasureError;
-use appliance::output::canvas::grey_png;
+use appliance::output::grey_png;
 use appliance::storage::folder::OutputFolder;
 use hal::frame::Samples;
 use hal::npy;

@@ -5,7 +5,7 @@ use crate::import::{Channel, Taken, import};
 use appliance::cli::numbers::number;
 use appliance::cli::{Output, Threads, model_files, names};
 use appliance::error::{Exit, Result};
-use appliance::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
+use appliance::head::calibration::opencv::{self, Declared, ImportedModels, Sizes, Unit};
 use hal::bounds::{MAX_NOISE_COUNTS, MAX_RANGE_MM, MIN_NOISE_COUNTS};
 use hal::replay::recorder;
 use serde::Serialize;
@@ -133,7 +133,7 @@ impl Import {
     }
 
     /// The models that the options name, for frames of this size.
-    fn models(&self, camera: (u32, u32)) -> Result<Option<Models>> {
+    fn models(&self, camera: (u32, u32)) -> Result<Option<ImportedModels>> {
         let named = [&self.camera_model, &self.projector_model, &self.models];
         model_files(named.into_iter().flatten())?;
         let sizes = Sizes {
@@ -152,6 +152,6 @@ impl Import {
             (_, _, Some(models)) => opencv::from_one(models, sizes, declared),
             _ => return Ok(None),
         };
-        both.map(Some).map_err(Exit::Content.failure())
+        both.map(Some)
     }
 }

@@ -9,7 +9,7 @@ use appliance::cli::numbers::number;
 use appliance::cli::{Quiet, Threads, names};
 use appliance::error::{Exit, Failure, Result};
 use appliance::head::seam;
-use appliance::output::canvas::grey_png;
+use appliance::output::grey_png;
 use hal::frame::{Frame, FrameFormat, Pixels};
 use hal::npy;
 use hal::replay::recorder;

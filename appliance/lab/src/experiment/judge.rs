@@ -4,12 +4,12 @@ use super::compared::Judged;
 use super::table::Values;
 use algo::math::solve::Normal;
 use algo::phase::Trust;
-use appliance::head::calibrated::Measured;
+use appliance::head::calibrated::MeasuredPart;
 use appliance::measure::{GROSS_MM, Score, Truth};
 
 /// Compares a measurement of a simulated part with the truth. All figures are over the pixels that
 /// truth calls wholly lit, as in the study; the ratio to the paper's run is not known yet.
-pub fn judge(truth: &sim::Truth, measured: &Measured, judged: Judged) -> Values {
+pub fn judge(truth: &sim::Truth, measured: &MeasuredPart, judged: Judged) -> Values {
     let known = Truth::from(truth);
     let (phases, heights) = (&measured.phases, &measured.heights);
     let whole: Vec<usize> = known.whole_pixels().collect();

@@ -11,7 +11,7 @@ use algo::pattern::{PhaseFunction, PhaseRange, Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use algo::units::AbsolutePhase;
-use appliance::head::calibrated::{CalibratedHead, MeasureError, Measured};
+use appliance::head::calibrated::{CalibratedHead, MeasureError, MeasuredPart};
 use appliance::head::calibration::Calibration;
 use appliance::recipe::adaptive::{AdaptivePattern, Preliminary};
 use hal::head::Head;
@@ -33,7 +33,7 @@ pub struct Runner {
 #[derive(Default)]
 struct Learnt {
     seed: u64,
-    preliminary: Option<Arc<Measured>>,
+    preliminary: Option<Arc<MeasuredPart>>,
     paper: Option<Arc<ProjectorMap>>,
     better: Option<Arc<AdaptivePattern>>,
     golden: Option<Arc<Vec<AbsolutePhase>>>,
@@ -44,7 +44,7 @@ pub struct Run {
     /// Errors against the truth.
     pub values: Values,
     /// Frames, phases and heights.
-    pub measured: Measured,
+    pub measured: MeasuredPart,
     /// The pattern.
     pub function: PhaseFunction,
     /// Which of the frames shows the finest level first.
@@ -122,7 +122,7 @@ impl Runner {
         method: Method,
         shots: impl Fn(PhaseRange) -> Vec<Shot>,
         seed: u64,
-    ) -> Result<(Measured, Option<Vec<AbsolutePhase>>), MeasureError> {
+    ) -> Result<(MeasuredPart, Option<Vec<AbsolutePhase>>), MeasureError> {
         self.learn_with(seed);
         let (function, map) = self.pattern(method)?;
         let shots = shots(function.range());
@@ -179,7 +179,7 @@ impl Runner {
         function: &PhaseFunction,
         shots: &[Shot],
         map: Option<&[AbsolutePhase]>,
-    ) -> Result<Measured, MeasureError> {
+    ) -> Result<MeasuredPart, MeasureError> {
         self.stage.reseed(self.learnt.seed * STREAMS + noise_stream);
         let mut head = CalibratedHead {
             head: &mut self.head,
@@ -195,7 +195,7 @@ impl Runner {
     }
 
     /// The preliminary measurement of both adaptive methods: one vertical sequence at 20 px pitch.
-    fn preliminary(&mut self) -> Result<Arc<Measured>, MeasureError> {
+    fn preliminary(&mut self) -> Result<Arc<MeasuredPart>, MeasureError> {
         if let Some(known) = &self.learnt.preliminary {
             return Ok(Arc::clone(known));
         }

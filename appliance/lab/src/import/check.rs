@@ -70,7 +70,7 @@ pub(super) fn notes(
         match channel.chain() {
             // With models, levels are unwrapped about the reference map.
             Err(_) if recording.camera_model.is_some() => {}
-            Err(missing) => note(missing),
+            Err(missing) => note(missing.to_string()),
             Ok(chain) => {
                 let seen = channel.seen()?;
                 let rows = Rows::of(&levels, seen.as_deref());

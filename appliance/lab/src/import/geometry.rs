@@ -8,9 +8,9 @@ use algo::geometry::{Pinhole, RigError};
 use algo::phase::Trust;
 use algo::pipeline::{Epipolar, PhaseMap};
 use appliance::error::Result;
-use appliance::head::calibration::opencv::Models;
+use appliance::head::calibration::opencv::ImportedModels;
 use appliance::head::seam;
-use appliance::measure::Geometry;
+use appliance::measure::RecordedRig;
 use hal::model::DeviceModel;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
@@ -31,7 +31,11 @@ const MIDDLE: std::ops::Range<f64> = 0.3..0.7;
 ///
 /// # Errors
 /// If heights could not be measured with them.
-pub(super) fn add(recording: &mut Recording, models: Models, folder: &Path) -> Result<Vec<String>> {
+pub(super) fn add(
+    recording: &mut Recording,
+    models: ImportedModels,
+    folder: &Path,
+) -> Result<Vec<String>> {
     let mut notes = models.notes;
     recording.camera_model = Some(models.camera);
     recording.projector.model = Some(models.projector);
@@ -103,7 +107,7 @@ fn works(recording: &Recording) -> Result<(), Failed> {
 fn rig(recording: &Recording) -> Result<Result<(), RigError>, Failed> {
     let projector = &recording.projector;
     let (columns, rows) = (projector.width as usize, projector.height as usize);
-    let geometry = Geometry::of(recording, None)?;
+    let geometry = RecordedRig::of(recording, None)?;
     for pattern in &recording.patterns {
         let function = seam::phase_function(pattern, columns, rows);
         let function = function.map_err(|error| error.to_string())?;

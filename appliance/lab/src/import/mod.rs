@@ -18,7 +18,7 @@ use crate::Failed;
 use crate::description::Description;
 use crate::layout::{Layout, Shown};
 use appliance::error::{Exit, Failure, Result};
-use appliance::head::calibration::opencv::Models;
+use appliance::head::calibration::opencv::ImportedModels;
 use appliance::measure::measure;
 use folder::Place;
 use hal::bounds::shortened;
@@ -66,7 +66,7 @@ pub struct Taken {
 pub fn import(
     folder: &Path,
     taken: &Taken,
-    models: impl FnOnce((u32, u32)) -> Result<Option<Models>>,
+    models: impl FnOnce((u32, u32)) -> Result<Option<ImportedModels>>,
 ) -> Result<Recording> {
     let layout = Layout::of(&taken.description);
     let layout = layout.map_err(Exit::Usage.because("import"))?;

@@ -1,26 +1,34 @@
 //! `fringed calibrate`: makes or imports the models, measures the rest of the calibration on the
-//! head, and writes `calibration.json`.
+//! head as the steps of commissioning do, and writes `calibration.json`.
 
 mod poses;
-mod report;
+
+pub use poses::Print;
 
 use super::numbers::number;
 use super::options::Measuring;
 use crate::config::HeadConfig;
-use crate::error::{Exit, Result};
-use crate::head::calibrate::{Basis, make};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::file::{COLDEST_C, CalibrationFile, HOTTEST_C};
-use crate::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
-use crate::head::calibration::place::Place;
+use crate::head::calibration::opencv::{self, Declared, Sizes, Unit};
+use crate::head::calibration::place::CalibrationPlace;
 use crate::head::calibration::{Calibration, HeightsBy};
-use crate::production::backend::{self, Opened};
+use crate::head::commission::{
+    Characteristics, Choices, Commissioning, HeadModels, OF_SCENARIO, PLANE, STEPS, Subject, TIMING,
+};
+use crate::production::backend;
 use crate::storage::state::StateFolder;
 use algo::geometry::RigError;
 use algo::pattern::PhaseFunction;
 use hal::bounds::MAX_RANGE_MM;
-use poses::Poses;
+use poses::BoardOptions;
+use serde_json::{Value, json};
 use sim::{Part, Stage};
+use std::fmt::{Display, Write as _};
 use std::path::{Path, PathBuf};
+
+/// What to do if the calibration cannot be written.
+const FULL: &str = "free space, or name another file with --out";
 
 /// Calibrate the head: make its models from a board or import them, measure delay, stamps, grey
 /// response, noise, contrast and the reference plane.
@@ -62,16 +70,10 @@ pub struct Calibrate {
     #[arg(long, value_name = "CELSIUS", allow_negative_numbers = true, conflicts_with = "board", value_parser = number(COLDEST_C, HOTTEST_C))]
     temperature: Option<f64>,
     #[command(flatten)]
-    poses: Poses,
+    board: BoardOptions,
     #[command(flatten)]
     measuring: Measuring,
 }
-
-/// The origin of models that do not come from a file.
-const OF_SCENARIO: &str = "scenario";
-
-/// What to do if the calibration cannot be written.
-const FULL: &str = "free space, or name another file with --out";
 
 impl Calibrate {
     /// Opens the head, measures it, writes the calibration and prints what was found.
@@ -81,8 +83,8 @@ impl Calibrate {
     /// cannot be written (73). The calibration before is then unchanged.
     pub fn run(&self) -> Result<()> {
         let options = &self.measuring;
-        if self.poses.given() {
-            return self.poses.run(options);
+        if self.board.given() {
+            return self.board.run(options);
         }
         let why = "calibrate: a recording carries its own calibration";
         let config = options.live(self.scenario.as_ref(), why)?;
@@ -90,7 +92,7 @@ impl Calibrate {
         // being replaced.
         let state = StateFolder::open(&options.files.state_folder()?)?;
         let head = config.head_in(state.path());
-        let place = Place::at(head.calibration.as_deref().unwrap_or(Path::new("")));
+        let place = CalibrationPlace::at(head.calibration.as_deref().unwrap_or(Path::new("")));
         let mut notes = Vec::new();
         let before = before(&place, &mut notes);
         let progress = options.output.progress();
@@ -103,20 +105,71 @@ impl Calibrate {
             ..head
         };
         let mut opened = pool.install(|| backend::open(&bare, &on_progress))?;
-        let (basis, response) = self.basis(&opened, before.as_ref(), &mut notes)?;
-        if basis.plate {
-            let stage = opened.stage.clone();
-            pool.install(|| lay_plate(stage.as_ref(), &mut notes))?;
+        let exact = opened.problem.is_none() && opened.stage.is_some();
+        let imported = self.imported(&opened.calibration, &mut notes)?;
+        let heights_by = match self.no_plate {
+            true => None,
+            false => self
+                .heights_by
+                .or(before.as_ref().map(|file| file.heights_by)),
+        };
+        let sizes = opened.calibration.sizes();
+        let usable = |file: &&CalibrationFile| {
+            file.sizes() == sizes && (exact || file.models_from != OF_SCENARIO)
+        };
+        let place = self
+            .board
+            .out
+            .as_deref()
+            .map_or(place, CalibrationPlace::at);
+        let timing = |share: f64, words: &str| progress.tell(0.3 + 0.525 * share, words);
+        let plane = |share: f64, words: &str| progress.tell(0.825 + 0.175 * share, words);
+        let mut kept = Commissioning::of(sizes, None);
+        let mut subject = Subject {
+            head: &mut opened.head,
+            calibration: &mut opened.calibration,
+            calibrated: opened.problem.is_none(),
+            exact,
+            before: before.as_ref().filter(usable).cloned(),
+            place: place.path(),
+            poses: None,
+            choices: Choices {
+                imported,
+                heights_by: Some(heights_by.unwrap_or(HeightsBy::Models)),
+                temperature_c: self.temperature.filter(|celsius| celsius.is_finite()),
+                no_plate: self.no_plate,
+                if_full: Some(FULL),
+            },
+            progress: &timing,
+            white: None,
+            stored: None,
+            notes,
+        };
+        if subject.models(&kept).is_none() {
+            let words = "calibrate: the models of camera and projector are not known yet: make them with --board and --poses, or import them with \
+                         --camera and --projector, or with --models";
+            return Exit::Usage.fail(words);
         }
-        let on_progress = |share: f64, words: &str| progress.tell(0.3 + 0.7 * share, words);
-        let made = pool.install(|| make(&mut opened.head, basis, response, &on_progress));
+        if !self.no_plate {
+            pool.install(|| lay_plate(opened.stage.as_ref(), &mut subject.notes))?;
+        }
+        let done = pool.install(|| -> Result<()> {
+            for step in STEPS
+                .iter()
+                .filter(|step| [TIMING, PLANE].contains(&step.name))
+            {
+                subject.progress = if step.name == TIMING { &timing } else { &plane };
+                step.carry_out(&mut subject, &mut kept)?;
+            }
+            Ok(())
+        });
         progress.clear();
-        let mut made = made?;
-        let place = self.poses.out.as_deref().map_or(place, Place::at);
-        place.save(&made.bytes, &made.maps, FULL)?;
-        notes.append(&mut made.notes);
-        let report = report::Report {
-            file: &made.file,
+        done?;
+        let Subject { stored, notes, .. } = subject;
+        // The step plane has stored it.
+        let Some(file) = &stored else { return Ok(()) };
+        let report = CalibrationReport {
+            file,
             before: before.as_ref().map(|file| file.fingerprint.as_str()),
             place: place.path(),
             notes: &notes,
@@ -124,64 +177,8 @@ impl Calibrate {
         options.output.answer(&report.json(), || report.table())
     }
 
-    /// What the calibration starts from, and the response of the one before.
-    fn basis(
-        &self,
-        opened: &Opened,
-        before: Option<&CalibrationFile>,
-        notes: &mut Vec<String>,
-    ) -> Result<(Basis, Option<Vec<f64>>)> {
-        let mut calibration = opened.calibration.clone();
-        let content = Exit::Content.failure::<String>();
-        let stored = before
-            .map(|file| Ok((file, file.calibration()?)))
-            .transpose()
-            .map_err(content)?
-            .filter(|(_, stored)| stored.sizes() == calibration.sizes());
-        let mut models_from = OF_SCENARIO.to_owned();
-        let mut geometry = None;
-        if let Some((from, models)) = self.imported(&calibration)? {
-            models_from = from;
-            notes.extend(models.notes);
-            let (camera, projector) = (models.camera, models.projector);
-            let (frames, raster) = (calibration.frames(), calibration.raster());
-            let noise = calibration.noise_counts;
-            let exposing = calibration.exposing;
-            calibration = Calibration::new(frames, raster, (&camera, &projector), noise)
-                .and_then(|imported| fits(&imported).map(|()| imported))
-                .map_err(|error| content(format!("import {models_from}: {error}")))?;
-            calibration.exposing = exposing;
-        } else if let Some((file, stored)) = &stored
-            && file.models_from != OF_SCENARIO
-        {
-            models_from = file.models_from.clone();
-            geometry = file.geometry.clone();
-            calibration.camera = stored.camera.clone();
-            calibration.projector = stored.projector.clone();
-        } else if opened.problem.is_some() || opened.stage.is_none() {
-            let words = "calibrate: the models of camera and projector are not known yet: make them with --board and --poses, or import them with \
-                         --camera and --projector, or with --models";
-            return Exit::Usage.fail(words);
-        }
-        calibration.response = None;
-        let heights_by = match self.no_plate {
-            true => None,
-            false => self.heights_by.or(before.map(|file| file.heights_by)),
-        };
-        let basis = Basis {
-            calibration,
-            models_from,
-            geometry,
-            temperature_c: self.temperature.filter(|celsius| celsius.is_finite()),
-            plate: !self.no_plate,
-            heights_by: heights_by.unwrap_or(HeightsBy::Models),
-        };
-        let response = stored.and_then(|(file, _)| file.response.clone());
-        Ok((basis, response))
-    }
-
-    /// The models that the options name, and their files' names.
-    fn imported(&self, head: &Calibration) -> Result<Option<(String, Models)>> {
+    /// The models that the options name; `notes` gets what was corrected in them.
+    fn imported(&self, head: &Calibration, notes: &mut Vec<String>) -> Result<Option<HeadModels>> {
         let (width, height, _) = head.frames();
         let sizes = Sizes {
             camera: (width, height),
@@ -195,8 +192,7 @@ impl Calibrate {
         let name = |path: &Path| path.display().to_string();
         let named = [&self.camera, &self.projector, &self.models];
         model_files(named.into_iter().flatten())?;
-        let content = Exit::Content.failure();
-        let (names, models) = match (&self.camera, &self.projector, &self.models) {
+        let (from, models) = match (&self.camera, &self.projector, &self.models) {
             (Some(camera), Some(projector), _) => {
                 let models = opencv::from_two(camera, projector, sizes, declared);
                 (format!("{}, {}", name(camera), name(projector)), models)
@@ -204,19 +200,31 @@ impl Calibrate {
             (_, _, Some(models)) => (name(models), opencv::from_one(models, sizes, declared)),
             _ => return Ok(None),
         };
-        let models = models.map_err(content)?;
-        match models.has_plane {
-            true => Ok(Some((names, models))),
-            false => Err(content(format!(
-                "import {names}: it states no plane z = 0: add plate_R and plate_T (the pose of the plate that lies in the reference \
+        let models = models?;
+        if !models.has_plane {
+            return Exit::Content.fail(format!(
+                "import {from}: it states no plane z = 0: add plate_R and plate_T (the pose of the plate that lies in the reference \
                  plane, as cv2.solvePnP gives it), or give the plane's distance with --plane-at"
-            ))),
+            ));
         }
+        notes.extend(models.notes);
+        let models = HeadModels {
+            camera: models.camera,
+            projector: models.projector,
+            from,
+            geometry: None,
+        };
+        let failed = |error: &dyn Display| {
+            Failure::new(Exit::Content, format!("import {}: {error}", models.from))
+        };
+        let calibration = models.calibration(head);
+        look_down(&calibration.map_err(|error| failed(&error))?, &failed)?;
+        Ok(Some(models))
     }
 }
 
 /// The calibration that is replaced, if one can be read; else a note says why.
-fn before(place: &Place, notes: &mut Vec<String>) -> Option<CalibrationFile> {
+fn before(place: &CalibrationPlace, notes: &mut Vec<String>) -> Option<CalibrationFile> {
     let loaded = place.load().unwrap_or_else(|problem| {
         notes.push(format!("{problem}; it is left behind"));
         None
@@ -239,21 +247,23 @@ pub fn model_files<'a>(named: impl IntoIterator<Item = &'a PathBuf>) -> Result<(
 }
 
 /// Checks that camera and projector look down at the plane z = 0 from two different places.
-fn fits(calibration: &Calibration) -> Result<(), String> {
-    let projector = &calibration.projector;
-    let (columns, rows) = (projector.width(), projector.height());
-    let function =
-        PhaseFunction::vertical(columns, rows, 1.0).map_err(|error| error.to_string())?;
+///
+/// # Errors
+/// With this beginning: they do not.
+fn look_down(calibration: &Calibration, failed: &dyn Fn(&dyn Display) -> Failure) -> Result<()> {
+    let (columns, rows) = calibration.raster();
+    let function = PhaseFunction::vertical(columns as usize, rows as usize, 1.0);
+    let function = function.map_err(|error| failed(&error))?;
     match calibration.triangulator(function, None) {
         Ok(_) => Ok(()),
-        Err(error @ RigError::NotAbove(_)) => Err(format!(
+        Err(error @ RigError::NotAbove(_)) => Err(failed(&format_args!(
             "{error}; OpenCV's boards have their z pointing away from the camera: then add --z-away"
-        )),
-        Err(error) => Err(error.to_string()),
+        ))),
+        Err(error) => Err(failed(&error)),
     }
 }
 
-/// Puts a flat plate in front of a simulated head, where nobody can lay one.
+/// Puts a flat plate in front of a simulated head.
 fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<()> {
     let Some(stage) = stage else {
         return Ok(());
@@ -266,4 +276,62 @@ fn lay_plate(stage: Option<&Stage>, notes: &mut Vec<String>) -> Result<()> {
     stage
         .place(&plate, &sim::Placement::default())
         .map_err(Exit::Software.failure())
+}
+
+/// A calibration that was written.
+struct CalibrationReport<'a> {
+    file: &'a CalibrationFile,
+    /// Fingerprint of the calibration before.
+    before: Option<&'a str>,
+    place: &'a Path,
+    notes: &'a [String],
+}
+
+impl CalibrationReport<'_> {
+    fn json(&self) -> Value {
+        json!({
+            "calibration": self.file, "file": self.place.display().to_string(), "notes": self.notes,
+            "fingerprint_before": self.before,
+        })
+    }
+
+    fn table(&self) -> String {
+        let file = self.file;
+        let mut lines = String::new();
+        let mut line = |name: &str, found: String| {
+            // Writing to a string cannot fail.
+            let _ = writeln!(lines, "{name:9} {found}");
+        };
+        line("models", format!("of {}", file.models_from));
+        for (name, found) in Characteristics::of(file)
+            .iter()
+            .flat_map(Characteristics::words)
+        {
+            line(name, found);
+        }
+        if let Some(plane) = &file.reference {
+            line("plane", plane.words());
+        }
+        for note in self.notes {
+            line("note", note.clone());
+        }
+        let digits = |fingerprint: &str| fingerprint.get(..8).unwrap_or_default().to_owned();
+        let recipes = match self.before {
+            Some(before) if before != file.fingerprint => format!(
+                "was {}: recipes made for that one are refused, teach them again",
+                digits(before)
+            ),
+            Some(_) => "as before: recipes stay valid".into(),
+            None => "the first one here".into(),
+        };
+        line(
+            "written",
+            format!(
+                "{}, fingerprint {}, {recipes}",
+                self.place.display(),
+                digits(&file.fingerprint)
+            ),
+        );
+        lines
+    }
 }

@@ -1,7 +1,7 @@
 //! Boundary values in every number of the command line: each is refused with its option and bounds,
 //! or lies within them.
 
-use super::super::part::SimulatedPart;
+use super::super::options::SimulatedPart;
 use super::{Arg, leaves};
 use crate::config::HeadConfig;
 use crate::error::Exit;

@@ -1,19 +1,18 @@
 //! `calibration.json`, version 2: its keys, its checks, its fingerprint and its checksum.
 
 use super::CalibrationSigma;
-use super::geometry::GeometryFile;
-use super::{Calibration, HeightsBy, size};
+use super::geometry::{GeometryFile, ReferenceFile};
+use super::{Calibration, HeightsBy, UnusableCalibration, inverted, size};
 use crate::head::exposing::Exposing;
 use crate::head::seam;
 use crate::storage::hex;
 use crate::system::clock;
 use algo::frame::SampleNoise;
 use algo::geometry::Pinhole;
-use algo::pattern::GreyResponse;
 use hal::bounded;
 use hal::bounds::{
-    Fields, LAST_SECOND, Longest, MAX_FRINGES, MAX_NAME, MAX_NOISE_COUNTS, MAX_SIDE,
-    MIN_NOISE_COUNTS, clipped, shortened,
+    Bound as _, Fields, LAST_SECOND, Longest, MAX_NAME, MAX_NOISE_COUNTS, MAX_SIDE,
+    MIN_NOISE_COUNTS, clipped, fingerprint, length, shortened,
 };
 use hal::head::{Stamp, Timing};
 use hal::model::{DeviceModel, PlaneModel};
@@ -35,6 +34,8 @@ const MAX_TIME_NS: u64 = 10_000_000_000;
 const MAX_REFRESHES: u32 = 1000;
 /// Longest list of the files that models came from, characters.
 const MAX_SOURCES: usize = 8192;
+/// Most levels of noise and pitches of contrast.
+const MAX_LEVELS: usize = 256;
 /// Stands in place of the checksum while it is computed.
 const NO_CHECKSUM: &str = "0000000000000000000000000000000000000000000000000000000000000000";
 /// σ of a sample in counts where it was not measured. Nothing is measured with such a calibration
@@ -62,9 +63,9 @@ bounded! {
         /// Where the models come from.
         pub models_from: String = Longest(MAX_SOURCES),
         /// The camera.
-        pub camera: CameraFile = Fields,
+        pub camera: CalibratedCamera = Fields,
         /// The projector.
-        pub projector: ProjectorFile = Fields,
+        pub projector: CalibratedProjector = Fields,
         /// Flips, light and stamps.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub timing: Option<TimingFile> = Fields,
@@ -88,7 +89,7 @@ bounded! {
     }
 
     /// Size and geometry of the camera.
-    pub struct CameraFile {
+    pub struct CalibratedCamera {
         /// Columns.
         pub width: u32 = 1..=MAX_SIDE,
         /// Rows.
@@ -100,7 +101,7 @@ bounded! {
     }
 
     /// Size and geometry of the projector.
-    pub struct ProjectorFile {
+    pub struct CalibratedProjector {
         /// Columns.
         pub width: u32 = 1..=MAX_SIDE,
         /// Rows.
@@ -189,7 +190,7 @@ impl ContrastFile {
     pub fn words(&self) -> String {
         let pitches = self.pitches.iter();
         let pitches: Vec<String> = pitches
-            .map(|of| format!("{:.0} % at {} px", of.contrast * 100.0, of.pitch_px))
+            .map(|pitch| format!("{:.0} % at {} px", pitch.contrast * 100.0, pitch.pitch_px))
             .collect();
         pitches.join(", ")
     }
@@ -202,34 +203,6 @@ bounded! {
         pub pitch_px: u32 = 1..=MAX_SIDE,
         /// Modulation relative to that of the coarsest.
         pub contrast: f64 = 0.0..=100.0,
-    }
-
-    /// The reference phase maps of the plane z = 0.
-    pub struct ReferenceFile {
-        /// Projector pixels per fringe.
-        pub pitch_px: f64 = 1.0..=f64::from(MAX_SIDE),
-        /// RMS distance of the models from the measured plane, projector pixels.
-        pub models_off_px: f64 = 0.0..=f64::from(MAX_SIDE),
-        /// The projector points of the plane, as the maps say.
-        pub plane: PlaneModel = Fields,
-        /// Under vertical fringes.
-        pub vertical: MapFile,
-        /// Under horizontal fringes.
-        pub horizontal: MapFile,
-    }
-
-    /// One reference phase map.
-    pub struct MapFile {
-        /// The array beside this file: f64, turns, the smooth fit over the whole frame.
-        pub file: String = Longest(MAX_NAME),
-        /// SHA-256 of that file.
-        pub sha256: String,
-        /// Estimated RMS error of the fit, see [`algo::pipeline::Plate`].
-        pub residual_turns: f64 = 0.0..=MAX_FRINGES,
-        /// Scatter of the pixels about the fit.
-        pub noise_turns: f64 = 0.0..=MAX_FRINGES,
-        /// Share of the frame that was fitted.
-        pub filled: f64 = 0.0..=1.0,
     }
 }
 
@@ -247,13 +220,13 @@ impl CalibrationFile {
             made_at_unix_s: clock::utc_us().unwrap_or(0) / 1_000_000,
             temperature_c: None,
             models_from: from,
-            camera: CameraFile {
+            camera: CalibratedCamera {
                 width,
                 height,
                 bit_depth,
                 model: seam::device_model(camera),
             },
-            projector: ProjectorFile {
+            projector: CalibratedProjector {
                 width: columns,
                 height: rows,
                 model: seam::device_model(projector),
@@ -284,39 +257,61 @@ impl CalibrationFile {
     /// Reads and checks the bytes of a file.
     ///
     /// # Errors
-    /// In words: what is wrong, and what to do.
-    pub fn read(bytes: &[u8]) -> Result<Self, String> {
+    /// What is wrong with it.
+    pub fn read(bytes: &[u8]) -> Result<Self, UnusableCalibration> {
         #[derive(Deserialize)]
-        struct Header {
+        struct FormatVersion {
             format: String,
             version: u32,
         }
-        let damaged = |error: serde_json::Error| {
-            let error = shortened(&error.to_string());
-            format!("it is damaged: {error}: calibrate anew")
-        };
-        let header: Header = serde_json::from_slice(bytes).map_err(damaged)?;
-        if header.format != FORMAT {
-            return Err(format!(
-                "its format is {:?}, expected {FORMAT:?}",
-                clipped(&header.format)
-            ));
+        let damaged =
+            |error: serde_json::Error| UnusableCalibration::Damaged(shortened(&error.to_string()));
+        let named: FormatVersion = serde_json::from_slice(bytes).map_err(damaged)?;
+        if named.format != FORMAT {
+            let found = clipped(&named.format).to_string();
+            return Err(UnusableCalibration::Format { found });
         }
-        if header.version != VERSION {
-            return Err(format!(
-                "it has version {}, this program reads {VERSION}: calibrate anew",
-                header.version
-            ));
+        if named.version != VERSION {
+            let found = named.version;
+            return Err(UnusableCalibration::Version { found });
         }
         let file: Self = serde_json::from_slice(bytes).map_err(damaged)?;
         if file.checksum != file.checksummed() {
-            return Err(
-                "it does not agree with its checksum: it is damaged, or was edited; calibrate anew"
-                    .into(),
-            );
+            return Err(UnusableCalibration::Checksum);
         }
-        file.check()?;
+        if file.heights_by == HeightsBy::Measured && file.reference.is_none() {
+            return Err(UnusableCalibration::NoReference);
+        }
+        if file.calibration()?.fingerprint() != file.fingerprint {
+            return Err(UnusableCalibration::Fingerprint);
+        }
         Ok(file)
+    }
+
+    /// Checks each value by itself.
+    ///
+    /// # Errors
+    /// In words that name the key, the value and the bounds.
+    fn check_bounds(&self) -> Result<(), String> {
+        fingerprint("fingerprint", &self.fingerprint)?;
+        Fields.check("", self)?;
+        if let Some(noise) = &self.noise {
+            length("noise.levels", noise.levels.len(), 0, MAX_LEVELS)?;
+        }
+        if let Some(response) = &self.response {
+            length("response", response.len(), 256, 256)?;
+        }
+        if let Some(contrast) = &self.contrast {
+            length("contrast.pitches", contrast.pitches.len(), 0, MAX_LEVELS)?;
+        }
+        if let Some(geometry) = &self.geometry {
+            geometry.check_bounds()?;
+        }
+        let Some(reference) = &self.reference else {
+            return Ok(());
+        };
+        reference.vertical.check_bounds("reference.vertical")?;
+        reference.horizontal.check_bounds("reference.horizontal")
     }
 
     /// What the measured reference plane is off the models.
@@ -324,26 +319,12 @@ impl CalibrationFile {
         Some(self.reference.as_ref()?.plane.clone())
     }
 
-    fn check(&self) -> Result<(), String> {
-        if self.heights_by == HeightsBy::Measured && self.reference.is_none() {
-            return Err(
-                "heights_by is \"measured\", and reference is missing: calibrate anew with a plate"
-                    .into(),
-            );
-        }
-        if self.calibration()?.fingerprint() != self.fingerprint {
-            return Err("its fingerprint is not that of its content: calibrate anew".into());
-        }
-        Ok(())
-    }
-
     /// The calibration.
     ///
     /// # Errors
     /// If a value is out of its bounds, a model is absurd, or the response cannot be inverted.
-    pub fn calibration(&self) -> Result<Calibration, String> {
-        self.check_bounds()
-            .map_err(|error| format!("{error}: calibrate anew"))?;
+    pub fn calibration(&self) -> Result<Calibration, UnusableCalibration> {
+        self.check_bounds().map_err(UnusableCalibration::Bounds)?;
         let (camera, projector) = (&self.camera, &self.projector);
         let nominal = SampleNoise::constant(NOMINAL_NOISE);
         Ok(Calibration {
@@ -393,12 +374,13 @@ impl CalibrationFile {
     ///
     /// # Errors
     /// If a number in it is not finite or the response cannot be inverted.
-    pub fn sealed(mut self) -> Result<(Self, Vec<u8>), String> {
+    pub fn sealed(mut self) -> Result<(Self, Vec<u8>), UnusableCalibration> {
         // The bounds ask for a fingerprint's form before there is one.
         self.fingerprint = NO_CHECKSUM.into();
         self.fingerprint = self.calibration()?.fingerprint();
         self.checksum = self.checksummed();
-        let mut bytes = serde_json::to_vec_pretty(&self).map_err(|error| error.to_string())?;
+        let mut bytes = serde_json::to_vec_pretty(&self)
+            .map_err(|error| UnusableCalibration::Unwritable(error.to_string()))?;
         bytes.push(b'\n');
         // A file that could not be read again is never written.
         let again = Self::read(&bytes)?;
@@ -413,17 +395,4 @@ impl CalibrationFile {
             serde_json::to_vec(&bare).unwrap_or_default(),
         ))
     }
-}
-
-/// The inverse of a response; none if it is linear already.
-///
-/// # Errors
-/// If it has not 256 levels, or falls.
-pub fn inverted(response: &[f64]) -> Result<Option<GreyResponse>, String> {
-    let levels: &[f64; 256] = response
-        .try_into()
-        .map_err(|_| format!("response has {} levels, expected 256", response.len()))?;
-    let inverse = GreyResponse::new(levels).map_err(|error| error.to_string())?;
-    let linear = (0..=u8::MAX).all(|level| inverse.level_for(level) == level);
-    Ok((!linear).then_some(inverse))
 }

@@ -1,8 +1,11 @@
-//! The key `geometry` of `calibration.json`: the board and the poses that the models were made
-//! with, and how well they fit.
+//! The keys `geometry` and `reference` of `calibration.json`: the board and the poses that the models
+//! were made with, and the reference phase maps of a plate.
 
 use hal::bounded;
-use hal::bounds::{Bound, Fields, Longest, MAX_NAME, MAX_SIDE, OutOfBounds, length};
+use hal::bounds::{
+    Bound, Fields, Longest, MAX_FRINGES, MAX_NAME, MAX_SIDE, OutOfBounds, fingerprint, length,
+};
+use hal::model::PlaneModel;
 
 /// Most poses.
 pub const MAX_POSES: usize = 64;
@@ -65,6 +68,34 @@ bounded! {
         /// Distance of the board's centre from the camera, mm.
         pub distance_mm: f64 = 0.0..=MAX_MM,
     }
+
+    /// The reference phase maps of the plane z = 0.
+    pub struct ReferenceFile {
+        /// Projector pixels per fringe.
+        pub pitch_px: f64 = 1.0..=f64::from(MAX_SIDE),
+        /// RMS distance of the models from the measured plane, projector pixels.
+        pub models_off_px: f64 = 0.0..=f64::from(MAX_SIDE),
+        /// The projector points of the plane, as the maps say.
+        pub plane: PlaneModel = Fields,
+        /// Under vertical fringes.
+        pub vertical: MapFile,
+        /// Under horizontal fringes.
+        pub horizontal: MapFile,
+    }
+
+    /// One reference phase map.
+    pub struct MapFile {
+        /// The array beside this file: f64, turns, the smooth fit over the whole frame.
+        pub file: String = Longest(MAX_NAME),
+        /// SHA-256 of that file.
+        pub sha256: String,
+        /// Estimated RMS error of the fit, see [`algo::pipeline::Plate`].
+        pub residual_turns: f64 = 0.0..=MAX_FRINGES,
+        /// Scatter of the pixels about the fit.
+        pub noise_turns: f64 = 0.0..=MAX_FRINGES,
+        /// Share of the frame that was fitted.
+        pub filled: f64 = 0.0..=1.0,
+    }
 }
 
 impl GeometryFile {
@@ -75,5 +106,38 @@ impl GeometryFile {
     pub fn check_bounds(&self) -> Result<(), OutOfBounds> {
         length("geometry.poses", self.poses.len(), 1, MAX_POSES)?;
         Fields.check("geometry", self)
+    }
+}
+
+impl ReferenceFile {
+    /// How well the maps and the models fit the plate.
+    pub fn words(&self) -> String {
+        let residual = |name: &str, map: &MapFile| {
+            let MapFile {
+                residual_turns,
+                noise_turns,
+                ..
+            } = map;
+            format!("{name} {residual_turns:.5} turn (noise {noise_turns:.4})")
+        };
+        format!(
+            "residual {}, {}; the models are off it by {:.3} px",
+            residual("vertical", &self.vertical),
+            residual("horizontal", &self.horizontal),
+            self.models_off_px
+        )
+    }
+}
+
+impl MapFile {
+    pub(super) fn check_bounds(&self, key: &str) -> Result<(), String> {
+        Fields.check(key, self)?;
+        if self.file.is_empty() || self.file.contains(['/', '\\']) {
+            return Err(format!(
+                "{key}.file is {:?}: it must be the name of a file beside this one",
+                self.file
+            ));
+        }
+        Ok(fingerprint(&format!("{key}.sha256"), &self.sha256)?)
     }
 }

@@ -1,24 +1,19 @@
 //! The calibration of a head: geometry, noise and grey response; its file and where it is stored;
 //! models imported from OpenCV.
 
-pub mod bounds;
-mod current;
 pub mod file;
 pub mod geometry;
 pub mod opencv;
 pub mod place;
 
-pub use current::Current;
-
-use file::ContrastFile;
-
 use crate::head::exposing::Exposing;
-use crate::head::seam;
+use crate::head::seam::{self, AbsurdModel};
 use crate::storage::hex;
 use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
-use algo::pattern::{GreyResponse, PhaseFunction, Waveform, Waveforms};
+use algo::pattern::{GreyResponse, PhaseFunction, ResponseError, Waveform, Waveforms};
 use algo::phase::LeastModulation;
+use file::ContrastFile;
 use hal::bounded;
 use hal::bounds::MAX_SIGMA_MM;
 use hal::frame::FrameFormat;
@@ -28,6 +23,85 @@ use hal::replay::recording::RecordedProjector;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use sim::Scenario;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Why a calibration cannot be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnusableCalibration {
+    /// The file cannot be read.
+    #[error("{0}: make it readable, or calibrate anew")]
+    Unreadable(String),
+    /// It is no JSON of this form.
+    #[error("it is damaged: {0}: calibrate anew")]
+    Damaged(String),
+    /// It is another kind of file.
+    #[error("its format is {found:?}, expected {:?}", file::FORMAT)]
+    Format {
+        /// The format that it names.
+        found: String,
+    },
+    /// It is of another version.
+    #[error(
+        "it has version {found}, this program reads {}: calibrate anew",
+        file::VERSION
+    )]
+    Version {
+        /// Its version.
+        found: u32,
+    },
+    /// It was changed.
+    #[error("it does not agree with its checksum: it is damaged, or was edited; calibrate anew")]
+    Checksum,
+    /// Heights go by a plane that was not measured.
+    #[error("heights_by is \"measured\", and reference is missing: calibrate anew with a plate")]
+    NoReference,
+    /// It was made by a program with another fingerprint.
+    #[error("its fingerprint is not that of its content: calibrate anew")]
+    Fingerprint,
+    /// A value is out of its bounds.
+    #[error("{0}: calibrate anew")]
+    Bounds(String),
+    /// A model is absurd.
+    #[error(transparent)]
+    Model(#[from] AbsurdModel),
+    /// The response cannot be inverted.
+    #[error(transparent)]
+    Response(#[from] UnusableResponse),
+    /// A number is not finite.
+    #[error("{0}")]
+    Unwritable(String),
+}
+
+impl From<UnusableCalibration> for String {
+    fn from(error: UnusableCalibration) -> Self {
+        error.to_string()
+    }
+}
+
+/// Why a grey response cannot be inverted.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum UnusableResponse {
+    /// It has not one light for each grey level.
+    #[error("response has {0} levels, expected 256")]
+    Levels(usize),
+    /// It falls, or does not rise.
+    #[error(transparent)]
+    Falls(#[from] ResponseError),
+}
+
+/// What a recording lacks for a calibration, as a predicate.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RecordedModelError {
+    /// The camera's model.
+    #[error("has no camera model")]
+    NoCamera,
+    /// The projector's model.
+    #[error("has no projector model")]
+    NoProjector,
+    /// A model that can be used.
+    #[error("has an absurd model: {0}")]
+    Absurd(#[from] AbsurdModel),
+}
 
 /// What heights go by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -86,13 +160,13 @@ impl Calibration {
     /// `(columns, rows)`; its response is not known, and heights go by the models.
     ///
     /// # Errors
-    /// In words: the model of the camera or of the projector is absurd, and why.
+    /// The model of the camera or of the projector is absurd.
     pub fn new(
         (width, height, bit_depth): (u32, u32, u8),
         raster: (u32, u32),
         (camera, projector): (&DeviceModel, &DeviceModel),
         noise_counts: f64,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, AbsurdModel> {
         Ok(Self {
             camera: seam::pinhole("camera", camera, (width, height))?,
             bit_depth,
@@ -113,7 +187,7 @@ impl Calibration {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn of_scenario(scenario: &Scenario) -> Result<Self, String> {
+    pub fn of_scenario(scenario: &Scenario) -> Result<Self, AbsurdModel> {
         let ((width, height), projector) = (scenario.frame_size(), &scenario.rig.projector);
         let head = Self::new(
             (width, height, scenario.bit_depth),
@@ -158,12 +232,15 @@ impl Calibration {
     ///
     /// # Errors
     /// What is wrong with the recording, as a predicate: "has no camera model".
-    pub fn of(recording: &Recording, noise_counts: f64) -> Result<Self, String> {
+    pub fn of(recording: &Recording, noise_counts: f64) -> Result<Self, RecordedModelError> {
         let projector = &recording.projector;
         let camera = recording.camera_model.as_ref();
         let models = (
-            camera.ok_or("has no camera model")?,
-            projector.model.as_ref().ok_or("has no projector model")?,
+            camera.ok_or(RecordedModelError::NoCamera)?,
+            projector
+                .model
+                .as_ref()
+                .ok_or(RecordedModelError::NoProjector)?,
         );
         let frames = (recording.width, recording.height);
         let by_models = Self::new(
@@ -178,7 +255,7 @@ impl Calibration {
                 Some(_) => HeightsBy::Measured,
                 None => HeightsBy::Models,
             },
-            ..by_models.map_err(|error| format!("has an absurd model: {error}"))?
+            ..by_models?
         })
     }
 
@@ -299,4 +376,37 @@ impl Calibration {
 /// Columns and rows of a device; they were given as `u32`.
 fn size(device: &Pinhole) -> (u32, u32) {
     (device.width() as u32, device.height() as u32)
+}
+
+/// Set by the measuring task whenever it opens a head. Cheap to clone.
+#[derive(Clone, Debug, Default)]
+pub struct Current(Arc<Mutex<Option<Arc<Calibration>>>>);
+
+impl Current {
+    /// Sets the calibration of the head that was just opened; `None` if the head has no calibration
+    /// that can be trusted.
+    pub fn set(&self, calibration: Option<&Calibration>) {
+        let calibration = calibration.cloned().map(Arc::new);
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = calibration;
+    }
+
+    /// The calibration; `None` before a head is open, and if the head has no calibration that can
+    /// be trusted.
+    pub fn get(&self) -> Option<Arc<Calibration>> {
+        let current = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        current.clone()
+    }
+}
+
+/// The inverse of a response; none if it is linear already.
+///
+/// # Errors
+/// If it has not 256 levels, or falls.
+pub fn inverted(response: &[f64]) -> Result<Option<GreyResponse>, UnusableResponse> {
+    let levels: &[f64; 256] = response
+        .try_into()
+        .map_err(|_| UnusableResponse::Levels(response.len()))?;
+    let inverse = GreyResponse::new(levels)?;
+    let linear = (0..=u8::MAX).all(|level| inverse.level_for(level) == level);
+    Ok((!linear).then_some(inverse))
 }

@@ -1,6 +1,7 @@
 //! The files of a calibration: `calibration.json`, its previous generation, and the phase maps
 //! beside them.
 
+use super::UnusableCalibration;
 use super::file::CalibrationFile;
 use crate::error::{Exit, Result};
 use crate::storage::folder::{name_also, read_whole, sync_folder_of, write_whole};
@@ -19,7 +20,7 @@ const DIGITS: usize = 16;
 
 /// The place of a `calibration.json`.
 #[derive(Clone, Debug)]
-pub struct Place {
+pub struct CalibrationPlace {
     path: PathBuf,
 }
 
@@ -32,7 +33,45 @@ pub struct Loaded {
     pub fallback: Option<String>,
 }
 
-impl Place {
+/// A `calibration.json` without a generation that can be used.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("calibration {}: {reason}", path.display())]
+pub struct UnusablePlace {
+    /// The file.
+    pub path: PathBuf,
+    /// What is wrong with the newest generation.
+    pub reason: UnusableCalibration,
+}
+
+impl From<UnusablePlace> for String {
+    fn from(error: UnusablePlace) -> Self {
+        error.to_string()
+    }
+}
+
+/// A reference phase map with the name of its file.
+#[derive(Clone, Debug)]
+pub struct NamedMap {
+    /// The file's name beside `calibration.json`.
+    pub file: String,
+    /// SHA-256 of the bytes.
+    pub sha256: String,
+    bytes: Vec<u8>,
+}
+
+impl NamedMap {
+    /// Names a map by its bytes.
+    pub fn new(name: &str, bytes: Vec<u8>) -> Self {
+        let sha256 = hex(&Sha256::digest(&bytes));
+        Self {
+            file: format!("{name}-{}.npy", &sha256[..DIGITS]),
+            sha256,
+            bytes,
+        }
+    }
+}
+
+impl CalibrationPlace {
     /// A `calibration.json`, which need not be there.
     pub fn at(path: &Path) -> Self {
         Self {
@@ -52,8 +91,8 @@ impl Place {
     /// Reads the newest generation that is whole; none if there never was one.
     ///
     /// # Errors
-    /// In words, with the file: no generation can be used.
-    pub fn load(&self) -> Result<Option<Loaded>, String> {
+    /// No generation can be used.
+    pub fn load(&self) -> Result<Option<Loaded>, UnusablePlace> {
         let newest = read(&self.path);
         if let Some(Ok(file)) = newest {
             return Ok(Some(Loaded {
@@ -68,38 +107,35 @@ impl Place {
                 file,
                 fallback: Some(format!(
                     "calibration {place}: {}; the previous generation is used",
-                    reason.as_deref().unwrap_or("it is missing")
+                    reason.map_or("it is missing".into(), |reason| reason.to_string())
                 )),
             })),
-            (_, Some(reason)) => Err(format!("calibration {place}: {reason}")),
+            (_, Some(reason)) => Err(UnusablePlace {
+                path: self.path.clone(),
+                reason,
+            }),
             (_, None) => Ok(None),
         }
     }
 
-    /// The name of a map in the file, by its bytes.
-    pub fn name_of_map(name: &str, bytes: &[u8]) -> (String, String) {
-        let sum = hex(&Sha256::digest(bytes));
-        (format!("{name}-{}.npy", &sum[..DIGITS]), sum)
-    }
-
-    /// Writes a calibration with its maps (name, bytes) and keeps the present one as the previous
+    /// Writes a calibration with its maps and keeps the present one as the previous
     /// generation. After a loss of power at any moment either the old one or the new one is whole:
     /// maps have names of their own, and count only once `calibration.json` names them.
     ///
     /// # Errors
     /// With this remedy, if it cannot be written (73); then the calibration is unchanged.
-    pub fn save(&self, bytes: &[u8], maps: &[(String, Vec<u8>)], remedy: &str) -> Result<()> {
+    pub fn save(&self, bytes: &[u8], maps: &[NamedMap], remedy: &str) -> Result<()> {
         let what = format!("write {}", self.path.display());
         self.write(bytes, maps)
             .map_err(Exit::CannotCreate.advising(what, remedy))
     }
 
-    fn write(&self, bytes: &[u8], maps: &[(String, Vec<u8>)]) -> io::Result<()> {
+    fn write(&self, bytes: &[u8], maps: &[NamedMap]) -> io::Result<()> {
         let folder = self.folder();
         fs::create_dir_all(folder)?;
         sync_folder_of(folder)?;
-        for (name, bytes) in maps {
-            write_whole(&folder.join(name), bytes)?;
+        for map in maps {
+            write_whole(&folder.join(&map.file), &map.bytes)?;
         }
         self.keep_previous()?;
         write_whole(&self.path, bytes)?;
@@ -148,10 +184,10 @@ impl Place {
 }
 
 /// Reads the calibration in a file, if there is one.
-fn read(path: &Path) -> Option<Result<CalibrationFile, String>> {
+fn read(path: &Path) -> Option<Result<CalibrationFile, UnusableCalibration>> {
     match read_whole(path, MAX_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-        Err(error) => Some(Err(format!("{error}: make it readable, or calibrate anew"))),
+        Err(error) => Some(Err(UnusableCalibration::Unreadable(error.to_string()))),
         Ok(bytes) => Some(CalibrationFile::read(&bytes)),
     }
 }

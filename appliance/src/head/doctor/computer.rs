@@ -1,10 +1,11 @@
-//! The doctor's checks of the computer, which need no head: lines whose program ends, power,
-//! versions, the sensor's mode.
+//! The doctor's checks that need no pictures: of the computer (lines whose program ends, power,
+//! versions, the sensor's mode) and of the projector's controller.
 
 use super::{Check, named};
-use crate::station::Power;
+use crate::station::{HOT_PROJECTOR_C, Power};
 use crate::system::host::{Host, major_minor};
 use crate::system::priority::Prompt;
+use hal::projector::{ControllerState, fault, processing};
 use hal::setup::{LinesSetup, TriggerSetup};
 use serde_json::json;
 
@@ -86,9 +87,9 @@ fn pulses(prompt: Prompt) -> Check {
 /// without voltage loses its card.
 fn power(power: Power) -> Check {
     let (now, since) = (power.now(), power.since_start());
-    let words = |of: &[&str]| match of {
+    let words = |conditions: &[&str]| match conditions {
         [] => "nothing".to_owned(),
-        of => of.join(", "),
+        conditions => conditions.join(", "),
     };
     let found = format!(
         "the firmware reports {}; since the computer's start {}",
@@ -113,11 +114,11 @@ fn versions(host: &Host) -> Check {
     let (kernel, libcamera) = (host.kernel(), host.libcamera());
     let shown = |version: &Option<String>| version.clone().unwrap_or_else(|| "not known".into());
     let found = format!("kernel {}, libcamera {}", shown(&kernel), shown(&libcamera));
-    let of = |version: &Option<String>| major_minor(version.as_deref()?);
+    let parsed = |version: &Option<String>| major_minor(version.as_deref()?);
     let [oldest, newest] = LIBCAMERA;
-    let remedy = if of(&kernel).is_some_and(|is| is < OLDEST_KERNEL) {
+    let remedy = if parsed(&kernel).is_some_and(|is| is < OLDEST_KERNEL) {
         Some("use a kernel of 5.7 or newer: older ones stamp the edges of lines on another clock")
-    } else if of(&libcamera).is_some_and(|is| !(oldest..=newest).contains(&is)) {
+    } else if parsed(&libcamera).is_some_and(|is| !(oldest..=newest).contains(&is)) {
         Some("install libcamera 0.4 to 0.7, for which this program is built")
     } else {
         None
@@ -175,10 +176,55 @@ fn released(host: &Host, chips: &[&str]) -> Check {
     Check::new(found, remedy, measured)
 }
 
+/// Checks what a controller said of itself.
+pub fn controller(state: &ControllerState) -> Check {
+    let processed: Vec<&str> = processing::words(state.processing).collect();
+    let faults: Vec<&str> = fault::words(state.faults).collect();
+    let hot = state
+        .temperature_c
+        .is_some_and(|celsius| celsius >= HOT_PROJECTOR_C);
+    let temperature = state
+        .temperature_c
+        .map(|celsius| format!("{celsius:.1} °C"));
+    let found = format!(
+        "a {} at {}, LED current {} steps, picture processing: {}, faults: {}",
+        state.device,
+        temperature.unwrap_or_else(|| "an unknown temperature".into()),
+        state.led_current,
+        listed(&processed),
+        listed(&faults)
+    );
+    let remedy = if !faults.is_empty() {
+        Some(
+            "switch the projector off and on; check its supply, its LED and the cable of the micromirror device",
+        )
+    } else if !processed.is_empty() {
+        Some(
+            "light depends on the content of a picture: end the program that sets the controller up besides this one, and open the head again",
+        )
+    } else if hot {
+        Some("cool the projector: clear its fan and vents, or reduce head.projector.led_current")
+    } else {
+        None
+    };
+    let measured = json!({
+        "device": state.device, "processing": processed, "faults": faults,
+        "temperature_c": state.temperature_c, "led_current_steps": state.led_current,
+    });
+    named("controller", Check::new(found, remedy, measured))
+}
+
+fn listed(words: &[&str]) -> String {
+    match words {
+        [] => "none".into(),
+        words => words.join(", "),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::head::doctor::Verdict;
+    use crate::head::doctor::CheckVerdict;
     use crate::system::host::tests::root;
 
     const ALL: Prompt = Prompt {
@@ -197,7 +243,7 @@ mod tests {
             line: Some("GPIO17".into()),
             ..TriggerSetup::default()
         };
-        for (parameter, verdict) in [("Y\n", Verdict::Fail), ("N\n", Verdict::Pass)] {
+        for (parameter, verdict) in [("Y\n", CheckVerdict::Fail), ("N\n", CheckVerdict::Pass)] {
             let root = root(&[(PARAMETER, parameter)]);
             let checks = examine(&Host::at(root.path()), &lines, Some(&trigger), ALL);
             let check = &checks[0];
@@ -205,13 +251,16 @@ mod tests {
             assert!(check.found.contains("pinctrl-rp1"), "{}", check.found);
             assert_eq!(
                 check.remedy.contains("strict_gpiod"),
-                verdict == Verdict::Fail
+                verdict == CheckVerdict::Fail
             );
         }
         // Another computer, and no lines at all.
         let empty = tempfile::tempdir().unwrap();
         let host = Host::at(empty.path());
-        assert_eq!(examine(&host, &lines, None, ALL)[0].verdict, Verdict::Pass);
+        assert_eq!(
+            examine(&host, &lines, None, ALL)[0].verdict,
+            CheckVerdict::Pass
+        );
         assert!(examine(&host, &LinesSetup::default(), None, ALL).is_empty());
     }
 
@@ -224,7 +273,7 @@ mod tests {
         };
         let lines = LinesSetup::default();
         let mut checks = examine(&Host::at(root.path()), &lines, Some(&trigger), ALL);
-        checks.retain(|check| check.verdict == Verdict::Fail);
+        checks.retain(|check| check.verdict == CheckVerdict::Fail);
         checks
     }
 
@@ -281,10 +330,53 @@ mod tests {
             (true, None, "isolcpus"),
         ] {
             let check = pulses(Prompt { real_time, core });
-            assert_eq!(check.verdict, Verdict::Fail);
+            assert_eq!(check.verdict, CheckVerdict::Fail);
             assert!(check.remedy.contains(word), "{}", check.remedy);
             assert!(check.remedy.contains("by_projector"));
         }
-        assert_eq!(pulses(ALL).verdict, Verdict::Pass);
+        assert_eq!(pulses(ALL).verdict, CheckVerdict::Pass);
+    }
+
+    #[test]
+    fn what_is_wrong_with_a_controller_is_named_with_its_remedy() {
+        let well = ControllerState {
+            device: "DLPC3478",
+            temperature_c: Some(41.2),
+            led_current: 600,
+            ..ControllerState::default()
+        };
+        let check = controller(&well);
+        assert_eq!(
+            (check.name, check.verdict),
+            ("controller", CheckVerdict::Pass)
+        );
+        assert!(check.found.contains("41.2 °C"), "{}", check.found);
+        let unknown = ControllerState {
+            temperature_c: None,
+            ..well.clone()
+        };
+        assert_eq!(controller(&unknown).verdict, CheckVerdict::Pass);
+        let adapts = ControllerState {
+            processing: processing::CAIC,
+            ..well.clone()
+        };
+        let broken = ControllerState {
+            faults: fault::LED,
+            ..well.clone()
+        };
+        let hot = ControllerState {
+            temperature_c: Some(HOT_PROJECTOR_C),
+            ..well
+        };
+        for (state, found, remedy) in [
+            (adapts, "CAIC", "content"),
+            (broken, "LED", "supply"),
+            (hot, "70.0 °C", "cool"),
+        ] {
+            let check = controller(&state);
+            assert_eq!(check.verdict, CheckVerdict::Fail);
+            assert!(check.found.contains(found), "{}", check.found);
+            assert!(check.remedy.contains(remedy), "{}", check.remedy);
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! The doctor's checks of light: there is some, it is exposed well, fringes are sharp, and light is
 //! proportional to grey.
 
-use super::{Check, Checked, Subject, Verdict};
+use super::{Check, CheckResult, CheckVerdict, Examination};
 use crate::head::examine::{self, SETTLE};
 use crate::head::examine::{
     LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, Lit, MOST_BY_CONTENT, MOST_SATURATED, by_content,
@@ -19,9 +19,9 @@ const LEAST_CONTRAST: f64 = 0.5;
 /// by 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
 
-pub(super) fn light(subject: &mut Subject<'_>) -> Checked {
-    let first = subject.first_light;
-    let mut check = lit_enough(subject.lit()?.1);
+pub(super) fn light(examination: &mut Examination<'_>) -> CheckResult {
+    let first = examination.first_light;
+    let mut check = lit_enough(examination.lit()?.1);
     if let Some(first) = first {
         let seconds = first.map(|first| first.as_secs_f64());
         check.measured["first_light_s"] = json!(seconds);
@@ -32,7 +32,7 @@ pub(super) fn light(subject: &mut Subject<'_>) -> Checked {
                 LONGEST_DARK.as_secs()
             ),
         };
-        if check.verdict == Verdict::Pass && first.is_none() {
+        if check.verdict == CheckVerdict::Pass && first.is_none() {
             let remedy = "the projector needs too long to lock on to its signal: let it stay switched on, and give it the mode that its own description prefers";
             return Ok(Check::new(check.found, Some(remedy), check.measured));
         }
@@ -57,8 +57,8 @@ pub fn lit_enough(lit: &Lit) -> Check {
 /// The remedy for a projector that adapts to content.
 const ADAPTS: &str = "switch off what adapts the projector to the content of a picture (CAIC, dynamic contrast, eco mode): for TI's DLPC3470, DLPC3478 and DLPC3479 write head.projector.controller = \"dlpc347x\"";
 
-pub(super) fn exposure(subject: &mut Subject<'_>) -> Checked {
-    Ok(exposed(subject.lit()?.1))
+pub(super) fn exposure(examination: &mut Examination<'_>) -> CheckResult {
+    Ok(exposed(examination.lit()?.1))
 }
 
 /// Judges whether white is neither saturated nor dark.
@@ -84,16 +84,16 @@ pub fn exposed(lit: &Lit) -> Check {
     Check::new(found, remedy, measured)
 }
 
-pub(super) fn contrast(subject: &mut Subject<'_>) -> Checked {
-    let calibration = subject.calibration;
-    let (head, lit) = subject.lit()?;
+pub(super) fn contrast(examination: &mut Examination<'_>) -> CheckResult {
+    let calibration = examination.calibration;
+    let (head, lit) = examination.lit()?;
     let found = examine::contrast(head, calibration, SETTLE, lit)?;
     let measured = json!({
         "modulation_counts": found.modulation_counts, "contrast_by_pitch": examine::by_pitch(&found),
     });
     let mut pitches = found.pitches.iter();
-    let sharp = pitches.find(|of| of.pitch_px == SHARP_PITCH);
-    let blurred = sharp.is_none_or(|of| of.contrast < LEAST_CONTRAST);
+    let sharp = pitches.find(|pitch| pitch.pitch_px == SHARP_PITCH);
+    let blurred = sharp.is_none_or(|pitch| pitch.contrast < LEAST_CONTRAST);
     let found = format!(
         "contrast of the coarsest pitch is kept to {}",
         found.words()
@@ -105,8 +105,8 @@ pub(super) fn contrast(subject: &mut Subject<'_>) -> Checked {
     Ok(Check::new(found, blurred.then_some(&*remedy), measured))
 }
 
-pub(super) fn content(subject: &mut Subject<'_>) -> Checked {
-    let (head, lit) = subject.lit()?;
+pub(super) fn content(examination: &mut Examination<'_>) -> CheckResult {
+    let (head, lit) = examination.lit()?;
     let Some(off) = by_content(head, SETTLE, lit)? else {
         return Ok(Check::new(
             "too little of the part shows one grey stripe alone to tell how its light depends on its surroundings",
@@ -117,7 +117,7 @@ pub(super) fn content(subject: &mut Subject<'_>) -> Checked {
     Ok(alike(off))
 }
 
-/// Judges whether a grey gives the same light whatever surrounds it; between white stripes it gives
+/// Judges whether the light of a grey is independent of its surroundings; between white stripes it gives
 /// more than between black ones by the share `off`.
 pub fn alike(off: f64) -> Check {
     Check::new(
@@ -130,11 +130,11 @@ pub fn alike(off: f64) -> Check {
     )
 }
 
-pub(super) fn response(subject: &mut Subject<'_>) -> Checked {
+pub(super) fn response(examination: &mut Examination<'_>) -> CheckResult {
     // Projected as patterns are: through the inverse of the calibrated response.
-    let response = subject.calibration.response.as_ref();
+    let response = examination.calibration.response.as_ref();
     let asked = GREYS.map(|grey| response.map_or(grey, |response| response.level_for(grey)));
-    let (head, lit) = subject.lit()?;
+    let (head, lit) = examination.lit()?;
     let lights = examine::lights(head, SETTLE, lit, &asked, &|_| ())?;
     let answers: Vec<(f64, f64)> = GREYS
         .iter()

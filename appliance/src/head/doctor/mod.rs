@@ -4,11 +4,8 @@
 //! its consequences are not. Pictures are taken long after each flip, so only the check of the
 //! flip-to-light delay depends on that delay.
 
+mod calibration;
 pub mod computer;
-pub mod controller;
-mod delivery;
-mod geometry;
-mod heights;
 pub mod light;
 mod time;
 
@@ -23,7 +20,7 @@ use std::time::Duration;
 /// The verdict of a check.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Verdict {
+pub enum CheckVerdict {
     /// What was checked is as it must be.
     Pass,
     /// What was checked is not as it must be.
@@ -32,7 +29,7 @@ pub enum Verdict {
     Skipped,
 }
 
-impl Verdict {
+impl CheckVerdict {
     /// The word for the verdict.
     pub fn word(self) -> &'static str {
         match self {
@@ -50,7 +47,7 @@ pub struct Check {
     #[serde(rename = "step")]
     pub name: &'static str,
     /// Its verdict.
-    pub verdict: Verdict,
+    pub verdict: CheckVerdict,
     /// What was found, in a sentence with its numbers.
     pub found: String,
     /// What to do about it; empty unless it failed.
@@ -65,8 +62,8 @@ impl Check {
         Self {
             name: "",
             verdict: match remedy {
-                Some(_) => Verdict::Fail,
-                None => Verdict::Pass,
+                Some(_) => CheckVerdict::Fail,
+                None => CheckVerdict::Pass,
             },
             found: found.into(),
             remedy: remedy.unwrap_or_default().to_owned(),
@@ -77,7 +74,7 @@ impl Check {
     /// A check that was not made, and why.
     fn skipped(why: impl Into<String>) -> Self {
         Self {
-            verdict: Verdict::Skipped,
+            verdict: CheckVerdict::Skipped,
             ..Self::new(why, None, json!({}))
         }
     }
@@ -95,7 +92,7 @@ fn named(name: &'static str, check: Check) -> Check {
 }
 
 /// What the checks of a head share.
-struct Subject<'a> {
+struct Examination<'a> {
     head: &'a mut Head,
     calibration: &'a Calibration,
     calibrated: bool,
@@ -105,7 +102,7 @@ struct Subject<'a> {
     lit: Option<Result<Lit, Error>>,
 }
 
-impl Subject<'_> {
+impl Examination<'_> {
     /// The head, and its pictures of black and white.
     fn lit(&mut self) -> Result<(&mut Head, &Lit), Error> {
         let head = &mut *self.head;
@@ -115,14 +112,14 @@ impl Subject<'_> {
 }
 
 /// How a check ended, or the error of the device that ended it.
-type Checked = Result<Check, Error>;
+type CheckResult = Result<Check, Error>;
 
 /// A row of [`CHECKS`]: its name, the checks that must have passed before it, and how it measures
 /// and judges.
 type Row = (
     &'static str,
     &'static [&'static str],
-    fn(&mut Subject<'_>) -> Checked,
+    fn(&mut Examination<'_>) -> CheckResult,
 );
 
 /// What the checks of light need.
@@ -136,7 +133,7 @@ const CHECKS: [Row; 15] = [
     ("start", &["devices"], time::start),
     ("cadence", &["devices"], time::cadence),
     ("trigger", &["devices"], time::trigger),
-    ("delivery", &["devices", "trigger"], delivery::delivery),
+    ("delivery", &["devices", "trigger"], time::delivery),
     ("light", &["devices", "trigger"], light::light),
     (
         "exposure",
@@ -156,9 +153,9 @@ const CHECKS: [Row; 15] = [
         &[
             "devices", "format", "mode", "cadence", "trigger", "light", "exposure", "delay",
         ],
-        geometry::geometry,
+        calibration::geometry,
     ),
-    ("heights", &[], heights::heights),
+    ("heights", &[], calibration::heights),
 ];
 
 /// Checks a head in front of any part, best a flat bright one. `progress` gets the share done and
@@ -183,7 +180,7 @@ pub fn examine_for(
     progress: &dyn Fn(f64, &str),
 ) -> Vec<Check> {
     let dark = head.starts_dark();
-    let mut subject = Subject {
+    let mut examination = Examination {
         first_light: dark.then(|| first_light(head).unwrap_or_default()),
         head,
         calibration,
@@ -194,7 +191,9 @@ pub fn examine_for(
     let mut checks: Vec<Check> = Vec::with_capacity(rows.len());
     for (at, &(name, needs, check)) in rows.iter().enumerate() {
         progress(at as f64 / rows.len() as f64, name);
-        let unmet = checks.iter().filter(|check| check.verdict != Verdict::Pass);
+        let unmet = checks
+            .iter()
+            .filter(|check| check.verdict != CheckVerdict::Pass);
         let missing = needs
             .iter()
             .find(|need| unmet.clone().any(|check| check.name == **need));
@@ -202,7 +201,7 @@ pub fn examine_for(
             Some(missing) => Check::skipped(format!(
                 "cannot be judged before the check {missing} passes"
             )),
-            None => check(&mut subject).unwrap_or_else(Check::from),
+            None => check(&mut examination).unwrap_or_else(Check::from),
         };
         checks.push(named(name, checked));
     }
@@ -229,6 +228,6 @@ mod tests {
         let check = Check::from(Error::unsupported("opening a: b", "free it: end c"));
         assert_eq!(check.found, "opening a: b is not supported");
         assert_eq!(check.remedy, "free it: end c");
-        assert_eq!(check.verdict, Verdict::Fail);
+        assert_eq!(check.verdict, CheckVerdict::Fail);
     }
 }

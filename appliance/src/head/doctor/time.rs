@@ -1,7 +1,7 @@
-//! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers,
-//! flip-to-light delay.
+//! The doctor's checks of devices and time: devices answer, format and mode, flips, triggers, how long
+//! frames need to this program, flip-to-light delay.
 
-use super::{Check, Checked, Subject};
+use super::{Check, CheckResult, Examination};
 use crate::head::examine::{
     Delay, MOST_LATE, PATIENCE, Spaced, Stamps, load_black_and_white, pace,
 };
@@ -26,13 +26,17 @@ const TRIGGERED: u32 = 24;
 const WHITE: usize = 1;
 /// Least uncertainty of the measured delay, ms: that of one round with a camera of few pixels.
 const LEAST_OFF_MS: f64 = 0.05;
+/// Refreshes over which frames are timed.
+const REFRESHES: u32 = 24;
+/// How much later than stated a frame may come: a few turns of the scheduler.
+const LATE: Duration = Duration::from_millis(5);
 
 pub(super) fn ms(time: Duration) -> f64 {
     time.as_secs_f64() * 1e3
 }
 
-pub(super) fn devices(subject: &mut Subject<'_>) -> Checked {
-    let head = &*subject.head;
+pub(super) fn devices(examination: &mut Examination<'_>) -> CheckResult {
+    let head = &*examination.head;
     head.present()?;
     let ((columns, rows), camera) = (head.projector_size(), head.camera_format());
     Ok(Check::new(
@@ -48,8 +52,8 @@ pub(super) fn devices(subject: &mut Subject<'_>) -> Checked {
     ))
 }
 
-pub(super) fn format(subject: &mut Subject<'_>) -> Checked {
-    let encoding = subject.head.encoding();
+pub(super) fn format(examination: &mut Examination<'_>) -> CheckResult {
+    let encoding = examination.head.encoding();
     let measured = json!({ "encoding": encoding.name, "exact": encoding.exact });
     if encoding.exact {
         let found = format!("{}: samples are what the sensor counted", encoding.name);
@@ -64,8 +68,8 @@ pub(super) fn format(subject: &mut Subject<'_>) -> Checked {
     Ok(Check::new(found, Some(remedy), measured))
 }
 
-pub(super) fn mode(subject: &mut Subject<'_>) -> Checked {
-    let head = &*subject.head;
+pub(super) fn mode(examination: &mut Examination<'_>) -> CheckResult {
+    let head = &*examination.head;
     let (camera, refresh) = (head.camera_timing(), head.refresh());
     let refreshes = camera.exposure.as_secs_f64() / refresh.as_secs_f64();
     let whole = refresh.mul_f64(refreshes.round().max(1.0));
@@ -90,8 +94,8 @@ pub(super) fn mode(subject: &mut Subject<'_>) -> Checked {
 }
 
 /// How long a cycle waits for the camera to start.
-pub(super) fn start(subject: &mut Subject<'_>) -> Checked {
-    let head = &mut *subject.head;
+pub(super) fn start(examination: &mut Examination<'_>) -> CheckResult {
+    let head = &mut *examination.head;
     let (took, stays_on) = (head.start_up()?, head.stays_on());
     let triggered = head.camera_timing().starts == Starts::OnTrigger;
     let measured = json!({ "start_ms": ms(took), "stays_on_s": stays_on.as_secs_f64() });
@@ -113,8 +117,8 @@ pub(super) fn start(subject: &mut Subject<'_>) -> Checked {
     Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn cadence(subject: &mut Subject<'_>) -> Checked {
-    let head = &mut *subject.head;
+pub(super) fn cadence(examination: &mut Examination<'_>) -> CheckResult {
+    let head = &mut *examination.head;
     load_black_and_white(head)?;
     let showing = |index: u32| Showing {
         index: index as usize % 2,
@@ -167,8 +171,8 @@ pub(super) fn cadence(subject: &mut Subject<'_>) -> Checked {
     Ok(Check::new(found, remedy, measured))
 }
 
-pub(super) fn trigger(subject: &mut Subject<'_>) -> Checked {
-    let head = &mut *subject.head;
+pub(super) fn trigger(examination: &mut Examination<'_>) -> CheckResult {
+    let head = &mut *examination.head;
     load_black_and_white(head)?;
     let showing = Showing {
         index: WHITE,
@@ -176,7 +180,7 @@ pub(super) fn trigger(subject: &mut Subject<'_>) -> Checked {
         settle: 0,
     };
     let mut seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
-    if !subject.calibrated && !seen.frames.is_empty() {
+    if !examination.calibrated && !seen.frames.is_empty() {
         // The doctor runs before the head is calibrated, so it measures the stamps as calibrating
         // will.
         let stamps = Stamps::measure(head)?;
@@ -191,7 +195,7 @@ pub(super) fn trigger(subject: &mut Subject<'_>) -> Checked {
     })
 }
 
-fn triggered(head: &mut Head, seen: &Watched<()>) -> Checked {
+fn triggered(head: &mut Head, seen: &Watched<()>) -> CheckResult {
     let (pulses, frames) = (seen.triggers.len(), seen.frames.len());
     let after = |frame: &WatchedFrame<()>| {
         let after = |at: &Timestamp| (i128::from(frame.start.0) - i128::from(at.0)) / 1000;
@@ -272,7 +276,7 @@ fn lost(refreshes: u32, tried: &[Spaced], found: String, mut measured: Value) ->
 }
 
 /// A camera that the projector triggers has a frame in every so many refreshes.
-fn by_projector(head: &mut Head, seen: &Watched<()>) -> Checked {
+fn by_projector(head: &mut Head, seen: &Watched<()>) -> CheckResult {
     let (hold, refresh) = (head.timing().hold, head.refresh());
     let Some(needed) = pace(head)?.pop() else {
         return Ok(Check::new(
@@ -328,8 +332,8 @@ fn by_itself(seen: &Watched<()>, nominal: Duration) -> Check {
 }
 
 /// The time from a flip to its light, from the brightness of the frames around many flips.
-pub(super) fn delay(subject: &mut Subject<'_>) -> Checked {
-    let (head, lit) = subject.lit()?;
+pub(super) fn delay(examination: &mut Examination<'_>) -> CheckResult {
+    let (head, lit) = examination.lit()?;
     let believed = head.timing().flip_to_light.as_secs_f64();
     let refresh = head.refresh().as_secs_f64();
     let Some(measured) = Delay::measure(head, lit, 1, &|_| ())? else {
@@ -358,4 +362,38 @@ pub(super) fn delay(subject: &mut Subject<'_>) -> Checked {
         (delay - believed) / refresh
     );
     Ok(Check::new(found, wrong.then_some(&*remedy), numbers))
+}
+
+/// The median time from the end of an exposure until its frame can be used.
+pub(super) fn delivery(examination: &mut Examination<'_>) -> CheckResult {
+    let head = &mut *examination.head;
+    load_black_and_white(head)?;
+    let camera = head.camera_timing();
+    let showing = Showing {
+        index: 0,
+        refreshes: REFRESHES,
+        settle: 0,
+    };
+    let seen = head.watch(&[showing], PATIENCE, &mut |_| ())?;
+    let needed = |frame: &WatchedFrame<()>| frame.arrived.since(frame.start + camera.exposure);
+    let mut times: Vec<Duration> = seen.frames.iter().map(needed).collect();
+    times.sort_unstable();
+    let median = times.get(times.len() / 2).copied().unwrap_or_default();
+    let stated = camera.delivery;
+    let found = format!(
+        "a frame can be used {:.1} ms after its exposure, {:.1} ms are stated",
+        ms(median),
+        ms(stated)
+    );
+    let measured = json!({ "delivered_ms": ms(median), "stated_ms": ms(stated) });
+    let remedy = format!(
+        "frames are read slowly: see that /dev/dma_heap/vidbuf_cached exists and this user may open it (group \"video\"), and that nothing else loads the computer; \
+         if it cannot be faster, set head.camera.delivery_us to {:.0}",
+        ms(median).ceil() * 1e3
+    );
+    Ok(Check::new(
+        found,
+        (median > stated + LATE).then_some(&*remedy),
+        measured,
+    ))
 }

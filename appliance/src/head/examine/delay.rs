@@ -8,7 +8,7 @@
 //! an exposure determines d: a relative noise ε of the mean, as a share of white, gives an error of
 //! ε·T, which falls with the square root of the number of such changes.
 
-use super::pictures::{Lit, load_black_and_white};
+use super::{Lit, load_black_and_white};
 use super::{PATIENCE, refreshes};
 use hal::error::Error;
 use hal::head::{Head, Showing};

@@ -12,7 +12,7 @@ const PER_PIXEL: f64 = 10.0;
 
 /// The outline at one height.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Outline {
+pub struct VolumeOutline {
     /// The height, mm.
     pub z_mm: f64,
     /// Its corners in pixels of the frame, in order.
@@ -21,11 +21,11 @@ pub struct Outline {
 
 /// The outlines at both ends of the default working range and between them at z = 0; heights at
 /// which camera and projector see no common region are left out.
-pub fn outlines(calibration: &Calibration) -> Vec<Outline> {
+pub fn outlines(calibration: &Calibration) -> Vec<VolumeOutline> {
     let (camera, projector) = (&calibration.camera, &calibration.projector);
     let range = HeightRange::of(camera, projector);
     let heights = [range.low, 0.0, range.high].into_iter();
-    let seen = heights.map(|z_mm| Outline {
+    let seen = heights.map(|z_mm| VolumeOutline {
         z_mm: z_mm.round(),
         points: outline(camera, projector, z_mm),
     });

@@ -4,7 +4,7 @@ use hal::bounds::clipped;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
 use sim::parts::{Across, Board, Defect, Joint, Plate};
-use sim::{Ground, Material, Part, Placement, Scenario};
+use sim::{Ground, Material, Part, Placement, Scenario, Unfit};
 
 /// The most defects of a part: each ray is traced against all of them.
 const MAX_DEFECTS: usize = 16;
@@ -43,6 +43,68 @@ pub struct Placed {
     pub floor: Option<Option<Ground>>,
 }
 
+/// A part that cannot be put in front of a head.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlacedError {
+    /// It is written wrongly.
+    #[error("part: {0}")]
+    Part(String),
+    /// There are two placements.
+    #[error("placement and pose: write one of them")]
+    PlacementAndPose,
+    /// There is no such part.
+    #[error("there is no part {kind}: name one of {known}")]
+    NoPart {
+        /// The name.
+        kind: String,
+        /// The names that there are.
+        known: String,
+    },
+    /// Only a board has poses.
+    #[error("pose {pose}: only a board has poses with numbers; write the placement of a {kind}")]
+    NoBoard {
+        /// The pose.
+        pose: u8,
+        /// The part.
+        kind: String,
+    },
+    /// A board has no such pose.
+    #[error("there is no pose {0}: write 1 to {most}", most = Board::POSES.len())]
+    NoPose(u8),
+    /// There is no such defect.
+    #[error("there is no defect {kind:?}: write one of {forms}")]
+    NoDefect {
+        /// The name.
+        kind: String,
+        /// The forms of all defects.
+        forms: String,
+    },
+    /// A defect is written wrongly.
+    #[error("{text:?} is not a defect: write {form}")]
+    DefectForm {
+        /// The defect.
+        text: String,
+        /// The form of such a defect.
+        form: String,
+    },
+    /// The part has no defects of this kind.
+    #[error("a {part} has no {defect}: {reason}")]
+    Unfit {
+        /// The part.
+        part: String,
+        /// The kind of the defect.
+        defect: String,
+        /// Why not.
+        reason: String,
+    },
+    /// There are too many defects.
+    #[error("{0} defects: at most {most} are simulated on a part", most = MAX_DEFECTS)]
+    Defects(usize),
+    /// A number is out of its range.
+    #[error("{0}")]
+    Range(#[from] Unfit),
+}
+
 /// Every part that can be put in front of a head, good and as designed.
 fn stock() -> impl Iterator<Item = Part> {
     let joint = |across| {
@@ -74,25 +136,26 @@ struct PlacedFile {
     floor: Option<Option<Ground>>,
 }
 
-/// A value that is given, also one that says that there is none.
+/// A value whose key is given, also if it is `null`.
 fn given<'a, T: Deserialize<'a>, D: Deserializer<'a>>(from: D) -> Result<Option<T>, D::Error> {
     T::deserialize(from).map(Some)
 }
 
 impl TryFrom<PlacedFile> for Placed {
-    type Error = String;
+    type Error = PlacedError;
 
-    fn try_from(file: PlacedFile) -> Result<Self, String> {
+    fn try_from(file: PlacedFile) -> Result<Self, PlacedError> {
         let mut placed = match file.part {
             Value::String(kind) => Self::stock(&kind)?,
             part => Self {
-                part: serde_json::from_value(part).map_err(|error| format!("part: {error}"))?,
+                part: serde_json::from_value(part)
+                    .map_err(|error| PlacedError::Part(error.to_string()))?,
                 ..Self::default()
             },
         };
         (placed.material, placed.floor) = (file.material, file.floor);
         match (file.placement, file.pose) {
-            (Some(_), Some(_)) => return Err("placement and pose: write one of them".into()),
+            (Some(_), Some(_)) => return Err(PlacedError::PlacementAndPose),
             (Some(placement), None) => placed.placement = placement,
             (None, Some(pose)) => placed.pose(pose)?,
             (None, None) => (),
@@ -106,11 +169,14 @@ impl Placed {
     ///
     /// # Errors
     /// If there is no such kind, naming those that there are.
-    pub fn stock(kind: &str) -> Result<Self, String> {
+    pub fn stock(kind: &str) -> Result<Self, PlacedError> {
         let found = stock().find(|part| self::kind(part) == kind);
         let part = found.ok_or_else(|| {
             let kinds: Vec<String> = stock().map(|part| self::kind(&part)).collect();
-            format!("there is no part {kind}: name one of {}", kinds.join(", "))
+            PlacedError::NoPart {
+                kind: kind.to_owned(),
+                known: kinds.join(", "),
+            }
         })?;
         Ok(Self {
             part,
@@ -122,22 +188,17 @@ impl Placed {
     ///
     /// # Errors
     /// If the part is no board, or there is no such pose.
-    pub fn pose(&mut self, number: u8) -> Result<(), String> {
+    pub fn pose(&mut self, number: u8) -> Result<(), PlacedError> {
         if !matches!(self.part, Part::Board(_)) {
-            return Err(format!(
-                "pose {number}: only a board has poses with numbers; write the placement of a {}",
-                kind(&self.part)
-            ));
+            return Err(PlacedError::NoBoard {
+                pose: number,
+                kind: kind(&self.part),
+            });
         }
         let pose = number
             .checked_sub(1)
-            .and_then(|at| Board::POSES.get(usize::from(at)));
-        self.placement = *pose.ok_or_else(|| {
-            format!(
-                "there is no pose {number}: write 1 to {}",
-                Board::POSES.len()
-            )
-        })?;
+            .and_then(|index| Board::POSES.get(usize::from(index)));
+        self.placement = *pose.ok_or(PlacedError::NoPose(number))?;
         Ok(())
     }
 
@@ -167,7 +228,7 @@ impl Placed {
     ///
     /// # Errors
     /// If the text is not a defect, or the part has none of this kind.
-    pub fn add_defect(&mut self, text: &str) -> Result<(), String> {
+    pub fn add_defect(&mut self, text: &str) -> Result<(), PlacedError> {
         let form = |(kind, keys): &(&str, &[(&str, f64)])| {
             let names: Vec<&str> = keys.iter().map(|(name, _)| *name).collect();
             format!("{kind}:{}", names.join(","))
@@ -176,11 +237,10 @@ impl Placed {
         let known = DEFECTS.iter().find(|(name, _)| *name == kind);
         let Some(known) = known else {
             let forms: Vec<String> = DEFECTS.iter().map(form).collect();
-            return Err(format!(
-                "there is no defect {:?}: write one of {}",
-                clipped(kind),
-                forms.join(" ")
-            ));
+            return Err(PlacedError::NoDefect {
+                kind: clipped(kind),
+                forms: forms.join(" "),
+            });
         };
         let numbers: Vec<f64> = numbers
             .split(',')
@@ -193,24 +253,27 @@ impl Placed {
             || numbers.len() != text.split(',').count()
             || !named.all(|((name, _), &n)| *name != "index" || is_place(n))
         {
-            let (text, form) = (clipped(text), form(known));
-            return Err(format!("{text:?} is not a defect: write {form}"));
+            return Err(PlacedError::DefectForm {
+                text: clipped(text),
+                form: form(known),
+            });
         }
         let named = known.1.iter().zip(numbers).map(|((name, _), n)| (*name, n));
-        add(&mut self.part, defect(kind, named))
-            .map_err(|error| format!("a {} has no {kind}: {error}", self::kind(&self.part)))
+        add(&mut self.part, defect(kind, named)).map_err(|reason| PlacedError::Unfit {
+            part: self::kind(&self.part),
+            defect: kind.to_owned(),
+            reason,
+        })
     }
 
     /// Checks every number.
     ///
     /// # Errors
     /// Naming the one that is out of its range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), PlacedError> {
         let defects = self.part.defects().len();
         if defects > MAX_DEFECTS {
-            return Err(format!(
-                "{defects} defects: at most {MAX_DEFECTS} are simulated on a part"
-            ));
+            return Err(PlacedError::Defects(defects));
         }
         let scenario = Scenario {
             part: self.part.clone(),

@@ -1,9 +1,10 @@
 //! Traits of real devices that data sheets leave out: the doctor names each, calibration measures
 //! it, and sequences cope with it.
 
-use crate::head::calibrate::{Basis, Made, make};
-use crate::head::calibration::{Calibration, HeightsBy};
-use crate::head::doctor::{Check, Verdict, examine};
+use crate::head::calibration::Calibration;
+use crate::head::calibration::file::CalibrationFile;
+use crate::head::commission::{Choices, Commissioning, PLANE, Step, Subject, TIMING};
+use crate::head::doctor::{Check, CheckVerdict, examine};
 use crate::head::examine::pace;
 use hal::head::{Exposure, Head, Timing};
 use hal::projector::Raster;
@@ -40,7 +41,7 @@ fn head(more: &str) -> (Head, Calibration) {
 /// The doctor's checks that failed.
 fn failed((head, calibration): &mut (Head, Calibration)) -> Vec<Check> {
     let mut checks = examine(head, calibration, true, &|_, _| ());
-    checks.retain(|check| check.verdict == Verdict::Fail);
+    checks.retain(|check| check.verdict == CheckVerdict::Fail);
     checks
 }
 
@@ -52,16 +53,33 @@ fn sequence(head: &mut Head) -> Result<Exposure, hal::error::Error> {
     head.acquire(&indices, Duration::from_secs(2), &mut |_, _| ())
 }
 
-fn calibrated((head, calibration): &mut (Head, Calibration)) -> Made {
-    let basis = Basis {
-        calibration: calibration.clone(),
-        models_from: "scenario".into(),
-        geometry: None,
-        temperature_c: None,
-        plate: false,
-        heights_by: HeightsBy::Models,
+/// Calibrates it without a plate.
+fn calibrated((head, calibration): &mut (Head, Calibration)) -> CalibrationFile {
+    let folder = tempfile::tempdir().unwrap();
+    let mut calibration = calibration.clone();
+    let mut kept = Commissioning::of(calibration.sizes(), None);
+    let mut subject = Subject {
+        head,
+        calibration: &mut calibration,
+        calibrated: true,
+        exact: true,
+        before: None,
+        place: &folder.path().join("calibration.json"),
+        poses: None,
+        choices: Choices {
+            no_plate: true,
+            ..Choices::default()
+        },
+        progress: &|_, _| (),
+        white: None,
+        stored: None,
+        notes: Vec::new(),
     };
-    make(head, basis, None, &|_, _| ()).unwrap()
+    for name in [TIMING, PLANE] {
+        let step = Step::of(name).unwrap();
+        step.carry_out(&mut subject, &mut kept).unwrap();
+    }
+    subject.stored.unwrap()
 }
 
 #[test]
@@ -79,12 +97,12 @@ fn a_camera_that_is_not_ready_in_time_is_named_and_calibration_finds_the_pace_th
     // Every other trigger is lost, and each costs a pattern another attempt.
     assert!(sequence(&mut own.0).unwrap().retaken > 4);
     let made = calibrated(&mut own);
-    assert_eq!(made.file.timing.as_ref().unwrap().refreshes, Some(3));
+    assert_eq!(made.timing.as_ref().unwrap().refreshes, Some(3));
     let taken = sequence(&mut own.0).unwrap();
     assert_eq!(taken.retaken, 0, "{taken:?}");
     // And by its file, on a head that is opened again.
     let (mut again, _) = head(&more);
-    again.set_timing(made.file.timing(again.timing()));
+    again.set_timing(made.timing(again.timing()));
     assert_eq!(sequence(&mut again).unwrap().retaken, 0);
     assert_eq!(failed(&mut (again, own.1)).len(), 0);
 }
@@ -158,7 +176,7 @@ fn stamps_that_are_late_by_a_constant_are_named_measured_and_corrected() {
             _ => assert!(uncorrected.is_err(), "{uncorrected:?}"),
         }
         let made = calibrated(&mut own);
-        let found = made.file.timing.as_ref().unwrap().stamp_late_ns.unwrap();
+        let found = made.timing.as_ref().unwrap().stamp_late_ns.unwrap();
         assert!(
             found.abs_diff(late_us * 1000) < 25_000,
             "{late_us}: {found}"
@@ -202,7 +220,7 @@ fn a_camera_that_the_projector_triggers_is_paced_by_its_readout_and_dead_time() 
     assert_eq!(check.name, "trigger");
     assert!(check.remedy.contains("3 refreshes"), "{}", check.remedy);
     let made = calibrated(&mut own);
-    let timing = made.file.timing.as_ref().unwrap();
+    let timing = made.timing.as_ref().unwrap();
     assert_eq!(timing.refreshes, Some(3));
     assert!(timing.flip_to_light_ns.abs_diff(20_000_000) < 50_000);
     let taken = sequence(&mut own.0).unwrap();

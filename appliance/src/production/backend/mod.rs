@@ -7,7 +7,7 @@ pub use devices::{Wires, built_for, leave_lines_idle, lines};
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
-use crate::head::calibration::place::{Loaded, Place};
+use crate::head::calibration::place::{CalibrationPlace, Loaded};
 use crate::head::examine::{LONGEST_DARK, first_light};
 use crate::head::exposing::Exposing;
 use crate::head::seam;
@@ -259,7 +259,7 @@ fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>, String> 
         .calibration
         .as_deref()
         .filter(|_| config.backend != Backend::Replay);
-    let Some(loaded) = place.map_or(Ok(None), |place| Place::at(place).load())? else {
+    let Some(loaded) = place.map_or(Ok(None), |place| CalibrationPlace::at(place).load())? else {
         return Ok(None);
     };
     let calibration = loaded.file.calibration()?;
@@ -429,5 +429,5 @@ fn calibration_of(folders: &[std::path::PathBuf], recordings: &[Recording]) -> R
     let noise = first
         .noise_counts
         .ok_or_else(|| missing("has no camera.noise_counts"))?;
-    Calibration::of(first, noise).map_err(|what| missing(&what))
+    Calibration::of(first, noise).map_err(|what| missing(&what.to_string()))
 }

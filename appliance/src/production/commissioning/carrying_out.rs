@@ -1,11 +1,11 @@
 //! The measuring task carries out a step.
 
-use super::{Asked, OpenHead, PICTURES};
+use super::{OpenHead, PICTURES, StepRequest};
 use crate::config::{Backend, HeadConfig};
 use crate::error::Result;
 use crate::head::calibration::file::CalibrationFile;
-use crate::head::calibration::place::Place;
-use crate::head::commission::{Commissioning, PLANE, Poses, Subject, TIMING};
+use crate::head::calibration::place::CalibrationPlace;
+use crate::head::commission::{Choices, Commissioning, PLANE, PoseAction, Subject, TIMING};
 use crate::head::exposing::Exposing;
 use crate::head::live::{Picture, outlines};
 use crate::production::{SIGN_OF_LIFE, Worker, active};
@@ -53,7 +53,7 @@ impl Worker {
         self.station.event(Event::Commissioned { job, recipe });
     }
 
-    fn carry_out(&mut self, job: JobId, asked: &Asked) {
+    fn carry_out(&mut self, job: JobId, asked: &StepRequest) {
         let mut kept = self.commission.kept();
         let head = self.opened.calibration.sizes();
         let name = asked.step.name;
@@ -87,7 +87,7 @@ impl Worker {
             // The calibration in use stays so until another one is complete.
             self.opened.head.set_timing(timing);
         }
-        if let Some(Poses::Pose(board, number)) = asked.poses {
+        if let Some(PoseAction::Pose(board, number)) = asked.poses {
             let pose = kept.poses.get(&number);
             let corners = pose.map_or(&[][..], |pose| &pose.corners);
             let marked: Vec<[f64; 2]> =
@@ -113,7 +113,7 @@ impl Worker {
     fn step(
         &mut self,
         job: JobId,
-        asked: &Asked,
+        asked: &StepRequest,
         kept: &mut Commissioning,
     ) -> (Option<Frame>, bool) {
         let before = self.stored();
@@ -149,13 +149,16 @@ impl Worker {
                 before,
                 place,
                 poses: asked.poses,
-                white: None,
+                choices: Choices::default(),
                 progress: &progress,
+                white: None,
+                stored: None,
+                notes: Vec::new(),
             };
             let mut work = || pool.install(|| asked.step.run(&mut subject, kept));
             match asked.poses {
                 // It computes for long, without a device and without telling how far it is.
-                Some(Poses::Solve(_)) => computing.on(|| {
+                Some(PoseAction::Solve(_)) => computing.on(|| {
                     thread::scope(|scope| {
                         let solving = scope.spawn(work);
                         while !solving.is_finished() {
@@ -183,12 +186,12 @@ impl Worker {
     /// The stored calibration, if it is of this head.
     fn stored(&self) -> Option<CalibrationFile> {
         let place = self.config.calibration.as_deref()?;
-        let file = Place::at(place).load().ok()??.file;
+        let file = CalibrationPlace::at(place).load().ok()??.file;
         (file.sizes() == self.opened.calibration.sizes()).then_some(file)
     }
 
     /// Sets exposure and gain, if the step asks for it.
-    fn set_exposing(&mut self, asked: &Asked) -> Result<()> {
+    fn set_exposing(&mut self, asked: &StepRequest) -> Result<()> {
         let Some((exposing, _)) = asked.exposing else {
             return Ok(());
         };
@@ -214,7 +217,7 @@ impl Worker {
 
     fn keep(&self, kept: Commissioning) {
         if let Err(problem) = self.commission.keep(kept) {
-            self.progress.warn(&problem);
+            self.progress.warn(&problem.to_string());
         }
     }
 

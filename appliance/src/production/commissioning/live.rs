@@ -6,7 +6,7 @@
 //! and PNG are worked out on the asking thread, which should have a low priority.
 
 use super::Commission;
-use crate::head::calibrate::settled;
+use crate::head::commission::settled;
 use crate::head::examine::{SETTLE, picture};
 use crate::head::live::{Figures, Fringes, Picture, Show, rasters};
 use crate::production::{Order, Worker};
@@ -33,7 +33,7 @@ pub struct Look {
 
 /// What was seen last.
 #[derive(Default)]
-struct Seen {
+struct LastPicture {
     number: u64,
     figures: Option<Value>,
 }
@@ -46,7 +46,7 @@ pub struct Live {
     /// The last pictures of fringes; locked while a picture is taken, so others who ask wait.
     fringes: Arc<Mutex<Fringes>>,
     /// Locked only for moments.
-    seen: Arc<Mutex<Seen>>,
+    seen: Arc<Mutex<LastPicture>>,
 }
 
 impl Live {
@@ -104,7 +104,7 @@ impl Live {
         self.seen().figures.clone()
     }
 
-    fn seen(&self) -> MutexGuard<'_, Seen> {
+    fn seen(&self) -> MutexGuard<'_, LastPicture> {
         self.seen.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -7,14 +7,18 @@
 
 mod carrying_out;
 pub mod live;
-mod view;
 
+use crate::error::Result;
+use crate::head::board;
 use crate::head::calibration::Calibration;
-use crate::head::commission::{Commissioning, Laid, Poses, Step};
+use crate::head::commission::{
+    Commissioning, GEOMETRY, Laid, PoseAction, STEPS, Step, StepOutcome, pose_name,
+};
 use crate::head::exposing::Exposing;
-use crate::head::live::Outline;
+use crate::head::live::VolumeOutline;
 use crate::production::drift::Trend;
-use crate::station::{Event, Request, StationHandle};
+use crate::station::{Event, Request, Snapshot, StationHandle};
+use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -24,11 +28,11 @@ const PICTURES: &str = "commissioning";
 
 /// A step that was asked for, with what is set before it.
 #[derive(Clone, Debug)]
-pub struct Asked {
+pub struct StepRequest {
     /// The step.
     pub step: &'static Step,
     /// What is done with the poses, where the step is about them.
-    pub poses: Option<Poses>,
+    pub poses: Option<PoseAction>,
     /// Exposure and gain to set first, and whether they are kept.
     pub exposing: Option<(Exposing, bool)>,
 }
@@ -47,7 +51,7 @@ pub struct OpenHead {
     /// Exposure and gain.
     pub exposing: Exposing,
     /// Outlines of the measuring volume in the camera's picture; none before it is calibrated.
-    pub volume: Vec<Outline>,
+    pub volume: Vec<VolumeOutline>,
     /// The least gain that the camera can be set to.
     pub least_gain: f64,
     /// Time between two refreshes of the projector.
@@ -64,8 +68,8 @@ struct Running {
 }
 
 #[derive(Debug, Default)]
-struct Inside {
-    asked: Option<Asked>,
+struct CommissionState {
+    asked: Option<StepRequest>,
     running: Option<Running>,
     head: Option<OpenHead>,
     kept: Commissioning,
@@ -77,7 +81,7 @@ struct Inside {
 #[derive(Clone, Debug)]
 pub struct Commission {
     state: PathBuf,
-    inside: Arc<Mutex<Inside>>,
+    inside: Arc<Mutex<CommissionState>>,
     drift: Trend,
 }
 
@@ -90,13 +94,13 @@ impl Commission {
             Ok(kept) => (kept, None),
             Err(problem) => {
                 Commissioning::put_aside(state);
-                (Commissioning::default(), Some(problem))
+                (Commissioning::default(), Some(problem.to_string()))
             }
         };
-        let inside = Inside {
+        let inside = CommissionState {
             laid: kept.laid(),
             kept,
-            ..Inside::default()
+            ..CommissionState::default()
         };
         let opened = Self {
             state: state.to_path_buf(),
@@ -111,13 +115,13 @@ impl Commission {
         &self.drift
     }
 
-    fn inside(&self) -> MutexGuard<'_, Inside> {
+    fn inside(&self) -> MutexGuard<'_, CommissionState> {
         self.inside.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Has the measuring task carry out a step; answers whether it does, which it does not while it
     /// has something else to do.
-    pub fn begin(&self, station: &StationHandle, asked: Asked) -> bool {
+    pub fn begin(&self, station: &StationHandle, asked: StepRequest) -> bool {
         {
             let mut inside = self.inside();
             if inside.asked.is_some() || inside.running.is_some() {
@@ -175,7 +179,7 @@ impl Commission {
     }
 
     /// The step that waits, for the measuring task.
-    fn take(&self) -> Option<Asked> {
+    fn take(&self) -> Option<StepRequest> {
         self.inside().asked.take()
     }
 
@@ -198,12 +202,137 @@ impl Commission {
     /// Keeps what the steps have found, also on the card.
     ///
     /// # Errors
-    /// In words: it cannot be stored; it is known until the next start.
-    fn keep(&self, mut kept: Commissioning) -> Result<(), String> {
+    /// It cannot be stored; it is known until the next start.
+    fn keep(&self, mut kept: Commissioning) -> Result<()> {
         let saved = kept.save(&self.state);
         let laid = kept.laid();
         let mut inside = self.inside();
         (inside.kept, inside.laid) = (kept, laid);
         saved
     }
+}
+
+impl Commission {
+    /// The state of head and steps; whether a recipe is active comes from the snapshot.
+    pub fn view(&self, snapshot: &Snapshot) -> Value {
+        let inside = self.inside();
+        let Some(head) = &inside.head else {
+            let words = match &snapshot.fault {
+                Some(fault) => format!("{}; {}", fault.cause, fault.remedy),
+                None => "the head is being opened".into(),
+            };
+            return json!({ "open": false, "problem": words, "running": null, "steps": [] });
+        };
+        let running = inside.running.as_ref().map(|running| {
+            json!({
+                "step": running.name, "said": running.said, "share": running.share,
+                "since_ms": running.since.elapsed().as_millis() as u64,
+            })
+        });
+        let (width, height, bits) = head.calibration.frames();
+        let (columns, rows) = head.calibration.raster();
+        json!({
+            "open": true,
+            "simulated": head.simulated,
+            "calibrated": head.problem.is_none(),
+            "problem": head.problem,
+            "camera": {
+                "columns": width, "rows": height, "bits": bits, "exposure_us": head.exposing.exposure_us, "gain": head.exposing.gain, "least_gain": head.least_gain,
+                "refresh_us": head.refresh.as_micros() as u64, "adjustable": head.adjustable,
+            },
+            "projector": { "columns": columns, "rows": rows },
+            "volume": head.volume,
+            "running": running,
+            "steps": steps(&inside, snapshot),
+            "geometry": geometry(&inside, head),
+            "drift": self.drift.view(&head.calibration.fingerprint()),
+        })
+    }
+}
+
+fn steps(inside: &CommissionState, snapshot: &Snapshot) -> Vec<Value> {
+    let running = inside.running.as_ref().map(|running| running.name);
+    let mut steps: Vec<Value> = STEPS
+        .iter()
+        .map(|step| {
+            let outcome = inside.kept.steps.get(step.name);
+            let state = match outcome {
+                _ if running == Some(step.name) => "running",
+                None => "open",
+                Some(outcome) if outcome.passed => "done",
+                Some(_) => "failed",
+            };
+            let mut shown = shown(step.name, state, outcome);
+            let ground = inside.laid.ground.as_ref();
+            if let (GEOMETRY, None, Some(ground)) = (step.name, outcome, ground) {
+                (shown["said"], shown["remedy"]) =
+                    (json!([ground.words()]), json!(ground.remedy()));
+            }
+            shown
+        })
+        .collect();
+    let state = match (&snapshot.teach, &snapshot.recipe) {
+        (Some(_), _) => "running",
+        (None, Some(_)) => "done",
+        (None, None) => "open",
+    };
+    let mut teach = shown("teach", state, None);
+    if let Some(recipe) = &snapshot.recipe {
+        let words = format!("recipe {} ({}) is active", recipe.number, recipe.name);
+        teach["said"] = json!([words]);
+    }
+    steps.push(teach);
+    steps
+}
+
+fn shown(name: &str, state: &str, outcome: Option<&StepOutcome>) -> Value {
+    json!({
+        "name": name, "state": state, "at_unix_s": outcome.map(|outcome| outcome.at_unix_s),
+        "said": outcome.map_or(&[][..], |outcome| &outcome.said),
+        "remedy": outcome.and_then(|outcome| outcome.remedy.as_ref()),
+        "figures": outcome.map_or(json!({}), |outcome| outcome.figures.clone()),
+    })
+}
+
+/// The poses, and the models if there are any. What a pose has left in the models is known by its
+/// name there.
+fn geometry(inside: &CommissionState, head: &OpenHead) -> Value {
+    let (kept, laid) = (&inside.kept, &inside.laid);
+    let models = kept.models.as_ref();
+    let corners = kept.board.as_deref().and_then(corners_of).unwrap_or(0);
+    let poses: Vec<Value> = kept
+        .poses
+        .iter()
+        .map(|(number, pose)| {
+            let name = pose_name(*number);
+            let fitted = models.and_then(|models| {
+                let mut poses = models.geometry.poses.iter();
+                poses.find(|fitted| fitted.recording == name)
+            });
+            json!({
+                "number": number, "corners": pose.located(), "of": corners, "usable": pose.problem.is_none(), "problem": pose.problem,
+                "tilt_degrees": laid.tilt(*number), "camera_px": fitted.map(|pose| pose.camera_px),
+                "projector_px": fitted.map(|pose| pose.projector_px),
+            })
+        })
+        .collect();
+    let result = models.map(|models| {
+        let file = &models.geometry;
+        json!({
+            "camera_px": file.camera_px, "projector_px": file.projector_px, "height_sigma_mm": file.height_sigma_mm,
+            "length_sigma_mm": file.length_sigma_mm, "baseline_mm": file.baseline_mm, "scale": models.scale,
+        })
+    });
+    let plane = laid.ground.as_ref().map(
+        |ground| json!({ "pose": ground.pose, "said": ground.words(), "remedy": ground.remedy() }),
+    );
+    json!({
+        "board": kept.board, "poses": poses, "plane": plane, "frame_covered": kept.covered(head.calibration.frames()),
+        "tilt_degrees": models.map(|models| models.tilt_degrees), "result": result,
+    })
+}
+
+fn corners_of(board: &str) -> Option<usize> {
+    let board = board::parse(board).ok()?;
+    Some(board.columns * board.rows)
 }

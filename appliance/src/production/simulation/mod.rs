@@ -116,7 +116,7 @@ impl Simulation {
         let stage = self.stage.get().ok_or_else(|| {
             unfit("the head is not simulated: its part is the one that lies there".into())
         })?;
-        placed.check().map_err(unfit)?;
+        placed.check().map_err(|error| unfit(error.to_string()))?;
         if self.placing.swap(true, Ordering::AcqRel) {
             let words =
                 "put the part in place: another one is being put there; try again when it is";

@@ -2,7 +2,7 @@
 
 mod other_programs;
 
-use super::{Declared, Models, Sizes, Unit, from_one, from_two};
+use super::{Declared, ImportedModels, Sizes, Unit, from_one, from_two};
 use hal::model::DeviceModel;
 use sim::Scenario;
 use std::fmt::Write as _;
@@ -146,10 +146,10 @@ fn written(folder: &Path, text: impl AsRef<[u8]>) -> PathBuf {
 }
 
 /// Reads a text as the file of the camera and of the projector.
-fn read(text: impl AsRef<[u8]>, declared: Declared) -> Result<DeviceModel, String> {
+fn read(text: impl AsRef<[u8]>, declared: Declared) -> crate::error::Result<DeviceModel> {
     let folder = tempfile::tempdir().unwrap();
     let path = written(folder.path(), text);
-    let Models {
+    let ImportedModels {
         camera,
         projector,
         has_plane,
@@ -179,9 +179,9 @@ fn lengths_are_in_the_unit_that_is_declared() {
     assert_eq!(read_in(Unit::Cm), Ok(600.0));
     assert_eq!(read_in(Unit::M), Ok(60_000.0));
     assert_eq!(read_in(Unit::Inch), Ok(1524.0));
-    let error = read(&bare, declared(None)).unwrap_err();
+    let error = read(&bare, declared(None)).unwrap_err().to_string();
     assert!(error.contains("--unit"), "{error}");
-    let error = read(YAML, declared(Some(Unit::M))).unwrap_err();
+    let error = read(YAML, declared(Some(Unit::M))).unwrap_err().to_string();
     assert!(error.contains("one of them is wrong"), "{error}");
 }
 
@@ -281,7 +281,9 @@ fn a_stereo_calibration_with_the_pose_of_the_plate_gives_both_devices() {
     }
     let without = text.replace("plate_T", "else");
     let path = written(folder.path(), without);
-    let error = from_one(&path, sizes, Declared::default()).unwrap_err();
+    let error = from_one(&path, sizes, Declared::default())
+        .unwrap_err()
+        .to_string();
     assert!(
         error.contains("plate_T") && error.contains("solvePnP"),
         "{error}"
@@ -403,13 +405,15 @@ fn what_is_broken_is_refused_with_the_node_and_the_remedy() {
     ];
     for (text, words) in cases {
         let read = read(&text, Declared::default());
-        let error = read.expect_err(words[0]);
+        let error = read.expect_err(words[0]).to_string();
         assert!(error.contains("models.any"), "{error}");
         for word in words {
             assert!(error.contains(word), "{word:?} is not in: {error}");
         }
     }
-    let error = read(b"\x1f\x8b\x08\xff\xfe", Declared::default()).unwrap_err();
+    let error = read(b"\x1f\x8b\x08\xff\xfe", Declared::default())
+        .unwrap_err()
+        .to_string();
     assert!(error.contains("compressed"), "{error}");
 }
 

@@ -1,4 +1,4 @@
-//! Models as other programs than OpenCV write them: other names, nested nodes, lists of rows, no
+//! ImportedModels as other programs than OpenCV write them: other names, nested nodes, lists of rows, no
 //! plate, few digits.
 
 use super::super::{Declared, Unit, from_one, from_two};
@@ -67,17 +67,17 @@ fn models_without_a_plate_are_read_under_the_names_of_other_programs_and_stand_w
         (length - 1.0).abs() < 1e-14 && (r[0] - 0.985).abs() < 5e-4,
         "{r:?}"
     );
-    let error = read(FOUR, None, true).unwrap_err();
+    let error = read(FOUR, None, true).unwrap_err().to_string();
     assert!(error.contains("leave out --z-away"), "{error}");
     let worse = FOUR.replace("0.174, 0, 0.985", "0.18, 0, 0.985");
-    let error = read(&worse, None, false).unwrap_err();
+    let error = read(&worse, None, false).unwrap_err().to_string();
     assert!(error.contains("Rlp is not a rotation matrix"), "{error}");
     let both = format!("{FOUR}plate_rvec: [3.14159265358979, 0, 0]\nplate_tvec: [0, 0, 0.5]\n");
-    let error = read(&both, Some(500.0), false).unwrap_err();
+    let error = read(&both, Some(500.0), false).unwrap_err().to_string();
     assert!(error.contains("leave out --plane-at"), "{error}");
     assert!(read(&both, None, true).unwrap().has_plane);
     let ragged = FOUR.replace("[0, 800, 200]", "[0, 800]");
-    let error = read(&ragged, None, false).unwrap_err();
+    let error = read(&ragged, None, false).unwrap_err().to_string();
     assert!(
         error.contains("M4 has rows of different lengths"),
         "{error}"
@@ -111,7 +111,7 @@ fn a_camera_that_is_the_origin_states_no_plane() {
     assert_eq!(found, read("", Some(400.0)).unwrap());
     assert!(!read(origin, None).unwrap().has_plane);
     let elsewhere = origin.replace("[0]]", "[500]]");
-    let refused = read(&elsewhere, Some(400.0)).unwrap_err();
+    let refused = read(&elsewhere, Some(400.0)).unwrap_err().to_string();
     assert!(refused.contains("leave out --plane-at"), "{refused}");
 }
 
@@ -147,7 +147,7 @@ fn a_file_that_names_another_model_than_a_pinhole_camera_s_is_refused_by_that_na
         ("projection: fisheye", "projection: fisheye"),
         ("xi: 1.2", "xi"),
     ] {
-        let refused = read(more).unwrap_err();
+        let refused = read(more).unwrap_err().to_string();
         assert!(
             refused.contains(named) && refused.contains("pinhole"),
             "{refused}"

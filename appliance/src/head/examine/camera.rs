@@ -1,25 +1,41 @@
-//! Which moment the camera's time stamps mark: the start of the exposure, its end, or the end of
-//! the readout.
+//! The times of a camera that data sheets and drivers do not state reliably: which moment its time
+//! stamps mark, and how many refreshes it needs for each pattern.
 //!
-//! For a triggered camera it follows from the time between trigger and stamp. Drivers stamp in an
-//! interrupt, so stamps are later than the moment that they mark by a constant time and some
-//! jitter: the median of that time is measured, too, and subtracted from then on. For a
-//! free-running camera only the time from the stamp to the delivery of its frame is known: exposure
-//! and readout, the readout, or zero. The length of a readout is then taken as configured, and a
-//! time that fits none of the three is an error.
+//! The stamps mark the start of the exposure, its end, or the end of the readout. For a triggered
+//! camera it follows from the time between trigger and stamp. Drivers stamp in an interrupt, so
+//! stamps are later than the moment that they mark by a constant time and some jitter: the median
+//! of that time is measured, too, and subtracted from then on. For a free-running camera only the
+//! time from the stamp to the delivery of its frame is known: exposure and readout, the readout, or
+//! zero. The length of a readout is then taken as configured, and a time that fits none of the
+//! three is an error.
+//!
+//! A camera that is still being read out loses a trigger without a sign, and its data sheet leaves
+//! out its own delays. So triggers are fired at the spacing of a sequence and their frames are
+//! counted; the pace is the fewest refreshes at which no trigger is lost. They are fired a little
+//! closer than the refreshes, because in a sequence a trigger may come late and the next one on
+//! time.
 
-use super::{PATIENCE, refreshes};
+use super::{PATIENCE, load_black_and_white, refreshes};
 use hal::camera::{CameraTiming, Starts};
 use hal::error::Error;
 use hal::head::{Head, Showing, Stamp, TOLERANCE, Timing, WatchedFrame};
 use hal::projector::Raster;
 use hal::units::Timestamp;
+use std::collections::BTreeSet;
 use std::time::Duration;
 
 /// Showings over which frames are taken.
 const SHOWINGS: usize = 6;
 /// How late stamps may be; a longer time after the exposure is a readout.
 pub const MOST_LATE: Duration = Duration::from_micros(500);
+/// Triggers that are fired at each spacing. If one in twenty is lost, that remains unnoticed once
+/// in twenty measurements (0.95⁶⁰ = 0.046).
+const TRIGGERS: u32 = 60;
+/// By how much triggers are fired closer than the refreshes: as late as one may be in a plan of the
+/// sequencer.
+const CLOSER: Duration = Duration::from_nanos(TOLERANCE.as_nanos() as u64 / 2);
+/// Spacings that are tried beyond the shortest that the camera states, refreshes.
+const MORE: u32 = 3;
 
 /// What the time stamps mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,6 +210,99 @@ fn by_waiting(camera: &CameraTiming, frames: &[WatchedFrame<()>]) -> Result<Stam
             "set head.camera.delivery_us to the time of its readout (where stamps mark the end of the exposure, as on a Raspberry Pi, to the first number)",
         )),
     }
+}
+
+/// What became of triggers that were so many refreshes apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Spaced {
+    /// Refreshes from trigger to trigger.
+    pub refreshes: u32,
+    /// Triggers.
+    pub triggers: usize,
+    /// Frames.
+    pub frames: usize,
+}
+
+impl Spaced {
+    /// Whether each trigger gave a frame.
+    pub fn none_lost(&self) -> bool {
+        self.frames >= self.triggers
+    }
+
+    /// What was found, for people.
+    pub fn words(&self) -> String {
+        let Self {
+            refreshes,
+            triggers,
+            frames,
+        } = self;
+        format!("{frames} frames for {triggers} triggers {refreshes} refreshes apart")
+    }
+}
+
+/// Tries spacings from the shortest that the camera states on, until none of the triggers is lost.
+/// The last one tried is the last of the result, which is empty for a camera that runs by itself. A
+/// camera that the projector triggers takes one refresh in so many by itself.
+///
+/// # Errors
+/// The error of a device.
+pub fn pace(head: &mut Head) -> Result<Vec<Spaced>, Error> {
+    let (camera, refresh) = (head.camera_timing(), head.refresh());
+    let mut tried = Vec::new();
+    if camera.starts == Starts::ByItself {
+        return Ok(tried);
+    }
+    load_black_and_white(head)?;
+    if camera.starts == Starts::ByProjector {
+        return by_projector(head);
+    }
+    let least = refreshes(head, camera.period).clamp(1, 1000);
+    for refreshes in least..=least + MORE {
+        let showing = Showing {
+            index: 0,
+            refreshes: refreshes * TRIGGERS,
+            settle: 0,
+        };
+        let spacing = (refresh * refreshes).saturating_sub(CLOSER);
+        let seen = head.watch_spaced(&[showing], spacing, PATIENCE, &mut |_| ())?;
+        // A frame that arrives twice is one frame.
+        let frames: BTreeSet<u64> = seen.frames.iter().map(|frame| frame.count).collect();
+        tried.push(Spaced {
+            refreshes,
+            triggers: seen.triggers.len(),
+            frames: frames.len(),
+        });
+        if tried.last().is_some_and(Spaced::none_lost) {
+            break;
+        }
+    }
+    Ok(tried)
+}
+
+/// The largest distance of two frames of a camera that the projector triggers.
+fn by_projector(head: &mut Head) -> Result<Vec<Spaced>, Error> {
+    let refresh = head.refresh();
+    let showing = Showing {
+        index: 0,
+        refreshes: MORE * TRIGGERS,
+        settle: 0,
+    };
+    let frames = head.watch(&[showing], PATIENCE, &mut |_| ())?.frames;
+    let apart = frames.windows(2).filter_map(|pair| {
+        let [before, after] = pair else { return None };
+        // A frame that was lost on its way says nothing of the camera.
+        let next = after.count == before.count + 1;
+        next.then(|| after.start.since(before.start).as_secs_f64() / refresh.as_secs_f64())
+    });
+    let largest = apart.fold(0.0, f64::max).round() as u32;
+    Ok((largest > 0)
+        .then_some(Spaced {
+            refreshes: largest,
+            triggers: frames.len(),
+            frames: frames.len(),
+        })
+        .into_iter()
+        .collect())
 }
 
 #[cfg(test)]

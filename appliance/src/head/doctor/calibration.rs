@@ -1,9 +1,9 @@
-//! The doctor's check of what heights go by: how far heights by the measured reference plane are
-//! from those by the models.
+//! The doctor's checks of the calibration: camera and projector stand to each other as when they were
+//! calibrated, and heights by the measured reference plane agree with those by the models.
 
-use super::{Check, Checked, Subject};
+use super::{Check, CheckResult, Examination};
 use crate::head::calibration::{Calibration, HeightsBy};
-use crate::head::examine::PLATE_PITCH;
+use crate::head::examine::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX, PATIENCE, PLATE_PITCH};
 use crate::head::seam;
 use algo::geometry::Triangulator;
 use serde_json::json;
@@ -13,8 +13,33 @@ const SHARES: [f64; 3] = [-0.05, 0.0, 0.05];
 /// Largest RMS difference, mm.
 const MOST_MM: f64 = 0.1;
 
-pub(super) fn heights(subject: &mut Subject<'_>) -> Checked {
-    let calibration = subject.calibration;
+pub(super) fn geometry(examination: &mut Examination<'_>) -> CheckResult {
+    let calibration = examination.calibration;
+    if !examination.calibrated {
+        return Ok(Check::skipped(
+            "cannot be judged before the head is calibrated",
+        ));
+    }
+    let fringes = CrossedFringes::take(examination.head, calibration, PATIENCE, &|_| ())?;
+    let Some(seen) = fringes.compare(calibration)? else {
+        return Ok(Check::skipped(
+            "cannot be judged: too little of the picture shows fringes; put a larger part into view",
+        ));
+    };
+    let found = format!(
+        "projector points are {:.2} px off their epipolar lines (limit {MOST_DRIFT_PX} px, noise of a point {:.2} px)",
+        seen.rms, seen.noise
+    );
+    let measured = json!({
+        "epipolar_px": seen.rms, "offset_px": seen.offset, "gradient_px": seen.gradient,
+        "noise_px": seen.noise, "pixels": seen.pixels,
+    });
+    let moved = !(seen.rms <= MOST_DRIFT_PX);
+    Ok(Check::new(found, moved.then_some(DRIFT_REMEDY), measured))
+}
+
+pub(super) fn heights(examination: &mut Examination<'_>) -> CheckResult {
+    let calibration = examination.calibration;
     let Some((rms, most)) = difference(calibration) else {
         return Ok(Check::skipped(
             "cannot be compared: no reference plane was measured",
