@@ -2,7 +2,7 @@
 
 use super::entry::Entry;
 use super::reader::{Reader, read, rows};
-use super::{HistoryError, Result};
+use super::{HistoryError, HistoryResult};
 use rusqlite::{Connection, Transaction};
 use std::path::PathBuf;
 
@@ -41,7 +41,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn after(&self, seq: u32, limit: usize) -> Result<After> {
+    pub fn after(&self, seq: u32, limit: usize) -> HistoryResult<After> {
         let connection = self.open()?;
         let failed = |error: rusqlite::Error| HistoryError::of(self.path(), &error);
         let sized = connection.pragma_update(None, "cache_size", -CACHE);
@@ -69,7 +69,7 @@ impl After {
     ///
     /// # Errors
     /// As [`Reader::results`].
-    pub fn page(&mut self) -> Result<Page> {
+    pub fn page(&mut self) -> HistoryResult<Page> {
         // A transaction, so that limits and results are of one state of the history.
         let transaction = self.connection.unchecked_transaction();
         let most = self.left.min(PAGE);

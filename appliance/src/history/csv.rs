@@ -3,7 +3,7 @@
 use super::entry::{Entry, Filter};
 use super::reader::{Reader, condition, rows};
 use super::time::utc;
-use super::{HistoryError, Result};
+use super::{HistoryError, HistoryResult};
 use rusqlite::params_from_iter;
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -20,7 +20,7 @@ impl Reader {
     ///
     /// # Errors
     /// [`HistoryError`], also where `out` takes no more.
-    pub fn csv(&self, filter: &Filter, out: &mut dyn Write) -> Result<()> {
+    pub fn csv(&self, filter: &Filter, out: &mut dyn Write) -> HistoryResult<()> {
         let gauges = self.gauges(filter)?;
         let mut head = COLUMNS.to_owned();
         for (name, unit) in &gauges {
@@ -61,7 +61,7 @@ impl Reader {
     }
 
     /// Name and unit of every gauge of the results that pass the filter.
-    fn gauges(&self, filter: &Filter) -> Result<Vec<(String, String)>> {
+    fn gauges(&self, filter: &Filter) -> HistoryResult<Vec<(String, String)>> {
         let (condition, mut values) = condition(filter);
         values.push(i64::try_from(filter.limit).unwrap_or(i64::MAX).into());
         let query = format!(

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 /// What the thread is asked to do.
-enum Order {
+enum KeepingOrder {
     Keep(Box<JudgedPart>),
     MakeRoom,
     Stop,
@@ -20,7 +20,7 @@ enum Order {
 /// The way to the thread; nothing here waits.
 #[derive(Clone)]
 pub(super) struct Keeper {
-    orders: SyncSender<Order>,
+    orders: SyncSender<KeepingOrder>,
     /// A failed part waits or is being written: its frames are memory that the head cannot use, so
     /// there is one at a time.
     busy: Arc<AtomicBool>,
@@ -29,7 +29,7 @@ pub(super) struct Keeper {
 
 /// The thread's own side.
 pub(super) struct Keeping {
-    orders: Receiver<Order>,
+    orders: Receiver<KeepingOrder>,
     busy: Arc<AtomicBool>,
     recordings: Recordings,
     history: SyncSender<Message>,
@@ -73,7 +73,7 @@ impl Keeper {
         if self.busy.swap(true, Ordering::AcqRel) {
             return Err(Unkept::Busy);
         }
-        let sent = self.orders.try_send(Order::Keep(Box::new(part())));
+        let sent = self.orders.try_send(KeepingOrder::Keep(Box::new(part())));
         sent.map_err(|_| {
             self.busy.store(false, Ordering::Release);
             Unkept::Busy
@@ -84,13 +84,13 @@ impl Keeper {
     /// parts.
     pub(super) fn make_room(&self) {
         // With a full queue of orders it is asked again with the next result.
-        let _ = self.orders.try_send(Order::MakeRoom);
+        let _ = self.orders.try_send(KeepingOrder::MakeRoom);
     }
 
     /// Ends the thread once the orders before are done; it sends a message then.
     pub(super) fn stop(&self) {
         // With a full queue of orders the daemon ends without waiting for it.
-        let _ = self.orders.try_send(Order::Stop);
+        let _ = self.orders.try_send(KeepingOrder::Stop);
     }
 }
 
@@ -105,7 +105,7 @@ impl Keeping {
         self.bound();
         while let Ok(order) = self.orders.recv() {
             match order {
-                Order::Keep(part) => {
+                KeepingOrder::Keep(part) => {
                     let seq = part.record.seq;
                     let kept = self.recordings.keep(&part);
                     drop(part);
@@ -114,13 +114,13 @@ impl Keeping {
                     self.send(Message::Frames { seq, kept });
                     self.bound();
                 }
-                Order::MakeRoom => {
+                KeepingOrder::MakeRoom => {
                     if let Some(name) = self.recordings.remove_oldest() {
                         let why = Unkept::Room;
                         self.send(Message::Removed { name, why });
                     }
                 }
-                Order::Stop => break,
+                KeepingOrder::Stop => break,
             }
         }
         self.send(Message::RecordingsEnded);

@@ -42,7 +42,7 @@ mod tests;
 
 pub use entry::{Entry, Filter, GaugeEntry, difference};
 pub use handle::History;
-pub use open::{Opened, open};
+pub use open::{OpenedHistory, open};
 pub use reader::{Reader, Trend, TrendPoint};
 pub use recordings::{JudgedPart, RECIPE, name_of, seq_of};
 pub use seqs::Numbering;
@@ -79,8 +79,8 @@ pub struct HistoryError {
     pub aside: Option<String>,
 }
 
-/// What is asked of the history, unless another error is named.
-pub type Result<T, E = HistoryError> = std::result::Result<T, E>;
+/// What is asked of the history, or why it could not be read or written.
+pub type HistoryResult<T> = Result<T, HistoryError>;
 
 impl HistoryError {
     fn of(path: &std::path::Path, error: &rusqlite::Error) -> Self {

@@ -7,7 +7,7 @@ use super::seqs::{AHEAD, Numbering};
 use super::spool::{SLOTS, Spool, is_after};
 use super::task::Task;
 use super::writer::Writer;
-use super::{Bounds, DATABASE, HistoryError, RECORDINGS, Result};
+use super::{Bounds, DATABASE, HistoryError, HistoryResult, RECORDINGS};
 use crate::recipe::Store;
 use std::os::unix::fs::MetadataExt as _;
 use std::path::Path;
@@ -29,7 +29,7 @@ const PER_SECOND: u64 = 8;
 const YEAR_2026_S: u64 = 1_767_225_600;
 
 /// An opened history.
-pub struct Opened {
+pub struct OpenedHistory {
     /// The way to it.
     pub history: History,
     /// Its thread's side.
@@ -53,7 +53,7 @@ fn by_time(utc_s: u64) -> Option<u32> {
 ///
 /// # Errors
 /// If database, folder or counter can neither be opened nor begun.
-pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> Result<Opened> {
+pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> HistoryResult<OpenedHistory> {
     let failed = |what: &str, error: std::io::Error| HistoryError {
         path: state.join(what),
         reason: format!("{error}: free space"),
@@ -126,7 +126,7 @@ pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> Result<Opened
     };
     let task = Task::new(history.clone(), inbox, writer, keeping, waiting);
     let complaints = lost.into_iter().chain(complaint);
-    Ok(Opened {
+    Ok(OpenedHistory {
         history,
         task,
         next_seq: next,

@@ -33,7 +33,7 @@ const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
 /// Opens the lines again.
-pub type Open = Box<dyn Fn() -> Result<Wires> + Send + Sync>;
+pub type Reopen = Box<dyn Fn() -> Result<Wires> + Send + Sync>;
 
 /// Serves the lines until `stopped` is true; then they are released.
 ///
@@ -41,7 +41,7 @@ pub type Open = Box<dyn Fn() -> Result<Wires> + Send + Sync>;
 /// If the system gives no runtime.
 pub fn serve(
     wires: Wires,
-    open: &Open,
+    open: &Reopen,
     station: &StationHandle,
     progress: &Progress,
     mut stopped: watch::Receiver<bool>,
@@ -58,7 +58,7 @@ pub fn serve(
 }
 
 /// Follows the station for ever, and opens the lines again when they fail.
-async fn follow(mut wires: Wires, open: &Open, station: &StationHandle, progress: &Progress) {
+async fn follow(mut wires: Wires, open: &Reopen, station: &StationHandle, progress: &Progress) {
     loop {
         if let Err(error) = wires.follow(station).await {
             progress.log(&format!("{error}; opened again when it is there"));
@@ -69,7 +69,7 @@ async fn follow(mut wires: Wires, open: &Open, station: &StationHandle, progress
     }
 }
 
-async fn reopened(open: &Open, progress: &Progress) -> Wires {
+async fn reopened(open: &Reopen, progress: &Progress) -> Wires {
     let (mut wait, mut said) = (FIRST_WAIT, String::new());
     loop {
         tokio::time::sleep(wait).await;

@@ -150,7 +150,7 @@ fn good() -> Arc<Inspection> {
 }
 
 /// Serves `wires` while `course` runs.
-fn serving(wires: Wires, open: Open, station: &StationHandle, course: impl FnOnce()) {
+fn serving(wires: Wires, open: Reopen, station: &StationHandle, course: impl FnOnce()) {
     let (stop, stopped) = watch::channel(false);
     std::thread::scope(|scope| {
         let served = scope.spawn(|| serve(wires, &open, station, &Progress::new(true), stopped));
@@ -174,7 +174,7 @@ fn missed(station: &StationHandle) {
     }
 }
 
-fn never() -> Open {
+fn never() -> Reopen {
     Box::new(|| panic!("nothing is to be opened again"))
 }
 
@@ -259,7 +259,7 @@ fn lines_that_went_are_opened_again_and_say_what_is_true_then() {
     let (station, _orders) = ready();
     let (panel, again) = (Panel::default(), Panel::default());
     let found = again.clone();
-    let open: Open = Box::new(move || Ok(found.wires()));
+    let open: Reopen = Box::new(move || Ok(found.wires()));
     serving(panel.wires(), open, &station, || {
         panel.broken.store(true, Ordering::Relaxed);
         let message = "on purpose".into();

@@ -19,10 +19,10 @@ const MUTE: Duration = Duration::from_millis(250);
 
 /// The places of one server. Cheap to clone.
 #[derive(Clone, Debug)]
-pub struct Clients(Arc<Mutex<Table>>);
+pub struct Clients(Arc<Mutex<PlaceTable>>);
 
 #[derive(Debug)]
-struct Table {
+struct PlaceTable {
     limit: usize,
     next: u64,
     taken: Vec<Connection>,
@@ -40,7 +40,7 @@ struct Connection {
     _open: oneshot::Sender<()>,
 }
 
-impl Table {
+impl PlaceTable {
     fn admit(&mut self, may_write: bool, now: Instant) -> Option<(u64, oneshot::Receiver<()>)> {
         let readers = self.taken.iter().filter(|other| !other.may_write).count();
         let room = self.taken.len() < self.limit && (may_write || readers + 1 < self.limit);
@@ -78,7 +78,7 @@ impl Table {
 impl Clients {
     /// Room for `limit` connections.
     pub fn new(limit: usize) -> Self {
-        Self(Arc::new(Mutex::new(Table {
+        Self(Arc::new(Mutex::new(PlaceTable {
             limit,
             next: 0,
             taken: Vec::new(),
@@ -93,29 +93,29 @@ impl Clients {
     }
 
     /// A place for a new connection, or `None` if all are taken and none is idle.
-    pub(super) fn admit(&self, may_write: bool) -> Option<Place> {
+    pub(super) fn admit(&self, may_write: bool) -> Option<ConnectionPlace> {
         let (number, closed) = self.table().admit(may_write, Instant::now())?;
-        Some(Place {
+        Some(ConnectionPlace {
             clients: self.clone(),
             number,
             closed,
         })
     }
 
-    fn table(&self) -> MutexGuard<'_, Table> {
+    fn table(&self) -> MutexGuard<'_, PlaceTable> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// The place of one connection, given back when it is dropped.
 #[derive(Debug)]
-pub struct Place {
+pub struct ConnectionPlace {
     clients: Clients,
     number: u64,
     closed: oneshot::Receiver<()>,
 }
 
-impl Place {
+impl ConnectionPlace {
     /// A complete request was received.
     pub(super) fn spoke(&self) {
         let mut table = self.clients.table();
@@ -132,7 +132,7 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for ConnectionPlace {
     fn drop(&mut self) {
         let mut table = self.clients.table();
         table.taken.retain(|other| other.number != self.number);
@@ -143,15 +143,15 @@ impl Drop for Place {
 mod tests {
     use super::*;
 
-    fn table(limit: usize) -> Table {
-        Table {
+    fn table(limit: usize) -> PlaceTable {
+        PlaceTable {
             limit,
             next: 0,
             taken: Vec::new(),
         }
     }
 
-    fn numbers(table: &Table) -> Vec<u64> {
+    fn numbers(table: &PlaceTable) -> Vec<u64> {
         table.taken.iter().map(|taken| taken.number).collect()
     }
 

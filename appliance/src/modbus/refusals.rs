@@ -12,7 +12,7 @@ const PAUSE: Duration = Duration::from_secs(10);
 
 /// What was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refused {
+pub enum RefusedPeer {
     /// A connection from outside the subnets that may read.
     Connection,
     /// A connection while all others are in use and none is idle.
@@ -21,7 +21,7 @@ pub enum Refused {
     Write,
 }
 
-impl Refused {
+impl RefusedPeer {
     fn words(self) -> &'static str {
         match self {
             Self::Connection => {
@@ -73,7 +73,7 @@ impl Refusals {
     }
 
     /// Logs a refusal, or counts it for the next line.
-    pub(super) fn note(&self, refused: Refused, peer: IpAddr) {
+    pub(super) fn note(&self, refused: RefusedPeer, peer: IpAddr) {
         let mut limits = self.limits.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(silent) = limits[refused as usize].pass(Instant::now()) else {
             return;

@@ -11,7 +11,7 @@ use tokio_modbus::{ExceptionCode, Request, Response, SlaveRequest};
 use super::blocks::block_words;
 use super::decode::{coil_write, control_write};
 use super::map;
-use super::refusals::{Refusals, Refused};
+use super::refusals::{Refusals, RefusedPeer};
 use crate::config::WordOrder;
 use crate::station::{ConnectionEdges, ControlWrite, Identity, Snapshot, StationHandle};
 
@@ -64,7 +64,7 @@ impl PlcService {
             return Err(ExceptionCode::GatewayTargetDevice);
         }
         if !self.may_write && writes(&request) {
-            self.refusals.note(Refused::Write, self.peer);
+            self.refusals.note(RefusedPeer::Write, self.peer);
             return Err(ExceptionCode::IllegalFunction);
         }
         // A flawed frame was replaced by an empty one of its function, which must not be carried

@@ -22,7 +22,7 @@ use crate::config::HeadConfig;
 use crate::head::calibration::Current;
 use crate::head::placed::Placed;
 use crate::history::{History, JudgedPart};
-use crate::production::backend::Opened;
+use crate::production::backend::OpenedHead;
 use crate::production::commissioning::Commission;
 use crate::production::commissioning::live::Look;
 use crate::production::drift::Watch;
@@ -81,7 +81,7 @@ const ABORTED: &str = "the PLC or a stop ended it";
 /// Everything that the measuring task owns.
 pub struct Worker {
     /// The head and its calibration.
-    pub opened: Opened,
+    pub opened: OpenedHead,
     /// Where the calibration is published for the page.
     pub calibration: Current,
     /// Computing threads.
@@ -243,7 +243,7 @@ impl Worker {
     /// Reports whether the head's calibration can be trusted, and what is known of the head.
     fn tell_condition(&mut self) {
         self.tell_head();
-        let Opened {
+        let OpenedHead {
             problem,
             fallback,
             dark,

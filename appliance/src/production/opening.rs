@@ -5,7 +5,7 @@ use super::Order;
 use super::recovery::{Pause, REMEDY};
 use crate::config::{Backend, HeadConfig};
 use crate::error::{Exit, Failure, Result, code_of};
-use crate::production::backend::{self, Opened};
+use crate::production::backend::{self, OpenedHead};
 use crate::station::{Event, StationHandle, error_code};
 use crate::system::computing::Computing;
 use crate::system::memory;
@@ -41,7 +41,7 @@ impl Opening<'_> {
         &self,
         orders: &Receiver<Order>,
         outcome: &Sender<Result<Option<Stage>>>,
-    ) -> Option<(Opened, Event)> {
+    ) -> Option<(OpenedHead, Event)> {
         let on_progress = |share: f64| {
             self.pulse.beat();
             self.station.event(Event::Alive);

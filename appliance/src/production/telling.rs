@@ -17,11 +17,11 @@ pub(super) struct Telling<'a> {
     pub bar: &'a Progress,
     pub aborts: &'a Aborts,
     pub job: JobId,
-    last: Mutex<Option<Told>>,
+    last: Mutex<Option<Reported>>,
 }
 
 /// What was told last.
-struct Told {
+struct Reported {
     at: Instant,
     share: f64,
     words: String,
@@ -63,7 +63,7 @@ impl<'a> Telling<'a> {
                     words: words.into(),
                 });
                 let (at, words) = (Instant::now(), words.to_owned());
-                *last = Some(Told { at, share, words });
+                *last = Some(Reported { at, share, words });
             }
         }
         !self.aborts.has(self.job)

@@ -19,7 +19,7 @@ use rooms::Rooms;
 use crate::config::{Backend, Config};
 use crate::error::{Exit, Result};
 use crate::head::calibration::Current;
-use crate::history::{self, Bounds, History, Numbering, Opened, Reader};
+use crate::history::{self, Bounds, History, Numbering, OpenedHistory, Reader};
 use crate::modbus;
 use crate::production::backend;
 use crate::production::commissioning::Commission;
@@ -109,7 +109,7 @@ impl Daemon {
         let (plc, page) = runtime.block_on(listen(config))?;
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
         let (orders, inbox) = mpsc::channel();
-        let Opened {
+        let OpenedHistory {
             history,
             task,
             next_seq,
@@ -262,7 +262,7 @@ fn left_of(state: &StateFolder, acknowledged: Option<u32>, progress: &Progress) 
     }
 }
 
-fn open_history(config: &Config, state: &StateFolder) -> Result<Opened> {
+fn open_history(config: &Config, state: &StateFolder) -> Result<OpenedHistory> {
     let bounds = Bounds {
         results: u64::from(config.history.results),
         recordings: u64::from(config.history.recordings_mib) << 20,

@@ -68,7 +68,7 @@ impl Rooms<'_> {
     pub fn lines(&self, wires: Wires) -> Room {
         let (station, progress) = (self.station.clone(), self.progress.clone());
         let (setup, stopped) = (self.config.lines.clone(), self.stopped.clone());
-        let open: lines::Open = Box::new(move || backend::lines(&setup));
+        let open: lines::Reopen = Box::new(move || backend::lines(&setup));
         spawn("lines", move || {
             if let Err(failure) = lines::serve(wires, &open, &station, &progress, stopped) {
                 progress.warn(&failure.to_string());

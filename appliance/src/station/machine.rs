@@ -10,7 +10,7 @@ use serde::Serialize;
 use super::clock::{Clock, Micros};
 use super::control;
 use super::event::{Condition, Effect, Effects, JobId, MAX_EFFECTS};
-use super::fault::Failure;
+use super::fault::LastFailure;
 use super::health::Health;
 use super::plc::Plc;
 use super::recipes::Recipes;
@@ -18,7 +18,7 @@ use super::requests::Requests;
 use super::results::{Buffered, Results};
 use super::state::State;
 use super::turns::Turns;
-use super::worker::Worker;
+use super::worker::WorkerState;
 
 /// How long the worker may be silent, by what it does: a slow one tells how far it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,9 +95,9 @@ pub struct Station {
     pub(super) requests: Requests,
     pub(super) turns: Turns,
     pub(super) recipes: Recipes,
-    pub(super) worker: Worker,
+    pub(super) worker: WorkerState,
     pub(super) results: Results,
-    pub(super) failure: Option<Failure>,
+    pub(super) failure: Option<LastFailure>,
     /// The load, teach or step of commissioning in which the worker fell silent; it goes on with the
     /// next sign of life.
     pub(super) suspended: Option<State>,
@@ -121,7 +121,7 @@ impl Station {
             requests: Requests::default(),
             turns: Turns::default(),
             recipes: Recipes::default(),
-            worker: Worker::new(now),
+            worker: WorkerState::new(now),
             results: Results::new(settings.next_seq, &settings.buffered),
             failure: None,
             suspended: None,

@@ -39,11 +39,11 @@ const PAUSE: Micros = Micros::from_millis(1000);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Turns {
     last: Client,
-    waiting: Option<Waiting>,
+    waiting: Option<WaitingClient>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Waiting {
+struct WaitingClient {
     client: Client,
     rejected: u32,
     /// When it asked last.
@@ -78,7 +78,7 @@ impl Turns {
         if before.is_some_and(|waiting| waiting.client != client) {
             return;
         }
-        self.waiting = Some(Waiting {
+        self.waiting = Some(WaitingClient {
             client,
             rejected: before.map_or(0, |waiting| waiting.rejected) + 1,
             at: now,

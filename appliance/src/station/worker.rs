@@ -9,7 +9,7 @@ const BEAT: Micros = Micros::from_millis(100);
 
 /// The worker as seen from the station.
 #[derive(Debug, Clone)]
-pub(super) struct Worker {
+pub(super) struct WorkerState {
     /// The last order.
     pub(super) last_job: JobId,
     /// The time of its last event.
@@ -19,7 +19,7 @@ pub(super) struct Worker {
     next_beat: Micros,
 }
 
-impl Worker {
+impl WorkerState {
     /// A worker that was started at `now` and has no orders yet.
     pub(super) fn new(now: Micros) -> Self {
         Self {
@@ -56,7 +56,7 @@ mod tests {
 
     #[test]
     fn late_ticks_are_made_up_for_and_missed_deadlines_are_not() {
-        let mut worker = Worker::new(Micros(0));
+        let mut worker = WorkerState::new(Micros(0));
         let ms = Micros::from_millis;
         worker.beat(true, ms(99));
         assert_eq!(worker.heartbeat, 0);

@@ -76,11 +76,11 @@ fn begun() -> bool {
 
 /// What is handed over to the thread.
 struct Outbox {
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<WaitingLines>,
     changed: Condvar,
 }
 
-struct Waiting {
+struct WaitingLines {
     /// Whole lines.
     lines: String,
     /// Lines behind them that found no room.
@@ -95,7 +95,7 @@ struct Waiting {
     detached: bool,
 }
 
-impl Waiting {
+impl WaitingLines {
     fn is_empty(&self) -> bool {
         self.lines.is_empty() && self.lost == 0 && self.bar.is_none()
     }
@@ -103,7 +103,7 @@ impl Waiting {
 
 impl Outbox {
     const fn new() -> Self {
-        let waiting = Waiting {
+        let waiting = WaitingLines {
             lines: String::new(),
             lost: 0,
             bar: None,
@@ -117,7 +117,7 @@ impl Outbox {
         }
     }
 
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+    fn waiting(&self) -> MutexGuard<'_, WaitingLines> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -144,12 +144,12 @@ impl Outbox {
     }
 
     /// Wakes the thread, and waits until it is done unless detached.
-    fn hand_over(&self, mut waiting: MutexGuard<'_, Waiting>) {
+    fn hand_over(&self, mut waiting: MutexGuard<'_, WaitingLines>) {
         waiting.handed += 1;
         self.changed.notify_all();
         if !waiting.detached {
             let handed = waiting.handed;
-            let ahead = |waiting: &mut Waiting| waiting.done < handed;
+            let ahead = |waiting: &mut WaitingLines| waiting.done < handed;
             drop(self.changed.wait_while(waiting, ahead));
         }
     }
@@ -158,7 +158,7 @@ impl Outbox {
         self.show(None);
         let waiting = self.waiting();
         let handed = waiting.handed;
-        let ahead = |waiting: &mut Waiting| waiting.done < handed;
+        let ahead = |waiting: &mut WaitingLines| waiting.done < handed;
         drop(self.changed.wait_timeout_while(waiting, LAST, ahead));
     }
 

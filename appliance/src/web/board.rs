@@ -5,19 +5,19 @@ use axum::http::header;
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
 
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::query::Query;
 use crate::head::board::parse;
 use crate::output::board::sheet;
 
 /// Which board is wanted.
 #[derive(Debug, Deserialize)]
-pub(super) struct Wanted {
+pub(super) struct BoardQuery {
     #[serde(default)]
     board: String,
 }
 
-pub(super) async fn pdf(Query(wanted): Query<Wanted>) -> Result<Response> {
+pub(super) async fn pdf(Query(wanted): Query<BoardQuery>) -> Answered<Response> {
     let board =
         parse(&wanted.board).map_err(|error| Problem::unclear(format!("board: {error}")))?;
     let sheet = sheet(&board).map_err(|error| Problem::unfit(format!("board: {error}")))?;

@@ -9,7 +9,7 @@ use serde::de::DeserializeOwned;
 use tokio::sync::{OwnedSemaphorePermit, mpsc};
 use tokio_stream::StreamExt as _;
 
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::site::Site;
 use crate::error::shortened;
 use crate::recipe::incoming::Incoming;
@@ -29,7 +29,7 @@ const FILE_TIME: Duration = Duration::from_secs(120);
 ///
 /// # Errors
 /// It is too long, too slow, or not the JSON of a `T`.
-pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T> {
+pub async fn json<T: DeserializeOwned>(body: Body) -> Answered<T> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
     parsed(&bytes)
 }
@@ -38,7 +38,7 @@ pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T> {
 ///
 /// # Errors
 /// As [`json`].
-pub async fn edit<T: DeserializeOwned>(body: Body) -> Result<T> {
+pub async fn edit<T: DeserializeOwned>(body: Body) -> Answered<T> {
     let bytes = read(body, MAX_EDIT, JSON_TIME).await?;
     parsed(&bytes)
 }
@@ -47,7 +47,7 @@ pub async fn edit<T: DeserializeOwned>(body: Body) -> Result<T> {
 ///
 /// # Errors
 /// As [`json`].
-pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Result<T> {
+pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Answered<T> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
     match bytes.is_empty() {
         true => Ok(T::default()),
@@ -55,7 +55,7 @@ pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Result<T>
     }
 }
 
-fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
+fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Answered<T> {
     serde_json::from_slice(bytes).map_err(|error| {
         let error = shortened(&error.to_string());
         Problem::unclear(format!("the request's JSON: {error}"))
@@ -74,7 +74,7 @@ pub struct Upload {
 ///
 /// # Errors
 /// Too many files are being received; it is too long or too slow; or there is no room for it.
-pub async fn file(site: &Site, body: Body) -> Result<Upload> {
+pub async fn file(site: &Site, body: Body) -> Answered<Upload> {
     let place = site.arriving.clone().try_acquire_owned().map_err(|_| {
         Problem::crowded("other files are being imported: wait until they are done")
     })?;
@@ -103,7 +103,7 @@ pub async fn file(site: &Site, body: Body) -> Result<Upload> {
 }
 
 /// Sends a body to `chunks` piece by piece, until the receiver is gone.
-async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<()> {
+async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Answered<()> {
     let mut body = body.into_data_stream();
     let mut left = MAX_FILE;
     while let Some(chunk) = body.next().await {
@@ -120,7 +120,7 @@ async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<()> {
     Ok(())
 }
 
-async fn read(body: Body, most: usize, time: Duration) -> Result<Bytes> {
+async fn read(body: Body, most: usize, time: Duration) -> Answered<Bytes> {
     let read = async {
         to_bytes(body, most)
             .await
@@ -129,7 +129,7 @@ async fn read(body: Body, most: usize, time: Duration) -> Result<Bytes> {
     in_time(time, read).await
 }
 
-async fn in_time<T>(time: Duration, work: impl Future<Output = Result<T>>) -> Result<T> {
+async fn in_time<T>(time: Duration, work: impl Future<Output = Answered<T>>) -> Answered<T> {
     tokio::time::timeout(time, work).await.unwrap_or_else(|_| {
         let words = format!(
             "the request's body did not come within {} s",

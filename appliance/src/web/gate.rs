@@ -10,7 +10,7 @@ use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 
 use super::host::only;
-use super::problem::{Outcome, Problem, Result};
+use super::problem::{Answered, Problem, ProblemWords};
 use super::site::Site;
 use crate::system::clock;
 use crate::system::journal::{self, Severity};
@@ -25,7 +25,7 @@ pub struct Peer(pub IpAddr);
 
 /// The name of a change in the record.
 #[derive(Clone, Copy, Debug)]
-pub struct Action(pub &'static str);
+pub struct ChangeName(pub &'static str);
 
 /// What a change has changed, in words: an extension of the answer, for the record.
 #[derive(Clone, Debug)]
@@ -52,7 +52,7 @@ pub fn is_signed_in(site: &Site, headers: &HeaderMap) -> bool {
 ///
 /// # Errors
 /// How to sign in.
-pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Result<()> {
+pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Answered<()> {
     let words = "sign in first: POST the device's secret to /api/session";
     let refused = || Problem::new(StatusCode::UNAUTHORIZED, words);
     is_signed_in(site, headers)
@@ -87,7 +87,7 @@ fn is_own(headers: &HeaderMap) -> bool {
 pub async fn signed_in_only(
     site: Site,
     Extension(Peer(from)): Extension<Peer>,
-    Extension(Action(action)): Extension<Action>,
+    Extension(ChangeName(action)): Extension<ChangeName>,
     request: Request,
     next: Next,
 ) -> Response {
@@ -96,10 +96,10 @@ pub async fn signed_in_only(
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     };
-    let refused = response.extensions().get::<Outcome>();
+    let refused = response.extensions().get::<ProblemWords>();
     let changed = response.extensions().get::<Changed>();
     let outcome = match refused {
-        Some(Outcome(words)) => Err(words.clone()),
+        Some(ProblemWords(words)) => Err(words.clone()),
         None => Ok(changed.map(|Changed(words)| words.clone())),
     };
     record(&site, from, action, subject, outcome).await;

@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::body;
 use super::gate::signed_in;
 use super::orders::{Accepted, accepted, not_now};
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::query::{Path, Query};
 use super::site::{Site, alone};
 use crate::head::board;
@@ -59,7 +59,7 @@ pub(super) async fn step(
     site: Site,
     Path(name): Path<String>,
     request: Request,
-) -> Result<Accepted> {
+) -> Answered<Accepted> {
     let asked = asked(&site, &name, request.into_body()).await?;
     if site.simulation.is_placing() {
         return Err(Problem::busy(format!(
@@ -77,7 +77,7 @@ pub(super) async fn step(
     Ok(accepted())
 }
 
-pub(super) async fn end(site: Site, Path(name): Path<String>) -> Result<Accepted> {
+pub(super) async fn end(site: Site, Path(name): Path<String>) -> Answered<Accepted> {
     if !site.commission.is_running(&name) {
         let words = format!("end the step {name}: it is not running");
         return Err(Problem::busy(words));
@@ -86,7 +86,7 @@ pub(super) async fn end(site: Site, Path(name): Path<String>) -> Result<Accepted
     Ok(accepted())
 }
 
-async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked> {
+async fn asked(site: &Site, name: &str, body: Body) -> Answered<Asked> {
     let step = Step::of(name).ok_or_else(|| {
         let [before @ .., last] = STEPS.each_ref().map(|step| step.name);
         let before = before.join(", ");
@@ -110,7 +110,7 @@ async fn asked(site: &Site, name: &str, body: Body) -> Result<Asked> {
     })
 }
 
-fn exposure(site: &Site, wanted: Exposure) -> Result<Option<(Exposing, bool)>> {
+fn exposure(site: &Site, wanted: Exposure) -> Answered<Option<(Exposing, bool)>> {
     let head = site.commission.head();
     let head = head.ok_or_else(|| Problem::busy("set the exposure: no head is open"))?;
     let exposing = Exposing {
@@ -154,7 +154,7 @@ fn geometry(site: &Site, wanted: Action) -> Result<Poses, String> {
 
 /// What a live picture is to show.
 #[derive(Debug, Deserialize)]
-pub(super) struct Shown {
+pub(super) struct LiveQuery {
     #[serde(default)]
     show: String,
 }
@@ -162,8 +162,8 @@ pub(super) struct Shown {
 pub(super) async fn live(
     site: Site,
     headers: HeaderMap,
-    Query(shown): Query<Shown>,
-) -> Result<Response> {
+    Query(shown): Query<LiveQuery>,
+) -> Answered<Response> {
     signed_in(&site, &headers)?;
     let Some(show) = Show::parse(&shown.show) else {
         let words = Show::ALL.map(Show::word).join(", ");
@@ -187,7 +187,7 @@ pub(super) async fn live(
     Ok(response)
 }
 
-pub(super) async fn figures(site: Site, headers: HeaderMap) -> Result<Json<Value>> {
+pub(super) async fn figures(site: Site, headers: HeaderMap) -> Answered<Json<Value>> {
     signed_in(&site, &headers)?;
     let words = "no live picture was taken yet: ask for one first";
     site.live
@@ -196,7 +196,7 @@ pub(super) async fn figures(site: Site, headers: HeaderMap) -> Result<Json<Value
         .ok_or_else(|| Problem::missing(words))
 }
 
-pub(super) async fn pose(site: Site, Path(number): Path<u32>) -> Result<Response> {
+pub(super) async fn pose(site: Site, Path(number): Path<u32>) -> Answered<Response> {
     let png = site
         .aside(move |site| {
             let picture = site.commission.pose_picture(number);

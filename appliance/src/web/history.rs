@@ -4,8 +4,8 @@ use axum::response::{Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::downloads::{Content, Packed, send, unpacked};
-use super::problem::{Problem, Result};
+use super::downloads::{Download, Packed, send, unpacked};
+use super::problem::{Answered, Problem};
 use super::query::{Path, Query};
 use super::site::Site;
 use crate::history::{Filter, HistoryError};
@@ -26,7 +26,7 @@ impl From<HistoryError> for Problem {
 /// The query of a request for results.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Wanted {
+pub(super) struct ResultsQuery {
     recipe: Option<u16>,
     verdict: Option<String>,
     part_id: Option<u32>,
@@ -36,10 +36,10 @@ pub(super) struct Wanted {
     limit: Option<usize>,
 }
 
-impl Wanted {
+impl ResultsQuery {
     /// The filter, of the `usual` number of results unless asked for another one, and at `most`
     /// that many.
-    fn filter(self, usual: usize, most: usize) -> Result<Filter> {
+    fn filter(self, usual: usize, most: usize) -> Answered<Filter> {
         let judged = |word: String| {
             let words = format!("verdict={word}: write PASS, FAIL or INVALID");
             Verdict::of_word(&word).ok_or_else(|| Problem::unclear(words))
@@ -57,7 +57,7 @@ impl Wanted {
     }
 }
 
-pub(super) async fn list(site: Site, Query(wanted): Query<Wanted>) -> Result<Json<Value>> {
+pub(super) async fn list(site: Site, Query(wanted): Query<ResultsQuery>) -> Answered<Json<Value>> {
     let filter = wanted.filter(PAGE, MAX_PAGE)?;
     let found = site.aside(move |site| {
         let results = site.history.results(&filter)?;
@@ -75,17 +75,17 @@ pub(super) async fn list(site: Site, Query(wanted): Query<Wanted>) -> Result<Jso
 /// The most results of one CSV, so that it fits into memory.
 const MAX_CSV: usize = 20_000;
 
-pub(super) async fn csv(site: Site, Query(wanted): Query<Wanted>) -> Result<Response> {
+pub(super) async fn csv(site: Site, Query(wanted): Query<ResultsQuery>) -> Answered<Response> {
     let filter = wanted.filter(MAX_CSV, MAX_CSV)?;
     send(&site, "text/csv; charset=utf-8", move |site| {
         let mut bytes = Vec::new();
         site.history.csv(&filter, &mut bytes)?;
-        Ok(("history.csv".into(), Content::Bytes(bytes)))
+        Ok(("history.csv".into(), Download::Bytes(bytes)))
     })
     .await
 }
 
-pub(super) async fn recording(site: Site, Path(seq): Path<u32>) -> Result<Response> {
+pub(super) async fn recording(site: Site, Path(seq): Path<u32>) -> Answered<Response> {
     send(&site, "application/zip", move |site| {
         let words = format!("the frames of result {seq} were not kept");
         let kept = site.history.recording(seq)?;
@@ -94,13 +94,13 @@ pub(super) async fn recording(site: Site, Path(seq): Path<u32>) -> Result<Respon
         let name = kept.file_name().unwrap_or_default().to_string_lossy();
         let packed = Packed::of(&kept, name.into_owned());
         let packed = packed.map_err(|error| Problem::broken(unpacked(error)))?;
-        Ok((format!("{seq}-recording.zip"), Content::Folder(packed)))
+        Ok((format!("{seq}-recording.zip"), Download::Folder(packed)))
     })
     .await
 }
 
 /// The last values of each gauge of the active recipe.
-pub(super) async fn trends(site: Site) -> Result<Json<Value>> {
+pub(super) async fn trends(site: Site) -> Answered<Json<Value>> {
     let active = site.station.snapshot().active();
     let recipe = active.ok_or_else(|| Problem::missing("no recipe is active: load one"))?;
     let read = site.aside(move |site| {

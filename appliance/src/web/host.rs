@@ -7,13 +7,13 @@
 use axum::http::{HeaderMap, HeaderName, StatusCode, Uri, header};
 use std::net::{IpAddr, Ipv6Addr};
 
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 
 /// Checks that a request names one host, and that this is the device.
 ///
 /// # Errors
 /// 400 where it names several, 421 where it names none or another.
-pub fn check(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Result<()> {
+pub fn check(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Answered<()> {
     let host = only(headers, &header::HOST);
     let several = headers.get_all(header::HOST).iter().count() > 1;
     // The request line may name a host, too.

@@ -13,7 +13,7 @@ use tokio::task::{JoinError, spawn_blocking};
 
 use super::look::{Level, found, map_of, place_of};
 use super::map::Map;
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::query::{Path, Query};
 use super::site::Site;
 use crate::error::{Exit, Failure};
@@ -25,7 +25,7 @@ use crate::system::priority;
 
 const OTHER_FRAMES: &str = "the recording's frames are not those of its recipe";
 
-pub(super) async fn one(site: Site, Path(seq): Path<u32>) -> Result<Json<Value>> {
+pub(super) async fn one(site: Site, Path(seq): Path<u32>) -> Answered<Json<Value>> {
     let found = site.aside(move |site| {
         let entry = site.history.result(seq)?;
         let entry = entry.ok_or_else(|| unknown(seq))?;
@@ -43,7 +43,7 @@ pub(super) async fn picture(
     site: Site,
     Path((seq, layer)): Path<(u32, String)>,
     Query(level): Query<Level>,
-) -> Result<Map> {
+) -> Answered<Map> {
     let at = place_of(&layer)?;
     // Waiting here takes no thread from other requests.
     let mut last = site.kept.clone().lock_owned().await;
@@ -63,7 +63,7 @@ pub(super) async fn picture(
 }
 
 /// What was found on a kept part.
-pub(super) async fn features(site: Site, Path(seq): Path<u32>) -> Result<Json<Value>> {
+pub(super) async fn features(site: Site, Path(seq): Path<u32>) -> Answered<Json<Value>> {
     // One part at a time, as for pictures.
     let place = site.kept.clone().lock_owned().await;
     let worked = spawn_blocking(move || {
@@ -81,7 +81,7 @@ fn failed(_: JoinError) -> Problem {
 }
 
 /// The entry of a kept part, and the folder with its frames.
-pub(super) fn recording(site: &Site, seq: u32) -> Result<(Entry, PathBuf)> {
+pub(super) fn recording(site: &Site, seq: u32) -> Answered<(Entry, PathBuf)> {
     let entry = site.history.result(seq)?.ok_or_else(|| unknown(seq))?;
     if let Some(words) = why_no_frames(&entry) {
         let words = format!("the frames of result {seq} are not kept: {words}");
@@ -96,7 +96,7 @@ fn judged<T: Send>(
     site: &Site,
     seq: u32,
     work: impl FnOnce(&Entry, &Plan, usize, &Kept) -> T + Send,
-) -> Result<T> {
+) -> Answered<T> {
     let (entry, folder) = recording(site, seq)?;
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)

@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::map::{Drawn, Map, Plane, map, surface, usual_stride};
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::query::{Path, Query};
 use super::site::Site;
 use super::view;
@@ -68,7 +68,7 @@ impl Level {
     ///
     /// # Errors
     /// There is no such level.
-    pub(super) fn stride(self, width: usize) -> Result<usize> {
+    pub(super) fn stride(self, width: usize) -> Answered<usize> {
         match self.level {
             None => Ok(usual_stride(width)),
             Some(level) if level <= MAX_LEVEL => Ok(1 << level),
@@ -90,7 +90,7 @@ pub(super) fn found(
     })
 }
 
-pub(super) async fn features(site: Site) -> Result<Response> {
+pub(super) async fn features(site: Site) -> Answered<Response> {
     site.aside(|site| {
         let asked = site.last_cycle.ask(|part| {
             let (_, features) = part.plan.look(part.sequence, &part.frames);
@@ -115,7 +115,7 @@ pub(super) async fn picture(
     site: Site,
     Path(layer): Path<String>,
     Query(level): Query<Level>,
-) -> Result<Response> {
+) -> Answered<Response> {
     site.aside(move |site| {
         let at = place_of(&layer)?;
         let Some((seq, layers)) = site.last_cycle.layers(site.last_seq()) else {
@@ -127,7 +127,7 @@ pub(super) async fn picture(
 }
 
 /// What teaching took for the part, and the place for which it was refused.
-pub(super) async fn part_seen(site: Site) -> Result<Response> {
+pub(super) async fn part_seen(site: Site) -> Answered<Response> {
     site.aside(|site| {
         let Some(seen) = site.seen.get() else {
             let words = "nothing was taught since the start";
@@ -150,7 +150,7 @@ pub(super) async fn part_seen(site: Site) -> Result<Response> {
 ///
 /// # Errors
 /// If there is no such picture.
-pub(super) fn place_of(layer: &str) -> Result<usize> {
+pub(super) fn place_of(layer: &str) -> Answered<usize> {
     let at = LAYERS.iter().position(|known| *known == layer);
     at.ok_or_else(|| Problem::missing("there are height, deviation, modulation and surface"))
 }
@@ -159,7 +159,7 @@ pub(super) fn place_of(layer: &str) -> Result<usize> {
 ///
 /// # Errors
 /// There is no such level.
-pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Result<Map> {
+pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Answered<Map> {
     let limit = layers.shown.gauge.as_ref().and_then(|gauge| {
         let limits = [gauge.low, gauge.high].into_iter().flatten();
         limits.map(f64::abs).max_by(f64::total_cmp)
@@ -239,7 +239,7 @@ pub(super) async fn registers(site: Site) -> Json<Value> {
     Json((site.registers)(&site.station.snapshot()))
 }
 
-pub(super) async fn log(site: Site) -> Result<Json<Value>> {
+pub(super) async fn log(site: Site) -> Answered<Json<Value>> {
     let lines = site
         .aside(|site| Ok(dated(site, site.log.latest())))
         .await?;
@@ -261,7 +261,7 @@ fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
     lines
 }
 
-pub(super) async fn changes(site: Site) -> Result<Json<Value>> {
+pub(super) async fn changes(site: Site) -> Answered<Json<Value>> {
     let lines = site
         .aside(|site| {
             let read = site.access.changes().latest();

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::body;
 use super::gate;
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::query::Path;
 use super::site::Site;
 use crate::recipe::bounds::check_marking;
@@ -55,7 +55,7 @@ fn edge(site: &Site, rising: u16, headers: &HeaderMap) -> Arc<Snapshot> {
     })
 }
 
-pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Result<Accepted> {
+pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Answered<Accepted> {
     let before = site.station.snapshot().triggers;
     let after = edge(&site, TRIGGER, &headers);
     if after.triggers == before {
@@ -64,7 +64,7 @@ pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Result<Accepted> 
     Ok(accepted())
 }
 
-pub(super) async fn reset(site: Site, headers: HeaderMap) -> Result<Accepted> {
+pub(super) async fn reset(site: Site, headers: HeaderMap) -> Answered<Accepted> {
     let after = edge(&site, ERROR_RESET, &headers);
     match &after.fault {
         None => Ok(accepted()),
@@ -75,7 +75,7 @@ pub(super) async fn reset(site: Site, headers: HeaderMap) -> Result<Accepted> {
     }
 }
 
-pub(super) async fn load(site: Site, Path(number): Path<u16>) -> Result<Accepted> {
+pub(super) async fn load(site: Site, Path(number): Path<u16>) -> Answered<Accepted> {
     begin_load(&site, number)?;
     Ok(accepted())
 }
@@ -121,7 +121,7 @@ pub(super) async fn reload(site: &Site, number: u16) -> Reload {
 ///
 /// # Errors
 /// It loads or teaches a recipe.
-pub(super) fn recipes_unused(site: &Site, what: &str) -> Result<()> {
+pub(super) fn recipes_unused(site: &Site, what: &str) -> Answered<()> {
     let snapshot = site.station.snapshot();
     match snapshot.state_word {
         "loading" | "teaching" => Err(not_now(what, &snapshot)),
@@ -133,7 +133,7 @@ pub(super) fn recipes_unused(site: &Site, what: &str) -> Result<()> {
 ///
 /// # Errors
 /// The station is busy.
-pub(super) fn begin_load(site: &Site, number: u16) -> Result<()> {
+pub(super) fn begin_load(site: &Site, number: u16) -> Answered<()> {
     let key = RecipeKey::Number(number);
     let after = site.station.event(Event::Request(Request::Load(key)));
     if after.state_word == "loading" {
@@ -146,7 +146,7 @@ pub(super) fn begin_load(site: &Site, number: u16) -> Result<()> {
 /// What may happen to a recipe that has the number already; without a body it is not replaced.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct Wanted {
+struct TeachRequest {
     /// It may be replaced; it stays as the previous generation.
     replace: bool,
     /// Its regions, gauges and limits stay.
@@ -163,7 +163,7 @@ pub(super) async fn teach(
     site: Site,
     Path(number): Path<u16>,
     request: Asked<Body>,
-) -> Result<Accepted> {
+) -> Answered<Accepted> {
     if !(1..=MAX_RECIPE).contains(&number) {
         return Err(Problem::unfit(format!(
             "recipe {number}: numbers are 1 to {MAX_RECIPE}"
@@ -179,7 +179,7 @@ pub(super) async fn teach(
     if let Some(problem) = unknown {
         return Err(Problem::busy(format!("teach: {problem}")));
     }
-    let Wanted {
+    let TeachRequest {
         replace: may_replace,
         keep_gauges,
         everything,

@@ -8,12 +8,12 @@ use axum::response::{Json, Response};
 use serde_json::{Value, json};
 
 use super::body;
-use super::downloads::{Content, send};
+use super::downloads::{Download, send};
 use super::gate::Changed;
 use super::look::{Level, SURFACE};
 use super::map::{Drawn, Map, Plane, map, surface};
 use super::orders::{self, Reload};
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::query::{Path, Query};
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, Edited};
@@ -52,7 +52,7 @@ impl From<ChangeError> for Problem {
     }
 }
 
-pub(super) async fn list(site: Site) -> Result<Json<Value>> {
+pub(super) async fn list(site: Site) -> Answered<Json<Value>> {
     let listed = site.aside(|site| Ok(listed(&site.recipes))).await?;
     Ok(Json(listed))
 }
@@ -89,17 +89,17 @@ fn summary(file: &RecipeFile) -> Value {
 }
 
 /// `recipe.json`: everything of a recipe except its arrays.
-pub(super) async fn one(site: Site, Path(number): Path<u16>) -> Result<Json<Value>> {
+pub(super) async fn one(site: Site, Path(number): Path<u16>) -> Answered<Json<Value>> {
     let read = site.aside(move |site| site.recipes.manifest(number).map_err(Problem::missing));
     let file = serde_json::to_value(read.await?);
     file.map(Json).map_err(Problem::broken)
 }
 
-pub(super) async fn export(site: Site, Path(number): Path<u16>) -> Result<Response> {
+pub(super) async fn export(site: Site, Path(number): Path<u16>) -> Answered<Response> {
     send(&site, "application/zip", move |site| {
         let opened = site.recipes.file(number);
         let failed = |error| Problem::missing(format!("read recipe {number}: {error}"));
-        let file = Content::Stored(opened.map_err(failed)?);
+        let file = Download::Stored(opened.map_err(failed)?);
         Ok((format!("{number:04}.recipe"), file))
     })
     .await
@@ -109,7 +109,7 @@ pub(super) async fn picture(
     site: Site,
     Path((number, layer)): Path<(u16, String)>,
     Query(level): Query<Level>,
-) -> Result<Map> {
+) -> Answered<Map> {
     site.aside(move |site| {
         let LoadedRecipe { file, recipe, .. } = site.recipes.load_to_edit(number)?;
         let head = file.head().map_err(Problem::unfit)?;
@@ -142,7 +142,7 @@ pub(super) async fn edit(
     site: Site,
     Path(number): Path<u16>,
     request: Request<Body>,
-) -> Result<(Extension<Changed>, Json<Value>)> {
+) -> Answered<(Extension<Changed>, Json<Value>)> {
     let wanted: Edit = body::edit(request.into_body()).await?;
     let edited = site.change(move |site| {
         let mut note = None;
@@ -173,7 +173,7 @@ pub(super) async fn edit(
 pub(super) async fn undo(
     site: Site,
     Path(number): Path<u16>,
-) -> Result<(Extension<Changed>, Json<Value>)> {
+) -> Answered<(Extension<Changed>, Json<Value>)> {
     orders::recipes_unused(&site, "undo a recipe")?;
     let (file, before) = site
         .change(move |site| {
@@ -197,7 +197,7 @@ pub(super) async fn undo(
 }
 
 /// Deletes a recipe that is not the active one; undo brings it back.
-pub(super) async fn delete(site: Site, Path(number): Path<u16>) -> Result<Json<Value>> {
+pub(super) async fn delete(site: Site, Path(number): Path<u16>) -> Answered<Json<Value>> {
     orders::recipes_unused(&site, "delete a recipe")?;
     if site.station.snapshot().active() == Some(number) {
         return Err(Problem::busy(format!(
@@ -240,7 +240,7 @@ pub(super) async fn import(
     site: Site,
     Query(to): Query<Destination>,
     request: Request<Body>,
-) -> Result<(StatusCode, Extension<Changed>, Json<Value>)> {
+) -> Answered<(StatusCode, Extension<Changed>, Json<Value>)> {
     if let Some(number) = to
         .number
         .filter(|number| !(1..=MAX_RECIPE).contains(number))

@@ -8,7 +8,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{MethodFilter, MethodRouter, get, on};
 use axum::{Extension, handler::Handler};
 
-use super::gate::{Action, own_page_only, signed_in_only};
+use super::gate::{ChangeName, own_page_only, signed_in_only};
 use super::problem::Problem;
 use super::site::Site;
 use super::{
@@ -164,7 +164,7 @@ pub fn router(site: Site) -> Router {
         if let Some(action) = route.changes {
             answer = answer
                 .route_layer(from_fn_with_state(site.clone(), signed_in_only))
-                .route_layer(Extension(Action(action)));
+                .route_layer(Extension(ChangeName(action)));
         }
         if route.method != Method::GET {
             answer = answer.route_layer(from_fn(own_page_only));

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 
 use super::body;
 use super::gate::{self, Peer};
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::site::Site;
 use crate::station::Micros;
 use crate::station::snapshot::warning;
@@ -34,7 +34,7 @@ pub(super) async fn begin(
     site: Site,
     Extension(Peer(from)): Extension<Peer>,
     request: extract::Request<Body>,
-) -> Result<Response> {
+) -> Answered<Response> {
     let SignIn { secret, time_ms } = body::json(request.into_body()).await?;
     let received = site.station.now();
     let guess = site.change(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));

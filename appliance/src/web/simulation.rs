@@ -5,7 +5,7 @@ use axum::response::Json;
 use serde_json::Value;
 
 use super::body::json;
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::site::{Site, alone};
 use crate::head::placed::Placed;
 use crate::production::simulation::PutError;
@@ -24,7 +24,7 @@ pub(super) async fn part(site: Site) -> Json<Value> {
 }
 
 /// Answers once the next cycle sees the part.
-pub(super) async fn put(site: Site, body: Body) -> Result<Json<Value>> {
+pub(super) async fn put(site: Site, body: Body) -> Answered<Json<Value>> {
     let placed: Placed = json(body).await?;
     let simulation = site.simulation.clone();
     let failed = "putting the part in place failed; see the log";

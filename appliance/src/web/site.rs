@@ -13,7 +13,7 @@ use serde_json::Value;
 use tokio::sync::{Mutex, Semaphore, oneshot};
 use tokio::time::Instant;
 
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::slots::Slots;
 use super::turns::Tries;
 use crate::head::calibration::Current;
@@ -162,8 +162,8 @@ impl Site {
     /// What `work` answers.
     pub async fn aside<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
-    ) -> Result<T> {
+        work: impl FnOnce(&Self) -> Answered<T> + Send + 'static,
+    ) -> Answered<T> {
         self.queued(self.looking.clone(), work).await
     }
 
@@ -173,16 +173,16 @@ impl Site {
     /// What `work` answers.
     pub async fn change<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
-    ) -> Result<T> {
+        work: impl FnOnce(&Self) -> Answered<T> + Send + 'static,
+    ) -> Answered<T> {
         self.queued(self.changing.clone(), work).await
     }
 
     async fn queued<T: Send + 'static>(
         &self,
         places: Arc<Semaphore>,
-        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
-    ) -> Result<T> {
+        work: impl FnOnce(&Self) -> Answered<T> + Send + 'static,
+    ) -> Answered<T> {
         let gone = |_| Problem::broken("the page's workers are gone; restart fringed");
         let permit = places.acquire_owned().await.map_err(gone)?;
         let site = self.clone();
@@ -209,7 +209,7 @@ pub(super) async fn alone<T: Send + 'static>(
     name: &str,
     failed: &str,
     work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T> {
+) -> Answered<T> {
     let (done, answer) = oneshot::channel();
     let run = move || {
         // The client may have closed its connection.

@@ -14,17 +14,17 @@ use tokio::sync::Notify;
 
 /// All slots.
 #[derive(Clone, Debug)]
-pub struct Slots(Arc<Inside>);
+pub struct Slots(Arc<SlotLimits>);
 
 #[derive(Debug)]
-struct Inside {
+struct SlotLimits {
     most: usize,
     each: usize,
-    table: Mutex<Table>,
+    table: Mutex<SlotTable>,
 }
 
 #[derive(Debug, Default)]
-struct Table {
+struct SlotTable {
     /// The number of the next slot.
     next: u64,
     /// The slots in use, oldest first.
@@ -49,7 +49,7 @@ pub struct Slot {
     leave: Arc<Notify>,
 }
 
-impl Table {
+impl SlotTable {
     fn held_by(&self, holder: Option<IpAddr>) -> usize {
         let held = self.taken.iter().filter(|taken| taken.holder == holder);
         holder.map_or(0, |_| held.count())
@@ -75,7 +75,7 @@ impl Slots {
     /// `most` slots, of which each address holds at most `each`.
     pub fn new(most: usize, each: usize) -> Self {
         let table = Mutex::default();
-        Self(Arc::new(Inside { most, each, table }))
+        Self(Arc::new(SlotLimits { most, each, table }))
     }
 
     /// A slot for `holder` (none for a proxy), which waits from `now` on. There is none if every
@@ -112,7 +112,7 @@ impl Slots {
         })
     }
 
-    fn table(&self) -> MutexGuard<'_, Table> {
+    fn table(&self) -> MutexGuard<'_, SlotTable> {
         self.0.table.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -24,7 +24,7 @@ use tokio::time::{Instant, sleep};
 use super::body;
 use super::gate::{signed_in, token};
 use super::kept::{broken, recording};
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::query::Path;
 use super::site::{LastOpened, Site, alone};
 use crate::history::kept::Kept;
@@ -101,7 +101,7 @@ pub(super) async fn attempt(
     Path(number): Path<u16>,
     headers: HeaderMap,
     request: Request<Body>,
-) -> Result<Json<Value>> {
+) -> Answered<Json<Value>> {
     signed_in(&site, &headers)?;
     let asked: Asked = body::edit(request.into_body()).await?;
     if let On::Kept(seqs) = &asked.on
@@ -151,7 +151,7 @@ fn tried(
     number: u16,
     Asked { edit, on }: Asked,
     (opened, is_over): (&mut LastOpened, &dyn Fn() -> bool),
-) -> Result<Value> {
+) -> Answered<Value> {
     let begun = Instant::now();
     if is_over() {
         return Err(superseded());
@@ -188,7 +188,7 @@ fn parts(
     of: (&Opened, &Tried),
     on: &On,
     is_over: &dyn Fn() -> bool,
-) -> Result<Vec<Value>> {
+) -> Answered<Vec<Value>> {
     let part = |seq: Option<u32>, measured: Result<(Value, Value), String>| {
         let mut part = match measured {
             Ok((mut part, before)) => {

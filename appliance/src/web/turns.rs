@@ -9,10 +9,10 @@ use tokio::sync::watch;
 
 /// The tries that are being answered, by session.
 #[derive(Clone, Default)]
-pub(super) struct Tries(Arc<Mutex<Inside>>);
+pub(super) struct Tries(Arc<Mutex<RunningTries>>);
 
 #[derive(Default)]
-struct Inside {
+struct RunningTries {
     number: u64,
     running: HashMap<u64, (u64, watch::Sender<()>)>,
 }
@@ -53,7 +53,7 @@ impl Turn {
 }
 
 impl Tries {
-    fn inside(&self) -> MutexGuard<'_, Inside> {
+    fn inside(&self) -> MutexGuard<'_, RunningTries> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 

@@ -13,7 +13,7 @@ use crate::head::calibration::file::{COLDEST_C, CalibrationFile, HOTTEST_C};
 use crate::head::calibration::opencv::{self, Declared, Models, Sizes, Unit};
 use crate::head::calibration::place::Place;
 use crate::head::calibration::{Calibration, HeightsBy};
-use crate::production::backend::{self, Opened};
+use crate::production::backend::{self, OpenedHead};
 use crate::storage::state::StateFolder;
 use algo::geometry::RigError;
 use algo::pattern::PhaseFunction;
@@ -127,7 +127,7 @@ impl Calibrate {
     /// What the calibration starts from, and the response of the one before.
     fn basis(
         &self,
-        opened: &Opened,
+        opened: &OpenedHead,
         before: Option<&CalibrationFile>,
         notes: &mut Vec<String>,
     ) -> Result<(Basis, Option<Vec<f64>>)> {

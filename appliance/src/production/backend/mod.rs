@@ -22,7 +22,7 @@ use std::fs;
 use std::path::Path;
 
 /// An opened head.
-pub struct Opened {
+pub struct OpenedHead {
     /// The devices.
     pub head: Head,
     /// Their calibration.
@@ -85,7 +85,7 @@ impl Played {
     }
 }
 
-impl Opened {
+impl OpenedHead {
     /// A head and what is known of it, before a stored calibration is looked for.
     fn new(head: Head, calibration: Calibration) -> Self {
         Self {
@@ -221,7 +221,7 @@ impl Opened {
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
-pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
+pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<OpenedHead> {
     let mut opened = open_as_it_is(config, progress)?;
     let encoding = opened.head.encoding();
     // Luma has passed an image processor, so it is used only if the configuration asks for it.
@@ -243,7 +243,7 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
-pub fn open_as_it_is(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
+pub fn open_as_it_is(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<OpenedHead> {
     let mut opened = match config.backend {
         Backend::Sim => simulated(config, progress)?,
         Backend::Replay => replayed(&config.recordings)?,
@@ -369,7 +369,7 @@ fn exact(scenario: &Scenario) -> Result<Calibration> {
     Calibration::of_scenario(scenario).map_err(Exit::Configuration.because("simulate the head"))
 }
 
-fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
+fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<OpenedHead> {
     let mut scenario = scenario(config.scenario.as_deref())?;
     if let Some(placed) = &config.part {
         (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
@@ -387,9 +387,9 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
         head.set_timing(Timing::default());
         devices::nominal(head.camera_format(), head.projector_size())?
     };
-    Ok(Opened {
+    Ok(OpenedHead {
         stage: Some(stage),
-        ..Opened::new(head, calibration)
+        ..OpenedHead::new(head, calibration)
     })
 }
 
@@ -400,7 +400,7 @@ fn exposed(stage: &Stage, exposing: Exposing) -> Result<()> {
         .map_err(Exit::Unavailable.failure())
 }
 
-fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened> {
+fn replayed(folders: &[std::path::PathBuf]) -> Result<OpenedHead> {
     let recordings = folders
         .iter()
         .map(|folder| Recording::open(folder))
@@ -409,9 +409,9 @@ fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened> {
     let first = folders.iter().zip(&recordings).next();
     let played = first.map(|(folder, recording)| Played::of(folder, recording));
     let head = hal::replay::head(recordings).map_err(Exit::Unavailable.failure())?;
-    Ok(Opened {
+    Ok(OpenedHead {
         played,
-        ..Opened::new(head, calibration)
+        ..OpenedHead::new(head, calibration)
     })
 }
 

@@ -13,7 +13,7 @@ use crate::head::calibration::Calibration;
 use crate::head::commission::{Commissioning, Laid, Poses, Step};
 use crate::head::exposing::Exposing;
 use crate::head::live::Outline;
-use crate::production::drift::Trend;
+use crate::production::drift::DriftTrend;
 use crate::station::{Event, Request, StationHandle};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -78,14 +78,14 @@ struct Inside {
 pub struct Commission {
     state: PathBuf,
     inside: Arc<Mutex<Inside>>,
-    drift: Trend,
+    drift: DriftTrend,
 }
 
 impl Commission {
     /// Commissioning with what is kept in the state folder, and complaints about files that cannot
     /// be used and begin anew.
     pub fn open(state: &Path) -> (Self, Vec<String>) {
-        let (drift, unfit) = Trend::open(state);
+        let (drift, unfit) = DriftTrend::open(state);
         let (kept, complaint) = match Commissioning::load(state) {
             Ok(kept) => (kept, None),
             Err(problem) => {
@@ -107,7 +107,7 @@ impl Commission {
     }
 
     /// What the checks of the geometry have found.
-    pub fn drift(&self) -> &Trend {
+    pub fn drift(&self) -> &DriftTrend {
         &self.drift
     }
 

@@ -9,7 +9,7 @@ mod due;
 mod trend;
 
 pub use due::Due;
-pub use trend::{FILE, Trend};
+pub use trend::{DriftTrend, FILE};
 
 use super::{DEVICE_TIMEOUT, Worker, recovery};
 use crate::config::Backend;
@@ -42,14 +42,14 @@ impl Watch {
 }
 
 /// Who hears of a check.
-struct Report {
-    trend: Trend,
+struct DriftReport {
+    trend: DriftTrend,
     station: StationHandle,
     progress: Progress,
     calibration: String,
 }
 
-impl Report {
+impl DriftReport {
     /// Keeps what a check has found, if it has found anything, and says so.
     fn tell(&self, compared: Result<Option<Epipolar>, Error>) {
         let seen = match compared {
@@ -165,8 +165,8 @@ impl Worker {
         self.config.backend != Backend::Replay && self.opened.problem.is_none()
     }
 
-    fn report(&self) -> Report {
-        Report {
+    fn report(&self) -> DriftReport {
+        DriftReport {
             trend: self.commission.drift().clone(),
             station: self.station.clone(),
             progress: self.progress.clone(),
@@ -196,7 +196,7 @@ impl Worker {
     }
 
     /// Has the frames worked out beside what comes next.
-    fn judge(&self, fringes: CrossedFringes, report: Report) {
+    fn judge(&self, fringes: CrossedFringes, report: DriftReport) {
         let calibration = self.opened.calibration.clone();
         let judging = self.watch.judging.clone();
         let pool = rayon::ThreadPoolBuilder::new()

@@ -28,7 +28,7 @@ const CONFIRMED: usize = 2;
 
 bounded! {
     /// One check. Distances in projector pixels.
-    struct Checked {
+    struct DriftCheck {
         /// When it was, s since 1970 UTC; 0 if the clock was not synchronised.
         at_unix_s: u64,
         /// Fingerprint of the calibration that it was compared with.
@@ -46,7 +46,7 @@ bounded! {
     }
 }
 
-impl Checked {
+impl DriftCheck {
     fn is_beyond(&self) -> bool {
         !(self.epipolar_px <= MOST_DRIFT_PX)
     }
@@ -58,7 +58,7 @@ bounded! {
     struct Checks {
         format: String,
         version: u32,
-        checks: Vec<Checked>,
+        checks: Vec<DriftCheck>,
     }
 }
 
@@ -80,7 +80,7 @@ impl Checks {
     }
 
     /// The checks that were compared with this calibration, the newest first.
-    fn newest<'a>(&'a self, calibration: &str) -> impl Iterator<Item = &'a Checked> {
+    fn newest<'a>(&'a self, calibration: &str) -> impl Iterator<Item = &'a DriftCheck> {
         let of = calibration.to_owned();
         let all = self.checks.iter().rev();
         all.filter(move |check| check.calibration == of)
@@ -96,7 +96,7 @@ impl Checks {
 
 /// The trend, for those who check and those who show it. Cheap to clone.
 #[derive(Clone, Debug)]
-pub struct Trend {
+pub struct DriftTrend {
     path: PathBuf,
     /// Locked only for moments.
     checks: Arc<Mutex<Checks>>,
@@ -104,7 +104,7 @@ pub struct Trend {
     writing: Arc<Mutex<()>>,
 }
 
-impl Trend {
+impl DriftTrend {
     /// What is kept in the state folder, and a complaint if that cannot be used: then the trend
     /// begins anew.
     pub fn open(state: &Path) -> (Self, Option<String>) {
@@ -142,7 +142,7 @@ impl Trend {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         let mut all = self.checks().clone();
         (all.format, all.version) = (FORMAT.into(), VERSION);
-        all.checks.push(Checked {
+        all.checks.push(DriftCheck {
             at_unix_s: clock::utc_us().unwrap_or(0) / 1_000_000,
             calibration: calibration.into(),
             epipolar_px: seen.rms,
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn two_checks_in_a_row_beyond_the_limit_are_a_drift_of_that_calibration_only() {
         let folder = tempfile::tempdir().unwrap();
-        let (trend, complaint) = Trend::open(folder.path());
+        let (trend, complaint) = DriftTrend::open(folder.path());
         assert_eq!((trend.last(HEAD), complaint), (None, None));
         assert_eq!(trend.view(HEAD), Value::Null);
         for (rms, doubtful, drifted) in [
@@ -240,11 +240,11 @@ mod tests {
     #[test]
     fn the_trend_survives_a_restart_and_one_that_is_damaged_begins_anew() {
         let folder = tempfile::tempdir().unwrap();
-        let (trend, _) = Trend::open(folder.path());
+        let (trend, _) = DriftTrend::open(folder.path());
         for at in 0..MOST_KEPT + 3 {
             trend.add(HEAD, &seen(at as f64 * 1e-3)).unwrap();
         }
-        let (again, complaint) = Trend::open(folder.path());
+        let (again, complaint) = DriftTrend::open(folder.path());
         assert_eq!(complaint, None);
         assert_eq!(*again.checks(), *trend.checks());
         assert_eq!(again.checks().checks.len(), MOST_KEPT);
@@ -261,11 +261,11 @@ mod tests {
             &text.replace(":1,", ":9,"),
         ] {
             fs::write(folder.path().join(FILE), wrong).unwrap();
-            let (anew, complaint) = Trend::open(folder.path());
+            let (anew, complaint) = DriftTrend::open(folder.path());
             assert!(complaint.unwrap().contains(FILE));
             assert_eq!(anew.last(HEAD), None);
             anew.add(HEAD, &seen(0.1)).unwrap();
-            assert_eq!(Trend::open(folder.path()).1, None);
+            assert_eq!(DriftTrend::open(folder.path()).1, None);
         }
     }
 }

@@ -14,7 +14,7 @@ const MAX_BYTES: u64 = 4096;
 
 /// The daemon's condition. If it ends without a stop, the file keeps the last one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Condition {
+pub enum RunState {
     /// It was stopped.
     #[default]
     Stopped,
@@ -25,7 +25,7 @@ pub enum Condition {
     Hanging,
 }
 
-impl Condition {
+impl RunState {
     const ALL: [Self; 3] = [Self::Stopped, Self::Running, Self::Hanging];
 
     fn word(self) -> &'static str {
@@ -47,7 +47,7 @@ pub struct Boots {
     /// Unclean starts after a daemon that hung, usually ended by a watchdog.
     pub after_hanging: u32,
     /// The current condition.
-    pub condition: Condition,
+    pub condition: RunState,
 }
 
 impl Boots {
@@ -60,17 +60,15 @@ impl Boots {
         let number = |word: Option<&str>| word.and_then(|word| word.parse().ok()).unwrap_or(0_u32);
         let (starts, unclean) = (number(words.next()), number(words.next()));
         let left = words.next().unwrap_or_default();
-        let condition = Condition::ALL
-            .into_iter()
-            .find(|known| known.word() == left);
+        let condition = RunState::ALL.into_iter().find(|known| known.word() == left);
         let condition = condition.unwrap_or_default();
         let more = |happened: bool| u32::from(happened);
         Self {
             starts: starts.saturating_add(1),
-            unclean: unclean.saturating_add(more(condition != Condition::Stopped)),
+            unclean: unclean.saturating_add(more(condition != RunState::Stopped)),
             after_hanging: number(words.next())
-                .saturating_add(more(condition == Condition::Hanging)),
-            condition: Condition::Running,
+                .saturating_add(more(condition == RunState::Hanging)),
+            condition: RunState::Running,
         }
     }
 
@@ -101,7 +99,7 @@ mod tests {
         boots
     }
 
-    fn end(boots: Boots, condition: Condition, folder: &Path) {
+    fn end(boots: Boots, condition: RunState, folder: &Path) {
         Boots { condition, ..boots }.store(folder).unwrap();
     }
 
@@ -112,7 +110,7 @@ mod tests {
         assert_eq!((start().starts, start().unclean), (1, 1));
         let third = start();
         assert_eq!((third.starts, third.unclean), (3, 2));
-        end(third, Condition::Stopped, folder.path());
+        end(third, RunState::Stopped, folder.path());
         assert_eq!(
             (start().starts, Boots::begin(folder.path()).unclean),
             (4, 3)
@@ -125,7 +123,7 @@ mod tests {
     fn a_start_after_the_end_of_a_daemon_that_hung_is_one_of_a_watchdog() {
         let folder = tempfile::tempdir().unwrap();
         let start = || start(folder.path());
-        end(start(), Condition::Hanging, folder.path());
+        end(start(), RunState::Hanging, folder.path());
         let second = start();
         assert_eq!((second.unclean, second.after_hanging), (1, 1));
         // Killed while all was well.

@@ -11,7 +11,7 @@ use crate::recipe::Store;
 use crate::station::{Event, Power, StationHandle, System};
 use crate::system::host::{Host, major_minor};
 use crate::system::progress::Progress;
-use boots::{Boots, Condition};
+use boots::{Boots, RunState};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
@@ -79,8 +79,8 @@ impl Survey {
                 false => late.saturating_add(1),
             };
             let condition = match late {
-                HANGING.. => Condition::Hanging,
-                _ => Condition::Running,
+                HANGING.. => RunState::Hanging,
+                _ => RunState::Running,
             };
             if condition != self.boots.condition {
                 self.boots.condition = condition;
@@ -91,7 +91,7 @@ impl Survey {
                 Ok(()) | Err(RecvTimeoutError::Disconnected) => break,
             }
         }
-        self.boots.condition = Condition::Stopped;
+        self.boots.condition = RunState::Stopped;
         self.store_boots();
     }
 

@@ -26,10 +26,10 @@ use std::time::{Duration, Instant};
 
 /// Access control of one device. Cheap to clone.
 #[derive(Clone, Debug)]
-pub struct Access(Arc<Inside>);
+pub struct Access(Arc<AccessState>);
 
 #[derive(Debug)]
-struct Inside {
+struct AccessState {
     hash: String,
     logins: Mutex<Logins>,
     /// One guess is hashed at a time: argon2id takes 19 MiB and a core.
@@ -79,7 +79,7 @@ impl Access {
             }
         };
         let changes = Changes::open(&folder.join("changes.jsonl"));
-        let inside = Inside {
+        let inside = AccessState {
             hash,
             logins: Mutex::default(),
             guessing: Mutex::default(),

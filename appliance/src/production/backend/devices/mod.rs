@@ -3,7 +3,7 @@
 #[cfg(all(feature = "kms", feature = "libcamera"))]
 mod rpi;
 
-use super::Opened;
+use super::OpenedHead;
 use crate::config::{Backend, Config, HeadConfig};
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
@@ -80,11 +80,11 @@ fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<()> {
 ///
 /// # Errors
 /// If this build has no such devices (78), or one of them is not there (69).
-pub(super) fn rpi(config: &HeadConfig) -> Result<Opened> {
+pub(super) fn rpi(config: &HeadConfig) -> Result<OpenedHead> {
     built_for_head(config)?;
     let head = head(config, trigger(&config.trigger)?)?;
     let calibration = nominal(head.camera_format(), head.projector_size())?;
-    Ok(Opened::new(head, calibration))
+    Ok(OpenedHead::new(head, calibration))
 }
 
 #[cfg(all(feature = "kms", feature = "libcamera"))]
