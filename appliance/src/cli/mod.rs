@@ -6,7 +6,7 @@ macro_rules! say {
     ($($argument:tt)*) => {{
         use std::io::Write as _;
         let text = format!($($argument)*);
-        let _ = writeln!(std::io::stdout(), "{}", crate::system::prefix::plain(&text));
+        let _ = writeln!(std::io::stdout(), "{}", crate::system::stderr::plain(&text));
     }};
 }
 
@@ -132,7 +132,7 @@ pub fn main() -> ExitCode {
 /// Parses the arguments of this process, runs the command and returns its exit code. Options may
 /// stand before the command or after it.
 pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
-    crate::system::memory::give_back();
+    crate::system::computing::give_back();
     journal::take_panics();
     let code = carry_out(run);
     stderr::end();

@@ -5,13 +5,13 @@ use super::part::SimulatedPart;
 use crate::error::Result;
 use crate::service::{Caller, Daemon};
 use crate::station::Snapshot;
-use crate::station::refusal::reject;
+use crate::station::snapshot::reject;
 use crate::station::snapshot::status;
+use crate::system::caller::Notify;
+use crate::system::caller::StopSignal;
 use crate::system::journal::Severity;
-use crate::system::notify::Notify;
 use crate::system::progress::Progress;
 use crate::system::runtime;
-use crate::system::stop_signal::StopSignal;
 use std::time::Duration;
 
 /// How long the start waits for devices that are switched on together with the computer.

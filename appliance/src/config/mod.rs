@@ -3,7 +3,6 @@
 //! A key is described in docs/configuration.md, whose table the program contains.
 
 mod devices;
-mod exposing;
 mod keys;
 
 pub use keys::{Key, keys, table};

@@ -7,10 +7,10 @@
 use super::HistoryResult;
 use super::entry::Entry;
 use super::handle::History;
-use super::keeper::Keeping;
-use super::message::{MAX_WAITING, Message};
+use super::handle::Keeping;
+use super::handle::{MAX_WAITING, Message};
+use super::recordings::Unkept;
 use super::recordings::seq_of;
-use super::unkept::Unkept;
 use super::writer::Writer;
 use crate::station::{Event, StationHandle};
 use std::collections::VecDeque;

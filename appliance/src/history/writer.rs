@@ -4,7 +4,7 @@
 
 use super::entry::Entry;
 use super::reader::rows;
-use super::unkept::Unkept;
+use super::recordings::Unkept;
 use super::{HistoryError, HistoryResult, schema};
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 use std::path::{Path, PathBuf};

@@ -17,7 +17,7 @@ use std::{io, iter};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep};
 
-use super::places::ConnectionPlace;
+use super::clients::ConnectionPlace;
 use super::service::{FrameFlaw, MAX_READ_WRITE, MAX_WRITE, MAX_WRITE_BITS};
 
 /// Transaction, protocol and length: the bytes needed to know the frame's length.

@@ -21,23 +21,18 @@
 //!   alone would close the connection or panic, so the guard checks first.
 
 pub mod blocks;
-pub mod decode;
+pub mod clients;
 pub mod encode;
 pub mod guard;
-pub mod live;
 pub mod map;
-pub mod places;
-pub mod refusals;
 pub mod render;
 pub mod server;
 pub mod service;
-pub mod tags;
 
 #[cfg(test)]
 mod tests;
 
-pub use live::live;
-pub use places::Clients;
-pub use refusals::Refusals;
+pub use blocks::live;
+pub use clients::{Clients, Refusals};
 pub use render::{registers_csv, registers_json};
 pub use server::{Options, serve};

@@ -10,9 +10,9 @@ use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_modbus::server::tcp::Server;
 
+use super::clients::Clients;
+use super::clients::{Refusals, RefusedPeer};
 use super::guard::Guard;
-use super::places::Clients;
-use super::refusals::{Refusals, RefusedPeer};
 use super::service::{FrameFlaw, PlcService};
 use crate::config::ModbusConfig;
 use crate::station::{Client, ConnectionEdges, StationHandle};

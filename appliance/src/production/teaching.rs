@@ -1,14 +1,14 @@
 //! Teaching on the station: from the part in front of the head to a stored recipe that is ready to
 //! measure.
 
-use super::telling::Telling;
-use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, recovery};
+use super::job::Telling;
+use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, opening};
 use crate::head::empty::EmptyStation;
 use crate::recipe::teach::{TaughtRecipe, TeachError, teach_showing};
 use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, Teaching, error_code};
+use crate::system::computing;
 use crate::system::headway::Headway;
-use crate::system::memory;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -122,7 +122,7 @@ impl Worker {
         };
         let packing = headway.part(0.8, 1.0).called("packing the recipe");
         packing.done(0.0);
-        memory::trim();
+        computing::trim();
         let packed =
             settled.and_then(|settled| self.computing.on(|| settled.seal_telling(packing)));
         packed.map_err(TeachError::Rig)
@@ -147,7 +147,7 @@ impl Worker {
             self.seen.refuse(place);
         }
         if let TeachError::Device(error) = error {
-            self.lost = Some(error).filter(recovery::is_lost);
+            self.lost = Some(error).filter(opening::is_lost);
         }
         failed
     }

@@ -1,7 +1,5 @@
 //! The threads of the daemon, one for each room that waits or works by itself.
 
-use super::caller::Caller;
-use super::serving::{PlcSide, serve};
 use super::survey::Survey;
 use crate::config::Config;
 use crate::error::{Exit, Result};
@@ -20,7 +18,9 @@ use crate::production::warm_up::WarmUp;
 use crate::production::{Aborts, JudgedBy, Order, Worker};
 use crate::recipe::Store;
 use crate::recipe::part_seen::LastSeen;
-use crate::station::{Request, StationHandle};
+use crate::station::{Request, StationHandle, tick};
+use crate::system::caller::Caller;
+use crate::system::clock;
 use crate::system::computing::Computing;
 use crate::system::progress::Progress;
 use crate::web::access::Access;
@@ -203,4 +203,44 @@ fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Room {
         .name(name.into())
         .spawn(run)
         .map_err(Exit::Software.because(format!("start the thread {name}")))
+}
+
+/// What the Modbus server needs.
+pub(super) struct PlcSide {
+    pub(super) listener: TcpListener,
+    pub(super) clients: modbus::Clients,
+    pub(super) refusals: modbus::Refusals,
+}
+
+pub(super) async fn serve(
+    plc: PlcSide,
+    page: TcpListener,
+    station: StationHandle,
+    site: web::Site,
+    config: &Config,
+    stopped: watch::Receiver<bool>,
+) {
+    let stop = || {
+        let mut stopped = stopped.clone();
+        async move {
+            // An error means that the daemon is gone, which is a reason to stop too.
+            let _ = stopped.wait_for(|stop| *stop).await;
+        }
+    };
+    let options = modbus::Options {
+        config: config.modbus.clone(),
+        ..modbus::Options::default()
+    };
+    tokio::join!(
+        tick(station.clone(), clock::utc_us, stop()),
+        modbus::serve(
+            plc.listener,
+            station,
+            options,
+            plc.clients,
+            plc.refusals,
+            stop()
+        ),
+        web::serve(page, site, stop()),
+    );
 }

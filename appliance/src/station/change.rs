@@ -7,7 +7,7 @@ use super::event::{Effect, Effects, JobId, Teaching};
 use super::fault::LastFailure;
 use super::machine::{Station, log, push};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
-use super::refusal::reject;
+use super::snapshot::reject;
 use super::state::{LoadProgress, State, TeachProgress};
 use std::sync::Arc;
 

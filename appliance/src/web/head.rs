@@ -1,26 +1,28 @@
-//! The head: its commissioning step by step, and the live picture.
+//! The head: its commissioning step by step, the board to print for it, the live picture, and the part
+//! in front of a simulated one.
 
-use axum::body::Body;
-use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
-use axum::response::{IntoResponse, Json, Response};
-use serde::Deserialize;
-use serde_json::Value;
-
-use super::body;
 use super::gate::signed_in;
 use super::orders::{Accepted, accepted, not_now};
 use super::problem::{Answered, Problem};
-use super::query::{Path, Query};
+use super::request::{self, Path, Query, json};
 use super::site::{Site, alone};
 use crate::head::board;
 use crate::head::calibration::geometry::MAX_POSES;
 use crate::head::commission::{EXPOSURE, GEOMETRY, Poses, STEPS, Solving, Step};
 use crate::head::exposing::Exposing;
 use crate::head::live::Show;
+use crate::head::placed::Placed;
+use crate::output::board::sheet;
 use crate::production::commissioning::Asked;
+use crate::production::simulation::PutError;
 use crate::station::{Event, Request as Command};
 use crate::system::priority;
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use axum::response::{IntoResponse, Json, Response};
+use serde::Deserialize;
+use serde_json::Value;
 
 /// The number of a live picture, which its figures have as well.
 const NUMBER: HeaderName = HeaderName::from_static("x-picture");
@@ -94,13 +96,13 @@ async fn asked(site: &Site, name: &str, body: Body) -> Answered<Asked> {
     })?;
     let (mut poses, mut exposing) = (None, None);
     match step.name {
-        EXPOSURE => exposing = exposure(site, body::json_if_any(body).await?)?,
+        EXPOSURE => exposing = exposure(site, request::json_if_any(body).await?)?,
         GEOMETRY => {
-            let wanted = geometry(site, body::json(body).await?);
+            let wanted = geometry(site, json(body).await?);
             poses = Some(wanted.map_err(Problem::unfit)?);
         }
         _ => {
-            let Nothing {} = body::json_if_any(body).await?;
+            let Nothing {} = request::json_if_any(body).await?;
         }
     }
     Ok(Asked {
@@ -204,4 +206,47 @@ pub(super) async fn pose(site: Site, Path(number): Path<u32>) -> Answered<Respon
         })
         .await?;
     Ok(([(header::CONTENT_TYPE, "image/png")], png).into_response())
+}
+
+/// Which board is wanted.
+#[derive(Debug, Deserialize)]
+pub(super) struct BoardQuery {
+    #[serde(default)]
+    board: String,
+}
+
+pub(super) async fn board_pdf(Query(wanted): Query<BoardQuery>) -> Answered<Response> {
+    let board =
+        board::parse(&wanted.board).map_err(|error| Problem::unclear(format!("board: {error}")))?;
+    let sheet = sheet(&board).map_err(|error| Problem::unfit(format!("board: {error}")))?;
+    let headers = [
+        (header::CONTENT_TYPE, "application/pdf"),
+        (
+            header::CONTENT_DISPOSITION,
+            "attachment; filename=\"board.pdf\"",
+        ),
+    ];
+    Ok((headers, sheet.pdf).into_response())
+}
+
+impl From<PutError> for Problem {
+    fn from(error: PutError) -> Self {
+        match error {
+            PutError::Unfit(words) => Self::unfit(words),
+            PutError::Busy(words) => Self::busy(words),
+        }
+    }
+}
+
+pub(super) async fn part(site: Site) -> Json<Value> {
+    Json(site.simulation.view())
+}
+
+/// Answers once the next cycle sees the part.
+pub(super) async fn put_part(site: Site, body: Body) -> Answered<Json<Value>> {
+    let placed: Placed = json(body).await?;
+    let simulation = site.simulation.clone();
+    let failed = "putting the part in place failed; see the log";
+    alone("staging", failed, move || simulation.put(&placed)).await??;
+    Ok(Json(site.simulation.view()))
 }

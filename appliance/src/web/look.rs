@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::map::{Drawn, Map, Plane, map, surface, usual_stride};
 use super::problem::{Answered, Problem};
-use super::query::{Path, Query};
+use super::request::{Path, Query};
 use super::site::Site;
 use super::view;
 use crate::recipe::plan::{Layers, Shown};

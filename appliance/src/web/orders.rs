@@ -11,10 +11,10 @@ use axum::response::Json;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::body;
 use super::gate;
 use super::problem::{Answered, Problem};
-use super::query::Path;
+use super::request;
+use super::request::Path;
 use super::site::Site;
 use crate::recipe::bounds::check_marking;
 use crate::recipe::replace;
@@ -185,7 +185,7 @@ pub(super) async fn teach(
         everything,
         marking,
         limit_mm,
-    } = body::json_if_any(request.into_body()).await?;
+    } = request::json_if_any(request.into_body()).await?;
     let limit = replace::check_limit(limit_mm);
     let marked = marking.as_ref().map_or(Ok(()), check_marking);
     let fits = limit.and(marked);

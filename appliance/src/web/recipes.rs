@@ -7,14 +7,14 @@ use axum::http::StatusCode;
 use axum::response::{Json, Response};
 use serde_json::{Value, json};
 
-use super::body;
 use super::downloads::{Download, send};
 use super::gate::Changed;
 use super::look::{Level, SURFACE};
 use super::map::{Drawn, Map, Plane, map, surface};
 use super::orders::{self, Reload};
 use super::problem::{Answered, Problem};
-use super::query::{Path, Query};
+use super::request;
+use super::request::{Path, Query};
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, Edited};
 use crate::recipe::exchange::Destination;
@@ -143,7 +143,7 @@ pub(super) async fn edit(
     Path(number): Path<u16>,
     request: Request<Body>,
 ) -> Answered<(Extension<Changed>, Json<Value>)> {
-    let wanted: Edit = body::edit(request.into_body()).await?;
+    let wanted: Edit = request::edit(request.into_body()).await?;
     let edited = site.change(move |site| {
         let mut note = None;
         let fits = |recipe| {
@@ -249,7 +249,7 @@ pub(super) async fn import(
             "import as recipe {number}: numbers are 1 to {MAX_RECIPE}"
         )));
     }
-    let upload = body::file(&site, request.into_body()).await?;
+    let upload = request::file(&site, request.into_body()).await?;
     let stored = site.change(move |site| {
         let mut recipe = upload.file.recipe().map_err(Problem::unfit)?;
         let id = recipe.id.clone();

@@ -16,7 +16,7 @@ use tokio::sync::oneshot;
 
 use super::downloads::ToClient;
 use super::problem::{Answered, Problem};
-use super::query::Query;
+use super::request::Query;
 use super::site::Site;
 use crate::history::after::{After, Page};
 use crate::history::{Entry, GaugeEntry};

@@ -12,8 +12,7 @@ use super::gate::{ChangeName, own_page_only, signed_in_only};
 use super::problem::Problem;
 use super::site::Site;
 use super::{
-    assets, board, downloads, events, head, history, host, kept, look, metrics, orders, recipes,
-    results, sessions, simulation, tries,
+    assets, downloads, gate, head, history, look, metrics, orders, recipes, results, tries, view,
 };
 
 /// Only files of this device, nothing inline, not inside a frame of another page.
@@ -67,7 +66,7 @@ fn change<T: 'static>(
 /// Every path that is answered, but for the page's own files.
 pub fn routes() -> Vec<Route> {
     vec![
-        look("/events", events::follow),
+        look("/events", view::follow),
         look("/healthz", look::health),
         look("/readyz", look::readiness),
         look("/metrics", metrics::metrics),
@@ -85,9 +84,9 @@ pub fn routes() -> Vec<Route> {
         look("/api/last/features", look::features),
         look("/api/history", history::list),
         look("/api/history.csv", history::csv),
-        look("/api/history/{seq}", kept::one),
-        look("/api/history/{seq}/picture/{layer}", kept::picture),
-        look("/api/history/{seq}/features", kept::features),
+        look("/api/history/{seq}", history::one),
+        look("/api/history/{seq}/picture/{layer}", history::picture),
+        look("/api/history/{seq}/features", history::features),
         look("/api/history/{seq}/recording.zip", history::recording),
         look("/api/results", results::after),
         look("/api/diagnostics.zip", downloads::diagnostics),
@@ -126,7 +125,7 @@ pub fn routes() -> Vec<Route> {
         change(POST, "/api/trigger", "trigger", orders::trigger),
         change(POST, "/api/reset", "reset errors", orders::reset),
         look("/api/head", head::state),
-        look("/api/head/board.pdf", board::pdf),
+        look("/api/head/board.pdf", head::board_pdf),
         look("/api/head/live", head::live),
         look("/api/head/live/figures", head::figures),
         look("/api/head/poses/{number}/picture", head::pose),
@@ -142,16 +141,16 @@ pub fn routes() -> Vec<Route> {
             "end step of commissioning",
             head::end,
         ),
-        look("/api/simulation/part", simulation::part),
+        look("/api/simulation/part", head::part),
         change(
             PUT,
             "/api/simulation/part",
             "place simulated part",
-            simulation::put,
+            head::put_part,
         ),
-        look("/api/session", sessions::state),
-        route(POST, "/api/session", None, sessions::begin),
-        route(DELETE, "/api/session", None, sessions::end),
+        look("/api/session", gate::state),
+        route(POST, "/api/session", None, gate::begin),
+        route(DELETE, "/api/session", None, gate::end),
     ]
 }
 
@@ -184,7 +183,7 @@ pub fn router(site: Site) -> Router {
 /// Refuses requests that do not name this device as their only host, and adds the headers of every
 /// answer.
 async fn guarded(site: Site, request: Request, next: Next) -> Response {
-    let mut response = match host::check(request.uri(), request.headers(), &site.hosts) {
+    let mut response = match gate::check(request.uri(), request.headers(), &site.hosts) {
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     };

@@ -19,11 +19,11 @@ use tokio::io::AsyncWrite as _;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_io_timeout::TimeoutStream;
 
-use super::events::Following;
 use super::gate::Peer;
 use super::router::router;
 use super::site::Site;
 use super::slots::{Slot, Slots};
+use super::view::Following;
 use crate::system::clock;
 
 /// The most connections at a time.

@@ -15,7 +15,7 @@ use tokio::time::Instant;
 
 use super::problem::{Answered, Problem};
 use super::slots::Slots;
-use super::turns::Tries;
+use super::slots::Tries;
 use crate::head::calibration::Current;
 use crate::history::Reader;
 use crate::production::commissioning::Commission;
@@ -27,7 +27,7 @@ use crate::recipe::part_seen::LastSeen;
 use crate::recipe::plan::Layers;
 use crate::recipe::trying::Opened;
 use crate::station::{Snapshot, StationHandle};
-use crate::system::logbook::Logbook;
+use crate::system::journal::Logbook;
 use crate::system::socket;
 use crate::web::access::Access;
 

@@ -21,11 +21,11 @@ use tokio::runtime::Handle;
 use tokio::sync::Mutex;
 use tokio::time::{Instant, sleep};
 
-use super::body;
 use super::gate::{signed_in, token};
-use super::kept::{broken, recording};
+use super::history::{broken, kept_frames};
 use super::problem::{Answered, Problem};
-use super::query::Path;
+use super::request;
+use super::request::Path;
 use super::site::{LastOpened, Site, alone};
 use crate::history::kept::Kept;
 use crate::recipe::ChangeError;
@@ -33,7 +33,7 @@ use crate::recipe::edit::Edit;
 use crate::recipe::plan::Plan;
 use crate::recipe::trying::{Opened, Over, Tried};
 use crate::station::result::flag::SIMULATED;
-use crate::system::{memory, priority};
+use crate::system::{computing, priority};
 
 /// Most kept parts of one try.
 const MAX_PARTS: usize = 20;
@@ -103,7 +103,7 @@ pub(super) async fn attempt(
     request: Request<Body>,
 ) -> Answered<Json<Value>> {
     signed_in(&site, &headers)?;
-    let asked: Asked = body::edit(request.into_body()).await?;
+    let asked: Asked = request::edit(request.into_body()).await?;
     if let On::Kept(seqs) = &asked.on
         && seqs.len() > MAX_PARTS
     {
@@ -141,7 +141,7 @@ async fn forget(opened: Arc<Mutex<LastOpened>>) {
         .take_if(|(_, tried)| tried.elapsed() >= KEPT)
         .is_some()
     {
-        memory::trim();
+        computing::trim();
     }
 }
 
@@ -253,7 +253,7 @@ fn last(
 /// What it measures of a kept part, and the verdict that this had.
 fn kept(site: &Site, (open, tried): (&Opened, &Tried), seq: u32) -> Result<(Value, Value), String> {
     let words = |problem: Problem| problem.words;
-    let (entry, folder) = recording(site, seq).map_err(words)?;
+    let (entry, folder) = kept_frames(site, seq).map_err(words)?;
     let recipe = open.recipe(tried)?;
     let kept = Kept::judged_by(&folder, &recipe).map_err(|failure| words(broken(failure)))?;
     let plan = kept.plan(recipe, entry.flags & SIMULATED != 0);

@@ -6,7 +6,7 @@
 //! another constant, are the bytes of the block's 32-bit values.
 
 use super::effort::Effort;
-use appliance::production::stopwatch::timed;
+use appliance::system::computing::timed;
 use std::hint::black_box;
 
 /// Frames that the floor reads.

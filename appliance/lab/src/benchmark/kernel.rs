@@ -8,7 +8,7 @@ use super::median::median;
 use super::timing::{Contender, Kernel, Round, interleaved};
 use super::variants;
 use super::workload::Workload;
-use appliance::system::memory::give_back;
+use appliance::system::computing::give_back;
 use serde::{Serialize, Serializer};
 
 /// One row of the table. Figures that a variant does not have, or that the machine does not offer,

@@ -2,7 +2,7 @@
 
 use super::effort::Effort;
 use super::median::median;
-use appliance::production::stopwatch::timed;
+use appliance::system::computing::timed;
 use rand_xoshiro::SplitMix64;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use std::fs;

@@ -44,7 +44,7 @@ impl<T: Copy + Default> Placed<T> {
 /// An array that begins at a multiple of [`PAGE`] bytes.
 ///
 /// The allocator maps an array of a megabyte and more by itself
-/// (`appliance::system::memory::give_back`), so one of the size of a camera's frame shares no page
+/// (`appliance::system::computing::give_back`), so one of the size of a camera's frame shares no page
 /// with another.
 pub struct Mapping<T: Copy + Default> {
     memory: Vec<T>,

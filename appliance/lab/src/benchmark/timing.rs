@@ -5,7 +5,7 @@ use super::effort::Effort;
 use super::floor::FloorSets;
 use super::frames::{FrameSet, Rotation};
 use super::words;
-use appliance::production::stopwatch::timed;
+use appliance::system::computing::timed;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::hint::black_box;
 use std::time::Duration;

@@ -831,7 +831,7 @@ fn a_result_that_does_not_go_into_shared_memory_does_not_bring_its_number_back()
     }
     drop((killed, never));
     let (_, _, next, _) = opened(&state, 2);
-    assert_eq!(next, 1 + seqs::AHEAD);
+    assert_eq!(next, 1 + AHEAD);
 }
 
 #[test]

@@ -1,18 +1,46 @@
-//! Reads the body of a request, with limits of size, time and memory.
-
-use std::io::{ErrorKind, Write as _};
-use std::time::Duration;
-
-use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
-use axum::http::StatusCode;
-use serde::de::DeserializeOwned;
-use tokio::sync::{OwnedSemaphorePermit, mpsc};
-use tokio_stream::StreamExt as _;
+//! Reads a request: its path, its query, and its body with limits of size, time and memory.
 
 use super::problem::{Answered, Problem};
 use super::site::Site;
 use crate::error::shortened;
 use crate::recipe::incoming::Incoming;
+use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
+use axum::extract::rejection::{PathRejection, QueryRejection};
+use axum::extract::{self, FromRequestParts};
+use axum::http::StatusCode;
+use axum::http::request::Parts;
+use serde::de::DeserializeOwned;
+use std::io::{ErrorKind, Write as _};
+use std::time::Duration;
+use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use tokio_stream::StreamExt as _;
+
+/// The query of a request.
+pub struct Query<T>(pub T);
+
+/// What a request's path names.
+pub struct Path<T>(pub T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Query<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let read = extract::Query::from_request_parts(parts, state).await;
+        let unread = |why: QueryRejection| Problem::new(why.status(), why.body_text());
+        read.map(|extract::Query(value)| Self(value))
+            .map_err(unread)
+    }
+}
+
+impl<T: DeserializeOwned + Send, S: Send + Sync> FromRequestParts<S> for Path<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let read = extract::Path::from_request_parts(parts, state).await;
+        let unread = |why: PathRejection| Problem::new(why.status(), why.body_text());
+        read.map(|extract::Path(value)| Self(value)).map_err(unread)
+    }
+}
 
 /// Largest body in JSON, bytes.
 const MAX_JSON: usize = 64 << 10;

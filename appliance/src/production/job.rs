@@ -1,11 +1,28 @@
-//! Tells the station, and the service manager, how far a job of the measuring task is.
+//! A job of the measuring task while it goes on: how far it is, and whether it is to end early.
 
-use super::aborts::Aborts;
 use crate::station::{Event, JobId, StationHandle};
-use crate::system::notify::Pulse;
+use crate::system::caller::Pulse;
 use crate::system::progress::Progress;
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
+
+/// The last aborted job: set by the station, read by the measuring task between two frames. Cheap
+/// to clone.
+#[derive(Clone, Debug, Default)]
+pub struct Aborts(Arc<AtomicU64>);
+
+impl Aborts {
+    /// Ends this job early. Jobs are numbered upwards.
+    pub fn abort(&self, job: JobId) {
+        self.0.fetch_max(job.0, Ordering::Relaxed);
+    }
+
+    /// Whether this job is to be ended.
+    pub(super) fn has(&self, job: JobId) -> bool {
+        self.0.load(Ordering::Relaxed) == job.0
+    }
+}
 
 /// A stage is told so often at most.
 const PERIOD: Duration = Duration::from_millis(250);
