@@ -18,9 +18,8 @@
 //! lacks: kill -9 costs at most the result in flight, however busy the card was. A loss of power
 //! costs what was not synced yet: what came in the time that the card takes for one sync.
 
-pub mod after;
-pub mod csv;
 pub mod entry;
+pub mod export;
 mod handle;
 pub mod kept;
 pub mod reader;

@@ -9,7 +9,6 @@ pub mod computing;
 pub mod headway;
 pub mod host;
 pub mod journal;
-pub mod priority;
 pub mod progress;
 pub mod socket;
 pub mod stderr;

@@ -28,7 +28,7 @@ use std::time::Instant;
 ///
 /// # Errors
 /// 400 where it names several, 421 where it names none or another.
-pub fn check(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Answered<()> {
+pub fn check_host(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Answered<()> {
     let host = only(headers, &header::HOST);
     let several = headers.get_all(header::HOST).iter().count() > 1;
     // The request line may name a host, too.
@@ -213,11 +213,11 @@ struct SignIn {
     time_ms: Option<u64>,
 }
 
-pub(super) async fn state(site: Site, headers: HeaderMap) -> Json<Value> {
+pub(super) async fn session(site: Site, headers: HeaderMap) -> Json<Value> {
     Json(json!({ "signed_in": is_signed_in(&site, &headers) }))
 }
 
-pub(super) async fn begin(
+pub(super) async fn begin_session(
     site: Site,
     Extension(Peer(from)): Extension<Peer>,
     request: Request<Body>,
@@ -262,7 +262,7 @@ pub(super) async fn begin(
     }
 }
 
-pub(super) async fn end(site: Site, headers: HeaderMap) -> Response {
+pub(super) async fn end_session(site: Site, headers: HeaderMap) -> Response {
     if let Some(token) = token(&headers) {
         site.access.sign_out(token);
     }

@@ -16,7 +16,7 @@ use crate::output::board::sheet;
 use crate::production::commissioning::Asked;
 use crate::production::simulation::PutError;
 use crate::station::{Event, Request as Command};
-use crate::system::priority;
+use crate::system::computing;
 use axum::body::Body;
 use axum::extract::Request;
 use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
@@ -179,7 +179,7 @@ pub(super) async fn live(
     let failed = "taking the picture failed; see the log";
     let taken = alone("looking", failed, move || {
         // The measuring task needs the cores.
-        priority::give_way();
+        computing::give_way();
         live.look(show)
     });
     let (number, png) = taken.await?.map_err(Problem::busy)?;

@@ -17,7 +17,7 @@ use crate::history::{Entry, Filter, HistoryError, why_no_frames};
 use crate::recipe::plan::Plan;
 use crate::station::Verdict;
 use crate::station::result::flag;
-use crate::system::priority;
+use crate::system::computing;
 use axum::response::{Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -203,7 +203,7 @@ fn judged<T: Send>(
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(1)
         .thread_name(|_| "looking-back".into())
-        .start_handler(|_| priority::give_way())
+        .start_handler(|_| computing::give_way())
         .build()
         .map_err(|error| Problem::broken(format!("start a thread: {error}: free memory")))?;
     pool.install(|| {

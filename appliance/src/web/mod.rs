@@ -11,7 +11,6 @@ pub mod assets;
 pub mod look;
 pub mod map;
 pub mod problem;
-pub mod router;
 pub mod server;
 pub mod slots;
 pub mod view;

@@ -18,11 +18,11 @@ use super::downloads::ToClient;
 use super::problem::{Answered, Problem};
 use super::request::Query;
 use super::site::Site;
-use crate::history::after::{After, Page};
+use crate::history::export::{After, Page};
 use crate::history::{Entry, GaugeEntry};
 use crate::station::Verdict;
 use crate::station::gauge::decision;
-use crate::system::priority;
+use crate::system::computing;
 
 /// The most results of one answer, and how many it has unless it asks for fewer.
 const MOST: usize = 10_000;
@@ -94,7 +94,7 @@ pub(super) async fn after(site: Site, Query(wanted): Query<AfterQuery>) -> Answe
     let work = move || {
         // Held until the client has received everything or is gone.
         let _permit = permit;
-        priority::stand_back();
+        computing::stand_back();
         let now = site.station.snapshot();
         site.collected_at_s.store(now.uptime_s, Relaxed);
         let serial = &*now.identity.serial;

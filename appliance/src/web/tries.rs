@@ -33,7 +33,7 @@ use crate::recipe::edit::Edit;
 use crate::recipe::plan::Plan;
 use crate::recipe::trying::{Opened, Over, Tried};
 use crate::station::result::flag::SIMULATED;
-use crate::system::{computing, priority};
+use crate::system::computing;
 
 /// Most kept parts of one try.
 const MAX_PARTS: usize = 20;
@@ -119,7 +119,7 @@ pub(super) async fn attempt(
         let site = site.clone();
         let failed = "trying the edit failed; see the log";
         let work = move || {
-            priority::give_way();
+            computing::give_way();
             let is_over = || watched.is_over();
             let answer = tried(&site, number, asked, (&mut opened, &is_over));
             runtime.spawn(forget(kept));

@@ -10,7 +10,7 @@ use crate::config::Backend;
 use crate::head::examine::{CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX};
 use crate::recipe::teach::TeachError;
 use crate::station::{Event, JobId, StationHandle};
-use crate::system::priority;
+use crate::system::computing;
 use crate::system::progress::Progress;
 use algo::pipeline::Epipolar;
 use hal::error::Error;
@@ -275,7 +275,7 @@ impl Worker {
         let pool = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .thread_name(|_| "checking".into())
-            .start_handler(|_| priority::give_way())
+            .start_handler(|_| computing::give_way())
             // Without one the program would end. The message is in the log, and there are no more
             // checks.
             .panic_handler(|_| ())
