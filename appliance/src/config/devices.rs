@@ -2,7 +2,7 @@
 //! [`hal::setup`]), and exposure and gain that were kept on the page, which take the place of the
 //! configured ones.
 
-use super::{Backend, Config, HeadConfig};
+use super::{Backend, Config, ConfigError, HeadConfig};
 use crate::head::exposing::{Exposing, LEAST_GAIN};
 use hal::bounds::within;
 use hal::setup::NO_GAIN;
@@ -11,7 +11,7 @@ use hal::setup::NO_GAIN;
 ///
 /// # Errors
 /// Naming the key and its range.
-pub(super) fn check(config: &Config) -> Result<(), String> {
+pub(super) fn check(config: &Config) -> Result<(), ConfigError> {
     let head = &config.head;
     let (camera, projector, trigger) = (&head.camera, &head.projector, &head.trigger);
     for (section, one, other) in [
@@ -19,9 +19,7 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
         ("head.projector", projector.width, projector.height),
     ] {
         if one.is_some() != other.is_some() {
-            return Err(format!(
-                "{section}.width and {section}.height: write both or neither"
-            ));
+            return Err(ConfigError::HalfSize { section });
         }
     }
     let (exposure_us, pulse_us) = (camera.exposure_us, trigger.pulse_us);
@@ -30,21 +28,20 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
         camera.period_us,
         exposure_us,
         10_000_000,
-    )?;
+    )
+    .map_err(ConfigError::Bounds)?;
     if trigger.line.is_some() && pulse_us > exposure_us {
         // Such a frame may show two patterns, which could not be seen in it.
-        return Err(format!(
-            "head.trigger.pulse_us = {pulse_us}: write at most head.camera.exposure_us = {exposure_us}: a camera that exposes while the pulse \
-             lasts would expose longer than it is said to"
-        ));
+        return Err(ConfigError::LongPulse {
+            pulse_us,
+            exposure_us,
+        });
     }
     if trigger.line.is_some() && trigger.by_projector {
-        return Err(
-            "head.trigger.line and head.trigger.by_projector: write one of them: a camera has one trigger input".into(),
-        );
+        return Err(ConfigError::TwoTriggers);
     }
     let lines = &config.lines;
-    let mut named: Vec<(&str, &str, &str)> = Vec::new();
+    let mut named: Vec<(&'static str, &str, &str)> = Vec::new();
     for (key, chip, line) in [
         ("head.trigger.line", &trigger.chip, &trigger.line),
         ("lines.start", &lines.chip, &lines.start),
@@ -54,9 +51,10 @@ pub(super) fn check(config: &Config) -> Result<(), String> {
     ] {
         let Some(line) = line else { continue };
         if let Some((other, ..)) = named.iter().find(|(_, c, l)| c == chip && l == line) {
-            return Err(format!(
-                "{other} and {key} are both \"{line}\": give each its own line"
-            ));
+            return Err(ConfigError::SharedLine {
+                keys: [other, key],
+                line: line.clone(),
+            });
         }
         named.push((key, chip, line));
     }

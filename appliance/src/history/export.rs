@@ -146,12 +146,17 @@ fn civil(days: u64) -> (u64, u64, u64) {
     (era * 400 + year + carry, month, of_month)
 }
 
+/// A text that is not a date or time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("write a date or time since 1970 as 2026-11-21 or 2026-11-21T16:30:00Z")]
+pub struct NoTime;
+
 /// The µs since 1970 UTC of a date (`2026-11-21`) or a time (`2026-11-21T16:30`,
 /// `2026-11-21T16:30:00+01:00`; without a zone it is UTC), as SQLite reads it.
 ///
 /// # Errors
-/// In words, if the text is not a date or time.
-pub fn utc_us(text: &str) -> Result<u64, String> {
+/// If the text is not a date or time.
+pub fn utc_us(text: &str) -> Result<u64, NoTime> {
     let calendar = || {
         let query = "SELECT CAST(round(unixepoch(?1, 'subsec') * 1e6) AS INTEGER)";
         let connection = Connection::open_in_memory()?;
@@ -161,7 +166,7 @@ pub fn utc_us(text: &str) -> Result<u64, String> {
     let dated = text.contains('-').then(calendar);
     match dated {
         Some(Ok(Some(us))) => Ok(us),
-        _ => Err("write a date or time since 1970 as 2026-11-21 or 2026-11-21T16:30:00Z".into()),
+        _ => Err(NoTime),
     }
 }
 

@@ -146,7 +146,7 @@ pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> HistoryResult
         Ok(counted) => spool.of_run(counted.run),
         Err(_) => spool.of_any_run(),
     });
-    let counted = numbering.counted.clone().unwrap_or_default();
+    let counted = numbering.counted.as_ref().copied().unwrap_or_default();
     let of_run = found.as_ref().and(spool.as_ref());
     let buffered = of_run.and_then(Spool::buffered).unwrap_or(counted.buffered);
     // Where shared memory does not say how a copied folder went on, nothing bounds its age.
@@ -157,7 +157,7 @@ pub fn open(state: &Path, numbering: Numbering, bounds: Bounds) -> HistoryResult
     // A counter that was lost or taken from an older copy of the folder must not bring back a
     // number.
     let last = stored.filter(|&seq| is_after(seq, last)).unwrap_or(last);
-    let lost = numbering.counted.clone().err();
+    let lost = numbering.counted.as_ref().err();
     let skipped = match lost {
         Some(_) => UNKNOWN,
         None if restored => RESTORED + numbering.run % APART,

@@ -12,7 +12,7 @@ use std::io::{self, Cursor, Read, Seek, SeekFrom, Write as _};
 use std::os::unix::fs::DirBuilderExt as _;
 use std::path::{Component, Path, PathBuf};
 use zip::read::ZipFile;
-use zip::result::ZipResult;
+use zip::result::{ZipError, ZipResult};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
@@ -41,6 +41,37 @@ pub fn packed<'a>(
     Ok(zip.finish()?.into_inner())
 }
 
+/// Why a ZIP is not read.
+#[derive(Debug, thiserror::Error)]
+pub enum ArchiveError {
+    /// The file cannot be read.
+    #[error("read its end: {0}")]
+    End(io::Error),
+    /// It does not end as a ZIP does.
+    #[error("it is no ZIP, or was cut off")]
+    NoZip,
+    /// It has more members than its format needs.
+    #[error("it lists {listed} members where at most {most} belong in it")]
+    TooMany {
+        /// How many it has.
+        listed: usize,
+        /// How many it may have.
+        most: usize,
+    },
+    /// Two members have one name.
+    #[error("two of its members have the same name")]
+    SameName,
+    /// Two members share bytes.
+    #[error("its members overlap: it was made by hand or damaged")]
+    Overlap,
+    /// The member of this name is not stored as it is.
+    #[error("member {0:?} is compressed or encrypted: pack it without compression (zip -0)")]
+    Compressed(String),
+    /// Its directory is damaged.
+    #[error("{0}")]
+    Directory(#[from] ZipError),
+}
+
 /// The members of a ZIP, by name; folders are left out.
 #[derive(Debug)]
 pub struct Members<R> {
@@ -53,42 +84,30 @@ impl<R: Read + Seek> Members<R> {
     /// Opens a ZIP of at most `most` members (folders count). Takes memory for the directory only.
     ///
     /// # Errors
-    /// In words: it is not a ZIP, has too many members, two of one name or two that share bytes, or
-    /// one is compressed.
-    pub fn open(mut source: R, most: usize) -> Result<Self, String> {
-        let listed = listed(&mut source).map_err(|error| format!("read its end: {error}"))?;
-        let listed = listed.ok_or("it is no ZIP, or was cut off")?;
+    /// It is not a ZIP, has too many members, two of one name or two that share bytes, or one is
+    /// compressed.
+    pub fn open(mut source: R, most: usize) -> Result<Self, ArchiveError> {
+        let listed = listed(&mut source).map_err(ArchiveError::End)?;
+        let listed = listed.ok_or(ArchiveError::NoZip)?;
         if listed > most {
-            return Err(format!(
-                "it lists {listed} members where at most {most} belong in it"
-            ));
+            return Err(ArchiveError::TooMany { listed, most });
         }
-        let mut zip = ZipArchive::new(source).map_err(|error| error.to_string())?;
+        let mut zip = ZipArchive::new(source)?;
         // Of two members with one name the library keeps the last.
         if zip.len() != listed {
-            return Err("two of its members have the same name".into());
+            return Err(ArchiveError::SameName);
         }
-        if zip
-            .has_overlapping_entries()
-            .map_err(|error| error.to_string())?
-        {
-            return Err("its members overlap: it was made by hand or damaged".into());
+        if zip.has_overlapping_entries()? {
+            return Err(ArchiveError::Overlap);
         }
         let mut places = Vec::with_capacity(listed);
         for place in 0..listed {
-            let entry = zip
-                .by_index_data(place)
-                .map_err(|error| error.to_string())?;
-            let name = entry
-                .name()
-                .map_err(|error| error.to_string())?
-                .into_owned();
+            let entry = zip.by_index_data(place)?;
+            let name = entry.name()?.into_owned();
             let stored = entry.compression() == CompressionMethod::Stored
                 && entry.size() == entry.compressed_size();
             if !stored || entry.encrypted() {
-                return Err(format!(
-                    "member {name:?} is compressed or encrypted: pack it without compression (zip -0)"
-                ));
+                return Err(ArchiveError::Compressed(name));
             }
             if entry.is_file() {
                 places.push((name, place));
@@ -313,7 +332,9 @@ mod tests {
     }
 
     fn refused(zip: &[u8], most: usize) -> String {
-        Members::open(Cursor::new(zip), most).unwrap_err()
+        Members::open(Cursor::new(zip), most)
+            .unwrap_err()
+            .to_string()
     }
 
     #[test]

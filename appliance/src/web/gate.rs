@@ -24,6 +24,56 @@ use serde_json::{Value, json};
 use std::net::{IpAddr, Ipv6Addr};
 use std::time::Instant;
 
+/// The session's cookie.
+const COOKIE: &str = "fringed-session";
+
+/// The client's address, added to each request by the server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Peer(pub IpAddr);
+
+/// The name of a change in the record.
+#[derive(Clone, Copy, Debug)]
+pub struct ChangeName(pub &'static str);
+
+/// What a change has changed, in words: an extension of the answer, for the record.
+#[derive(Clone, Debug)]
+pub struct Changed(pub String);
+
+/// How a change ended, for the record.
+enum ChangeOutcome {
+    /// It was done; what was changed, in words, where that is known.
+    Done(Option<String>),
+    /// Why it was refused, in words.
+    Refused(String),
+}
+
+impl ChangeOutcome {
+    /// The words for the record: `"done"`, or why it was refused.
+    fn words(&self) -> &str {
+        match self {
+            Self::Done(_) => "done",
+            Self::Refused(words) => words,
+        }
+    }
+
+    /// What was changed.
+    fn changed(&self) -> Option<&str> {
+        match self {
+            Self::Done(changed) => changed.as_deref(),
+            Self::Refused(_) => None,
+        }
+    }
+}
+
+/// The body of a sign-in.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SignIn {
+    secret: String,
+    /// The time by the browser's clock, ms since 1970 UTC.
+    time_ms: Option<u64>,
+}
+
 /// Checks that a request names one host, and that this is the device.
 ///
 /// # Errors
@@ -78,21 +128,6 @@ fn is_allowed(header: &str, configured: &[String]) -> bool {
 fn is_port(text: Option<&str>) -> bool {
     text.is_some_and(|text| text.parse::<u16>().is_ok())
 }
-
-/// The session's cookie.
-const COOKIE: &str = "fringed-session";
-
-/// The client's address, added to each request by the server.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Peer(pub IpAddr);
-
-/// The name of a change in the record.
-#[derive(Clone, Copy, Debug)]
-pub struct ChangeName(pub &'static str);
-
-/// What a change has changed, in words: an extension of the answer, for the record.
-#[derive(Clone, Debug)]
-pub struct Changed(pub String);
 
 /// The session token of a request, if it has one.
 pub fn token(headers: &HeaderMap) -> Option<&str> {
@@ -162,21 +197,20 @@ pub async fn signed_in_only(
     let refused = response.extensions().get::<ProblemWords>();
     let changed = response.extensions().get::<Changed>();
     let outcome = match refused {
-        Some(ProblemWords(words)) => Err(words.clone()),
-        None => Ok(changed.map(|Changed(words)| words.clone())),
+        Some(ProblemWords(words)) => ChangeOutcome::Refused(words.clone()),
+        None => ChangeOutcome::Done(changed.map(|Changed(words)| words.clone())),
     };
     record(&site, from, action, subject, outcome).await;
     response
 }
 
-/// Adds a line to the record of changes, with why the change was refused, or that it was done and
-/// perhaps what was changed; if that fails, the log says so.
-pub async fn record(
+/// Adds a line to the record of changes; if that fails, the log says so.
+async fn record(
     site: &Site,
     from: IpAddr,
     action: &'static str,
     subject: String,
-    outcome: Result<Option<String>, String>,
+    outcome: ChangeOutcome,
 ) {
     let written = site
         .change(move |site| {
@@ -188,8 +222,8 @@ pub async fn record(
                 from,
                 action,
                 subject: &subject,
-                outcome: outcome.as_ref().map_or_else(String::as_str, |_| "done"),
-                changed: outcome.as_ref().ok().and_then(Option::as_deref),
+                outcome: outcome.words(),
+                changed: outcome.changed(),
             };
             let stored = site.access.changes().add(&change);
             stored.map_err(Problem::broken)
@@ -203,14 +237,6 @@ pub async fn record(
         journal::write(Severity::Warning, &line);
         site.log.add(&line);
     }
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SignIn {
-    secret: String,
-    /// The time by the browser's clock, ms since 1970 UTC.
-    time_ms: Option<u64>,
 }
 
 pub(super) async fn session(site: Site, headers: HeaderMap) -> Json<Value> {
@@ -229,8 +255,8 @@ pub(super) async fn begin_session(
     // A guess that has to wait is not recorded, so that guessing cannot fill the record.
     if !matches!(token, Err(Refused::Wait(_))) {
         let outcome = match &token {
-            Ok(_) => Ok(None),
-            Err(refused) => Err(refused.to_string()),
+            Ok(_) => ChangeOutcome::Done(None),
+            Err(refused) => ChangeOutcome::Refused(refused.to_string()),
         };
         record(&site, from, "sign in", "session".into(), outcome).await;
     }

@@ -4,7 +4,7 @@
 use super::gate::signed_in;
 use super::orders::{Accepted, accepted, not_now};
 use super::problem::{Answered, Problem};
-use super::request::{self, Path, Query, json};
+use super::request::{self, Path, Query};
 use super::site::{Site, alone};
 use crate::head::board;
 use crate::head::calibration::geometry::MAX_POSES;
@@ -98,8 +98,7 @@ async fn asked(site: &Site, name: &str, body: Body) -> Answered<Asked> {
     match step.name {
         EXPOSURE => exposing = exposure(site, request::json_if_any(body).await?)?,
         GEOMETRY => {
-            let wanted = geometry(site, json(body).await?);
-            poses = Some(wanted.map_err(Problem::unfit)?);
+            poses = Some(geometry(site, request::json(body).await?)?);
         }
         _ => {
             let Nothing {} = request::json_if_any(body).await?;
@@ -134,21 +133,24 @@ fn exposure(site: &Site, wanted: Exposure) -> Answered<Option<(Exposing, bool)>>
     Ok(given.then_some((exposing, wanted.keep)))
 }
 
-fn geometry(site: &Site, wanted: Action) -> Result<Poses, String> {
+fn geometry(site: &Site, wanted: Action) -> Answered<Poses> {
     let most = MAX_POSES as u32;
     let within = |pose: u32| match (1..=most).contains(&pose) {
         true => Ok(pose),
-        false => Err(format!("pose {pose}: poses are numbered 1 to {most}")),
+        false => Err(Problem::unfit(format!(
+            "pose {pose}: poses are numbered 1 to {most}"
+        ))),
     };
     Ok(match wanted {
         Action::Pose { board, pose } => {
-            let board = board::parse(&board).map_err(|error| format!("board: {error}"))?;
+            let board =
+                board::parse(&board).map_err(|error| Problem::unfit(format!("board: {error}")))?;
             let number = pose.unwrap_or_else(|| site.commission.free_pose());
             Poses::Pose(board, within(number)?)
         }
         Action::Forget { pose } => Poses::Forget(pose.map(within).transpose()?),
         Action::Solve(solving) => {
-            solving.check()?;
+            solving.check().map_err(Problem::unfit)?;
             Poses::Solve(solving)
         }
     })
@@ -244,7 +246,7 @@ pub(super) async fn part(site: Site) -> Json<Value> {
 
 /// Answers once the next cycle sees the part.
 pub(super) async fn put_part(site: Site, body: Body) -> Answered<Json<Value>> {
-    let placed: Placed = json(body).await?;
+    let placed: Placed = request::json(body).await?;
     let simulation = site.simulation.clone();
     let failed = "putting the part in place failed; see the log";
     alone("staging", failed, move || simulation.put(&placed)).await??;

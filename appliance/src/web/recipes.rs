@@ -147,7 +147,7 @@ pub(super) async fn edit(
     let edited = site.change(move |site| {
         let mut note = None;
         let fits = |recipe| {
-            note = tried(site, recipe)?;
+            note = tried(site, recipe).map_err(|error| error.to_string())?;
             Ok(())
         };
         let edited = edit::edit(&site.recipes, number, wanted, fits)?;
@@ -213,8 +213,8 @@ pub(super) async fn delete(site: Site, Path(number): Path<u16>) -> Answered<Json
 /// be checked on this head.
 ///
 /// # Errors
-/// In words: it was made for this head and cannot be used on it.
-fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
+/// [`PlanError::Unfit`]: it was made for this head and cannot be used on it.
+fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, PlanError> {
     let Some(calibration) = site.calibration.get() else {
         let words =
             "no calibrated head is open: whether the recipe can be used shows when it is loaded";
@@ -229,7 +229,7 @@ fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
             took.as_secs_f64()
         ))),
         Ok(()) => Ok(None),
-        Err(error @ PlanError::Unfit { .. }) => Err(error.to_string()),
+        Err(error @ PlanError::Unfit { .. }) => Err(error),
         Err(error) => Ok(Some(error.to_string())),
     }
 }

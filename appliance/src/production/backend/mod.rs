@@ -212,7 +212,7 @@ impl OpenedHead {
                     .or_else(|| unfinished(config, &loaded))
                     .or_else(|| set_otherwise(&loaded, exposing))
             }
-            Err(problem) => Some(problem),
+            Err(failure) => Some(failure.to_string()),
         };
     }
 }
@@ -254,15 +254,20 @@ pub fn open_as_it_is(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Re
 }
 
 /// The stored calibration of the configured head, if there is one. Recordings carry their own.
-fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>, String> {
+///
+/// # Errors
+/// If it cannot be used (65).
+fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>> {
     let place = config
         .calibration
         .as_deref()
         .filter(|_| config.backend != Backend::Replay);
-    let Some(loaded) = place.map_or(Ok(None), |place| Place::at(place).load())? else {
+    let loaded = place.map_or(Ok(None), |place| Place::at(place).load());
+    let Some(loaded) = loaded.map_err(Exit::Content.failure())? else {
         return Ok(None);
     };
-    let calibration = loaded.file.calibration()?;
+    let calibration = loaded.file.calibration();
+    let calibration = calibration.map_err(Exit::Content.failure())?;
     Ok(Some((loaded, calibration)))
 }
 
@@ -321,7 +326,7 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration> {
         Backend::Sim => {
             let scenario = scenario(config.scenario.as_deref())?;
             let exact = exact(&scenario)?;
-            match stored(config).map_err(wrong)? {
+            match stored(config)? {
                 None if !scenario.calibrated => Err(devices::uncalibrated()),
                 None => Ok(exact),
                 Some((loaded, calibration)) => misfit(config, &exact, &calibration)
@@ -337,7 +342,7 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration> {
                 .map(|folder| Recording::open(folder));
             calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
         }
-        Backend::Rpi => match stored(config).map_err(wrong)? {
+        Backend::Rpi => match stored(config)? {
             Some((loaded, calibration)) => {
                 unfinished(config, &loaded).map_or(Ok(calibration), |why| Err(wrong(why)))
             }

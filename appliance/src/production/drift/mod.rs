@@ -131,7 +131,7 @@ impl DriftReport {
             Err(error) => return self.progress.warn(&format!("check the geometry: {error}")),
         };
         if let Err(problem) = self.trend.add(&self.calibration, &seen) {
-            self.progress.warn(&problem);
+            self.progress.warn(&problem.to_string());
         }
         let last = self.trend.last(&self.calibration);
         let words = format!(

@@ -62,19 +62,42 @@ bounded! {
     }
 }
 
+/// Why the trend could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum DriftError {
+    /// The file cannot be read.
+    #[error("{0}")]
+    Read(io::Error),
+    /// It is no JSON of a trend.
+    #[error("{}", shortened(&.0.to_string()))]
+    Json(#[from] serde_json::Error),
+    /// It is of another format or version.
+    #[error("it is not a {FORMAT:?} of version {VERSION}, which this program reads")]
+    Format,
+    /// A value in it is out of its bounds.
+    #[error("{0}")]
+    Bounds(String),
+    /// A check cannot be stored.
+    #[error("write {}: {source}: free space", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the file system answers.
+        source: io::Error,
+    },
+}
+
 impl Checks {
     /// Reads and checks the content of a file.
-    fn read(bytes: &[u8]) -> Result<Self, String> {
-        let file: Self =
-            serde_json::from_slice(bytes).map_err(|error| shortened(&error.to_string()))?;
+    fn read(bytes: &[u8]) -> Result<Self, DriftError> {
+        let file: Self = serde_json::from_slice(bytes)?;
         if (file.format.as_str(), file.version) != (FORMAT, VERSION) {
-            return Err(format!(
-                "it is not a {FORMAT:?} of version {VERSION}, which this program reads"
-            ));
+            return Err(DriftError::Format);
         }
-        length("checks", file.checks.len(), 0, MOST_KEPT)?;
+        let out_of_bounds = |error: String| DriftError::Bounds(error);
+        length("checks", file.checks.len(), 0, MOST_KEPT).map_err(out_of_bounds)?;
         for check in &file.checks {
-            Fields.check("", check)?;
+            Fields.check("", check).map_err(out_of_bounds)?;
         }
         Ok(file)
     }
@@ -111,8 +134,9 @@ impl DriftTrend {
         let path = state.join(FILE);
         let read = match read_whole(&path, MAX_BYTES) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Checks::default()),
-            Err(error) => Err(error.to_string()),
-            Ok(bytes) => Checks::read(&bytes),
+            read => read
+                .map_err(DriftError::Read)
+                .and_then(|bytes| Checks::read(&bytes)),
         };
         let (checks, complaint) = match read {
             Ok(checks) => (checks, None),
@@ -137,8 +161,8 @@ impl DriftTrend {
     /// Adds a check and keeps it, also on the card.
     ///
     /// # Errors
-    /// In words: it cannot be stored; it is known until the next start.
-    pub fn add(&self, calibration: &str, seen: &Epipolar) -> Result<(), String> {
+    /// It cannot be stored; it is known until the next start.
+    pub fn add(&self, calibration: &str, seen: &Epipolar) -> Result<(), DriftError> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         let mut all = self.checks().clone();
         (all.format, all.version) = (FORMAT.into(), VERSION);
@@ -157,7 +181,8 @@ impl DriftTrend {
         let stored = serde_json::to_vec(&all).map_err(io::Error::from);
         let stored = stored.and_then(|bytes| write_whole(&self.path, &bytes));
         *self.checks() = all;
-        stored.map_err(|error| format!("write {}: {error}: free space", self.path.display()))
+        let path = self.path.clone();
+        stored.map_err(|source| DriftError::Write { path, source })
     }
 
     /// The last check of the head with this calibration; none if there was none.

@@ -100,14 +100,16 @@ impl Access {
         if let Some(wait) = self.logins().patience.wait(from, now) {
             return Err(Refused::Wait(wait));
         }
-        let right = secret::is_right(secret, &self.0.hash).map_err(Refused::Broken)?;
+        let right = secret::is_right(secret, &self.0.hash);
+        let right = right.map_err(|error| Refused::Broken(error.to_string()))?;
         let mut logins = self.logins();
         if !right {
             logins.patience.wrong(from, now);
             return Err(Refused::Wrong);
         }
         logins.patience.right(from);
-        logins.sessions.begin(now).map_err(Refused::Broken)
+        let begun = logins.sessions.begin(now);
+        begun.map_err(|error| Refused::Broken(error.to_string()))
     }
 
     /// Whether a session is still open; each use keeps it open.
@@ -178,9 +180,9 @@ impl Sessions {
     ///
     /// # Errors
     /// If the system gives no random bits.
-    fn begin(&mut self, now: Instant) -> Result<Token, String> {
+    fn begin(&mut self, now: Instant) -> Result<Token, getrandom::Error> {
         let mut random = [0_u8; 32];
-        getrandom::fill(&mut random).map_err(|error| error.to_string())?;
+        getrandom::fill(&mut random)?;
         let token = Token(crate::storage::hex(&random));
         self.0.retain(|session| session.is_open(now));
         if self.0.len() >= MOST_SESSIONS {
