@@ -6,10 +6,10 @@
 //! 1.3. Modbus and the page see nothing but one immutable [`Snapshot`]. [`StationHandle`] is the
 //! one place where the machine meets a clock, a mutex and channels.
 //!
-//! [`machine`] holds the parts: clock, PLC, request counters, recipes, worker, results. Each part
-//! has its own file and is changed only by its own functions. `step` sends an event to the
-//! transition that takes it: `plc` (a write), `cycle` (trigger to result), `change` (load and
-//! teach), `watch` (faults).
+//! [`machine`] holds the parts: clock, PLC, triggers, recipes, worker, results. Each part is changed
+//! only by its own functions. [`mod@step`] takes a write of the PLC itself and sends other events to
+//! the transition that takes them: `cycle` (trigger to result), `change` (load and teach), `watch`
+//! (faults).
 //!
 //! Decisions where the register map is silent:
 //!
