@@ -32,7 +32,7 @@ mod serve;
 mod teach;
 
 pub use calibrate::model_files;
-pub use completions::Completions;
+pub use completions::{Completions, Manual};
 pub use options::{Files, Output, Quiet, Threads};
 
 use crate::VERSION;
@@ -68,6 +68,9 @@ macro_rules! commands {
             $($(#[$meta])* $name($options),)*
             /// Print what makes a shell complete the command line.
             Completions(Completions),
+            /// Write the manual pages.
+            #[command(hide = true)]
+            Manual(Manual),
         }
 
         impl Command {
@@ -75,6 +78,7 @@ macro_rules! commands {
                 match self {
                     $(Self::$name(options) => options.run(),)*
                     Self::Completions(options) => options.run(Arguments::command()),
+                    Self::Manual(options) => options.run(Arguments::command()),
                 }
             }
         }
