@@ -18,8 +18,8 @@ use std::time::Duration;
 /// Results that may wait for the card before some are lost to the history.
 pub(super) const MAX_WAITING: usize = SLOTS as usize;
 
-/// What reaches the thread: from the station, from a sign-in, from the thread that writes
-/// recordings.
+/// A message to the thread `history`: from the station, from a sign-in, or from the thread
+/// `recordings`.
 pub(super) enum Message {
     Result(Box<Entry>),
     /// The name under which the frames of a result are kept, or why they are not.
@@ -46,24 +46,24 @@ pub(super) enum Message {
     RecordingsEnded,
 }
 
-/// What the thread is asked to do.
+/// An order to the thread `recordings`.
 enum KeepingOrder {
     Keep(Box<JudgedPart>),
     MakeRoom,
     Stop,
 }
 
-/// The way to the thread; nothing here waits.
+/// Access to the thread `recordings`.
 #[derive(Clone)]
 pub(super) struct Keeper {
     orders: SyncSender<KeepingOrder>,
-    /// A failed part waits or is being written: its frames are memory that the head cannot use, so
+    /// Whether a part waits or is being written: its frames are memory that the head cannot use, so
     /// there is one at a time.
     busy: Arc<AtomicBool>,
     quota: u64,
 }
 
-/// The thread's own side.
+/// What the thread `recordings` owns.
 pub(super) struct Keeping {
     orders: Receiver<KeepingOrder>,
     busy: Arc<AtomicBool>,
@@ -179,7 +179,7 @@ impl Keeping {
 /// Longest wait of a sign-in for its time to be stored.
 const DATING: Duration = Duration::from_secs(2);
 
-/// The way to the history's threads. Cheap to clone.
+/// Access to the history's threads. Cheap to clone.
 #[derive(Clone)]
 pub struct History {
     pub(super) queue: SyncSender<Message>,

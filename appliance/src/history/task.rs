@@ -31,7 +31,7 @@ const TOO_LONG: u64 = 32 << 20;
 /// When the daemon ends, a recording that is being written has this long.
 const LAST_PART: Duration = Duration::from_secs(1);
 
-/// The thread's own side.
+/// What the thread `history` owns.
 pub struct Task {
     history: History,
     inbox: Receiver<Message>,

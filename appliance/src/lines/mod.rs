@@ -1,9 +1,10 @@
 //! Digital lines: start in, and busy, ok and fault out, for presses without Modbus and for lamps.
 //!
-//! What may block the thread: its own chip, and the station's lock for one step of another event. It
-//! gets snapshots through a channel that keeps only the latest, so nobody waits for it.
+//! One thread serves them. It blocks only on its own chip, and on the station's lock for one step of
+//! another event. It gets snapshots through a channel that keeps only the latest, so no other thread
+//! waits for it.
 //!
-//! One thread serves them. It follows the station's snapshots, as Modbus and the page do, and its
+//! It follows the station's snapshots, as Modbus and the page do, and its
 //! start is a trigger by edge, as the page's is. When the GPIO chip is lost it is opened again
 //! until that succeeds; meanwhile pull resistors hold the fault line on.
 

@@ -24,10 +24,11 @@ impl Aborts {
     }
 }
 
-/// A stage is told so often at most.
+/// Shortest time between two reports of one stage: often enough for a bar that moves.
 const PERIOD: Duration = Duration::from_millis(250);
 
-/// What a job tells while it goes on. Its threads may tell each row that they have done.
+/// Reports the progress of a job to the station, the bar and the service manager. The job's threads
+/// may report each row that they have done.
 pub(super) struct Telling<'a> {
     pub station: &'a StationHandle,
     pub pulse: &'a Pulse,
@@ -37,7 +38,7 @@ pub(super) struct Telling<'a> {
     last: Mutex<Option<Reported>>,
 }
 
-/// What was told last.
+/// The last report.
 struct Reported {
     at: Instant,
     share: f64,
@@ -49,7 +50,8 @@ impl<'a> Telling<'a> {
         station: &'a StationHandle,
         pulse: &'a Pulse,
         bar: &'a Progress,
-        (aborts, job): (&'a Aborts, JobId),
+        aborts: &'a Aborts,
+        job: JobId,
     ) -> Self {
         Self {
             station,
@@ -61,15 +63,15 @@ impl<'a> Telling<'a> {
         }
     }
 
-    /// Tells that a share of the job is done, and the present stage; answers whether to go on.
+    /// Reports that a share of the job is done, and the present stage; answers whether to go on.
     pub fn tell(&self, share: f64, words: &str) -> bool {
         self.pulse.beat();
-        // Another thread that is telling tells the same.
+        // Another thread that is reporting says the same.
         if let Ok(mut last) = self.last.try_lock() {
-            let before = last.as_ref().map_or(0.0, |told| told.share);
+            let before = last.as_ref().map_or(0.0, |report| report.share);
             let due = last
                 .as_ref()
-                .is_none_or(|told| told.words != words || told.at.elapsed() >= PERIOD);
+                .is_none_or(|report| report.words != words || report.at.elapsed() >= PERIOD);
             if due {
                 // Rows are not done in their order.
                 let share = share.max(before);

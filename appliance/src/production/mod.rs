@@ -158,12 +158,12 @@ impl Worker {
                 Ok(Order::Load(job, key)) => {
                     self.forget();
                     self.load(job, &key);
-                    computing::trim();
+                    computing::trim_memory();
                 }
                 Ok(Order::Teach(job, teaching)) => {
                     self.forget();
                     self.teach(job, &teaching);
-                    computing::trim();
+                    computing::trim_memory();
                 }
                 Ok(Order::Commission(job)) => {
                     self.forget();
@@ -177,7 +177,7 @@ impl Worker {
                 }
                 Ok(Order::Place(placing)) => {
                     placing.carry_out();
-                    computing::trim();
+                    computing::trim_memory();
                 }
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
@@ -353,7 +353,8 @@ impl Worker {
             &self.station,
             &self.pulse,
             &self.progress,
-            (&self.aborts, job),
+            &self.aborts,
+            job,
         );
         let tell = |share: f64, words: &str| telling.tell(share, words);
         let headway = Headway::new(&tell, "reading the recipe").part(from, 1.0);

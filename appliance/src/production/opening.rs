@@ -64,7 +64,7 @@ impl Opening<'_> {
             };
             match opened {
                 Ok(head) => {
-                    computing::trim();
+                    computing::trim_memory();
                     // The receiver is gone if the start was given up.
                     drop(outcome.send(Ok(head.stage.clone())));
                     let event = match reported.is_empty() {

@@ -30,11 +30,9 @@ impl Worker {
         }));
         let taught = taught
             .unwrap_or_else(|panic| Err(TeachError::Rig(broken("teach: the part", &*panic))))
-            .and_then(|taught| self.check_taught(job, (SETTLED, CHECKED)).map(|()| taught));
+            .and_then(|taught| self.check_taught(job, SETTLED..CHECKED).map(|()| taught));
         self.progress.clear();
-        let telling = (&self.aborts, job);
-        Telling::new(&self.station, &self.pulse, &self.progress, telling)
-            .tell(CHECKED, "storing the recipe");
+        self.telling(job).tell(CHECKED, "storing the recipe");
         let stored = match taught {
             Ok(taught) => self.store(&taught, replaced.filter(|_| keep_gauges)),
             Err(error) => Err(self.refuse_teaching(error)),
@@ -96,8 +94,8 @@ impl Worker {
             .or(naming.limit_mm);
         let shared = self.recipes.refuse_shared(number, &naming.part_number);
         shared.map_err(TeachError::Rig)?;
-        let telling = (&self.aborts, job);
-        let telling = Telling::new(&self.station, &self.pulse, &self.progress, telling);
+        let (aborts, bar) = (&self.aborts, &self.progress);
+        let telling = Telling::new(&self.station, &self.pulse, bar, aborts, job);
         let tell = |share: f64, words: &str| telling.tell(share, words);
         let headway = Headway::new(&tell, "teaching");
         let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
@@ -122,7 +120,7 @@ impl Worker {
         };
         let packing = headway.part(0.8, 1.0).called("packing the recipe");
         packing.done(0.0);
-        computing::trim();
+        computing::trim_memory();
         let packed =
             settled.and_then(|settled| self.computing.on(|| settled.seal_telling(packing)));
         packed.map_err(TeachError::Rig)
@@ -134,6 +132,11 @@ impl Worker {
         let loaded = EmptyStation::load(place, &self.opened.calibration);
         let loaded = loaded.map_err(|words| self.progress.warn(&words));
         loaded.ok()?.map(Arc::new)
+    }
+
+    fn telling(&self, job: JobId) -> Telling<'_> {
+        let (aborts, bar) = (&self.aborts, &self.progress);
+        Telling::new(&self.station, &self.pulse, bar, aborts, job)
     }
 
     /// ERROR_CODE and words of a failure; a lost head is remembered.
@@ -177,8 +180,7 @@ impl Worker {
         let Some((stage, placed)) = self.opened.stage.as_ref().zip(self.waiting.take()) else {
             return;
         };
-        let telling = (&self.aborts, job);
-        let telling = Telling::new(&self.station, &self.pulse, &self.progress, telling);
+        let telling = self.telling(job);
         let words = "putting the part in front of the head";
         let progress = |share: f64| {
             telling.tell(share, words);

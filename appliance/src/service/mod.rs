@@ -237,7 +237,8 @@ fn address_of(listener: &TcpListener) -> Result<SocketAddr> {
         .map_err(Exit::Unavailable.because("ask for a socket's port"))
 }
 
-/// What the run before has left of BUFFERED mode, in which `acknowledged` was acknowledged last.
+/// The results that the run before has left in BUFFERED mode; `acknowledged` is the last SEQ that was
+/// acknowledged in it.
 fn left_of(state: &StateFolder, acknowledged: Option<u32>, progress: &Progress) -> Buffered {
     let behind = |seq| Reader::of(state.path()).after(seq, MAX_BUFFERED)?.page();
     let entries = match acknowledged.map(behind) {

@@ -126,7 +126,7 @@ impl Rooms<'_> {
         Ok((end, thread))
     }
 
-    /// Opens the head, of which `opened` hears, and measures.
+    /// Opens the head, sends the outcome to `opened`, and measures.
     pub fn measuring(
         self,
         pool: rayon::ThreadPool,

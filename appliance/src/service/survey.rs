@@ -15,8 +15,8 @@ use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::Duration;
 use std::{fs, io};
 
-/// The file: starts, unclean starts, the daemon's condition, and starts after it hung, e.g. `12 1
-/// running 0`.
+/// The file with the counts of starts: starts, unclean starts, the daemon's condition, and starts
+/// after it hung, e.g. `12 1 running 0`.
 const FILE: &str = "boots";
 
 /// Longest file, bytes.
@@ -47,7 +47,8 @@ impl RunState {
     }
 }
 
-/// The counts, this start included.
+/// The counts of the daemon's starts with a state folder, this one included, and of those that
+/// followed an end without a stop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Boots {
     /// Starts.

@@ -45,7 +45,7 @@ pub struct Teaching {
 }
 
 impl Teaching {
-    /// A recipe with this number, of which nothing else is said.
+    /// A recipe with this number; everything else as in the recipe that it replaces, or by default.
     pub fn of(number: u16) -> Self {
         Self {
             number,

@@ -203,7 +203,7 @@ impl Station {
             error,
             fault,
             control: ControlRegisters {
-                // The mode that holds, whoever wrote without it.
+                // BUFFERED shows the mode that holds, also after a write without the bit.
                 control: self.plc.registers.control
                     | self.results.buffered.map_or(0, |_| control::BUFFERED),
                 ..self.plc.registers

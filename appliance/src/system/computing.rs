@@ -7,7 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-/// Set by the measuring task, read when the program stops. Cheap to clone; clones share the flag.
+/// Whether the measuring task only computes: it then uses no device and stores nothing, so the program
+/// may end without waiting for it. Cheap to clone; clones share the flag.
 #[derive(Clone, Debug, Default)]
 pub struct Computing(Arc<AtomicBool>);
 
@@ -29,21 +30,26 @@ impl Computing {
 /// Runs `work` and returns the processor time that this thread spent on it. Time in which another
 /// thread had the core does not count.
 pub fn timed(work: impl FnOnce()) -> Duration {
-    let began = now();
+    let began = thread_time();
     work();
-    now().saturating_sub(began)
+    thread_time().saturating_sub(began)
 }
 
 /// Runs `work` on `pool` and returns its result and the processor time of all threads of the pool
 /// meanwhile. On a pool of several threads this includes their search for work.
 pub fn timed_on<T: Send>(pool: &ThreadPool, work: impl FnOnce() -> T + Send) -> (T, Duration) {
-    let spent = || pool.broadcast(|_| now()).into_iter().sum::<Duration>();
+    let spent = || {
+        pool.broadcast(|_| thread_time())
+            .into_iter()
+            .sum::<Duration>()
+    };
     let began = spent();
     let done = pool.install(work);
     (done, spent().saturating_sub(began))
 }
 
-fn now() -> Duration {
+/// Processor time of the calling thread.
+fn thread_time() -> Duration {
     let time = clock_gettime(ClockId::ThreadCPUTime);
     // Processor time is never negative.
     Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
@@ -72,7 +78,7 @@ pub fn give_back() {
     unsafe_code,
     reason = "the C library's function has no safe wrapper that is kept"
 )]
-pub fn trim() {
+pub fn trim_memory() {
     // SAFETY: releases memory that nothing uses; valid at any time, from any thread.
     unsafe { libc::malloc_trim(0) };
 }
@@ -83,7 +89,7 @@ pub fn give_back() {}
 
 /// Elsewhere the allocator's default holds.
 #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
-pub fn trim() {}
+pub fn trim_memory() {}
 
 /// Nice value of a thread that must not slow others down: on a busy core it gets a tenth of the
 /// share of another thread.

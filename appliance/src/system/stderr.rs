@@ -1,5 +1,5 @@
-//! The thread that writes on stderr: the lines of the log and the bar, from whichever thread they
-//! come.
+//! The thread that writes on stderr: the lines of the log, with the prefix that a person or a journal
+//! needs, and the bar.
 //!
 //! stderr can be a pipe that nobody reads, a terminal that was stopped, or a journal that hangs: a
 //! write then waits for as long as that lasts. Only the thread `stderr` waits. Lines are handed

@@ -125,8 +125,10 @@ pub(super) async fn trends(site: Site) -> Answered<Json<Value>> {
     read.await.map(Json)
 }
 
+/// Why a kept part cannot be worked out.
 const OTHER_FRAMES: &str = "the recording's frames are not those of its recipe";
 
+/// One result in full, with its flags in words and why there are no frames.
 pub(super) async fn one(site: Site, Path(seq): Path<u32>) -> Answered<Json<Value>> {
     let found = site.aside(move |site| {
         let entry = site.history.result(seq)?;
@@ -172,7 +174,7 @@ pub(super) async fn features(site: Site, Path(seq): Path<u32>) -> Answered<Json<
         let _place = place;
         judged(&site, seq, |entry, plan, sequence, kept| {
             let (_, features) = plan.look(sequence, &kept.frames());
-            found((seq, entry.verdict), (plan.id(), &features))
+            found(seq, entry.verdict, plan.id(), &features)
         })
     });
     worked.await.map_err(failed)?.map(Json)
@@ -193,7 +195,7 @@ pub(super) fn kept_frames(site: &Site, seq: u32) -> Answered<(Entry, PathBuf)> {
     Ok((entry, folder))
 }
 
-/// Does something with the frames of a kept part and the plan that judged it.
+/// Works on the frames of a kept part and the plan that judged it.
 fn judged<T: Send>(
     site: &Site,
     seq: u32,

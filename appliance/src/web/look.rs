@@ -6,7 +6,7 @@ use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::map::{Drawn, Map, Plane, map, surface, usual_stride};
+use super::map::{Drawn, Map, Plane, Sampling, map, surface};
 use super::problem::{Answered, Problem};
 use super::request::{Path, Query};
 use super::site::Site;
@@ -64,14 +64,17 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Pixels from one to the next that is sent of frames of `width` columns.
+    /// Which pixels of frames of `width` columns are sent.
     ///
     /// # Errors
     /// There is no such level.
-    pub(super) fn stride(self, width: usize) -> Answered<usize> {
+    pub(super) fn sampling(self, width: usize) -> Answered<Sampling> {
         match self.level {
-            None => Ok(usual_stride(width)),
-            Some(level) if level <= MAX_LEVEL => Ok(1 << level),
+            None => Ok(Sampling::usual(width)),
+            Some(level) if level <= MAX_LEVEL => Ok(Sampling {
+                width,
+                stride: 1 << level,
+            }),
             Some(level) => Err(Problem::unfit(format!(
                 "level {level}: write 0 to {MAX_LEVEL}"
             ))),
@@ -80,10 +83,7 @@ impl Level {
 }
 
 /// What was found on a part.
-pub(super) fn found(
-    (seq, verdict): (u32, Verdict),
-    (id, features): (&RecipeId, &[Seen<'_>]),
-) -> Value {
+pub(super) fn found(seq: u32, verdict: Verdict, id: &RecipeId, features: &[Seen<'_>]) -> Value {
     json!({
         "seq": seq, "recipe": id.number, "fingerprint": id.fingerprint, "verdict": verdict.word(),
         "features": features,
@@ -94,10 +94,8 @@ pub(super) async fn features(site: Site) -> Answered<Response> {
     site.aside(|site| {
         let asked = site.last_cycle.ask(|part| {
             let (_, features) = part.plan.look(part.sequence, &part.frames);
-            found(
-                (part.record.seq, part.record.verdict),
-                (part.plan.id(), &features),
-            )
+            let record = &part.record;
+            found(record.seq, record.verdict, part.plan.id(), &features)
         });
         let answer = asked.map(|found| Json(found).into_response());
         Ok(answer.unwrap_or_else(none))
@@ -133,12 +131,13 @@ pub(super) async fn part_seen(site: Site) -> Answered<Response> {
             let words = "nothing was taught since the start";
             return Ok((StatusCode::NO_CONTENT, [("x-none", words)]).into_response());
         };
-        let of = (seen.width, usual_stride(seen.width));
+        let sampling = Sampling::usual(seen.width);
+        let plane = |name, unit, values| Plane::of(name, unit, values, sampling, Drawn::Plain);
         let planes = [
-            Plane::of("modulation", "counts", (&seen.modulation, of), Drawn::Plain),
-            Plane::of("part", "", (&seen.part, of), Drawn::Plain),
+            plane("modulation", "counts", &seen.modulation[..]),
+            plane("part", "", &seen.part),
         ];
-        let mut picture = surface(&planes, of, None);
+        let mut picture = surface(&planes, sampling, None);
         picture.description["place"] = json!(seen.place);
         picture.description["marking"] = json!(seen.marking);
         Ok(picture.into_response())
@@ -166,18 +165,19 @@ pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Answ
     });
     let deviation = Drawn::Deviation { limit };
     if LAYERS[at] == SURFACE {
-        let of = (layers.width, level.stride(layers.width)?);
-        let mut planes = Plane::points(layers.points(of.1));
+        let sampling = level.sampling(layers.width)?;
+        let mut planes = Plane::points(layers.points(sampling.stride));
         planes.extend([
-            Plane::of("deviation", "mm", (&layers.deviation_mm, of), deviation),
+            Plane::of("deviation", "mm", &layers.deviation_mm, sampling, deviation),
             Plane::of(
                 "modulation",
                 "counts",
-                (&layers.modulation, of),
+                &layers.modulation,
+                sampling,
                 Drawn::Plain,
             ),
         ]);
-        return Ok(surface(&planes, of, Some(seq)));
+        return Ok(surface(&planes, sampling, Some(seq)));
     }
     let (values, unit, drawn) = [
         (&layers.height_mm, "mm", Drawn::Plain),

@@ -83,7 +83,7 @@ pub(super) async fn load(site: Site, Path(number): Path<u16>) -> Answered<Accept
 /// Longest wait for a cycle to end before a changed recipe is loaded.
 const REST: Duration = Duration::from_secs(5);
 
-/// What the station does with a recipe of which another version was stored.
+/// What the station does with a recipe that was replaced by another version.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reload {
     /// Whether the recipe is the active one.

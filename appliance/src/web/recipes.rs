@@ -121,11 +121,17 @@ pub(super) async fn picture(
             "height" => plain(&arrays.golden_height, "mm"),
             "modulation" => plain(&arrays.modulation, "counts"),
             SURFACE => {
-                let of = (width, level.stride(width)?);
-                let mut planes = Plane::points(view.points(&recipe, of.1));
-                let light = (&arrays.modulation[..], of);
-                planes.push(Plane::of("modulation", "counts", light, Drawn::Plain));
-                surface(&planes, of, None)
+                let sampling = level.sampling(width)?;
+                let mut planes = Plane::points(view.points(&recipe, sampling.stride));
+                let light = &arrays.modulation;
+                planes.push(Plane::of(
+                    "modulation",
+                    "counts",
+                    light,
+                    sampling,
+                    Drawn::Plain,
+                ));
+                surface(&planes, sampling, None)
             }
             _ => {
                 let words = "a recipe has height, modulation and surface";

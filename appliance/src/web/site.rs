@@ -50,7 +50,7 @@ const MAX_COLLECTING: usize = 4;
 
 /// The maps that were computed last, and the SEQ of their result.
 pub(super) type LastKept = Option<(u32, Arc<Layers>)>;
-/// The recipe of which an edit was tried last, and when.
+/// The recipe whose edit was tried last, and when.
 pub(super) type LastOpened = Option<(Opened, Instant)>;
 
 /// What the daemon hands to the page.
@@ -109,7 +109,7 @@ pub struct Site {
     /// The maps of a kept part that were computed last; locked while something else is computed of
     /// one.
     pub(super) kept: Arc<Mutex<LastKept>>,
-    /// The recipe of which an edit was tried last; locked while one is tried.
+    /// The recipe whose edit was tried last; locked while an edit is tried.
     pub(super) opened: Arc<Mutex<LastOpened>>,
     /// The tries that are being answered.
     pub(super) tries: Tries,

@@ -74,7 +74,7 @@ impl SlotTable {
 }
 
 impl Slots {
-    /// `most` slots, of which each address holds at most `each`.
+    /// `most` slots; each address holds at most `each` of them.
     pub fn new(most: usize, each: usize) -> Self {
         let table = Mutex::default();
         Self(Arc::new(SlotLimits { most, each, table }))
@@ -160,7 +160,7 @@ pub(super) struct Turn {
     watched: Watched,
 }
 
-/// What the thread that works on a try asks.
+/// The view of a try that the thread working on it has.
 #[derive(Clone)]
 pub(super) struct Watched {
     /// Closed when the try is over.
@@ -168,14 +168,14 @@ pub(super) struct Watched {
 }
 
 impl Watched {
-    /// Whether nobody waits for the answer any more.
+    /// Whether the answer is no longer waited for.
     pub(super) fn is_over(&self) -> bool {
         self.open.has_changed().is_err()
     }
 }
 
 impl Turn {
-    /// What the thread that works on it asks.
+    /// The view for the thread that works on it.
     pub(super) fn watched(&self) -> Watched {
         self.watched.clone()
     }

@@ -141,7 +141,7 @@ async fn forget(opened: Arc<Mutex<LastOpened>>) {
         .take_if(|(_, tried)| tried.elapsed() >= KEPT)
         .is_some()
     {
-        computing::trim();
+        computing::trim_memory();
     }
 }
 

@@ -43,7 +43,7 @@ pub struct OpenedHead {
 /// The recordings that a replay head plays.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// What each frame of a recording shows, and of which pattern.
+    /// The pattern and the shift that each frame of the first recording shows.
     shots: Vec<(PatternFile, Shot)>,
     /// Fingerprint of the calibration that they were taken with, if a station kept the recipe too.
     calibration: Option<String>,

@@ -14,6 +14,7 @@ use crate::system::computing;
 use crate::system::progress::Progress;
 use algo::pipeline::Epipolar;
 use hal::error::Error;
+use std::ops::Range;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -114,7 +115,7 @@ impl Watch {
     }
 }
 
-/// Who hears of a check.
+/// Where the outcome of a check goes: to the trend, the log and the station.
 struct DriftReport {
     trend: DriftTrend,
     station: StationHandle,
@@ -123,7 +124,7 @@ struct DriftReport {
 }
 
 impl DriftReport {
-    /// Keeps what a check has found, if it has found anything, and says so.
+    /// Keeps and reports what a check has found, if it has found anything.
     fn tell(&self, compared: Result<Option<Epipolar>, Error>) {
         let seen = match compared {
             Ok(Some(seen)) if seen.rms.is_finite() => seen,
@@ -183,14 +184,14 @@ impl Worker {
         }
     }
 
-    /// Checks the geometry on the part that was taught, between two shares of the job.
+    /// Checks the geometry on the part that was taught, which takes these shares of the job.
     ///
     /// # Errors
     /// A device is lost, or the teach was ended.
     pub(super) fn check_taught(
         &mut self,
         job: JobId,
-        (from, to): (f64, f64),
+        shares: Range<f64>,
     ) -> Result<(), TeachError> {
         if !(self.watch.due.is_on() && self.can_be_checked()) {
             return Ok(());
@@ -199,7 +200,7 @@ impl Worker {
         let goes_on = move || !aborts.has(job);
         let progress = |share: f64| {
             let words = "checking the geometry".into();
-            let fraction = (from + 0.6 * (to - from) * share) as f32;
+            let fraction = (shares.start + 0.6 * (shares.end - shares.start) * share) as f32;
             station.event(Event::Progress {
                 job,
                 fraction,
