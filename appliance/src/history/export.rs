@@ -119,57 +119,6 @@ fn behind(
     rows(connection, query, bounds, |row| read(connection, row))
 }
 
-/// A time in µs since 1970 UTC as text. Years after 9999 have a sign, as ISO 8601 asks for.
-pub fn utc(us: u64) -> String {
-    let (days, rest) = (us / 86_400_000_000, us % 86_400_000_000);
-    let (year, month, day) = civil(days);
-    let (seconds, us) = (rest / 1_000_000, rest % 1_000_000);
-    let (hour, minute, second) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
-    let sign = if year > 9999 { "+" } else { "" };
-    format!("{sign}{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{us:06}Z")
-}
-
-/// Year, month and day of a number of days since 1970-01-01 (H. Hinnant, "chrono-compatible
-/// low-level date algorithms", `civil_from_days`, for days that are not negative).
-fn civil(days: u64) -> (u64, u64, u64) {
-    let shifted = days + 719_468;
-    let (era, day) = (shifted / 146_097, shifted % 146_097);
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let of_month = day - (153 * month + 2) / 5 + 1;
-    let (month, carry) = if month < 10 {
-        (month + 3, 0)
-    } else {
-        (month - 9, 1)
-    };
-    (era * 400 + year + carry, month, of_month)
-}
-
-/// A text that is not a date or time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("write a date or time since 1970 as 2026-11-21 or 2026-11-21T16:30:00Z")]
-pub struct NoTime;
-
-/// The µs since 1970 UTC of a date (`2026-11-21`) or a time (`2026-11-21T16:30`,
-/// `2026-11-21T16:30:00+01:00`; without a zone it is UTC), as SQLite reads it.
-///
-/// # Errors
-/// If the text is not a date or time.
-pub fn utc_us(text: &str) -> Result<u64, NoTime> {
-    let calendar = || {
-        let query = "SELECT CAST(round(unixepoch(?1, 'subsec') * 1e6) AS INTEGER)";
-        let connection = Connection::open_in_memory()?;
-        connection.query_row(query, [text], |row| row.get::<_, Option<u64>>(0))
-    };
-    // A bare number would be taken for a Julian day.
-    let dated = text.contains('-').then(calendar);
-    match dated {
-        Some(Ok(Some(us))) => Ok(us),
-        _ => Err(NoTime),
-    }
-}
-
 /// The columns before the gauges'.
 const COLUMNS: &str = "seq,time_utc,recipe,fingerprint,part_id,press_stroke,token,verdict,error_code,reason,flags,\
     valid_points,coverage_permille,temperature_c,height_noise_mm,fitness_permille,exposure_us,total_us,stages_us,recording,time_source";
@@ -216,7 +165,7 @@ impl Reader {
         let mut line = String::new();
         self.each(filter, |entry| {
             line.clear();
-            one(&mut line, &entry, &gauges);
+            put(&mut line, &entry, &gauges);
             write(out, &line)
         })
     }
@@ -238,7 +187,8 @@ impl Reader {
     }
 }
 
-fn one(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
+/// Appends a result to a line.
+fn put(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
     // Writing to a string cannot fail.
     let (time, source) = match (entry.time_utc_us, entry.browser_utc_us) {
         (Some(us), _) => (utc(us), "clock"),
@@ -304,6 +254,57 @@ fn quoted(text: &str) -> Cow<'_, str> {
         format!("\"{guard}{}\"", text.replace('"', "\"\"")).into()
     } else {
         text.into()
+    }
+}
+
+/// A time in µs since 1970 UTC as text. Years after 9999 have a sign, as ISO 8601 asks for.
+pub fn utc(us: u64) -> String {
+    let (days, rest) = (us / 86_400_000_000, us % 86_400_000_000);
+    let (year, month, day) = civil(days);
+    let (seconds, us) = (rest / 1_000_000, rest % 1_000_000);
+    let (hour, minute, second) = (seconds / 3600, seconds / 60 % 60, seconds % 60);
+    let sign = if year > 9999 { "+" } else { "" };
+    format!("{sign}{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}.{us:06}Z")
+}
+
+/// Year, month and day of a number of days since 1970-01-01 (H. Hinnant, "chrono-compatible
+/// low-level date algorithms", `civil_from_days`, for days that are not negative).
+fn civil(days: u64) -> (u64, u64, u64) {
+    let shifted = days + 719_468;
+    let (era, day) = (shifted / 146_097, shifted % 146_097);
+    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * day + 2) / 153;
+    let of_month = day - (153 * month + 2) / 5 + 1;
+    let (month, carry) = if month < 10 {
+        (month + 3, 0)
+    } else {
+        (month - 9, 1)
+    };
+    (era * 400 + year + carry, month, of_month)
+}
+
+/// A text that is not a date or time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("write a date or time since 1970 as 2026-11-21 or 2026-11-21T16:30:00Z")]
+pub struct NoTime;
+
+/// The µs since 1970 UTC of a date (`2026-11-21`) or a time (`2026-11-21T16:30`,
+/// `2026-11-21T16:30:00+01:00`; without a zone it is UTC), as SQLite reads it.
+///
+/// # Errors
+/// If the text is not a date or time.
+pub fn utc_us(text: &str) -> Result<u64, NoTime> {
+    let calendar = || {
+        let query = "SELECT CAST(round(unixepoch(?1, 'subsec') * 1e6) AS INTEGER)";
+        let connection = Connection::open_in_memory()?;
+        connection.query_row(query, [text], |row| row.get::<_, Option<u64>>(0))
+    };
+    // A bare number would be taken for a Julian day.
+    let dated = text.contains('-').then(calendar);
+    match dated {
+        Some(Ok(Some(us))) => Ok(us),
+        _ => Err(NoTime),
     }
 }
 

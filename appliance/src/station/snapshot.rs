@@ -79,6 +79,22 @@ pub mod warning {
     pub const OF_A_PART: u16 = LOW_LIGHT | SATURATION | PATTERN_UNFIT | FRAME_SLIP;
 }
 
+/// REJECT_REASON, register 120: why the last rejected request was rejected.
+pub mod reject {
+    /// The station is busy, boots or stops.
+    pub const NOT_READY: u16 = 1;
+    /// The PLC does not ask for ONLINE.
+    pub const OFFLINE: u16 = 2;
+    /// No recipe is active.
+    pub const NO_RECIPE: u16 = 3;
+    /// The config does not let the PLC teach.
+    pub const TEACH_NOT_ALLOWED: u16 = 4;
+    /// The station has a fault, or the number of a result is still to be stored.
+    pub const FAULT: u16 = 5;
+    /// The recipe of RECIPE_SELECT is not the active one, or the last load failed.
+    pub const OTHER_RECIPE: u16 = 6;
+}
+
 /// Everything that Modbus and the page show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot {
@@ -250,6 +266,21 @@ impl Station {
             ])
     }
 
+    /// Why a trigger would be rejected now, as REJECT_REASON; `None` exactly while READY.
+    pub(super) fn refusal(&self) -> Option<u16> {
+        Some(match self.state {
+            _ if !self.plc.holds(control::ONLINE) => reject::OFFLINE,
+            State::Fault(_) => reject::FAULT,
+            State::Ready if self.recipes.active.is_none() => reject::NO_RECIPE,
+            State::Ready if self.results.unstored => reject::FAULT,
+            State::Ready if self.recipes.is_other_asked_for(&self.plc.registers) => {
+                reject::OTHER_RECIPE
+            }
+            State::Ready => return None,
+            _ => reject::NOT_READY,
+        })
+    }
+
     fn status(&self, warnings: u16, error_code: u16) -> u16 {
         let (state, results) = (&self.state, &self.results);
         let up = !matches!(state, State::Boot { .. } | State::Stopping { .. });
@@ -284,39 +315,6 @@ impl Station {
 fn word<const N: usize>(bits: [(u16, bool); N]) -> u16 {
     let set = bits.into_iter().filter(|(_, set)| *set);
     set.fold(0, |word, (bit, _)| word | bit)
-}
-
-/// REJECT_REASON, register 120: why the last rejected request was rejected.
-pub mod reject {
-    /// The station is busy, boots or stops.
-    pub const NOT_READY: u16 = 1;
-    /// The PLC does not ask for ONLINE.
-    pub const OFFLINE: u16 = 2;
-    /// No recipe is active.
-    pub const NO_RECIPE: u16 = 3;
-    /// The config does not let the PLC teach.
-    pub const TEACH_NOT_ALLOWED: u16 = 4;
-    /// The station has a fault, or the number of a result is still to be stored.
-    pub const FAULT: u16 = 5;
-    /// The recipe of RECIPE_SELECT is not the active one, or the last load failed.
-    pub const OTHER_RECIPE: u16 = 6;
-}
-
-impl Station {
-    /// Why a trigger would be rejected now, as REJECT_REASON; `None` exactly while READY.
-    pub(super) fn refusal(&self) -> Option<u16> {
-        Some(match self.state {
-            _ if !self.plc.holds(control::ONLINE) => reject::OFFLINE,
-            State::Fault(_) => reject::FAULT,
-            State::Ready if self.recipes.active.is_none() => reject::NO_RECIPE,
-            State::Ready if self.results.unstored => reject::FAULT,
-            State::Ready if self.recipes.is_other_asked_for(&self.plc.registers) => {
-                reject::OTHER_RECIPE
-            }
-            State::Ready => return None,
-            _ => reject::NOT_READY,
-        })
-    }
 }
 
 impl Snapshot {
