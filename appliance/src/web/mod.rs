@@ -1,10 +1,10 @@
 //! The technician's page and its API: shows the station and its results, and changes what may be
 //! changed.
 //!
-//! [`router`] is the table of all paths, described in `openapi.json`. Reading needs no login; every
-//! change passes the [`gate`]: Origin, session, record of changes. It also refuses requests for
-//! another host name. [`view`] is the snapshot as JSON and as server-sent events, [`server`] listens
-//! and [`slots`] limits its connections. The files of the page are in `assets/` and compiled in.
+//! [`server`] has the table of all paths, described in `openapi.json`, and listens; [`slots`] limits its
+//! connections. Reading needs no login; every change passes the gate (`gate.rs`): Origin, session,
+//! record of changes. It also refuses requests for another host name. [`view`] is the snapshot as
+//! JSON and as server-sent events. The files of the page are in `assets/` and compiled in.
 
 pub mod access;
 pub mod assets;
