@@ -25,7 +25,7 @@ fleet=${package/fringed_/fringed-fleet_}
 dpkg-deb --raw-extract "$fleet" "$work-fleet"
 for file in usr/bin/fringed usr/lib/systemd/system/fringed.service usr/lib/sysusers.d/fringed.conf usr/lib/tmpfiles.d/fringed.conf \
     usr/lib/udev/rules.d/60-fringed.rules etc/security/limits.d/fringed.conf usr/share/{bash-completion/completions/fringed,zsh/vendor-completions/_fringed,fish/vendor_completions.d/fringed.fish} \
-    usr/share/man/man1/fringed.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/{fringed.toml,fringed.st,verdict.st,plc.py,handshakes.py}}; do
+    usr/share/man/man1/fringed{,-serve,-recipe-list}.1.gz usr/share/doc/fringed/{README.md,licences.txt,copyright,examples/{fringed.toml,fringed.st,verdict.st,plc.py,handshakes.py}}; do
     [[ -s $work/$file ]] || broken "there is no $file"
 done
 for file in fringed.service 60-fringed.rules; do
@@ -33,7 +33,7 @@ for file in fringed.service 60-fringed.rules; do
 done
 # Other files than those of the program and its documentation must not be in the package.
 stray=$(cd "$work" && find . -type f -not -path './DEBIAN/*' -not -path './usr/bin/fringed' -not -path './usr/share/doc/fringed/*' \
-    -not -path ./usr/share/man/man1/fringed.1.gz -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path './usr/share/*completions*/*fringed*' -not -path ./etc/fringed/fringed.toml -not -path ./etc/security/limits.d/fringed.conf)
+    -not -path './usr/share/man/man1/fringed*.1.gz' -not -path './usr/lib/s*' -not -path './usr/lib/tmpfiles.d/*' -not -path './usr/lib/udev/*' -not -path './usr/share/*completions*/*fringed*' -not -path ./etc/fringed/fringed.toml -not -path ./etc/security/limits.d/fringed.conf)
 [[ -z $stray ]] || broken "nobody asked for $stray"
 
 # The completion of each shell has the commands, and the options of one command.
@@ -60,21 +60,21 @@ for step in 'postinst deb-systemd-helper enable' 'postinst systemd-sysusers' 'po
 done
 
 # fringed-lab has a program and its documentation, and nothing that would affect a station.
-stray=$(cd "$work-lab" && find . -type f -not -path './usr/share/doc/fringed-lab/*' | sort | tr '\n' ' ')
+stray=$(cd "$work-lab" && find . -type f -not -path './usr/share/doc/fringed-lab/*' -not -path './usr/share/man/man1/fringed-lab*.1.gz' | sort | tr '\n' ' ')
 [[ $stray == './DEBIAN/control ./DEBIAN/md5sums ./usr/bin/fringed-lab ./usr/share/bash-completion/completions/fringed-lab '\
-'./usr/share/fish/vendor_completions.d/fringed-lab.fish ./usr/share/man/man1/fringed-lab.1.gz ./usr/share/zsh/vendor-completions/_fringed-lab ' ]] ||
+'./usr/share/fish/vendor_completions.d/fringed-lab.fish ./usr/share/zsh/vendor-completions/_fringed-lab ' ]] ||
     broken "fringed-lab has $stray"
-for file in licences.txt copyright; do
-    [[ -s $work-lab/usr/share/doc/fringed-lab/$file ]] || broken "fringed-lab has no $file"
+for file in doc/fringed-lab/{licences.txt,copyright} man/man1/fringed-lab{,-bench}.1.gz; do
+    [[ -s $work-lab/usr/share/$file ]] || broken "fringed-lab has no $file"
 done
 grep -q -- --frames "$work-lab/usr/share/bash-completion/completions/fringed-lab" || broken "the completion of fringed-lab does not know --frames"
 
 # fringed-fleet has a program, its unit and its documentation; the unit is there and waits for a configuration.
-stray=$(cd "$work-fleet" && find . -type f -not -path './DEBIAN/*' -not -path './usr/share/doc/fringed-fleet/*' | sort | tr '\n' ' ')
-[[ $stray == './usr/bin/fringed-fleet ./usr/lib/systemd/system/fringed-fleet-collect.service ./usr/share/man/man1/fringed-fleet.1.gz ' ]] ||
+stray=$(cd "$work-fleet" && find . -type f -not -path './DEBIAN/*' -not -path './usr/share/doc/fringed-fleet/*' -not -path './usr/share/man/man1/fringed-fleet*.1.gz' | sort | tr '\n' ' ')
+[[ $stray == './usr/bin/fringed-fleet ./usr/lib/systemd/system/fringed-fleet-collect.service ' ]] ||
     broken "fringed-fleet has $stray"
-for file in fleet.md licences.txt copyright examples/{fleet.toml,prometheus.yml,alerts.yml,results.json,health.json}; do
-    [[ -s $work-fleet/usr/share/doc/fringed-fleet/$file ]] || broken "fringed-fleet has no $file"
+for file in doc/fringed-fleet/{fleet.md,licences.txt,copyright,examples/{fleet.toml,prometheus.yml,alerts.yml,results.json,health.json}} man/man1/fringed-fleet{,-collect}.1.gz; do
+    [[ -s $work-fleet/usr/share/$file ]] || broken "fringed-fleet has no $file"
 done
 [[ -d $work-fleet/etc/fringed-fleet ]] || broken "fringed-fleet has no folder for a configuration"
 grep -q 'deb-systemd-helper enable' "$work-fleet/DEBIAN/postinst" || broken "the collector is not enabled"

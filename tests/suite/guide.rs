@@ -1,11 +1,12 @@
-//! The operations guide has every error code, and only log lines that the program writes; the
-//! manual page is complete.
+//! The operations guide has every error code, and only log lines that the program writes; manual
+//! pages are complete.
 
 use crate::written::{collector, laboratory, program};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 use tests::files;
+use tests::program::Program;
 use tests::shared::root;
 
 /// The first cell of each table row below a heading of the operations guide.
@@ -84,27 +85,17 @@ fn every_line_of_the_log_in_the_guide_is_one_that_the_program_writes() {
     }
 }
 
-/// A manual page.
-struct Page(String);
-
-impl Page {
-    fn of(program: &str) -> Self {
-        let file = root().join("debian").join(program).with_extension("1");
-        Self(fs::read_to_string(file).unwrap())
-    }
-
-    /// The first words of the items of a kind.
-    fn items(&self, kind: &str) -> BTreeSet<String> {
-        let of_kind = self.0.lines().filter_map(|line| line.strip_prefix(kind));
-        of_kind
-            .map(|item| item.split(' ').next().unwrap().to_owned())
-            .collect()
-    }
-
-    fn exit_codes(&self) -> BTreeSet<u8> {
-        let items = self.items(".It ");
-        items.iter().filter_map(|item| item.parse().ok()).collect()
-    }
+/// The manual pages that a program writes, by name.
+fn manual(program: &Program) -> BTreeMap<String, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let written = program.run(&["manual", folder.path().to_str().unwrap()]);
+    assert_eq!(written.code, 0, "{}", written.stderr);
+    let names = files::names(folder.path()).into_iter();
+    let pages = names.map(|name| {
+        let page = fs::read_to_string(folder.path().join(&name)).unwrap();
+        (name, page.replace("\\-", "-"))
+    });
+    pages.collect()
 }
 
 /// The commands in the help of a program.
@@ -119,7 +110,7 @@ fn commands(help: &str) -> BTreeSet<String> {
 fn options(help: &str) -> BTreeSet<String> {
     let (_, options) = help.split_once("\nOptions:\n").unwrap();
     let long = options.lines().filter_map(|line| line.split_once(" --"));
-    long.map(|(_, option)| format!("-{}", option.split(' ').next().unwrap()))
+    long.map(|(_, option)| format!("--{}", option.split(' ').next().unwrap()))
         .collect()
 }
 
@@ -134,41 +125,27 @@ fn exit_codes() -> BTreeSet<u8> {
 }
 
 #[test]
-fn the_manual_page_has_exactly_the_commands_options_and_exit_codes_that_there_are() {
-    let page = Page::of("fringed");
-    let help = program().run(&["--help"]).stdout;
-    let mut told = page.items(".It Cm ");
-    assert!(told.insert("help".to_owned()) && told.len() > 10);
-    assert_eq!(told, commands(&help));
-    let mut options = options(&help);
-    let mut told = page.items(".It Fl ");
-    assert!(told.insert("-version".to_owned()));
-    // `serve`, which runs without a command, prints no table.
-    assert!(options.insert("-json".to_owned()));
-    assert_eq!(told, options);
+fn a_program_writes_a_manual_page_for_each_command_with_its_options_and_the_exit_codes() {
     assert!(exit_codes().contains(&78));
-    assert_eq!(page.exit_codes(), exit_codes());
-}
-
-#[test]
-fn the_other_manual_pages_have_exactly_the_commands_and_options_that_there_are() {
     for (name, program) in [
+        ("fringed", program()),
         ("fringed-lab", laboratory()),
         ("fringed-fleet", collector()),
     ] {
-        let page = Page::of(name);
-        let help = program.run(&["--help"]).stdout;
-        let mut told = page.items(".It Cm ");
-        assert!(told.insert("help".to_owned()));
-        assert_eq!(told, commands(&help));
-        let names = told.iter().filter(|name| *name != "help");
-        let help: Vec<_> = names
-            .map(|name| program.run(&[name.as_str(), "--help"]).stdout)
-            .collect();
-        assert_eq!(
-            page.items(".It Fl "),
-            help.iter().flat_map(|help| options(help)).collect()
-        );
-        assert!(page.exit_codes().is_subset(&exit_codes()));
+        let pages = manual(&program);
+        for code in exit_codes() {
+            assert!(
+                pages[&format!("{name}.1")].contains(&format!("\n{code}: ")),
+                "{name}, {code}"
+            );
+        }
+        let mut commands = commands(&program.run(&["--help"]).stdout);
+        assert!(commands.remove("help") && commands.len() > 3);
+        for command in commands {
+            let page = &pages[&format!("{name}-{command}.1")];
+            for option in options(&program.run(&[&command, "--help"]).stdout) {
+                assert!(page.contains(&option), "{name} {command} {option}");
+            }
+        }
     }
 }

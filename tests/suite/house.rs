@@ -300,7 +300,7 @@ fn no_file_of_inspect_names_an_item_of_a_module_that_it_lies_in() {
 }
 
 /// The files of a crate without those of tests: their paths below its folder, and their texts.
-fn files_of(folder: &str) -> Vec<(String, String)> {
+pub fn files_of(folder: &str) -> Vec<(String, String)> {
     let own = sources(folder).into_iter();
     // A program beside a library is a crate of its own.
     let own = own.filter(|source| !is_of_tests(source) && !source.name.ends_with("/main.rs"));

@@ -6,7 +6,7 @@ use appliance::config::{Backend, HeadConfig};
 use appliance::head::calibrated::CalibratedHead;
 use appliance::head::examine::{Lit, SETTLE};
 use appliance::head::seam;
-use appliance::production::backend::{self, Opened};
+use appliance::production::backend::{self, OpenedHead};
 use hal::error::DeviceKind;
 use hal::replay::Recording;
 use hal::replay::recording::PatternSpec;
@@ -15,11 +15,11 @@ use std::time::Duration;
 use tests::small_head::SMALL_HEAD as HEAD;
 
 /// Opens a small head with these keys, as every command does that measures.
-fn open(folder: &Path, keys: &str) -> (HeadConfig, Opened) {
+fn open(folder: &Path, keys: &str) -> (HeadConfig, OpenedHead) {
     open_scenario(folder, &format!("{HEAD}{keys}"))
 }
 
-fn open_scenario(folder: &Path, text: &str) -> (HeadConfig, Opened) {
+fn open_scenario(folder: &Path, text: &str) -> (HeadConfig, OpenedHead) {
     let scenario = folder.join("scenario.toml");
     std::fs::write(&scenario, text).unwrap();
     let config = HeadConfig {
@@ -35,7 +35,7 @@ fn open_scenario(folder: &Path, text: &str) -> (HeadConfig, Opened) {
 fn light_that_comes_seconds_after_the_mode_was_set_is_waited_for_also_when_a_lost_head_is_back() {
     let folder = tempfile::tempdir().unwrap();
     let (config, mut opened) = open(folder.path(), "[timing]\nfirst_light_us = 3000000\n");
-    let lit = |opened: &mut Opened| Lit::take(&mut opened.head, SETTLE).unwrap().share();
+    let lit = |opened: &mut OpenedHead| Lit::take(&mut opened.head, SETTLE).unwrap().share();
     assert_eq!((opened.dark.clone(), lit(&mut opened)), (None, 1.0));
     let stage = opened.stage.clone().unwrap();
     stage.unplug(DeviceKind::Projector);

@@ -51,6 +51,7 @@ mod light;
 mod limits;
 mod measured;
 mod messages;
+mod names;
 mod one_click;
 mod outputs;
 mod page;

@@ -3,7 +3,7 @@
 
 use crate::station_plc::{Daemon, Place, Plc, READY, command, long};
 use crate::written::FRINGED;
-use appliance::history::{self, Bounds, Filter, Numbering, Opened, Reader};
+use appliance::history::{self, Bounds, Filter, Numbering, OpenedHistory, Reader};
 use appliance::recipe::Store;
 use appliance::recipe::archive;
 use appliance::storage::state::{Counted, StateFolder};
@@ -264,7 +264,7 @@ impl Promise {
             good_every: 0,
         };
         let opened = history::open(state, numbering, bounds);
-        let Opened {
+        let OpenedHistory {
             history,
             task,
             next_seq: next,

@@ -31,11 +31,12 @@ pub mod status;
 pub mod store;
 
 use backup::Backup;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
 use collect::Collect;
 use error::{Exit, Result};
 use log::Severity;
 use status::Status;
+use std::path::PathBuf;
 use std::process::ExitCode;
 use store::{Kind, schema};
 
@@ -62,7 +63,32 @@ enum Command {
         #[arg(long, value_enum)]
         store: Kind,
     },
+    /// Write the manual pages.
+    #[command(hide = true)]
+    Manual {
+        /// The folder for them.
+        folder: PathBuf,
+    },
 }
+
+/// At the end of the program's page: [`Exit`] in words.
+const EXIT_STATUS: &str = "Exit status:
+
+0: done.
+
+64: the command line is wrong.
+
+65: an answer or a store has wrong content.
+
+66: the named file does not exist, or the store has no heads.
+
+69: a head or the store cannot be reached, or a port is in use.
+
+70: the program itself is at fault.
+
+73: output cannot be created.
+
+78: the configuration is wrong.";
 
 /// Runs the program `fringed-fleet`: parses the arguments of this process, runs the command and
 /// returns its exit code.
@@ -99,6 +125,11 @@ async fn run(command: Command) -> Result<()> {
         Command::Schema { store } => {
             say!("{}", schema(store).trim_end());
             Ok(())
+        }
+        Command::Manual { folder } => {
+            let program = Arguments::command().after_long_help(EXIT_STATUS);
+            let what = format!("write manual pages to {}", folder.display());
+            clap_mangen::generate_to(program, folder).map_err(Exit::CannotCreate.because(what))
         }
     }
 }

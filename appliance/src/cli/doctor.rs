@@ -5,8 +5,8 @@ use crate::config::Backend;
 use crate::error::{Exit, Result};
 use crate::head::doctor::{Check, CheckVerdict, computer, examine};
 use crate::production::backend;
+use crate::system::computing;
 use crate::system::host::Host;
-use crate::system::priority;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -45,7 +45,7 @@ impl Doctor {
         let real = config.head.backend == Backend::Rpi;
         let trigger = real.then_some(&config.head.trigger);
         let host = Host::default();
-        let prompt = priority::prompt(host.isolated_core());
+        let prompt = computing::prompt(host.isolated_core());
         let mut checks = computer::examine(&host, &config.lines, trigger, prompt);
         checks.extend(pool.install(|| {
             examine(

@@ -4,7 +4,7 @@ use super::numbers::number;
 use super::options::{Files, Json};
 use crate::config::MAX_RESULTS;
 use crate::error::{Exit, Failure, Result};
-use crate::history::{Entry, Filter, HistoryError, Reader, time};
+use crate::history::{Entry, Filter, HistoryError, Reader, export};
 use crate::station::Verdict;
 use crate::station::control::MAX_RECIPE;
 use crate::station::gauge::decision;
@@ -27,10 +27,10 @@ pub struct HistoryOptions {
     #[arg(long, value_name = "PART_ID", value_parser = number(0, u32::MAX))]
     part: Option<u32>,
     /// Only triggered at or after this time (UTC).
-    #[arg(long, value_parser = time::utc_us, value_name = "TIME")]
+    #[arg(long, value_parser = export::utc_us, value_name = "TIME")]
     since: Option<u64>,
     /// Only triggered before this time (UTC).
-    #[arg(long, value_parser = time::utc_us, value_name = "TIME")]
+    #[arg(long, value_parser = export::utc_us, value_name = "TIME")]
     until: Option<u64>,
     /// At most this many, the newest; as CSV all, unless given.
     #[arg(long, value_name = "N", value_parser = number(1, MAX_RESULTS))]
@@ -170,7 +170,7 @@ impl From<HistoryError> for Failure {
 /// The time of a result, to the second: by the clock, else by a browser's clock, else since the
 /// start of the daemon.
 fn moment(entry: &Entry) -> String {
-    let second = |us| format!("{:.19}", time::utc(us));
+    let second = |us| format!("{:.19}", export::utc(us));
     match (entry.time_utc_us, entry.browser_utc_us) {
         (Some(us), _) => second(us),
         (None, Some(us)) => format!("≈{}", second(us)),

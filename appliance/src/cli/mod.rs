@@ -6,11 +6,12 @@ macro_rules! say {
     ($($argument:tt)*) => {{
         use std::io::Write as _;
         let text = format!($($argument)*);
-        let _ = writeln!(std::io::stdout(), "{}", crate::system::prefix::plain(&text));
+        let _ = writeln!(std::io::stdout(), "{}", crate::system::stderr::plain(&text));
     }};
 }
 
 mod calibrate;
+mod completions;
 mod config;
 mod demo;
 mod doctor;
@@ -27,6 +28,7 @@ mod serve;
 mod teach;
 
 pub use calibrate::model_files;
+pub use completions::{Completions, Manual};
 pub use options::{Files, Output, Quiet, Threads};
 
 use crate::VERSION;
@@ -37,7 +39,6 @@ use algo::phase::DecodeError;
 use algo::simd::Backend;
 use clap::error::{ContextKind, ContextValue};
 use clap::{CommandFactory as _, Parser, Subcommand};
-use clap_complete::{Shell, generate};
 use std::process::ExitCode;
 
 /// The open 3-D smart sensor.
@@ -63,6 +64,9 @@ macro_rules! commands {
             $($(#[$meta])* $name($options),)*
             /// Print what makes a shell complete the command line.
             Completions(Completions),
+            /// Write the manual pages.
+            #[command(hide = true)]
+            Manual(Manual),
         }
 
         impl Command {
@@ -70,6 +74,7 @@ macro_rules! commands {
                 match self {
                     $(Self::$name(options) => options.run(),)*
                     Self::Completions(options) => options.run(Arguments::command()),
+                    Self::Manual(options) => options.run(Arguments::command()),
                 }
             }
         }
@@ -109,28 +114,6 @@ commands! {
     Registers(registers::Registers);
 }
 
-/// Print what makes a shell complete the command line.
-#[derive(Debug, clap::Args)]
-pub struct Completions {
-    /// The shell that the script is for.
-    #[arg(value_enum)]
-    shell: Shell,
-}
-
-impl Completions {
-    /// Prints the script for all commands and options of `program`.
-    ///
-    /// # Errors
-    /// None.
-    pub fn run(&self, mut program: clap::Command) -> Result<()> {
-        let name = program.get_name().to_owned();
-        let mut script = Vec::new();
-        generate(self.shell, &mut program, name, &mut script);
-        say!("{}", String::from_utf8_lossy(&script).trim_end());
-        Ok(())
-    }
-}
-
 /// Commands of `fringed-lab` that `fringed` once had.
 const LABORATORY: [&str; 6] = [
     "adapt",
@@ -149,7 +132,7 @@ pub fn main() -> ExitCode {
 /// Parses the arguments of this process, runs the command and returns its exit code. Options may
 /// stand before the command or after it.
 pub fn start<A: Parser>(run: impl FnOnce(A) -> Result<()>) -> ExitCode {
-    crate::system::memory::give_back();
+    crate::system::computing::give_back();
     journal::take_panics();
     let code = carry_out(run);
     stderr::end();

@@ -8,7 +8,7 @@ use crate::error::{Exit, Result};
 use crate::head::scan::take;
 use crate::head::seam;
 use crate::history::{RECIPE, kept};
-use crate::production::backend::{self, Opened};
+use crate::production::backend::{self, OpenedHead};
 use crate::recipe::Recipe;
 use crate::recipe::plan::Plan;
 use algo::pattern::{PhaseFunction, Sequence};
@@ -87,8 +87,8 @@ impl Record {
         Ok(())
     }
 
-    fn take(&self, opened: &mut Opened, on_progress: &dyn Fn(f64)) -> Result<Recording> {
-        let Opened {
+    fn take(&self, opened: &mut OpenedHead, on_progress: &dyn Fn(f64)) -> Result<Recording> {
+        let OpenedHead {
             head,
             calibration,
             stage,
@@ -117,11 +117,11 @@ impl Record {
 /// Takes the sequence for production of a recipe. Two frames alone have no phase, so the sequence
 /// behind them is taken.
 fn take_of_recipe(
-    opened: &mut Opened,
+    opened: &mut OpenedHead,
     recipe: Recipe,
     on_progress: &dyn Fn(f64),
 ) -> Result<Recording> {
-    let Opened {
+    let OpenedHead {
         head,
         calibration,
         stage,

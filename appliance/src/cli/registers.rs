@@ -3,7 +3,7 @@
 use super::options::Json;
 use crate::error::Result;
 use crate::history::kept;
-use crate::modbus::tags::{self, SlotName};
+use crate::modbus::render::{self, SlotName};
 use crate::modbus::{registers_csv, registers_json};
 use std::path::PathBuf;
 
@@ -51,8 +51,8 @@ impl Registers {
             })
             .collect();
         let csv = match format {
-            Format::Flat => tags::flat(&names),
-            Format::Kepware => tags::kepware(&names),
+            Format::Flat => render::flat(&names),
+            Format::Kepware => render::kepware(&names),
         };
         say!("{}", csv.trim_end_matches('\n'));
         Ok(())

@@ -10,7 +10,7 @@ use crate::recipe::plan::PlanError;
 use crate::recipe::{Outline, Recipe, Store};
 use crate::station::result::flag::SIMULATED;
 use crate::station::{Inspection, ResultRecord, Square};
-use crate::storage::unpack::Unpacked;
+use crate::storage::archive::Unpacked;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,20 +1,17 @@
 //! `fringed serve`: the station, until the stop signal. `fringed idle`: the output lines at their idle
 //! levels, for the service manager after the daemon was killed.
 
-use super::options::SimulatedPart;
-use super::options::{Quiet, Serving};
+use super::options::{Quiet, Serving, SimulatedPart};
 use crate::config::Config;
 use crate::error::Result;
 use crate::production::backend;
 use crate::service::{Caller, Daemon};
 use crate::station::Snapshot;
-use crate::station::refusal::reject;
-use crate::station::snapshot::status;
+use crate::station::snapshot::{reject, status};
+use crate::system::caller::{Notify, StopSignal};
 use crate::system::journal::Severity;
-use crate::system::notify::Notify;
 use crate::system::progress::Progress;
 use crate::system::runtime;
-use crate::system::stop_signal::StopSignal;
 use std::path::PathBuf;
 use std::time::Duration;
 

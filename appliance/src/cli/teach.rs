@@ -10,7 +10,7 @@ use crate::head::calibrated::EmptyStation;
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::measure::{measure, measure_after};
-use crate::production::backend::{self, Opened};
+use crate::production::backend::{self, OpenedHead};
 use crate::recipe::file::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
 use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe, UnsealedRecipe};
 use crate::recipe::replace::{LEAST_LIMIT_MM, MOST_LIMIT_MM};
@@ -259,7 +259,7 @@ impl Teach {
             empty: empty.flatten().map(Arc::new),
             ..naming.clone()
         };
-        let Opened {
+        let OpenedHead {
             mut head,
             calibration,
             ..

@@ -3,7 +3,6 @@
 //! A key is described in docs/configuration.md, whose table the program contains.
 
 mod devices;
-mod exposing;
 mod keys;
 
 pub use keys::{Key, keys, table};
@@ -15,7 +14,7 @@ use crate::head::exposing::Exposing;
 use crate::head::placed::Placed;
 use crate::station::control::MAX_RECIPE;
 use hal::bounded;
-use hal::bounds::{Bound, Fields, Longest, MAX_PATH, clipped, length, shortened};
+use hal::bounds::{Bound, Fields, Longest, MAX_PATH, OutOfBounds, clipped, length, shortened};
 use hal::setup::{CameraSetup, LinesSetup, ProjectorSetup, TriggerSetup};
 use ipnet::IpNet;
 use serde::{Deserialize, Serialize};
@@ -185,6 +184,47 @@ fn networks(all: &[&str]) -> Vec<IpNet> {
     all.iter().filter_map(|net| net.parse().ok()).collect()
 }
 
+/// A configuration whose values do not fit each other or their bounds.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum ConfigError {
+    /// A value is out of its bounds, which the words name with the key.
+    #[error(transparent)]
+    Bounds(#[from] OutOfBounds),
+    /// A device has a width or a height alone.
+    #[error("{section}.width and {section}.height: write both or neither")]
+    HalfSize {
+        /// The device's section.
+        section: &'static str,
+    },
+    /// The trigger's pulse is longer than the exposure.
+    #[error(
+        "head.trigger.pulse_us = {pulse_us}: write at most head.camera.exposure_us = {exposure_us}: a camera that exposes while the pulse \
+         lasts would expose longer than it is said to"
+    )]
+    LongPulse {
+        /// The pulse, µs.
+        pulse_us: u32,
+        /// The exposure, µs.
+        exposure_us: u32,
+    },
+    /// The camera is triggered by a line and by the projector.
+    #[error(
+        "head.trigger.line and head.trigger.by_projector: write one of them: a camera has one trigger input"
+    )]
+    TwoTriggers,
+    /// Two lines have one name.
+    #[error("{} and {} are both \"{line}\": give each its own line", keys[0], keys[1])]
+    SharedLine {
+        /// The keys that name it.
+        keys: [&'static str; 2],
+        /// The line.
+        line: String,
+    },
+    /// A replay head without recordings.
+    #[error("head.recordings is empty: the replay head needs at least one folder")]
+    NoRecordings,
+}
+
 impl Config {
     /// Reads and checks a file. Paths in it are relative to its folder.
     ///
@@ -209,7 +249,7 @@ impl Config {
             Failure::new(Exit::Configuration, words)
         };
         let mut config: Self = toml::from_str(&text).map_err(|error| wrong(error.to_string()))?;
-        config.check().map_err(wrong)?;
+        config.check().map_err(|error| wrong(error.to_string()))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let head = &mut config.head;
         let paths = head.scenario.iter_mut().chain(&mut head.recordings);
@@ -236,18 +276,20 @@ impl Config {
     ///
     /// # Errors
     /// Naming the key and its range.
-    pub fn check(&self) -> Result<(), String> {
+    pub fn check(&self) -> Result<(), ConfigError> {
         Fields.check("", self)?;
         let modbus = &self.modbus;
-        length("modbus.readers", modbus.readers.len(), 0, MAX_LISTED)?;
-        length("modbus.writers", modbus.writers.len(), 0, MAX_LISTED)?;
-        length("http.hosts", self.http.hosts.len(), 0, MAX_LISTED)?;
-        length("head.recordings", self.head.recordings.len(), 0, MAX_LISTED)?;
+        for (key, count) in [
+            ("modbus.readers", modbus.readers.len()),
+            ("modbus.writers", modbus.writers.len()),
+            ("http.hosts", self.http.hosts.len()),
+            ("head.recordings", self.head.recordings.len()),
+        ] {
+            length(key, count, 0, MAX_LISTED)?;
+        }
         devices::check(self)?;
         if self.head.backend == Backend::Replay && self.head.recordings.is_empty() {
-            return Err(
-                "head.recordings is empty: the replay head needs at least one folder".into(),
-            );
+            return Err(ConfigError::NoRecordings);
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! Reads the history for the page and the command line. Nothing here can change it.
 
 use super::entry::{Entry, Filter, GaugeEntry};
-use super::{HistoryError, Result, schema};
+use super::{HistoryError, HistoryResult, schema};
 use crate::station::{Counts, Verdict};
 use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension as _, Params, Row, params_from_iter};
@@ -70,7 +70,7 @@ impl Reader {
         self.recordings.join(format!(".page.partial-{count}"))
     }
 
-    pub(super) fn open(&self) -> Result<Connection> {
+    pub(super) fn open(&self) -> HistoryResult<Connection> {
         if !self.path.exists() {
             return Err(HistoryError {
                 path: self.path.clone(),
@@ -85,7 +85,7 @@ impl Reader {
     pub(super) fn read<T>(
         &self,
         work: impl FnOnce(&Connection) -> rusqlite::Result<T>,
-    ) -> Result<T> {
+    ) -> HistoryResult<T> {
         work(&self.open()?).map_err(|error| HistoryError::of(&self.path, &error))
     }
 
@@ -93,7 +93,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn id(&self) -> Result<String> {
+    pub fn id(&self) -> HistoryResult<String> {
         let query = "SELECT id FROM history";
         self.read(|connection| connection.query_row(query, (), |row| row.get(0)))
     }
@@ -103,7 +103,7 @@ impl Reader {
     /// # Errors
     /// [`HistoryError`] if the database is missing, busy for seconds, damaged, or of another
     /// version.
-    pub fn results(&self, filter: &Filter) -> Result<Vec<Entry>> {
+    pub fn results(&self, filter: &Filter) -> HistoryResult<Vec<Entry>> {
         let mut all = Vec::new();
         self.each(filter, |entry| {
             all.push(entry);
@@ -116,7 +116,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn result(&self, seq: u32) -> Result<Option<Entry>> {
+    pub fn result(&self, seq: u32) -> HistoryResult<Option<Entry>> {
         self.first(
             "SELECT * FROM dated WHERE seq = ?1 ORDER BY id DESC LIMIT 1",
             seq,
@@ -127,14 +127,14 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn recorded_as(&self, name: &str) -> Result<Option<Entry>> {
+    pub fn recorded_as(&self, name: &str) -> HistoryResult<Option<Entry>> {
         self.first(
             "SELECT * FROM dated WHERE recording = ?1 ORDER BY id DESC LIMIT 1",
             name,
         )
     }
 
-    fn first(&self, query: &str, key: impl rusqlite::ToSql) -> Result<Option<Entry>> {
+    fn first(&self, query: &str, key: impl rusqlite::ToSql) -> HistoryResult<Option<Entry>> {
         self.read(|connection| {
             let found = connection.query_row(query, [key], |row| read(connection, row));
             found.optional()
@@ -145,7 +145,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn recording(&self, seq: u32) -> Result<Option<PathBuf>> {
+    pub fn recording(&self, seq: u32) -> HistoryResult<Option<PathBuf>> {
         let found = self.result(seq)?.and_then(|entry| entry.recording);
         Ok(found.map(|name| self.recordings.join(name)))
     }
@@ -156,8 +156,8 @@ impl Reader {
     pub(super) fn each(
         &self,
         filter: &Filter,
-        mut take: impl FnMut(Entry) -> Result<()>,
-    ) -> Result<()> {
+        mut take: impl FnMut(Entry) -> HistoryResult<()>,
+    ) -> HistoryResult<()> {
         let connection = self.open()?;
         let (condition, values) = condition(filter);
         let query =
@@ -186,7 +186,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn counts(&self, filter: &Filter) -> Result<Counts> {
+    pub fn counts(&self, filter: &Filter) -> HistoryResult<Counts> {
         let (condition, values) = condition(filter);
         let query =
             format!("SELECT verdict, count(*) FROM dated WHERE {condition} GROUP BY verdict");
@@ -208,7 +208,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn undated(&self, filter: &Filter) -> Result<u64> {
+    pub fn undated(&self, filter: &Filter) -> HistoryResult<u64> {
         if filter.since_us.is_none() && filter.until_us.is_none() {
             return Ok(0);
         }
@@ -231,7 +231,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn starts(&self) -> Result<BTreeMap<String, u64>> {
+    pub fn starts(&self) -> HistoryResult<BTreeMap<String, u64>> {
         let query = "SELECT boot_id, browser_utc_us FROM start";
         self.read(|connection| rows(connection, query, (), |row| Ok((row.get(0)?, row.get(1)?))))
     }
@@ -241,7 +241,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn trends(&self, recipe: u16, last: usize) -> Result<Vec<Trend>> {
+    pub fn trends(&self, recipe: u16, last: usize) -> HistoryResult<Vec<Trend>> {
         let filter = Filter {
             recipe: Some(recipe),
             limit: last,
@@ -280,7 +280,7 @@ impl Reader {
     ///
     /// # Errors
     /// As [`Self::results`].
-    pub fn fitness(&self, recipe: u16, last: usize) -> Result<Vec<(u32, u16)>> {
+    pub fn fitness(&self, recipe: u16, last: usize) -> HistoryResult<Vec<(u32, u16)>> {
         let query = "SELECT seq, fitness_permille FROM result
             WHERE recipe = ?1 AND error_code = 0 ORDER BY id DESC LIMIT ?2";
         let mut points: Vec<_> = self.read(|connection| {

@@ -1,7 +1,7 @@
 //! The database's tables, how it is opened, and how one that cannot be used is set aside.
 
 use super::entry::{Entry, GaugeEntry};
-use super::{HistoryError, Result};
+use super::{HistoryError, HistoryResult};
 use rusqlite::{Connection, ErrorCode, OpenFlags};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -64,7 +64,7 @@ PRAGMA query_only = true;
 ///
 /// # Errors
 /// [`HistoryError`]; `aside` if the file is there and is not a history of this version.
-pub(super) fn open(path: &Path) -> Result<Connection> {
+pub(super) fn open(path: &Path) -> HistoryResult<Connection> {
     let failed = |error: rusqlite::Error| HistoryError::of(path, &error);
     let mut connection = Connection::open(path).map_err(failed)?;
     settle(&connection).map_err(failed)?;
@@ -82,7 +82,7 @@ pub(super) fn open(path: &Path) -> Result<Connection> {
 ///
 /// # Errors
 /// [`HistoryError`], also where the file does not exist.
-pub(super) fn open_read_only(path: &Path) -> Result<Connection> {
+pub(super) fn open_read_only(path: &Path) -> HistoryResult<Connection> {
     let failed = |error: rusqlite::Error| HistoryError::of(path, &error);
     // Read and write for the log's shared index; `query_only` keeps the content as it is.
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;

@@ -9,7 +9,7 @@
 
 use super::spool::Spool;
 use crate::station::Unstored;
-use crate::storage::state::{Counted, Counter};
+use crate::storage::state::{Counted, Counter, CounterError};
 use std::io;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -24,7 +24,7 @@ const FEW: i32 = (AHEAD / 4 * 3) as i32;
 #[derive(Debug)]
 pub struct Numbering {
     /// What the card said at the start, or why that is not known.
-    pub counted: Result<Counted, String>,
+    pub counted: Result<Counted, CounterError>,
     /// The counter on the card.
     pub counter: Counter,
     /// The serial of the device.

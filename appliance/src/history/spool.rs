@@ -111,7 +111,7 @@ impl Spool {
         self.file.write_all_at(text.as_bytes(), BUFFERED)
     }
 
-    /// What [`Self::buffer`] was told last; `None` where it was told nothing.
+    /// The last value of [`Self::buffer`]; `None` if it was never called.
     pub fn buffered(&self) -> Option<Option<u32>> {
         let [mode, seq] = self.numbers(BUFFERED)?;
         Some((mode != 0).then_some(seq))

@@ -4,13 +4,13 @@
 //! While the card hangs, 512 results wait for the database; later ones are lost to the history and
 //! counted. Cycles go on with the numbers that are reserved, then fault 603 until the card answers.
 
-use super::Result;
+use super::HistoryResult;
 use super::entry::Entry;
 use super::handle::History;
-use super::keeper::Keeping;
-use super::message::{MAX_WAITING, Message};
+use super::handle::Keeping;
+use super::handle::{MAX_WAITING, Message};
+use super::recordings::Unkept;
 use super::recordings::seq_of;
-use super::unkept::Unkept;
 use super::writer::Writer;
 use crate::station::{Event, StationHandle};
 use std::collections::VecDeque;
@@ -31,7 +31,7 @@ const TOO_LONG: u64 = 32 << 20;
 /// When the daemon ends, a recording that is being written has this long.
 const LAST_PART: Duration = Duration::from_secs(1);
 
-/// The thread's own side.
+/// What the thread `history` owns.
 pub struct Task {
     history: History,
     inbox: Receiver<Message>,
@@ -140,7 +140,7 @@ impl Task {
     }
 
     /// Notes where the frames of a result are, or why they are not kept.
-    fn note(&mut self, seq: u32, kept: &Result<String, Unkept>) -> Result<()> {
+    fn note(&mut self, seq: u32, kept: &Result<String, Unkept>) -> HistoryResult<()> {
         let waiting = self.waiting.iter_mut().find(|entry| entry.seq == seq);
         match (waiting, kept) {
             (Some(entry), Ok(name)) => entry.recording = Some(name.clone()),
@@ -170,7 +170,7 @@ impl Task {
     }
 
     /// Stores what waits, if need be in a new database: then a line that says so.
-    fn store(&mut self) -> Result<Option<String>> {
+    fn store(&mut self) -> HistoryResult<Option<String>> {
         if self.waiting.is_empty() {
             return Ok(None);
         }

@@ -4,8 +4,8 @@
 
 use super::entry::Entry;
 use super::reader::rows;
-use super::unkept::Unkept;
-use super::{HistoryError, Result, schema};
+use super::recordings::Unkept;
+use super::{HistoryError, HistoryResult, schema};
 use rusqlite::{Connection, OptionalExtension as _, Transaction, params};
 use std::path::{Path, PathBuf};
 
@@ -28,7 +28,7 @@ impl Writer {
     ///
     /// # Errors
     /// If it can be neither opened nor set aside.
-    pub fn open(path: &Path, limit: u64) -> Result<(Self, Option<String>)> {
+    pub fn open(path: &Path, limit: u64) -> HistoryResult<(Self, Option<String>)> {
         match Self::open_sound(path, limit) {
             Err(error) if error.aside.is_some() => {
                 let said = set_aside(&error)?;
@@ -38,7 +38,7 @@ impl Writer {
         }
     }
 
-    fn open_sound(path: &Path, limit: u64) -> Result<Self> {
+    fn open_sound(path: &Path, limit: u64) -> HistoryResult<Self> {
         let connection = schema::open(path)?;
         if let Some(reason) = schema::complaint(&connection) {
             return Err(HistoryError {
@@ -63,7 +63,7 @@ impl Writer {
     ///
     /// # Errors
     /// If that is not possible; then nothing can be stored until it is.
-    pub fn begin_anew(&mut self, why: &HistoryError) -> Result<String> {
+    pub fn begin_anew(&mut self, why: &HistoryError) -> HistoryResult<String> {
         let failed = |error| HistoryError::of(&self.path, &error);
         // Closed before it is renamed: a log that is still open would be taken for the new
         // database's.
@@ -87,7 +87,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn last_seq(&self) -> Result<Option<u32>> {
+    pub fn last_seq(&self) -> HistoryResult<Option<u32>> {
         let newest = "SELECT seq FROM result ORDER BY id DESC LIMIT 1";
         let seq = self.connection.query_row(newest, (), |row| row.get(0));
         seq.optional().map_err(|error| self.failed(&error))
@@ -98,7 +98,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`]; then nothing was stored.
-    pub fn store<'a>(&mut self, entries: impl Iterator<Item = &'a Entry>) -> Result<()> {
+    pub fn store<'a>(&mut self, entries: impl Iterator<Item = &'a Entry>) -> HistoryResult<()> {
         let (known, limit) = (self.count, self.limit);
         let stored = self.connection.transaction().and_then(|transaction| {
             let mut count = known;
@@ -134,7 +134,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn checkpoint(&mut self) -> Result<()> {
+    pub fn checkpoint(&mut self) -> HistoryResult<()> {
         schema::checkpoint(&self.connection).map_err(|error| self.failed(&error))
     }
 
@@ -142,7 +142,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn link(&mut self, seq: u32, name: &str) -> Result<()> {
+    pub fn link(&mut self, seq: u32, name: &str) -> HistoryResult<()> {
         let newest = "UPDATE result SET recording = ?2, unkept = NULL
             WHERE id = (SELECT max(id) FROM result WHERE seq = ?1)";
         self.change(newest, params![seq, name])
@@ -152,7 +152,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn leave_out(&mut self, seq: u32, why: &Unkept) -> Result<()> {
+    pub fn leave_out(&mut self, seq: u32, why: &Unkept) -> HistoryResult<()> {
         let newest =
             "UPDATE result SET unkept = ?2 WHERE id = (SELECT max(id) FROM result WHERE seq = ?1)";
         self.change(newest, params![seq, why.to_string()])
@@ -162,7 +162,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn unlink(&mut self, name: &str, why: &Unkept) -> Result<()> {
+    pub fn unlink(&mut self, name: &str, why: &Unkept) -> HistoryResult<()> {
         let linked = "UPDATE result SET recording = NULL, unkept = ?2 WHERE recording = ?1";
         self.change(linked, params![name, why.to_string()])
     }
@@ -172,7 +172,7 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn date(&mut self, boot_id: &str, utc_us: u64) -> Result<()> {
+    pub fn date(&mut self, boot_id: &str, utc_us: u64) -> HistoryResult<()> {
         let start = "INSERT INTO start VALUES (?1, ?2)
             ON CONFLICT (boot_id) DO UPDATE SET browser_utc_us = excluded.browser_utc_us";
         self.change(start, params![boot_id, utc_us])?;
@@ -184,13 +184,13 @@ impl Writer {
     ///
     /// # Errors
     /// [`HistoryError`].
-    pub fn linked(&self) -> Result<Vec<String>> {
+    pub fn linked(&self) -> HistoryResult<Vec<String>> {
         let linked = "SELECT DISTINCT recording FROM result WHERE recording IS NOT NULL";
         let names = rows(&self.connection, linked, (), |row| row.get(0));
         names.map_err(|error| self.failed(&error))
     }
 
-    fn change(&mut self, statement: &str, values: impl rusqlite::Params) -> Result<()> {
+    fn change(&mut self, statement: &str, values: impl rusqlite::Params) -> HistoryResult<()> {
         let changed = self.connection.execute(statement, values);
         changed.map_err(|error| self.failed(&error))?;
         Ok(())
@@ -213,7 +213,7 @@ fn insert(transaction: &Transaction<'_>, entry: &Entry) -> rusqlite::Result<()> 
 }
 
 /// Sets the database of an error aside; answers with a line for the log.
-fn set_aside(error: &HistoryError) -> Result<String> {
+fn set_aside(error: &HistoryError) -> HistoryResult<String> {
     let HistoryError {
         path,
         reason,

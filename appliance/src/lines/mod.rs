@@ -1,20 +1,18 @@
 //! Digital lines: start in, and busy, ok and fault out, for presses without Modbus and for lamps.
 //!
-//! What may block the thread: its own chip, and the station's lock for one step of another event. It
-//! gets snapshots through a channel that keeps only the latest, so nobody waits for it.
+//! One thread serves them. It blocks only on its own chip, and on the station's lock for one step of
+//! another event. It gets snapshots through a channel that keeps only the latest, so no other thread
+//! waits for it.
 //!
-//! One thread serves them. It follows the station's snapshots, as Modbus and the page do, and its
+//! It follows the station's snapshots, as Modbus and the page do, and its
 //! start is a trigger by edge, as the page's is. When the GPIO chip is lost it is opened again
 //! until that succeeds; meanwhile pull resistors hold the fault line on.
-
-mod signals;
-
-pub use signals::{Follower, Signals};
 
 use crate::error::Result;
 use crate::production::backend::Wires;
 use crate::station::control::TRIGGER;
-use crate::station::{Client, ControlWrite, Event, StationHandle};
+use crate::station::snapshot::status;
+use crate::station::{Client, ControlWrite, Event, Snapshot, StationHandle, Verdict};
 use crate::system::progress::Progress;
 use crate::system::runtime;
 use hal::clock::monotonic;
@@ -33,7 +31,7 @@ const FIRST_WAIT: Duration = Duration::from_millis(100);
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
 /// Opens the lines again.
-pub type Open = Box<dyn Fn() -> Result<Wires> + Send + Sync>;
+pub type Reopen = Box<dyn Fn() -> Result<Wires> + Send + Sync>;
 
 /// Serves the lines until `stopped` is true; then they are released.
 ///
@@ -41,7 +39,7 @@ pub type Open = Box<dyn Fn() -> Result<Wires> + Send + Sync>;
 /// If the system gives no runtime.
 pub fn serve(
     wires: Wires,
-    open: &Open,
+    open: &Reopen,
     station: &StationHandle,
     progress: &Progress,
     mut stopped: watch::Receiver<bool>,
@@ -58,7 +56,7 @@ pub fn serve(
 }
 
 /// Follows the station for ever, and opens the lines again when they fail.
-async fn follow(mut wires: Wires, open: &Open, station: &StationHandle, progress: &Progress) {
+async fn follow(mut wires: Wires, open: &Reopen, station: &StationHandle, progress: &Progress) {
     loop {
         if let Err(error) = wires.follow(station).await {
             progress.log(&format!("{error}; opened again when it is there"));
@@ -69,7 +67,7 @@ async fn follow(mut wires: Wires, open: &Open, station: &StationHandle, progress
     }
 }
 
-async fn reopened(open: &Open, progress: &Progress) -> Wires {
+async fn reopened(open: &Reopen, progress: &Progress) -> Wires {
     let (mut wait, mut said) = (FIRST_WAIT, String::new());
     loop {
         tokio::time::sleep(wait).await;
@@ -186,6 +184,77 @@ async fn moved(descriptor: Option<&AsyncFd<OwnedFd>>, settles: Option<Timestamp>
         }
     };
     tokio::select! { () = edges => {} () = still => {} }
+}
+
+/// The output lines. A start is taken exactly while busy and fault are both off.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Signals {
+    /// The station measures, loads, teaches, starts or stops.
+    pub busy: bool,
+    /// The part of the last start was measured and passed.
+    pub ok: bool,
+    /// The station is idle, but takes no start: somebody has to do something first.
+    pub fault: bool,
+}
+
+/// Follows a station. Ok is never on for a part that was not measured: not for the part before, nor
+/// for one whose start was missed.
+#[derive(Clone, Copy, Debug)]
+pub struct Follower {
+    seq: u32,
+    missed: u32,
+    passed: bool,
+    said: Signals,
+}
+
+impl Follower {
+    /// Starts with a snapshot and its signals. Its result is of an earlier part, so it does not
+    /// count.
+    pub fn new(snapshot: &Snapshot) -> (Self, Signals) {
+        let mut follower = Self {
+            seq: snapshot.result_seq,
+            missed: snapshot.missed,
+            passed: false,
+            said: Signals::default(),
+        };
+        follower.said = follower.signals(snapshot);
+        (follower, follower.said)
+    }
+
+    /// The signals to set after this snapshot, in order; none if nothing changed. Snapshots in
+    /// between may be missing.
+    pub fn follow(&mut self, snapshot: &Snapshot) -> impl Iterator<Item = Signals> + use<> {
+        let finished = snapshot.result_seq != self.seq;
+        let missed = snapshot.missed != self.missed;
+        let verdict = snapshot.result.as_ref().map(|result| result.verdict);
+        if finished {
+            self.passed = verdict == Some(Verdict::Pass);
+        }
+        // Work in this snapshot is on a later part.
+        self.passed &= !snapshot.is_working() && !missed;
+        (self.seq, self.missed) = (snapshot.result_seq, snapshot.missed);
+        // A whole cycle may pass between two snapshots; a machine that waits for busy must still
+        // see it.
+        let unseen = (finished && !self.said.busy).then_some(Signals {
+            busy: true,
+            ..Signals::default()
+        });
+        let signals = self.signals(snapshot);
+        self.passed &= !signals.fault;
+        let changed = (unseen.is_some() || signals != self.said).then_some(signals);
+        self.said = signals;
+        unseen.into_iter().chain(changed)
+    }
+
+    fn signals(&self, snapshot: &Snapshot) -> Signals {
+        let busy = snapshot.is_working();
+        let fault = !busy && !snapshot.is(status::READY);
+        Signals {
+            busy,
+            ok: self.passed && !busy && !fault,
+            fault,
+        }
+    }
 }
 
 #[cfg(test)]

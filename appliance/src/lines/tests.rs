@@ -1,10 +1,10 @@
 //! The lines with a start line and lamps of this process, and a real station.
 
 use super::*;
-use crate::station::refusal::reject::OTHER_RECIPE;
+use crate::station::snapshot::reject::OTHER_RECIPE;
 use crate::station::{
     ActiveRecipe, ConnectionEdges, Effect, GaugeValue, Identity, Inspection, JobId, Limits,
-    Measured, Micros, RecipeKey, Request, Settings, Station, Unit, Verdict,
+    Measured, Micros, RecipeKey, Request, ResultRecord, Settings, Station, Unit, Verdict,
 };
 use hal::lines::OutputLine;
 use rustix::io::{read, write};
@@ -150,7 +150,7 @@ fn good() -> Arc<Inspection> {
 }
 
 /// Serves `wires` while `course` runs.
-fn serving(wires: Wires, open: Open, station: &StationHandle, course: impl FnOnce()) {
+fn serving(wires: Wires, open: Reopen, station: &StationHandle, course: impl FnOnce()) {
     let (stop, stopped) = watch::channel(false);
     std::thread::scope(|scope| {
         let served = scope.spawn(|| serve(wires, &open, station, &Progress::new(true), stopped));
@@ -174,7 +174,7 @@ fn missed(station: &StationHandle) {
     }
 }
 
-fn never() -> Open {
+fn never() -> Reopen {
     Box::new(|| panic!("nothing is to be opened again"))
 }
 
@@ -259,7 +259,7 @@ fn lines_that_went_are_opened_again_and_say_what_is_true_then() {
     let (station, _orders) = ready();
     let (panel, again) = (Panel::default(), Panel::default());
     let found = again.clone();
-    let open: Open = Box::new(move || Ok(found.wires()));
+    let open: Reopen = Box::new(move || Ok(found.wires()));
     serving(panel.wires(), open, &station, || {
         panel.broken.store(true, Ordering::Relaxed);
         let message = "on purpose".into();
@@ -270,4 +270,111 @@ fn lines_that_went_are_opened_again_and_say_what_is_true_then() {
         });
         assert_eq!(again.until("+fault"), "+fault");
     });
+}
+
+const READY: (u16, u16) = (1, status::READY);
+const ACQUIRING: (u16, u16) = (2, 0);
+const LOADING: (u16, u16) = (4, 0);
+const FAULT: (u16, u16) = (7, 0);
+
+const BUSY: Signals = signals(true, false, false);
+const OK: Signals = signals(false, true, false);
+const NOT_OK: Signals = signals(false, false, false);
+
+const fn signals(busy: bool, ok: bool, fault: bool) -> Signals {
+    Signals { busy, ok, fault }
+}
+
+/// A station in this state, with the result of this number and so many missed triggers.
+fn snapshot((state, status): (u16, u16), seq: u32, verdict: Verdict, missed: u32) -> Snapshot {
+    let record = ResultRecord {
+        seq,
+        verdict,
+        ..ResultRecord::default()
+    };
+    Snapshot {
+        state,
+        status,
+        result_seq: seq,
+        result: Some(Arc::new(record)),
+        missed,
+        ..Station::new(settings(), Micros(0)).snapshot()
+    }
+}
+
+/// What is said after each of these snapshots, by a station that has just become ready.
+fn said(snapshots: &[Snapshot]) -> Vec<Signals> {
+    let (mut follower, first) = Follower::new(&snapshot(READY, 7, Verdict::Pass, 0));
+    assert_eq!(first, NOT_OK, "an earlier result does not count");
+    let said = snapshots
+        .iter()
+        .flat_map(|snapshot| follower.follow(snapshot).collect::<Vec<_>>());
+    said.collect()
+}
+
+#[test]
+fn a_part_that_passes_is_busy_then_ok_until_the_next_start() {
+    let cycle = [
+        snapshot(ACQUIRING, 7, Verdict::Pass, 0),
+        snapshot(READY, 8, Verdict::Pass, 0),
+        snapshot(READY, 8, Verdict::Pass, 0),
+        snapshot(ACQUIRING, 8, Verdict::Pass, 0),
+    ];
+    assert_eq!(said(&cycle), [BUSY, OK, BUSY]);
+}
+
+#[test]
+fn a_part_that_fails_or_could_not_be_measured_is_not_ok() {
+    for verdict in [Verdict::Fail, Verdict::Invalid, Verdict::None] {
+        let cycle = [
+            snapshot(ACQUIRING, 7, Verdict::Pass, 0),
+            snapshot(READY, 8, verdict, 0),
+        ];
+        assert_eq!(said(&cycle), [BUSY, NOT_OK]);
+    }
+}
+
+#[test]
+fn a_cycle_between_two_looks_is_busy_all_the_same() {
+    let passed = snapshot(READY, 8, Verdict::Pass, 0);
+    assert_eq!(said(&[passed]), [BUSY, OK]);
+}
+
+#[test]
+fn a_missed_start_takes_ok_away() {
+    let missed = [
+        snapshot(READY, 8, Verdict::Pass, 0),
+        snapshot(READY, 8, Verdict::Pass, 1),
+    ];
+    assert_eq!(said(&missed), [BUSY, OK, NOT_OK]);
+}
+
+#[test]
+fn ok_does_not_come_back_after_a_fault_or_another_recipe() {
+    for (between, shown) in [(FAULT, signals(false, false, true)), (LOADING, BUSY)] {
+        let course = [
+            snapshot(READY, 8, Verdict::Pass, 0),
+            snapshot(between, 8, Verdict::Pass, 0),
+            snapshot(READY, 8, Verdict::Pass, 0),
+        ];
+        assert_eq!(said(&course), [BUSY, OK, shown, NOT_OK]);
+    }
+}
+
+#[test]
+fn ok_does_not_come_back_where_the_end_of_the_cycle_and_the_change_of_recipe_were_one_look() {
+    let course = [
+        snapshot(LOADING, 8, Verdict::Pass, 0),
+        snapshot(READY, 8, Verdict::Pass, 0),
+    ];
+    assert_eq!(said(&course), [BUSY, BUSY, NOT_OK]);
+}
+
+#[test]
+fn a_station_that_waits_for_something_else_than_a_start_says_fault() {
+    // Offline; and ready without a recipe.
+    for state in [(6, 0), (1, 0), (7, 0)] {
+        let waits = [snapshot(state, 7, Verdict::Pass, 0)];
+        assert_eq!(said(&waits), [signals(false, false, true)]);
+    }
 }

@@ -17,7 +17,7 @@ use std::{io, iter};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::time::{Instant, Sleep};
 
-use super::places::Place;
+use super::clients::ConnectionPlace;
 use super::service::{FrameFlaw, MAX_READ_WRITE, MAX_WRITE, MAX_WRITE_BITS};
 
 /// Transaction, protocol and length: the bytes needed to know the frame's length.
@@ -42,7 +42,7 @@ enum Waiting {
 pub struct Guard<T> {
     stream: T,
     /// Held while the connection is open; another client may displace it.
-    place: Place,
+    place: ConnectionPlace,
     flaw: FrameFlaw,
     idle: Duration,
     frame: Duration,
@@ -58,7 +58,13 @@ pub struct Guard<T> {
 impl<T> Guard<T> {
     /// Guards `stream`: `idle` between two requests, `frame` to finish a started frame or to take
     /// an answer.
-    pub fn new(stream: T, place: Place, flaw: FrameFlaw, idle: Duration, frame: Duration) -> Self {
+    pub fn new(
+        stream: T,
+        place: ConnectionPlace,
+        flaw: FrameFlaw,
+        idle: Duration,
+        frame: Duration,
+    ) -> Self {
         Self {
             stream,
             place,

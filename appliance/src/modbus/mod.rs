@@ -1,9 +1,9 @@
 //! Modbus TCP: the register map, version 1.4, and the server that shows a
 //! [`Snapshot`](crate::station::Snapshot) through it.
 //!
-//! [`map`] is the one table, which [`render`] and [`tags`] print; [`encode`] turns a snapshot into words, [`decode`] words into a write
-//! of the PLC, [`service`] answers one request, [`guard`] checks one connection's frames and times,
-//! [`places`] limits the connections, [`refusals`] logs what is refused, [`server`] joins them to
+//! [`map`] is the one table, which [`render`] prints; [`encode`] and [`blocks`] turn a snapshot into
+//! words, [`service`] answers one request, [`guard`] checks one connection's frames and times,
+//! [`clients`] limits the connections and logs what is refused, [`server`] joins them to
 //! `tokio-modbus`.
 //!
 //! Decisions where the map is silent:
@@ -21,23 +21,18 @@
 //!   alone would close the connection or panic, so the guard checks first.
 
 pub mod blocks;
-pub mod decode;
+pub mod clients;
 pub mod encode;
 pub mod guard;
-pub mod live;
 pub mod map;
-pub mod places;
-pub mod refusals;
 pub mod render;
 pub mod server;
 pub mod service;
-pub mod tags;
 
 #[cfg(test)]
 mod tests;
 
-pub use live::live;
-pub use places::Clients;
-pub use refusals::Refusals;
+pub use blocks::live;
+pub use clients::{Clients, Refusals};
 pub use render::{registers_csv, registers_json};
 pub use server::{Options, serve};

@@ -10,9 +10,9 @@ use std::time::Duration;
 use tokio::net::{TcpListener, TcpStream};
 use tokio_modbus::server::tcp::Server;
 
+use super::clients::Clients;
+use super::clients::{Refusals, RefusedPeer};
 use super::guard::Guard;
-use super::places::Clients;
-use super::refusals::{Refusals, Refused};
 use super::service::{FrameFlaw, PlcService};
 use crate::config::ModbusConfig;
 use crate::station::{Client, ConnectionEdges, StationHandle};
@@ -52,13 +52,13 @@ pub async fn serve(
     let connections = AtomicU64::new(0);
     let admit = |peer: IpAddr| {
         if !holds(&options.config.readers, peer) {
-            refusals.note(Refused::Connection, peer);
+            refusals.note(RefusedPeer::Connection, peer);
             return None;
         }
         let may_write = holds(&options.config.writers, peer);
         let place = clients.admit(may_write);
         if place.is_none() {
-            refusals.note(Refused::Full, peer);
+            refusals.note(RefusedPeer::Full, peer);
         }
         place.map(|place| (place, may_write))
     };

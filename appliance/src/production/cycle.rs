@@ -1,7 +1,6 @@
 //! A cycle of the measuring task: one sequence after the other until one is good enough, then the
 //! result.
 
-use super::stopwatch::timed_on;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker};
 use crate::error::code_of;
 use crate::history::JudgedPart;
@@ -11,6 +10,7 @@ use crate::station::snapshot::warning;
 use crate::station::{
     Event, Inspection, Job, JobId, Pace, ResultRecord, Stage, Stages, error_code,
 };
+use crate::system::computing::timed_on;
 use hal::frame::Frame;
 use hal::head::Exposure;
 use std::sync::Arc;

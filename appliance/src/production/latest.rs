@@ -16,22 +16,22 @@ const PATIENCE: Duration = Duration::from_secs(3);
 const MOST_WAITING: usize = 8;
 
 /// A request, which sends its own answer.
-type Request = Box<dyn FnOnce(Option<&JudgedPart>) + Send>;
+type LastCycleRequest = Box<dyn FnOnce(Option<&JudgedPart>) + Send>;
 
 /// Requests about the last cycle. Cheap to clone.
 #[derive(Clone, Default)]
-pub struct LastCycleRequests(Arc<Mutex<Inside>>);
+pub struct LastCycleRequests(Arc<Mutex<LastCycleQueue>>);
 
 #[derive(Default)]
-struct Inside {
-    waiting: Vec<Request>,
+struct LastCycleQueue {
+    waiting: Vec<LastCycleRequest>,
     /// The layers (height, deviation and modulation maps) that were computed last, with the SEQ of
     /// their result.
     layers: Option<(u32, Arc<Layers>)>,
 }
 
 impl LastCycleRequests {
-    fn inside(&self) -> MutexGuard<'_, Inside> {
+    fn inside(&self) -> MutexGuard<'_, LastCycleQueue> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -45,7 +45,7 @@ impl LastCycleRequests {
     ) -> Option<T> {
         let (sender, receiver): (SyncSender<Option<T>>, _) = sync_channel(1);
         let (begin, begun) = sync_channel(1);
-        let request: Request = Box::new(move |cycle| {
+        let request: LastCycleRequest = Box::new(move |cycle| {
             // The requester may have given up.
             let _ = begin.send(());
             let _ = sender.send(cycle.map(answer));

@@ -1,28 +1,25 @@
 //! The measuring task: one thread that owns the head, the plan and the computing threads.
 
-mod aborts;
 pub mod backend;
 pub mod commissioning;
 mod cycle;
 pub mod drift;
+mod job;
 pub mod latest;
 pub mod opening;
-mod recovery;
 pub mod shelf;
 pub mod simulation;
-pub mod stopwatch;
 mod teaching;
-mod telling;
 pub mod warm_up;
 
-pub use aborts::Aborts;
 pub use cycle::JudgedBy;
+pub use job::Aborts;
 
 use crate::config::HeadConfig;
 use crate::head::calibration::Current;
 use crate::head::placed::Placed;
 use crate::history::{History, JudgedPart};
-use crate::production::backend::Opened;
+use crate::production::backend::OpenedHead;
 use crate::production::commissioning::Commission;
 use crate::production::commissioning::live::Look;
 use crate::production::drift::Watch;
@@ -37,19 +34,18 @@ use crate::station::{
     ActiveRecipe, Condition, Event, Job, JobId, ProjectorHealth, RecipeKey, RecipeResult, Request,
     StationHandle, Teaching,
 };
-use crate::system::computing::Computing;
+use crate::system::caller::Pulse;
+use crate::system::computing::{self, Computing};
 use crate::system::headway::Headway;
-use crate::system::memory;
-use crate::system::notify::Pulse;
 use crate::system::progress::Progress;
 use hal::error::Error;
 use hal::projector::{ControllerState, fault};
+use job::Telling;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
 use std::time::{Duration, Instant};
-use telling::Telling;
 use warm_up::WarmUp;
 
 /// What the measuring task is to do.
@@ -81,7 +77,7 @@ const ABORTED: &str = "the PLC or a stop ended it";
 /// Everything that the measuring task owns.
 pub struct Worker {
     /// The head and its calibration.
-    pub opened: Opened,
+    pub opened: OpenedHead,
     /// Where the calibration is published for the page.
     pub calibration: Current,
     /// Computing threads.
@@ -162,12 +158,12 @@ impl Worker {
                 Ok(Order::Load(job, key)) => {
                     self.forget();
                     self.load(job, &key);
-                    memory::trim();
+                    computing::trim_memory();
                 }
                 Ok(Order::Teach(job, teaching)) => {
                     self.forget();
                     self.teach(job, &teaching);
-                    memory::trim();
+                    computing::trim_memory();
                 }
                 Ok(Order::Commission(job)) => {
                     self.forget();
@@ -181,7 +177,7 @@ impl Worker {
                 }
                 Ok(Order::Place(placing)) => {
                     placing.carry_out();
-                    memory::trim();
+                    computing::trim_memory();
                 }
                 Ok(Order::Stop) | Err(RecvTimeoutError::Disconnected) => return,
                 Err(RecvTimeoutError::Timeout) => {
@@ -243,7 +239,7 @@ impl Worker {
     /// Reports whether the head's calibration can be trusted, and what is known of the head.
     fn tell_condition(&mut self) {
         self.tell_head();
-        let Opened {
+        let OpenedHead {
             problem,
             fallback,
             dark,
@@ -320,7 +316,7 @@ impl Worker {
         let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
         match self.pool.install(|| before.load(head, calibration)) {
             Ok(()) => {}
-            Err(error) if recovery::is_lost(&error) => self.lost = Some(error),
+            Err(error) if opening::is_lost(&error) => self.lost = Some(error),
             Err(error) => {
                 self.progress.warn(&error.to_string());
                 self.plan = None;
@@ -357,7 +353,8 @@ impl Worker {
             &self.station,
             &self.pulse,
             &self.progress,
-            (&self.aborts, job),
+            &self.aborts,
+            job,
         );
         let tell = |share: f64, words: &str| telling.tell(share, words);
         let headway = Headway::new(&tell, "reading the recipe").part(from, 1.0);
@@ -398,7 +395,7 @@ impl Worker {
         pool.install(|| plan.load(head, calibration))
             .map_err(|error| {
                 let message = error.to_string();
-                self.lost = Some(error).filter(recovery::is_lost);
+                self.lost = Some(error).filter(opening::is_lost);
                 (RecipeResult::Unfit, message)
             })?;
         Ok((plan, fallback))

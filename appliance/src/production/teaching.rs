@@ -1,14 +1,14 @@
 //! Teaching on the station: from the part in front of the head to a stored recipe that is ready to
 //! measure.
 
-use super::telling::Telling;
-use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, recovery};
+use super::job::Telling;
+use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, opening};
 use crate::head::calibrated::EmptyStation;
 use crate::recipe::teach::{TaughtRecipe, TeachError, teach_showing};
 use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, Teaching, error_code};
+use crate::system::computing;
 use crate::system::headway::Headway;
-use crate::system::memory;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
@@ -30,11 +30,9 @@ impl Worker {
         }));
         let taught = taught
             .unwrap_or_else(|panic| Err(TeachError::Rig(broken("teach: the part", &*panic))))
-            .and_then(|taught| self.check_taught(job, (SETTLED, CHECKED)).map(|()| taught));
+            .and_then(|taught| self.check_taught(job, SETTLED..CHECKED).map(|()| taught));
         self.progress.clear();
-        let telling = (&self.aborts, job);
-        Telling::new(&self.station, &self.pulse, &self.progress, telling)
-            .tell(CHECKED, "storing the recipe");
+        self.telling(job).tell(CHECKED, "storing the recipe");
         let stored = match taught {
             Ok(taught) => self.store(&taught, replaced.filter(|_| keep_gauges)),
             Err(error) => Err(self.refuse_teaching(error)),
@@ -96,8 +94,8 @@ impl Worker {
             .or(naming.limit_mm);
         let shared = self.recipes.refuse_shared(number, &naming.part_number);
         shared.map_err(TeachError::Rig)?;
-        let telling = (&self.aborts, job);
-        let telling = Telling::new(&self.station, &self.pulse, &self.progress, telling);
+        let (aborts, bar) = (&self.aborts, &self.progress);
+        let telling = Telling::new(&self.station, &self.pulse, bar, aborts, job);
         let tell = |share: f64, words: &str| telling.tell(share, words);
         let headway = Headway::new(&tell, "teaching");
         let (head, calibration) = (&mut self.opened.head, &self.opened.calibration);
@@ -122,7 +120,7 @@ impl Worker {
         };
         let packing = headway.part(0.8, 1.0).called("packing the recipe");
         packing.done(0.0);
-        memory::trim();
+        computing::trim_memory();
         let packed =
             settled.and_then(|settled| self.computing.on(|| settled.seal_telling(packing)));
         packed.map_err(TeachError::Rig)
@@ -136,6 +134,11 @@ impl Worker {
         loaded.ok()?.map(Arc::new)
     }
 
+    fn telling(&self, job: JobId) -> Telling<'_> {
+        let (aborts, bar) = (&self.aborts, &self.progress);
+        Telling::new(&self.station, &self.pulse, bar, aborts, job)
+    }
+
     /// ERROR_CODE and words of a failure; a lost head is remembered.
     fn refuse_teaching(&mut self, error: TeachError) -> (u16, String) {
         let words = match error {
@@ -147,7 +150,7 @@ impl Worker {
             self.seen.refuse(place);
         }
         if let TeachError::Device(error) = error {
-            self.lost = Some(error).filter(recovery::is_lost);
+            self.lost = Some(error).filter(opening::is_lost);
         }
         failed
     }
@@ -177,8 +180,7 @@ impl Worker {
         let Some((stage, placed)) = self.opened.stage.as_ref().zip(self.waiting.take()) else {
             return;
         };
-        let telling = (&self.aborts, job);
-        let telling = Telling::new(&self.station, &self.pulse, &self.progress, telling);
+        let telling = self.telling(job);
         let words = "putting the part in front of the head";
         let progress = |share: f64| {
             telling.tell(share, words);

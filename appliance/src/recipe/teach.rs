@@ -18,9 +18,9 @@ use super::surroundings;
 use crate::head::calibrated::CalibratedHead;
 use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
+use crate::system::computing;
 use crate::system::computing::Computing;
 use crate::system::headway::Headway;
-use crate::system::memory;
 use algo::pattern::{Sequence, Shot};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
@@ -154,7 +154,7 @@ pub fn teach_showing(
         comparison: Some(comparison),
     };
     let words = part.illumination.words();
-    memory::trim();
+    computing::trim_memory();
     let making = stage(0.55, 0.9, "working out what good parts may read")?;
     let made = computing.on(|| part.recipe(naming, making));
     let UnsealedRecipe {
@@ -163,7 +163,7 @@ pub fn teach_showing(
         mut choice,
     } = made?;
     choice.reasons.extend(words);
-    memory::trim();
+    computing::trim_memory();
     let trying = stage(0.9, 1.0, "trying the recipe on the part")?;
     let recipe = Recipe::check(&manifest, arrays.clone()).map_err(TeachError::Rig)?;
     let plan = computing.on(|| Plan::telling(recipe, calibration, false, trying.part(0.0, 0.4)));

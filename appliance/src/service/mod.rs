@@ -4,40 +4,36 @@
 //! runtime, and others write the history, serve the lines and survey the machine. They share the
 //! station through its handle.
 
-mod caller;
 mod rooms;
-mod serving;
-mod settling;
-mod stopping;
 pub mod survey;
 
-use crate::recipe::Store;
-use crate::recipe::part_seen::LastSeen;
-pub use caller::Caller;
-use rooms::Rooms;
+pub use crate::system::caller::Caller;
 
 use crate::config::{Backend, Config};
-use crate::error::{Exit, Result};
+use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Current;
-use crate::history::{self, Bounds, History, Numbering, Opened, Reader};
+use crate::history::{self, Bounds, History, Numbering, OpenedHistory, Reader};
 use crate::modbus;
-use crate::production::backend;
 use crate::production::commissioning::Commission;
 use crate::production::commissioning::live::Live;
 use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
-use crate::production::{Aborts, Order};
+use crate::production::{Aborts, Order, backend};
+use crate::recipe::Store;
+use crate::recipe::part_seen::LastSeen;
+use crate::station::snapshot::status;
 use crate::station::{
-    Buffered, Effect, Event, Identity, Limits, MAX_BUFFERED, Micros, RecipeKey, Request, Settings,
-    Station, StationHandle, Teaching,
+    Buffered, Effect, Event, Identity, Limits, MAX_BUFFERED, Micros, RecipeKey, RecipeResult,
+    Request, Settings, Snapshot, Station, StationHandle, Teaching,
 };
 use crate::storage::state::{StateFolder, random};
+use crate::system::caller::StopSignal;
 use crate::system::computing::Computing;
 use crate::system::journal::{self, Severity};
 use crate::system::progress::Progress;
-use crate::system::stop_signal::StopSignal;
 use crate::system::{clock, runtime, socket, stderr};
 use crate::web::access::{Access, NewSecret};
+use rooms::Rooms;
 use sim::Stage;
 use std::net::SocketAddr;
 use std::path::Path;
@@ -109,7 +105,7 @@ impl Daemon {
         let (plc, page) = runtime.block_on(listen(config))?;
         let (modbus, http) = (address_of(&plc)?, address_of(&page)?);
         let (orders, inbox) = mpsc::channel();
-        let Opened {
+        let OpenedHistory {
             history,
             task,
             next_seq,
@@ -184,6 +180,49 @@ impl Daemon {
             }
         }
     }
+
+    /// Waits until the station has its recipe or cannot get it. With a recipe it is READY, unless
+    /// the PLC has not set ONLINE or selects another recipe.
+    ///
+    /// # Errors
+    /// The station has a fault, or its recipe could be neither loaded nor taught.
+    pub fn wait_until_ready(&self) -> Result<Arc<Snapshot>> {
+        runtime()?.block_on(self.settled())
+    }
+
+    /// As [`Daemon::wait_until_ready`], as a future.
+    ///
+    /// # Errors
+    /// As [`Daemon::wait_until_ready`].
+    pub async fn settled(&self) -> Result<Arc<Snapshot>> {
+        if !self.awaited {
+            let message = "there is no recipe yet: load or teach one, or import one with `fringed recipe import`";
+            return Exit::Unavailable.fail(message);
+        }
+        let mut snapshots = self.station.subscribe();
+        let refused = |snapshot: &Snapshot| snapshot.recipe_result != RecipeResult::Ok;
+        let settled = |snapshot: &Arc<Snapshot>| {
+            let broken = snapshot.fault.is_some() || snapshot.error.is_some();
+            let loaded = snapshot.recipe.is_some() && !snapshot.is_working();
+            loaded || broken || refused(snapshot)
+        };
+        let snapshot = snapshots.wait_for(settled).await.map(|found| found.clone());
+        let snapshot = snapshot
+            .map_err(|_| Failure::new(Exit::Software, "the station ended before it was ready"))?;
+        match (&snapshot.fault, &snapshot.error) {
+            (Some(fault), _) => {
+                let message = format!("{}: {}", fault.cause, fault.remedy);
+                Exit::Unavailable.fail(message)
+            }
+            (None, error) if refused(&snapshot) => {
+                let otherwise = "the recipe was not loaded: load another, or teach it again";
+                let message = error.as_deref().unwrap_or(otherwise);
+                Exit::Content.fail(message)
+            }
+            (None, Some(error)) if !snapshot.is(status::READY) => Exit::Unavailable.fail(error),
+            _ => Ok(snapshot),
+        }
+    }
 }
 
 /// Waits for the measuring task's head, or for the stop signal: where parts are placed in front of
@@ -240,7 +279,8 @@ fn address_of(listener: &TcpListener) -> Result<SocketAddr> {
         .map_err(Exit::Unavailable.because("ask for a socket's port"))
 }
 
-/// What the run before has left of BUFFERED mode, in which `acknowledged` was acknowledged last.
+/// The results that the run before has left in BUFFERED mode; `acknowledged` is the last SEQ that was
+/// acknowledged in it.
 fn left_of(state: &StateFolder, acknowledged: Option<u32>, progress: &Progress) -> Buffered {
     let behind = |seq| Reader::of(state.path()).after(seq, MAX_BUFFERED)?.page();
     let entries = match acknowledged.map(behind) {
@@ -262,7 +302,7 @@ fn left_of(state: &StateFolder, acknowledged: Option<u32>, progress: &Progress) 
     }
 }
 
-fn open_history(config: &Config, state: &StateFolder) -> Result<Opened> {
+fn open_history(config: &Config, state: &StateFolder) -> Result<OpenedHistory> {
     let bounds = Bounds {
         results: u64::from(config.history.results),
         recordings: u64::from(config.history.recordings_mib) << 20,

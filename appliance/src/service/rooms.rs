@@ -1,7 +1,7 @@
-//! The threads of the daemon, one for each room that waits or works by itself.
+//! The threads of the daemon, one for each room that waits or works by itself; and how they are stopped:
+//! each is asked to end, and waited for within a limit.
 
-use super::caller::Caller;
-use super::serving::{PlcSide, serve};
+use super::Daemon;
 use super::survey::Survey;
 use crate::config::Config;
 use crate::error::{Exit, Result};
@@ -20,7 +20,9 @@ use crate::production::warm_up::WarmUp;
 use crate::production::{Aborts, JudgedBy, Order, Worker};
 use crate::recipe::Store;
 use crate::recipe::part_seen::LastSeen;
-use crate::station::{Request, StationHandle};
+use crate::station::{Event, Request, StationHandle, tick};
+use crate::system::caller::Caller;
+use crate::system::clock;
 use crate::system::computing::Computing;
 use crate::system::progress::Progress;
 use crate::web::access::Access;
@@ -29,6 +31,7 @@ use sim::Stage;
 use std::path::Path;
 use std::sync::mpsc::{self, Receiver, Sender};
 use std::thread::{Builder, JoinHandle};
+use std::time::{Duration, Instant};
 use tokio::net::TcpListener;
 use tokio::runtime::Runtime;
 use tokio::sync::watch;
@@ -68,7 +71,7 @@ impl Rooms<'_> {
     pub fn lines(&self, wires: Wires) -> Room {
         let (station, progress) = (self.station.clone(), self.progress.clone());
         let (setup, stopped) = (self.config.lines.clone(), self.stopped.clone());
-        let open: lines::Open = Box::new(move || backend::lines(&setup));
+        let open: lines::Reopen = Box::new(move || backend::lines(&setup));
         spawn("lines", move || {
             if let Err(failure) = lines::serve(wires, &open, &station, &progress, stopped) {
                 progress.warn(&failure.to_string());
@@ -126,7 +129,7 @@ impl Rooms<'_> {
         Ok((end, thread))
     }
 
-    /// Opens the head, of which `opened` hears, and measures.
+    /// Opens the head, sends the outcome to `opened`, and measures.
     pub fn measuring(
         self,
         pool: rayon::ThreadPool,
@@ -203,4 +206,114 @@ fn spawn(name: &str, run: impl FnOnce() + Send + 'static) -> Room {
         .name(name.into())
         .spawn(run)
         .map_err(Exit::Software.because(format!("start the thread {name}")))
+}
+
+/// What the Modbus server needs.
+pub(super) struct PlcSide {
+    pub(super) listener: TcpListener,
+    pub(super) clients: modbus::Clients,
+    pub(super) refusals: modbus::Refusals,
+}
+
+pub(super) async fn serve(
+    plc: PlcSide,
+    page: TcpListener,
+    station: StationHandle,
+    site: web::Site,
+    config: &Config,
+    stopped: watch::Receiver<bool>,
+) {
+    let stop = || {
+        let mut stopped = stopped.clone();
+        async move {
+            // An error means that the daemon is gone, which is a reason to stop too.
+            let _ = stopped.wait_for(|stop| *stop).await;
+        }
+    };
+    let options = modbus::Options {
+        config: config.modbus.clone(),
+        ..modbus::Options::default()
+    };
+    tokio::join!(
+        tick(station.clone(), clock::utc_us, stop()),
+        modbus::serve(
+            plc.listener,
+            station,
+            options,
+            plc.clients,
+            plc.refusals,
+            stop()
+        ),
+        web::serve(page, site, stop()),
+    );
+}
+
+/// Time between two checks whether a thread has ended.
+const POLLING: Duration = Duration::from_millis(2);
+/// A measuring task that has not ended after this time is abandoned: each wait for a device ends
+/// after 2 s.
+const MEASURING: Duration = Duration::from_secs(3);
+/// A thread that has not ended after this time is abandoned: a stop takes at most 5 s, whatever
+/// hangs.
+const STOPPING: Duration = Duration::from_millis(4500);
+
+impl Daemon {
+    /// Stops everything: the cycle in flight ends with its result, INVALID if it was still
+    /// exposing; then the sockets close.
+    pub fn stop(self) {
+        self.station.event(Event::Stop);
+        self.end();
+    }
+
+    /// Ends measuring, then the sockets, the survey and the history.
+    pub(super) fn end(self) {
+        let began = Instant::now();
+        let until = began + STOPPING;
+        // Fails only if the measuring task has ended already.
+        drop(self.orders.send(Order::Stop));
+        let [measuring, serving, surveying, wiring] = self.threads;
+        let join = |thread| join_while(thread, until, &self.progress, &|| true);
+        // A thread that only computes may end with the program.
+        join_while(measuring, began + MEASURING, &self.progress, &|| {
+            !self.computing.is_under_way()
+        });
+        // A cycle that has no result by now gets none from the measuring task.
+        self.station.event(Event::Stop);
+        let _ = self.sockets.send(true);
+        join(serving);
+        join(wiring);
+        drop(self.survey);
+        join(surveying);
+        // Last, so that the results of the others are stored.
+        let last_seq = self.station.snapshot().result_seq;
+        while !self.history.stop(last_seq) && Instant::now() < until {
+            std::thread::sleep(POLLING);
+        }
+        join(self.writing);
+    }
+}
+
+/// Waits for a thread to end as long as it is `needed`, until `until` at most: a thread that hangs
+/// in a device or the storage must not keep the program alive.
+fn join_while(
+    thread: JoinHandle<()>,
+    until: Instant,
+    progress: &Progress,
+    needed: &dyn Fn() -> bool,
+) {
+    while !thread.is_finished() {
+        if !needed() {
+            return;
+        }
+        if Instant::now() > until {
+            let name = thread.thread().name().unwrap_or_default();
+            progress.warn(&format!(
+                "the thread {name} does not end and is left behind"
+            ));
+            return;
+        }
+        std::thread::sleep(POLLING);
+    }
+    // The message of a panic is in the log already.
+    drop(thread.join());
 }

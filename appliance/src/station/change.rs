@@ -4,10 +4,10 @@
 use super::control::BY_PART_NUMBER;
 use super::error_code;
 use super::event::{Effect, Effects, JobId, Teaching};
-use super::fault::Failure;
+use super::fault::LastFailure;
 use super::machine::{Station, log, push};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
-use super::refusal::reject;
+use super::snapshot::reject;
 use super::state::{LoadProgress, State, TeachProgress};
 use std::sync::Arc;
 
@@ -173,7 +173,7 @@ impl Station {
             log(effects, words.clone());
             if matches!(result, RecipeResult::Corrupt | RecipeResult::Unfit) {
                 let code = error_code::RECIPE_UNUSABLE;
-                self.failure = Some(Failure { code, words });
+                self.failure = Some(LastFailure { code, words });
             }
         }
     }
@@ -245,7 +245,7 @@ impl Station {
         if self.ends(self.is_teaching(), job, "a failed teach", effects) {
             log(effects, words.clone());
             let code = error_code::or_unnamed(code);
-            self.failure = Some(Failure { code, words });
+            self.failure = Some(LastFailure { code, words });
         }
     }
 }

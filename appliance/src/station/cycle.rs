@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::error_code;
 use super::event::{Effect, Effects, Job, JobId};
-use super::fault::Failure;
+use super::fault::LastFailure;
 use super::machine::{Station, log, push};
 use super::result::{Inspection, ResultRecord, Verdict};
 use super::stages::Stages;
@@ -96,7 +96,7 @@ impl Station {
             reason: Some(words.clone()),
             ..Default::default()
         };
-        self.failure = Some(Failure { code, words });
+        self.failure = Some(LastFailure { code, words });
         self.publish(cycle, Arc::new(inspection), effects);
     }
 

@@ -7,7 +7,7 @@ use super::control::ControlWrite;
 use super::health::{Drift, Pace, ProjectorHealth, System};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
-use super::turns::Client;
+use super::triggers::Client;
 use algo::inspect::Marking;
 
 /// The number of one order to the worker. Each answer carries it, so that a late answer is
@@ -45,7 +45,7 @@ pub struct Teaching {
 }
 
 impl Teaching {
-    /// A recipe with this number, of which nothing else is said.
+    /// A recipe with this number; everything else as in the recipe that it replaces, or by default.
     pub fn of(number: u16) -> Self {
         Self {
             number,

@@ -101,7 +101,7 @@ impl Fault {
 
 /// How the last cycle, load or teach failed. Shown until one succeeds or ERROR_RESET.
 #[derive(Debug, Clone)]
-pub(super) struct Failure {
+pub(super) struct LastFailure {
     /// ERROR_CODE.
     pub(super) code: u16,
     /// What was attempted with what, and the remedy.

@@ -229,7 +229,7 @@ pub struct GaugeValue {
 
 impl GaugeValue {
     /// A gauge with the decision that follows from its value and limits. A σ of 0 says that nothing
-    /// is known of it: a share of which no pixel is near the threshold would have none.
+    /// is known of it: a share without pixels near the threshold would have none.
     pub fn judged(
         slot: u16,
         name: impl Into<Arc<str>>,

@@ -68,7 +68,7 @@ impl Power {
     }
 }
 
-/// What the controller of the projector says of itself; nothing where there is none.
+/// What the controller of the projector reports; everything is `None` without a controller.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ProjectorHealth {
     /// Its temperature, °C.

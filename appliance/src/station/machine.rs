@@ -1,24 +1,65 @@
 //! What the station remembers between two events, its settings, and the few changes that several
 //! events share.
 //!
-//! A measuring task that is silent for longer than its [`Limits`] is stuck: fault 801.
-
-use std::sync::Arc;
-
-use serde::Serialize;
+//! A measuring task (the worker) that is silent for longer than its [`Limits`] is stuck: fault 801.
 
 use super::clock::{Clock, Micros};
-use super::control;
+use super::control::{self, Plc};
 use super::event::{Condition, Effect, Effects, JobId, MAX_EFFECTS};
-use super::fault::Failure;
+use super::fault::LastFailure;
 use super::health::Health;
-use super::plc::Plc;
 use super::recipes::Recipes;
-use super::requests::Requests;
 use super::results::{Buffered, Results};
 use super::state::State;
-use super::turns::Turns;
-use super::worker::Worker;
+use super::triggers::{Requests, Turns};
+use serde::Serialize;
+use std::sync::Arc;
+
+/// The HEARTBEAT register advances once in this time.
+const BEAT: Micros = Micros::from_millis(100);
+
+/// The worker as seen from the station.
+#[derive(Debug, Clone)]
+pub(super) struct WorkerState {
+    /// The last order.
+    pub(super) last_job: JobId,
+    /// The time of its last event.
+    pub(super) last_alive: Micros,
+    /// HEARTBEAT.
+    pub(super) heartbeat: u16,
+    next_beat: Micros,
+}
+
+impl WorkerState {
+    /// A worker that was started at `now` and has no orders yet.
+    pub(super) fn new(now: Micros) -> Self {
+        Self {
+            last_job: JobId(0),
+            last_alive: now,
+            heartbeat: 0,
+            next_beat: now.after(BEAT),
+        }
+    }
+
+    /// The number of a new order.
+    pub(super) fn next_job(&mut self) -> JobId {
+        self.last_job = JobId(self.last_job.0.wrapping_add(1));
+        self.last_job
+    }
+
+    /// Advances HEARTBEAT to `now`, or holds it while the worker misses its deadlines. Beats missed
+    /// that way are not made up for.
+    pub(super) fn beat(&mut self, in_time: bool, now: Micros) {
+        if !in_time {
+            self.next_beat = now.after(BEAT);
+        } else if self.next_beat <= now {
+            let beats = now.since(self.next_beat).0 / BEAT.0 + 1;
+            // The register is the low 16 bits of the count.
+            self.heartbeat = self.heartbeat.wrapping_add((beats & 0xFFFF) as u16);
+            self.next_beat = self.next_beat.after(Micros(beats.saturating_mul(BEAT.0)));
+        }
+    }
+}
 
 /// How long the worker may be silent, by what it does: a slow one tells how far it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,9 +136,9 @@ pub struct Station {
     pub(super) requests: Requests,
     pub(super) turns: Turns,
     pub(super) recipes: Recipes,
-    pub(super) worker: Worker,
+    pub(super) worker: WorkerState,
     pub(super) results: Results,
-    pub(super) failure: Option<Failure>,
+    pub(super) failure: Option<LastFailure>,
     /// The load, teach or step of commissioning in which the worker fell silent; it goes on with the
     /// next sign of life.
     pub(super) suspended: Option<State>,
@@ -121,7 +162,7 @@ impl Station {
             requests: Requests::default(),
             turns: Turns::default(),
             recipes: Recipes::default(),
-            worker: Worker::new(now),
+            worker: WorkerState::new(now),
             results: Results::new(settings.next_seq, &settings.buffered),
             failure: None,
             suspended: None,
@@ -215,4 +256,24 @@ pub(super) fn push(effects: &mut Effects, effect: Effect) {
 /// Queues a line for the log.
 pub(super) fn log(effects: &mut Effects, line: impl Into<Arc<str>>) {
     push(effects, Effect::Log(line.into()));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn late_ticks_are_made_up_for_and_missed_deadlines_are_not() {
+        let mut worker = WorkerState::new(Micros(0));
+        let ms = Micros::from_millis;
+        worker.beat(true, ms(99));
+        assert_eq!(worker.heartbeat, 0);
+        worker.beat(true, ms(350));
+        assert_eq!(worker.heartbeat, 3);
+        worker.beat(false, ms(1000));
+        worker.beat(true, ms(1099));
+        assert_eq!(worker.heartbeat, 3);
+        worker.beat(true, ms(1100));
+        assert_eq!(worker.heartbeat, 4);
+    }
 }

@@ -6,10 +6,10 @@
 //! 1.3. Modbus and the page see nothing but one immutable [`Snapshot`]. [`StationHandle`] is the
 //! one place where the machine meets a clock, a mutex and channels.
 //!
-//! [`machine`] holds the parts: clock, PLC, request counters, recipes, worker, results. Each part
-//! has its own file and is changed only by its own functions. `step` sends an event to the
-//! transition that takes it: `plc` (a write), `cycle` (trigger to result), `change` (load and
-//! teach), `watch` (faults).
+//! [`machine`] holds the parts: clock, PLC, triggers, recipes, worker, results. Each part is changed
+//! only by its own functions. [`mod@step`] takes a write of the PLC itself and sends other events to
+//! the transition that takes them: `cycle` (trigger to result), `change` (load and teach), `watch`
+//! (faults).
 //!
 //! Decisions where the register map is silent:
 //!
@@ -56,8 +56,25 @@
 //!   granted last is rejected as not ready, although READY is 1.
 //! - REJECT_REASON stays until the next rejected request.
 
-#[macro_use]
-mod bits;
+/// Declares the bits of a word: each once, with its name, its number and what people read while it is
+/// set. Where each has words, `words` gives those of the bits that are set.
+macro_rules! bits {
+    ($($(#[$doc:meta])* $name:ident = $bit:literal;)*) => {
+        $($(#[$doc])* pub const $name: u16 = 1 << $bit;)*
+
+        /// The names of the bits in their order, from bit 0 on.
+        pub const NAMES: &[&str] = &[$(stringify!($name)),*];
+    };
+    ($($(#[$doc:meta])* $name:ident = $bit:literal, $words:literal;)*) => {
+        bits! { $($(#[$doc])* $name = $bit;)* }
+
+        /// The words of the bits that are set.
+        pub fn words(bits: u16) -> impl Iterator<Item = &'static str> {
+            let all = [$(($name, $words)),*].into_iter();
+            all.filter(move |(bit, _)| bits & bit != 0).map(|(_, words)| words)
+        }
+    };
+}
 
 pub mod clock;
 pub mod control;
@@ -69,22 +86,17 @@ pub mod handle;
 pub mod health;
 pub mod machine;
 pub mod recipes;
-pub mod refusal;
 pub mod result;
 pub mod results;
 pub mod snapshot;
 pub mod stages;
 pub mod state;
 pub mod step;
-pub mod turns;
+pub mod triggers;
 
 mod change;
 mod cycle;
-mod plc;
-mod requests;
 mod watch;
-mod worker;
-mod write;
 
 #[cfg(test)]
 mod tests;
@@ -107,4 +119,4 @@ pub use snapshot::Snapshot;
 pub use stages::{Stage, StageTime, Stages};
 pub use state::{Cycle, LoadProgress, State, TeachProgress};
 pub use step::step;
-pub use turns::Client;
+pub use triggers::Client;

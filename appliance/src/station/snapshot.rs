@@ -1,10 +1,8 @@
 //! The snapshot: one immutable copy of what the station shows. Registers and page are two views of
-//! it.
-
-use std::sync::Arc;
+//! it. It says also why a trigger would be rejected: the number for the PLC, and the words for people.
 
 use super::clock::Micros;
-use super::control::{self, ControlRegisters};
+use super::control::{self, BY_PART_NUMBER, ControlRegisters};
 use super::fault::Fault;
 use super::health::Health;
 use super::machine::{Identity, Station};
@@ -12,6 +10,7 @@ use super::recipes::{ActiveRecipe, RecipeResult};
 use super::result::ResultRecord;
 use super::results::Counts;
 use super::state::{LoadProgress, State, TeachProgress};
+use std::sync::Arc;
 
 /// STATUS bits, register 100.
 pub mod status {
@@ -80,6 +79,22 @@ pub mod warning {
     pub const OF_A_PART: u16 = LOW_LIGHT | SATURATION | PATTERN_UNFIT | FRAME_SLIP;
 }
 
+/// REJECT_REASON, register 120: why the last rejected request was rejected.
+pub mod reject {
+    /// The station is busy, boots or stops.
+    pub const NOT_READY: u16 = 1;
+    /// The PLC does not ask for ONLINE.
+    pub const OFFLINE: u16 = 2;
+    /// No recipe is active.
+    pub const NO_RECIPE: u16 = 3;
+    /// The config does not let the PLC teach.
+    pub const TEACH_NOT_ALLOWED: u16 = 4;
+    /// The station has a fault, or the number of a result is still to be stored.
+    pub const FAULT: u16 = 5;
+    /// The recipe of RECIPE_SELECT is not the active one, or the last load failed.
+    pub const OTHER_RECIPE: u16 = 6;
+}
+
 /// Everything that Modbus and the page show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Snapshot {
@@ -121,9 +136,9 @@ pub struct Snapshot {
     pub last_token: u16,
     /// Results waiting for RESULT_ACK.
     pub buffered: u16,
-    /// REJECT_REASON, see [`super::refusal::reject`].
+    /// REJECT_REASON, see [`reject`].
     pub reject_reason: u16,
-    /// Why a trigger would be rejected now, see [`super::refusal::reject`]; `None` exactly while
+    /// Why a trigger would be rejected now, see [`reject`]; `None` exactly while
     /// READY.
     pub refusal: Option<u16>,
     /// Seconds since the start.
@@ -204,7 +219,7 @@ impl Station {
             error,
             fault,
             control: ControlRegisters {
-                // The mode that holds, whoever wrote without it.
+                // BUFFERED shows the mode that holds, also after a write without the bit.
                 control: self.plc.registers.control
                     | self.results.buffered.map_or(0, |_| control::BUFFERED),
                 ..self.plc.registers
@@ -251,6 +266,21 @@ impl Station {
             ])
     }
 
+    /// Why a trigger would be rejected now, as REJECT_REASON; `None` exactly while READY.
+    pub(super) fn refusal(&self) -> Option<u16> {
+        Some(match self.state {
+            _ if !self.plc.holds(control::ONLINE) => reject::OFFLINE,
+            State::Fault(_) => reject::FAULT,
+            State::Ready if self.recipes.active.is_none() => reject::NO_RECIPE,
+            State::Ready if self.results.unstored => reject::FAULT,
+            State::Ready if self.recipes.is_other_asked_for(&self.plc.registers) => {
+                reject::OTHER_RECIPE
+            }
+            State::Ready => return None,
+            _ => reject::NOT_READY,
+        })
+    }
+
     fn status(&self, warnings: u16, error_code: u16) -> u16 {
         let (state, results) = (&self.state, &self.results);
         let up = !matches!(state, State::Boot { .. } | State::Stopping { .. });
@@ -285,4 +315,58 @@ impl Station {
 fn word<const N: usize>(bits: [(u16, bool); N]) -> u16 {
     let set = bits.into_iter().filter(|(_, set)| *set);
     set.fold(0, |word, (bit, _)| word | bit)
+}
+
+impl Snapshot {
+    /// Why a trigger would be rejected now, in words with the remedy; `None` exactly while READY.
+    pub fn refusal_words(&self) -> Option<String> {
+        Some(match (self.refusal?, &self.fault, &self.recipe) {
+            (reject::OFFLINE, ..) => {
+                "offline: the PLC does not ask for ONLINE; it sets CONTROL bit 0".into()
+            }
+            (reject::NO_RECIPE, ..) if !self.is(status::CALIBRATION_VALID) => {
+                "the head is not calibrated: commission it on the page, under Head, or run `fringed calibrate`".into()
+            }
+            (reject::NO_RECIPE, ..) => "no recipe is active: load or teach one".into(),
+            (reject::FAULT, Some(fault), _) => {
+                format!("fault {}: {}; {}", fault.code, fault.cause, fault.remedy)
+            }
+            (reject::FAULT, None, _) => {
+                "the number of the last result is not stored yet: it is tried every second".into()
+            }
+            (reject::OTHER_RECIPE, _, Some(active)) => self.other_recipe(active),
+            _ => format!(
+                "the station is in state {}: try again when it is ready",
+                self.state_word
+            ),
+        })
+    }
+
+    /// Which recipe was asked for while `active` is active, and the remedy.
+    fn other_recipe(&self, active: &ActiveRecipe) -> String {
+        let number = active.number;
+        match (self.recipe_result, self.control.recipe_select) {
+            (RecipeResult::Ok, BY_PART_NUMBER) => format!(
+                "the PLC selects part number {:?}, recipe {number} for {:?} is active: load the recipe of that part",
+                self.control.part_number_text(),
+                active.part_number
+            ),
+            (RecipeResult::Ok, select) => format!(
+                "the PLC selects recipe {select}, recipe {number} is active: load recipe {select}, or have the PLC write \
+                 {number} or 0 to RECIPE_SELECT"
+            ),
+            (failed, _) => {
+                let asked = match self.requested_recipe {
+                    BY_PART_NUMBER => "the recipe of the PLC's PART_NUMBER".into(),
+                    requested => format!("recipe {requested}"),
+                };
+                let other = match self.requested_recipe == number {
+                    true => String::new(),
+                    false => format!(", or recipe {number} to go on with that one"),
+                };
+                let why = failed.words();
+                format!("{asked} could not be loaded: {why}; load it{other}")
+            }
+        }
+    }
 }

@@ -4,7 +4,6 @@
 pub mod archive;
 pub mod folder;
 pub mod state;
-pub mod unpack;
 
 /// Lower-case hexadecimal digits.
 pub fn hex(bytes: &[u8]) -> String {

@@ -89,22 +89,21 @@ impl StateFolder {
     /// What the counter's file says; 0 without a file.
     ///
     /// # Errors
-    /// In words: it cannot be read or is damaged. Guessing would let a SEQ be used twice.
-    pub fn counted(&self) -> Result<Counted, String> {
+    /// It cannot be read or is damaged. Guessing would let a SEQ be used twice.
+    pub fn counted(&self) -> Result<Counted, CounterError> {
         let file = self.path.join(COUNTER);
-        let wrong = |problem: String| format!("read {}: {problem}", file.display());
         let bytes = match read_whole(&file, MOST) {
             Ok(bytes) => bytes,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return Ok(Counted::default());
             }
-            Err(error) => return Err(wrong(error.to_string())),
+            Err(source) => return Err(CounterError::Read { file, source }),
         };
         let text = String::from_utf8_lossy(&bytes);
         let made = File::open(&file).map_or(0, |file| made(&file));
         Counted::read(&text, made).ok_or_else(|| {
-            let begin: String = text.trim().chars().take(40).collect();
-            wrong(format!("{begin:?} is no number"))
+            let begin = text.trim().chars().take(40).collect();
+            CounterError::Damaged { file, begin }
         })
     }
 
@@ -132,6 +131,27 @@ impl StateFolder {
             .map_err(Exit::CannotCreate.because(format!("write {}", file.display())))?;
         Ok(serial)
     }
+}
+
+/// Why it is not known which SEQs may be in use.
+#[derive(Debug, thiserror::Error)]
+pub enum CounterError {
+    /// The counter's file cannot be read.
+    #[error("read {}: {source}", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the file system answers.
+        source: std::io::Error,
+    },
+    /// The counter's file holds something else.
+    #[error("read {}: {begin:?} is no number", file.display())]
+    Damaged {
+        /// The file.
+        file: PathBuf,
+        /// How its content begins.
+        begin: String,
+    },
 }
 
 /// The last SEQ that may be in use, and which run of the daemon wrote it.
@@ -290,7 +310,7 @@ mod tests {
         let state = StateFolder::open(folder.path()).unwrap();
         for damaged in ["4x", "", "4 y", "4 5 6 7 8", "-4", "4294967296"] {
             fs::write(folder.path().join(COUNTER), damaged).unwrap();
-            let refused = state.counted().unwrap_err();
+            let refused = state.counted().unwrap_err().to_string();
             assert!(refused.contains("result-seq"), "{damaged}");
         }
         fs::write(folder.path().join(COUNTER), "4\n").unwrap();

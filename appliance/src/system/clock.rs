@@ -81,7 +81,7 @@ fn synchronised() -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::history::time::utc;
+    use crate::history::export::utc;
 
     #[test]
     fn bounds_of_believable_times_are_those_of_the_calendar() {

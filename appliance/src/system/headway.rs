@@ -1,11 +1,11 @@
-//! How far a long piece of work has come, for whoever waits for it: work that is slow tells so, and
-//! only a task that is silent is taken to hang.
+//! Progress of a long piece of work, for the task that waits for it: slow work reports, so that only
+//! a silent task is taken to hang.
 
 /// Gets the share of the work that is done and the present stage in words, from any thread and
 /// often; answers whether to go on.
 pub type Tell<'a> = dyn Fn(f64, &str) -> bool + Sync + 'a;
 
-/// A stage of a longer piece of work. Copies tell the same listener.
+/// A stage of a longer piece of work. Copies report to the same listener.
 #[derive(Clone, Copy)]
 pub struct Headway<'a> {
     tell: &'a Tell<'a>,
@@ -26,12 +26,12 @@ impl<'a> Headway<'a> {
         }
     }
 
-    /// Work that nobody waits for.
+    /// Work whose progress is not reported.
     pub fn silent() -> Headway<'static> {
         Headway::new(&|_, _| true, "")
     }
 
-    /// The part of it between two shares.
+    /// The part of the stage between two shares.
     #[must_use]
     pub fn part(self, from: f64, to: f64) -> Self {
         let at = |share: f64| self.from + share * (self.to - self.from);
@@ -42,18 +42,18 @@ impl<'a> Headway<'a> {
         }
     }
 
-    /// The same, called otherwise.
+    /// The same stage with other words.
     #[must_use]
     pub fn called(self, words: &'a str) -> Self {
         Self { words, ..self }
     }
 
-    /// Tells that a share of this stage is done; `false` if the work is to end.
+    /// Reports that a share of this stage is done; `false` if the work is to end.
     pub fn tell(self, share: f64) -> bool {
         (self.tell)(self.from + share * (self.to - self.from), self.words)
     }
 
-    /// The same where work cannot end.
+    /// Reports as [`Self::tell`], where work cannot end early.
     pub fn done(self, share: f64) {
         self.tell(share);
     }

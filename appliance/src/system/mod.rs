@@ -3,20 +3,15 @@
 
 use crate::error::{Exit, Result};
 
+pub mod caller;
 pub mod clock;
 pub mod computing;
 pub mod headway;
 pub mod host;
 pub mod journal;
-pub mod logbook;
-pub mod memory;
-pub mod notify;
-pub(crate) mod prefix;
-pub mod priority;
 pub mod progress;
 pub mod socket;
 pub mod stderr;
-pub mod stop_signal;
 
 /// A current-thread runtime for sockets.
 ///

@@ -1,8 +1,8 @@
 //! A progress bar, and the log above it: both on stderr and not with `--quiet`, the bar only on a
 //! terminal.
 
+use crate::system::journal::Logbook;
 use crate::system::journal::{self, Severity};
-use crate::system::logbook::Logbook;
 use crate::system::stderr;
 use std::io::IsTerminal as _;
 

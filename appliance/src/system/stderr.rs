@@ -1,5 +1,5 @@
-//! The thread that writes on stderr: the lines of the log and the bar, from whichever thread they
-//! come.
+//! The thread that writes on stderr: the lines of the log, with the prefix that a person or a journal
+//! needs, and the bar.
 //!
 //! stderr can be a pipe that nobody reads, a terminal that was stopped, or a journal that hangs: a
 //! write then waits for as long as that lasts. Only the thread `stderr` waits. Lines are handed
@@ -10,13 +10,84 @@
 //! A command waits until its lines are written, so that they stand in order with what it prints. A
 //! daemon does not, after [`detach`].
 
-use super::prefix::{Severity, form_of_own};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::mem::take;
 use std::sync::{Condvar, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::Builder;
 use std::time::Duration;
+
+/// How much a line matters, as syslog numbers it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// Nothing is measured until its cause is removed.
+    Error = 3,
+    /// Measuring goes on, but something needs attention.
+    Warning = 4,
+    /// Rare and worth finding again: the device's secret, a start, a stop.
+    Notice = 5,
+    /// Normal operation.
+    Info = 6,
+}
+
+/// Text with its control characters but tabs and ends of lines written out: those of a file's name or a
+/// message are no commands to a terminal.
+pub(crate) fn plain(text: &str) -> Cow<'_, str> {
+    let is_command = |c: char| c.is_control() && !matches!(c, '\n' | '\t');
+    if !text.contains(is_command) {
+        return text.into();
+    }
+    let mut shown = String::with_capacity(text.len());
+    for c in text.chars() {
+        match is_command(c) {
+            true => shown.extend(c.escape_default()),
+            false => shown.push(c),
+        }
+    }
+    shown.into()
+}
+
+/// Lines in the daemon's name, as they are written.
+pub(super) fn form_of_own(severity: Severity, words: &str) -> String {
+    form_of("fringed", severity, words)
+}
+
+/// Lines in the name of `program`, as they are written.
+pub(super) fn form_of(program: &str, severity: Severity, words: &str) -> String {
+    form(program, is_read_by_a_journal(), severity, words)
+}
+
+fn is_read_by_a_journal() -> bool {
+    static JOURNAL: OnceLock<bool> = OnceLock::new();
+    *JOURNAL.get_or_init(stderr_is_a_journal)
+}
+
+/// The lines with their prefix.
+fn form(program: &str, journal: bool, severity: Severity, words: &str) -> String {
+    let words = plain(words);
+    let lines = words.lines().map(|line| match journal {
+        true => format!("<{}>{line}\n", severity as u8),
+        false => format!("{program}: {line}\n"),
+    });
+    lines.collect()
+}
+
+/// Whether stderr is the stream that systemd.exec(5) describes.
+fn stderr_is_a_journal() -> bool {
+    let named = std::env::var("JOURNAL_STREAM").unwrap_or_default();
+    rustix::fs::fstat(io::stderr())
+        .is_ok_and(|stream| is_named(&named, stream.st_dev, stream.st_ino))
+}
+
+/// Whether the text names this file as `device:inode`.
+fn is_named(text: &str, device: u64, inode: u64) -> bool {
+    let number = |text: &str| text.parse().ok();
+    let named = text
+        .split_once(':')
+        .map(|(device, inode)| (number(device), number(inode)));
+    named == Some((Some(device), Some(inode)))
+}
 
 /// Name of the thread.
 pub(super) const THREAD: &str = "stderr";
@@ -76,11 +147,11 @@ fn begun() -> bool {
 
 /// What is handed over to the thread.
 struct Outbox {
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<WaitingLines>,
     changed: Condvar,
 }
 
-struct Waiting {
+struct WaitingLines {
     /// Whole lines.
     lines: String,
     /// Lines behind them that found no room.
@@ -95,7 +166,7 @@ struct Waiting {
     detached: bool,
 }
 
-impl Waiting {
+impl WaitingLines {
     fn is_empty(&self) -> bool {
         self.lines.is_empty() && self.lost == 0 && self.bar.is_none()
     }
@@ -103,7 +174,7 @@ impl Waiting {
 
 impl Outbox {
     const fn new() -> Self {
-        let waiting = Waiting {
+        let waiting = WaitingLines {
             lines: String::new(),
             lost: 0,
             bar: None,
@@ -117,7 +188,7 @@ impl Outbox {
         }
     }
 
-    fn waiting(&self) -> MutexGuard<'_, Waiting> {
+    fn waiting(&self) -> MutexGuard<'_, WaitingLines> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -144,12 +215,12 @@ impl Outbox {
     }
 
     /// Wakes the thread, and waits until it is done unless detached.
-    fn hand_over(&self, mut waiting: MutexGuard<'_, Waiting>) {
+    fn hand_over(&self, mut waiting: MutexGuard<'_, WaitingLines>) {
         waiting.handed += 1;
         self.changed.notify_all();
         if !waiting.detached {
             let handed = waiting.handed;
-            let ahead = |waiting: &mut Waiting| waiting.done < handed;
+            let ahead = |waiting: &mut WaitingLines| waiting.done < handed;
             drop(self.changed.wait_while(waiting, ahead));
         }
     }
@@ -158,7 +229,7 @@ impl Outbox {
         self.show(None);
         let waiting = self.waiting();
         let handed = waiting.handed;
-        let ahead = |waiting: &mut Waiting| waiting.done < handed;
+        let ahead = |waiting: &mut WaitingLines| waiting.done < handed;
         drop(self.changed.wait_timeout_while(waiting, LAST, ahead));
     }
 
@@ -248,6 +319,30 @@ mod tests {
     use super::*;
     use std::io::{BufRead as _, BufReader};
     use std::sync::Arc;
+
+    #[test]
+    fn a_journal_gets_the_priority_of_every_line_and_people_get_none() {
+        let words = "fault 101: gone\nplug it in";
+        let journal = form("fringed", true, Severity::Error, words);
+        assert_eq!(journal, "<3>fault 101: gone\n<3>plug it in\n");
+        let people = form("fringed", false, Severity::Error, words);
+        assert_eq!(people, "fringed: fault 101: gone\nfringed: plug it in\n");
+    }
+
+    #[test]
+    fn only_the_stream_that_is_named_is_a_journal() {
+        assert!(is_named("8:15", 8, 15));
+        for other in ["8:16", "9:15", "", "8", "8:", ":15", "8:15:1", "x:y"] {
+            assert!(!is_named(other, 8, 15), "{other}");
+        }
+    }
+
+    #[test]
+    fn control_characters_are_written_out() {
+        assert_eq!(plain("name\tand\nline"), "name\tand\nline");
+        let lines = form("fringed", false, Severity::Error, "no \u{1b}[31mfile\u{7}");
+        assert_eq!(lines, "fringed: no \\u{1b}[31mfile\\u{7}\n");
+    }
 
     /// An outbox whose thread writes into this.
     fn writing(out: impl Write + Send + 'static, detached: bool) -> Arc<Outbox> {

@@ -17,7 +17,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use zip::ZipWriter;
 use zip::result::ZipError;
 
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::site::Site;
 use super::{metrics, view};
 use crate::history::{Filter, JudgedPart, name_of};
@@ -27,7 +27,7 @@ use crate::storage::archive::{packed, stored};
 const CHUNK: usize = 64 << 10;
 
 /// What is sent.
-pub(super) enum Content {
+pub(super) enum Download {
     /// A file in memory.
     Bytes(Vec<u8>),
     /// A stored file.
@@ -36,7 +36,7 @@ pub(super) enum Content {
     Folder(Packed),
 }
 
-impl Content {
+impl Download {
     /// Its bytes, where they are known beforehand.
     fn length(&self) -> io::Result<Option<u64>> {
         Ok(match self {
@@ -65,8 +65,8 @@ impl Content {
 pub(super) async fn send(
     site: &Site,
     kind: &'static str,
-    work: impl FnOnce(&Site) -> Result<(String, Content)> + Send + 'static,
-) -> Result<Response> {
+    work: impl FnOnce(&Site) -> Answered<(String, Download)> + Send + 'static,
+) -> Answered<Response> {
     let permit =
         site.files.clone().try_acquire_owned().map_err(|_| {
             Problem::crowded("too many files are being sent: wait until one is done")
@@ -206,11 +206,11 @@ impl io::Write for ToClient {
     }
 }
 
-pub(super) async fn cloud(site: Site) -> Result<Response> {
+pub(super) async fn cloud(site: Site) -> Answered<Response> {
     send(&site, "application/octet-stream", |site| {
         let asked = site.last_cycle.ask(|cycle| {
             let cloud = cycle.plan.cloud(cycle.sequence, &cycle.frames)?;
-            Some((format!("{}.ply", cycle.record.seq), Content::Bytes(cloud)))
+            Some((format!("{}.ply", cycle.record.seq), Download::Bytes(cloud)))
         });
         asked.flatten().ok_or_else(|| Problem::missing(GONE))
     })
@@ -221,7 +221,7 @@ pub(super) async fn cloud(site: Site) -> Result<Response> {
 const GONE: &str =
     "the frames of the last result are gone, or the station is busy; trigger a measurement";
 
-pub(super) async fn recording(site: Site) -> Result<Response> {
+pub(super) async fn recording(site: Site) -> Answered<Response> {
     send(&site, "application/zip", |site| {
         let asked = site.last_cycle.ask(JudgedPart::clone);
         let part = asked.ok_or_else(|| Problem::missing(GONE))?;
@@ -234,7 +234,7 @@ pub(super) async fn recording(site: Site) -> Result<Response> {
         // Its files are open. What cannot be removed now is removed at the next start.
         let _ = std::fs::remove_dir_all(&scratch);
         let name = format!("{}-recording.zip", part.record.seq);
-        Ok((name, Content::Folder(packed.map_err(Problem::broken)?)))
+        Ok((name, Download::Folder(packed.map_err(Problem::broken)?)))
     })
     .await
 }
@@ -244,11 +244,11 @@ pub(super) fn unpacked(error: io::Error) -> String {
     format!("pack the recording: {error}: free space")
 }
 
-pub(super) async fn gauges(site: Site) -> Result<Response> {
+pub(super) async fn gauges(site: Site) -> Answered<Response> {
     send(&site, "text/csv; charset=utf-8", gauges_csv).await
 }
 
-fn gauges_csv(site: &Site) -> Result<(String, Content)> {
+fn gauges_csv(site: &Site) -> Answered<(String, Download)> {
     let snapshot = site.station.snapshot();
     let words = "nothing was measured yet; trigger a measurement";
     let result = snapshot
@@ -282,17 +282,17 @@ fn gauges_csv(site: &Site) -> Result<(String, Content)> {
     }
     Ok((
         format!("{}.csv", result.seq),
-        Content::Bytes(csv.into_bytes()),
+        Download::Bytes(csv.into_bytes()),
     ))
 }
 
 /// A ZIP of everything that explains a device's behaviour; no secrets.
-pub(super) async fn diagnostics(site: Site) -> Result<Response> {
+pub(super) async fn diagnostics(site: Site) -> Answered<Response> {
     send(&site, "application/zip", |site| {
         let packed = pack(site).map_err(Problem::broken);
         let serial = &site.station.snapshot().identity.serial;
         let safe: String = serial.chars().filter(char::is_ascii_alphanumeric).collect();
-        Ok((format!("fringed-{safe}.zip"), Content::Bytes(packed?)))
+        Ok((format!("fringed-{safe}.zip"), Download::Bytes(packed?)))
     })
     .await
 }

@@ -1,20 +1,28 @@
-//! The gate in front of every change: checks origin and session, and records what was done.
+//! The gate: checks the Host header of every request, and origin and session of every change, whose
+//! outcome it records; opens and ends sessions.
+//!
+//! Another site can let its own name resolve to this device (DNS rebinding) and then read it through
+//! its visitor's browser. It cannot forge the Host header, so only IP addresses, `localhost` and
+//! configured names are answered.
 
-use std::net::IpAddr;
-use std::time::Instant;
-
-use axum::Extension;
-use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderValue, StatusCode, header};
-use axum::middleware::Next;
-use axum::response::{IntoResponse, Response};
-
-use super::host::only;
-use super::problem::{Outcome, Problem, Result};
+use super::problem::{Answered, Problem, ProblemWords};
+use super::request;
 use super::site::Site;
+use crate::station::Micros;
+use crate::station::snapshot::warning;
 use crate::system::clock;
 use crate::system::journal::{self, Severity};
-use crate::web::access::{Change, MAX_AGE_S, Token};
+use crate::web::access::{Change, MAX_AGE_S, Refused, Token};
+use axum::Extension;
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, StatusCode, Uri, header};
+use axum::middleware::Next;
+use axum::response::{IntoResponse, Json, Response};
+use serde::Deserialize;
+use serde_json::{Value, json};
+use std::net::{IpAddr, Ipv6Addr};
+use std::time::Instant;
 
 /// The session's cookie.
 const COOKIE: &str = "fringed-session";
@@ -25,11 +33,101 @@ pub struct Peer(pub IpAddr);
 
 /// The name of a change in the record.
 #[derive(Clone, Copy, Debug)]
-pub struct Action(pub &'static str);
+pub struct ChangeName(pub &'static str);
 
 /// What a change has changed, in words: an extension of the answer, for the record.
 #[derive(Clone, Debug)]
 pub struct Changed(pub String);
+
+/// How a change ended, for the record.
+enum ChangeOutcome {
+    /// It was done; what was changed, in words, where that is known.
+    Done(Option<String>),
+    /// Why it was refused, in words.
+    Refused(String),
+}
+
+impl ChangeOutcome {
+    /// The words for the record: `"done"`, or why it was refused.
+    fn words(&self) -> &str {
+        match self {
+            Self::Done(_) => "done",
+            Self::Refused(words) => words,
+        }
+    }
+
+    /// What was changed.
+    fn changed(&self) -> Option<&str> {
+        match self {
+            Self::Done(changed) => changed.as_deref(),
+            Self::Refused(_) => None,
+        }
+    }
+}
+
+/// The body of a sign-in.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SignIn {
+    secret: String,
+    /// The time by the browser's clock, ms since 1970 UTC.
+    time_ms: Option<u64>,
+}
+
+/// Checks that a request names one host, and that this is the device.
+///
+/// # Errors
+/// 400 where it names several, 421 where it names none or another.
+pub fn check_host(uri: &Uri, headers: &HeaderMap, configured: &[String]) -> Answered<()> {
+    let host = only(headers, &header::HOST);
+    let several = headers.get_all(header::HOST).iter().count() > 1;
+    // The request line may name a host, too.
+    let named = uri.authority().map(|authority| authority.as_str());
+    if several || named.is_some_and(|named| host.is_some_and(|host| host != named)) {
+        let words = "the request names more than one host: send one Host header, and in the request line a path only";
+        return Err(Problem::unclear(words));
+    }
+    if is_allowed(host.unwrap_or(""), configured) {
+        return Ok(());
+    }
+    let words = "this device does not go by the name in the Host header; use its IP address, or add the name to the config";
+    Err(Problem::new(StatusCode::MISDIRECTED_REQUEST, words))
+}
+
+/// The text of a header; none if it is missing, repeated, or not text.
+pub fn only<'a>(headers: &'a HeaderMap, name: &HeaderName) -> Option<&'a str> {
+    let mut values = headers.get_all(name).into_iter();
+    let first = values.next()?;
+    let once = values.next().is_none();
+    once.then(|| first.to_str().ok())?
+}
+
+/// Whether a request with this Host header is meant for this device.
+fn is_allowed(header: &str, configured: &[String]) -> bool {
+    let name = if let Some(rest) = header.strip_prefix('[') {
+        let Some((address, port)) = rest.split_once(']') else {
+            return false;
+        };
+        return address.parse::<Ipv6Addr>().is_ok()
+            && (port.is_empty() || is_port(port.strip_prefix(':')));
+    } else if let Some((name, port)) = header.split_once(':') {
+        if !is_port(Some(port)) {
+            return false;
+        }
+        name
+    } else {
+        header
+    };
+    name.eq_ignore_ascii_case("localhost")
+        || name.parse::<IpAddr>().is_ok()
+        || configured
+            .iter()
+            .any(|allowed| name.eq_ignore_ascii_case(allowed))
+}
+
+fn is_port(text: Option<&str>) -> bool {
+    text.is_some_and(|text| text.parse::<u16>().is_ok())
+}
 
 /// The session token of a request, if it has one.
 pub fn token(headers: &HeaderMap) -> Option<&str> {
@@ -52,7 +150,7 @@ pub fn is_signed_in(site: &Site, headers: &HeaderMap) -> bool {
 ///
 /// # Errors
 /// How to sign in.
-pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Result<()> {
+pub(super) fn signed_in(site: &Site, headers: &HeaderMap) -> Answered<()> {
     let words = "sign in first: POST the device's secret to /api/session";
     let refused = || Problem::new(StatusCode::UNAUTHORIZED, words);
     is_signed_in(site, headers)
@@ -87,7 +185,7 @@ fn is_own(headers: &HeaderMap) -> bool {
 pub async fn signed_in_only(
     site: Site,
     Extension(Peer(from)): Extension<Peer>,
-    Extension(Action(action)): Extension<Action>,
+    Extension(ChangeName(action)): Extension<ChangeName>,
     request: Request,
     next: Next,
 ) -> Response {
@@ -96,24 +194,23 @@ pub async fn signed_in_only(
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     };
-    let refused = response.extensions().get::<Outcome>();
+    let refused = response.extensions().get::<ProblemWords>();
     let changed = response.extensions().get::<Changed>();
     let outcome = match refused {
-        Some(Outcome(words)) => Err(words.clone()),
-        None => Ok(changed.map(|Changed(words)| words.clone())),
+        Some(ProblemWords(words)) => ChangeOutcome::Refused(words.clone()),
+        None => ChangeOutcome::Done(changed.map(|Changed(words)| words.clone())),
     };
     record(&site, from, action, subject, outcome).await;
     response
 }
 
-/// Adds a line to the record of changes, with why the change was refused, or that it was done and
-/// perhaps what was changed; if that fails, the log says so.
-pub async fn record(
+/// Adds a line to the record of changes; if that fails, the log says so.
+async fn record(
     site: &Site,
     from: IpAddr,
     action: &'static str,
     subject: String,
-    outcome: Result<Option<String>, String>,
+    outcome: ChangeOutcome,
 ) {
     let written = site
         .change(move |site| {
@@ -125,8 +222,8 @@ pub async fn record(
                 from,
                 action,
                 subject: &subject,
-                outcome: outcome.as_ref().map_or_else(String::as_str, |_| "done"),
-                changed: outcome.as_ref().ok().and_then(Option::as_deref),
+                outcome: outcome.words(),
+                changed: outcome.changed(),
             };
             let stored = site.access.changes().add(&change);
             stored.map_err(Problem::broken)
@@ -139,5 +236,119 @@ pub async fn record(
         );
         journal::write(Severity::Warning, &line);
         site.log.add(&line);
+    }
+}
+
+pub(super) async fn session(site: Site, headers: HeaderMap) -> Json<Value> {
+    Json(json!({ "signed_in": is_signed_in(&site, &headers) }))
+}
+
+pub(super) async fn begin_session(
+    site: Site,
+    Extension(Peer(from)): Extension<Peer>,
+    request: Request<Body>,
+) -> Answered<Response> {
+    let SignIn { secret, time_ms } = request::json(request.into_body()).await?;
+    let received = site.station.now();
+    let guess = site.change(move |site| Ok(site.access.sign_in(from, &secret, Instant::now())));
+    let token = guess.await?;
+    // A guess that has to wait is not recorded, so that guessing cannot fill the record.
+    if !matches!(token, Err(Refused::Wait(_))) {
+        let outcome = match &token {
+            Ok(_) => ChangeOutcome::Done(None),
+            Err(refused) => ChangeOutcome::Refused(refused.to_string()),
+        };
+        record(&site, from, "sign in", "session".into(), outcome).await;
+    }
+    match token {
+        Ok(token) => {
+            let time = match time_ms {
+                Some(ms) => {
+                    let dated = site.change(move |site| Ok(date(site, ms, received)));
+                    Some(dated.await?)
+                }
+                None => None,
+            };
+            let answer = json!({ "signed_in": true, "time": time });
+            Ok(with_cookie(cookie(Some(&token)), answer))
+        }
+        Err(refused) => {
+            let status = match &refused {
+                Refused::Wrong => StatusCode::FORBIDDEN,
+                Refused::Wait(_) => StatusCode::TOO_MANY_REQUESTS,
+                Refused::Broken(_) => StatusCode::INTERNAL_SERVER_ERROR,
+            };
+            let mut response = Problem::new(status, &refused).into_response();
+            if let Refused::Wait(time) = refused {
+                let seconds = HeaderValue::from(time.as_secs().max(1));
+                response.headers_mut().insert(header::RETRY_AFTER, seconds);
+            }
+            Ok(response)
+        }
+    }
+}
+
+pub(super) async fn end_session(site: Site, headers: HeaderMap) -> Response {
+    if let Some(token) = token(&headers) {
+        site.access.sign_out(token);
+    }
+    with_cookie(cookie(None), json!({ "signed_in": false }))
+}
+
+/// Dates this start by the clock of a browser whose user has signed in, where the device's own
+/// clock is not synchronised; answers with the outcome. The last sign-in counts, so a wrong time is
+/// corrected by signing in from a browser with the right one.
+fn date(site: &Site, ms: u64, received: Micros) -> &'static str {
+    if site.station.snapshot().warnings & warning::CLOCK_UNSYNCED == 0 {
+        return "not needed";
+    }
+    let Some(us) = clock::of_browser(ms) else {
+        return "refused";
+    };
+    clock::tell(us);
+    match (site.date)(us.saturating_sub(received.0)) {
+        true => "taken",
+        false => "not stored",
+    }
+}
+
+fn with_cookie(cookie: Option<HeaderValue>, answer: Value) -> Response {
+    let mut response = Json(answer).into_response();
+    if let Some(cookie) = cookie {
+        response.headers_mut().insert(header::SET_COOKIE, cookie);
+    }
+    response
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_localhost_and_configured_names_are_answered_and_nothing_else() {
+        let configured = ["sensor-7.local".to_owned()];
+        for fine in [
+            "127.0.0.1:8080",
+            "10.0.0.5",
+            "[::1]:8080",
+            "[fe80::1]",
+            "localhost",
+            "LocalHost:80",
+            "Sensor-7.local:8080",
+        ] {
+            assert!(is_allowed(fine, &configured), "{fine}");
+        }
+        for other in [
+            "",
+            "evil.example",
+            "evil.example:8080",
+            "127.0.0.1.evil.example",
+            "localhost:x",
+            "[::1",
+            "[evil]",
+            "[::1]x",
+        ] {
+            assert!(!is_allowed(other, &configured), "{other}");
+        }
     }
 }

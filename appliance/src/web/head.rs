@@ -1,26 +1,28 @@
-//! The head: its commissioning step by step, and the live picture.
+//! The head: its commissioning step by step, the board to print for it, the live picture, and the part
+//! in front of a simulated one.
 
-use axum::body::Body;
-use axum::extract::Request;
-use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
-use axum::response::{IntoResponse, Json, Response};
-use serde::Deserialize;
-use serde_json::Value;
-
-use super::body;
 use super::gate::signed_in;
 use super::orders::{Accepted, accepted, not_now};
-use super::problem::{Problem, Result};
-use super::query::{Path, Query};
+use super::problem::{Answered, Problem};
+use super::request::{self, Path, Query};
 use super::site::{Site, alone};
 use crate::head::board;
 use crate::head::calibration::geometry::MAX_POSES;
 use crate::head::commission::{EXPOSURE, GEOMETRY, PoseAction, STEPS, Solving, Step};
 use crate::head::exposing::Exposing;
 use crate::head::live::Show;
+use crate::head::placed::Placed;
+use crate::output::board::sheet;
 use crate::production::commissioning::StepRequest;
+use crate::production::simulation::PutError;
 use crate::station::{Event, Request as Command};
-use crate::system::priority;
+use crate::system::computing;
+use axum::body::Body;
+use axum::extract::Request;
+use axum::http::{HeaderMap, HeaderName, HeaderValue, header};
+use axum::response::{IntoResponse, Json, Response};
+use serde::Deserialize;
+use serde_json::Value;
 
 /// The number of a live picture, which its figures have as well.
 const NUMBER: HeaderName = HeaderName::from_static("x-picture");
@@ -59,7 +61,7 @@ pub(super) async fn step(
     site: Site,
     Path(name): Path<String>,
     request: Request,
-) -> Result<Accepted> {
+) -> Answered<Accepted> {
     let asked = asked(&site, &name, request.into_body()).await?;
     if site.simulation.is_placing() {
         return Err(Problem::busy(format!(
@@ -77,7 +79,7 @@ pub(super) async fn step(
     Ok(accepted())
 }
 
-pub(super) async fn end(site: Site, Path(name): Path<String>) -> Result<Accepted> {
+pub(super) async fn end(site: Site, Path(name): Path<String>) -> Answered<Accepted> {
     if !site.commission.is_running(&name) {
         let words = format!("end the step {name}: it is not running");
         return Err(Problem::busy(words));
@@ -86,7 +88,7 @@ pub(super) async fn end(site: Site, Path(name): Path<String>) -> Result<Accepted
     Ok(accepted())
 }
 
-async fn asked(site: &Site, name: &str, body: Body) -> Result<StepRequest> {
+async fn asked(site: &Site, name: &str, body: Body) -> Answered<StepRequest> {
     let step = Step::of(name).ok_or_else(|| {
         let [before @ .., last] = STEPS.each_ref().map(|step| step.name);
         let before = before.join(", ");
@@ -94,13 +96,12 @@ async fn asked(site: &Site, name: &str, body: Body) -> Result<StepRequest> {
     })?;
     let (mut poses, mut exposing) = (None, None);
     match step.name {
-        EXPOSURE => exposing = exposure(site, body::json_if_any(body).await?)?,
+        EXPOSURE => exposing = exposure(site, request::json_if_any(body).await?)?,
         GEOMETRY => {
-            let wanted = geometry(site, body::json(body).await?);
-            poses = Some(wanted.map_err(Problem::unfit)?);
+            poses = Some(geometry(site, request::json(body).await?)?);
         }
         _ => {
-            let Nothing {} = body::json_if_any(body).await?;
+            let Nothing {} = request::json_if_any(body).await?;
         }
     }
     Ok(StepRequest {
@@ -110,7 +111,7 @@ async fn asked(site: &Site, name: &str, body: Body) -> Result<StepRequest> {
     })
 }
 
-fn exposure(site: &Site, wanted: Exposure) -> Result<Option<(Exposing, bool)>> {
+fn exposure(site: &Site, wanted: Exposure) -> Answered<Option<(Exposing, bool)>> {
     let head = site.commission.head();
     let head = head.ok_or_else(|| Problem::busy("set the exposure: no head is open"))?;
     let exposing = Exposing {
@@ -132,21 +133,24 @@ fn exposure(site: &Site, wanted: Exposure) -> Result<Option<(Exposing, bool)>> {
     Ok(given.then_some((exposing, wanted.keep)))
 }
 
-fn geometry(site: &Site, wanted: Action) -> Result<PoseAction, String> {
+fn geometry(site: &Site, wanted: Action) -> Answered<PoseAction> {
     let most = MAX_POSES as u32;
     let within = |pose: u32| match (1..=most).contains(&pose) {
         true => Ok(pose),
-        false => Err(format!("pose {pose}: poses are numbered 1 to {most}")),
+        false => Err(Problem::unfit(format!(
+            "pose {pose}: poses are numbered 1 to {most}"
+        ))),
     };
     Ok(match wanted {
         Action::Pose { board, pose } => {
-            let board = board::parse(&board).map_err(|error| format!("board: {error}"))?;
+            let board =
+                board::parse(&board).map_err(|error| Problem::unfit(format!("board: {error}")))?;
             let number = pose.unwrap_or_else(|| site.commission.free_pose());
             PoseAction::Pose(board, within(number)?)
         }
         Action::Forget { pose } => PoseAction::Forget(pose.map(within).transpose()?),
         Action::Solve(solving) => {
-            solving.check()?;
+            solving.check().map_err(Problem::unfit)?;
             PoseAction::Solve(solving)
         }
     })
@@ -154,7 +158,7 @@ fn geometry(site: &Site, wanted: Action) -> Result<PoseAction, String> {
 
 /// What a live picture is to show.
 #[derive(Debug, Deserialize)]
-pub(super) struct Shown {
+pub(super) struct LiveQuery {
     #[serde(default)]
     show: String,
 }
@@ -162,8 +166,8 @@ pub(super) struct Shown {
 pub(super) async fn live(
     site: Site,
     headers: HeaderMap,
-    Query(shown): Query<Shown>,
-) -> Result<Response> {
+    Query(shown): Query<LiveQuery>,
+) -> Answered<Response> {
     signed_in(&site, &headers)?;
     let Some(show) = Show::parse(&shown.show) else {
         let words = Show::ALL.map(Show::word).join(", ");
@@ -177,7 +181,7 @@ pub(super) async fn live(
     let failed = "taking the picture failed; see the log";
     let taken = alone("looking", failed, move || {
         // The measuring task needs the cores.
-        priority::give_way();
+        computing::give_way();
         live.look(show)
     });
     let (number, png) = taken.await?.map_err(Problem::busy)?;
@@ -187,7 +191,7 @@ pub(super) async fn live(
     Ok(response)
 }
 
-pub(super) async fn figures(site: Site, headers: HeaderMap) -> Result<Json<Value>> {
+pub(super) async fn figures(site: Site, headers: HeaderMap) -> Answered<Json<Value>> {
     signed_in(&site, &headers)?;
     let words = "no live picture was taken yet: ask for one first";
     site.live
@@ -196,7 +200,7 @@ pub(super) async fn figures(site: Site, headers: HeaderMap) -> Result<Json<Value
         .ok_or_else(|| Problem::missing(words))
 }
 
-pub(super) async fn pose(site: Site, Path(number): Path<u32>) -> Result<Response> {
+pub(super) async fn pose(site: Site, Path(number): Path<u32>) -> Answered<Response> {
     let png = site
         .aside(move |site| {
             let picture = site.commission.pose_picture(number);
@@ -204,4 +208,47 @@ pub(super) async fn pose(site: Site, Path(number): Path<u32>) -> Result<Response
         })
         .await?;
     Ok(([(header::CONTENT_TYPE, "image/png")], png).into_response())
+}
+
+/// Which board is wanted.
+#[derive(Debug, Deserialize)]
+pub(super) struct BoardQuery {
+    #[serde(default)]
+    board: String,
+}
+
+pub(super) async fn board_pdf(Query(wanted): Query<BoardQuery>) -> Answered<Response> {
+    let board =
+        board::parse(&wanted.board).map_err(|error| Problem::unclear(format!("board: {error}")))?;
+    let sheet = sheet(&board).map_err(|error| Problem::unfit(format!("board: {error}")))?;
+    let headers = [
+        (header::CONTENT_TYPE, "application/pdf"),
+        (
+            header::CONTENT_DISPOSITION,
+            "attachment; filename=\"board.pdf\"",
+        ),
+    ];
+    Ok((headers, sheet.pdf).into_response())
+}
+
+impl From<PutError> for Problem {
+    fn from(error: PutError) -> Self {
+        match error {
+            PutError::Unfit(words) => Self::unfit(words),
+            PutError::Busy(words) => Self::busy(words),
+        }
+    }
+}
+
+pub(super) async fn part(site: Site) -> Json<Value> {
+    Json(site.simulation.view())
+}
+
+/// Answers once the next cycle sees the part.
+pub(super) async fn put_part(site: Site, body: Body) -> Answered<Json<Value>> {
+    let placed: Placed = request::json(body).await?;
+    let simulation = site.simulation.clone();
+    let failed = "putting the part in place failed; see the log";
+    alone("staging", failed, move || simulation.put(&placed)).await??;
+    Ok(Json(site.simulation.view()))
 }

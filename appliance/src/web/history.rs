@@ -1,15 +1,29 @@
-//! Stored results: lists, trends, CSV and the frames that were kept.
+//! Stored results: lists, trends, CSV, and one result in full with the frames and pictures of its part,
+//! where they were kept.
+//!
+//! Pictures are computed from the recording by the code that makes those of the last part. That takes
+//! as much memory as a recipe, so it is done for one part at a time, on a thread with a lower priority
+//! than the measuring task.
 
+use super::downloads::{Download, Packed, send, unpacked};
+use super::look::{Level, found, map_of, place_of};
+use super::map::Map;
+use super::problem::{Answered, Problem};
+use super::request::{Path, Query};
+use super::site::Site;
+use crate::error::{Exit, Failure};
+use crate::history::kept::Kept;
+use crate::history::{Entry, Filter, HistoryError, why_no_frames};
+use crate::recipe::plan::Plan;
+use crate::station::Verdict;
+use crate::station::result::flag;
+use crate::system::computing;
 use axum::response::{Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
-
-use super::downloads::{Content, Packed, send, unpacked};
-use super::problem::{Problem, Result};
-use super::query::{Path, Query};
-use super::site::Site;
-use crate::history::{Filter, HistoryError};
-use crate::station::Verdict;
+use std::path::PathBuf;
+use std::sync::Arc;
+use tokio::task::{JoinError, spawn_blocking};
 
 /// Results of one answer, unless it asks for fewer.
 const PAGE: usize = 100;
@@ -26,7 +40,7 @@ impl From<HistoryError> for Problem {
 /// The query of a request for results.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Wanted {
+pub(super) struct ResultsQuery {
     recipe: Option<u16>,
     verdict: Option<String>,
     part_id: Option<u32>,
@@ -36,10 +50,10 @@ pub(super) struct Wanted {
     limit: Option<usize>,
 }
 
-impl Wanted {
+impl ResultsQuery {
     /// The filter, of the `usual` number of results unless asked for another one, and at `most`
     /// that many.
-    fn filter(self, usual: usize, most: usize) -> Result<Filter> {
+    fn filter(self, usual: usize, most: usize) -> Answered<Filter> {
         let judged = |word: String| {
             let words = format!("verdict={word}: write PASS, FAIL or INVALID");
             Verdict::of_word(&word).ok_or_else(|| Problem::unclear(words))
@@ -57,7 +71,7 @@ impl Wanted {
     }
 }
 
-pub(super) async fn list(site: Site, Query(wanted): Query<Wanted>) -> Result<Json<Value>> {
+pub(super) async fn list(site: Site, Query(wanted): Query<ResultsQuery>) -> Answered<Json<Value>> {
     let filter = wanted.filter(PAGE, MAX_PAGE)?;
     let found = site.aside(move |site| {
         let results = site.history.results(&filter)?;
@@ -75,17 +89,17 @@ pub(super) async fn list(site: Site, Query(wanted): Query<Wanted>) -> Result<Jso
 /// The most results of one CSV, so that it fits into memory.
 const MAX_CSV: usize = 20_000;
 
-pub(super) async fn csv(site: Site, Query(wanted): Query<Wanted>) -> Result<Response> {
+pub(super) async fn csv(site: Site, Query(wanted): Query<ResultsQuery>) -> Answered<Response> {
     let filter = wanted.filter(MAX_CSV, MAX_CSV)?;
     send(&site, "text/csv; charset=utf-8", move |site| {
         let mut bytes = Vec::new();
         site.history.csv(&filter, &mut bytes)?;
-        Ok(("history.csv".into(), Content::Bytes(bytes)))
+        Ok(("history.csv".into(), Download::Bytes(bytes)))
     })
     .await
 }
 
-pub(super) async fn recording(site: Site, Path(seq): Path<u32>) -> Result<Response> {
+pub(super) async fn recording(site: Site, Path(seq): Path<u32>) -> Answered<Response> {
     send(&site, "application/zip", move |site| {
         let words = format!("the frames of result {seq} were not kept");
         let kept = site.history.recording(seq)?;
@@ -94,13 +108,13 @@ pub(super) async fn recording(site: Site, Path(seq): Path<u32>) -> Result<Respon
         let name = kept.file_name().unwrap_or_default().to_string_lossy();
         let packed = Packed::of(&kept, name.into_owned());
         let packed = packed.map_err(|error| Problem::broken(unpacked(error)))?;
-        Ok((format!("{seq}-recording.zip"), Content::Folder(packed)))
+        Ok((format!("{seq}-recording.zip"), Download::Folder(packed)))
     })
     .await
 }
 
 /// The last values of each gauge of the active recipe.
-pub(super) async fn trends(site: Site) -> Result<Json<Value>> {
+pub(super) async fn trends(site: Site) -> Answered<Json<Value>> {
     let active = site.station.snapshot().active();
     let recipe = active.ok_or_else(|| Problem::missing("no recipe is active: load one"))?;
     let read = site.aside(move |site| {
@@ -109,4 +123,105 @@ pub(super) async fn trends(site: Site) -> Result<Json<Value>> {
         Ok(json!({ "recipe": recipe, "gauges": gauges, "fitness": fitness }))
     });
     read.await.map(Json)
+}
+
+/// Why a kept part cannot be worked out.
+const OTHER_FRAMES: &str = "the recording's frames are not those of its recipe";
+
+/// One result in full, with its flags in words and why there are no frames.
+pub(super) async fn one(site: Site, Path(seq): Path<u32>) -> Answered<Json<Value>> {
+    let found = site.aside(move |site| {
+        let entry = site.history.result(seq)?;
+        let entry = entry.ok_or_else(|| unknown(seq))?;
+        let flags = flag::words(entry.flags).collect::<Vec<_>>();
+        Ok(json!({ "result": entry, "flags": flags, "no_frames": why_no_frames(&entry) }))
+    });
+    found.await.map(Json)
+}
+
+fn unknown(seq: u32) -> Problem {
+    Problem::missing(format!("there is no result {seq} in the history"))
+}
+
+pub(super) async fn picture(
+    site: Site,
+    Path((seq, layer)): Path<(u32, String)>,
+    Query(level): Query<Level>,
+) -> Answered<Map> {
+    let at = place_of(&layer)?;
+    // Waiting here takes no thread from other requests.
+    let mut last = site.kept.clone().lock_owned().await;
+    let worked = spawn_blocking(move || {
+        if last.as_ref().is_none_or(|(of, _)| *of != seq) {
+            *last = None;
+            let layers = judged(&site, seq, |_, plan, sequence, kept| {
+                plan.layers(sequence, &kept.frames())
+            })?;
+            let layers = layers.ok_or_else(|| Problem::broken(OTHER_FRAMES))?;
+            *last = Some((seq, Arc::new(layers)));
+        }
+        let (_, layers) = last.as_ref().ok_or_else(|| Problem::broken(OTHER_FRAMES))?;
+        map_of(layers, at, seq, level)
+    });
+    worked.await.map_err(failed)?
+}
+
+/// What was found on a kept part.
+pub(super) async fn features(site: Site, Path(seq): Path<u32>) -> Answered<Json<Value>> {
+    // One part at a time, as for pictures.
+    let place = site.kept.clone().lock_owned().await;
+    let worked = spawn_blocking(move || {
+        let _place = place;
+        judged(&site, seq, |entry, plan, sequence, kept| {
+            let (_, features) = plan.look(sequence, &kept.frames());
+            found(seq, entry.verdict, plan.id(), &features)
+        })
+    });
+    worked.await.map_err(failed)?.map(Json)
+}
+
+fn failed(_: JoinError) -> Problem {
+    Problem::broken("working it out failed; see the log")
+}
+
+/// The entry of a kept part, and the folder with its frames.
+pub(super) fn kept_frames(site: &Site, seq: u32) -> Answered<(Entry, PathBuf)> {
+    let entry = site.history.result(seq)?.ok_or_else(|| unknown(seq))?;
+    if let Some(words) = why_no_frames(&entry) {
+        let words = format!("the frames of result {seq} are not kept: {words}");
+        return Err(Problem::missing(words));
+    }
+    let folder = site.history.recording(seq)?.ok_or_else(|| unknown(seq))?;
+    Ok((entry, folder))
+}
+
+/// Works on the frames of a kept part and the plan that judged it.
+fn judged<T: Send>(
+    site: &Site,
+    seq: u32,
+    work: impl FnOnce(&Entry, &Plan, usize, &Kept) -> T + Send,
+) -> Answered<T> {
+    let (entry, folder) = kept_frames(site, seq)?;
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .thread_name(|_| "looking-back".into())
+        .start_handler(|_| computing::give_way())
+        .build()
+        .map_err(|error| Problem::broken(format!("start a thread: {error}: free memory")))?;
+    pool.install(|| {
+        let kept = Kept::open(&folder).map_err(broken)?;
+        let (recipe, _) = kept.recipe(&site.recipes).map_err(broken)?;
+        let plan = kept.plan(recipe, false);
+        let plan = plan.map_err(Problem::broken)?;
+        let sequence = plan.sequence_of(&kept.shots());
+        let sequence = sequence.ok_or_else(|| Problem::broken(OTHER_FRAMES))?;
+        Ok(work(&entry, &plan, sequence, &kept))
+    })
+}
+
+pub(super) fn broken(failure: Failure) -> Problem {
+    match failure.exit {
+        Exit::Missing => Problem::missing(failure.to_string()),
+        _ => Problem::broken(failure.to_string()),
+    }
 }

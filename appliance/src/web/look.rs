@@ -6,9 +6,9 @@ use axum::response::{IntoResponse, Json, Response};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::map::{Drawn, Map, Plane, map, surface, usual_stride};
-use super::problem::{Problem, Result};
-use super::query::{Path, Query};
+use super::map::{Drawn, Map, Plane, Sampling, map, surface};
+use super::problem::{Answered, Problem};
+use super::request::{Path, Query};
 use super::site::Site;
 use super::view;
 use crate::recipe::plan::{Layers, Shown};
@@ -64,14 +64,17 @@ pub(super) struct Level {
 }
 
 impl Level {
-    /// Pixels from one to the next that is sent of frames of `width` columns.
+    /// Which pixels of frames of `width` columns are sent.
     ///
     /// # Errors
     /// There is no such level.
-    pub(super) fn stride(self, width: usize) -> Result<usize> {
+    pub(super) fn sampling(self, width: usize) -> Answered<Sampling> {
         match self.level {
-            None => Ok(usual_stride(width)),
-            Some(level) if level <= MAX_LEVEL => Ok(1 << level),
+            None => Ok(Sampling::usual(width)),
+            Some(level) if level <= MAX_LEVEL => Ok(Sampling {
+                width,
+                stride: 1 << level,
+            }),
             Some(level) => Err(Problem::unfit(format!(
                 "level {level}: write 0 to {MAX_LEVEL}"
             ))),
@@ -80,24 +83,19 @@ impl Level {
 }
 
 /// What was found on a part.
-pub(super) fn found(
-    (seq, verdict): (u32, Verdict),
-    (id, features): (&RecipeId, &[Seen<'_>]),
-) -> Value {
+pub(super) fn found(seq: u32, verdict: Verdict, id: &RecipeId, features: &[Seen<'_>]) -> Value {
     json!({
         "seq": seq, "recipe": id.number, "fingerprint": id.fingerprint, "verdict": verdict.word(),
         "features": features,
     })
 }
 
-pub(super) async fn features(site: Site) -> Result<Response> {
+pub(super) async fn features(site: Site) -> Answered<Response> {
     site.aside(|site| {
         let asked = site.last_cycle.ask(|part| {
             let (_, features) = part.plan.look(part.sequence, &part.frames);
-            found(
-                (part.record.seq, part.record.verdict),
-                (part.plan.id(), &features),
-            )
+            let record = &part.record;
+            found(record.seq, record.verdict, part.plan.id(), &features)
         });
         let answer = asked.map(|found| Json(found).into_response());
         Ok(answer.unwrap_or_else(none))
@@ -115,7 +113,7 @@ pub(super) async fn picture(
     site: Site,
     Path(layer): Path<String>,
     Query(level): Query<Level>,
-) -> Result<Response> {
+) -> Answered<Response> {
     site.aside(move |site| {
         let at = place_of(&layer)?;
         let Some((seq, layers)) = site.last_cycle.layers(site.last_seq()) else {
@@ -127,18 +125,19 @@ pub(super) async fn picture(
 }
 
 /// What teaching took for the part, and the place for which it was refused.
-pub(super) async fn part_seen(site: Site) -> Result<Response> {
+pub(super) async fn part_seen(site: Site) -> Answered<Response> {
     site.aside(|site| {
         let Some(seen) = site.seen.get() else {
             let words = "nothing was taught since the start";
             return Ok((StatusCode::NO_CONTENT, [("x-none", words)]).into_response());
         };
-        let of = (seen.width, usual_stride(seen.width));
+        let sampling = Sampling::usual(seen.width);
+        let plane = |name, unit, values| Plane::of(name, unit, values, sampling, Drawn::Plain);
         let planes = [
-            Plane::of("modulation", "counts", (&seen.modulation, of), Drawn::Plain),
-            Plane::of("part", "", (&seen.part, of), Drawn::Plain),
+            plane("modulation", "counts", &seen.modulation[..]),
+            plane("part", "", &seen.part),
         ];
-        let mut picture = surface(&planes, of, None);
+        let mut picture = surface(&planes, sampling, None);
         picture.description["place"] = json!(seen.place);
         picture.description["marking"] = json!(seen.marking);
         Ok(picture.into_response())
@@ -150,7 +149,7 @@ pub(super) async fn part_seen(site: Site) -> Result<Response> {
 ///
 /// # Errors
 /// If there is no such picture.
-pub(super) fn place_of(layer: &str) -> Result<usize> {
+pub(super) fn place_of(layer: &str) -> Answered<usize> {
     let at = LAYERS.iter().position(|known| *known == layer);
     at.ok_or_else(|| Problem::missing("there are height, deviation, modulation and surface"))
 }
@@ -159,25 +158,26 @@ pub(super) fn place_of(layer: &str) -> Result<usize> {
 ///
 /// # Errors
 /// There is no such level.
-pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Result<Map> {
+pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Answered<Map> {
     let limit = layers.shown.gauge.as_ref().and_then(|gauge| {
         let limits = [gauge.low, gauge.high].into_iter().flatten();
         limits.map(f64::abs).max_by(f64::total_cmp)
     });
     let deviation = Drawn::Deviation { limit };
     if LAYERS[at] == SURFACE {
-        let of = (layers.width, level.stride(layers.width)?);
-        let mut planes = Plane::points(layers.points(of.1));
+        let sampling = level.sampling(layers.width)?;
+        let mut planes = Plane::points(layers.points(sampling.stride));
         planes.extend([
-            Plane::of("deviation", "mm", (&layers.deviation_mm, of), deviation),
+            Plane::of("deviation", "mm", &layers.deviation_mm, sampling, deviation),
             Plane::of(
                 "modulation",
                 "counts",
-                (&layers.modulation, of),
+                &layers.modulation,
+                sampling,
                 Drawn::Plain,
             ),
         ]);
-        return Ok(surface(&planes, of, Some(seq)));
+        return Ok(surface(&planes, sampling, Some(seq)));
     }
     let (values, unit, drawn) = [
         (&layers.height_mm, "mm", Drawn::Plain),
@@ -239,7 +239,7 @@ pub(super) async fn registers(site: Site) -> Json<Value> {
     Json((site.registers)(&site.station.snapshot()))
 }
 
-pub(super) async fn log(site: Site) -> Result<Json<Value>> {
+pub(super) async fn log(site: Site) -> Answered<Json<Value>> {
     let lines = site
         .aside(|site| Ok(dated(site, site.log.latest())))
         .await?;
@@ -261,7 +261,7 @@ fn dated(site: &Site, mut lines: Vec<Value>) -> Vec<Value> {
     lines
 }
 
-pub(super) async fn changes(site: Site) -> Result<Json<Value>> {
+pub(super) async fn changes(site: Site) -> Answered<Json<Value>> {
     let lines = site
         .aside(|site| {
             let read = site.access.changes().latest();

@@ -20,10 +20,10 @@ const MAP: HeaderName = HeaderName::from_static("x-map");
 /// How a map is drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Drawn {
-    /// Colours over the range of the values; every so many pixels one is sent.
+    /// Colours over the range of the values; of each square the first pixel is sent.
     Plain,
-    /// Colours that reach equally far to both sides of zero; of the pixels that become one, the
-    /// largest deviation is sent.
+    /// Colours that reach equally far to both sides of zero; of each square the largest deviation is
+    /// sent.
     Deviation {
         /// The larger of the gauge's limits; without one the colours go by the values.
         limit: Option<f64>,
@@ -41,21 +41,38 @@ pub struct Map {
     pub description: serde_json::Value,
 }
 
-/// Pixels from one to the next that is sent of `width` columns, unless a request says otherwise.
-pub fn usual_stride(width: usize) -> usize {
-    width.div_ceil(MAX_WIDTH).max(1)
+/// Which pixels of a frame are sent: one of each square.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sampling {
+    /// Columns of the frame.
+    pub width: usize,
+    /// Pixels along each side of a square.
+    pub stride: usize,
+}
+
+impl Sampling {
+    /// That of a frame of `width` columns, unless a request says otherwise.
+    pub fn usual(width: usize) -> Self {
+        let stride = width.div_ceil(MAX_WIDTH).max(1);
+        Self { width, stride }
+    }
+
+    /// Columns that are sent.
+    fn columns(self) -> usize {
+        self.width.div_ceil(self.stride).max(1)
+    }
 }
 
 /// Makes a map of `width` columns.
 pub fn map(values: &[f32], width: usize, unit: &str, drawn: Drawn, seq: Option<u32>) -> Map {
-    let stride = usual_stride(width);
-    let thin = thinned(values, (width, stride), drawn);
-    let columns = width.div_ceil(stride).max(1);
+    let sampling = Sampling::usual(width);
+    let thin = thinned(values, sampling, drawn);
+    let columns = sampling.columns();
     let (words, mut description) = encoded(&thin, unit, drawn);
     for (key, value) in [
         ("width", json!(columns)),
         ("height", json!(thin.len() / columns)),
-        ("stride", json!(stride)),
+        ("stride", json!(sampling.stride)),
         ("seq", json!(seq)),
     ] {
         description[key] = value;
@@ -73,17 +90,18 @@ pub struct Plane {
 }
 
 impl Plane {
-    /// Of values of so many columns, from one pixel to the next that is sent.
+    /// The plane of the values of a frame.
     pub fn of(
         name: &'static str,
         unit: &'static str,
-        (values, size): (&[f32], (usize, usize)),
+        values: &[f32],
+        sampling: Sampling,
         drawn: Drawn,
     ) -> Self {
         Self {
             name,
             unit,
-            thin: thinned(values, size, drawn),
+            thin: thinned(values, sampling, drawn),
             drawn,
         }
     }
@@ -102,9 +120,9 @@ impl Plane {
     }
 }
 
-/// Makes a surface of planes of so many columns, with one pixel in `stride` along each.
-pub fn surface(planes: &[Plane], (width, stride): (usize, usize), seq: Option<u32>) -> Map {
-    let columns = width.div_ceil(stride).max(1);
+/// Makes a surface of planes of one sampling.
+pub fn surface(planes: &[Plane], sampling: Sampling, seq: Option<u32>) -> Map {
+    let columns = sampling.columns();
     let rows = planes.first().map_or(0, |plane| plane.thin.len() / columns);
     let (mut words, mut described) = (Vec::new(), Vec::new());
     for plane in planes {
@@ -114,7 +132,7 @@ pub fn surface(planes: &[Plane], (width, stride): (usize, usize), seq: Option<u3
         described.push(description);
     }
     let description = json!({
-        "width": columns, "height": rows, "stride": stride, "seq": seq, "planes": described,
+        "width": columns, "height": rows, "stride": sampling.stride, "seq": seq, "planes": described,
     });
     Map { words, description }
 }
@@ -166,8 +184,8 @@ fn encoded(thin: &[f32], unit: &str, drawn: Drawn) -> (Vec<u8>, serde_json::Valu
     )
 }
 
-/// One value for each square of `stride` pixels, of those that lie in the frame.
-fn thinned(values: &[f32], (width, stride): (usize, usize), drawn: Drawn) -> Vec<f32> {
+/// One value for each square of pixels, of those that lie in the frame.
+fn thinned(values: &[f32], Sampling { width, stride }: Sampling, drawn: Drawn) -> Vec<f32> {
     let width = width.max(1);
     let rows = values.len() / width;
     let mut thin = Vec::with_capacity(rows.div_ceil(stride) * width.div_ceil(stride));
@@ -318,12 +336,12 @@ mod tests {
         let (width, rows, stride) = (10, 6, 2);
         let values: Vec<f32> = (0..width * rows).map(|at| at as f32).collect();
         let far: Vec<f32> = values.iter().map(|value| value * 1000.0).collect();
-        let of = (width, stride);
+        let sampling = Sampling { width, stride };
         let planes = [
-            Plane::of("a", "mm", (&values, of), Drawn::Plain),
-            Plane::of("b", "counts", (&far, of), Drawn::Plain),
+            Plane::of("a", "mm", &values, sampling, Drawn::Plain),
+            Plane::of("b", "counts", &far, sampling, Drawn::Plain),
         ];
-        let map = surface(&planes, of, Some(4));
+        let map = surface(&planes, sampling, Some(4));
         let described = &map.description;
         assert_eq!(
             (&described["width"], &described["height"]),

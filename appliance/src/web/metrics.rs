@@ -19,7 +19,7 @@ pub(super) async fn metrics(site: Site) -> impl IntoResponse {
 /// The text: one family of samples after the other, each with its type and meaning.
 pub(super) fn text(site: &Site) -> String {
     let now = site.station.snapshot();
-    let mut out = Text(String::new());
+    let mut out = Exposition(String::new());
     let truth = |yes: bool| f64::from(u8::from(yes));
     let identity = &now.identity;
     out.family("fringed_build", "info", "This device.");
@@ -105,9 +105,9 @@ pub(super) fn text(site: &Site) -> String {
     out.end()
 }
 
-struct Text(String);
+struct Exposition(String);
 
-impl Text {
+impl Exposition {
     /// Temperatures, power and the projector's controller; what is not known is left out.
     fn health(&mut self, health: &Health) {
         let (system, projector) = (&health.system, &health.projector);

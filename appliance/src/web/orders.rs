@@ -11,10 +11,10 @@ use axum::response::Json;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::body;
 use super::gate;
-use super::problem::{Problem, Result};
-use super::query::Path;
+use super::problem::{Answered, Problem};
+use super::request;
+use super::request::Path;
 use super::site::Site;
 use crate::recipe::bounds::check_marking;
 use crate::recipe::replace;
@@ -55,7 +55,7 @@ fn edge(site: &Site, rising: u16, headers: &HeaderMap) -> Arc<Snapshot> {
     })
 }
 
-pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Result<Accepted> {
+pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Answered<Accepted> {
     let before = site.station.snapshot().triggers;
     let after = edge(&site, TRIGGER, &headers);
     if after.triggers == before {
@@ -64,7 +64,7 @@ pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Result<Accepted> 
     Ok(accepted())
 }
 
-pub(super) async fn reset(site: Site, headers: HeaderMap) -> Result<Accepted> {
+pub(super) async fn reset(site: Site, headers: HeaderMap) -> Answered<Accepted> {
     let after = edge(&site, ERROR_RESET, &headers);
     match &after.fault {
         None => Ok(accepted()),
@@ -75,7 +75,7 @@ pub(super) async fn reset(site: Site, headers: HeaderMap) -> Result<Accepted> {
     }
 }
 
-pub(super) async fn load(site: Site, Path(number): Path<u16>) -> Result<Accepted> {
+pub(super) async fn load(site: Site, Path(number): Path<u16>) -> Answered<Accepted> {
     begin_load(&site, number)?;
     Ok(accepted())
 }
@@ -83,7 +83,7 @@ pub(super) async fn load(site: Site, Path(number): Path<u16>) -> Result<Accepted
 /// Longest wait for a cycle to end before a changed recipe is loaded.
 const REST: Duration = Duration::from_secs(5);
 
-/// What the station does with a recipe of which another version was stored.
+/// What the station does with a recipe that was replaced by another version.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Reload {
     /// Whether the recipe is the active one.
@@ -121,7 +121,7 @@ pub(super) async fn reload(site: &Site, number: u16) -> Reload {
 ///
 /// # Errors
 /// It loads or teaches a recipe.
-pub(super) fn recipes_unused(site: &Site, what: &str) -> Result<()> {
+pub(super) fn recipes_unused(site: &Site, what: &str) -> Answered<()> {
     let snapshot = site.station.snapshot();
     match snapshot.state_word {
         "loading" | "teaching" => Err(not_now(what, &snapshot)),
@@ -133,7 +133,7 @@ pub(super) fn recipes_unused(site: &Site, what: &str) -> Result<()> {
 ///
 /// # Errors
 /// The station is busy.
-pub(super) fn begin_load(site: &Site, number: u16) -> Result<()> {
+pub(super) fn begin_load(site: &Site, number: u16) -> Answered<()> {
     let key = RecipeKey::Number(number);
     let after = site.station.event(Event::Request(Request::Load(key)));
     if after.state_word == "loading" {
@@ -146,7 +146,7 @@ pub(super) fn begin_load(site: &Site, number: u16) -> Result<()> {
 /// What may happen to a recipe that has the number already; without a body it is not replaced.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, deny_unknown_fields)]
-struct Wanted {
+struct TeachRequest {
     /// It may be replaced; it stays as the previous generation.
     replace: bool,
     /// Its regions, gauges and limits stay.
@@ -163,7 +163,7 @@ pub(super) async fn teach(
     site: Site,
     Path(number): Path<u16>,
     request: Asked<Body>,
-) -> Result<Accepted> {
+) -> Answered<Accepted> {
     if !(1..=MAX_RECIPE).contains(&number) {
         return Err(Problem::unfit(format!(
             "recipe {number}: numbers are 1 to {MAX_RECIPE}"
@@ -179,13 +179,13 @@ pub(super) async fn teach(
     if let Some(problem) = unknown {
         return Err(Problem::busy(format!("teach: {problem}")));
     }
-    let Wanted {
+    let TeachRequest {
         replace: may_replace,
         keep_gauges,
         everything,
         marking,
         limit_mm,
-    } = body::json_if_any(request.into_body()).await?;
+    } = request::json_if_any(request.into_body()).await?;
     let limit = replace::check_limit(limit_mm);
     let marked = marking.as_ref().map_or(Ok(()), check_marking);
     let fits = limit.and(marked);

@@ -84,14 +84,14 @@ impl IntoResponse for Problem {
             let soon = HeaderValue::from_static(RETRY_AFTER_S);
             response.headers_mut().insert(header::RETRY_AFTER, soon);
         }
-        response.extensions_mut().insert(Outcome(self.words));
+        response.extensions_mut().insert(ProblemWords(self.words));
         response
     }
 }
 
-/// An answer, unless another error is named.
-pub type Result<T, E = Problem> = std::result::Result<T, E>;
+/// An answer, or the problem that the client gets instead.
+pub type Answered<T> = Result<T, Problem>;
 
 /// The words of a problem, for the record of changes.
 #[derive(Clone, Debug)]
-pub struct Outcome(pub String);
+pub struct ProblemWords(pub String);

@@ -7,14 +7,14 @@ use axum::http::StatusCode;
 use axum::response::{Json, Response};
 use serde_json::{Value, json};
 
-use super::body;
-use super::downloads::{Content, send};
+use super::downloads::{Download, send};
 use super::gate::Changed;
 use super::look::{Level, SURFACE};
 use super::map::{Drawn, Map, Plane, map, surface};
 use super::orders::{self, Reload};
-use super::problem::{Problem, Result};
-use super::query::{Path, Query};
+use super::problem::{Answered, Problem};
+use super::request;
+use super::request::{Path, Query};
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, Edited};
 use crate::recipe::exchange::Destination;
@@ -52,7 +52,7 @@ impl From<ChangeError> for Problem {
     }
 }
 
-pub(super) async fn list(site: Site) -> Result<Json<Value>> {
+pub(super) async fn list(site: Site) -> Answered<Json<Value>> {
     let listed = site.aside(|site| Ok(listed(&site.recipes))).await?;
     Ok(Json(listed))
 }
@@ -89,17 +89,17 @@ fn summary(file: &RecipeFile) -> Value {
 }
 
 /// `recipe.json`: everything of a recipe except its arrays.
-pub(super) async fn one(site: Site, Path(number): Path<u16>) -> Result<Json<Value>> {
+pub(super) async fn one(site: Site, Path(number): Path<u16>) -> Answered<Json<Value>> {
     let read = site.aside(move |site| site.recipes.manifest(number).map_err(Problem::missing));
     let file = serde_json::to_value(read.await?);
     file.map(Json).map_err(Problem::broken)
 }
 
-pub(super) async fn export(site: Site, Path(number): Path<u16>) -> Result<Response> {
+pub(super) async fn export(site: Site, Path(number): Path<u16>) -> Answered<Response> {
     send(&site, "application/zip", move |site| {
         let opened = site.recipes.file(number);
         let failed = |error| Problem::missing(format!("read recipe {number}: {error}"));
-        let file = Content::Stored(opened.map_err(failed)?);
+        let file = Download::Stored(opened.map_err(failed)?);
         Ok((format!("{number:04}.recipe"), file))
     })
     .await
@@ -109,7 +109,7 @@ pub(super) async fn picture(
     site: Site,
     Path((number, layer)): Path<(u16, String)>,
     Query(level): Query<Level>,
-) -> Result<Map> {
+) -> Answered<Map> {
     site.aside(move |site| {
         let LoadedRecipe { file, recipe, .. } = site.recipes.load_to_edit(number)?;
         let head = file.head().map_err(Problem::unfit)?;
@@ -121,11 +121,17 @@ pub(super) async fn picture(
             "height" => plain(&arrays.golden_height, "mm"),
             "modulation" => plain(&arrays.modulation, "counts"),
             SURFACE => {
-                let of = (width, level.stride(width)?);
-                let mut planes = Plane::points(view.points(&recipe, of.1));
-                let light = (&arrays.modulation[..], of);
-                planes.push(Plane::of("modulation", "counts", light, Drawn::Plain));
-                surface(&planes, of, None)
+                let sampling = level.sampling(width)?;
+                let mut planes = Plane::points(view.points(&recipe, sampling.stride));
+                let light = &arrays.modulation;
+                planes.push(Plane::of(
+                    "modulation",
+                    "counts",
+                    light,
+                    sampling,
+                    Drawn::Plain,
+                ));
+                surface(&planes, sampling, None)
             }
             _ => {
                 let words = "a recipe has height, modulation and surface";
@@ -142,12 +148,12 @@ pub(super) async fn edit(
     site: Site,
     Path(number): Path<u16>,
     request: Request<Body>,
-) -> Result<(Extension<Changed>, Json<Value>)> {
-    let wanted: Edit = body::edit(request.into_body()).await?;
+) -> Answered<(Extension<Changed>, Json<Value>)> {
+    let wanted: Edit = request::edit(request.into_body()).await?;
     let edited = site.change(move |site| {
         let mut note = None;
         let fits = |recipe| {
-            note = tried(site, recipe)?;
+            note = tried(site, recipe).map_err(|error| error.to_string())?;
             Ok(())
         };
         let edited = edit::edit(&site.recipes, number, wanted, fits)?;
@@ -173,7 +179,7 @@ pub(super) async fn edit(
 pub(super) async fn undo(
     site: Site,
     Path(number): Path<u16>,
-) -> Result<(Extension<Changed>, Json<Value>)> {
+) -> Answered<(Extension<Changed>, Json<Value>)> {
     orders::recipes_unused(&site, "undo a recipe")?;
     let (file, before) = site
         .change(move |site| {
@@ -197,7 +203,7 @@ pub(super) async fn undo(
 }
 
 /// Deletes a recipe that is not the active one; undo brings it back.
-pub(super) async fn delete(site: Site, Path(number): Path<u16>) -> Result<Json<Value>> {
+pub(super) async fn delete(site: Site, Path(number): Path<u16>) -> Answered<Json<Value>> {
     orders::recipes_unused(&site, "delete a recipe")?;
     if site.station.snapshot().active() == Some(number) {
         return Err(Problem::busy(format!(
@@ -213,8 +219,8 @@ pub(super) async fn delete(site: Site, Path(number): Path<u16>) -> Result<Json<V
 /// be checked on this head.
 ///
 /// # Errors
-/// In words: it was made for this head and cannot be used on it.
-fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
+/// [`PlanError::Unfit`]: it was made for this head and cannot be used on it.
+fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, PlanError> {
     let Some(calibration) = site.calibration.get() else {
         let words =
             "no calibrated head is open: whether the recipe can be used shows when it is loaded";
@@ -229,7 +235,7 @@ fn tried(site: &Site, recipe: Recipe) -> Result<Option<String>, String> {
             took.as_secs_f64()
         ))),
         Ok(()) => Ok(None),
-        Err(error @ PlanError::Unfit { .. }) => Err(error.to_string()),
+        Err(error @ PlanError::Unfit { .. }) => Err(error),
         Err(error) => Ok(Some(error.to_string())),
     }
 }
@@ -240,7 +246,7 @@ pub(super) async fn import(
     site: Site,
     Query(to): Query<Destination>,
     request: Request<Body>,
-) -> Result<(StatusCode, Extension<Changed>, Json<Value>)> {
+) -> Answered<(StatusCode, Extension<Changed>, Json<Value>)> {
     if let Some(number) = to
         .number
         .filter(|number| !(1..=MAX_RECIPE).contains(number))
@@ -249,7 +255,7 @@ pub(super) async fn import(
             "import as recipe {number}: numbers are 1 to {MAX_RECIPE}"
         )));
     }
-    let upload = body::file(&site, request.into_body()).await?;
+    let upload = request::file(&site, request.into_body()).await?;
     let stored = site.change(move |site| {
         let mut recipe = upload.file.recipe().map_err(Problem::unfit)?;
         let id = recipe.id.clone();

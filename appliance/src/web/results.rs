@@ -15,14 +15,14 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::oneshot;
 
 use super::downloads::ToClient;
-use super::problem::{Problem, Result};
-use super::query::Query;
+use super::problem::{Answered, Problem};
+use super::request::Query;
 use super::site::Site;
-use crate::history::after::{After, Page};
+use crate::history::export::{After, Page};
 use crate::history::{Entry, GaugeEntry};
 use crate::station::Verdict;
 use crate::station::gauge::decision;
-use crate::system::priority;
+use crate::system::computing;
 
 /// The most results of one answer, and how many it has unless it asks for fewer.
 const MOST: usize = 10_000;
@@ -34,7 +34,7 @@ const LONGEST: Duration = Duration::from_millis(20);
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Wanted {
+pub(super) struct AfterQuery {
     #[serde(default)]
     after: u32,
     limit: Option<usize>,
@@ -42,7 +42,7 @@ pub(super) struct Wanted {
 
 /// The first line.
 #[derive(Serialize)]
-struct Header<'a> {
+struct FirstLine<'a> {
     serial: &'a str,
     history: &'a str,
     first: Option<u32>,
@@ -85,16 +85,16 @@ struct Gauge<'a> {
     reason: Option<&'a str>,
 }
 
-pub(super) async fn after(site: Site, Query(wanted): Query<Wanted>) -> Result<Response> {
+pub(super) async fn after(site: Site, Query(wanted): Query<AfterQuery>) -> Answered<Response> {
     let permit = site.collecting.clone().try_acquire_owned();
     let crowded = "too many programs collect results: wait until one is done";
     let permit = permit.map_err(|_| Problem::crowded(crowded))?;
     let (mut to, body) = ToClient::new();
-    let (begun, beginning) = oneshot::channel::<Result<()>>();
+    let (begun, beginning) = oneshot::channel::<Answered<()>>();
     let work = move || {
         // Held until the client has received everything or is gone.
         let _permit = permit;
-        priority::stand_back();
+        computing::stand_back();
         let now = site.station.snapshot();
         site.collected_at_s.store(now.uptime_s, Relaxed);
         let serial = &*now.identity.serial;
@@ -119,7 +119,7 @@ pub(super) async fn after(site: Site, Query(wanted): Query<Wanted>) -> Result<Re
 
 fn write(to: &mut ToClient, serial: &str, mut walk: After, mut page: Page) -> io::Result<()> {
     let history = walk.id().to_owned();
-    let header = Header {
+    let header = FirstLine {
         serial,
         history: &history,
         first: page.first,

@@ -13,9 +13,9 @@ use serde_json::Value;
 use tokio::sync::{Mutex, Semaphore, oneshot};
 use tokio::time::Instant;
 
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::slots::Slots;
-use super::turns::Tries;
+use super::slots::Tries;
 use crate::head::calibration::Current;
 use crate::history::Reader;
 use crate::production::commissioning::Commission;
@@ -27,7 +27,7 @@ use crate::recipe::part_seen::LastSeen;
 use crate::recipe::plan::Layers;
 use crate::recipe::trying::Opened;
 use crate::station::{Snapshot, StationHandle};
-use crate::system::logbook::Logbook;
+use crate::system::journal::Logbook;
 use crate::system::socket;
 use crate::web::access::Access;
 
@@ -50,7 +50,7 @@ const MAX_COLLECTING: usize = 4;
 
 /// The maps that were computed last, and the SEQ of their result.
 pub(super) type LastKept = Option<(u32, Arc<Layers>)>;
-/// The recipe of which an edit was tried last, and when.
+/// The recipe whose edit was tried last, and when.
 pub(super) type LastOpened = Option<(Opened, Instant)>;
 
 /// What the daemon hands to the page.
@@ -109,7 +109,7 @@ pub struct Site {
     /// The maps of a kept part that were computed last; locked while something else is computed of
     /// one.
     pub(super) kept: Arc<Mutex<LastKept>>,
-    /// The recipe of which an edit was tried last; locked while one is tried.
+    /// The recipe whose edit was tried last; locked while an edit is tried.
     pub(super) opened: Arc<Mutex<LastOpened>>,
     /// The tries that are being answered.
     pub(super) tries: Tries,
@@ -162,8 +162,8 @@ impl Site {
     /// What `work` answers.
     pub async fn aside<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
-    ) -> Result<T> {
+        work: impl FnOnce(&Self) -> Answered<T> + Send + 'static,
+    ) -> Answered<T> {
         self.queued(self.looking.clone(), work).await
     }
 
@@ -173,16 +173,16 @@ impl Site {
     /// What `work` answers.
     pub async fn change<T: Send + 'static>(
         &self,
-        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
-    ) -> Result<T> {
+        work: impl FnOnce(&Self) -> Answered<T> + Send + 'static,
+    ) -> Answered<T> {
         self.queued(self.changing.clone(), work).await
     }
 
     async fn queued<T: Send + 'static>(
         &self,
         places: Arc<Semaphore>,
-        work: impl FnOnce(&Self) -> Result<T> + Send + 'static,
-    ) -> Result<T> {
+        work: impl FnOnce(&Self) -> Answered<T> + Send + 'static,
+    ) -> Answered<T> {
         let gone = |_| Problem::broken("the page's workers are gone; restart fringed");
         let permit = places.acquire_owned().await.map_err(gone)?;
         let site = self.clone();
@@ -209,7 +209,7 @@ pub(super) async fn alone<T: Send + 'static>(
     name: &str,
     failed: &str,
     work: impl FnOnce() -> T + Send + 'static,
-) -> Result<T> {
+) -> Answered<T> {
     let (done, answer) = oneshot::channel();
     let run = move || {
         // The client may have closed its connection.

@@ -1,30 +1,32 @@
-//! Slots for connections and for pages that follow the events: a limited number, shared fairly
-//! between addresses.
+//! Limits between clients: slots for connections and for pages that follow the events, shared fairly
+//! between addresses; and of a session's tries of an edit, only the newest is answered.
 //!
 //! A slot is either waiting for a request or being answered. One address holds at most its share of
-//! the slots. When all are in use, the one waiting for longest is closed for the new one, so a
-//! crowd of silent connections displaces only itself. If none is waiting, the address with most
-//! slots loses one to an address with fewer, so no address can keep another out.
+//! the slots. When all are in use, the one waiting for longest is closed for the new one, so a crowd of
+//! silent connections displaces only itself. If none is waiting, the address with most slots loses one
+//! to an address with fewer, so no address can keep another out.
 
+use std::collections::HashMap;
+use std::collections::hash_map::DefaultHasher;
+use std::hash::{Hash as _, Hasher as _};
 use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
-
-use tokio::sync::Notify;
+use tokio::sync::{Notify, watch};
 
 /// All slots.
 #[derive(Clone, Debug)]
-pub struct Slots(Arc<Inside>);
+pub struct Slots(Arc<SlotLimits>);
 
 #[derive(Debug)]
-struct Inside {
+struct SlotLimits {
     most: usize,
     each: usize,
-    table: Mutex<Table>,
+    table: Mutex<SlotTable>,
 }
 
 #[derive(Debug, Default)]
-struct Table {
+struct SlotTable {
     /// The number of the next slot.
     next: u64,
     /// The slots in use, oldest first.
@@ -49,7 +51,7 @@ pub struct Slot {
     leave: Arc<Notify>,
 }
 
-impl Table {
+impl SlotTable {
     fn held_by(&self, holder: Option<IpAddr>) -> usize {
         let held = self.taken.iter().filter(|taken| taken.holder == holder);
         holder.map_or(0, |_| held.count())
@@ -72,10 +74,10 @@ impl Table {
 }
 
 impl Slots {
-    /// `most` slots, of which each address holds at most `each`.
+    /// `most` slots; each address holds at most `each` of them.
     pub fn new(most: usize, each: usize) -> Self {
         let table = Mutex::default();
-        Self(Arc::new(Inside { most, each, table }))
+        Self(Arc::new(SlotLimits { most, each, table }))
     }
 
     /// A slot for `holder` (none for a proxy), which waits from `now` on. There is none if every
@@ -112,7 +114,7 @@ impl Slots {
         })
     }
 
-    fn table(&self) -> MutexGuard<'_, Table> {
+    fn table(&self) -> MutexGuard<'_, SlotTable> {
         self.0.table.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
@@ -137,6 +139,86 @@ impl Drop for Slot {
     fn drop(&mut self) {
         let mut table = self.slots.table();
         table.taken.retain(|taken| taken.number != self.number);
+    }
+}
+
+/// The tries that are being answered, by session.
+#[derive(Clone, Default)]
+pub(super) struct Tries(Arc<Mutex<RunningTries>>);
+
+#[derive(Default)]
+struct RunningTries {
+    number: u64,
+    running: HashMap<u64, (u64, watch::Sender<()>)>,
+}
+
+/// A try that is being answered; dropped, it is over.
+pub(super) struct Turn {
+    tries: Tries,
+    session: u64,
+    number: u64,
+    watched: Watched,
+}
+
+/// The view of a try that the thread working on it has.
+#[derive(Clone)]
+pub(super) struct Watched {
+    /// Closed when the try is over.
+    open: watch::Receiver<()>,
+}
+
+impl Watched {
+    /// Whether the answer is no longer waited for.
+    pub(super) fn is_over(&self) -> bool {
+        self.open.has_changed().is_err()
+    }
+}
+
+impl Turn {
+    /// The view for the thread that works on it.
+    pub(super) fn watched(&self) -> Watched {
+        self.watched.clone()
+    }
+
+    /// Waits until it is over.
+    pub(super) async fn over(&mut self) {
+        // Nothing is ever sent: it ends when the sender is gone.
+        let _ = self.watched.open.changed().await;
+    }
+}
+
+impl Tries {
+    fn inside(&self) -> MutexGuard<'_, RunningTries> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Begins a try of a session, which has this token; the one before is over.
+    pub(super) fn begin(&self, token: &str) -> Turn {
+        let mut hash = DefaultHasher::new();
+        token.hash(&mut hash);
+        let session = hash.finish();
+        let (sender, open) = watch::channel(());
+        let mut inside = self.inside();
+        inside.number += 1;
+        let number = inside.number;
+        inside.running.insert(session, (number, sender));
+        drop(inside);
+        Turn {
+            tries: self.clone(),
+            session,
+            number,
+            watched: Watched { open },
+        }
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        let mut inside = self.tries.inside();
+        let own = inside.running.get(&self.session);
+        if own.is_some_and(|(number, _)| *number == self.number) {
+            inside.running.remove(&self.session);
+        }
     }
 }
 
@@ -206,5 +288,20 @@ mod tests {
         // The newest of an address goes first.
         crowd[7].left().await;
         crowd[6].left().await;
+    }
+
+    #[test]
+    fn of_one_session_the_newest_try_is_open_and_other_sessions_do_not_matter() {
+        let tries = Tries::default();
+        let is_over = |turn: &Turn| turn.watched.is_over();
+        let (first, other) = (tries.begin("a"), tries.begin("b"));
+        assert!(!is_over(&first) && !is_over(&other));
+        let second = tries.begin("a");
+        assert!(is_over(&first) && !is_over(&second) && !is_over(&other));
+        // One that was given up does not end the newer one.
+        drop(first);
+        assert!(!is_over(&second));
+        drop((second, other));
+        assert!(tries.inside().running.is_empty());
     }
 }

@@ -21,19 +21,19 @@ use tokio::runtime::Handle;
 use tokio::sync::Mutex;
 use tokio::time::{Instant, sleep};
 
-use super::body;
 use super::gate::{signed_in, token};
-use super::kept::{broken, recording};
-use super::problem::{Problem, Result};
-use super::query::Path;
+use super::history::{broken, kept_frames};
+use super::problem::{Answered, Problem};
+use super::request;
+use super::request::Path;
 use super::site::{LastOpened, Site, alone};
 use crate::history::kept::Kept;
-use crate::recipe::ChangeError;
 use crate::recipe::edit::Edit;
-use crate::recipe::plan::Plan;
+use crate::recipe::plan::{Plan, PlanError};
 use crate::recipe::trying::{Opened, Over, Tried};
+use crate::recipe::{ChangeError, Recipe};
 use crate::station::result::flag::SIMULATED;
-use crate::system::{memory, priority};
+use crate::system::computing;
 
 /// Most kept parts of one try.
 const MAX_PARTS: usize = 20;
@@ -101,9 +101,9 @@ pub(super) async fn attempt(
     Path(number): Path<u16>,
     headers: HeaderMap,
     request: Request<Body>,
-) -> Result<Json<Value>> {
+) -> Answered<Json<Value>> {
     signed_in(&site, &headers)?;
-    let asked: Asked = body::edit(request.into_body()).await?;
+    let asked: Asked = request::edit(request.into_body()).await?;
     if let On::Kept(seqs) = &asked.on
         && seqs.len() > MAX_PARTS
     {
@@ -119,7 +119,7 @@ pub(super) async fn attempt(
         let site = site.clone();
         let failed = "trying the edit failed; see the log";
         let work = move || {
-            priority::give_way();
+            computing::give_way();
             let is_over = || watched.is_over();
             let answer = tried(&site, number, asked, (&mut opened, &is_over));
             runtime.spawn(forget(kept));
@@ -141,7 +141,7 @@ async fn forget(opened: Arc<Mutex<LastOpened>>) {
         .take_if(|(_, tried)| tried.elapsed() >= KEPT)
         .is_some()
     {
-        memory::trim();
+        computing::trim_memory();
     }
 }
 
@@ -151,7 +151,7 @@ fn tried(
     number: u16,
     Asked { edit, on }: Asked,
     (opened, is_over): (&mut LastOpened, &dyn Fn() -> bool),
-) -> Result<Value> {
+) -> Answered<Value> {
     let begun = Instant::now();
     if is_over() {
         return Err(superseded());
@@ -182,21 +182,62 @@ fn tried(
     }))
 }
 
+/// What a tried list measures of a part.
+struct TriedPart {
+    part: Value,
+    /// The verdict that the part had.
+    before: Value,
+}
+
+/// Why a tried list measures nothing of a part.
+#[derive(Debug, thiserror::Error)]
+enum UntriedPart {
+    /// Nothing was measured, or its frames are gone.
+    #[error("the frames are gone, or nothing was measured yet: trigger a measurement")]
+    NoFrames,
+    /// The part was measured by this recipe.
+    #[error("it was measured by recipe {0}")]
+    OtherRecipe(u16),
+    /// The frames are of no sequence of the recipe.
+    #[error("the recipe has no sequence with its frames")]
+    OtherFrames,
+    /// The recipe cannot be made.
+    #[error("{0}")]
+    Unsealed(String),
+    /// The recipe cannot be planned for the part's head.
+    #[error(transparent)]
+    Unplanned(#[from] PlanError),
+    /// What was kept of the part cannot be read.
+    #[error("{}", .0.words)]
+    Unread(Problem),
+}
+
+impl From<Problem> for UntriedPart {
+    fn from(problem: Problem) -> Self {
+        Self::Unread(problem)
+    }
+}
+
+fn recipe_of(open: &Opened, tried: &Tried) -> Result<Recipe, UntriedPart> {
+    let recipe = open.recipe(tried);
+    recipe.map_err(|error| UntriedPart::Unsealed(error.to_string()))
+}
+
 /// What a tried list measures of parts.
 fn parts(
     site: &Site,
     of: (&Opened, &Tried),
     on: &On,
     is_over: &dyn Fn() -> bool,
-) -> Result<Vec<Value>> {
-    let part = |seq: Option<u32>, measured: Result<(Value, Value), String>| {
+) -> Answered<Vec<Value>> {
+    let part = |seq: Option<u32>, measured: Result<TriedPart, UntriedPart>| {
         let mut part = match measured {
-            Ok((mut part, before)) => {
+            Ok(TriedPart { mut part, before }) => {
                 part["before"] = before;
                 part["error"] = Value::Null;
                 part
             }
-            Err(words) => json!({ "error": words }),
+            Err(error) => json!({ "error": error.to_string() }),
         };
         part["seq"] = seq.into();
         part
@@ -221,49 +262,45 @@ fn parts(
 fn last(
     site: &Site,
     (open, tried): (&Opened, &Tried),
-) -> (Option<u32>, Result<(Value, Value), String>) {
+) -> (Option<u32>, Result<TriedPart, UntriedPart>) {
     let Some(part) = site.last_cycle.ask(|part| part.clone()) else {
-        let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
-        return (None, Err(words.into()));
+        return (None, Err(UntriedPart::NoFrames));
     };
     let measured = || {
         let number = part.record.recipe;
         if number != open.id().0 {
-            return Err(format!("it was measured by recipe {number}"));
+            return Err(UntriedPart::OtherRecipe(number));
         }
-        let recipe = open.recipe(tried)?;
+        let recipe = recipe_of(open, tried)?;
         let shots: Vec<_> = part.plan.shots(part.sequence).map(Some).collect();
         let plan = Plan::new(
             recipe,
             &part.calibration,
             part.record.flags() & SIMULATED != 0,
-        );
-        let plan = plan.map_err(|error| error.to_string())?;
+        )?;
         let sequence = plan.sequence_among(&shots);
-        let (sequence, at) = sequence.ok_or("the recipe has no sequence with its frames")?;
-        let frames: Vec<_> = at.iter().map(|&at| part.frames[at].clone()).collect();
-        Ok((
-            tried.part(&plan, sequence, &frames),
-            part.record.verdict.word().into(),
-        ))
+        let (sequence, places) = sequence.ok_or(UntriedPart::OtherFrames)?;
+        let frames: Vec<_> = places.iter().map(|&k| part.frames[k].clone()).collect();
+        Ok(TriedPart {
+            part: tried.part(&plan, sequence, &frames),
+            before: part.record.verdict.word().into(),
+        })
     };
     (Some(part.record.seq), measured())
 }
 
 /// What it measures of a kept part, and the verdict that this had.
-fn kept(site: &Site, (open, tried): (&Opened, &Tried), seq: u32) -> Result<(Value, Value), String> {
-    let words = |problem: Problem| problem.words;
-    let (entry, folder) = recording(site, seq).map_err(words)?;
-    let recipe = open.recipe(tried)?;
-    let kept = Kept::judged_by(&folder, &recipe).map_err(|failure| words(broken(failure)))?;
-    let plan = kept.plan(recipe, entry.flags & SIMULATED != 0);
-    let plan = plan.map_err(|error| error.to_string())?;
+fn kept(site: &Site, (open, tried): (&Opened, &Tried), seq: u32) -> Result<TriedPart, UntriedPart> {
+    let (entry, folder) = kept_frames(site, seq)?;
+    let recipe = recipe_of(open, tried)?;
+    let kept = Kept::judged_by(&folder, &recipe).map_err(broken)?;
+    let plan = kept.plan(recipe, entry.flags & SIMULATED != 0)?;
     let sequence = kept.sequence(&plan);
-    let (sequence, frames) = sequence.ok_or("the recipe has no sequence with its frames")?;
-    Ok((
-        tried.part(&plan, sequence, &frames),
-        entry.verdict.word().into(),
-    ))
+    let (sequence, frames) = sequence.ok_or(UntriedPart::OtherFrames)?;
+    Ok(TriedPart {
+        part: tried.part(&plan, sequence, &frames),
+        before: entry.verdict.word().into(),
+    })
 }
 
 #[cfg(test)]

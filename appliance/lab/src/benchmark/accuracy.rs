@@ -11,7 +11,7 @@ use algo::pipeline::{self, PhaseMap};
 use algo::units::{AbsolutePhase, Modulation};
 use appliance::head::calibrated::MeasuredPart;
 use appliance::measure::{Score, Truth};
-use appliance::production::stopwatch::timed;
+use appliance::system::computing::timed;
 use hal::frame::Frame;
 use scenes::oracle::unwrap::recognise;
 use scenes::oracle::{PixelTwin, Scale, levels_from};

@@ -12,7 +12,7 @@ use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use algo::units::{AbsolutePhase, Modulation};
 use appliance::head::seam::view;
-use appliance::production::stopwatch::timed;
+use appliance::system::computing::timed;
 use hal::frame::{Frame, Pixels, Samples};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::hint::black_box;

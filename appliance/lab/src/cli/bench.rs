@@ -5,7 +5,7 @@ use crate::benchmark::{self, Effort, Machine, Report, Study};
 use appliance::cli::{Output, Threads, names};
 use appliance::error::{Exit, Result};
 use appliance::storage::folder::OutputFolder;
-use appliance::system::memory::give_back;
+use appliance::system::computing::give_back;
 use std::path::PathBuf;
 
 /// Time the kernels, time against error, and trigger to verdict.

@@ -8,7 +8,7 @@ use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibration::Calibration;
 use appliance::head::rasters::ShownPictures;
 use appliance::head::scan::take_loaded;
-use appliance::production::backend::{self, Opened};
+use appliance::production::backend::{self, OpenedHead};
 use hal::bounds::{MAX_FRINGES, shortened};
 use hal::frame::Frame;
 use hal::projector::Raster;
@@ -180,7 +180,7 @@ impl Capture {
 
 impl Plan {
     /// Writes the frames of a pose: a recording if there are fringes, else pictures alone.
-    fn write(&self, opened: &Opened, taken: Vec<Frame>, folder: &Path) -> Result<()> {
+    fn write(&self, opened: &OpenedHead, taken: Vec<Frame>, folder: &Path) -> Result<()> {
         let mut frames = taken.into_iter();
         let mut recording = self.shown.recording(&opened.calibration, &mut frames);
         recording.source = match opened.stage {

@@ -10,7 +10,7 @@ mod import;
 mod patterns;
 
 use appliance::VERSION;
-use appliance::cli::{Completions, start};
+use appliance::cli::{Completions, Manual, start};
 use appliance::error::Result;
 use clap::{CommandFactory as _, Parser, Subcommand};
 use std::process::ExitCode;
@@ -44,6 +44,9 @@ enum Command {
     Capture(capture::Capture),
     /// Print what makes a shell complete the command line.
     Completions(Completions),
+    /// Write the manual pages.
+    #[command(hide = true)]
+    Manual(Manual),
 }
 
 /// Runs the program `fringed-lab`.
@@ -61,6 +64,7 @@ fn run(arguments: Arguments) -> Result<()> {
         Command::Import(command) => command.run(),
         Command::Capture(command) => command.run(),
         Command::Completions(command) => command.run(Arguments::command()),
+        Command::Manual(command) => command.run(Arguments::command()),
     }
 }
 

@@ -3,8 +3,8 @@
 
 use super::{Check, named};
 use crate::station::{HOT_PROJECTOR_C, Power};
+use crate::system::computing::Prompt;
 use crate::system::host::{Host, major_minor};
-use crate::system::priority::Prompt;
 use hal::projector::{ControllerState, fault, processing};
 use hal::setup::{LinesSetup, TriggerSetup};
 use serde_json::json;

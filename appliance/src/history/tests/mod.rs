@@ -471,11 +471,11 @@ pub(super) fn wait(what: &str, done: impl Fn() -> bool) {
 }
 
 /// Opens the history of a state folder that keeps no recordings, for a run.
-fn begun(state: &StateFolder, run: u32) -> Opened {
+fn begun(state: &StateFolder, run: u32) -> OpenedHistory {
     begun_at(state, run, None)
 }
 
-fn begun_at(state: &StateFolder, run: u32, utc_s: Option<u64>) -> Opened {
+fn begun_at(state: &StateFolder, run: u32, utc_s: Option<u64>) -> OpenedHistory {
     let bounds = Bounds {
         results: ENOUGH,
         recordings: 0,
@@ -493,7 +493,7 @@ fn begun_at(state: &StateFolder, run: u32, utc_s: Option<u64>) -> Opened {
 
 /// The same, without what was acknowledged.
 pub(super) fn opened(state: &StateFolder, run: u32) -> (History, Task, u32, Option<String>) {
-    let Opened {
+    let OpenedHistory {
         history,
         task,
         next_seq,
@@ -831,7 +831,7 @@ fn a_result_that_does_not_go_into_shared_memory_does_not_bring_its_number_back()
     }
     drop((killed, never));
     let (_, _, next, _) = opened(&state, 2);
-    assert_eq!(next, 1 + seqs::AHEAD);
+    assert_eq!(next, 1 + AHEAD);
 }
 
 #[test]

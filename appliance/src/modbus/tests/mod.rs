@@ -25,7 +25,7 @@ use super::*;
 use crate::config::WordOrder;
 use crate::station::snapshot::status;
 use crate::station::*;
-use crate::system::logbook::Logbook;
+use crate::system::journal::Logbook;
 use crate::system::progress::Progress;
 
 fn settings() -> Settings {

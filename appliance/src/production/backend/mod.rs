@@ -22,7 +22,7 @@ use std::fs;
 use std::path::Path;
 
 /// An opened head.
-pub struct Opened {
+pub struct OpenedHead {
     /// The devices.
     pub head: Head,
     /// Their calibration.
@@ -43,7 +43,7 @@ pub struct Opened {
 /// The recordings that a replay head plays.
 #[derive(Clone, Debug)]
 pub struct Played {
-    /// What each frame of a recording shows, and of which pattern.
+    /// The pattern and the shift that each frame of the first recording shows.
     shots: Vec<(PatternFile, Shot)>,
     /// Fingerprint of the calibration that they were taken with, if a station kept the recipe too.
     calibration: Option<String>,
@@ -85,7 +85,7 @@ impl Played {
     }
 }
 
-impl Opened {
+impl OpenedHead {
     /// A head and what is known of it, before a stored calibration is looked for.
     fn new(head: Head, calibration: Calibration) -> Self {
         Self {
@@ -212,7 +212,7 @@ impl Opened {
                     .or_else(|| unfinished(config, &loaded))
                     .or_else(|| set_otherwise(&loaded, exposing))
             }
-            Err(problem) => Some(problem),
+            Err(failure) => Some(failure.to_string()),
         };
     }
 }
@@ -221,7 +221,7 @@ impl Opened {
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
-pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
+pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<OpenedHead> {
     let mut opened = open_as_it_is(config, progress)?;
     let encoding = opened.head.encoding();
     // Luma has passed an image processor, so it is used only if the configuration asks for it.
@@ -243,7 +243,7 @@ pub fn open(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Open
 ///
 /// # Errors
 /// If a file of the head is missing or wrong, or a device is not there.
-pub fn open_as_it_is(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
+pub fn open_as_it_is(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<OpenedHead> {
     let mut opened = match config.backend {
         Backend::Sim => simulated(config, progress)?,
         Backend::Replay => replayed(&config.recordings)?,
@@ -254,15 +254,20 @@ pub fn open_as_it_is(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Re
 }
 
 /// The stored calibration of the configured head, if there is one. Recordings carry their own.
-fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>, String> {
+///
+/// # Errors
+/// If it cannot be used (65).
+fn stored(config: &HeadConfig) -> Result<Option<(Loaded, Calibration)>> {
     let place = config
         .calibration
         .as_deref()
         .filter(|_| config.backend != Backend::Replay);
-    let Some(loaded) = place.map_or(Ok(None), |place| CalibrationPlace::at(place).load())? else {
+    let loaded = place.map_or(Ok(None), |place| CalibrationPlace::at(place).load());
+    let Some(loaded) = loaded.map_err(Exit::Content.failure())? else {
         return Ok(None);
     };
-    let calibration = loaded.file.calibration()?;
+    let calibration = loaded.file.calibration();
+    let calibration = calibration.map_err(Exit::Content.failure())?;
     Ok(Some((loaded, calibration)))
 }
 
@@ -321,7 +326,7 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration> {
         Backend::Sim => {
             let scenario = scenario(config.scenario.as_deref())?;
             let exact = exact(&scenario)?;
-            match stored(config).map_err(wrong)? {
+            match stored(config)? {
                 None if !scenario.calibrated => Err(devices::uncalibrated()),
                 None => Ok(exact),
                 Some((loaded, calibration)) => misfit(config, &exact, &calibration)
@@ -337,7 +342,7 @@ pub fn calibration(config: &HeadConfig) -> Result<Calibration> {
                 .map(|folder| Recording::open(folder));
             calibration_of(&config.recordings, &first.collect::<Result<Vec<_>, _>>()?)
         }
-        Backend::Rpi => match stored(config).map_err(wrong)? {
+        Backend::Rpi => match stored(config)? {
             Some((loaded, calibration)) => {
                 unfinished(config, &loaded).map_or(Ok(calibration), |why| Err(wrong(why)))
             }
@@ -369,7 +374,7 @@ fn exact(scenario: &Scenario) -> Result<Calibration> {
     Calibration::of_scenario(scenario).map_err(Exit::Configuration.because("simulate the head"))
 }
 
-fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Opened> {
+fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<OpenedHead> {
     let mut scenario = scenario(config.scenario.as_deref())?;
     if let Some(placed) = &config.part {
         (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
@@ -387,9 +392,9 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
         head.set_timing(Timing::default());
         devices::nominal(head.camera_format(), head.projector_size())?
     };
-    Ok(Opened {
+    Ok(OpenedHead {
         stage: Some(stage),
-        ..Opened::new(head, calibration)
+        ..OpenedHead::new(head, calibration)
     })
 }
 
@@ -400,7 +405,7 @@ fn exposed(stage: &Stage, exposing: Exposing) -> Result<()> {
         .map_err(Exit::Unavailable.failure())
 }
 
-fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened> {
+fn replayed(folders: &[std::path::PathBuf]) -> Result<OpenedHead> {
     let recordings = folders
         .iter()
         .map(|folder| Recording::open(folder))
@@ -409,9 +414,9 @@ fn replayed(folders: &[std::path::PathBuf]) -> Result<Opened> {
     let first = folders.iter().zip(&recordings).next();
     let played = first.map(|(folder, recording)| Played::of(folder, recording));
     let head = hal::replay::head(recordings).map_err(Exit::Unavailable.failure())?;
-    Ok(Opened {
+    Ok(OpenedHead {
         played,
-        ..Opened::new(head, calibration)
+        ..OpenedHead::new(head, calibration)
     })
 }
 

@@ -16,7 +16,7 @@ use crate::head::commission::{
 };
 use crate::head::exposing::Exposing;
 use crate::head::live::VolumeOutline;
-use crate::production::drift::Trend;
+use crate::production::drift::DriftTrend;
 use crate::station::{Event, Request, Snapshot, StationHandle};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -82,14 +82,14 @@ struct CommissionState {
 pub struct Commission {
     state: PathBuf,
     inside: Arc<Mutex<CommissionState>>,
-    drift: Trend,
+    drift: DriftTrend,
 }
 
 impl Commission {
     /// Commissioning with what is kept in the state folder, and complaints about files that cannot
     /// be used and begin anew.
     pub fn open(state: &Path) -> (Self, Vec<String>) {
-        let (drift, unfit) = Trend::open(state);
+        let (drift, unfit) = DriftTrend::open(state);
         let (kept, complaint) = match Commissioning::load(state) {
             Ok(kept) => (kept, None),
             Err(problem) => {
@@ -111,7 +111,7 @@ impl Commission {
     }
 
     /// What the checks of the geometry have found.
-    pub fn drift(&self) -> &Trend {
+    pub fn drift(&self) -> &DriftTrend {
         &self.drift
     }
 

@@ -6,7 +6,9 @@ use crate::storage::folder::{read_whole, write_whole};
 use crate::system::clock;
 use algo::pipeline::Epipolar;
 use hal::bounded;
-use hal::bounds::{Bound as _, FINGERPRINT_DIGITS, Fields, Longest, length, shortened};
+use hal::bounds::{
+    Bound as _, FINGERPRINT_DIGITS, Fields, Longest, OutOfBounds, length, shortened,
+};
 use serde_json::{Value, json};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -28,7 +30,7 @@ const CONFIRMED: usize = 2;
 
 bounded! {
     /// One check. Distances in projector pixels.
-    struct Checked {
+    struct DriftCheck {
         /// When it was, s since 1970 UTC; 0 if the clock was not synchronised.
         at_unix_s: u64,
         /// Fingerprint of the calibration that it was compared with.
@@ -46,7 +48,7 @@ bounded! {
     }
 }
 
-impl Checked {
+impl DriftCheck {
     fn is_beyond(&self) -> bool {
         !(self.epipolar_px <= MOST_DRIFT_PX)
     }
@@ -58,19 +60,41 @@ bounded! {
     struct Checks {
         format: String,
         version: u32,
-        checks: Vec<Checked>,
+        checks: Vec<DriftCheck>,
     }
+}
+
+/// Why the trend could not be read or written.
+#[derive(Debug, thiserror::Error)]
+pub enum DriftError {
+    /// The file cannot be read.
+    #[error("{0}")]
+    Read(io::Error),
+    /// It is no JSON of a trend.
+    #[error("{}", shortened(&.0.to_string()))]
+    Json(#[from] serde_json::Error),
+    /// It is of another format or version.
+    #[error("it is not a {FORMAT:?} of version {VERSION}, which this program reads")]
+    Format,
+    /// A value in it is out of its bounds.
+    #[error(transparent)]
+    Bounds(#[from] OutOfBounds),
+    /// A check cannot be stored.
+    #[error("write {}: {source}: free space", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// What the file system answers.
+        source: io::Error,
+    },
 }
 
 impl Checks {
     /// Reads and checks the content of a file.
-    fn read(bytes: &[u8]) -> Result<Self, String> {
-        let file: Self =
-            serde_json::from_slice(bytes).map_err(|error| shortened(&error.to_string()))?;
+    fn read(bytes: &[u8]) -> Result<Self, DriftError> {
+        let file: Self = serde_json::from_slice(bytes)?;
         if (file.format.as_str(), file.version) != (FORMAT, VERSION) {
-            return Err(format!(
-                "it is not a {FORMAT:?} of version {VERSION}, which this program reads"
-            ));
+            return Err(DriftError::Format);
         }
         length("checks", file.checks.len(), 0, MOST_KEPT)?;
         for check in &file.checks {
@@ -80,7 +104,7 @@ impl Checks {
     }
 
     /// The checks that were compared with this calibration, the newest first.
-    fn newest<'a>(&'a self, calibration: &str) -> impl Iterator<Item = &'a Checked> {
+    fn newest<'a>(&'a self, calibration: &str) -> impl Iterator<Item = &'a DriftCheck> {
         let of = calibration.to_owned();
         let all = self.checks.iter().rev();
         all.filter(move |check| check.calibration == of)
@@ -96,7 +120,7 @@ impl Checks {
 
 /// The trend, for those who check and those who show it. Cheap to clone.
 #[derive(Clone, Debug)]
-pub struct Trend {
+pub struct DriftTrend {
     path: PathBuf,
     /// Locked only for moments.
     checks: Arc<Mutex<Checks>>,
@@ -104,15 +128,16 @@ pub struct Trend {
     writing: Arc<Mutex<()>>,
 }
 
-impl Trend {
+impl DriftTrend {
     /// What is kept in the state folder, and a complaint if that cannot be used: then the trend
     /// begins anew.
     pub fn open(state: &Path) -> (Self, Option<String>) {
         let path = state.join(FILE);
         let read = match read_whole(&path, MAX_BYTES) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(Checks::default()),
-            Err(error) => Err(error.to_string()),
-            Ok(bytes) => Checks::read(&bytes),
+            read => read
+                .map_err(DriftError::Read)
+                .and_then(|bytes| Checks::read(&bytes)),
         };
         let (checks, complaint) = match read {
             Ok(checks) => (checks, None),
@@ -137,12 +162,12 @@ impl Trend {
     /// Adds a check and keeps it, also on the card.
     ///
     /// # Errors
-    /// In words: it cannot be stored; it is known until the next start.
-    pub fn add(&self, calibration: &str, seen: &Epipolar) -> Result<(), String> {
+    /// It cannot be stored; it is known until the next start.
+    pub fn add(&self, calibration: &str, seen: &Epipolar) -> Result<(), DriftError> {
         let _writing = self.writing.lock().unwrap_or_else(PoisonError::into_inner);
         let mut all = self.checks().clone();
         (all.format, all.version) = (FORMAT.into(), VERSION);
-        all.checks.push(Checked {
+        all.checks.push(DriftCheck {
             at_unix_s: clock::utc_us().unwrap_or(0) / 1_000_000,
             calibration: calibration.into(),
             epipolar_px: seen.rms,
@@ -157,7 +182,8 @@ impl Trend {
         let stored = serde_json::to_vec(&all).map_err(io::Error::from);
         let stored = stored.and_then(|bytes| write_whole(&self.path, &bytes));
         *self.checks() = all;
-        stored.map_err(|error| format!("write {}: {error}: free space", self.path.display()))
+        let path = self.path.clone();
+        stored.map_err(|source| DriftError::Write { path, source })
     }
 
     /// The last check of the head with this calibration; none if there was none.
@@ -215,7 +241,7 @@ mod tests {
     #[test]
     fn two_checks_in_a_row_beyond_the_limit_are_a_drift_of_that_calibration_only() {
         let folder = tempfile::tempdir().unwrap();
-        let (trend, complaint) = Trend::open(folder.path());
+        let (trend, complaint) = DriftTrend::open(folder.path());
         assert_eq!((trend.last(HEAD), complaint), (None, None));
         assert_eq!(trend.view(HEAD), Value::Null);
         for (rms, doubtful, drifted) in [
@@ -240,11 +266,11 @@ mod tests {
     #[test]
     fn the_trend_survives_a_restart_and_one_that_is_damaged_begins_anew() {
         let folder = tempfile::tempdir().unwrap();
-        let (trend, _) = Trend::open(folder.path());
+        let (trend, _) = DriftTrend::open(folder.path());
         for at in 0..MOST_KEPT + 3 {
             trend.add(HEAD, &seen(at as f64 * 1e-3)).unwrap();
         }
-        let (again, complaint) = Trend::open(folder.path());
+        let (again, complaint) = DriftTrend::open(folder.path());
         assert_eq!(complaint, None);
         assert_eq!(*again.checks(), *trend.checks());
         assert_eq!(again.checks().checks.len(), MOST_KEPT);
@@ -261,11 +287,11 @@ mod tests {
             &text.replace(":1,", ":9,"),
         ] {
             fs::write(folder.path().join(FILE), wrong).unwrap();
-            let (anew, complaint) = Trend::open(folder.path());
+            let (anew, complaint) = DriftTrend::open(folder.path());
             assert!(complaint.unwrap().contains(FILE));
             assert_eq!(anew.last(HEAD), None);
             anew.add(HEAD, &seen(0.1)).unwrap();
-            assert_eq!(Trend::open(folder.path()).1, None);
+            assert_eq!(DriftTrend::open(folder.path()).1, None);
         }
     }
 }

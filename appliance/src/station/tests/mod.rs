@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use super::control::{self, BY_PART_NUMBER};
 use super::error_code;
-use super::refusal::reject;
+use super::snapshot::reject;
 use super::snapshot::{status, warning};
 use super::*;
 

@@ -2,9 +2,9 @@
 
 use crate::storage::folder::{read_whole, write_whole};
 use argon2::Argon2;
-use argon2::password_hash::phc::PasswordHash;
-use argon2::password_hash::{PasswordHasher, PasswordVerifier};
-use std::io::ErrorKind;
+use argon2::password_hash::phc::{self, PasswordHash};
+use argon2::password_hash::{self, PasswordHasher, PasswordVerifier};
+use std::io::{self, ErrorKind};
 use std::os::unix::fs::PermissionsExt as _;
 use std::path::Path;
 
@@ -20,31 +20,61 @@ const MOST: u64 = 4096;
 /// Letters and digits of the shortest secret that may be given: 60 bits where they are random.
 const SHORTEST: usize = 12;
 
+/// Why a secret cannot be used, read or made.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum SecretError {
+    /// The file of the configured secret cannot be read.
+    #[error("read the secret that was given: {0}")]
+    Given(io::Error),
+    /// The configured secret begins as a hash does.
+    #[error("the secret that was given begins with $ but is not a hash ({0}): give a new one")]
+    GivenHash(phc::Error),
+    /// The configured secret is too short or too long.
+    #[error(
+        "the secret that was given must have {SHORTEST} letters and digits at least and {LONGEST} characters at most: give a new one"
+    )]
+    GivenLength,
+    /// The stored hash cannot be read.
+    #[error("{0}")]
+    Read(io::Error),
+    /// The stored hash is not text.
+    #[error("it is not text")]
+    NoText,
+    /// The stored hash is damaged.
+    #[error("it is damaged ({0})")]
+    Damaged(phc::Error),
+    /// The system gives no random bits.
+    #[error("{0}")]
+    Random(#[from] getrandom::Error),
+    /// The secret cannot be hashed.
+    #[error("{0}")]
+    Hash(#[from] password_hash::Error),
+    /// The hash cannot be stored.
+    #[error("write secret: {0}: free space")]
+    Write(io::Error),
+}
+
 /// The hash of the secret in this file, which holds it in plain text or as an argon2id hash; none
 /// if there is no such file.
 ///
 /// # Errors
-/// In words, with the remedy.
-pub(super) fn given(file: &Path) -> Result<Option<String>, String> {
+/// It cannot be read or used.
+pub(super) fn given(file: &Path) -> Result<Option<String>, SecretError> {
     let text = match std::fs::read_to_string(file) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        read => read.map_err(|error| format!("read the secret that was given: {error}"))?,
+        read => read.map_err(SecretError::Given)?,
     };
     let text = text.trim();
     if text.starts_with('$') {
         return match PasswordHash::new(text) {
             Ok(_) => Ok(Some(text.to_owned())),
-            Err(error) => Err(format!(
-                "the secret that was given begins with $ but is not a hash ({error}): give a new one"
-            )),
+            Err(error) => Err(SecretError::GivenHash(error)),
         };
     }
     if plain(text).len() < SHORTEST || text.len() > LONGEST {
-        return Err(format!(
-            "the secret that was given must have {SHORTEST} letters and digits at least and {LONGEST} characters at most: give a new one"
-        ));
+        return Err(SecretError::GivenLength);
     }
-    hash(text).map(Some)
+    Ok(Some(hash(text)?))
 }
 
 /// A secret that was made, and is to be shown.
@@ -59,8 +89,8 @@ pub struct NewSecret {
 /// The stored hash; without one that can be used, a new secret with its hash.
 ///
 /// # Errors
-/// In words, with the remedy.
-pub(super) fn open(file: &Path) -> Result<(String, Option<NewSecret>), String> {
+/// None can be made or stored.
+pub(super) fn open(file: &Path) -> Result<(String, Option<NewSecret>), SecretError> {
     let complaint = match read(file) {
         Ok(Some(hash)) => return Ok((hash, None)),
         Ok(None) => None,
@@ -77,19 +107,19 @@ pub(super) fn open(file: &Path) -> Result<(String, Option<NewSecret>), String> {
     let hash = hash(&secret)?;
     write_whole(file, format!("{hash}\n").as_bytes())
         .and_then(|()| close_to_others(file))
-        .map_err(|error| format!("write secret: {error}: free space"))?;
+        .map_err(SecretError::Write)?;
     Ok((hash, Some(NewSecret { secret, complaint })))
 }
 
 /// The stored hash, if there is one.
-fn read(file: &Path) -> Result<Option<String>, String> {
+fn read(file: &Path) -> Result<Option<String>, SecretError> {
     let bytes = match read_whole(file, MOST) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        read => read.map_err(|error| error.to_string())?,
+        read => read.map_err(SecretError::Read)?,
     };
-    let text = String::from_utf8(bytes).map_err(|_| "it is not text".to_owned())?;
+    let text = String::from_utf8(bytes).map_err(|_| SecretError::NoText)?;
     let hash = text.trim();
-    PasswordHash::new(hash).map_err(|error| format!("it is damaged ({error})"))?;
+    PasswordHash::new(hash).map_err(SecretError::Damaged)?;
     Ok(Some(hash.to_owned()))
 }
 
@@ -97,18 +127,18 @@ fn read(file: &Path) -> Result<Option<String>, String> {
 ///
 /// # Errors
 /// If the stored hash cannot be read.
-pub(super) fn is_right(typed: &str, stored: &str) -> Result<bool, String> {
+pub(super) fn is_right(typed: &str, stored: &str) -> Result<bool, phc::Error> {
     if typed.len() > LONGEST {
         return Ok(false);
     }
-    let stored = PasswordHash::new(stored).map_err(|error| error.to_string())?;
+    let stored = PasswordHash::new(stored)?;
     let verified = Argon2::default().verify_password(plain(typed).as_bytes(), &stored);
     Ok(verified.is_ok())
 }
 
-fn make() -> Result<String, String> {
+fn make() -> Result<String, getrandom::Error> {
     let mut random = [0_u8; LENGTH];
-    getrandom::fill(&mut random).map_err(|error| error.to_string())?;
+    getrandom::fill(&mut random)?;
     // 256 is a multiple of 32: every digit is equally likely.
     let digits: Vec<char> = random
         .iter()
@@ -118,12 +148,11 @@ fn make() -> Result<String, String> {
     Ok(groups.join("-"))
 }
 
-fn hash(secret: &str) -> Result<String, String> {
+fn hash(secret: &str) -> Result<String, password_hash::Error> {
     // The crate's default: argon2id, 19 MiB, 2 passes, as OWASP recommends.
     Argon2::default()
         .hash_password(plain(secret).as_bytes())
         .map(|hash| hash.to_string())
-        .map_err(|error| error.to_string())
 }
 
 /// The form that is hashed: only letters and digits, in capitals, with the letters that Crockford's
@@ -138,7 +167,7 @@ fn plain(typed: &str) -> String {
     .collect()
 }
 
-fn close_to_others(file: &Path) -> std::io::Result<()> {
+fn close_to_others(file: &Path) -> io::Result<()> {
     std::fs::set_permissions(file, std::fs::Permissions::from_mode(0o600))
 }
 
@@ -161,7 +190,7 @@ mod tests {
     fn a_secret_is_given_as_such_or_as_its_hash_and_a_weak_or_broken_one_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("given");
-        assert_eq!(given(&file), Ok(None));
+        assert_eq!(given(&file).unwrap(), None);
         let hashed = hash("0123A-BCDEF-GHJKM").unwrap();
         for text in ["0123a-bcdef-ghjkm\n", hashed.as_str()] {
             std::fs::write(&file, text).unwrap();
@@ -177,7 +206,7 @@ mod tests {
             &"0".repeat(65),
         ] {
             std::fs::write(&file, text).unwrap();
-            let refused = given(&file).unwrap_err();
+            let refused = given(&file).unwrap_err().to_string();
             assert!(refused.contains("give a new one"), "{text}: {refused}");
         }
     }

@@ -20,7 +20,7 @@ async fn the_description_names_exactly_the_paths_that_are_answered() {
         }
     }
     let mut answered = BTreeSet::new();
-    for route in router::routes() {
+    for route in server::routes() {
         answered.insert((route.path.to_owned(), route.method.to_string()));
         let operation = &description["paths"][route.path][route.method.as_str().to_lowercase()];
         // Whatever needs a session says so.
@@ -50,7 +50,7 @@ async fn every_answer_has_a_status_that_the_description_names() {
     let served = served().await;
     let cookie = served.sign_in().await;
     let description: Value = serde_json::from_str(look::OPENAPI).unwrap();
-    for route in router::routes()
+    for route in server::routes()
         .iter()
         .filter(|route| route.path != "/events")
     {

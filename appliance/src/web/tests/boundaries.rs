@@ -119,7 +119,7 @@ async fn a_boundary_value_in_any_address_or_body_is_answered_and_never_breaks_th
     let long = format!("{{\"fingerprint\": \"{}\"}}", "x".repeat(60_000));
     let mut cases = 0;
     let mut asked = Vec::new();
-    for route in router::routes()
+    for route in server::routes()
         .iter()
         .filter(|route| route.path != "/events" && route.method != "DELETE")
     {

@@ -20,7 +20,7 @@ const CHANGES: [(&str, &str); 11] = [
 async fn looking_needs_no_login_and_every_change_needs_one() {
     let served = served().await;
     let mut guarded = 0;
-    for route in router::routes() {
+    for route in server::routes() {
         let path = route
             .path
             .replace("{number}", "1")

@@ -1,18 +1,46 @@
-//! Reads the body of a request, with limits of size, time and memory.
+//! Reads a request: its path, its query, and its body with limits of size, time and memory.
 
-use std::io::{ErrorKind, Write as _};
-use std::time::Duration;
-
-use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
-use axum::http::StatusCode;
-use serde::de::DeserializeOwned;
-use tokio::sync::{OwnedSemaphorePermit, mpsc};
-use tokio_stream::StreamExt as _;
-
-use super::problem::{Problem, Result};
+use super::problem::{Answered, Problem};
 use super::site::Site;
 use crate::error::shortened;
 use crate::recipe::incoming::Incoming;
+use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
+use axum::extract::rejection::{PathRejection, QueryRejection};
+use axum::extract::{self, FromRequestParts};
+use axum::http::StatusCode;
+use axum::http::request::Parts;
+use serde::de::DeserializeOwned;
+use std::io::{ErrorKind, Write as _};
+use std::time::Duration;
+use tokio::sync::{OwnedSemaphorePermit, mpsc};
+use tokio_stream::StreamExt as _;
+
+/// The query of a request.
+pub struct Query<T>(pub T);
+
+/// What a request's path names.
+pub struct Path<T>(pub T);
+
+impl<T: DeserializeOwned, S: Send + Sync> FromRequestParts<S> for Query<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let read = extract::Query::from_request_parts(parts, state).await;
+        let unread = |why: QueryRejection| Problem::new(why.status(), why.body_text());
+        read.map(|extract::Query(value)| Self(value))
+            .map_err(unread)
+    }
+}
+
+impl<T: DeserializeOwned + Send, S: Send + Sync> FromRequestParts<S> for Path<T> {
+    type Rejection = Problem;
+
+    async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
+        let read = extract::Path::from_request_parts(parts, state).await;
+        let unread = |why: PathRejection| Problem::new(why.status(), why.body_text());
+        read.map(|extract::Path(value)| Self(value)).map_err(unread)
+    }
+}
 
 /// Largest body in JSON, bytes.
 const MAX_JSON: usize = 64 << 10;
@@ -29,7 +57,7 @@ const FILE_TIME: Duration = Duration::from_secs(120);
 ///
 /// # Errors
 /// It is too long, too slow, or not the JSON of a `T`.
-pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T> {
+pub async fn json<T: DeserializeOwned>(body: Body) -> Answered<T> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
     parsed(&bytes)
 }
@@ -38,7 +66,7 @@ pub async fn json<T: DeserializeOwned>(body: Body) -> Result<T> {
 ///
 /// # Errors
 /// As [`json`].
-pub async fn edit<T: DeserializeOwned>(body: Body) -> Result<T> {
+pub async fn edit<T: DeserializeOwned>(body: Body) -> Answered<T> {
     let bytes = read(body, MAX_EDIT, JSON_TIME).await?;
     parsed(&bytes)
 }
@@ -47,7 +75,7 @@ pub async fn edit<T: DeserializeOwned>(body: Body) -> Result<T> {
 ///
 /// # Errors
 /// As [`json`].
-pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Result<T> {
+pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Answered<T> {
     let bytes = read(body, MAX_JSON, JSON_TIME).await?;
     match bytes.is_empty() {
         true => Ok(T::default()),
@@ -55,7 +83,7 @@ pub async fn json_if_any<T: DeserializeOwned + Default>(body: Body) -> Result<T>
     }
 }
 
-fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Result<T> {
+fn parsed<T: DeserializeOwned>(bytes: &[u8]) -> Answered<T> {
     serde_json::from_slice(bytes).map_err(|error| {
         let error = shortened(&error.to_string());
         Problem::unclear(format!("the request's JSON: {error}"))
@@ -74,7 +102,7 @@ pub struct Upload {
 ///
 /// # Errors
 /// Too many files are being received; it is too long or too slow; or there is no room for it.
-pub async fn file(site: &Site, body: Body) -> Result<Upload> {
+pub async fn file(site: &Site, body: Body) -> Answered<Upload> {
     let place = site.arriving.clone().try_acquire_owned().map_err(|_| {
         Problem::crowded("other files are being imported: wait until they are done")
     })?;
@@ -103,7 +131,7 @@ pub async fn file(site: &Site, body: Body) -> Result<Upload> {
 }
 
 /// Sends a body to `chunks` piece by piece, until the receiver is gone.
-async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<()> {
+async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Answered<()> {
     let mut body = body.into_data_stream();
     let mut left = MAX_FILE;
     while let Some(chunk) = body.next().await {
@@ -120,7 +148,7 @@ async fn send(body: Body, chunks: mpsc::Sender<Bytes>) -> Result<()> {
     Ok(())
 }
 
-async fn read(body: Body, most: usize, time: Duration) -> Result<Bytes> {
+async fn read(body: Body, most: usize, time: Duration) -> Answered<Bytes> {
     let read = async {
         to_bytes(body, most)
             .await
@@ -129,7 +157,7 @@ async fn read(body: Body, most: usize, time: Duration) -> Result<Bytes> {
     in_time(time, read).await
 }
 
-async fn in_time<T>(time: Duration, work: impl Future<Output = Result<T>>) -> Result<T> {
+async fn in_time<T>(time: Duration, work: impl Future<Output = Answered<T>>) -> Answered<T> {
     tokio::time::timeout(time, work).await.unwrap_or_else(|_| {
         let words = format!(
             "the request's body did not come within {} s",

@@ -1,13 +1,15 @@
-//! Places: the limit on connections, and which one is closed for a new one.
+//! Clients: the limit on their connections, which one is closed for a new one, and the log of what is
+//! refused.
 //!
 //! One place is kept for a client that may write. When all connections are in use, the one idle for
-//! longest is closed for the new one; if none is idle, the new one is refused. Readers never
-//! displace writers.
+//! longest is closed for the new one; if none is idle, the new one is refused. Readers never displace
+//! writers. Lines of the log about refusals have a rate limit, so that an attack cannot flood it.
 
+use crate::system::progress::Progress;
+use std::net::IpAddr;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::task::{Context, Poll};
 use std::time::{Duration, Instant};
-
 use tokio::sync::oneshot;
 
 /// A connection is idle if its last request is older than this: a slow PLC has then missed three
@@ -19,10 +21,10 @@ const MUTE: Duration = Duration::from_millis(250);
 
 /// The places of one server. Cheap to clone.
 #[derive(Clone, Debug)]
-pub struct Clients(Arc<Mutex<Table>>);
+pub struct Clients(Arc<Mutex<PlaceTable>>);
 
 #[derive(Debug)]
-struct Table {
+struct PlaceTable {
     limit: usize,
     next: u64,
     taken: Vec<Connection>,
@@ -40,7 +42,7 @@ struct Connection {
     _open: oneshot::Sender<()>,
 }
 
-impl Table {
+impl PlaceTable {
     fn admit(&mut self, may_write: bool, now: Instant) -> Option<(u64, oneshot::Receiver<()>)> {
         let readers = self.taken.iter().filter(|other| !other.may_write).count();
         let room = self.taken.len() < self.limit && (may_write || readers + 1 < self.limit);
@@ -78,7 +80,7 @@ impl Table {
 impl Clients {
     /// Room for `limit` connections.
     pub fn new(limit: usize) -> Self {
-        Self(Arc::new(Mutex::new(Table {
+        Self(Arc::new(Mutex::new(PlaceTable {
             limit,
             next: 0,
             taken: Vec::new(),
@@ -93,29 +95,29 @@ impl Clients {
     }
 
     /// A place for a new connection, or `None` if all are taken and none is idle.
-    pub(super) fn admit(&self, may_write: bool) -> Option<Place> {
+    pub(super) fn admit(&self, may_write: bool) -> Option<ConnectionPlace> {
         let (number, closed) = self.table().admit(may_write, Instant::now())?;
-        Some(Place {
+        Some(ConnectionPlace {
             clients: self.clone(),
             number,
             closed,
         })
     }
 
-    fn table(&self) -> MutexGuard<'_, Table> {
+    fn table(&self) -> MutexGuard<'_, PlaceTable> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// The place of one connection, given back when it is dropped.
 #[derive(Debug)]
-pub struct Place {
+pub struct ConnectionPlace {
     clients: Clients,
     number: u64,
     closed: oneshot::Receiver<()>,
 }
 
-impl Place {
+impl ConnectionPlace {
     /// A complete request was received.
     pub(super) fn spoke(&self) {
         let mut table = self.clients.table();
@@ -132,10 +134,89 @@ impl Place {
     }
 }
 
-impl Drop for Place {
+impl Drop for ConnectionPlace {
     fn drop(&mut self) {
         let mut table = self.clients.table();
         table.taken.retain(|other| other.number != self.number);
+    }
+}
+
+/// At most one line in this time.
+const PAUSE: Duration = Duration::from_secs(10);
+
+/// What was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RefusedPeer {
+    /// A connection from outside the subnets that may read.
+    Connection,
+    /// A connection while all others are in use and none is idle.
+    Full,
+    /// A write of a client that may not write.
+    Write,
+}
+
+impl RefusedPeer {
+    fn words(self) -> &'static str {
+        match self {
+            Self::Connection => {
+                "a connection was refused: modbus.readers does not list its address"
+            }
+            Self::Full => "a connection was refused: all connections are in use and none is idle",
+            Self::Write => "a write was refused: modbus.writers does not list its address",
+        }
+    }
+}
+
+/// Logs refusals. Cheap to clone; clones share the rate limit.
+#[derive(Clone, Debug)]
+pub struct Refusals {
+    progress: Progress,
+    /// By kind, so that a flood of one does not hide another.
+    limits: Arc<Mutex<[RateLimit; 3]>>,
+}
+
+#[derive(Debug, Default)]
+struct RateLimit {
+    last: Option<Instant>,
+    /// Refusals since the last line.
+    silent: u64,
+}
+
+impl RateLimit {
+    /// Whether a line may be written now: then the number of refusals since the last line.
+    fn pass(&mut self, now: Instant) -> Option<u64> {
+        if self
+            .last
+            .is_some_and(|last| now.saturating_duration_since(last) < PAUSE)
+        {
+            self.silent += 1;
+            return None;
+        }
+        self.last = Some(now);
+        Some(std::mem::take(&mut self.silent))
+    }
+}
+
+impl Refusals {
+    /// Logs refusals as warnings.
+    pub fn new(progress: Progress) -> Self {
+        Self {
+            progress,
+            limits: Arc::default(),
+        }
+    }
+
+    /// Logs a refusal, or counts it for the next line.
+    pub(super) fn note(&self, refused: RefusedPeer, peer: IpAddr) {
+        let mut limits = self.limits.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(silent) = limits[refused as usize].pass(Instant::now()) else {
+            return;
+        };
+        let mut line = format!("Modbus, {peer}: {}", refused.words());
+        if silent > 0 {
+            line += &format!("; {silent} more since the last such line");
+        }
+        self.progress.warn(&line);
     }
 }
 
@@ -143,15 +224,15 @@ impl Drop for Place {
 mod tests {
     use super::*;
 
-    fn table(limit: usize) -> Table {
-        Table {
+    fn table(limit: usize) -> PlaceTable {
+        PlaceTable {
             limit,
             next: 0,
             taken: Vec::new(),
         }
     }
 
-    fn numbers(table: &Table) -> Vec<u64> {
+    fn numbers(table: &PlaceTable) -> Vec<u64> {
         table.taken.iter().map(|taken| taken.number).collect()
     }
 
@@ -194,5 +275,16 @@ mod tests {
             table.admit(false, at(9000)).is_none(),
             "a reader displaces no writer"
         );
+    }
+
+    #[test]
+    fn a_flood_of_refusals_is_one_line_in_ten_seconds_that_counts_the_others() {
+        let (mut limit, start) = (RateLimit::default(), Instant::now());
+        assert_eq!(limit.pass(start), Some(0));
+        for ms in 1..=500 {
+            assert_eq!(limit.pass(start + Duration::from_millis(ms)), None);
+        }
+        assert_eq!(limit.pass(start + PAUSE), Some(500));
+        assert_eq!(limit.pass(start + 2 * PAUSE), Some(0));
     }
 }

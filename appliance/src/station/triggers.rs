@@ -1,10 +1,11 @@
-//! Whose turn it is, where several clients trigger without a pause: each is granted in turn, else
-//! the fastest would starve the others.
+//! Triggers of several clients: whose turn it is, how many were accepted and missed, and why the last
+//! request was rejected.
 //!
-//! A client that was rejected several times within a second, because the station was busy, waits
-//! for its turn. Until it has had it, the client that was granted last is rejected, if both are of
-//! one kind: a PLC never waits for the page, and a start line, which cannot ask again, never for
-//! anybody.
+//! Each of the clients that trigger without a pause is granted in turn, else the fastest would starve
+//! the others. A client that was rejected several times within a second, because the station was busy,
+//! waits for its turn. Until it has had it, the client that was granted last is rejected, if both are
+//! of one kind: a PLC never waits for the page, and a start line, which cannot ask again, waits for no
+//! other client.
 
 use super::clock::Micros;
 
@@ -39,11 +40,11 @@ const PAUSE: Micros = Micros::from_millis(1000);
 #[derive(Debug, Clone, Default)]
 pub(super) struct Turns {
     last: Client,
-    waiting: Option<Waiting>,
+    waiting: Option<WaitingClient>,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Waiting {
+struct WaitingClient {
     client: Client,
     rejected: u32,
     /// When it asked last.
@@ -78,11 +79,60 @@ impl Turns {
         if before.is_some_and(|waiting| waiting.client != client) {
             return;
         }
-        self.waiting = Some(Waiting {
+        self.waiting = Some(WaitingClient {
             client,
             rejected: before.map_or(0, |waiting| waiting.rejected) + 1,
             at: now,
         });
+    }
+}
+
+/// The counters and latches of requests.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Requests {
+    /// Accepted triggers.
+    pub(super) triggers: u32,
+    /// Rejected triggers.
+    pub(super) missed: u32,
+    /// Whether a trigger was rejected since the last ERROR_RESET.
+    pub(super) missed_latch: bool,
+    /// The last accepted token.
+    pub(super) last_token: u16,
+    /// Why the last rejected request was rejected ([`super::reject`]); 0 before the first.
+    pub(super) reject_reason: u16,
+}
+
+impl Requests {
+    /// The token of a write if it is a trigger: neither 0 nor the last accepted one, whatever
+    /// connection that came from. So a write that is sent again does not measure again, until
+    /// another token is accepted or the daemon is started again.
+    pub(super) fn new_token(&self, written: Option<u16>) -> Option<u16> {
+        written.filter(|&token| token != 0 && token != self.last_token)
+    }
+
+    /// Counts an accepted trigger; `token` is 0 for an edge.
+    pub(super) fn accept(&mut self, token: u16) {
+        self.triggers = self.triggers.wrapping_add(1);
+        if token != 0 {
+            self.last_token = token;
+        }
+    }
+
+    /// Counts a rejected trigger.
+    pub(super) fn miss(&mut self, reason: u16) {
+        self.reject(reason);
+        self.missed = self.missed.wrapping_add(1);
+        self.missed_latch = true;
+    }
+
+    /// Notes why a request of any kind was rejected.
+    pub(super) fn reject(&mut self, reason: u16) {
+        self.reject_reason = reason;
+    }
+
+    /// ERROR_RESET clears the latch; counters and token stay.
+    pub(super) fn reset(&mut self) {
+        self.missed_latch = false;
     }
 }
 
@@ -131,5 +181,16 @@ mod tests {
             }
             assert!(turns.may(FAST, at(9)) && turns.may(Client::Line, at(9)));
         }
+    }
+
+    #[test]
+    fn a_token_is_new_until_it_is_accepted_and_an_edge_leaves_it() {
+        let mut requests = Requests::default();
+        requests.miss(1);
+        assert_eq!(requests.new_token(Some(7)), Some(7));
+        requests.accept(7);
+        requests.accept(0);
+        assert_eq!((requests.new_token(Some(7)), requests.triggers), (None, 2));
+        assert_eq!(requests.new_token(Some(0)), None);
     }
 }

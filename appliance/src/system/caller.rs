@@ -1,13 +1,27 @@
-//! Notifications to the service manager (`sd_notify`): READY, signs of life of the measuring task,
-//! the status line, the stop.
+//! The caller of the daemon: the service manager (`sd_notify`: READY, signs of life of the measuring
+//! task, the status line, the stop), and the source of the stop signal.
 //!
-//! Without a service manager nothing is sent. A notification that fails is dropped and measuring
-//! goes on: the manager's own time-outs notice what is missing.
+//! Without a service manager nothing is sent. A notification that fails is dropped and measuring goes
+//! on: the manager's own time-outs notice what is missing.
 
+use super::runtime;
+use crate::error::{Exit, Result};
 use sd_notify::NotifyState;
+use std::future::pending;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::watch;
+
+/// The caller of the daemon; by default there is no service manager and no stop signal.
+#[derive(Clone, Debug, Default)]
+pub struct Caller {
+    /// The service manager.
+    pub notify: Notify,
+    /// The stop signal, which also ends a start early.
+    pub stop: StopSignal,
+}
 
 /// Signs of life that are sent per watchdog period.
 const BEATS: u32 = 4;
@@ -113,4 +127,56 @@ impl Pulse {
 /// Saturates.
 fn millis(time: Duration) -> u64 {
     u64::try_from(time.as_millis()).unwrap_or(u64::MAX)
+}
+
+/// Whether the signal has arrived; the default value never gets one. Cheap to clone.
+#[derive(Clone, Debug, Default)]
+pub struct StopSignal(Option<watch::Receiver<bool>>);
+
+impl StopSignal {
+    /// Catches the signals from now on.
+    ///
+    /// # Errors
+    /// If the system does not deliver signals (exit code 70).
+    pub fn listen() -> Result<Self> {
+        let failed = Exit::Software.because("wait for a signal");
+        let runtime = runtime()?;
+        let listen = |kind| {
+            let _inside = runtime.enter();
+            signal(kind).map_err(&failed)
+        };
+        let mut interrupt = listen(SignalKind::interrupt())?;
+        let mut terminate = listen(SignalKind::terminate())?;
+        let (arrive, arrived) = watch::channel(false);
+        let wait = move || {
+            runtime.block_on(async {
+                tokio::select! {
+                    _ = interrupt.recv() => {}
+                    _ = terminate.recv() => {}
+                }
+            });
+            // All receivers are gone only where the program ends anyway.
+            let _ = arrive.send(true);
+        };
+        std::thread::Builder::new()
+            .name("signals".into())
+            .spawn(wait)
+            .map_err(&failed)?;
+        Ok(Self(Some(arrived)))
+    }
+
+    /// Whether it has arrived.
+    pub fn has_arrived(&self) -> bool {
+        self.0.as_ref().is_some_and(|arrived| *arrived.borrow())
+    }
+
+    /// Waits until it arrives.
+    pub async fn wait(&self) {
+        if let Some(mut arrived) = self.0.clone()
+            && arrived.wait_for(|arrived| *arrived).await.is_ok()
+        {
+            return;
+        }
+        pending::<()>().await;
+    }
 }

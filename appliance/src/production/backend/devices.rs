@@ -1,9 +1,6 @@
 //! Real devices: which of their libraries this build has, and how they are opened.
 
-#[cfg(all(feature = "kms", feature = "libcamera"))]
-mod rpi;
-
-use super::Opened;
+use super::OpenedHead;
 use crate::config::{Backend, Config, HeadConfig};
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::Calibration;
@@ -80,11 +77,11 @@ fn built_with(key: &str, needed: &[&str], feature: &str) -> Result<()> {
 ///
 /// # Errors
 /// If this build has no such devices (78), or one of them is not there (69).
-pub(super) fn rpi(config: &HeadConfig) -> Result<Opened> {
+pub(super) fn rpi(config: &HeadConfig) -> Result<OpenedHead> {
     built_for_head(config)?;
     let head = head(config, trigger(&config.trigger)?)?;
     let calibration = nominal(head.camera_format(), head.projector_size())?;
-    Ok(Opened::new(head, calibration))
+    Ok(OpenedHead::new(head, calibration))
 }
 
 #[cfg(all(feature = "kms", feature = "libcamera"))]
@@ -105,7 +102,7 @@ fn trigger(setup: &TriggerSetup) -> Result<Box<dyn Trigger>> {
     };
     let prepare = || {
         // What it does not get, `fringed doctor` names.
-        crate::system::priority::be_prompt(crate::system::host::Host::default().isolated_core());
+        crate::system::computing::be_prompt(crate::system::host::Host::default().isolated_core());
     };
     match hal::gpio::Pulse::open(setup, line, prepare) {
         Ok(pulse) => Ok(Box::new(pulse)),
@@ -220,6 +217,77 @@ fn wired(setup: &LinesSetup) -> Result<Wires> {
 #[cfg(not(feature = "gpio"))]
 fn wired(_: &LinesSetup) -> Result<Wires> {
     Ok(Wires::default())
+}
+
+/// A head of a camera through libcamera and a projector on a display connector.
+#[cfg(all(feature = "kms", feature = "libcamera"))]
+mod rpi {
+    use crate::config::HeadConfig;
+    use crate::system::host::libcamera_patience;
+    use hal::clock::Monotonic;
+    #[cfg(feature = "i2c")]
+    use hal::dlpc347x::{Controlled, Controller, bus::Bus};
+    use hal::error::Error;
+    use hal::head::{Head, Timing};
+    use hal::libcamera::{LibCamera, Settings};
+    use hal::projector::Projector;
+    #[cfg(feature = "i2c")]
+    use hal::setup::ControllerKind;
+    use hal::setup::ProjectorSetup;
+    use hal::trigger::Trigger;
+    #[cfg(feature = "i2c")]
+    use std::time::Duration;
+
+    /// Opens camera and projector. The times between them are set later, from the calibration.
+    ///
+    /// # Errors
+    /// The error of the device that is not there.
+    pub fn head(config: &HeadConfig, trigger: Box<dyn Trigger>) -> Result<Head, Error> {
+        let starts = config.trigger.starts();
+        let settings = Settings {
+            stays_on: libcamera_patience() / 2,
+            ..Settings::new(&config.camera, starts)
+        };
+        let camera = LibCamera::open(settings)?;
+        let display = hal::kms::open(&config.projector)?;
+        let clock = Monotonic::new(vec![camera.ready()?, display.descriptor()?]);
+        let projector = controlled(&config.projector, Box::new(display))?;
+        Ok(Head::new(
+            Box::new(camera),
+            projector,
+            trigger,
+            Box::new(clock),
+            Timing::unproven(starts),
+        ))
+    }
+
+    /// How often the controller of the projector is asked whether it still streams patterns.
+    #[cfg(feature = "i2c")]
+    const WATCHED: Duration = Duration::from_secs(1);
+
+    /// The projector, whose controller is set up for patterns if one is configured.
+    #[cfg(feature = "i2c")]
+    fn controlled(
+        setup: &ProjectorSetup,
+        display: Box<dyn Projector>,
+    ) -> Result<Box<dyn Projector>, Error> {
+        if setup.controller == ControllerKind::None {
+            return Ok(display);
+        }
+        let bus = Bus::open(&setup.controller_bus)?;
+        let controller = Controller::open(bus, setup.controller_address, setup.led)?;
+        let projector = Controlled::new(display, controller, setup.led_current, WATCHED)?;
+        Ok(Box::new(projector))
+    }
+
+    /// Without I²C no controller is configured: a build without it refuses one.
+    #[cfg(not(feature = "i2c"))]
+    fn controlled(
+        _: &ProjectorSetup,
+        display: Box<dyn Projector>,
+    ) -> Result<Box<dyn Projector>, Error> {
+        Ok(display)
+    }
 }
 
 #[cfg(test)]
