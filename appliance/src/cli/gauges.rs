@@ -3,6 +3,7 @@
 use super::options::Json;
 use crate::error::{Exit, Failure, Result};
 use crate::recipe::RecipeFile;
+use crate::recipe::Refusal;
 use crate::recipe::archive::{self, Arrays};
 use crate::recipe::gauges_toml::{Gauging, MAX_TEXT};
 use crate::recipe::golden::TaughtRecipe;
@@ -65,7 +66,7 @@ impl Gauges {
         let target = target.map_err(Exit::Missing.because(&what))?;
         let _alone = alone(&target, &what)?;
         let (before, arrays) = self.unpacked()?;
-        let unfit = |error: String| Failure::because(Exit::Content, &what, error);
+        let unfit = |error: Refusal| Failure::because(Exit::Content, &what, error);
         let TaughtRecipe {
             bytes,
             manifest,
@@ -73,9 +74,8 @@ impl Gauges {
             ..
         } = gauging.set(&before, arrays).map_err(unfit)?;
         let head = manifest.head().map_err(unfit)?;
-        let golden = Plan::golden(recipe, &head, Headway::silent())
-            .map_err(|error| unfit(error.to_string()));
-        let mut golden = golden?;
+        let golden = Plan::golden(recipe, &head, Headway::silent());
+        let mut golden = golden.map_err(|error| unfit(error.into()))?;
         let (golden, features) = golden.judged((&manifest).into());
         let changed = manifest.differences(&before);
         let same = RecipeFile {

@@ -113,10 +113,7 @@ impl RecipeCommand {
                 let store = store(files)?;
                 let head = files.head(&files.configuration()?);
                 let calibration = backend::calibration(&head)?;
-                let fits = |recipe| {
-                    let tried = Plan::try_out(recipe, &calibration);
-                    tried.map_err(|error| error.to_string())
-                };
+                let fits = |recipe| Ok(Plan::try_out(recipe, &calibration)?);
                 let to = Destination {
                     number: *number,
                     replace: *replace,

@@ -85,7 +85,7 @@ impl Worker {
         let (width, height, _) = self.opened.calibration.frames();
         let kept = replaced.filter(|_| keep_gauges);
         if let Some(file) = kept {
-            replace::check_kept(file, (width, height)).map_err(TeachError::Rig)?;
+            replace::check_kept(file, (width, height))?;
         }
         let mut naming = replace::naming(number, replaced, keep_gauges);
         naming.everything = everything.unwrap_or(naming.everything);
@@ -95,7 +95,7 @@ impl Worker {
             .map(|um| f64::from(um) / 1000.0)
             .or(naming.limit_mm);
         let shared = self.recipes.refuse_shared(number, &naming.part_number);
-        shared.map_err(TeachError::Rig)?;
+        shared?;
         let telling = (&self.aborts, job);
         let telling = Telling::new(&self.station, &self.pulse, &self.progress, telling);
         let tell = |share: f64, words: &str| telling.tell(share, words);
@@ -125,7 +125,7 @@ impl Worker {
         memory::trim();
         let packed =
             settled.and_then(|settled| self.computing.on(|| settled.seal_telling(packing)));
-        packed.map_err(TeachError::Rig)
+        Ok(packed?)
     }
 
     /// What the station shows without a part, if it was recorded.

@@ -1,6 +1,8 @@
 //! A recipe as one file: an uncompressed ZIP of `recipe.json` and NumPy arrays, with a fingerprint.
 
+use super::Refusal;
 use super::file::{FORMAT, RecipeFile, VERSION};
+use crate::recipe::rules::refused;
 use crate::storage::archive::{Members, packed};
 use crate::storage::hex;
 use crate::system::headway::Headway;
@@ -59,7 +61,7 @@ macro_rules! arrays {
             }
 
             /// Sets an array to the content of its member.
-            fn read(&mut self, member: &str, bytes: &[u8]) -> Result<(), String> {
+            fn read(&mut self, member: &str, bytes: &[u8]) -> Result<(), Refusal> {
                 match member {
                     $(concat!(stringify!($name), ".npy") => self.$name = read(member, bytes)?.into(),)*
                     unknown => return Err(broken(format!("it holds an unknown member {unknown:?}"))),
@@ -112,16 +114,16 @@ impl Arrays {
 
 /// What is wrong with a file that is not a ZIP, lacks a member, or has one that cannot be read;
 /// with the remedy.
-pub(super) fn broken(what: impl std::fmt::Display) -> String {
+pub(super) fn broken(what: impl std::fmt::Display) -> Refusal {
     let what = shortened(&what.to_string());
-    format!("{what}: export the recipe again or teach it")
+    format!("{what}: export the recipe again or teach it").into()
 }
 
 /// Packs a recipe; its fingerprint is filled in. Returns the bytes and the fingerprint.
 ///
 /// # Errors
 /// In words: the archive cannot be made.
-pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), String> {
+pub fn pack(file: &RecipeFile, arrays: &Arrays) -> Result<(Vec<u8>, String), Refusal> {
     pack_telling(file, arrays, Headway::silent())
 }
 
@@ -130,7 +132,7 @@ pub(super) fn pack_telling(
     file: &RecipeFile,
     arrays: &Arrays,
     headway: Headway<'_>,
-) -> Result<(Vec<u8>, String), String> {
+) -> Result<(Vec<u8>, String), Refusal> {
     let zeroed = RecipeFile {
         fingerprint: NO_FINGERPRINT.into(),
         ..file.clone()
@@ -158,15 +160,15 @@ pub(crate) fn seal(
     members: Vec<Member<'_>>,
     size: usize,
     headway: Headway<'_>,
-) -> Result<(Vec<u8>, String), String> {
+) -> Result<(Vec<u8>, String), Refusal> {
     let fingerprint = fingerprint(manifest.as_bytes(), &members);
     let manifest = manifest.replacen(NO_FINGERPRINT, &fingerprint, 1);
     // What is written can be read.
     if manifest.len() as u64 > MAX_MANIFEST {
         let size = manifest.len();
-        return Err(format!(
+        return refused!(
             "{MANIFEST} would have {size} bytes where at most {MAX_MANIFEST} are read: draw features with fewer corners"
-        ));
+        );
     }
     let room = size + manifest.len() + HEADERS * (members.len() + 1);
     let first = (MANIFEST, manifest.into_bytes());
@@ -184,7 +186,7 @@ pub(crate) fn seal(
 ///
 /// # Errors
 /// In words, with the remedy: it is not a recipe, of another version, or changed.
-pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), String> {
+pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays), Refusal> {
     let mut zip = Members::open(source, MAX_MEMBERS).map_err(broken)?;
     let (file, zeroed) = read_manifest(&mut zip)?;
     let mut hash = Fingerprint::new(zeroed.as_bytes());
@@ -201,11 +203,11 @@ pub fn unpack(source: impl Read + Seek, size: u64) -> Result<(RecipeFile, Arrays
     }
     let computed = hash.finish();
     if computed != file.fingerprint {
-        return Err(format!(
+        return refused!(
             "its fingerprint is {}, its content has {computed}: the file was changed or damaged; export \
              it again or teach it",
             file.fingerprint
-        ));
+        );
     }
     match problem {
         Some(problem) => Err(problem),
@@ -246,14 +248,14 @@ fn agrees(source: impl Read + Seek, stated: impl FnOnce(&str) -> Option<String>)
 }
 
 /// The manifest, and its text with the fingerprint replaced by zeros.
-fn read_manifest(zip: &mut Members<impl Read + Seek>) -> Result<(RecipeFile, String), String> {
+fn read_manifest(zip: &mut Members<impl Read + Seek>) -> Result<(RecipeFile, String), Refusal> {
     let text = manifest_text(zip)?;
     let file = parse(&text)?;
     let zeroed = zeroed(&text, &file.fingerprint);
     Ok((file, zeroed))
 }
 
-fn manifest_text(zip: &mut Members<impl Read + Seek>) -> Result<String, String> {
+fn manifest_text(zip: &mut Members<impl Read + Seek>) -> Result<String, Refusal> {
     let text = zip.content(MANIFEST, MAX_MANIFEST);
     let text = text.map_err(|error| broken(format!("{MANIFEST}: {error}")))?;
     String::from_utf8(text).map_err(broken)
@@ -273,7 +275,7 @@ fn arrays_of<R: Read + Seek>(zip: &Members<R>) -> Vec<String> {
 ///
 /// # Errors
 /// In words, with the remedy: it is not a recipe, or of another version.
-pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, String> {
+pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, Refusal> {
     let mut zip = Members::open(file, MAX_MEMBERS).map_err(broken)?;
     Ok(read_manifest(&mut zip)?.0)
 }
@@ -283,7 +285,7 @@ pub fn manifest(file: impl Read + Seek) -> Result<RecipeFile, String> {
 /// # Errors
 /// In words, with the remedy: it is not a manifest, of another version, or a value is out of its
 /// bounds.
-pub fn parse(text: &str) -> Result<RecipeFile, String> {
+pub fn parse(text: &str) -> Result<RecipeFile, Refusal> {
     /// What every version has, read first: another version is reported as such, whatever else it
     /// contains.
     #[derive(serde::Deserialize)]
@@ -302,20 +304,21 @@ pub fn parse(text: &str) -> Result<RecipeFile, String> {
     }
     if version != VERSION {
         let version = shortened(&version.to_string());
-        return Err(format!(
+        return refused!(
             "recipe.json: version is {version}, this program reads {VERSION}: teach the part again"
-        ));
+        );
     }
     let file: RecipeFile =
         serde_json::from_str(text).map_err(|error| broken(format!("recipe.json: {error}")))?;
     // Checked apart from the bounds: a recipe that is being made has no fingerprint yet.
     bounds::fingerprint("fingerprint", &file.fingerprint)
+        .map_err(Refusal::from)
         .and_then(|()| file.check_bounds())
         .map_err(|error| broken(format!("recipe.json: {error}")))?;
     Ok(file)
 }
 
-fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, String> {
+fn read<T: npy::Element>(name: &str, bytes: &[u8]) -> Result<Vec<T>, Refusal> {
     npy::read(bytes)
         .map(|array| array.elements)
         .map_err(|error| broken(format!("member {name}: {error}")))

@@ -8,6 +8,7 @@
 //!
 //! The captures are averaged as two means, from which follows what of that difference is noise.
 
+use super::Refusal;
 use super::failure::TeachError;
 use super::light;
 use crate::head::calibrated::CalibratedHead;
@@ -87,7 +88,7 @@ impl Captured {
             // Means of frames have more bits than the camera's samples.
             let unit = full_scale / f64::from(scan.decoder.full_scale());
             let offset = counts.map(|counts| counts * unit);
-            Ok::<_, String>((scan.noise(calibration, &phases), offset, phases))
+            Ok::<_, Refusal>((scan.noise(calibration, &phases), offset, phases))
         };
         illumination.load(head, function, &shots, calibration)?;
         let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
@@ -110,7 +111,7 @@ impl Captured {
                 taking.done(0.85 + 0.15 * known as f64 / short.len() as f64);
                 Ok(by.offsets_from(&phases))
             });
-            let offsets: Result<_, String> = offsets.collect();
+            let offsets: Result<_, Refusal> = offsets.collect();
             all.push((phases, offsets.map_err(TeachError::rig)?));
         }
         let sequence = Sequence::from_frames(full).map_err(TeachError::rig)?;
@@ -157,10 +158,10 @@ fn scan<'a>(
     function: &PhaseFunction,
     (shots, shown): (&[Shot], &[Shot]),
     means: &'a [Frame],
-) -> Result<Scan<'a>, String> {
+) -> Result<Scan<'a>, Refusal> {
     let frame = |shot| shots.iter().position(|other| other == shot);
     let frames = shown.iter().filter_map(frame).map(|at| &means[at]);
-    Scan::new(function.range(), shown, frames)
+    Ok(Scan::new(function.range(), shown, frames)?)
 }
 
 /// The shots of all sequences, each shot once.

@@ -1,14 +1,15 @@
 //! From the file form of a recipe to a checked one.
 
+use super::Refusal;
 use super::archive::{Arrays, short, unpack};
 use super::demands::Demands;
-use super::feature::FeatureFile;
 use super::file::{PatternFile, RecipeFile, SequenceKind};
 use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
 use super::outline::Outline;
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
+use crate::recipe::rules::refused;
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
 use algo::inspect::{CalibrationError, Feature, Gauge};
@@ -17,9 +18,6 @@ use algo::phase::LeastModulation;
 use algo::units::Modulation;
 use std::io::{Cursor, Read, Seek};
 
-/// The radius of a rim that nobody states, mm: U then covers rims rounded by up to 0.3 mm, as those
-/// of punched sheets are, with diameters larger by 0.42 of that (docs/accuracy.md).
-const UNKNOWN_RIM_MM: f64 = 0.35;
 /// Most different sides of squares of one recipe, with 0 where any will do: each takes time in
 /// every cycle.
 const MAX_SIDES: usize = 5;
@@ -134,7 +132,7 @@ impl Recipe {
     ///
     /// # Errors
     /// In words, with the remedy: it is broken, of another version, changed, or inconsistent.
-    pub fn from_bytes(bytes: &[u8]) -> Result<Self, String> {
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, Refusal> {
         Self::read(Cursor::new(bytes), bytes.len() as u64)
     }
 
@@ -143,7 +141,7 @@ impl Recipe {
     ///
     /// # Errors
     /// As above.
-    pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, String> {
+    pub fn read(source: impl Read + Seek, size: u64) -> Result<Self, Refusal> {
         let (file, recipe) = Self::read_to_edit(source, size)?;
         file.check_judging()?;
         Ok(recipe)
@@ -157,7 +155,7 @@ impl Recipe {
     pub(super) fn read_to_edit(
         source: impl Read + Seek,
         size: u64,
-    ) -> Result<(RecipeFile, Self), String> {
+    ) -> Result<(RecipeFile, Self), Refusal> {
         let (file, arrays) = unpack(source, size)?;
         let recipe =
             Self::fit(&file, arrays).map_err(|error| format!("{error}: teach it again"))?;
@@ -182,7 +180,7 @@ impl Recipe {
     ///
     /// # Errors
     /// In words: what does not fit.
-    pub fn check(file: &RecipeFile, arrays: Arrays) -> Result<Self, String> {
+    pub fn check(file: &RecipeFile, arrays: Arrays) -> Result<Self, Refusal> {
         file.check_judging()?;
         Self::fit(file, arrays)
     }
@@ -191,7 +189,7 @@ impl Recipe {
     ///
     /// # Errors
     /// In words: what does not fit.
-    pub(super) fn fit(file: &RecipeFile, arrays: Arrays) -> Result<Self, String> {
+    pub(super) fn fit(file: &RecipeFile, arrays: Arrays) -> Result<Self, Refusal> {
         file.check_bounds()?;
         let (width, height) = (file.camera.width as usize, file.camera.height as usize);
         let pixels = width.checked_mul(height).filter(|&pixels| pixels > 0);
@@ -208,10 +206,10 @@ impl Recipe {
             let expected = pixels.and_then(|pixels| pixels.checked_mul(maps));
             let optional = ["sequence_offset", "smoothing", "golden_signal"].contains(&name);
             if Some(length) != expected && !(optional && length == 0) {
-                return Err(format!(
+                return refused!(
                     "{name} has {length} values for a camera of {width}x{height} and {} sequences",
                     file.sequences.len()
-                ));
+                );
             }
         }
         let (columns, rows) = (
@@ -224,21 +222,21 @@ impl Recipe {
             _ => columns * rows,
         };
         if amplitude.len() != expected || amplitude.contains(&0) {
-            return Err(format!(
+            return refused!(
                 "amplitude has {} values, {} of them 0, for a projector of {columns}x{rows} and {} exposures: it has one of 1 to 255 for each pixel where there are several, else none",
                 amplitude.len(),
                 amplitude.iter().filter(|share| **share == 0).count(),
                 file.exposures
-            ));
+            );
         }
         let mut sides = arrays.smoothing.to_vec();
         sides.sort_unstable();
         sides.dedup();
         if sides.len() > MAX_SIDES || sides.iter().any(|&side| side > 0 && side % 2 == 0) {
-            return Err(format!(
+            return refused!(
                 "smoothing has {} different values: it has at most {MAX_SIDES}, 0 or odd, as squares have a middle pixel",
                 sides.len()
-            ));
+            );
         }
         let function = match file.pattern {
             PatternFile::Vertical { fringes } => PhaseFunction::vertical(columns, rows, fringes),
@@ -251,9 +249,11 @@ impl Recipe {
         };
         let function = function.map_err(|error| format!("projector and pattern: {error}"))?;
         file.head()?;
+        let features = file.features.iter();
+        let features = features.map(|of| of.checked(&file.features, (width, height)));
         Ok(Self {
             sequences: sequences(file)?,
-            features: features(&file.features, (width, height))?,
+            features: features.collect::<Result<_, _>>()?,
             gauges: gauges(file),
             id: file.into(),
             conditions: file.into(),
@@ -266,7 +266,7 @@ impl Recipe {
 }
 
 /// The sequence for production, and behind it those that unwrap further than the one before.
-fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
+fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, Refusal> {
     let mut chain: Vec<RecipeSequence> = Vec::new();
     if file.two_frames {
         chain.push(RecipeSequence {
@@ -298,31 +298,6 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, String> {
         }
     }
     Ok(chain)
-}
-
-/// The features of frames of (width, height) pixels.
-///
-/// # Errors
-/// Naming the feature that cannot be used, and why.
-fn features(
-    features: &[FeatureFile],
-    (width, height): (usize, usize),
-) -> Result<Vec<Feature>, String> {
-    let feature = |feature: &FeatureFile| {
-        let region = feature.pixels((width, height))?;
-        let plane = feature.plane.as_ref();
-        let plane = plane.and_then(|name| features.iter().position(|of| of.name == *name));
-        let of_plane = || features.get(plane?)?.rim_mm;
-        Ok(Feature {
-            kind: feature.kind,
-            region,
-            plane,
-            rim: feature.rim_mm.or_else(of_plane).unwrap_or(UNKNOWN_RIM_MM),
-            thickness: feature.thickness_mm,
-            cut: feature.cut(),
-        })
-    };
-    features.iter().map(feature).collect()
 }
 
 /// The gauges that are computed; their features were checked to be there.

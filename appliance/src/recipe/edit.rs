@@ -3,13 +3,11 @@
 //! Of two clients that change one recipe the second is refused: an edit names the fingerprint that
 //! it changes (`ChangeError::Outdated`).
 
-use super::file::LONGEST_NAME;
 use super::golden::UnsealedRecipe;
-use super::judging::check_unique;
+use super::rules::{self, Rules};
 use super::store::LoadedRecipe;
-use super::{ChangeError, DatumFile, FeatureFile, GaugeFile, Recipe, RecipeFile, Store};
+use super::{ChangeError, DatumFile, FeatureFile, GaugeFile, Recipe, RecipeFile, Refusal, Store};
 use crate::system::headway::Headway;
-use hal::bounds::clipped;
 use serde::Deserialize;
 
 /// A change to a recipe; what is `None` stays as it is.
@@ -57,7 +55,7 @@ pub fn edit(
     store: &Store,
     number: u16,
     edit: Edit,
-    fits: impl FnOnce(Recipe) -> Result<(), String>,
+    fits: impl FnOnce(Recipe) -> Result<(), Refusal>,
 ) -> Result<Edited, ChangeError> {
     let LoadedRecipe {
         mut file, recipe, ..
@@ -111,11 +109,11 @@ impl Edit {
 
 impl RecipeFile {
     /// Makes the recipe one whose features, datum systems and gauges were changed from those of the
-    /// recipe `before`, and checks its names.
+    /// recipe `before`, and checks it.
     ///
     /// # Errors
-    /// In words: a name is empty, too long, or there twice.
-    pub(super) fn set_gauges_of(&mut self, before: &Self) -> Result<(), String> {
+    /// The first rule of edits that it breaks.
+    pub(super) fn set_gauges_of(&mut self, before: &Self) -> Result<(), Refusal> {
         // Limits that are added end that it judges nothing.
         self.judges_nothing &= self.is_without_limits();
         // It is not known how gauges that were changed judge good parts.
@@ -126,29 +124,6 @@ impl RecipeFile {
         let mut tried = std::mem::take(&mut self.tried);
         tried.retain(|tried| of(&before.gauges, &tried.gauge) == of(&self.gauges, &tried.gauge));
         self.tried = tried;
-        check_names("feature", self.features.iter().map(|feature| &feature.name))?;
-        check_names("datum", self.datums.iter().map(|datum| &datum.name))?;
-        check_names("gauge", self.gauges.iter().map(|gauge| &gauge.name))?;
-        check_names("recipe", std::iter::once(&self.name))
+        rules::check(self, Rules::Edit)
     }
-}
-
-/// Refuses a name that is empty, too long, or there twice.
-///
-/// # Errors
-/// In words.
-pub(super) fn check_names<'a>(
-    what: &str,
-    names: impl Iterator<Item = &'a String> + Clone,
-) -> Result<(), String> {
-    for name in names.clone() {
-        let length = name.chars().count();
-        if name.trim().is_empty() || length > LONGEST_NAME {
-            return Err(format!(
-                "{what} name {:?} has {length} characters: write 1 to {LONGEST_NAME}",
-                clipped(name)
-            ));
-        }
-    }
-    check_unique(what, names)
 }

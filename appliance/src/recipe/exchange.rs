@@ -1,6 +1,7 @@
 //! Lists, exports and imports stored recipes. A file is imported only if it is whole, and replaces
 //! a recipe only on request.
 
+use super::Refusal;
 use super::archive::{self, broken};
 use super::incoming::Incoming;
 use super::replace::refuse_taken;
@@ -105,8 +106,8 @@ impl Store {
             .and_then(archive::manifest);
         let previous = self.previous(number).exists();
         let bytes = fs::metadata(&path).map_or(0, |found| found.len());
-        let unreadable = |problem| Listed {
-            problem: Some(problem),
+        let unreadable = |problem: Refusal| Listed {
+            problem: Some(problem.words),
             ..Listed::default()
         };
         Listed {
@@ -154,9 +155,11 @@ impl Store {
         source: &Path,
         to: Destination,
         replace: &str,
-        fits: impl FnOnce(Recipe) -> Result<(), String>,
+        fits: impl FnOnce(Recipe) -> Result<(), Refusal>,
     ) -> Result<Imported, ChangeError> {
-        let refused = |reason| ChangeError::Unfit(format!("import {}: {reason}", source.display()));
+        let refused = |reason: Refusal| {
+            ChangeError::Unfit(format!("import {}: {reason}", source.display()).into())
+        };
         let missing = |error| ChangeError::Missing {
             path: source.to_path_buf(),
             source: error,
@@ -215,11 +218,11 @@ impl Store {
         if !to.replace {
             let words = ("import", replace, "import it as number");
             let refused = refuse_taken(self, number, words);
-            refused.map_err(|words| ChangeError::Taken { number, words })?;
+            refused.map_err(|refusal| ChangeError::Taken { number, refusal })?;
         }
         if number == id.number {
             let shared = self.refuse_shared(number, &id.part_number);
-            shared.map_err(|words| ChangeError::Unfit(format!("import: {words}")))?;
+            shared.map_err(|words| ChangeError::Unfit(format!("import: {words}").into()))?;
             self.put_received(incoming, number).map_err(write(&path))?;
             return Ok(whole(id, replaced));
         }

@@ -1,5 +1,6 @@
 //! Why a part could not be taught.
 
+use super::Refusal;
 use crate::error::code_of;
 use crate::head::calibrated::MeasureError;
 use crate::station::{Square, error_code};
@@ -64,6 +65,12 @@ impl From<MeasureError> for TeachError {
             MeasureError::Device(error) => Self::Device(error),
             MeasureError::Impossible(error) => Self::Rig(error),
         }
+    }
+}
+
+impl From<Refusal> for TeachError {
+    fn from(refusal: Refusal) -> Self {
+        Self::rig(refusal)
     }
 }
 

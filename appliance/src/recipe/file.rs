@@ -6,6 +6,7 @@ use super::feature::{DatumFile, FeatureFile};
 use super::gauge::GaugeFile;
 use super::good_parts::GoodPartsFile;
 use super::models::ModelsFile;
+use super::rules::{self, Refusal, Rules};
 use crate::head::calibration::{Calibration, CalibrationSigma};
 use crate::head::exposing::Exposing;
 use crate::station::control::MAX_RECIPE;
@@ -217,7 +218,7 @@ impl RecipeFile {
     ///
     /// # Errors
     /// In words: a model is absurd, and why.
-    pub fn head(&self) -> Result<Calibration, String> {
+    pub fn head(&self) -> Result<Calibration, Refusal> {
         let CameraFile {
             width,
             height,
@@ -227,6 +228,45 @@ impl RecipeFile {
         let frames = (width, height, bit_depth);
         let (noise, sigma) = (self.noise_counts, self.calibration_sigma);
         self.models.head(frames, raster, noise, sigma)
+    }
+
+    /// A feature by its name.
+    pub fn feature(&self, name: &str) -> Option<&FeatureFile> {
+        self.features.iter().find(|feature| feature.name == name)
+    }
+
+    /// Whether a gauge is of a contour.
+    pub(super) fn is_of_contour(&self, gauge: &GaugeFile) -> bool {
+        let is_contour = |name: &String| self.feature(name).is_some_and(|of| of.kind.is_contour());
+        gauge.of.iter().any(is_contour)
+    }
+
+    /// Whether any gauge is of a contour.
+    pub(super) fn has_contours(&self) -> bool {
+        self.gauges.iter().any(|gauge| self.is_of_contour(gauge))
+    }
+
+    /// Whether no gauge has a limit that a part can miss.
+    pub(super) fn is_without_limits(&self) -> bool {
+        !self.gauges.iter().any(GaugeFile::can_fail)
+    }
+
+    /// Checks the bounds of all values, and that what is named is there;
+    /// [`Recipe::check`](super::Recipe::check) checks that they fit the arrays.
+    ///
+    /// # Errors
+    /// The first that is wrong, with its key and the bounds.
+    pub fn check_bounds(&self) -> Result<(), Refusal> {
+        rules::check(self, Rules::Bounds)
+    }
+
+    /// Refuses a recipe whose verdict does not depend on the part as its gauges say, and one
+    /// without any limit that does not state `judges_nothing`.
+    ///
+    /// # Errors
+    /// With the name of the first such gauge and the remedy.
+    pub(super) fn check_judging(&self) -> Result<(), Refusal> {
+        rules::check(self, Rules::Judging)
     }
 }
 

@@ -1,6 +1,8 @@
 //! The gauges of a recipe in its file, and which limits are refused.
 
+use super::rules::Refusal;
 use super::tolerance::{About, Master, Tolerance};
+use crate::recipe::rules::refused;
 use crate::station::Unit;
 use algo::inspect::{Basis, Measure};
 use hal::bounds::within;
@@ -71,11 +73,20 @@ fn spaced(unit: Unit) -> String {
 }
 
 impl GaugeFile {
+    /// Refuses limits that no part can keep or miss.
+    ///
+    /// # Errors
+    /// In words, with the gauge's name and the remedy.
+    pub(super) fn check_judging(&self) -> Result<(), Refusal> {
+        let refused = self.check_limits();
+        Ok(refused.map_err(|error| format!("{error}: change the limits"))?)
+    }
+
     /// Refuses limits that no part can keep, and those that its unit cannot have.
     ///
     /// # Errors
     /// In words, with the gauge's name.
-    pub(super) fn check_limits(&self) -> Result<(), String> {
+    fn check_limits(&self) -> Result<(), Refusal> {
         let Self {
             name,
             measures,
@@ -87,22 +98,20 @@ impl GaugeFile {
         let [least, most] = unit.range();
         let symbol = spaced(unit);
         if self.needs_golden() && self.golden_value.is_none() {
-            return Err(format!(
-                "gauge {name:?} has no golden_value: set the gauges again"
-            ));
+            return refused!("gauge {name:?} has no golden_value: set the gauges again");
         }
         for (which, limit) in [("low", low), ("high", high)] {
             if let Some(limit) = limit.filter(|limit| !(least..=most).contains(limit)) {
-                return Err(no_limit(name, unit, which, limit));
+                return Err(no_limit(name, unit, which, limit).into());
             }
         }
         match (low, high) {
-            (Some(low), Some(high)) if low > high => Err(format!(
+            (Some(low), Some(high)) if low > high => refused!(
                 "gauge {name:?} passes no part: its limit low = {low}{symbol} is above high = {high}{symbol}"
-            )),
-            (_, Some(high)) if *high < 0.0 && measures.facts().never_negative => Err(format!(
+            ),
+            (_, Some(high)) if *high < 0.0 && measures.facts().never_negative => refused!(
                 "gauge {name:?} passes no part: its value is never below 0, its limit high = {high}{symbol} is"
-            )),
+            ),
             _ => Ok(()),
         }
     }
@@ -112,7 +121,7 @@ impl GaugeFile {
     ///
     /// # Errors
     /// In words that name the key, the value and the bounds.
-    pub(super) fn check_numbers(&self) -> Result<(), String> {
+    pub(super) fn check_numbers(&self) -> Result<(), Refusal> {
         let [_, most] = self.measures.facts().unit.range();
         if let Some(Tolerance { about, plus, minus }) = self.tolerance {
             if let About::Nominal(nominal) = about {
@@ -124,9 +133,9 @@ impl GaugeFile {
             if let (Some(plus), Some(minus)) = (plus, minus)
                 && plus < -minus
             {
-                return Err(format!(
+                return refused!(
                     "plus is {plus} and minus is {minus}: the lower limit would be above the upper one"
-                ));
+                );
             }
         }
         if let Some(Master { value, u }) = self.master {
@@ -134,7 +143,7 @@ impl GaugeFile {
             within("master_u", u, 0.0, most)?;
         }
         let mut golden = self.golden_value.into_iter();
-        golden.try_for_each(|value| within("golden_value", value, f64::MIN, f64::MAX))
+        Ok(golden.try_for_each(|value| within("golden_value", value, f64::MIN, f64::MAX))?)
     }
 
     /// Whether a part can miss one of its limits: limits at the ends of what its unit can have are
@@ -205,7 +214,7 @@ mod tests {
                 (None, Some(most * (1.0 + 1e-9))),
             ] {
                 let words = check(low, high).expect_err(&format!("{kind:?} {low:?} {high:?}"));
-                assert!(words.contains("\"the gauge\""), "{words}");
+                assert!(words.words.contains("\"the gauge\""), "{words}");
             }
         }
         for kind in [

@@ -3,8 +3,10 @@
 //! Numbers are parsed once the gauge's name is known, so that a refusal can name the gauge and the
 //! key; the parser's message would only give the line and column.
 
+use super::Refusal;
 use super::gauge::{GaugeFile, no_limit};
 use super::tolerance::{About, Master, Tolerance};
+use crate::recipe::rules::refused;
 use algo::inspect::Measure;
 use hal::bounds::{clipped, shortened};
 use serde::de::{DeserializeOwned, Error as _, MapAccess, Visitor};
@@ -18,6 +20,7 @@ use std::fmt::{Display, Formatter};
 const SAME: f64 = 1e-9;
 
 /// The keys of an object in their order, each with the text of its value.
+#[derive(Default)]
 pub(super) struct Keys(pub Vec<(String, Box<RawValue>)>);
 
 impl<'de> Deserialize<'de> for Keys {
@@ -60,20 +63,20 @@ impl Keys {
     }
 
     /// The value of a key, `what` it is; none if it is missing or null.
-    fn read<T: DeserializeOwned>(&mut self, key: &str, what: &str) -> Result<Option<T>, String> {
+    fn read<T: DeserializeOwned>(&mut self, key: &str, what: &str) -> Result<Option<T>, Refusal> {
         let Some(text) = self.take(key) else {
             return Ok(None);
         };
         serde_json::from_str(text.get())
-            .map_err(|_| format!("{key} is {}: write {what}", clipped(text.get())))
+            .map_err(|_| format!("{key} is {}: write {what}", clipped(text.get())).into())
     }
 
-    fn number(&mut self, key: &str) -> Result<Option<f64>, String> {
+    fn number(&mut self, key: &str) -> Result<Option<f64>, Refusal> {
         self.read(key, "a number")
     }
 
     /// What limits come from.
-    fn tolerance(&mut self) -> Result<Option<Tolerance>, String> {
+    fn tolerance(&mut self) -> Result<Option<Tolerance>, Refusal> {
         // A place is a parameter of the kind.
         let is_place = |(key, value): &(String, Box<RawValue>)| {
             key == "nominal" && value.get().starts_with('[')
@@ -95,9 +98,7 @@ impl Keys {
             (None, false) => {
                 let stray = plus.map(|_| "plus").or(minus.map(|_| "minus"));
                 return stray.map_or(Ok(None), |key| {
-                    Err(format!(
-                        "it has {key} without nominal or golden = true: add one of them"
-                    ))
+                    refused!("it has {key} without nominal or golden = true: add one of them")
                 });
             }
         };
@@ -107,7 +108,7 @@ impl Keys {
         Ok(Some(Tolerance { about, plus, minus }))
     }
 
-    fn master(&mut self) -> Result<Option<Master>, String> {
+    fn master(&mut self) -> Result<Option<Master>, Refusal> {
         let (value, u) = (self.number("master")?, self.number("master_u")?);
         match (value, u) {
             (None, Some(_)) => Err("it has master_u without master: add it".into()),
@@ -119,7 +120,7 @@ impl Keys {
     }
 
     /// The kind with its parameters: all keys that are left.
-    fn measures(self) -> Result<Measure, String> {
+    fn measures(self) -> Result<Measure, Refusal> {
         let Self(keys) = self;
         if !keys.iter().any(|(key, _)| key == "kind") {
             return Err("it has no kind: add one".into());
@@ -131,7 +132,7 @@ impl Keys {
         let known = parameters(&measures);
         let unknown = |key: &&(String, _)| key.0 != "kind" && !known.contains_key(&key.0);
         match keys.iter().find(unknown) {
-            Some((key, _)) => Err(format!("it has an unknown key {:?}", clipped(key))),
+            Some((key, _)) => refused!("it has an unknown key {:?}", clipped(key)),
             None => Ok(measures),
         }
     }
@@ -154,10 +155,10 @@ impl<'de> Deserialize<'de> for GaugeFile {
 
 impl GaugeFile {
     /// The gauge that has these keys.
-    fn read(mut keys: Keys) -> Result<Self, String> {
+    fn read(mut keys: Keys) -> Result<Self, Refusal> {
         let name = keys.read("name", "the gauge's name in quotes")?;
         let name: String = name.ok_or("a gauge has no name: add one")?;
-        let named = |error: String| format!("gauge {:?}: {error}", clipped(&name));
+        let named = |error: Refusal| format!("gauge {:?}: {error}", clipped(&name));
         let limits = ["low", "high"].map(|which| (which, keys.take(which)));
         let mut gauge = Self::without_limits(keys, &name).map_err(named)?;
         for (which, limit) in limits {
@@ -178,7 +179,7 @@ impl GaugeFile {
         Ok(gauge)
     }
 
-    fn without_limits(mut keys: Keys, name: &str) -> Result<Self, String> {
+    fn without_limits(mut keys: Keys, name: &str) -> Result<Self, Refusal> {
         let slot = keys.read("slot", "a whole number from 1 to 64")?;
         let slot = slot.ok_or("it has no slot: write 1 to 64")?;
         let of: Vec<String> = keys
@@ -203,7 +204,7 @@ impl GaugeFile {
     }
 
     /// Refuses limits that are not what they are said to come from.
-    fn check_sources(&self) -> Result<(), String> {
+    fn check_sources(&self) -> Result<(), Refusal> {
         let Some(tolerance) = self.tolerance else {
             return Ok(());
         };
@@ -226,9 +227,9 @@ impl GaugeFile {
                 (limit, expected) => limit.is_none() && expected.is_none(),
             };
             if !same {
-                return Err(format!(
+                return refused!(
                     "{which} is not what {source} with plus and minus gives: leave {which} or {source} out"
-                ));
+                );
             }
         }
         Ok(())

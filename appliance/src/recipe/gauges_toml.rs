@@ -3,15 +3,17 @@
 //! What is worked out is left out: limits that come from a nominal value or from golden, and what
 //! golden has. So the text that is written for a recipe is read as what it was written for.
 
+use super::Refusal;
 use super::archive::Arrays;
 use super::file::RecipeFile;
-use super::gauge_keys::placeless;
+use super::gauge_keys::{Keys, placeless};
 use super::golden::{TaughtRecipe, UnsealedRecipe};
 use super::{DatumFile, FeatureFile, GaugeFile};
+use crate::recipe::rules::refused;
 use crate::system::headway::Headway;
 use hal::bounds::{clipped, shortened};
-use serde::Deserialize;
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
 use std::fmt::Write as _;
 use toml::Table;
 
@@ -57,12 +59,9 @@ impl Gauging {
     ///
     /// # Errors
     /// In words: it is no TOML, too long, or a key is unknown, missing, or not of its kind.
-    pub fn from_toml(text: &str) -> Result<Self, String> {
+    pub fn from_toml(text: &str) -> Result<Self, Refusal> {
         if text.len() as u64 > MAX_TEXT {
-            return Err(format!(
-                "it has {} bytes: write at most {MAX_TEXT}",
-                text.len()
-            ));
+            return refused!("it has {} bytes: write at most {MAX_TEXT}", text.len());
         }
         let wrong = |error: toml::de::Error| shortened(error.to_string().trim_end());
         let text: Text = toml::from_str(text).map_err(wrong)?;
@@ -78,48 +77,17 @@ impl Gauging {
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
         for feature in &self.features {
-            let keys = [
-                ("name", Some(json!(feature.name))),
-                ("kind", Some(json!(feature.kind))),
-                (
-                    "region",
-                    Some(json!(feature.region)).filter(|_| !feature.region.is_empty()),
-                ),
-                ("plane", feature.plane.as_ref().map(|name| json!(name))),
-                ("rim_mm", feature.rim_mm.map(|mm| json!(mm))),
-                ("thickness_mm", feature.thickness_mm.map(|mm| json!(mm))),
-                ("from", feature.from.map(|place| json!(place))),
-                ("to", feature.to.map(|place| json!(place))),
-                ("width_mm", feature.width_mm.map(|mm| json!(mm))),
-                ("left", feature.left.map(|at| json!(at))),
-                ("right", feature.right.map(|at| json!(at))),
-                ("edge_mm", feature.edge_mm.map(|mm| json!(mm))),
-                (
-                    "edge_tolerance_mm",
-                    feature.edge_tolerance_mm.map(|mm| json!(mm)),
-                ),
-            ];
-            let keys = keys.into_iter();
-            write(
-                &mut text,
-                "feature",
-                keys.filter_map(|(key, value)| Some((key, value?))),
-            );
+            write(&mut text, "feature", feature, &[]);
         }
-        for DatumFile { name, of } in &self.datums {
-            write(
-                &mut text,
-                "datum",
-                [("name", json!(name)), ("of", json!(of))],
-            );
+        for datum in &self.datums {
+            write(&mut text, "datum", datum, &[]);
         }
         for gauge in &self.gauges {
-            let by_tolerance =
-                |key: &str| gauge.tolerance.is_some() && matches!(key, "low" | "high");
-            let keys = gauge.keys();
-            let keys = keys.iter().map(|(key, value)| (&**key, value.clone()));
-            let written = keys.filter(|(key, _)| *key != WORKED_OUT && !by_tolerance(key));
-            write(&mut text, "gauge", written);
+            let worked_out: &[_] = match gauge.tolerance {
+                Some(_) => &[WORKED_OUT, "low", "high"],
+                None => &[WORKED_OUT],
+            };
+            write(&mut text, "gauge", gauge, worked_out);
         }
         text
     }
@@ -128,7 +96,7 @@ impl Gauging {
     ///
     /// # Errors
     /// In words: they do not fit each other or the recipe.
-    pub fn set(self, before: &RecipeFile, arrays: Arrays) -> Result<TaughtRecipe, String> {
+    pub fn set(self, before: &RecipeFile, arrays: Arrays) -> Result<TaughtRecipe, Refusal> {
         let mut file = RecipeFile {
             features: self.features,
             datums: self.datums,
@@ -137,13 +105,12 @@ impl Gauging {
         };
         file.gauges.sort_by_key(|gauge| gauge.slot);
         file.set_gauges_of(before)?;
-        file.check_bounds()?;
         UnsealedRecipe::of(file, arrays, Headway::silent())?.seal()
     }
 }
 
 /// A gauge from its table.
-fn gauge(table: Table) -> Result<GaugeFile, String> {
+fn gauge(table: Table) -> Result<GaugeFile, Refusal> {
     let name = table.get("name").and_then(toml::Value::as_str);
     let name = format!("gauge {:?}", clipped(name.unwrap_or_default()));
     let nominal = table.get("nominal");
@@ -160,29 +127,36 @@ fn gauge(table: Table) -> Result<GaugeFile, String> {
             .filter(|_| there)
             .find(|key| table.contains_key(*key));
         if let Some(limit) = limit {
-            return Err(format!(
+            return refused!(
                 "{name}: it has {limit} and {source}, which gives the limits: leave one of them out"
-            ));
+            );
         }
     }
     if table.contains_key(WORKED_OUT) {
-        return Err(format!("{name}: it has an unknown key {WORKED_OUT:?}"));
+        return refused!("{name}: it has an unknown key {WORKED_OUT:?}");
     }
     for (key, value) in &table {
         if let Some(number) = value.as_float().filter(|number| !number.is_finite()) {
             let key = clipped(key);
-            return Err(format!("{name}: {key} is {number}: write a finite number"));
+            return refused!("{name}: {key} is {number}: write a finite number");
         }
     }
     // Numbers inside of lists that are not finite become null, which no key takes.
     let json = serde_json::to_string(&table).map_err(placeless)?;
-    serde_json::from_str(&json).map_err(placeless)
+    Ok(serde_json::from_str(&json).map_err(placeless)?)
 }
 
-/// Writes an element of the list `of` with its keys.
-fn write<'a>(text: &mut String, of: &str, keys: impl IntoIterator<Item = (&'a str, Value)>) {
-    let _ = writeln!(text, "{}[[{of}]]", if text.is_empty() { "" } else { "\n" });
-    for (key, value) in keys {
+/// Writes an element of a list with its keys in their order, but for those that are left out.
+fn write(text: &mut String, list: &str, element: &impl Serialize, left_out: &[&str]) {
+    let _ = writeln!(
+        text,
+        "{}[[{list}]]",
+        if text.is_empty() { "" } else { "\n" }
+    );
+    let json = serde_json::to_string(element).unwrap_or_default();
+    let Keys(keys) = serde_json::from_str(&json).unwrap_or_default();
+    for (key, value) in keys.iter().filter(|(key, _)| !left_out.contains(&&**key)) {
+        let value = serde_json::from_str(value.get()).unwrap_or_default();
         let _ = writeln!(text, "{key} = {}", written(&value));
     }
 }
@@ -301,7 +275,7 @@ master_u = 0.002
             ("[[datum]]", "[[system]]", "system"),
         ] {
             let said = refused(from, to);
-            assert!(said.contains(words), "{to}: {said}");
+            assert!(said.words.contains(words), "{to}: {said}");
         }
         let deep = format!("x = {}{}", "[".repeat(100_000), "]".repeat(100_000));
         Gauging::from_toml(&deep).unwrap_err();

@@ -5,6 +5,7 @@
 //! A kill between any two renames loses no generation.
 
 use super::RecipeFile;
+use super::Refusal;
 use super::store::{ChangeError, LoadError, Store, is_sound, manifest_at, write};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::{name_also, remove, rename_whole, sync_folder_of};
@@ -77,9 +78,9 @@ impl Store {
     pub fn undo(&self, number: u16, calibration: Option<&str>) -> Result<RecipeFile, ChangeError> {
         let _alone = self.lock().map_err(write(&self.folder))?;
         let before = self.before(number).ok_or(ChangeError::Nothing(number))?;
-        let unfit = |reason| {
+        let unfit = |reason: Refusal| {
             let words = format!("undo recipe {number}: its previous generation {reason}");
-            ChangeError::Unfit(words)
+            ChangeError::Unfit(words.into())
         };
         let restored = read(&before, number).map_err(unfit)?;
         let (path, previous, kept) = (self.path(number), self.previous(number), self.kept(number));
@@ -90,7 +91,8 @@ impl Store {
             return Err(unfit(reason.into()));
         }
         let shared = self.refuse_shared(number, &restored.part_number);
-        shared.map_err(|words| ChangeError::Unfit(format!("undo recipe {number}: {words}")))?;
+        shared
+            .map_err(|words| ChangeError::Unfit(format!("undo recipe {number}: {words}").into()))?;
         let rename = |from: &Path, to: &Path| rename_whole(from, to).map_err(write(to));
         if !path.exists() {
             rename(&before, &path)?;
@@ -142,10 +144,10 @@ impl Store {
 ///
 /// # Errors
 /// In words: why it cannot be used.
-fn read(path: &Path, number: u16) -> Result<RecipeFile, String> {
+fn read(path: &Path, number: u16) -> Result<RecipeFile, Refusal> {
     let read = Store::read(path, number).ok_or("is gone: teach the recipe again")?;
     read.and_then(|(file, _)| file.check_judging().map(|()| file))
-        .map_err(|reason| format!("cannot be used: {reason}"))
+        .map_err(|reason| format!("cannot be used: {reason}").into())
 }
 
 #[cfg(test)]
@@ -373,7 +375,7 @@ mod tests {
             let expected =
                 format!("version is {version}, this program reads 3: teach the part again");
             let words = Recipe::from_bytes(&bytes).unwrap_err();
-            assert!(words.contains(&expected), "{words}");
+            assert!(words.words.contains(&expected), "{words}");
             fs::write(place.file(""), &bytes).unwrap();
             let error = place.store.load(7).unwrap_err();
             assert!(matches!(error, LoadError::Unfit { .. }), "{error}");

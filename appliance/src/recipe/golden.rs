@@ -1,5 +1,6 @@
 //! Makes a recipe from a golden measurement, which comes from a head or from a recording.
 
+use super::Refusal;
 use super::archive::{self, Arrays};
 use super::captures::Offsets;
 use super::comparison::ComparisonFile;
@@ -164,7 +165,7 @@ impl UnsealedRecipe {
     ///
     /// # Errors
     /// In words, if it could not be packed, or not be loaded again.
-    pub fn seal(self) -> Result<TaughtRecipe, String> {
+    pub fn seal(self) -> Result<TaughtRecipe, Refusal> {
         self.seal_telling(Headway::silent())
     }
 
@@ -172,7 +173,7 @@ impl UnsealedRecipe {
     ///
     /// # Errors
     /// As [`Self::seal`].
-    pub fn seal_telling(self, headway: Headway<'_>) -> Result<TaughtRecipe, String> {
+    pub fn seal_telling(self, headway: Headway<'_>) -> Result<TaughtRecipe, Refusal> {
         let Self {
             manifest,
             arrays,

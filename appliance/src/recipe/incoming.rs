@@ -3,6 +3,7 @@
 //!
 //! Dropping it removes the file; files that a kill leaves behind are removed at the next start.
 
+use super::Refusal;
 use super::{Recipe, RecipeFile, Store};
 use crate::station::FULL_STORAGE_MIB;
 use crate::storage::folder::rename_whole;
@@ -86,13 +87,13 @@ impl Incoming {
     ///
     /// # Errors
     /// In words: why it is not a usable recipe.
-    pub fn recipe(&self) -> Result<Recipe, String> {
+    pub fn recipe(&self) -> Result<Recipe, Refusal> {
         let file = File::open(&self.path).map_err(|error| error.to_string())?;
         Recipe::read(BufReader::new(file), self.bytes)
     }
 
     /// The recipe with its manifest, once it was checked.
-    pub(super) fn read(&self) -> Result<(RecipeFile, Recipe), String> {
+    pub(super) fn read(&self) -> Result<(RecipeFile, Recipe), Refusal> {
         let file = File::open(&self.path).map_err(|error| error.to_string())?;
         Recipe::read_to_edit(BufReader::new(file), self.bytes)
     }

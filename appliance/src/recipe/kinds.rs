@@ -1,8 +1,12 @@
-//! The table of kinds as data: what gauges can measure, for programs that show or edit recipes, and
+//! The tables of kinds as data: what gauges can measure, and what a form for features, datum systems
+//! and limits needs, for programs that show or edit recipes (no editor has a list of its own), and
 //! for people.
 
-use super::forms;
-use algo::inspect::{Domain, FeatureKind, Measure, Parameter, Unit};
+use super::feature::{self, LONGEST_NAME, MAX_CORNERS, MAX_OF};
+use super::rules::MAX_DATUMS;
+use algo::inspect::{
+    Domain, FeatureKind, MAX_FEATURES, MAX_GAUGES, Measure, Parameter, Unit, makes_datum,
+};
 use serde_json::{Value, json};
 
 /// All kinds of gauges in their order, with their default parameters, and the units that they have
@@ -14,8 +18,12 @@ pub fn json() -> Value {
         json!({ "unit": unit.symbol(), "low": low, "high": high })
     });
     json!({
-        "kinds": kinds, "units": units, "limits": forms::limits(), "features": forms::features(),
-        "datums": forms::datums(), "bounds": forms::bounds(),
+        "kinds": kinds, "units": units, "limits": limits(), "datums": datums(),
+        "features": feature::KINDS.map(|kind| kind.json()),
+        "bounds": {
+            "features": MAX_FEATURES, "gauges": MAX_GAUGES, "corners": MAX_CORNERS,
+            "characters": LONGEST_NAME,
+        },
     })
 }
 
@@ -38,7 +46,7 @@ fn kind(example: &Measure) -> Value {
         "words": facts.words,
         "unit": facts.unit.symbol(),
         "takes": takes(example),
-        "pairs": forms::pairs(example),
+        "pairs": pairs(example),
         "negative": negative(example),
         "datum": facts.datum,
         "compares": facts.compares,
@@ -153,9 +161,81 @@ fn unit_with(example: &Measure, name: &str, word: &str) -> Unit {
     with().map_or(Unit::None, |with| with.facts().unit)
 }
 
+/// Which kinds of features go together in a gauge of two; none of others.
+fn pairs(of: &Measure) -> Vec<[&'static str; 2]> {
+    let [first, second] = of.facts().takes else {
+        return Vec::new();
+    };
+    let all = first
+        .iter()
+        .flat_map(|&one| second.iter().map(move |&other| [one, other]));
+    let measured = all.filter(|pair| of.measures(pair));
+    measured.map(|pair| pair.map(FeatureKind::name)).collect()
+}
+
+/// What makes a datum system.
+fn datums() -> Value {
+    let mut frames: Vec<Vec<FeatureKind>> = vec![Vec::new()];
+    let mut from = 0;
+    for _ in 0..MAX_OF {
+        let to = frames.len();
+        for at in from..to {
+            for kind in FeatureKind::ALL {
+                let longer = frames[at].iter().copied().chain([kind]).collect();
+                frames.push(longer);
+            }
+        }
+        from = to;
+    }
+    let frames = frames.iter().filter(|of| makes_datum(of));
+    let names =
+        |of: &Vec<FeatureKind>| -> Vec<&str> { of.iter().map(|kind| kind.name()).collect() };
+    json!({
+        "about": "A frame of the part's own features (ISO 5459): a plane, then what places it in the plane.",
+        "most": MAX_DATUMS, "frames": frames.map(names).collect::<Vec<_>>(),
+    })
+}
+
+/// The keys that the limits of a gauge come from.
+fn limits() -> Value {
+    let limit = |name: &str, of: &[&str], about: &str| json!({ "name": name, "unit": null, "of": of, "about": about });
+    let tolerance = ["nominal", "golden"];
+    json!([
+        limit("low", &["limits"], "lower limit, inclusive"),
+        limit("high", &["limits"], "upper limit, inclusive"),
+        limit(
+            "nominal",
+            &["nominal"],
+            "the middle of the tolerance, from the drawing"
+        ),
+        limit(
+            "golden",
+            &["golden"],
+            "true: the middle is what the part that was taught has"
+        ),
+        limit(
+            "plus",
+            &tolerance,
+            "how far above the middle the upper limit lies"
+        ),
+        limit(
+            "minus",
+            &tolerance,
+            "how far below the middle the lower limit lies"
+        ),
+        limit(
+            "master",
+            &["master"],
+            "what another instrument has measured of the part that was taught"
+        ),
+        limit("master_u", &["master"], "standard uncertainty of that"),
+    ])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::recipe::DatumFile;
 
     #[test]
     fn every_kind_is_listed_with_words_for_its_parameters_alone_and_its_defaults_are_allowed() {
@@ -198,5 +278,24 @@ mod tests {
         let units: Vec<&Value> = choices.iter().map(|of| &of["unit"]).collect();
         assert_eq!(units, ["mm", "mm", "mm", "°", "°", "°"]);
         assert!(table().contains("placement (whole part; ° or mm)"));
+    }
+
+    #[test]
+    fn pairs_and_frames_are_those_that_a_recipe_accepts() {
+        let distance = Measure::examples();
+        let distance = distance.iter().find(|of| of.name() == "distance").unwrap();
+        let pairs = pairs(distance);
+        assert!(pairs.contains(&["plane", "plane"]) && pairs.contains(&["circle", "slot"]));
+        assert!(!pairs.contains(&["plane", "circle"]));
+        let datums = datums();
+        let frames = datums["frames"].as_array().unwrap();
+        assert!(frames.contains(&json!(["plane"])));
+        assert!(frames.contains(&json!(["plane", "circle", "line"])));
+        assert!(!frames.contains(&json!(["circle"])));
+        for frame in frames {
+            let of: Vec<String> = serde_json::from_value(frame.clone()).unwrap();
+            let name = "A".into();
+            assert_eq!(DatumFile { name, of }.check_bounds(), Ok(()));
+        }
     }
 }

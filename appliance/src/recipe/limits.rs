@@ -78,7 +78,7 @@ impl GoldenPart<'_> {
         drop((weighed, noise));
         arrays.smoothing = sides.least.into();
         let proof = Proof::new(manifest, arrays, self.calibration, headway.part(0.2, 0.35));
-        let proof = proof.map_err(TeachError::Rig)?;
+        let proof = proof?;
         let mut judged = proof.displaced(headway.part(0.35, 1.0));
         drop(proof);
         if let Some(magnitudes) = Magnitudes::of(&judged, 0) {

@@ -1,5 +1,6 @@
 //! The models of the head that a recipe was taught with: with them golden is measured anywhere.
 
+use super::Refusal;
 use crate::head::calibration::{Calibration, CalibrationSigma, HeightsBy};
 use crate::head::seam;
 use hal::bounded;
@@ -41,7 +42,7 @@ impl ModelsFile {
         raster: (u32, u32),
         noise_counts: f64,
         sigma: Option<CalibrationSigma>,
-    ) -> Result<Calibration, String> {
+    ) -> Result<Calibration, Refusal> {
         let models = (&self.camera, &self.projector);
         let by_models = Calibration::new(frames, raster, models, noise_counts)
             .map_err(|error| format!("models: {error}"))?;

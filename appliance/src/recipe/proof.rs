@@ -6,6 +6,7 @@
 //! that would refuse the recipe's own part is moved until it holds, and teaching says so; that of the
 //! deviation is never moved (`refusal`).
 
+use super::Refusal;
 use super::archive::Arrays;
 use super::failure::TeachError;
 use super::file::TriedFile;
@@ -56,7 +57,7 @@ impl Proof {
         arrays: &Arrays,
         calibration: &Calibration,
         headway: Headway<'_>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refusal> {
         let recipe = Recipe::check(manifest, arrays.clone())?;
         let sequences = 0..recipe.sequences.len();
         let light = sequences.map(|sequence| recipe.light(sequence)).collect();

@@ -1,7 +1,9 @@
 //! Which pattern of a recording is a recipe's.
 
 use super::Recipe;
+use super::Refusal;
 use crate::head::seam;
+use crate::recipe::rules::refused;
 use algo::pattern::PhaseFunction;
 use hal::replay::Recording;
 
@@ -13,15 +15,16 @@ impl Recipe {
     ///
     /// # Errors
     /// If the frames are of another size, or no pattern is the recipe's; both are named.
-    pub fn pattern_in(&self, recording: &Recording) -> Result<usize, String> {
+    pub fn pattern_in(&self, recording: &Recording) -> Result<usize, Refusal> {
         let number = self.id.number;
         let (width, height, _) = self.conditions.camera;
         if (width, height) != (recording.width, recording.height) {
-            return Err(format!(
+            return refused!(
                 "recipe {number} is for frames of {width}x{height}, the recording has {}x{}: name the recipe that \
                  was taught with this camera",
-                recording.width, recording.height
-            ));
+                recording.width,
+                recording.height
+            );
         }
         let projector = &recording.projector;
         let mut others = Vec::new();
@@ -38,11 +41,11 @@ impl Recipe {
                 None => function.to_string(),
             });
         }
-        Err(format!(
+        refused!(
             "the recording was made with {}, recipe {number} with {}: name the recipe of this pattern",
             others.join(" and "),
             self.function
-        ))
+        )
     }
 }
 

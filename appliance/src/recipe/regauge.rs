@@ -3,9 +3,9 @@
 
 use super::archive::Arrays;
 use super::golden::UnsealedRecipe;
-use super::plan::{Golden, Plan, PlanError};
+use super::plan::{Golden, Plan};
 use super::planner::{self, Choice};
-use super::{GaugeFile, Part, Recipe, RecipeFile};
+use super::{Element, GaugeFile, Part, Recipe, RecipeFile, Refusal};
 use crate::head::calibration::Calibration;
 use crate::system::headway::Headway;
 use algo::inspect::{Findings, Missing};
@@ -25,14 +25,14 @@ impl UnsealedRecipe {
         mut manifest: RecipeFile,
         arrays: Arrays,
         headway: Headway<'_>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refusal> {
         let head = manifest.head()?;
         let settled = manifest.settle((&arrays, &head), headway);
-        let (mut choice, _) = settled.map_err(|error| error.words)?;
+        let (mut choice, _) = settled?;
         if manifest.two_frames {
             choice.reasons.push(Self::TWO_FRAMES.into());
         }
-        if manifest.gauge_of_contour().is_some() {
+        if manifest.has_contours() {
             choice.reasons.push(Self::CONTOURS.into());
         }
         Ok(Self {
@@ -40,22 +40,6 @@ impl UnsealedRecipe {
             arrays,
             choice,
         })
-    }
-}
-
-/// Why a recipe's limits and sequence cannot be settled.
-#[derive(Clone, Debug)]
-pub(super) struct Unsettled {
-    /// In words.
-    pub words: String,
-    /// The feature or gauge that is why, by its name.
-    pub of: Option<(Part, String)>,
-}
-
-impl From<String> for Unsettled {
-    fn from(words: String) -> Self {
-        let of = None;
-        Self { words, of }
     }
 }
 
@@ -70,12 +54,12 @@ impl RecipeFile {
         &mut self,
         (arrays, head): (&Arrays, &Calibration),
         headway: Headway<'_>,
-    ) -> Result<(Choice, Option<Golden>), Unsettled> {
+    ) -> Result<(Choice, Option<Golden>), Refusal> {
         self.gauges.sort_by_key(|gauge| gauge.slot);
         let choose = |of: &Self| planner::choose(&of.sequences, &of.gauges, arrays.widest());
         let mut choice = choose(self);
         self.production = choice.production;
-        if self.gauge_of_contour().is_none() && !self.gauges.iter().any(GaugeFile::needs_golden) {
+        if !self.has_contours() && !self.gauges.iter().any(GaugeFile::needs_golden) {
             return Ok((choice, None));
         }
         let head = &head.clone().with_rays();
@@ -102,32 +86,23 @@ impl RecipeFile {
         (arrays, head): (&Arrays, &Calibration),
         lenient: bool,
         headway: Headway<'_>,
-    ) -> Result<Golden, Unsettled> {
+    ) -> Result<Golden, Refusal> {
         let recipe = Recipe::fit(self, arrays.clone())?;
-        let name = |at: usize| {
-            let feature = self.features.get(at)?;
-            Some((Part::Feature, feature.name.clone()))
-        };
         let measure = match lenient {
             true => Plan::golden_leniently,
             false => Plan::golden,
         };
-        measure(recipe, head, headway).map_err(|error| Unsettled {
-            words: error.to_string(),
-            of: match error {
-                PlanError::Unfit { feature, .. } => feature.and_then(name),
-                _ => None,
-            },
-        })
+        Ok(measure(recipe, head, headway)?)
     }
 
     /// Takes over what is found of golden.
     ///
     /// # Errors
     /// In words: a gauge that needs golden's value has none, or one can never have a value.
-    fn follow(&mut self, golden: &Findings) -> Result<(), Unsettled> {
+    fn follow(&mut self, golden: &Findings) -> Result<(), Refusal> {
         let found = golden.readings.iter().zip(&golden.missing);
-        for (gauge, (reading, missing)) in self.gauges.iter_mut().zip(found) {
+        let gauges = self.gauges.iter_mut().enumerate();
+        for ((place, gauge), (reading, missing)) in gauges.zip(found) {
             gauge.set_golden(reading.as_ref());
             let name = clipped(&gauge.name);
             let words = if *missing == Some(Missing::Open) {
@@ -141,8 +116,8 @@ impl RecipeFile {
             } else {
                 continue;
             };
-            let of = Some((Part::Gauge, gauge.name.clone()));
-            return Err(Unsettled { words, of });
+            let of = Some(Element::new(Part::Gauge, place, &gauge.name));
+            return Err(Refusal { words, of });
         }
         Ok(())
     }

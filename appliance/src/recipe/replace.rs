@@ -1,8 +1,10 @@
 //! Teaching under a number that is taken: what the new recipe keeps of the one that it replaces.
 
+use super::Refusal;
 use super::golden::{Naming, UnsealedRecipe};
 use super::good_parts::DEVIATION_MM;
 use super::{RecipeFile, Store};
+use crate::recipe::rules::refused;
 use crate::system::headway::Headway;
 use algo::inspect::Marking;
 use hal::bounds::within;
@@ -15,9 +17,9 @@ pub const MOST_LIMIT_MM: f64 = 100.0;
 ///
 /// # Errors
 /// In words, with the bounds.
-pub fn check_limit(limit_mm: Option<f64>) -> Result<(), String> {
+pub fn check_limit(limit_mm: Option<f64>) -> Result<(), Refusal> {
     limit_mm.map_or(Ok(()), |limit| {
-        within("limit_mm", limit, LEAST_LIMIT_MM, MOST_LIMIT_MM)
+        Ok(within("limit_mm", limit, LEAST_LIMIT_MM, MOST_LIMIT_MM)?)
     })
 }
 
@@ -74,7 +76,7 @@ pub fn refuse_taken(
     recipes: &Store,
     number: u16,
     (attempt, replace, instead): (&str, &str, &str),
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     if !recipes.numbers().contains(&number) {
         return Ok(());
     }
@@ -93,10 +95,10 @@ pub fn refuse_taken(
     };
     let free = recipes.free();
     let free = free.map(|free| format!(", or {instead} {free}, which is free"));
-    Err(format!(
+    refused!(
         "{attempt}: recipe {number} has {has}: {replace}{}",
         free.unwrap_or_default()
-    ))
+    )
 }
 
 /// The refusal to keep the gauges of a recipe that is not there.
@@ -109,15 +111,17 @@ pub fn no_gauges(number: u16) -> String {
 /// # Errors
 /// In words: the frames have another size (features have polygons in camera pixels), or the recipe
 /// cannot judge.
-pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<(), String> {
+pub fn check_kept(replaced: &RecipeFile, (width, height): (u32, u32)) -> Result<(), Refusal> {
     let camera = &replaced.camera;
     if (camera.width, camera.height) == (width, height) {
         return replaced.check_judging();
     }
-    Err(format!(
+    refused!(
         "the features of recipe {} are in pixels of frames of {}×{}, this camera has {width}×{height}: teach without its gauges",
-        replaced.number, camera.width, camera.height
-    ))
+        replaced.number,
+        camera.width,
+        camera.height
+    )
 }
 
 /// Gives a recipe that was just taught the features, datum systems, gauges, guard band and least
@@ -130,7 +134,7 @@ pub fn keep_gauges(
     taught: UnsealedRecipe,
     replaced: &RecipeFile,
     headway: Headway<'_>,
-) -> Result<UnsealedRecipe, String> {
+) -> Result<UnsealedRecipe, Refusal> {
     let UnsealedRecipe {
         mut manifest,
         arrays,

@@ -5,7 +5,7 @@ use super::archive::Arrays;
 use super::golden::UnsealedRecipe;
 use super::plan::{Plan, PlanError};
 use super::planner::{self, Choice};
-use super::{FeatureFile, GaugeFile, Recipe, RecipeFile};
+use super::{FeatureFile, GaugeFile, Recipe, RecipeFile, Refusal};
 use crate::head::calibration::Calibration;
 use crate::system::headway::Headway;
 use algo::inspect::kinds::{Found, Roundness};
@@ -45,7 +45,7 @@ impl UnsealedRecipe {
     ///
     /// # Errors
     /// In words, if its manifest has no models of a head.
-    pub fn with_rims(self, headway: Headway<'_>) -> Result<Self, String> {
+    pub fn with_rims(self, headway: Headway<'_>) -> Result<Self, Refusal> {
         let Self {
             mut manifest,
             arrays,
@@ -139,18 +139,17 @@ fn keep_fitting(
     arrays: &Arrays,
     head: &Calibration,
     mut headway: Headway<'_>,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     while !rims.is_empty() {
         let recipe = Recipe::fit(manifest, arrays.clone())?;
         let planning = headway.part(0.0, 0.5);
         headway = headway.part(0.5, 1.0);
         let unfit = match Plan::check(recipe, head, planning) {
             Ok(()) => break,
-            Err(PlanError::Unfit {
-                feature: Some(unfit),
-                ..
-            }) => unfit,
-            Err(error) => return Err(error.to_string()),
+            Err(error) => Refusal::from(error),
+        };
+        let Some(crate::recipe::Element { place: unfit, .. }) = unfit.of else {
+            return Err(unfit);
         };
         let at = rims.iter().position(|(of, _)| of.feature == unfit);
         let at = at.ok_or_else(|| format!("feature {unfit} cannot be planned: teach again"))?;
@@ -262,9 +261,11 @@ fn found(
                 break;
             }
             Err(PlanError::Unfit {
-                feature: Some(unseen),
+                reason: Refusal {
+                    of: Some(unseen), ..
+                },
                 ..
-            }) if unseen < left.len() => drop(left.remove(unseen)),
+            }) if unseen.place < left.len() => drop(left.remove(unseen.place)),
             Err(_) => break,
         }
     }

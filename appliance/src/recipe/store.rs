@@ -4,8 +4,10 @@
 //! No recipe is ever half stored: a temporary name, sync, rename, sync of the folder. The generation
 //! before stays.
 
+use super::Refusal;
 use super::{Recipe, RecipeFile, archive};
 use crate::error::{Exit, Result};
+use crate::recipe::rules::refused;
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
 use std::fs;
@@ -30,7 +32,7 @@ pub enum LoadError {
         /// The newer file.
         path: PathBuf,
         /// What is wrong with it.
-        reason: String,
+        reason: Refusal,
     },
     /// The newer generation is not damaged, and cannot be used.
     #[error("recipe file {path}: {reason}", path = path.display())]
@@ -38,7 +40,7 @@ pub enum LoadError {
         /// The newer file.
         path: PathBuf,
         /// Why it cannot be used, with the remedy.
-        reason: String,
+        reason: Refusal,
     },
     /// Several recipes have the part number, so it selects none of them.
     #[error(
@@ -66,12 +68,12 @@ pub enum ChangeError {
     Nothing(u16),
     /// The number has a recipe, which is not to be replaced without being asked for: in words, with
     /// the remedy.
-    #[error("{words}")]
+    #[error("{refusal}")]
     Taken {
         /// The number.
         number: u16,
         /// Which recipe has the number, how to replace it, and a number that is free.
-        words: String,
+        refusal: Refusal,
     },
     /// Another change was stored since the recipe that is edited was read.
     #[error(
@@ -80,7 +82,7 @@ pub enum ChangeError {
     Outdated(u16),
     /// The recipe that is edited, imported or restored cannot be used: why, with the remedy.
     #[error("{0}")]
-    Unfit(String),
+    Unfit(Refusal),
     /// The edited recipe cannot be stored.
     #[error("store recipe: {0}: free space")]
     Store(io::Error),
@@ -259,7 +261,9 @@ impl Store {
                 fallback: Some(format!(
                     "recipe file {} {}; the previous generation is used",
                     path.display(),
-                    reason.as_deref().unwrap_or("is missing")
+                    reason
+                        .as_ref()
+                        .map_or("is missing", |reason| &*reason.words)
                 )),
             }),
             _ => match reason {
@@ -301,18 +305,19 @@ impl Store {
     }
 
     /// The recipe in a file and its manifest, if the file exists.
-    pub(super) fn read(path: &Path, number: u16) -> Option<Result<(RecipeFile, Recipe), String>> {
+    pub(super) fn read(path: &Path, number: u16) -> Option<Result<(RecipeFile, Recipe), Refusal>> {
         let opened = fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (size, file) = match opened {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
-            Err(error) => return Some(Err(error.to_string())),
+            Err(error) => return Some(Err(error.to_string().into())),
             Ok(opened) => opened,
         };
         Some(match Recipe::read_to_edit(io::BufReader::new(file), size) {
-            Ok((file, _)) if file.number != number => Err(format!(
+            Ok((file, _)) if file.number != number => refused!(
                 "holds recipe {}: rename it to {:04}.recipe",
-                file.number, file.number
-            )),
+                file.number,
+                file.number
+            ),
             read => read,
         })
     }
@@ -321,7 +326,7 @@ impl Store {
     ///
     /// # Errors
     /// In words: there is none, or it cannot be read.
-    pub fn manifest(&self, number: u16) -> Result<RecipeFile, String> {
+    pub fn manifest(&self, number: u16) -> Result<RecipeFile, Refusal> {
         let file = fs::File::open(self.path(number))
             .map_err(|error| format!("recipe {number}: {error}: teach or import it"))?;
         archive::manifest(file)
@@ -369,13 +374,13 @@ impl Store {
     ///
     /// # Errors
     /// In words: which recipe has it, with the remedy.
-    pub fn refuse_shared(&self, number: u16, part_number: &str) -> Result<(), String> {
+    pub fn refuse_shared(&self, number: u16, part_number: &str) -> Result<(), Refusal> {
         match self.other_holder(number, part_number) {
             None => Ok(()),
-            Some(other) => Err(format!(
+            Some(other) => refused!(
                 "recipe {other} has the part number {part_number:?}, by which a PLC selects: give one of them another part number, or \
                  delete recipe {other}"
-            )),
+            ),
         }
     }
 
@@ -431,6 +436,6 @@ fn is_undamaged(path: &Path) -> bool {
 fn refuse_judging(path: &Path, file: &RecipeFile) -> Result<(), LoadError> {
     file.check_judging().map_err(|reason| LoadError::Unfit {
         path: path.to_path_buf(),
-        reason: format!("{reason}; edit it on the page (Recipes, Edit)"),
+        reason: format!("{reason}; edit it on the page (Recipes, Edit)").into(),
     })
 }

@@ -165,7 +165,7 @@ pub fn teach_showing(
     choice.reasons.extend(words);
     memory::trim();
     let trying = stage(0.9, 1.0, "trying the recipe on the part")?;
-    let recipe = Recipe::check(&manifest, arrays.clone()).map_err(TeachError::Rig)?;
+    let recipe = Recipe::check(&manifest, arrays.clone())?;
     let plan = computing.on(|| Plan::telling(recipe, calibration, false, trying.part(0.0, 0.4)));
     let plan = plan.map_err(TeachError::rig)?;
     let trying = trying.part(0.4, 1.0);
@@ -194,7 +194,7 @@ pub fn teach_showing(
     // Other limits may ask for another sequence.
     let settling = trying.part(0.8, 1.0);
     let settled = computing.on(|| UnsealedRecipe::of(manifest, arrays, settling));
-    let mut settled = settled.map_err(TeachError::Rig)?;
+    let mut settled = settled?;
     settled.choice.reasons = choice.reasons;
     Ok(settled)
 }

@@ -10,9 +10,9 @@ use super::archive::Arrays;
 use super::edit::Edit;
 use super::outline::{Outline, Seen};
 use super::plan::{Golden, Plan};
-use super::regauge::Unsettled;
+use super::rules;
 use super::store::LoadedRecipe;
-use super::{FeatureFile, GaugeFile, Part, Recipe, RecipeFile, Wrong};
+use super::{Element, FeatureFile, GaugeFile, Part, Recipe, RecipeFile, Refusal};
 use crate::head::calibration::Calibration;
 use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, MAX_GAUGES};
 use crate::system::headway::Headway;
@@ -24,9 +24,17 @@ use serde_json::{Value, json};
 /// Limits less than so many times U apart are too fine for a gauge.
 const FINE: f64 = 4.0;
 
+/// Something that is wrong with an edit.
+#[derive(Debug)]
+struct Problem {
+    refusal: Refusal,
+    /// Whether the list cannot be stored because of it.
+    refused: bool,
+}
+
 /// A recipe that is edited: what does not change between tries.
 #[derive(Debug)]
-pub struct Opened {
+pub struct EditedRecipe {
     file: RecipeFile,
     arrays: Arrays,
     /// The models of the recipe, with the rays of all pixels.
@@ -40,7 +48,7 @@ pub struct Over;
 /// An edit that was tried.
 #[derive(Debug)]
 pub struct Tried {
-    /// The recipe with what of the list is not wrong.
+    /// The recipe with the valid part of the list.
     file: RecipeFile,
     outline: Outline,
     /// All that is wrong with the list, as the API has it.
@@ -51,10 +59,10 @@ pub struct Tried {
     pub gauges: Vec<Value>,
 }
 
-impl Opened {
+impl EditedRecipe {
     /// # Errors
     /// In words, if its models are none.
-    pub fn new(LoadedRecipe { file, recipe, .. }: LoadedRecipe) -> Result<Self, String> {
+    pub fn new(LoadedRecipe { file, recipe, .. }: LoadedRecipe) -> Result<Self, Refusal> {
         let (head, arrays) = (file.head()?.with_rays(), recipe.arrays);
         Ok(Self { file, arrays, head })
     }
@@ -72,8 +80,14 @@ impl Opened {
         let mut sent = self.file.clone();
         edit.apply(&mut sent);
         sent.judges_nothing &= sent.is_without_limits();
+        let problems = rules::problems(&sent).into_iter();
         let mut trial = Trial {
-            wrong: sent.wrong(),
+            problems: problems
+                .map(|refusal| Problem {
+                    refusal,
+                    refused: true,
+                })
+                .collect(),
             sent,
             of: (&self.arrays, &self.head),
             is_over,
@@ -102,7 +116,7 @@ impl Opened {
         trial.features.sort_by_key(|(at, _)| *at);
         let features = trial.features.into_iter().map(|(_, seen)| seen);
         Ok(Tried {
-            problems: trial.wrong.iter().map(Wrong::json).collect(),
+            problems: trial.problems.iter().map(Problem::json).collect(),
             features: features.collect(),
             gauges,
             outline,
@@ -114,8 +128,20 @@ impl Opened {
     ///
     /// # Errors
     /// In words: nothing of it can be measured.
-    pub fn recipe(&self, tried: &Tried) -> Result<Recipe, String> {
+    pub fn recipe(&self, tried: &Tried) -> Result<Recipe, Refusal> {
         Recipe::fit(&tried.file, self.arrays.clone())
+    }
+}
+
+impl Problem {
+    /// As the API has it (docs/api.md, `problems`).
+    fn json(&self) -> Value {
+        let mut all = json!({ "words": self.refusal.words, "refused": self.refused });
+        if let Some(Element { part, place, name }) = &self.refusal.of {
+            all[part.word()] = name.as_str().into();
+            all["at"] = (*place).into();
+        }
+        all
     }
 }
 
@@ -137,7 +163,7 @@ struct Trial<'a> {
     /// The recipe's arrays and models.
     of: (&'a Arrays, &'a Calibration),
     is_over: &'a dyn Fn() -> bool,
-    wrong: Vec<Wrong>,
+    problems: Vec<Problem>,
     /// What golden has of features, with their places in the list.
     features: Vec<(usize, Value)>,
     /// The places of features that golden does not have.
@@ -149,7 +175,7 @@ impl Trial<'_> {
     /// it measures anything.
     fn settled(&mut self) -> Result<(RecipeFile, Option<Golden>), Over> {
         loop {
-            let mut file = self.sent.without(&self.wrong);
+            let mut file = self.valid();
             if file.gauges.is_empty() {
                 return Ok((file, None));
             }
@@ -162,7 +188,7 @@ impl Trial<'_> {
             match golden {
                 Ok(golden) => return Ok((file, Some(golden))),
                 Err(error) => {
-                    if !self.refuse(error, true) {
+                    if !self.cannot_measure(&error, true) {
                         return Ok((file, None));
                     }
                 }
@@ -177,30 +203,84 @@ impl Trial<'_> {
         }
     }
 
-    /// Takes over why something cannot be measured; answers whether something can be left out
-    /// because of it.
-    fn refuse(&mut self, error: Unsettled, refused: bool) -> bool {
-        let Unsettled { words, of } = error;
-        let place =
-            |(part, name): (Part, String)| Some((part, self.sent.place(part, &name)?, name));
-        let of = of.and_then(place);
-        if let Some((Part::Feature, at, _)) = &of {
-            self.missed.push(*at);
+    /// Whether an element of the list has a problem, or one because of which it cannot be stored.
+    fn is_wrong(&self, part: Part, place: usize, refused: bool) -> bool {
+        self.problems.iter().any(|problem| {
+            let of = problem.refusal.of.as_ref();
+            (problem.refused || !refused)
+                && of.is_some_and(|of| (of.part, of.place) == (part, place))
+        })
+    }
+
+    /// The recipe without the elements that cannot be stored, and without those that refer to them.
+    fn valid(&self) -> RecipeFile {
+        fn retain<T>(list: &mut Vec<T>, keep: impl Fn(usize, &T) -> bool) {
+            let mut places = 0..;
+            list.retain(|element| places.next().is_some_and(|place| keep(place, element)));
         }
-        let is_new = !self.wrong.iter().any(|wrong| wrong.words == words);
+        let is_valid = |part, place| !self.is_wrong(part, place, true);
+        let mut file = self.sent.clone();
+        retain(&mut file.features, |place, _| {
+            is_valid(Part::Feature, place)
+        });
+        let planes: Vec<String> = file.features.iter().map(|of| of.name.clone()).collect();
+        let has_plane = |of: &FeatureFile| of.plane.as_ref().is_none_or(|of| planes.contains(of));
+        file.features.retain(has_plane);
+        let names: Vec<&String> = file.features.iter().map(|of| &of.name).collect();
+        let are_there = |of: &[String]| of.iter().all(|name| names.contains(&name));
+        retain(&mut file.datums, |place, datum| {
+            is_valid(Part::Datum, place) && are_there(&datum.of)
+        });
+        let datums: Vec<&String> = file.datums.iter().map(|of| &of.name).collect();
+        retain(&mut file.gauges, |place, gauge| {
+            let has_datum = gauge.datum.as_ref().is_none_or(|of| datums.contains(&of));
+            is_valid(Part::Gauge, place) && has_datum && are_there(&gauge.of)
+        });
+        file
+    }
+
+    /// The place of the first feature or gauge with a name in the list that was sent.
+    fn place(&self, part: Part, name: &str) -> Option<usize> {
+        match part {
+            Part::Feature => self.sent.features.iter().position(|of| of.name == name),
+            Part::Datum => self.sent.datums.iter().position(|of| of.name == name),
+            Part::Gauge => self.sent.gauges.iter().position(|of| of.name == name),
+        }
+    }
+
+    /// Takes over why a valid part of the list cannot be measured, or stored where it is `refused`;
+    /// answers whether something can be left out because of it.
+    fn refuse(&mut self, words: String, of: Option<(Part, &str)>, refused: bool) -> bool {
+        let of = of.and_then(|(part, name)| {
+            let place = self.place(part, name)?;
+            Some(Element::new(part, place, name))
+        });
+        if let Some(feature) = of.as_ref().filter(|of| of.part == Part::Feature) {
+            self.missed.push(feature.place);
+        }
         let is_known = of.is_some();
+        let is_new = !self
+            .problems
+            .iter()
+            .any(|problem| problem.refusal.words == words);
         if is_new {
-            self.wrong.push(Wrong { of, words, refused });
+            let refusal = Refusal { words, of };
+            self.problems.push(Problem { refusal, refused });
         }
         is_new && is_known
+    }
+
+    /// As [`Self::refuse`], of what planning or measuring refuses.
+    fn cannot_measure(&mut self, Refusal { words, of }: &Refusal, refused: bool) -> bool {
+        let of = of.as_ref().map(|of| (of.part, &*of.name));
+        self.refuse(words.clone(), of, refused)
     }
 
     /// Names gauges whose limits golden has made impossible, and what golden does not show.
     fn warn(&mut self, file: &RecipeFile, judged: &Inspection, seen: &[Seen<'_>]) {
         for gauge in file.gauges.iter().filter(|gauge| gauge.needs_golden()) {
-            if let Err(words) = gauge.check_judging() {
-                let of = Some((Part::Gauge, gauge.name.clone()));
-                self.refuse(Unsettled { words, of }, true);
+            if let Err(Refusal { words, .. }) = gauge.check_judging() {
+                self.refuse(words, Some((Part::Gauge, &gauge.name)), true);
             }
         }
         self.miss(seen);
@@ -212,8 +292,7 @@ impl Trial<'_> {
                 let name = clipped(&gauge.name);
                 let words =
                     format!("gauge {name:?} has no value on the part that was taught: {reason}");
-                let of = Some((Part::Gauge, gauge.name.clone()));
-                self.refuse(Unsettled { words, of }, false);
+                self.refuse(words, Some((Part::Gauge, &gauge.name)), false);
             }
         }
     }
@@ -227,15 +306,14 @@ impl Trial<'_> {
             let name = clipped(feature.name());
             let words =
                 format!("feature {name:?}, on the part that was taught: {reason}: {remedy}");
-            let of = Some((Part::Feature, feature.name().into()));
-            self.refuse(Unsettled { words, of }, false);
+            self.refuse(words, Some((Part::Feature, feature.name())), false);
         }
     }
 
     /// Keeps what golden has of features.
     fn take(&mut self, seen: &[Seen<'_>]) {
         for feature in seen {
-            let place = self.sent.place(Part::Feature, feature.name());
+            let place = self.place(Part::Feature, feature.name());
             let value = serde_json::to_value(feature).ok();
             self.features.extend(place.zip(value));
         }
@@ -244,8 +322,8 @@ impl Trial<'_> {
     /// Measures the features that no gauge is of.
     fn probe(&mut self, file: &RecipeFile) -> Result<(), Over> {
         loop {
-            let place = |feature: &FeatureFile| self.sent.place(Part::Feature, &feature.name);
-            let is_wrong = |at| self.wrong.iter().any(|wrong| wrong.is(Part::Feature, at));
+            let place = |feature: &FeatureFile| self.place(Part::Feature, &feature.name);
+            let is_wrong = |place| self.is_wrong(Part::Feature, place, false);
             let is_left =
                 |of: &&FeatureFile| place(of).is_some_and(|at| !self.is_known(at) && !is_wrong(at));
             let left = file.features.iter().filter(is_left).take(MAX_GAUGES);
@@ -266,7 +344,7 @@ impl Trial<'_> {
                 }
                 // A feature without a gauge may be stored.
                 Err(error) => {
-                    if !self.refuse(error, false) {
+                    if !self.cannot_measure(&error, false) {
                         return Ok(());
                     }
                 }

@@ -16,8 +16,8 @@ use super::gate;
 use super::problem::{Problem, Result};
 use super::query::Path;
 use super::site::Site;
-use crate::recipe::bounds::check_marking;
 use crate::recipe::replace;
+use crate::recipe::rules::check_marking;
 use crate::station::control::{ERROR_RESET, MAX_RECIPE, TRIGGER};
 use crate::station::{
     Client, ControlWrite, Event, Marking, RecipeKey, RecipeResult, Request, Snapshot, Teaching,

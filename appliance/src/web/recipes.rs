@@ -66,7 +66,7 @@ fn listed(recipes: &Store) -> Value {
     let rows = recipes.numbers().into_iter().map(|number| {
         let mut row = match recipes.manifest(number) {
             Ok(file) => summary(&file),
-            Err(words) => json!({ "number": number, "error": words }),
+            Err(error) => json!({ "number": number, "error": error.words }),
         };
         row["before"] = recipes.manifest_before(number).as_ref().map(summary).into();
         row

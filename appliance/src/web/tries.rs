@@ -31,7 +31,7 @@ use crate::history::kept::Kept;
 use crate::recipe::ChangeError;
 use crate::recipe::edit::Edit;
 use crate::recipe::plan::Plan;
-use crate::recipe::trying::{Opened, Over, Tried};
+use crate::recipe::trying::{EditedRecipe, Over, Tried};
 use crate::station::result::flag::SIMULATED;
 use crate::system::{memory, priority};
 
@@ -157,10 +157,11 @@ fn tried(
         return Err(superseded());
     }
     let stored = site.recipes.manifest(number).map_err(Problem::missing)?;
-    let same = |(opened, _): &(Opened, Instant)| opened.id() == (number, &*stored.fingerprint);
+    let same =
+        |(opened, _): &(EditedRecipe, Instant)| opened.id() == (number, &*stored.fingerprint);
     let open = match opened.take().filter(same) {
         Some((open, _)) => open,
-        None => Opened::new(site.recipes.load_to_edit(number)?).map_err(Problem::unfit)?,
+        None => EditedRecipe::new(site.recipes.load_to_edit(number)?).map_err(Problem::unfit)?,
     };
     let fingerprint = open.id().1.to_owned();
     if edit.fingerprint != fingerprint {
@@ -171,7 +172,7 @@ fn tried(
     let shared = shared.map_or(Ok(()), |of| site.recipes.refuse_shared(number, of));
     let mut tried = open.attempt(edit, is_over).map_err(|Over| superseded())?;
     if let Err(words) = shared {
-        let problem = json!({ "words": words, "refused": true });
+        let problem = json!({ "words": words.to_string(), "refused": true });
         tried.problems.insert(0, problem);
     }
     let parts = parts(site, (&open, &tried), &on, is_over)?;
@@ -185,7 +186,7 @@ fn tried(
 /// What a tried list measures of parts.
 fn parts(
     site: &Site,
-    of: (&Opened, &Tried),
+    of: (&EditedRecipe, &Tried),
     on: &On,
     is_over: &dyn Fn() -> bool,
 ) -> Result<Vec<Value>> {
@@ -220,7 +221,7 @@ fn parts(
 /// What it measures of the last part, and the verdict that this had.
 fn last(
     site: &Site,
-    (open, tried): (&Opened, &Tried),
+    (open, tried): (&EditedRecipe, &Tried),
 ) -> (Option<u32>, Result<(Value, Value), String>) {
     let Some(part) = site.last_cycle.ask(|part| part.clone()) else {
         let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
@@ -251,7 +252,11 @@ fn last(
 }
 
 /// What it measures of a kept part, and the verdict that this had.
-fn kept(site: &Site, (open, tried): (&Opened, &Tried), seq: u32) -> Result<(Value, Value), String> {
+fn kept(
+    site: &Site,
+    (open, tried): (&EditedRecipe, &Tried),
+    seq: u32,
+) -> Result<(Value, Value), String> {
     let words = |problem: Problem| problem.words;
     let (entry, folder) = recording(site, seq).map_err(words)?;
     let recipe = open.recipe(tried)?;

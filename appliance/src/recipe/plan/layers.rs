@@ -8,6 +8,7 @@ use crate::head::calibration::Calibration;
 use crate::head::seam;
 use crate::output::cloud::{Axes, ply};
 use crate::recipe::Recipe;
+use crate::recipe::Refusal;
 use crate::station::Square;
 use algo::geometry::{HeightRange, Triangulator};
 use algo::inspect::{Findings, Maps};
@@ -69,11 +70,13 @@ impl GoldenView {
     ///
     /// # Errors
     /// In words: they are none.
-    pub fn new(recipe: &Recipe, head: &Calibration) -> Result<Self, String> {
+    pub fn new(recipe: &Recipe, head: &Calibration) -> Result<Self, Refusal> {
         let [low, high] = recipe.conditions.range_mm;
         let range = Some(HeightRange { low, high });
         let triangulator = head.triangulator(recipe.function.clone(), range);
-        triangulator.map(Self).map_err(|error| error.to_string())
+        triangulator
+            .map(Self)
+            .map_err(|error| error.to_string().into())
     }
 
     /// x, y and z in mm of every `stride`-th pixel of its heights, NaN where not known.

@@ -23,7 +23,7 @@ use crate::head::calibration::Calibration;
 use crate::head::rasters::Illumination;
 use crate::head::seam;
 use crate::recipe::light::{GoldenLight, Light};
-use crate::recipe::{Conditions, Demands, Outline, Recipe, RecipeId};
+use crate::recipe::{Conditions, Demands, Outline, Recipe, RecipeId, Refusal};
 use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{JUDGES_NOTHING, SIMULATED};
 use crate::station::{Inspection, Stage, Verdict};
@@ -35,7 +35,6 @@ use algo::pattern::{MAX_FRAMES, Shot};
 use algo::pipeline::HeightCubics;
 use hal::frame::Frame;
 use laps::Laps;
-use refused::Refusal;
 use run::{Prepared, Run, Shared};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
@@ -140,12 +139,8 @@ impl Plan {
         let number = recipe.id.number;
         refused::same_devices(&recipe.conditions, calibration)
             .map_err(|reason| PlanError::OtherHead { number, reason })?;
-        let unfit = |Refusal { words, feature }| PlanError::Unfit {
-            number,
-            reason: words,
-            feature,
-        };
-        Self::joined(recipe, calibration, (simulated, golden), headway).map_err(unfit)
+        Self::joined(recipe, calibration, (simulated, golden), headway)
+            .map_err(|reason| PlanError::Unfit { number, reason })
     }
 
     fn joined(
@@ -180,7 +175,7 @@ impl Plan {
         let triangulator = quick.triangulator(function, Some(HeightRange { low, high }));
         let triangulator = triangulator.map_err(|error| error.to_string())?;
         headway.done(0.1);
-        window::of_sections(&mut features, size, &triangulator)?;
+        window::of_sections((&mut features, &demands.features), size, &triangulator)?;
         let (window, away) =
             window::of((&features, &gauges), size, &triangulator, &demands, &arrays);
         // The golden surface is by the sequence that is projected first, so that deviations by that
@@ -341,7 +336,7 @@ impl Plan {
     fn judged(
         &self,
         (sequence, frames): (usize, &[Frame]),
-        found: Result<(Findings, Option<f64>), String>,
+        found: Result<(Findings, Option<f64>), Refusal>,
         laps: &mut Laps,
     ) -> Inspection {
         let simulated = if self.simulated { SIMULATED } else { 0 };
@@ -371,7 +366,7 @@ impl Plan {
             }
             Err(reason) => {
                 inspection.judged = Verdict::Invalid;
-                inspection.reason = Some(reason.into());
+                inspection.reason = Some(reason.words.into());
                 inspection.error_code = WRONG_FRAMES;
             }
         }
@@ -402,7 +397,7 @@ impl Plan {
         (arriving, frames): (Arriving, &[Frame]),
         maps: Maps<'_>,
         laps: &mut Laps,
-    ) -> Result<(Findings, Option<f64>), String> {
+    ) -> Result<(Findings, Option<f64>), Refusal> {
         let sequence = arriving.sequence();
         let run = self.runs.get(sequence);
         let run = run.ok_or_else(|| format!("the recipe has no sequence {sequence}"))?;
@@ -424,7 +419,7 @@ impl Plan {
                 Ok((findings, Some(found.map_or(0.0, |found| found.likeness))))
             });
             laps.end(Stage::Strips);
-            return findings.map_err(|error| error.to_string());
+            return findings.map_err(|error| error.to_string().into());
         }
         let (arrived, finest) = run.complete(arriving, &views).map_err(|e| e.to_string())?;
         let input = Input::Finest(&arrived, &finest);

@@ -8,7 +8,8 @@
 
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
-use crate::recipe::Conditions;
+use crate::recipe::rules::refused;
+use crate::recipe::{Conditions, Refusal};
 
 /// A recipe that cannot be run on this head.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -31,8 +32,8 @@ pub enum PlanError {
     OtherHead {
         /// The recipe's number.
         number: u16,
-        /// In words.
-        reason: String,
+        /// What the head has else.
+        reason: Refusal,
     },
     /// It was taught with another exposure or gain.
     #[error(
@@ -52,32 +53,19 @@ pub enum PlanError {
     Unfit {
         /// The recipe's number.
         number: u16,
-        /// In words, with the remedy.
-        reason: String,
-        /// Which of its features is why, if one is.
-        feature: Option<usize>,
+        /// Why, and which of its features is why, if one is.
+        reason: Refusal,
     },
 }
 
-/// Why a recipe and a head cannot be joined.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Refusal {
-    /// In words, with the remedy.
-    pub words: String,
-    /// Which feature is why, if one is.
-    pub feature: Option<usize>,
-}
-
-impl From<String> for Refusal {
-    fn from(words: String) -> Self {
-        let feature = None;
-        Self { words, feature }
-    }
-}
-
-impl From<&str> for Refusal {
-    fn from(words: &str) -> Self {
-        String::from(words).into()
+impl From<PlanError> for Refusal {
+    fn from(error: PlanError) -> Self {
+        let words = error.to_string();
+        let of = match error {
+            PlanError::Unfit { reason, .. } => reason.of,
+            _ => None,
+        };
+        Self { words, of }
     }
 }
 
@@ -88,18 +76,14 @@ impl From<&str> for Refusal {
 pub(super) fn same_devices(
     conditions: &Conditions,
     calibration: &Calibration,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     let (camera, here) = (conditions.camera, calibration.frames());
     if camera != here {
-        return Err(format!(
-            "it is for a camera of {camera:?}, this head's has {here:?}"
-        ));
+        return refused!("it is for a camera of {camera:?}, this head's has {here:?}");
     }
     let (raster, here) = (conditions.raster, calibration.raster());
     match raster == here {
         true => Ok(()),
-        false => Err(format!(
-            "it is for a projector of {raster:?}, this head's has {here:?}"
-        )),
+        false => refused!("it is for a projector of {raster:?}, this head's has {here:?}"),
     }
 }

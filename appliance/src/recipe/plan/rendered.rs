@@ -35,7 +35,7 @@ impl Plan {
             });
             drop(strips);
             let findings = findings.map(|findings| (findings, None));
-            let found = findings.map_err(|error| error.to_string());
+            let found = findings.map_err(|error| error.to_string().into());
             let inspection = self.judged((sequence, &[]), found, &mut laps);
             sequence += 1;
             if inspection.step_up.is_none() || sequence == self.runs.len() {

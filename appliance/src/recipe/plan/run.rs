@@ -1,9 +1,9 @@
 //! One sequence of a recipe, ready to judge parts.
 
 use super::golden;
-use super::refused::Refusal;
 use crate::recipe::archive::Arrays;
-use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
+use crate::recipe::rules::refused;
+use crate::recipe::{Conditions, Element, Part, RecipeSequence, Refusal, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
@@ -94,7 +94,7 @@ impl Prepared {
         conditions: &Conditions,
         golden: (&Arrays, &[f32], Option<usize>),
         range: PhaseRange,
-    ) -> Result<(Vec<Self>, Vec<Shot>), String> {
+    ) -> Result<(Vec<Self>, Vec<Shot>), Refusal> {
         let mut shots = Vec::new();
         // Golden was measured with the full sequence, the last.
         let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
@@ -108,12 +108,12 @@ impl Prepared {
         let (columns, rows) = conditions.raster;
         let patterns = shots.len() * columns as usize * rows as usize;
         if patterns > MAX_PATTERN_BYTES {
-            return Err(format!(
+            return refused!(
                 "its sequences show {} patterns of {} MiB together, at most {} are held: teach it with fewer frames",
                 shots.len(),
                 patterns >> 20,
                 MAX_PATTERN_BYTES >> 20
-            ));
+            );
         }
         Ok((prepared, shots))
     }
@@ -127,7 +127,7 @@ impl Prepared {
         (arrays, shares, base): (&Arrays, &[f32], Option<usize>),
         range: PhaseRange,
         rasters: &mut Vec<Shot>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refusal> {
         let RecipeSequence {
             kind,
             shots,
@@ -290,7 +290,8 @@ fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> Refusal {
         .features
         .get(feature)
         .map_or("contour", |of| of.kind.name());
-    let name = shared.names.get(feature).map_or("", |name| name);
+    let name = shared.names.get(feature).map_or("", String::as_str);
+    let of = Some(Element::new(Part::Feature, feature, name));
     let name = clipped(name);
     let is_section = matches!(error, Unmeasurable::NoSection { .. });
     let words = match shared.signal {
@@ -304,6 +305,5 @@ fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> Refusal {
             "feature {name:?}: golden has no {kind} in its region, or too little of its rim is seen: draw the region around it, with 1.5 mm or more on both sides"
         ),
     };
-    let feature = Some(feature);
-    Refusal { words, feature }
+    Refusal { words, of }
 }

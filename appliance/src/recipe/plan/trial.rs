@@ -115,8 +115,7 @@ fn alone<T: Send>(
     let threads = rayon::ThreadPoolBuilder::new().build();
     let threads = threads.map_err(|error| PlanError::Unfit {
         number,
-        reason: format!("it cannot be tried out: {error}: end other programs"),
-        feature: None,
+        reason: format!("it cannot be tried out: {error}: end other programs").into(),
     })?;
     threads.install(|| work(recipe))
 }
@@ -130,8 +129,7 @@ fn golden(
     let number = recipe.id.number;
     let unfit = |reason: String| PlanError::Unfit {
         number,
-        reason,
-        feature: None,
+        reason: reason.into(),
     };
     // Two frames compare pictures, and golden's is by the sequence behind them.
     let planned = recipe.sequences.iter().position(|of| !of.is_pair());

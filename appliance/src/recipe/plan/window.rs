@@ -1,8 +1,7 @@
 //! The part of the frame that the gauges need.
 
-use super::refused::Refusal;
-use crate::recipe::Demands;
 use crate::recipe::archive::Arrays;
+use crate::recipe::{Demands, Element, Part, Refusal};
 use algo::geometry::Triangulator;
 use algo::inspect::{Cut, Feature, Gauge, Region, RegionError};
 use algo::units::Height;
@@ -58,12 +57,12 @@ pub(super) fn of(
 /// # Errors
 /// In words: one lies outside of the frame.
 pub(super) fn of_sections(
-    features: &mut [Feature],
+    (features, names): (&mut [Feature], &[String]),
     (width, height): (usize, usize),
     triangulator: &Triangulator,
 ) -> Result<(), Refusal> {
     let pitch = pitch(triangulator).ok_or("the camera sees no plane in its middle")?;
-    for (at, feature) in features.iter_mut().enumerate() {
+    for ((place, feature), name) in features.iter_mut().enumerate().zip(names) {
         let Some(Cut {
             from: [u0, v0],
             to: [u1, v1],
@@ -85,7 +84,7 @@ pub(super) fn of_sections(
         ];
         let refused = |error: RegionError| Refusal {
             words: error.to_string(),
-            feature: Some(at),
+            of: Some(Element::new(Part::Feature, place, name)),
         };
         feature.region = Region::polygon(&corners, width, height).map_err(refused)?;
     }
