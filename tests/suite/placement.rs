@@ -5,7 +5,7 @@ use algo::phase::Trust;
 use algo::units::{AbsolutePhase, Height};
 use appliance::head::calibrated::CalibratedHead;
 use appliance::head::calibration::Calibration;
-use appliance::recipe::archive::{Arrays, pack};
+use appliance::recipe::file::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, TaughtRecipe, UnsealedRecipe, teach};
 use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile, safe};

@@ -3,8 +3,9 @@
 
 use crate::station_plc::Place;
 use crate::written::program;
-use appliance::recipe::gauges_toml::Gauging;
-use appliance::recipe::{Recipe, RecipeFile, archive};
+use appliance::recipe::file::archive;
+use appliance::recipe::file::gauges_toml::Gauging;
+use appliance::recipe::{Recipe, RecipeFile};
 use serde_json::Value;
 use std::fs;
 use std::path::PathBuf;

@@ -7,8 +7,9 @@
 //! once towards the quota, and goes with its last link.
 
 use crate::head::calibration::Calibration;
+use crate::recipe::Store;
+use crate::recipe::file::archive;
 use crate::recipe::plan::Plan;
-use crate::recipe::{Store, archive};
 use crate::station::{ResultRecord, Verdict};
 use crate::storage::folder::{name_also, rename_whole};
 use hal::frame::Frame;

@@ -4,8 +4,9 @@
 use super::telling::Telling;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, recovery};
 use crate::head::empty::EmptyStation;
+use crate::recipe::RecipeFile;
+use crate::recipe::teach::replace;
 use crate::recipe::teach::{TaughtRecipe, TeachError, teach_showing};
-use crate::recipe::{RecipeFile, replace};
 use crate::station::{Event, JobId, RecipeKey, Teaching, error_code};
 use crate::system::headway::Headway;
 use crate::system::memory;

@@ -12,7 +12,7 @@ mod stopping;
 pub mod survey;
 
 use crate::recipe::Store;
-use crate::recipe::part_seen::LastSeen;
+use crate::recipe::teach::part::LastSeen;
 pub use caller::Caller;
 use rooms::Rooms;
 

@@ -3,10 +3,10 @@
 use super::{Tally, one_in};
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
-use crate::recipe::archive::{members, pack, parse, seal};
-use crate::recipe::exchange::Destination;
-use crate::recipe::golden::Naming;
+use crate::recipe::file::archive::{members, pack, parse, seal};
 use crate::recipe::plan::Plan;
+use crate::recipe::store::exchange::Destination;
+use crate::recipe::teach::golden::Naming;
 use crate::recipe::teach::teach;
 use crate::recipe::{DatumFile, Recipe, RecipeFile, Store};
 use crate::system::headway::Headway;

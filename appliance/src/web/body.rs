@@ -12,7 +12,7 @@ use tokio_stream::StreamExt as _;
 use super::problem::{Problem, Result};
 use super::site::Site;
 use crate::error::shortened;
-use crate::recipe::incoming::Incoming;
+use crate::recipe::store::incoming::Incoming;
 
 /// Largest body in JSON, bytes.
 const MAX_JSON: usize = 64 << 10;

@@ -11,8 +11,8 @@ use super::problem::{Problem, Result};
 use super::query::{Path, Query};
 use super::site::Site;
 use super::view;
-use crate::recipe::plan::{Layers, Shown};
-use crate::recipe::{RecipeId, Seen};
+use crate::recipe::plan::{Layers, ShownDeviation};
+use crate::recipe::{FeatureView, RecipeId};
 use crate::station::Verdict;
 use crate::station::snapshot::status;
 
@@ -82,7 +82,7 @@ impl Level {
 /// What was found on a part.
 pub(super) fn found(
     (seq, verdict): (u32, Verdict),
-    (id, features): (&RecipeId, &[Seen<'_>]),
+    (id, features): (&RecipeId, &[FeatureView<'_>]),
 ) -> Value {
     json!({
         "seq": seq, "recipe": id.number, "fingerprint": id.fingerprint, "verdict": verdict.word(),
@@ -198,13 +198,13 @@ pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Resu
 }
 
 /// What a map of deviations shows, for people.
-fn words(shown: &Shown) -> String {
+fn words(shown: &ShownDeviation) -> String {
     let motion = match (shown.aligned, shown.placed) {
         (true, true) => "motion taken back",
         (true, false) => "motion not found and not taken back",
         (false, _) => "as the part lies",
     };
-    let Shown { side, gauge, .. } = shown;
+    let ShownDeviation { side, gauge, .. } = shown;
     let mean = match side {
         1 => "pixel by pixel".into(),
         side => format!("mean over {side} × {side} px"),
@@ -220,8 +220,8 @@ fn words(shown: &Shown) -> String {
 }
 
 /// What a map of deviations shows, for programs.
-fn described(shown: &Shown) -> Value {
-    let Shown {
+fn described(shown: &ShownDeviation) -> Value {
+    let ShownDeviation {
         side,
         placed,
         ref gauge,

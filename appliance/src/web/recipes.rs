@@ -17,9 +17,9 @@ use super::problem::{Problem, Result};
 use super::query::{Path, Query};
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, Edited};
-use crate::recipe::exchange::Destination;
 use crate::recipe::plan::{GoldenView, Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
+use crate::recipe::store::exchange::Destination;
 use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, Store};
 use crate::station::control::MAX_RECIPE;
 use std::time::{Duration, Instant};
@@ -59,7 +59,7 @@ pub(super) async fn list(site: Site) -> Result<Json<Value>> {
 
 /// What gauges can measure.
 pub(super) async fn kinds() -> Json<Value> {
-    Json(crate::recipe::kinds::json())
+    Json(crate::recipe::file::kinds::json())
 }
 
 fn listed(recipes: &Store) -> Value {

@@ -30,8 +30,8 @@ use super::site::{LastOpened, Site, alone};
 use crate::history::kept::Kept;
 use crate::recipe::ChangeError;
 use crate::recipe::edit::Edit;
+use crate::recipe::edit::trying::{EditedRecipe, Over, Tried};
 use crate::recipe::plan::Plan;
-use crate::recipe::trying::{EditedRecipe, Over, Tried};
 use crate::station::result::flag::SIMULATED;
 use crate::system::{memory, priority};
 

@@ -3,9 +3,10 @@
 use super::bounded;
 use super::part::PART;
 use appliance::recipe::edit::{self, Edit};
-use appliance::recipe::gauges_toml::Gauging;
+use appliance::recipe::file::archive;
+use appliance::recipe::file::gauges_toml::Gauging;
 use appliance::recipe::plan::Plan;
-use appliance::recipe::{Recipe, RecipeFile, Store, archive};
+use appliance::recipe::{Recipe, RecipeFile, Store};
 use std::fs;
 use std::io::Cursor;
 use tempfile::TempDir;

@@ -1,8 +1,8 @@
 //! One sequence of a recipe, ready to judge parts.
 
-use super::golden;
-use crate::recipe::archive::Arrays;
-use crate::recipe::rules::refused;
+use super::taught;
+use crate::recipe::file::archive::Arrays;
+use crate::recipe::file::rules::refused;
 use crate::recipe::{Conditions, Element, Part, RecipeSequence, Refusal, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
@@ -136,7 +136,7 @@ impl Prepared {
             ripple_mm,
         } = sequence;
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
-        let offsets = (golden::offset(arrays, offset), golden::offset(arrays, base));
+        let offsets = (taught::offset(arrays, offset), taught::offset(arrays, base));
         let decoder = Decoder::new(&levels, range, conditions.camera.2);
         let decoder = decoder.map_err(|error| error.to_string())?;
         let decoder = decoder.with_least_modulation(conditions.least_modulation);
@@ -150,8 +150,8 @@ impl Prepared {
         Ok(Self {
             kind,
             indices: indices.collect(),
-            taught: golden::taught((conditions.noise, brighter), arrays, shares, &decoder),
-            map: golden::map(arrays, kind, offsets),
+            taught: taught::taught((conditions.noise, brighter), arrays, shares, &decoder),
+            map: taught::map(arrays, kind, offsets),
             levels: Levels::new(&levels, decoder.full_scale()),
             decoder,
             brighter,
