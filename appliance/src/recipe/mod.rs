@@ -20,10 +20,11 @@ pub mod store;
 pub mod teach;
 
 pub use file::archive::short;
+pub use file::demands::{Demands, Labels};
 pub use file::feature::{DatumFile, FeatureFile};
 pub use file::gauge::GaugeFile;
-pub use file::recipe::{Conditions, Demands, Labels, Recipe, RecipeId, RecipeSequence};
-pub use file::rules::{Element, Part, Refusal};
+pub use file::recipe::{Conditions, Recipe, RecipeId, RecipeSequence};
+pub use file::refusal::{Element, Part, Refusal};
 pub use file::{
     AlignmentKind, PatternFile, RecipeFile, SequenceFile, SequenceKind, UnseenFile, safe,
 };

@@ -1,7 +1,7 @@
 //! What is said and drawn of the features of a part, as data (docs/api.md): what became of each, why
 //! one was not found and what to do, its fit, the pieces of a contour, the profile of a section.
 
-use crate::recipe::file::recipe::{LabelledFeature, Labels};
+use crate::recipe::file::demands::{LabelledFeature, Labels};
 use crate::station::{GaugeValue, Inspection};
 use algo::geometry::Vector;
 use algo::inspect::contour::Outcome;

@@ -1,6 +1,6 @@
 //! A recipe as one file: an uncompressed ZIP of `recipe.json` and NumPy arrays, with a fingerprint.
 
-use super::rules::refused;
+use super::refusal::refused;
 use super::{FORMAT, VERSION};
 use crate::recipe::{RecipeFile, Refusal};
 use crate::storage::archive::{Members, packed};

@@ -4,7 +4,7 @@
 //! bounds, forms and the checked feature follow from these. The file form has the keys of all
 //! kinds, so that a key of another kind is refused by its name.
 
-use super::rules::refused;
+use super::refusal::refused;
 use crate::recipe::Refusal;
 use algo::inspect::{Cut, Feature, FeatureKind, Measure, Region};
 use hal::bounded;

@@ -1,6 +1,6 @@
 //! The gauges of a recipe in its file: what their limits come from, and which are refused.
 
-use super::rules::refused;
+use super::refusal::refused;
 use crate::recipe::Refusal;
 use crate::station::Unit;
 use algo::inspect::{Basis, Measure, Reading};

@@ -4,7 +4,7 @@
 //! key; the parser's message would only give the line and column.
 
 use super::gauge::{About, Master, Tolerance, no_limit};
-use super::rules::refused;
+use super::refusal::refused;
 use crate::recipe::{GaugeFile, Refusal};
 use algo::inspect::Measure;
 use hal::bounds::{clipped, shortened};

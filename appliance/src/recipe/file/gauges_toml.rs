@@ -4,7 +4,7 @@
 //! golden has. So the text that is written for a recipe is read as what it was written for.
 
 use super::gauge_keys::{Keys, placeless};
-use super::rules::refused;
+use super::refusal::refused;
 use crate::recipe::{DatumFile, FeatureFile, GaugeFile, RecipeFile, Refusal};
 use hal::bounds::{clipped, shortened};
 use serde::{Deserialize, Serialize};

@@ -6,12 +6,14 @@
 //! arrays and fingerprint, [`recipe`] its checked form.
 
 pub mod archive;
+pub mod demands;
 pub mod feature;
 pub mod gauge;
 mod gauge_keys;
 pub mod gauges_toml;
 pub mod kinds;
 pub mod recipe;
+pub mod refusal;
 pub mod rules;
 mod sequence;
 mod taught;

@@ -6,7 +6,11 @@
 //! shape could pass, and nobody would see why.
 
 use super::feature::LONGEST_NAME;
-use crate::recipe::{DatumFile, FeatureFile, GaugeFile, PatternFile, RecipeFile, SequenceFile};
+use super::refusal::refused;
+use crate::recipe::{
+    DatumFile, Element, FeatureFile, GaugeFile, Part, PatternFile, RecipeFile, Refusal,
+    SequenceFile,
+};
 use crate::station::MAX_GAUGES;
 use algo::inspect::{FeatureKind, MAX_FEATURES, MAX_PLACES, Marking, makes_datum};
 use algo::pattern::{MAX_FRAMES, Sequence, Shot};
@@ -26,14 +30,6 @@ const MAX_SLOT: u16 = MAX_GAUGES as u16;
 /// Datum systems of a recipe.
 pub(crate) const MAX_DATUMS: usize = 8;
 
-/// The refusal in these words, formatted.
-macro_rules! refused {
-    ($($words:tt)*) => {
-        Err(crate::recipe::Refusal::from(format!($($words)*)))
-    };
-}
-pub(crate) use refused;
-
 /// Which rules must be kept; each of these adds to those before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Rules {
@@ -45,73 +41,6 @@ pub(crate) enum Rules {
     /// It is an edit: names are not empty, regions lie in the frame. Gauges may stand in any order,
     /// and limits that come from golden are checked when golden has been measured.
     Edit,
-}
-
-/// A list of a recipe that people edit.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Part {
-    /// Features.
-    Feature,
-    /// Datum systems.
-    Datum,
-    /// Gauges.
-    Gauge,
-}
-
-/// An element of a recipe's lists.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Element {
-    /// In which list.
-    pub part: Part,
-    /// Its place there.
-    pub place: usize,
-    /// Its name.
-    pub name: String,
-}
-
-impl Element {
-    pub(crate) fn new(part: Part, place: usize, name: &str) -> Self {
-        let name = name.into();
-        Self { part, place, name }
-    }
-}
-
-/// Why a recipe is refused.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("{words}")]
-pub struct Refusal {
-    /// A sentence, with the remedy.
-    pub words: String,
-    /// The element that is why, if one is.
-    pub of: Option<Element>,
-}
-
-impl From<String> for Refusal {
-    fn from(words: String) -> Self {
-        Self { words, of: None }
-    }
-}
-
-impl From<&str> for Refusal {
-    fn from(words: &str) -> Self {
-        String::from(words).into()
-    }
-}
-
-impl From<Refusal> for String {
-    fn from(refusal: Refusal) -> Self {
-        refusal.words
-    }
-}
-
-impl Part {
-    pub(crate) fn word(self) -> &'static str {
-        match self {
-            Self::Feature => "feature",
-            Self::Datum => "datum",
-            Self::Gauge => "gauge",
-        }
-    }
 }
 
 /// What a check finds.

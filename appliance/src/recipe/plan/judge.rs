@@ -5,7 +5,7 @@
 //! that has no value and is not absent.
 
 use super::light::{Cause, Light};
-use crate::recipe::file::recipe::GaugeDemands;
+use crate::recipe::file::demands::GaugeDemands;
 use crate::recipe::shown::{MIN_SHARE, why_lost};
 use crate::recipe::{Demands, SequenceKind};
 use crate::station::error_code::{BLURRED, GUARD_BAND, NOT_MEASURED, NOT_THE_PART, OUT_OF_PLACE};

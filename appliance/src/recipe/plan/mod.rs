@@ -17,7 +17,7 @@ pub use trial::Golden;
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use crate::head::rasters::Illumination;
-use crate::recipe::file::rules::refused;
+use crate::recipe::file::refusal::refused;
 use crate::recipe::{Conditions, Demands, Labels, Recipe, RecipeId, Refusal};
 use crate::system::headway::Headway;
 use algo::geometry::HeightRange;

@@ -4,7 +4,7 @@ use super::Plan;
 use super::run::Run;
 use crate::head::calibration::Calibration;
 use crate::head::seam;
-use crate::recipe::file::rules::refused;
+use crate::recipe::file::refusal::refused;
 use crate::recipe::{PatternFile, Recipe, Refusal};
 use algo::pattern::{PhaseFunction, Shot};
 use hal::frame::Frame;

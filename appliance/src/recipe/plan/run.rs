@@ -2,7 +2,7 @@
 
 use super::taught;
 use crate::recipe::file::archive::Arrays;
-use crate::recipe::file::rules::refused;
+use crate::recipe::file::refusal::refused;
 use crate::recipe::{Conditions, Element, Part, RecipeSequence, Refusal, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;

@@ -10,7 +10,7 @@ pub mod incoming;
 
 use crate::error::{Exit, Result};
 use crate::recipe::file::archive;
-use crate::recipe::file::rules::refused;
+use crate::recipe::file::refusal::refused;
 use crate::recipe::{Recipe, RecipeFile, Refusal};
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;

@@ -3,9 +3,9 @@
 use super::captures::Offsets;
 use super::good_parts::DEVIATION_MM;
 use super::part::SceneFacts;
-use super::sequences::Choice;
+use super::planner::Choice;
 use super::sides::SIDES;
-use super::{TeachError, part, sequences};
+use super::{TeachError, part, planner};
 use crate::head::calibration::Calibration;
 use crate::head::empty::EmptyStation;
 use crate::head::rasters::Illumination;
@@ -224,7 +224,7 @@ impl GoldenPart<'_> {
         );
         let sequences = self.sequences(&arrays, headway.part(0.1, 0.2));
         self.release();
-        let choice = sequences::choose(&sequences, &gauges, 0);
+        let choice = planner::choose(&sequences, &gauges, 0);
         let range = self.triangulator.range();
         let calibration = self.calibration;
         let (width, height, bit_depth) = calibration.frames();
@@ -290,7 +290,7 @@ impl GoldenPart<'_> {
         )?;
         // The smaller the squares, the less noise is allowed.
         let widest = arrays.widest();
-        let mut choice = sequences::choose(&manifest.sequences, &manifest.gauges, widest);
+        let mut choice = planner::choose(&manifest.sequences, &manifest.gauges, widest);
         manifest.production = choice.production;
         choice.reasons.append(&mut words);
         choice

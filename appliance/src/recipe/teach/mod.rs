@@ -6,10 +6,11 @@ pub mod golden;
 pub mod good_parts;
 mod limits;
 pub mod part;
+pub mod planner;
 mod proof;
 pub mod replace;
 mod rounds;
-pub mod sequences;
+mod sequences;
 mod sides;
 
 pub use golden::{Naming, TaughtRecipe, UnsealedRecipe};

@@ -5,11 +5,11 @@
 
 use super::golden::{Naming, UnsealedRecipe};
 use super::good_parts::DEVIATION_MM;
-use super::sequences;
-use super::sequences::Choice;
+use super::planner;
+use super::planner::Choice;
 use crate::head::calibration::Calibration;
 use crate::recipe::file::archive::Arrays;
-use crate::recipe::file::rules::refused;
+use crate::recipe::file::refusal::refused;
 use crate::recipe::plan::{Golden, Plan};
 use crate::recipe::{Element, GaugeFile, Part, Recipe, RecipeFile, Refusal};
 use crate::system::headway::Headway;
@@ -172,7 +172,7 @@ impl RecipeFile {
         headway: Headway<'_>,
     ) -> Result<(Choice, Option<Golden>), Refusal> {
         self.gauges.sort_by_key(|gauge| gauge.slot);
-        let choose = |of: &Self| sequences::choose(&of.sequences, &of.gauges, arrays.widest());
+        let choose = |of: &Self| planner::choose(&of.sequences, &of.gauges, arrays.widest());
         let mut choice = choose(self);
         self.production = choice.production;
         if !self.has_contours() && !self.gauges.iter().any(GaugeFile::needs_golden) {

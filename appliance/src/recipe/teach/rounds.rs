@@ -2,8 +2,8 @@
 //! its rim should be, wherever the part lies and whatever is seen through it.
 
 use super::golden::UnsealedRecipe;
-use super::sequences;
-use super::sequences::Choice;
+use super::planner;
+use super::planner::Choice;
 use crate::head::calibration::Calibration;
 use crate::recipe::file::archive::Arrays;
 use crate::recipe::plan::{Plan, PlanError};
@@ -116,7 +116,7 @@ impl UnsealedRecipe {
         manifest.tried.retain(|tried| !is_rim(&tried.gauge));
         reasons.push(Self::CONTOURS.into());
         // Golden was seen to have them, so nothing is left to settle but the sequence.
-        let choice = sequences::choose(&manifest.sequences, &manifest.gauges, arrays.widest());
+        let choice = planner::choose(&manifest.sequences, &manifest.gauges, arrays.widest());
         manifest.production = choice.production;
         let choice = Choice { reasons, ..choice };
         Ok(Self {
