@@ -1,6 +1,6 @@
 //! The features of a recipe in its file, and datum systems of them.
 //!
-//! A feature kind is a row of [`KINDS`], a key of features a row of `keys!`: reading, writing,
+//! A feature kind is a row of `KINDS`, a key of features a row of `keys!`: reading, writing,
 //! bounds, forms and the checked feature follow from these. The file form has the keys of all
 //! kinds, so that a key of another kind is refused by its name.
 

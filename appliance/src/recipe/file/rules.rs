@@ -1,5 +1,5 @@
 //! The rules that a recipe's manifest keeps, in one order: an editor shows all that is broken,
-//! [`problems`]; what reads, edits or teaches a recipe refuses the first, [`check`].
+//! `problems`; what reads, edits or teaches a recipe refuses the first, `check`.
 //!
 //! The same bounds hold for files that are read and for edits; `docs/formats.md` lists them. Those
 //! of single values stand beside their keys. Without the rules of judging a part of any

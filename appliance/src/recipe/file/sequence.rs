@@ -50,7 +50,7 @@ bounded! {
 #[serde(rename_all = "snake_case")]
 pub enum SequenceKind {
     /// The fringe and its complement, fitted in windows about golden as the part lies in the
-    /// picture. It is not in the list of sequences: [`RecipeFile::two_frames`].
+    /// picture. It is not in the list of sequences: [`RecipeFile::two_frames`](super::RecipeFile::two_frames).
     #[serde(skip)]
     TwoFrames,
     /// One level: |ΔΦ| < 0.4 turn, of 0.5 that are unambiguous.
