@@ -9,6 +9,7 @@
 use super::Edit;
 use crate::head::calibration::Calibration;
 use crate::recipe::file::archive::Arrays;
+use crate::recipe::file::feature::KINDS;
 use crate::recipe::file::rules;
 use crate::recipe::plan::{Golden, Plan};
 use crate::recipe::store::LoadedRecipe;
@@ -17,7 +18,7 @@ use crate::recipe::{
 };
 use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, MAX_GAUGES};
 use crate::system::headway::Headway;
-use algo::inspect::{FeatureKind, Measure, kinds};
+use algo::inspect::FeatureKind;
 use hal::bounds::clipped;
 use hal::frame::Frame;
 use serde_json::{Value, json};
@@ -380,25 +381,17 @@ impl Trial<'_> {
 
 /// A recipe with a gauge of each of these features and no other.
 fn probing<'a>(file: &RecipeFile, of: impl Iterator<Item = &'a FeatureFile>) -> RecipeFile {
-    let gauges = of.enumerate().map(|(at, feature)| {
+    let gauges = of.enumerate().filter_map(|(at, feature)| {
+        let kind = KINDS.iter().find(|row| row.kind == feature.kind)?;
         let of = [feature.name.as_str()];
-        GaugeFile::new(at as u16 + 1, &feature.name, probe(feature.kind), &of)
+        let measure = (kind.probe)();
+        Some(GaugeFile::new(at as u16 + 1, &feature.name, measure, &of))
     });
     RecipeFile {
         gauges: gauges.collect(),
         datums: Vec::new(),
         two_frames: false,
         ..file.clone()
-    }
-}
-
-/// A gauge that every feature of a kind has.
-fn probe(kind: FeatureKind) -> Measure {
-    match kind {
-        FeatureKind::Surface => kinds::MeanHeight {}.into(),
-        FeatureKind::Plane => kinds::Z {}.into(),
-        FeatureKind::Section => kinds::Gap {}.into(),
-        FeatureKind::Line | FeatureKind::Circle | FeatureKind::Slot => kinds::Found {}.into(),
     }
 }
 

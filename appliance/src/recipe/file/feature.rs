@@ -6,6 +6,7 @@
 
 use super::refusal::refused;
 use crate::recipe::Refusal;
+use algo::inspect::kinds::{Found, Gap, MeanHeight, Z};
 use algo::inspect::{Cut, Feature, FeatureKind, Measure, Region};
 use hal::bounded;
 use hal::bounds::{Bound, Fields, Longest, MAX_SIDE, length, text, within};
@@ -123,12 +124,14 @@ keys! {
 
 /// A kind of feature.
 pub(crate) struct Kind {
-    kind: FeatureKind,
+    pub kind: FeatureKind,
     about: &'static str,
     /// How a form draws it; one that is drawn as a section has no region.
     shapes: &'static [&'static str],
     /// The kind of gauge that measures its size, where that is one number.
     size: Option<&'static str>,
+    /// A gauge that every such feature has.
+    pub probe: fn() -> Measure,
     /// The keys that it must have, and those that it may have.
     needs: &'static [&'static str],
     may: &'static [&'static str],
@@ -142,6 +145,7 @@ const AREA: Kind = Kind {
     about: "Heights, and deviations from golden, of a region.",
     shapes: &["rectangle", "polygon", "circle"],
     size: None,
+    probe: || MeanHeight {}.into(),
     needs: &[],
     may: &[],
 };
@@ -152,6 +156,7 @@ pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
     Kind {
         kind: FeatureKind::Plane,
         about: "The plane that fits the heights of a region best, by least squares.",
+        probe: || Z {}.into(),
         may: &["thickness_mm", "rim_mm"],
         ..AREA
     },
@@ -159,6 +164,7 @@ pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
         kind: FeatureKind::Line,
         about: "A straight edge of a face, where the face ends.",
         shapes: &["points", "rectangle", "polygon"],
+        probe: || Found {}.into(),
         may: &["plane", "rim_mm"],
         ..AREA
     },
@@ -167,6 +173,7 @@ pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
         about: "A round hole in a face: where the face ends, by least squares.",
         shapes: &["circle", "rectangle", "polygon"],
         size: Some("diameter"),
+        probe: || Found {}.into(),
         may: &["plane", "rim_mm"],
         ..AREA
     },
@@ -174,6 +181,7 @@ pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
         kind: FeatureKind::Slot,
         about: "A slot with round ends in a face: where the face ends, by least squares.",
         shapes: &["rectangle", "polygon"],
+        probe: || Found {}.into(),
         may: &["plane", "rim_mm"],
         ..AREA
     },
@@ -182,6 +190,7 @@ pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
         about: "A cut across a joint of two sheets with rounded edges.",
         shapes: SECTION,
         needs: &["from", "to", "width_mm", "left", "right"],
+        probe: || Gap {}.into(),
         may: &["edge_mm", "edge_tolerance_mm"],
         ..AREA
     },
