@@ -7,10 +7,11 @@ mod plans;
 use algo::inspect::{FeatureKind, Measure};
 use allocation_counter::measure;
 use appliance::head::calibration::Calibration;
-use appliance::recipe::golden::Naming;
+use appliance::recipe::file::archive;
 use appliance::recipe::plan::Plan;
+use appliance::recipe::teach::golden::Naming;
 use appliance::recipe::teach::teach;
-use appliance::recipe::{FeatureFile, GaugeFile, Recipe, archive};
+use appliance::recipe::{FeatureFile, GaugeFile, Recipe};
 use appliance::station::{
     ActiveRecipe, Event, Identity, Limits, Micros, Settings, Station, StationHandle,
 };

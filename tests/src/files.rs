@@ -1,7 +1,7 @@
 //! Reading the files that the program writes, with libraries other than the program's own code.
 
 use appliance::recipe::RecipeFile;
-use appliance::recipe::archive::{Arrays, unpack};
+use appliance::recipe::file::archive::{Arrays, unpack};
 use hal::npy::Array;
 use std::io::Cursor;
 use std::path::Path;

@@ -4,8 +4,9 @@
 use crate::station_plc::{Daemon, Place, Plc, READY, RECIPE_OK, TRIGGER, long, trigger};
 use crate::written::program;
 use appliance::head::calibration::Calibration;
+use appliance::recipe::Store;
+use appliance::recipe::file::archive;
 use appliance::recipe::plan::Plan;
-use appliance::recipe::{Store, archive};
 use sim::Scenario;
 use std::fs;
 use std::time::{Duration, Instant};

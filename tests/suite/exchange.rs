@@ -4,7 +4,8 @@
 use crate::page::{Browser, signed_in};
 use crate::station_plc::{Daemon, ONLINE, Place, Plc};
 use crate::written::program;
-use appliance::recipe::{RecipeFile, Store, archive};
+use appliance::recipe::file::archive;
+use appliance::recipe::{RecipeFile, Store};
 use serde_json::{Value, json};
 use std::fs;
 use tests::files;

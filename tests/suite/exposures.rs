@@ -6,9 +6,11 @@ use super::placement::{Bed, bed, naming, scenario, taught_asking};
 use super::station_plc::{Daemon, Place, Plc, command, long};
 use super::two_frames::MIDDLE;
 use super::written::program;
-use appliance::recipe::golden::Naming;
+use appliance::recipe::file::archive;
 use appliance::recipe::plan::Plan;
-use appliance::recipe::{Recipe, RecipeFile, SequenceKind, archive, replace};
+use appliance::recipe::teach::golden::Naming;
+use appliance::recipe::teach::replace;
+use appliance::recipe::{Recipe, RecipeFile, SequenceKind};
 use appliance::station::{Inspection, Verdict};
 use hal::frame::Samples;
 use sim::parts::{Board, Cone, Defect, SheetMetal};
@@ -287,10 +289,10 @@ fn refused_without_its_light(file: &RecipeFile, arrays: &archive::Arrays) {
         (3, dark),
     ] {
         let refused = check(exposures, amplitude).unwrap_err();
-        assert!(refused.contains("amplitude has"), "{refused}");
+        assert!(refused.words.contains("amplitude has"), "{refused}");
     }
     for exposures in [0, 5] {
         let refused = check(exposures, whole.clone()).unwrap_err();
-        assert!(refused.contains("exposures"), "{refused}");
+        assert!(refused.words.contains("exposures"), "{refused}");
     }
 }

@@ -137,6 +137,6 @@ fn a_least_modulation_out_of_its_bounds_is_refused() {
             ..taught.manifest.clone()
         };
         let error = file.check_bounds().unwrap_err();
-        assert!(error.contains("least_modulation"), "{error}");
+        assert!(error.words.contains("least_modulation"), "{error}");
     }
 }

@@ -9,7 +9,7 @@ use algo::inspect::kinds::{
 use algo::inspect::{FeatureKind, Findings, Measure, Production};
 use algo::simd::Backend;
 use appliance::head::seam;
-use appliance::recipe::archive::{Arrays, pack};
+use appliance::recipe::file::archive::{Arrays, pack};
 use appliance::recipe::plan::{Plan, PlanError};
 use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile};
 use appliance::station::{Inspection, Unit, Verdict};

@@ -3,7 +3,7 @@
 
 use super::gauges::{frames, plan};
 use super::placement::{Bed, bed, scenario, taught};
-use appliance::recipe::archive::Arrays;
+use appliance::recipe::file::archive::Arrays;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
 use sim::parts::Plane;

@@ -4,7 +4,7 @@ use crate::history::{place_with_a_dent, reader, recording};
 use crate::page::Browser;
 use crate::station_plc::{Daemon, Place, Plc, long};
 use crate::written::{FRINGED, program};
-use appliance::recipe::archive;
+use appliance::recipe::file::archive;
 use appliance::station::Verdict;
 use std::fs;
 use std::path::{Path, PathBuf};

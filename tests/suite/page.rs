@@ -2,7 +2,8 @@
 
 use super::written::program;
 use crate::station_plc::{Daemon, Place, Plc, long};
-use appliance::recipe::{Store, archive};
+use appliance::recipe::Store;
+use appliance::recipe::file::archive;
 use serde_json::{Value, json};
 use std::io::{Read as _, Write as _};
 use std::net::{SocketAddr, TcpStream};

@@ -5,7 +5,7 @@ use algo::phase::Trust;
 use algo::units::{AbsolutePhase, Height};
 use appliance::head::calibrated::CalibratedHead;
 use appliance::head::calibration::Calibration;
-use appliance::recipe::archive::{Arrays, pack};
+use appliance::recipe::file::archive::{Arrays, pack};
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::{Naming, TaughtRecipe, UnsealedRecipe, teach};
 use appliance::recipe::{AlignmentKind, FeatureFile, GaugeFile, Recipe, RecipeFile, safe};
@@ -104,7 +104,7 @@ pub(crate) fn one_click(bed: &mut Bed) -> Result<TaughtRecipe, String> {
     let naming = naming(TOLERANCE_MM);
     let taught = teach(head, calibration, &naming, TIMEOUT, Headway::silent());
     let taught = taught.map_err(|error| error.to_string())?;
-    taught.with_rims(Headway::silent())?.seal()
+    Ok(taught.with_rims(Headway::silent())?.seal()?)
 }
 
 /// The names of a part, with this placement tolerance and else what the program takes.
@@ -126,7 +126,7 @@ pub(crate) fn naming(placement_tolerance_mm: f64) -> Naming {
 fn teach_now(bed: &mut Bed, naming: &Naming) -> Result<TaughtRecipe, String> {
     let (head, calibration) = (&mut bed.head, &bed.calibration);
     let taught = teach(head, calibration, naming, TIMEOUT, Headway::silent());
-    taught.map_err(|error| error.to_string())?.seal()
+    Ok(taught.map_err(|error| error.to_string())?.seal()?)
 }
 
 /// The same recipe, whose cycles begin with two frames.

@@ -5,7 +5,7 @@ use crate::station_plc::{Daemon, Place, Plc, READY, command, long};
 use crate::written::FRINGED;
 use appliance::history::{self, Bounds, Filter, Numbering, OpenedHistory, Reader};
 use appliance::recipe::Store;
-use appliance::recipe::archive;
+use appliance::recipe::file::archive;
 use appliance::storage::state::{Counted, StateFolder};
 use appliance::web::access::Access;
 use hal::replay::Recording;

@@ -9,7 +9,7 @@ use algo::pipeline::{HeightMap, decode};
 use algo::simd::Backend;
 use algo::units::{AbsolutePhase, Height, PhaseDelta};
 use appliance::head::seam;
-use appliance::recipe::archive::pack;
+use appliance::recipe::file::archive::pack;
 use appliance::recipe::plan::Plan;
 use appliance::recipe::teach::TaughtRecipe;
 use appliance::recipe::{AlignmentKind, Recipe};

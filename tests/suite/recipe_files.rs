@@ -3,8 +3,9 @@
 
 use crate::station_plc::Place;
 use crate::written::program;
-use appliance::recipe::gauges_toml::Gauging;
-use appliance::recipe::{Recipe, RecipeFile, archive};
+use appliance::recipe::file::archive;
+use appliance::recipe::file::gauges_toml::Gauging;
+use appliance::recipe::{Recipe, RecipeFile};
 use serde_json::Value;
 use std::fs;
 use std::path::PathBuf;
@@ -288,9 +289,9 @@ fn hostile_texts_are_refused_by_name_at_once_and_nothing_is_written() {
         let began = Instant::now();
         let set = Gauging::from_toml(&text).and_then(|read| read.set(&file, arrays.clone()));
         let shown: String = text.chars().rev().take(300).collect();
-        let words = set.map(drop).expect_err(&shown);
-        assert!(began.elapsed() < PATIENCE, "{case}: {words}");
-        assert!(words.len() < 2_000, "{case}: {words}");
+        let refusal = set.map(drop).expect_err(&shown);
+        assert!(began.elapsed() < PATIENCE, "{case}: {refusal}");
+        assert!(refusal.words.len() < 2_000, "{case}: {refusal}");
         if case < BY_PROGRAM {
             let began = Instant::now();
             let run = bench.set(&text);
@@ -358,11 +359,11 @@ fn hostile_recipes_are_refused_and_the_stored_one_stays() {
         let read = Recipe::from_bytes(&changed);
         assert!(began.elapsed() < PATIENCE, "{case}");
         // Bytes that nobody reads, such as a member's time, may have changed.
-        let Err(words) = read else {
+        let Err(refusal) = read else {
             assert_eq!(case % 2, 1, "{case} was accepted");
             continue;
         };
-        assert!(words.len() < 2_000, "{words}");
+        assert!(refusal.words.len() < 2_000, "{refusal}");
         if by_program < BY_PROGRAM {
             by_program += 1;
             let path = bench.place.path("hostile.recipe");

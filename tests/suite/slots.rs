@@ -6,7 +6,7 @@ use crate::page::Browser;
 use crate::station_plc::{Daemon, ONLINE, Place, Plc, RESULT_ACK, long, trigger};
 use crate::written::program;
 use appliance::history::{Entry, GaugeEntry};
-use appliance::recipe::archive;
+use appliance::recipe::file::archive;
 use std::collections::{BTreeMap, HashSet};
 use std::fs;
 use std::sync::atomic::{AtomicBool, Ordering};

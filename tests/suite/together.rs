@@ -4,7 +4,8 @@
 use crate::page::Browser;
 use crate::station_plc::{Daemon, ONLINE, Place, Plc, READY, long, trigger};
 use appliance::history::{Filter, Reader};
-use appliance::recipe::{Store, archive};
+use appliance::recipe::Store;
+use appliance::recipe::file::archive;
 use std::collections::BTreeMap;
 use std::fs;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -272,9 +272,11 @@ fn teach_asks_for_two_frames_only_when_it_is_told_to() {
         let run = program().run(&[&command[..], &[out.to_str().unwrap()], more].concat());
         assert_eq!(run.code, 0, "{}", run.stderr);
         let bytes = std::fs::read(&out).unwrap();
-        let (file, _): (RecipeFile, _) =
-            appliance::recipe::archive::unpack(std::io::Cursor::new(&bytes), bytes.len() as u64)
-                .unwrap();
+        let (file, _): (RecipeFile, _) = appliance::recipe::file::archive::unpack(
+            std::io::Cursor::new(&bytes),
+            bytes.len() as u64,
+        )
+        .unwrap();
         assert_eq!(file.two_frames, expected);
         let recipe = Recipe::from_bytes(&bytes).unwrap();
         assert_eq!(recipe.sequences[0].shots.len() == 2, expected);

@@ -2,7 +2,7 @@
 //! height difference that lies along the surface's normal.
 //!
 //! Weights are in the recipe's `valid.npy`; teaching sets them (`set_limits` in the daemon's
-//! `recipe/limits.rs`).
+//! `recipe/teach/limits.rs`).
 
 /// The weight of a pixel as a byte: 0 if it is not compared, 1 if its deviation counts in full, n
 /// from 2 on if its deviation is multiplied by n/256.

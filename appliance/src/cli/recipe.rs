@@ -9,12 +9,13 @@ use super::numbers::number;
 use super::options::{Files, Json, Quiet};
 use crate::error::{Exit, Failure, Result};
 use crate::production::backend;
-use crate::recipe::archive::{self, Arrays};
-use crate::recipe::exchange::{Destination, Listed};
-use crate::recipe::gauges_toml::{Gauging, MAX_TEXT};
-use crate::recipe::golden::TaughtRecipe;
+use crate::recipe::file::archive::{self, Arrays};
+use crate::recipe::file::gauges_toml::{Gauging, MAX_TEXT};
+use crate::recipe::file::kinds;
 use crate::recipe::plan::Plan;
-use crate::recipe::{ChangeError, LoadError, RecipeFile, Store, kinds};
+use crate::recipe::store::exchange::{Destination, Listed};
+use crate::recipe::teach::golden::TaughtRecipe;
+use crate::recipe::{ChangeError, LoadError, RecipeFile, Refusal, Store};
 use crate::station::GaugeValue;
 use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::write_whole;
@@ -122,10 +123,7 @@ impl RecipeCommand {
                 let store = store(files)?;
                 let head = files.head(&files.configuration()?);
                 let calibration = backend::calibration(&head)?;
-                let fits = |recipe| {
-                    let tried = Plan::try_out(recipe, &calibration);
-                    tried.map_err(|error| error.to_string())
-                };
+                let fits = |recipe| Ok(Plan::try_out(recipe, &calibration)?);
                 let to = Destination {
                     number: *number,
                     replace: *replace,
@@ -278,7 +276,7 @@ impl Gauges {
         let target = target.map_err(Exit::Missing.because(&what))?;
         let _alone = alone(&target, &what)?;
         let (before, arrays) = self.unpacked()?;
-        let unfit = |error: String| Failure::because(Exit::Content, &what, error);
+        let unfit = |error: Refusal| Failure::because(Exit::Content, &what, error);
         let TaughtRecipe {
             bytes,
             manifest,
@@ -286,9 +284,8 @@ impl Gauges {
             ..
         } = gauging.set(&before, arrays).map_err(unfit)?;
         let head = manifest.head().map_err(unfit)?;
-        let golden = Plan::golden(recipe, &head, Headway::silent())
-            .map_err(|error| unfit(error.to_string()));
-        let mut golden = golden?;
+        let golden = Plan::golden(recipe, &head, Headway::silent());
+        let mut golden = golden.map_err(|error| unfit(error.into()))?;
         let (golden, features) = golden.judged((&manifest).into());
         let changed = manifest.differences(&before);
         let same = RecipeFile {

@@ -7,7 +7,7 @@ use crate::error::{Exit, Failure, Result};
 use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, GaugeEntry, Reader, difference, seq_of};
 use crate::recipe::plan::PlanError;
-use crate::recipe::{Outline, Recipe, Store};
+use crate::recipe::{Labels, Recipe, Store};
 use crate::station::result::flag::SIMULATED;
 use crate::station::{Inspection, ResultRecord, Square};
 use crate::storage::archive::Unpacked;
@@ -210,7 +210,7 @@ fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {
 }
 
 /// An entry with the kind of each gauge, and the features.
-fn detailed(entry: &Entry, outline: &Outline, features: Value) -> Result<Value> {
+fn detailed(entry: &Entry, outline: &Labels, features: Value) -> Result<Value> {
     let shown = serde_json::to_value(entry);
     let mut shown = shown.map_err(Exit::Software.because("write the result"))?;
     for (gauge, value) in entry.gauges.iter().enumerate() {

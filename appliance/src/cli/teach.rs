@@ -12,11 +12,10 @@ use crate::head::rasters::Illumination;
 use crate::measure::{measure, measure_after};
 use crate::production::backend::{self, OpenedHead};
 use crate::recipe::file::{LONGEST_NAME, LONGEST_PART_NUMBER, MAX_EXPOSURES, MAX_TOLERANCE_MM};
-use crate::recipe::golden::{GoldenPart, Naming, TaughtRecipe, UnsealedRecipe};
-use crate::recipe::replace::{LEAST_LIMIT_MM, MOST_LIMIT_MM};
-use crate::recipe::teach::{TeachError, teach};
-use crate::recipe::{PatternFile, RecipeFile, Store};
-use crate::recipe::{captures, replace, surroundings};
+use crate::recipe::teach::golden::{GoldenPart, Naming, TaughtRecipe, UnsealedRecipe};
+use crate::recipe::teach::replace::{LEAST_LIMIT_MM, MOST_LIMIT_MM};
+use crate::recipe::teach::{TeachError, captures, part, replace, teach};
+use crate::recipe::{PatternFile, RecipeFile, Store, store};
 use crate::station::control::MAX_RECIPE;
 use crate::storage::folder::write_whole;
 use crate::storage::state::StateFolder;
@@ -219,7 +218,7 @@ impl Teach {
         let number = self.number;
         if !self.replace {
             let words = ("teach", "add --replace (and --keep-gauges)", "teach number");
-            replace::refuse_taken(recipes, number, words).map_err(Exit::CannotCreate.failure())?;
+            store::refuse_taken(recipes, number, words).map_err(Exit::CannotCreate.failure())?;
         }
         let replaced = recipes.present(number);
         if self.keep_gauges && replaced.is_none() {
@@ -325,10 +324,10 @@ impl Teach {
         let signal =
             captures::recorded_signal(&recording, primary).map_err(|error| wrong(&error))?;
         let (mut phases, mut heights) = (phases.clone(), surface.map.clone());
-        let found = surroundings::of(&heights, &surface.triangulator, naming.told());
+        let found = part::of(&heights, &surface.triangulator, naming.told());
         let found = found.map_err(|error| wrong(&error))?;
         if let Some(found) = &found {
-            surroundings::leave_out(found, &mut phases, &mut heights);
+            part::leave_out(found, &mut phases, &mut heights);
         }
         let part = GoldenPart {
             calibration: &calibration,

@@ -8,8 +8,9 @@
 
 use super::entry::Entry;
 use crate::head::calibration::Calibration;
+use crate::recipe::Store;
+use crate::recipe::file::archive;
 use crate::recipe::plan::Plan;
-use crate::recipe::{Store, archive};
 use crate::station::{ResultRecord, Stages, Verdict};
 use crate::storage::folder::{name_also, rename_whole};
 use hal::frame::Frame;

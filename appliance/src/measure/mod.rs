@@ -14,6 +14,7 @@ use crate::head::scan::{PhasesError, Scan};
 use crate::head::seam::{self, AbsurdModel};
 use crate::output::cloud::Surface;
 use crate::recipe::Recipe;
+use crate::recipe::Refusal;
 use algo::adaptive::ProjectorMap;
 use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, Reference, RigError, Triangulator};
@@ -43,7 +44,7 @@ pub(crate) enum UnmeasurableRecording {
     Rig(#[from] RigError),
     /// The recipe is of another pattern, or of frames of another size.
     #[error("{0}")]
-    Recipe(String),
+    Recipe(Refusal),
     /// There is nothing to be decoded.
     #[error("it has neither fringes nor a Gray code: record one of both")]
     NothingShown,

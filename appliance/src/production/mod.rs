@@ -111,7 +111,7 @@ pub struct Worker {
     /// The part that is put in front of a simulated head once a good one is taught.
     pub waiting: Option<Placed>,
     /// What teaching took for the part.
-    pub seen: crate::recipe::part_seen::LastSeen,
+    pub seen: crate::recipe::teach::part::LastSeen,
     /// Steps of commissioning, and what they have found.
     pub commission: Commission,
     /// Whether the projector has the patterns for live pictures behind those of the recipe.

@@ -4,8 +4,8 @@
 use super::job::Telling;
 use super::{ABORTED, DEVICE_TIMEOUT, Worker, active, broken, opening};
 use crate::head::calibrated::EmptyStation;
-use crate::recipe::teach::{TaughtRecipe, TeachError, teach_showing};
-use crate::recipe::{RecipeFile, replace};
+use crate::recipe::RecipeFile;
+use crate::recipe::teach::{TaughtRecipe, TeachError, replace, teach_showing};
 use crate::station::{Event, JobId, RecipeKey, Teaching, error_code};
 use crate::system::computing;
 use crate::system::headway::Headway;
@@ -83,7 +83,7 @@ impl Worker {
         let (width, height, _) = self.opened.calibration.frames();
         let kept = replaced.filter(|_| keep_gauges);
         if let Some(file) = kept {
-            replace::check_kept(file, (width, height)).map_err(TeachError::Rig)?;
+            replace::check_kept(file, (width, height))?;
         }
         let mut naming = replace::naming(number, replaced, keep_gauges);
         naming.everything = everything.unwrap_or(naming.everything);
@@ -93,7 +93,7 @@ impl Worker {
             .map(|um| f64::from(um) / 1000.0)
             .or(naming.limit_mm);
         let shared = self.recipes.refuse_shared(number, &naming.part_number);
-        shared.map_err(TeachError::Rig)?;
+        shared?;
         let (aborts, bar) = (&self.aborts, &self.progress);
         let telling = Telling::new(&self.station, &self.pulse, bar, aborts, job);
         let tell = |share: f64, words: &str| telling.tell(share, words);
@@ -123,7 +123,7 @@ impl Worker {
         computing::trim_memory();
         let packed =
             settled.and_then(|settled| self.computing.on(|| settled.seal_telling(packing)));
-        packed.map_err(TeachError::Rig)
+        Ok(packed?)
     }
 
     /// What the station shows without a part, if it was recorded.

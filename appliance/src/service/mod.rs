@@ -20,7 +20,7 @@ use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::production::{Aborts, Order, backend};
 use crate::recipe::Store;
-use crate::recipe::part_seen::LastSeen;
+use crate::recipe::teach::part::LastSeen;
 use crate::station::snapshot::status;
 use crate::station::{
     Buffered, Effect, Event, Identity, Limits, MAX_BUFFERED, Micros, RecipeKey, RecipeResult,

@@ -19,7 +19,7 @@ use crate::production::simulation::Simulation;
 use crate::production::warm_up::WarmUp;
 use crate::production::{Aborts, JudgedBy, Order, Worker};
 use crate::recipe::Store;
-use crate::recipe::part_seen::LastSeen;
+use crate::recipe::teach::part::LastSeen;
 use crate::station::{Event, Request, StationHandle, tick};
 use crate::system::caller::Caller;
 use crate::system::clock;

@@ -3,10 +3,10 @@
 use super::{Tally, one_in};
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
-use crate::recipe::archive::{members, pack, parse, seal};
-use crate::recipe::exchange::Destination;
-use crate::recipe::golden::Naming;
+use crate::recipe::file::archive::{members, pack, parse, seal};
 use crate::recipe::plan::Plan;
+use crate::recipe::store::exchange::Destination;
+use crate::recipe::teach::golden::Naming;
 use crate::recipe::teach::teach;
 use crate::recipe::{DatumFile, Recipe, RecipeFile, Store};
 use crate::system::headway::Headway;
@@ -241,7 +241,9 @@ fn a_recipe_for_a_projector_of_four_billion_columns_is_refused_and_does_not_repl
     let (bytes, _) = seal(&text, without, 0, Headway::silent()).unwrap();
     let words = Recipe::from_bytes(&bytes).unwrap_err();
     assert!(
-        words.contains("projector.width is 4294967295: write 1 to 8192"),
+        words
+            .words
+            .contains("projector.width is 4294967295: write 1 to 8192"),
         "{words}"
     );
     // As if somebody had stored it in the folder: it is listed with its problem, and the previous
@@ -271,7 +273,7 @@ fn a_recipe_is_tried_out_on_the_head_before_it_is_taken() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(&folder.path().join("recipes")).unwrap();
     let arriving = folder.path().join("arriving.recipe");
-    let try_out = |recipe| Plan::try_out(recipe, &bed.calibration).map_err(|e| e.to_string());
+    let try_out = |recipe| Ok(Plan::try_out(recipe, &bed.calibration)?);
     let import = |bytes: &[u8]| {
         std::fs::write(&arriving, bytes).unwrap();
         store

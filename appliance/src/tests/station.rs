@@ -5,7 +5,7 @@ use super::recipes::HEAD;
 use crate::config::Config;
 use crate::production::caught;
 use crate::recipe::Store;
-use crate::recipe::archive::pack;
+use crate::recipe::file::archive::pack;
 use crate::service::{Caller, Daemon};
 use crate::station::snapshot::status;
 use crate::station::{

@@ -306,7 +306,7 @@ fn pack(site: &Site) -> Result<Vec<u8>, ZipError> {
         .into_iter()
         .map(|number| match site.recipes.manifest(number) {
             Ok(file) => serde_json::to_value(file).unwrap_or_default(),
-            Err(words) => json!({ "number": number, "error": words }),
+            Err(error) => json!({ "number": number, "error": error.words }),
         })
         .collect();
     let results = site.history.results(&Filter::default());

@@ -11,8 +11,8 @@ use super::problem::{Answered, Problem};
 use super::request::{Path, Query};
 use super::site::Site;
 use super::view;
-use crate::recipe::plan::{Layers, Shown};
-use crate::recipe::{RecipeId, Seen};
+use crate::recipe::plan::{Layers, ShownDeviation};
+use crate::recipe::{FeatureView, RecipeId};
 use crate::station::Verdict;
 use crate::station::snapshot::status;
 
@@ -83,7 +83,12 @@ impl Level {
 }
 
 /// What was found on a part.
-pub(super) fn found(seq: u32, verdict: Verdict, id: &RecipeId, features: &[Seen<'_>]) -> Value {
+pub(super) fn found(
+    seq: u32,
+    verdict: Verdict,
+    id: &RecipeId,
+    features: &[FeatureView<'_>],
+) -> Value {
     json!({
         "seq": seq, "recipe": id.number, "fingerprint": id.fingerprint, "verdict": verdict.word(),
         "features": features,
@@ -198,13 +203,13 @@ pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Answ
 }
 
 /// What a map of deviations shows, for people.
-fn words(shown: &Shown) -> String {
+fn words(shown: &ShownDeviation) -> String {
     let motion = match (shown.aligned, shown.placed) {
         (true, true) => "motion taken back",
         (true, false) => "motion not found and not taken back",
         (false, _) => "as the part lies",
     };
-    let Shown { side, gauge, .. } = shown;
+    let ShownDeviation { side, gauge, .. } = shown;
     let mean = match side {
         1 => "pixel by pixel".into(),
         side => format!("mean over {side} × {side} px"),
@@ -220,8 +225,8 @@ fn words(shown: &Shown) -> String {
 }
 
 /// What a map of deviations shows, for programs.
-fn described(shown: &Shown) -> Value {
-    let Shown {
+fn described(shown: &ShownDeviation) -> Value {
+    let ShownDeviation {
         side,
         placed,
         ref gauge,

@@ -16,8 +16,9 @@ use super::problem::{Answered, Problem};
 use super::request;
 use super::request::Path;
 use super::site::Site;
-use crate::recipe::bounds::check_marking;
-use crate::recipe::replace;
+use crate::recipe::file::rules::check_marking;
+use crate::recipe::store;
+use crate::recipe::teach::replace;
 use crate::station::control::{ERROR_RESET, MAX_RECIPE, TRIGGER};
 use crate::station::{
     Client, ControlWrite, Event, Marking, RecipeKey, RecipeResult, Request, Snapshot, Teaching,
@@ -204,7 +205,7 @@ pub(super) async fn teach(
                     "send {\"replace\": true} to replace it",
                     "teach number",
                 );
-                replace::refuse_taken(&site.recipes, number, words).map_err(Problem::busy)?;
+                store::refuse_taken(&site.recipes, number, words).map_err(Problem::busy)?;
             }
             (true, true) if replaced.is_none() => {
                 return Err(Problem::missing(replace::no_gauges(number)));

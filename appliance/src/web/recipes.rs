@@ -17,9 +17,9 @@ use super::request;
 use super::request::{Path, Query};
 use super::site::Site;
 use crate::recipe::edit::{self, Edit, Edited};
-use crate::recipe::exchange::Destination;
 use crate::recipe::plan::{GoldenView, Plan, PlanError};
 use crate::recipe::store::LoadedRecipe;
+use crate::recipe::store::exchange::Destination;
 use crate::recipe::{ChangeError, LoadError, Recipe, RecipeFile, Store};
 use crate::station::control::MAX_RECIPE;
 use std::time::{Duration, Instant};
@@ -59,14 +59,14 @@ pub(super) async fn list(site: Site) -> Answered<Json<Value>> {
 
 /// What gauges can measure.
 pub(super) async fn kinds() -> Json<Value> {
-    Json(crate::recipe::kinds::json())
+    Json(crate::recipe::file::kinds::json())
 }
 
 fn listed(recipes: &Store) -> Value {
     let rows = recipes.numbers().into_iter().map(|number| {
         let mut row = match recipes.manifest(number) {
             Ok(file) => summary(&file),
-            Err(words) => json!({ "number": number, "error": words }),
+            Err(error) => json!({ "number": number, "error": error.words }),
         };
         row["before"] = recipes.manifest_before(number).as_ref().map(summary).into();
         row

@@ -3,7 +3,7 @@
 use super::problem::{Answered, Problem};
 use super::site::Site;
 use crate::error::shortened;
-use crate::recipe::incoming::Incoming;
+use crate::recipe::store::incoming::Incoming;
 use axum::body::{Body, Bytes, HttpBody as _, to_bytes};
 use axum::extract::rejection::{PathRejection, QueryRejection};
 use axum::extract::{self, FromRequestParts};

@@ -23,9 +23,9 @@ use crate::production::commissioning::live::Live;
 use crate::production::latest::LastCycleRequests;
 use crate::production::simulation::Simulation;
 use crate::recipe::Store;
-use crate::recipe::part_seen::LastSeen;
+use crate::recipe::edit::trying::EditedRecipe;
 use crate::recipe::plan::Layers;
-use crate::recipe::trying::Opened;
+use crate::recipe::teach::part::LastSeen;
 use crate::station::{Snapshot, StationHandle};
 use crate::system::journal::Logbook;
 use crate::system::socket;
@@ -51,7 +51,7 @@ const MAX_COLLECTING: usize = 4;
 /// The maps that were computed last, and the SEQ of their result.
 pub(super) type LastKept = Option<(u32, Arc<Layers>)>;
 /// The recipe whose edit was tried last, and when.
-pub(super) type LastOpened = Option<(Opened, Instant)>;
+pub(super) type LastOpened = Option<(EditedRecipe, Instant)>;
 
 /// What the daemon hands to the page.
 pub struct Parts {

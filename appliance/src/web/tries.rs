@@ -29,8 +29,8 @@ use super::request::Path;
 use super::site::{LastOpened, Site, alone};
 use crate::history::kept::Kept;
 use crate::recipe::edit::Edit;
+use crate::recipe::edit::trying::{EditedRecipe, Over, Tried};
 use crate::recipe::plan::{Plan, PlanError};
-use crate::recipe::trying::{Opened, Over, Tried};
 use crate::recipe::{ChangeError, Recipe};
 use crate::station::result::flag::SIMULATED;
 use crate::system::computing;
@@ -157,10 +157,11 @@ fn tried(
         return Err(superseded());
     }
     let stored = site.recipes.manifest(number).map_err(Problem::missing)?;
-    let same = |(opened, _): &(Opened, Instant)| opened.id() == (number, &*stored.fingerprint);
+    let same =
+        |(opened, _): &(EditedRecipe, Instant)| opened.id() == (number, &*stored.fingerprint);
     let open = match opened.take().filter(same) {
         Some((open, _)) => open,
-        None => Opened::new(site.recipes.load_to_edit(number)?).map_err(Problem::unfit)?,
+        None => EditedRecipe::new(site.recipes.load_to_edit(number)?).map_err(Problem::unfit)?,
     };
     let fingerprint = open.id().1.to_owned();
     if edit.fingerprint != fingerprint {
@@ -171,7 +172,7 @@ fn tried(
     let shared = shared.map_or(Ok(()), |of| site.recipes.refuse_shared(number, of));
     let mut tried = open.attempt(edit, is_over).map_err(|Over| superseded())?;
     if let Err(words) = shared {
-        let problem = json!({ "words": words, "refused": true });
+        let problem = json!({ "words": words.to_string(), "refused": true });
         tried.problems.insert(0, problem);
     }
     let parts = parts(site, (&open, &tried), &on, is_over)?;
@@ -218,7 +219,7 @@ impl From<Problem> for UntriedPart {
     }
 }
 
-fn recipe_of(open: &Opened, tried: &Tried) -> Result<Recipe, UntriedPart> {
+fn recipe_of(open: &EditedRecipe, tried: &Tried) -> Result<Recipe, UntriedPart> {
     let recipe = open.recipe(tried);
     recipe.map_err(|error| UntriedPart::Unsealed(error.to_string()))
 }
@@ -226,7 +227,7 @@ fn recipe_of(open: &Opened, tried: &Tried) -> Result<Recipe, UntriedPart> {
 /// What a tried list measures of parts.
 fn parts(
     site: &Site,
-    of: (&Opened, &Tried),
+    of: (&EditedRecipe, &Tried),
     on: &On,
     is_over: &dyn Fn() -> bool,
 ) -> Answered<Vec<Value>> {
@@ -261,7 +262,7 @@ fn parts(
 /// What it measures of the last part, and the verdict that this had.
 fn last(
     site: &Site,
-    (open, tried): (&Opened, &Tried),
+    (open, tried): (&EditedRecipe, &Tried),
 ) -> (Option<u32>, Result<TriedPart, UntriedPart>) {
     let Some(part) = site.last_cycle.ask(|part| part.clone()) else {
         return (None, Err(UntriedPart::NoFrames));
@@ -290,7 +291,11 @@ fn last(
 }
 
 /// What it measures of a kept part, and the verdict that this had.
-fn kept(site: &Site, (open, tried): (&Opened, &Tried), seq: u32) -> Result<TriedPart, UntriedPart> {
+fn kept(
+    site: &Site,
+    (open, tried): (&EditedRecipe, &Tried),
+    seq: u32,
+) -> Result<TriedPart, UntriedPart> {
     let (entry, folder) = kept_frames(site, seq)?;
     let recipe = recipe_of(open, tried)?;
     let kept = Kept::judged_by(&folder, &recipe).map_err(broken)?;

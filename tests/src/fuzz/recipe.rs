@@ -3,9 +3,10 @@
 use super::bounded;
 use super::part::PART;
 use appliance::recipe::edit::{self, Edit};
-use appliance::recipe::gauges_toml::Gauging;
+use appliance::recipe::file::archive;
+use appliance::recipe::file::gauges_toml::Gauging;
 use appliance::recipe::plan::Plan;
-use appliance::recipe::{Recipe, RecipeFile, Store, archive};
+use appliance::recipe::{Recipe, RecipeFile, Store};
 use std::fs;
 use std::io::Cursor;
 use tempfile::TempDir;
@@ -92,10 +93,7 @@ pub fn edit(data: &[u8]) {
     STORED.with(|stored| {
         // Written directly and not through the store, which would spend most of the time in syncs.
         fs::write(stored.folder.path().join("0001.recipe"), &part.bytes).expect("put back");
-        let fits = |recipe| {
-            let tried = Plan::try_out(recipe, &part.calibration);
-            tried.map_err(|error| error.to_string())
-        };
+        let fits = |recipe| Ok(Plan::try_out(recipe, &part.calibration)?);
         if edit::edit(&stored.store, 1, wanted, fits).is_ok() {
             let loaded = stored.store.load(1).expect("what was taken can be loaded");
             assert_eq!(loaded.fallback, None);

@@ -5,7 +5,7 @@ use crate::gauges::{frames, planned};
 use crate::placement::{Bed, bed, taught_within};
 use algo::inspect::State;
 use appliance::recipe::plan::{Plan, PlanError};
-use appliance::recipe::{GaugeFile, RecipeFile};
+use appliance::recipe::{GaugeFile, RecipeFile, Refusal};
 use appliance::station::{GaugeValue, Inspection};
 use sim::parts::Plate;
 use sim::{Part, Placement};
@@ -50,8 +50,12 @@ impl Line {
             let refused = match planned(&bed, &file, &taught.recipe.arrays) {
                 Ok(plan) => break plan,
                 Err(PlanError::Unfit {
-                    feature: Some(at), ..
-                }) if setting.some => at,
+                    reason:
+                        Refusal {
+                            of: Some(feature), ..
+                        },
+                    ..
+                }) if setting.some => feature.place,
                 Err(error) => panic!("{error}"),
             };
             // What golden does not show is not measured, nor what refers to it.

@@ -13,7 +13,7 @@ use algo::pipeline::PhaseMap;
 use algo::units::AbsolutePhase;
 use appliance::head::calibrated::{CalibratedHead, MeasureError, MeasuredPart};
 use appliance::head::calibration::Calibration;
-use appliance::recipe::adaptive::{AdaptivePattern, Preliminary};
+use appliance::recipe::teach::adaptive::{AdaptivePattern, Preliminary};
 use hal::head::Head;
 use sim::{Stage, Truth};
 use std::sync::Arc;

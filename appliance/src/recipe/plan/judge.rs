@@ -4,9 +4,9 @@
 //! part that cannot be judged (`not_judged` has the reasons), a value in a guard band, and a gauge
 //! that has no value and is not absent.
 
-use crate::recipe::demands::GaugeLimits as Limits;
-use crate::recipe::light::{Cause, Light};
-use crate::recipe::lost::{MIN_SHARE, why_lost};
+use super::light::{Cause, Light};
+use crate::recipe::file::demands::GaugeDemands;
+use crate::recipe::shown::{MIN_SHARE, why_lost};
 use crate::recipe::{Demands, SequenceKind};
 use crate::station::error_code::{BLURRED, GUARD_BAND, NOT_MEASURED, NOT_THE_PART, OUT_OF_PLACE};
 use crate::station::result::flag::{FULL_SEQUENCE, SINGLE_LEVEL, TWO_LEVELS};
@@ -47,7 +47,12 @@ const NOTHING: &str = "found nothing to measure";
 
 impl Demands {
     /// What is known of a gauge without a value.
-    fn without_value(&self, limits: &Limits, missing: Option<Missing>, of: &Findings) -> Measured {
+    fn without_value(
+        &self,
+        limits: &GaugeDemands,
+        missing: Option<Missing>,
+        of: &Findings,
+    ) -> Measured {
         let found = |at: usize| of.features.iter().find(|found| found.feature == at);
         let (absent, reason) = match missing {
             Some(Missing::Feature(at)) => match found(at) {
@@ -79,7 +84,7 @@ impl Demands {
     }
 }
 
-impl Limits {
+impl GaugeDemands {
     /// Why there is no value, where these shares of its features were measured.
     fn unseen(&self, shares: [f64; MAX_PLACES]) -> String {
         let mut features = self.of.iter().zip(shares);

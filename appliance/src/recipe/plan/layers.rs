@@ -2,12 +2,12 @@
 //! cloud.
 
 use super::Plan;
-use super::laps::Laps;
-use super::window::pitch;
+use super::inspect::Laps;
+use super::taught::pitch;
 use crate::head::calibration::Calibration;
 use crate::head::seam;
 use crate::output::cloud::{Axes, ply};
-use crate::recipe::Recipe;
+use crate::recipe::{Recipe, Refusal};
 use crate::station::Square;
 use algo::geometry::{HeightRange, Triangulator};
 use algo::inspect::{Drawing, Findings, Maps};
@@ -27,7 +27,7 @@ pub struct Layers {
     /// Deviation from golden in mm as [`Self::shown`] says, NaN where the part is not compared.
     pub deviation_mm: Vec<f32>,
     /// Which deviation the map shows.
-    pub shown: Shown,
+    pub shown: ShownDeviation,
     /// Modulation of the finest level in counts.
     pub modulation: Vec<f32>,
     triangulator: Arc<Triangulator>,
@@ -69,11 +69,13 @@ impl GoldenView {
     ///
     /// # Errors
     /// In words: they are none.
-    pub fn new(recipe: &Recipe, head: &Calibration) -> Result<Self, String> {
+    pub fn new(recipe: &Recipe, head: &Calibration) -> Result<Self, Refusal> {
         let [low, high] = recipe.conditions.range_mm;
         let range = Some(HeightRange { low, high });
         let triangulator = head.triangulator(recipe.function.clone(), range);
-        triangulator.map(Self).map_err(|error| error.to_string())
+        triangulator
+            .map(Self)
+            .map_err(|error| error.to_string().into())
     }
 
     /// x, y and z in mm of every `stride`-th pixel of its heights, NaN where not known.
@@ -90,7 +92,7 @@ impl GoldenView {
 
 /// What a map of deviations shows: what a gauge of the recipe was judged by.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shown {
+pub struct ShownDeviation {
     /// Each pixel has the mean over the square of so many pixels about it; 1 = its own deviation.
     pub side: usize,
     /// Whether the recipe has the part's motion taken back.
@@ -180,7 +182,7 @@ impl Plan {
     }
 
     /// Which deviation a map of the part shows.
-    fn shown(&self, findings: &Findings) -> Shown {
+    fn shown(&self, findings: &Findings) -> ShownDeviation {
         let limits = self.demands.limits.iter().zip(&findings.readings);
         let gauges = self.production().gauges().iter().zip(limits);
         let deviations = gauges.filter_map(|(gauge, (limits, reading))| {
@@ -197,7 +199,7 @@ impl Plan {
         });
         let used = |(_, gauge): &(usize, ShownGauge)| gauge.used();
         let gauge = deviations.max_by(|a, b| used(a).total_cmp(&used(b)));
-        Shown {
+        ShownDeviation {
             side: gauge.as_ref().map_or(1, |(side, _)| *side),
             aligned: self.demands.aligned,
             placed: findings.placed.is_some(),

@@ -1,44 +1,32 @@
 //! A recipe joined with the head's calibration. Planning can fail; judging a part with the plan
 //! always ends in an inspection.
 
-mod arriving;
-mod golden;
+mod inspect;
 mod judge;
-mod laps;
 mod layers;
-mod look;
+pub(super) mod light;
 mod patterns;
-mod refused;
-mod rendered;
 mod run;
+pub(super) mod taught;
 mod trial;
-pub(super) mod window;
 
-pub use arriving::Arriving;
-pub use layers::{GoldenView, Layers, Shown, ShownGauge};
-pub use refused::PlanError;
+pub use inspect::Arriving;
+pub use layers::{GoldenView, Layers, ShownDeviation, ShownGauge};
 pub use trial::Golden;
 
 use crate::head::calibration::Calibration;
+use crate::head::exposing::Exposing;
 use crate::head::rasters::Illumination;
-use crate::head::seam;
-use crate::recipe::light::{GoldenLight, Light};
-use crate::recipe::{Conditions, Demands, Outline, Recipe, RecipeId};
-use crate::station::error_code::WRONG_FRAMES;
-use crate::station::result::flag::{JUDGES_NOTHING, SIMULATED};
-use crate::station::{Inspection, Stage, Verdict};
+use crate::recipe::file::refusal::refused;
+use crate::recipe::{Conditions, Demands, Labels, Recipe, RecipeId, Refusal};
 use crate::system::headway::Headway;
-use algo::frame::FrameView;
 use algo::geometry::HeightRange;
-use algo::inspect::{Findings, Input, Maps, PairPlaced, Production, Signal, Strips, normal_shares};
-use algo::pattern::{MAX_FRAMES, Shot};
+use algo::inspect::{Production, Strips, normal_shares};
+use algo::pattern::Shot;
 use algo::pipeline::HeightCubics;
-use hal::frame::Frame;
-use laps::Laps;
-use refused::Refusal;
+use light::GoldenLight;
 use run::{Prepared, Run, Shared};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::sync::{Arc, Mutex};
 use trial::OfGolden;
 
 /// A recipe joined with the head's calibration. Of the recipe's arrays only what production reads
@@ -50,7 +38,7 @@ pub struct Plan {
     /// What it demands of a part.
     demands: Demands,
     /// What its gauges and features are called.
-    outline: Outline,
+    outline: Labels,
     /// The light of its patterns.
     illumination: Illumination,
     /// What the rasters show, each once; those of the first run come first.
@@ -138,14 +126,10 @@ impl Plan {
         headway: Headway<'_>,
     ) -> Result<Self, PlanError> {
         let number = recipe.id.number;
-        refused::same_devices(&recipe.conditions, calibration)
+        same_devices(&recipe.conditions, calibration)
             .map_err(|reason| PlanError::OtherHead { number, reason })?;
-        let unfit = |Refusal { words, feature }| PlanError::Unfit {
-            number,
-            reason: words,
-            feature,
-        };
-        Self::joined(recipe, calibration, (simulated, golden), headway).map_err(unfit)
+        Self::joined(recipe, calibration, (simulated, golden), headway)
+            .map_err(|reason| PlanError::Unfit { number, reason })
     }
 
     fn joined(
@@ -180,25 +164,25 @@ impl Plan {
         let triangulator = quick.triangulator(function, Some(HeightRange { low, high }));
         let triangulator = triangulator.map_err(|error| error.to_string())?;
         headway.done(0.1);
-        window::of_sections(&mut features, size, &triangulator)?;
+        taught::of_sections((&mut features, &demands.features), size, &triangulator)?;
         let (window, away) =
-            window::of((&features, &gauges), size, &triangulator, &demands, &arrays);
+            taught::window((&features, &gauges), size, &triangulator, &demands, &arrays);
         // The golden surface is by the sequence that is projected first, so that deviations by that
         // have no other error of golden's.
         let base = sequences.first().and_then(|first| first.offset);
         let base = base.filter(|_| !arrays.sequence_offset.is_empty());
-        let surface = golden::surface(size.0, &arrays, golden::offset(&arrays, base));
+        let surface = taught::surface(size.0, &arrays, taught::offset(&arrays, base));
         let shares = normal_shares(&triangulator, &surface);
         headway.done(0.25);
         let range = triangulator.function().range();
         let lenient = of_golden.is_some_and(|of| of.lenient);
-        let signal = golden::signal(&mut arrays, &sequences, (&features, &gauges), lenient);
+        let signal = taught::signal(&mut arrays, &sequences, (&features, &gauges), lenient);
         let golden = (&arrays, &shares[..], base);
         let (prepared, shots) = Prepared::all(sequences, &conditions, golden, range)?;
         drop(shares);
         headway.done(0.4);
         let golden_light = GoldenLight::of(&arrays, conditions.golden_offset_counts);
-        let noise_counts = golden::even_noise(conditions.noise, &arrays);
+        let noise_counts = taught::even_noise(conditions.noise, &arrays);
         let modulation = match demands.aligned {
             true => std::mem::take(&mut arrays.modulation),
             false => [].into(),
@@ -317,128 +301,81 @@ impl Plan {
     pub fn into_production(mut self) -> Production {
         self.runs.swap_remove(0).production
     }
+}
 
-    /// Judges a part from the frames of a sequence; the times of its stages begin at `exposed`. A
-    /// part that cannot be measured is INVALID with a reason.
-    pub fn inspect(&self, sequence: usize, frames: &[Frame], exposed: Instant) -> Inspection {
-        self.inspect_arrived(frames, self.arriving(sequence), exposed)
-    }
+/// A recipe that cannot be run on this head.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum PlanError {
+    /// It was made for another calibration.
+    #[error(
+        "recipe {number} was made for calibration {made_for}, this head has {present}: teach it again on \
+         this head"
+    )]
+    OtherCalibration {
+        /// The recipe's number.
+        number: u16,
+        /// First digits of the fingerprint in the recipe.
+        made_for: String,
+        /// First digits of the head's.
+        present: String,
+    },
+    /// It was made on a head with another camera or projector.
+    #[error("recipe {number} was made on another head: {reason}: teach it again on this head")]
+    OtherHead {
+        /// The recipe's number.
+        number: u16,
+        /// What the head has else.
+        reason: Refusal,
+    },
+    /// It was taught with another exposure or gain.
+    #[error(
+        "recipe {number} was taught with {taught}, and the camera is set to {present}, where its noise is another: set the camera as it was, or \
+         teach the recipe again"
+    )]
+    OtherExposing {
+        /// The recipe's number.
+        number: u16,
+        /// What it was taught with.
+        taught: Exposing,
+        /// What the head is set to.
+        present: Exposing,
+    },
+    /// Something in it does not fit.
+    #[error("recipe {number}: {reason}")]
+    Unfit {
+        /// The recipe's number.
+        number: u16,
+        /// Why, and which of its features is why, if one is.
+        reason: Refusal,
+    },
+}
 
-    /// As [`Self::inspect`], with the levels that were decoded on arrival.
-    pub fn inspect_arrived(
-        &self,
-        frames: &[Frame],
-        arriving: Arriving,
-        exposed: Instant,
-    ) -> Inspection {
-        let sequence = arriving.sequence();
-        let mut laps = Laps::since(exposed);
-        let of = (arriving, frames);
-        let found = self.run(&mut self.strips(), of, Maps::default(), &mut laps);
-        self.judged((sequence, frames), found, &mut laps)
-    }
-
-    /// The inspection by the findings of the frames of a sequence, or by why there are none.
-    fn judged(
-        &self,
-        (sequence, frames): (usize, &[Frame]),
-        found: Result<(Findings, Option<f64>), String>,
-        laps: &mut Laps,
-    ) -> Inspection {
-        let simulated = if self.simulated { SIMULATED } else { 0 };
-        let nothing = match self.demands.judges_nothing {
-            true => JUDGES_NOTHING,
-            false => 0,
+impl From<PlanError> for Refusal {
+    fn from(error: PlanError) -> Self {
+        let words = error.to_string();
+        let of = match error {
+            PlanError::Unfit { reason, .. } => reason.of,
+            _ => None,
         };
-        let kind = self.runs.get(sequence).map(|run| run.kind);
-        let mut inspection = Inspection {
-            flags: kind.map_or(0, judge::sequence_flag) | simulated | nothing,
-            ..Inspection::default()
-        };
-        match found {
-            Ok((findings, likeness)) => {
-                self.demands.judge(&findings, &mut inspection);
-                if sequence + 1 < self.runs.len() {
-                    let unlike = likeness.is_some_and(|likeness| likeness < judge::ALIKE);
-                    inspection.step_up = match unlike {
-                        true => Some("the picture differs from that of the taught part"),
-                        false => self.demands.step_up(&findings, &inspection),
-                    };
-                }
-                if inspection.step_up.is_none() && Demands::doubts_the_light(&inspection) {
-                    let light = self.light(sequence, frames);
-                    self.demands.explain(light, &mut inspection);
-                }
-            }
-            Err(reason) => {
-                inspection.judged = Verdict::Invalid;
-                inspection.reason = Some(reason.into());
-                inspection.error_code = WRONG_FRAMES;
-            }
-        }
-        laps.end(Stage::Judgement);
-        inspection.stages = laps.stages.clone();
-        inspection
+        Self { words, of }
     }
+}
 
-    /// The light of a part from the frames of a sequence; none if the frames do not fit.
-    fn light(&self, sequence: usize, frames: &[Frame]) -> Option<Light> {
-        let full_scale = self.runs.get(sequence)?.production.decoder().full_scale();
-        let modulation = self.modulation(sequence, frames)?;
-        let views: Result<Vec<FrameView<'_>>, _> = frames.iter().map(seam::view).collect();
-        Light::of(&self.golden_light, &views.ok()?, (&modulation, full_scale))
+/// Checks that camera and projector have the size that the recipe was made for.
+///
+/// # Errors
+/// In words: which of them has not.
+pub(super) fn same_devices(
+    conditions: &Conditions,
+    calibration: &Calibration,
+) -> Result<(), Refusal> {
+    let (camera, here) = (conditions.camera, calibration.frames());
+    if camera != here {
+        return refused!("it is for a camera of {camera:?}, this head's has {here:?}");
     }
-
-    /// The buffers of an inspection.
-    fn strips(&self) -> MutexGuard<'_, Strips> {
-        // A poisoned lock does no harm: strips are cleared before they are used.
-        self.strips.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// The findings from the frames of a sequence, and of two frames how much the picture is like
-    /// golden's.
-    fn run(
-        &self,
-        strips: &mut Strips,
-        (arriving, frames): (Arriving, &[Frame]),
-        maps: Maps<'_>,
-        laps: &mut Laps,
-    ) -> Result<(Findings, Option<f64>), String> {
-        let sequence = arriving.sequence();
-        let run = self.runs.get(sequence);
-        let run = run.ok_or_else(|| format!("the recipe has no sequence {sequence}"))?;
-        // On the stack: a trigger allocates nothing.
-        let mut views: heapless::Vec<FrameView<'_>, MAX_FRAMES> = heapless::Vec::new();
-        for frame in frames {
-            let view = seam::view(frame).map_err(|error| error.to_string())?;
-            let full = |_| format!("{} frames are more than any sequence has", frames.len());
-            views.push(view).map_err(full)?;
-        }
-        let production = &run.production;
-        if let Some(buffers) = &run.pair {
-            let mut buffers = buffers.lock().unwrap_or_else(PoisonError::into_inner);
-            let placed = production.place_pair(&views, strips, &mut buffers);
-            laps.end(Stage::Alignment);
-            let findings = placed.and_then(|PairPlaced { found, placed }| {
-                let input = (Input::Phases(buffers.phases()), Signal::None);
-                let findings = production.inspect_placed(input, strips, placed, maps)?;
-                Ok((findings, Some(found.map_or(0.0, |found| found.likeness))))
-            });
-            laps.end(Stage::Strips);
-            return findings.map_err(|error| error.to_string());
-        }
-        let (arrived, finest) = run.complete(arriving, &views).map_err(|e| e.to_string())?;
-        let input = Input::Finest(&arrived, &finest);
-        let placed = production.place(input, strips);
-        laps.end(Stage::Alignment);
-        let findings = placed
-            .and_then(|placed| {
-                let input = (input, Signal::Frames(&views));
-                production.inspect_placed(input, strips, placed, maps)
-            })
-            .map_err(|error| error.to_string());
-        laps.end(Stage::Strips);
-        run.keep(arrived);
-        Ok((findings?, None))
+    let (raster, here) = (conditions.raster, calibration.raster());
+    match raster == here {
+        true => Ok(()),
+        false => refused!("it is for a projector of {raster:?}, this head's has {here:?}"),
     }
 }

@@ -1,9 +1,9 @@
 //! One sequence of a recipe, ready to judge parts.
 
-use super::golden;
-use super::refused::Refusal;
-use crate::recipe::archive::Arrays;
-use crate::recipe::{Conditions, RecipeSequence, SequenceKind};
+use super::taught;
+use crate::recipe::file::archive::Arrays;
+use crate::recipe::file::refusal::refused;
+use crate::recipe::{Conditions, Element, Part, RecipeSequence, Refusal, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
@@ -96,7 +96,7 @@ impl Prepared {
         conditions: &Conditions,
         golden: (&Arrays, &[f32], Option<usize>),
         range: PhaseRange,
-    ) -> Result<(Vec<Self>, Vec<Shot>), String> {
+    ) -> Result<(Vec<Self>, Vec<Shot>), Refusal> {
         let mut shots = Vec::new();
         // Golden was measured with the full sequence, the last.
         let taught = sequences.last().map_or(1.0, RecipeSequence::fundamental);
@@ -110,12 +110,12 @@ impl Prepared {
         let (columns, rows) = conditions.raster;
         let patterns = shots.len() * columns as usize * rows as usize;
         if patterns > MAX_PATTERN_BYTES {
-            return Err(format!(
+            return refused!(
                 "its sequences show {} patterns of {} MiB together, at most {} are held: teach it with fewer frames",
                 shots.len(),
                 patterns >> 20,
                 MAX_PATTERN_BYTES >> 20
-            ));
+            );
         }
         Ok((prepared, shots))
     }
@@ -129,7 +129,7 @@ impl Prepared {
         (arrays, shares, base): (&Arrays, &[f32], Option<usize>),
         range: PhaseRange,
         rasters: &mut Vec<Shot>,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, Refusal> {
         let RecipeSequence {
             kind,
             shots,
@@ -138,7 +138,7 @@ impl Prepared {
             ripple_mm,
         } = sequence;
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
-        let offsets = (golden::offset(arrays, offset), golden::offset(arrays, base));
+        let offsets = (taught::offset(arrays, offset), taught::offset(arrays, base));
         let decoder = Decoder::new(&levels, range, conditions.camera.2);
         let decoder = decoder.map_err(|error| error.to_string())?;
         let decoder = decoder.with_least_modulation(conditions.least_modulation);
@@ -152,8 +152,8 @@ impl Prepared {
         Ok(Self {
             kind,
             indices: indices.collect(),
-            taught: golden::taught((conditions.noise, brighter), arrays, shares, &decoder),
-            map: golden::map(arrays, kind, offsets),
+            taught: taught::taught((conditions.noise, brighter), arrays, shares, &decoder),
+            map: taught::map(arrays, kind, offsets),
             levels: Levels::new(&levels, decoder.full_scale()),
             decoder,
             brighter,
@@ -293,7 +293,8 @@ fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> Refusal {
         .features
         .get(feature)
         .map_or("contour", |of| of.kind.name());
-    let name = shared.names.get(feature).map_or("", |name| name);
+    let name = shared.names.get(feature).map_or("", String::as_str);
+    let of = Some(Element::new(Part::Feature, feature, name));
     let name = clipped(name);
     let is_section = matches!(error, Unmeasurable::NoSection { .. });
     let words = match shared.signal {
@@ -307,6 +308,5 @@ fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> Refusal {
             "feature {name:?}: golden has no {kind} in its region, or too little of its rim is seen: draw the region around it, with 1.5 mm or more on both sides"
         ),
     };
-    let feature = Some(feature);
-    Refusal { words, feature }
+    Refusal { words, of }
 }

@@ -1,13 +1,16 @@
 //! Plans a recipe before it is used: whether it can be used on a head, and what it measures of
 //! golden. The plan is dropped.
+//!
+//! Golden is also judged as a displaced part would be, as production would.
 
-use super::laps::Laps;
+use super::inspect::Laps;
 use super::{Plan, PlanError};
 use crate::head::calibration::Calibration;
-use crate::recipe::{Demands, Recipe, Seen};
+use crate::recipe::{Demands, FeatureView, Recipe};
 use crate::station::Inspection;
 use crate::system::headway::Headway;
-use algo::inspect::{Drawing, Findings, Input, Maps, Signal};
+use algo::geometry::Vector;
+use algo::inspect::{Drawing, Findings, Input, Maps, Motion, Signal};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use algo::units::Modulation;
@@ -91,7 +94,7 @@ pub struct Golden {
 impl Golden {
     /// Golden judged as a part is, by a recipe that has other limits at most, and what became of
     /// the features that its gauges need.
-    pub fn judged(&mut self, demands: Demands) -> (Inspection, Vec<Seen<'_>>) {
+    pub fn judged(&mut self, demands: Demands) -> (Inspection, Vec<FeatureView<'_>>) {
         self.plan.demands = demands;
         let plan = &self.plan;
         let mut laps = Laps::since(Instant::now());
@@ -115,8 +118,7 @@ fn alone<T: Send>(
     let threads = rayon::ThreadPoolBuilder::new().build();
     let threads = threads.map_err(|error| PlanError::Unfit {
         number,
-        reason: format!("it cannot be tried out: {error}: end other programs"),
-        feature: None,
+        reason: format!("it cannot be tried out: {error}: end other programs").into(),
     })?;
     threads.install(|| work(recipe))
 }
@@ -130,8 +132,7 @@ fn golden(
     let number = recipe.id.number;
     let unfit = |reason: String| PlanError::Unfit {
         number,
-        reason,
-        feature: None,
+        reason: reason.into(),
     };
     // Two frames compare pictures, and golden's is by the sequence behind them.
     let planned = recipe.sequences.iter().position(|of| !of.is_pair());
@@ -171,4 +172,45 @@ fn golden(
         plan,
         findings: found,
     })
+}
+
+impl Plan {
+    /// Judges the part as taught after a motion, by one sequence after the other as production
+    /// does. `light` is golden's modulation by each of the plan's sequences; other seeds give other
+    /// noise. `None` for sequences of two frames.
+    pub(in crate::recipe) fn inspect_rendered(
+        &self,
+        motion: &Motion,
+        light: &[Vec<Modulation>],
+        seed: u64,
+    ) -> Option<Inspection> {
+        let mut sequence = 0;
+        loop {
+            let run = self.runs.get(sequence).filter(|run| run.pair.is_none())?;
+            let phases = run
+                .production
+                .rendered(motion, &light[sequence], Some(seed));
+            let mut laps = Laps::since(Instant::now());
+            let mut strips = self.strips();
+            let input = (Input::Phases(&phases), Signal::None);
+            let placed = run.production.place_rendered(&phases, &mut strips, motion);
+            let findings = placed.and_then(|placed| {
+                run.production
+                    .inspect_placed(input, &mut strips, placed, Maps::default())
+            });
+            drop(strips);
+            let findings = findings.map(|findings| (findings, None));
+            let found = findings.map_err(|error| error.to_string().into());
+            let inspection = self.judged((sequence, &[]), found, &mut laps);
+            sequence += 1;
+            if inspection.step_up.is_none() || sequence == self.runs.len() {
+                return Some(inspection);
+            }
+        }
+    }
+
+    /// Corners of the box around the part as taught; none if parts are not aligned.
+    pub(in crate::recipe) fn corners(&self) -> &[Vector] {
+        self.production().corners()
+    }
 }

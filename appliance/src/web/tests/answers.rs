@@ -41,7 +41,7 @@ async fn the_description_names_exactly_the_paths_that_are_answered() {
 #[tokio::test]
 async fn the_table_of_kinds_is_the_one_that_the_command_prints() {
     let served = served().await;
-    let table = crate::recipe::kinds::json();
+    let table = crate::recipe::file::kinds::json();
     assert_eq!(served.get("/api/kinds").await.json(), table);
 }
 

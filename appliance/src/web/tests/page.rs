@@ -97,7 +97,7 @@ fn the_scripts_stay_within_what_old_tablets_understand() {
 
 #[test]
 fn the_editor_has_no_list_of_characteristics_units_or_parameters() {
-    let table = crate::recipe::kinds::json();
+    let table = crate::recipe::file::kinds::json();
     let list = |key: &str| table[key].as_array().unwrap().clone();
     let word = |of: &Value, key: &str| of[key].as_str().unwrap().to_owned();
     let mut words: Vec<String> = list("units").iter().map(|of| word(of, "unit")).collect();
