@@ -18,7 +18,6 @@ const CRATES: [&str; 6] = [
 const MAX_NAMESAKES: usize = 3;
 
 #[test]
-#[ignore = "names of other rooms are still being mended"]
 fn a_name_of_a_type_stands_for_one_thing_in_a_crate() {
     let rule = "One word, one meaning: no struct, enum, trait, union or type of a module has the name of \
                 another one of its crate.";
@@ -41,7 +40,6 @@ fn a_name_of_a_type_stands_for_one_thing_in_a_crate() {
 }
 
 #[test]
-#[ignore = "names of other rooms are still being mended"]
 fn a_name_of_a_file_stands_at_most_three_times_in_a_crate() {
     let rule =
         format!("A file is found by its name: at most {MAX_NAMESAKES} of one name in a crate.");
