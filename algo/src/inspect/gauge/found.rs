@@ -10,9 +10,9 @@ kind! {
 impl Kind for Found {
     fn facts(&self) -> Facts {
         Facts {
-            takes: CONTOUR,
+            unit: Unit::Share,
             never_negative: true,
-            ..Facts::new(Unit::Share, Basis::Rim, "")
+            ..Facts::new(Basis::Rim, CONTOUR)
         }
     }
 

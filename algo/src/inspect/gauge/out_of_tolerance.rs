@@ -24,13 +24,11 @@ kind! {
 impl Kind for OutOfTolerance {
     fn facts(&self) -> Facts {
         Facts {
+            unit: Unit::Share,
+            words: "of {tolerance_mm} mm over {smoothing_px} px",
             compares: true,
             noise_limit: Some(self.tolerance_mm),
-            ..Facts::new(
-                Unit::Share,
-                Basis::Cells(self.smoothing_px),
-                "of {tolerance_mm} mm over {smoothing_px} px",
-            )
+            ..Facts::new(Basis::Cells(self.smoothing_px), SURFACE)
         }
     }
 
