@@ -59,7 +59,7 @@ impl<'a> Drawing<'a> {
     /// was not looked for.
     pub fn of(&self, feature: usize) -> Option<Drawn> {
         let strips = self.strips;
-        if let Some(section) = strips.features.joints.iter().find(|of| of.is_of(&[feature])) {
+        if let Some(section) = strips.features.joints.iter().find(|of| of.is_of(feature)) {
             let points = section.points();
             let every = points.len().div_ceil(POINTS).max(1);
             let points = points.iter().step_by(every);
@@ -77,7 +77,7 @@ impl<'a> Drawing<'a> {
             .features
             .contours
             .iter()
-            .find(|of| of.is_of(&[feature]))?;
+            .find(|of| of.is_of(feature))?;
         let pieces = contour.pieces.as_ref()?;
         let ends = pieces.outline().next().zip(pieces.outline().last());
         let seen = |(point, outcome)| Some((self.place(point)?, outcome));
