@@ -6,10 +6,10 @@
 
 use super::face::Face;
 use crate::geometry::Vector;
-use crate::inspect::components;
 use crate::inspect::contour::PlaneView;
 use crate::inspect::contour::shape::{Outline, PlanePlace, Trace};
 use crate::inspect::feature::{FeatureKind, PlaneFrame};
+use crate::inspect::mask::components;
 use crate::inspect::region::Region;
 use crate::inspect::strips::golden::part::Golden;
 use alloc::vec;
