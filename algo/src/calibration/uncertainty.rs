@@ -47,7 +47,7 @@ const INNER: f64 = 0.8;
 pub const LENGTH: f64 = 100.0;
 
 /// What the poses say of one corner, in board coordinates.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 struct PrintedCorner {
     /// Poses that see it.
     poses: usize,
@@ -64,10 +64,8 @@ impl Adjustment<'_> {
     pub(super) fn covariance_of_print(&self, rig: &Rig, inverse: &[f64]) -> Option<Vec<f64>> {
         let n = self.free.len();
         let unseen = PrintedCorner {
-            poses: 0,
-            normal: [0.0; 3],
-            right: [0.0; 2],
             moves: vec![[0.0; 2]; n],
+            ..PrintedCorner::default()
         };
         let mut corners = vec![unseen; rig.board.corners()];
         for at in 0..self.views.len() {

@@ -19,8 +19,7 @@ impl Kind for Found {
     fn of_rim(&self, rim: &Rim) -> Option<OfRim> {
         Some(OfRim {
             value: rim.found,
-            variance: 0.0,
-            unknown: 0.0,
+            ..OfRim::default()
         })
     }
 

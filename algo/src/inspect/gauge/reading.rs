@@ -55,7 +55,7 @@ pub struct FoundValue {
 }
 
 /// A value of the points of a contour.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OfRim {
     /// The value.
     pub value: f64,

@@ -255,8 +255,7 @@ impl Evaluation<'_> {
             (Some(rim), _) => kind.of_rim(rim)?,
             (None, true) => OfRim {
                 value: kind.of_absent()?,
-                variance: 0.0,
-                unknown: 0.0,
+                ..OfRim::default()
             },
             (None, false) => return None,
         };
