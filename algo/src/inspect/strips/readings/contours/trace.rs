@@ -7,7 +7,7 @@
 use super::face::Face;
 use crate::geometry::Vector;
 use crate::inspect::contour::PlaneView;
-use crate::inspect::contour::shape::{Outline, PlanePlace, Trace};
+use crate::inspect::contour::shape::{Outline, PlanePlace, Trace, mean};
 use crate::inspect::feature::{FeatureKind, PlaneFrame};
 use crate::inspect::mask::components;
 use crate::inspect::region::Region;
@@ -171,14 +171,6 @@ impl RegionPixels {
         let open = |beside: &Option<usize>| beside.is_some_and(|beside| self.is_open(beside));
         self.beside(at).iter().any(open)
     }
-}
-
-fn mean(places: impl Iterator<Item = PlanePlace>) -> Option<PlanePlace> {
-    let (mut x, mut y, mut count) = (0.0, 0.0, 0.0);
-    for at in places {
-        (x, y, count) = (x + at.0, y + at.1, count + 1.0);
-    }
-    (count > 0.0).then(|| (x / count, y / count))
 }
 
 /// The convex hull of points, counterclockwise (A. M. Andrew, Inf. Process. Lett. 9, 1979).
