@@ -18,8 +18,7 @@
 use super::ProjectorMap;
 use super::map::UNKNOWN;
 use crate::geometry::{Triangulator, Vector};
-use crate::math::around;
-use crate::pipeline::{HeightMap, for_each_row};
+use crate::pipeline::{HeightMap, over_squares};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -121,7 +120,7 @@ pub fn amplitude(
     }
     let farthest = columns.max(rows);
     let reach = (libm::ceil(reach.min(farthest as f64)) as usize + MARGIN).min(farthest);
-    let mut amplitude = least_around(&asked, (columns, rows), reach);
+    let mut amplitude = over_squares(&asked, columns, reach, f32::min);
     rise_slowly(&mut amplitude, columns);
     let level = |share: &f32| (libm::floorf(share * 255.0) as u8).max(1);
     amplitude.iter().map(level).collect()
@@ -140,28 +139,6 @@ fn between(points: &[[f64; 2]], u: usize) -> [f64; 2] {
         }
         (left, right) => left.or(right).map_or(UNKNOWN, |at| points[at]),
     }
-}
-
-/// The least value in the square of `reach` pixels around each pixel.
-fn least_around(values: &[f32], (columns, rows): (usize, usize), reach: usize) -> Vec<f32> {
-    let least = |values: &[f32]| values.iter().fold(1.0_f32, |least, here| least.min(*here));
-    let mut across = vec![1.0; values.len()];
-    for_each_row(&mut across, columns, |row, out| {
-        let line = &values[row * columns..][..columns];
-        for (column, out) in out.iter_mut().enumerate() {
-            *out = least(&line[around(column, reach, columns)]);
-        }
-    });
-    let mut all = vec![1.0_f32; values.len()];
-    for_each_row(&mut all, columns, |row, out| {
-        for other in around(row, reach, rows) {
-            let line = &across[other * columns..][..columns];
-            for (out, here) in out.iter_mut().zip(line) {
-                *out = out.min(*here);
-            }
-        }
-    });
-    all
 }
 
 /// Lowers values until none is larger than a neighbour's by more than [`SLOPE`] of the neighbour's:

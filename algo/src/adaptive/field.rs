@@ -1,7 +1,7 @@
 //! A field of values over a raster, usually fringe frequencies over the projector's: its filters,
 //! and its integral, a phase function.
 
-use crate::pipeline::map_rows;
+use crate::pipeline::{for_each_row, map_rows, over_squares};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -51,35 +51,27 @@ impl Field {
             .map(|i| libm::exp(-0.5 * (i as f64 / sigma) * (i as f64 / sigma)))
             .collect();
         let sum: f64 = weights.iter().sum();
-        self.along_rows(reach, &|window: &[f64]| {
-            let products = window.iter().zip(&weights).map(|(g, w)| g * w);
-            products.sum::<f64>() / sum
-        })
-    }
-
-    /// The smallest value within `reach` pixels along both axes.
-    pub fn minimum(&self, reach: usize) -> Self {
-        let least = |window: &[f64]| window.iter().copied().fold(f64::INFINITY, f64::min);
-        let reach = reach as isize;
-        let rows = self.along_rows(reach, &least).transposed();
-        rows.along_rows(reach, &least).transposed()
-    }
-
-    /// Applies a filter of 2·reach + 1 taps along the rows.
-    fn along_rows(&self, reach: isize, filter: &(impl Fn(&[f64]) -> f64 + Sync + Send)) -> Self {
         let mut out = self.clone();
-        crate::pipeline::for_each_row(&mut out.values, self.columns, |row, out| {
+        for_each_row(&mut out.values, self.columns, |row, out| {
             let line = &self.values[row * self.columns..][..self.columns];
             let last = self.columns as isize - 1;
             let padded: Vec<f64> = (-reach..=last + reach)
                 .map(|i| line[i.clamp(0, last) as usize])
                 .collect();
-            let windows = padded.windows(2 * reach as usize + 1);
-            for (value, window) in out.iter_mut().zip(windows) {
-                *value = filter(window);
+            for (value, window) in out.iter_mut().zip(padded.windows(weights.len())) {
+                let products = window.iter().zip(&weights).map(|(g, w)| g * w);
+                *value = products.sum::<f64>() / sum;
             }
         });
         out
+    }
+
+    /// The smallest value within `reach` pixels along both axes.
+    pub fn minimum(&self, reach: usize) -> Self {
+        Self {
+            columns: self.columns,
+            values: over_squares(&self.values, self.columns, reach, f64::min),
+        }
     }
 
     fn transposed(&self) -> Self {
@@ -103,7 +95,7 @@ impl Field {
                 let value = inside.then(|| before[row as usize * columns + column as usize])?;
                 (!value.is_nan()).then_some(value)
             };
-            crate::pipeline::for_each_row(&mut self.values, columns, |row, line| {
+            for_each_row(&mut self.values, columns, |row, line| {
                 for (column, value) in line.iter_mut().enumerate() {
                     if !value.is_nan() {
                         continue;
@@ -151,7 +143,7 @@ impl Field {
     /// Fills unknown cells of each row by linear interpolation between known ones; beyond the
     /// outermost known cell its value is repeated. A row without known cells becomes `otherwise`.
     pub fn fill_rows(&mut self, otherwise: f64) {
-        crate::pipeline::for_each_row(&mut self.values, self.columns, |_, line| {
+        for_each_row(&mut self.values, self.columns, |_, line| {
             let mut before: Option<usize> = None;
             for column in 0..line.len() {
                 if line[column].is_nan() {

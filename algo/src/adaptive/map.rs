@@ -11,9 +11,8 @@
 //! step of ξ from pixel to pixel this is the shift in projector pixels.
 
 use crate::geometry::Triangulator;
-use crate::math::around;
 use crate::pattern::PhaseFunction;
-use crate::pipeline::{HeightMap, for_each_row};
+use crate::pipeline::{HeightMap, for_each_row, over_squares};
 use crate::units::AbsolutePhase;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -104,15 +103,10 @@ impl ProjectorMap {
     /// Erodes the known region by one pixel, because silhouettes mix surfaces: a pixel stays known
     /// if all 3 × 3 pixels around it, inside the frame, are known.
     pub fn eroded(&self) -> Self {
-        let points = (0..self.points.len()).map(|place| {
-            let columns = around(place % self.width, 1, self.width);
-            let mut rows = around(place / self.width, 1, self.height());
-            let known = rows.all(|v| {
-                let row = &self.points[v * self.width..][columns.clone()];
-                row.iter().all(|point| !point[0].is_nan())
-            });
-            if known { self.points[place] } else { UNKNOWN }
-        });
+        let known: Vec<bool> = self.points.iter().map(|at| !at[0].is_nan()).collect();
+        let known = over_squares(&known, self.width, 1, |a, b| a && b);
+        let points = self.points.iter().zip(known);
+        let points = points.map(|(at, known)| if known { *at } else { UNKNOWN });
         Self {
             width: self.width,
             points: points.collect(),

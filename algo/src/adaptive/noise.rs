@@ -16,8 +16,7 @@
 //! ([`replicas`]), both in radian.
 
 use super::blur::{Blur, FringeOptics, contrast, replicas};
-use super::field::Field;
-use super::field::balanced_rows;
+use super::field::{Field, balanced_rows};
 use super::{AdaptError, ProjectorMap};
 use crate::math::around;
 use crate::pattern::PhaseFunction;

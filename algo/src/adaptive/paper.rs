@@ -4,8 +4,7 @@
 //! point. Where the fringes of the camera's image would be finer than p_I, |∂Φ^V/∂u| > 1/(c p_I),
 //! the pattern's pitch grows in proportion, G = 1/(c p_I p_P |∂Φ^V/∂u|); elsewhere it is p_P.
 
-use super::field::Field;
-use super::field::rows_from_zero;
+use super::field::{Field, rows_from_zero};
 use super::{AdaptError, ProjectorMap};
 use crate::inspect::{components, polygon_spans};
 use crate::pattern::PhaseFunction;

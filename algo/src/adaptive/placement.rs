@@ -24,8 +24,7 @@
 //! every third and so on, with the square's half diagonal in place of the pixel's.
 
 use crate::geometry::{Triangulator, Vector};
-use crate::math::around;
-use crate::pipeline::{KnownSurface, for_each_row, for_each_row_of_two};
+use crate::pipeline::{KnownSurface, for_each_row, for_each_row_of_two, over_squares};
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -78,9 +77,13 @@ pub fn phase_reach(triangulator: &Triangulator, golden: &KnownSurface, tolerance
             *reach = ends.map_or(f32::INFINITY, |(near, far)| near.max(far));
         }
     });
+    // Something unknown may move into view.
     let known: Vec<bool> = golden.phase.iter().map(|phase| phase.is_known()).collect();
     let away = libm::ceil(tolerance / spacing) as usize + 1;
-    forbid_near_unknown(&mut reach, &known, width, away);
+    let known = over_squares(&known, width, away, |a, b| a && b);
+    for (reach, _) in reach.iter_mut().zip(known).filter(|(_, known)| !known) {
+        *reach = f32::INFINITY;
+    }
     reach
 }
 
@@ -142,7 +145,7 @@ impl Ball {
                 true => f32::NEG_INFINITY,
                 false => sign * distance,
             });
-            largest_around(values.collect(), width, half)
+            over_squares(&values.collect::<Vec<_>>(), width, half, f32::max)
         };
         // The nearest distances are the largest of the negative ones.
         let (nearest, farthest) = (spread(-1.0), spread(1.0));
@@ -181,50 +184,6 @@ fn raise(out: &mut [f32], line: &[f32], aside: isize, rise: f32) {
         let value = value + rise;
         *out = if value > *out { value } else { *out };
     }
-}
-
-/// The largest value within `half` pixels of each pixel, along rows and columns.
-fn largest_around(values: Vec<f32>, width: usize, half: usize) -> Vec<f32> {
-    if half == 0 {
-        return values;
-    }
-    let rows = values.len() / width;
-    let largest = |values: &mut dyn Iterator<Item = f32>| values.fold(f32::NEG_INFINITY, f32::max);
-    let mut along = vec![0.0; values.len()];
-    for_each_row(&mut along, width, |v, row| {
-        let line = &values[v * width..(v + 1) * width];
-        for (u, out) in row.iter_mut().enumerate() {
-            *out = largest(&mut line[around(u, half, width)].iter().copied());
-        }
-    });
-    let mut out = vec![0.0; values.len()];
-    for_each_row(&mut out, width, |v, row| {
-        for (u, out) in row.iter_mut().enumerate() {
-            *out = largest(&mut around(v, half, rows).map(|v| along[v * width + u]));
-        }
-    });
-    out
-}
-
-/// Makes the reach of pixels within `away` of unknown golden pixels infinite: something unknown may
-/// move into view there.
-fn forbid_near_unknown(reach: &mut [f32], known: &[bool], width: usize, away: usize) {
-    let rows = known.len() / width;
-    // Rows first, then columns: a separable square.
-    let mut near_row = vec![false; known.len()];
-    for_each_row(&mut near_row, width, |v, row| {
-        let line = &known[v * width..(v + 1) * width];
-        for (u, near) in row.iter_mut().enumerate() {
-            *near = line[around(u, away, width)].contains(&false);
-        }
-    });
-    for_each_row(reach, width, |v, row| {
-        for (u, reach) in row.iter_mut().enumerate() {
-            if around(v, away, rows).any(|v| near_row[v * width + u]) {
-                *reach = f32::INFINITY;
-            }
-        }
-    });
 }
 
 #[cfg(test)]

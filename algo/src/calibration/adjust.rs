@@ -201,7 +201,7 @@ impl Adjustment<'_> {
 
     /// σ of the residuals of a view, in their order.
     fn sigmas(&self, at: usize) -> impl Iterator<Item = f64> + '_ {
-        let corners = self.views[at].found.corners.iter().flatten().count();
+        let corners = self.views[at].found.located();
         let [camera, projector] = self.sigma;
         (0..).map(move |at| if at < corners { camera } else { projector })
     }
@@ -227,23 +227,14 @@ impl Adjustment<'_> {
         let (mut matrix, mut right) = (vec![0.0; n * n], vec![0.0; n]);
         for at in 0..self.views.len() {
             let residuals = self.view(rig, at)?;
-            let own = SHARED + POSE * at..SHARED + POSE * (at + 1);
-            // Places in `free` of the numbers that this view depends on.
-            let numbers: Vec<usize> = (0..n)
-                .filter(|&i| self.free[i] < SHARED || own.contains(&self.free[i]))
-                .collect();
-            let mut slopes = Vec::with_capacity(numbers.len());
-            for &i in &numbers {
-                slopes.push(self.slopes(rig, at, self.free[i])?);
-            }
+            let slopes = self.slopes(rig, at)?;
             for (k, (residual, sigma)) in residuals.iter().zip(self.sigmas(at)).enumerate() {
                 let weight = weight(*residual, sigma) / (sigma * sigma);
-                for (a, &i) in numbers.iter().enumerate() {
-                    let slope = [slopes[a][k][0] * weight, slopes[a][k][1] * weight];
-                    right[i] += slope[0] * residual[0] + slope[1] * residual[1];
-                    for (b, &j) in numbers[..=a].iter().enumerate() {
-                        matrix[i * n + j] +=
-                            slope[0] * slopes[b][k][0] + slope[1] * slopes[b][k][1];
+                for (a, (i, own)) in slopes.iter().enumerate() {
+                    let slope = own[k].map(|slope| slope * weight);
+                    right[*i] += slope[0] * residual[0] + slope[1] * residual[1];
+                    for (j, other) in &slopes[..=a] {
+                        matrix[i * n + j] += slope[0] * other[k][0] + slope[1] * other[k][1];
                     }
                 }
             }
@@ -266,8 +257,19 @@ impl Adjustment<'_> {
         })
     }
 
+    /// The places in `free` of the numbers that a view depends on, and the derivatives of its
+    /// predictions with each.
+    pub(super) fn slopes(&self, rig: &Rig, at: usize) -> Option<Vec<(usize, Vec<[f64; 2]>)>> {
+        let own = SHARED + POSE * at..SHARED + POSE * (at + 1);
+        let numbers = self.free.iter().enumerate();
+        numbers
+            .filter(|(_, number)| **number < SHARED || own.contains(number))
+            .map(|(i, number)| Some((i, self.slope(rig, at, *number)?)))
+            .collect()
+    }
+
     /// Derivatives of a view's predictions with one number.
-    pub(super) fn slopes(&self, rig: &Rig, at: usize, number: usize) -> Option<Vec<[f64; 2]>> {
+    fn slope(&self, rig: &Rig, at: usize, number: usize) -> Option<Vec<[f64; 2]>> {
         let step = step_of(number);
         let moved = |by: f64| {
             let mut all = vec![0.0; rig.numbers()];
@@ -290,7 +292,7 @@ impl Adjustment<'_> {
         let views = 0..self.views.len();
         let split = |at: usize| {
             let all = self.view(rig, at)?;
-            let corners = self.views[at].found.corners.iter().flatten().count();
+            let corners = self.views[at].found.located();
             Some([sum(&all[..corners]), sum(&all[corners..])])
         };
         views.map(split).collect()
@@ -301,7 +303,7 @@ impl Adjustment<'_> {
     fn estimated(&self, rig: &Rig) -> Option<[f64; 2]> {
         let (mut sums, mut weights) = ([0.0; 2], [0.0; 2]);
         for at in 0..self.views.len() {
-            let corners = self.views[at].found.corners.iter().flatten().count();
+            let corners = self.views[at].found.located();
             let residuals = self.view(rig, at)?;
             for (k, (residual, sigma)) in residuals.iter().zip(self.sigmas(at)).enumerate() {
                 let device = usize::from(k >= corners);

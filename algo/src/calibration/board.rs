@@ -286,10 +286,9 @@ impl Board {
         }
         self.enough(&corners)?;
         self.turn(&mut corners);
-        steps.sort_by(f64::total_cmp);
         Ok(FoundBoard {
             corners,
-            step: steps[steps.len() / 2],
+            step: median(steps.into_iter()),
         })
     }
 
@@ -371,6 +370,13 @@ fn edges(grid: &CornerGrid, (column, row): (i32, i32)) -> (Option<[(f64, f64); 2
     (edges, shortest)
 }
 
+/// The middle one of some numbers; 0 of none.
+pub(super) fn median(values: impl Iterator<Item = f64>) -> f64 {
+    let mut sorted: Vec<f64> = values.collect();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+}
+
 /// Of two errors, the one that says more.
 fn worse(before: Result<FoundBoard, BoardError>, now: BoardError) -> BoardError {
     match (before, now) {
@@ -388,14 +394,7 @@ fn worse(before: Result<FoundBoard, BoardError>, now: BoardError) -> BoardError 
 impl FoundBoard {
     /// Median σ of the edges' blur, px.
     pub fn blur(&self) -> f64 {
-        let mut blurs: Vec<f64> = self
-            .corners
-            .iter()
-            .flatten()
-            .map(|corner| corner.blur)
-            .collect();
-        blurs.sort_by(f64::total_cmp);
-        blurs.get(blurs.len() / 2).copied().unwrap_or(0.0)
+        median(self.corners.iter().flatten().map(|corner| corner.blur))
     }
 
     /// The corners that were located.

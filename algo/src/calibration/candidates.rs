@@ -13,6 +13,7 @@
 //! responds as much as a bright one.
 
 use crate::frame::FrameView;
+use crate::math::around;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -163,7 +164,7 @@ pub(super) fn candidates(picture: &GreyPicture) -> Vec<Candidate> {
         return Vec::new();
     }
     let mut responses = GreyPicture {
-        counts: alloc::vec![0.0; width * height],
+        counts: vec![0.0; width * height],
         ..*picture
     };
     for v in MARGIN..height - MARGIN {
@@ -221,10 +222,8 @@ fn response(picture: &GreyPicture, u: usize, v: usize) -> f32 {
 /// Whether no response nearby is larger, and none before this place, row by row, is equal.
 fn largest(responses: &GreyPicture, u: usize, v: usize) -> bool {
     let strength = responses.at(u, v);
-    let rows = v.saturating_sub(LEAST_APART)..(v + LEAST_APART + 1).min(responses.height);
-    rows.into_iter().all(|row| {
-        let columns = u.saturating_sub(LEAST_APART)..(u + LEAST_APART + 1).min(responses.width);
-        columns.into_iter().all(|column| {
+    around(v, LEAST_APART, responses.height).all(|row| {
+        around(u, LEAST_APART, responses.width).all(|column| {
             let other = responses.at(column, row);
             other < strength || (other == strength && (row, column) >= (v, u))
         })

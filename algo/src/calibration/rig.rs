@@ -192,10 +192,8 @@ impl Rig {
     }
 
     /// Projector pixel that lights what the camera sees of the board at a pixel.
-    pub(super) fn node(&self, pose: &Pose, (u, v): (f64, f64)) -> Option<(f64, f64)> {
-        let (x, y) = self.camera.undistorted(u, v)?;
-        let ray = Vector::new(x, y, 1.0);
-        let on_board = self.on_board(pose, ray)?;
+    pub(super) fn node(&self, pose: &Pose, pixel: (f64, f64)) -> Option<(f64, f64)> {
+        let on_board = self.on_board(pose, ray(&self.camera, pixel)?)?;
         seen(&self.projector, self.relative.apply(on_board))
     }
 
@@ -228,6 +226,12 @@ impl Rig {
 pub(super) fn seen(lens: &Lens, point: Vector) -> Option<(f64, f64)> {
     let depth = point.z;
     (depth > 0.0).then(|| lens.pixel(point.x / depth, point.y / depth))
+}
+
+/// The direction, in the device's coordinates, in which a pixel sees.
+pub(super) fn ray(lens: &Lens, (u, v): (f64, f64)) -> Option<Vector> {
+    let (x, y) = lens.undistorted(u, v)?;
+    Some(Vector::new(x, y, 1.0))
 }
 
 fn lens_moved(lens: &Lens, by: &[f64]) -> Lens {

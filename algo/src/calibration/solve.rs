@@ -1,10 +1,10 @@
 //! From views of a board to an adjusted rig, or the pose that does not fit.
 
 use super::adjust::{Adjusted, Undetermined, adjust};
-use super::board::Board;
+use super::board::{Board, median};
 use super::initial::{self, Correspondence, Mirrored};
 use super::look::BoardView;
-use super::rig::{Pose, Rig, SHARED};
+use super::rig::{Pose, Rig, SHARED, ray};
 use crate::geometry::Vector;
 use crate::math::solve::Normal;
 use alloc::vec::Vec;
@@ -196,8 +196,7 @@ fn first(
     for (view, pose) in views.iter().zip(&poses) {
         let back = pose.inverse();
         for node in &view.nodes {
-            let (x, y) = camera.undistorted(node.at.0, node.at.1)?;
-            let ray = Vector::new(x, y, 1.0);
+            let ray = ray(&camera, node.at)?;
             let (from, along) = (back.shift, back.turned(ray));
             points.push((ray * (-from.z / along.z), node.lit_by));
         }
@@ -226,12 +225,6 @@ impl Mirrored {
         }
         righted
     }
-}
-
-fn median(values: impl Iterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
 }
 
 /// Checks that no pose is much less sharp than the others.

@@ -27,7 +27,7 @@
 
 use super::adjust::{Adjusted, Adjustment, step_of, weight};
 use super::look::BoardView;
-use super::rig::{POSE, Rig, SHARED, seen};
+use super::rig::{POSE, Rig, SHARED, ray, seen};
 use crate::geometry::Vector;
 use crate::math::solve::Normal;
 use alloc::vec;
@@ -47,7 +47,7 @@ const INNER: f64 = 0.8;
 pub const LENGTH: f64 = 100.0;
 
 /// What the poses say of one corner, in board coordinates.
-#[derive(Clone)]
+#[derive(Clone, Default)]
 struct PrintedCorner {
     /// Poses that see it.
     poses: usize,
@@ -64,10 +64,8 @@ impl Adjustment<'_> {
     pub(super) fn covariance_of_print(&self, rig: &Rig, inverse: &[f64]) -> Option<Vec<f64>> {
         let n = self.free.len();
         let unseen = PrintedCorner {
-            poses: 0,
-            normal: [0.0; 3],
-            right: [0.0; 2],
             moves: vec![[0.0; 2]; n],
+            ..PrintedCorner::default()
         };
         let mut corners = vec![unseen; rig.board.corners()];
         for at in 0..self.views.len() {
@@ -102,13 +100,7 @@ impl Adjustment<'_> {
     fn gather(&self, rig: &Rig, at: usize, corners: &mut [PrintedCorner]) -> Option<()> {
         let (view, pose) = (&self.views[at], &rig.poses[at]);
         let residuals = self.view(rig, at)?;
-        let own = SHARED + POSE * at..SHARED + POSE * (at + 1);
-        let mut slopes = Vec::new();
-        for (i, &number) in self.free.iter().enumerate() {
-            if number < SHARED || own.contains(&number) {
-                slopes.push((i, self.slopes(rig, at, number)?));
-            }
-        }
+        let slopes = self.slopes(rig, at)?;
         let seen = view.found.corners.iter().enumerate();
         let seen = seen.filter(|(_, corner)| corner.is_some());
         for (k, (corner, _)) in seen.enumerate() {
@@ -333,8 +325,7 @@ impl Rig {
     /// the world of the last pose.
     pub(super) fn measured(&self, target: &Target) -> Option<Vector> {
         let world = self.poses.last()?.inverse();
-        let (x, y) = self.camera.undistorted(target.pixel.0, target.pixel.1)?;
-        let ray = Vector::new(x, y, 1.0);
+        let ray = ray(&self.camera, target.pixel)?;
         let (from, along) = (world.shift, world.turned(ray));
         let xi = |z: f64| {
             let point = ray * ((z - from.z) / along.z);
@@ -384,8 +375,7 @@ impl Adjusted {
         let squares: f64 = points.iter().map(|&p| plane.off(p) * plane.off(p)).sum();
         let corner = |at: usize| {
             let corner = (*view.found.corners.get(at)?)?;
-            let (x, y) = self.rig.camera.undistorted(corner.u, corner.v)?;
-            let along = world.turned(Vector::new(x, y, 1.0));
+            let along = world.turned(ray(&self.rig.camera, (corner.u, corner.v))?);
             let far = -plane.off(world.shift) / plane.normal.dot(along);
             Some(world.shift + along * far)
         };

@@ -11,6 +11,7 @@
 //! it resolves.
 
 use super::{Cells, CodeError, CodePictures};
+use crate::math::around;
 use crate::pipeline::{PhaseMap, for_each_row};
 use crate::trust::{LeastModulation, Trust};
 use crate::units::{AbsolutePhase, Modulation};
@@ -141,8 +142,7 @@ impl CodePictures<'_> {
             };
             let washed: Vec<u32> = (0..length)
                 .map(|along| {
-                    let window = along.saturating_sub(WINDOW)..length.min(along + WINDOW + 1);
-                    let lit = window
+                    let lit = around(along, WINDOW, length)
                         .map(index)
                         .filter(|&index| pixels[index].modulation > 0.0);
                     lit.map(|index| pixels[index].faint).min().unwrap_or(0)

@@ -53,11 +53,11 @@ use super::gauge::MIN_SUPPORT;
 use super::table::IntegralTable;
 use super::weight::Weight;
 use crate::geometry::Vector;
-use crate::math::around;
+use crate::math::{around, normal_density};
 use crate::pipeline::for_each_row;
 use alloc::vec;
 use alloc::vec::Vec;
-use core::f64::consts::{PI, SQRT_2};
+use core::f64::consts::SQRT_2;
 
 /// The variances of each pixel's deviation on a good part, mm².
 #[derive(Clone, Copy, Debug)]
@@ -154,12 +154,10 @@ pub fn motion_variance(
     whole: GoldenSurface<'_>,
     window: crate::pipeline::Window<'_>,
 ) -> Vec<f32> {
-    let still = || vec![0.0; golden.surface.height.len()];
-    let Some(alignment) = Alignment::new(golden, window) else {
-        return still();
-    };
-    let Some(placed) = alignment.still(golden) else {
-        return still();
+    let alignment = Alignment::new(golden, window);
+    let placed = alignment.as_ref().and_then(|plan| plan.still(golden));
+    let (Some(alignment), Some(placed)) = (&alignment, placed) else {
+        return vec![0.0; golden.surface.height.len()];
     };
     let fitting = alignment.fitting(golden);
     of_facets(whole, |facet, point| {
@@ -351,21 +349,17 @@ impl LargestDeviation {
 fn clumps_per_square(t: f64, side: f64, axes: i32) -> f64 {
     let half = t * libm::sqrt(2.0 / side) / 2.0;
     let below = 0.5 * libm::erfc(-half / SQRT_2);
-    let nu = (below - 0.5) / half / (half * below + density(half));
+    let nu = (below - 0.5) / half / (half * below + normal_density(half));
     let theta = (2.0 * half * half * nu).min(1.0);
     let independent = -libm::log(libm::erf(t / SQRT_2)) / (side * side);
     let theta = (0..axes).fold(1.0, |product, _| product * theta);
-    (2.0 * density(t) / t * theta).max(independent)
-}
-
-/// φ, the normal density.
-fn density(t: f64) -> f64 {
-    libm::exp(-t * t / 2.0) / libm::sqrt(2.0 * PI)
+    (2.0 * normal_density(t) / t * theta).max(independent)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use core::f64::consts::PI;
     use rand_xoshiro::SplitMix64;
     use rand_xoshiro::rand_core::{Rng, SeedableRng};
 

@@ -1,6 +1,7 @@
 //! Masks of pixels.
 
 use crate::math::around;
+use crate::pipeline::over_squares;
 use alloc::vec;
 use alloc::vec::Vec;
 
@@ -40,15 +41,12 @@ pub(crate) fn components(mask: &[bool], width: usize, corners: bool) -> Vec<Vec<
 pub fn eroded(mask: &[bool], width: usize, by: usize) -> Vec<bool> {
     let rows = mask.len() / width.max(1);
     let inside = |column: usize, row: usize| {
-        let fits = column >= by && row >= by && column + by < width && row + by < rows;
-        fits && (row - by..=row + by).all(|v| {
-            mask[v * width + column - by..=v * width + column + by]
-                .iter()
-                .all(|on| *on)
-        })
+        column >= by && row >= by && column + by < width && row + by < rows
     };
-    (0..mask.len())
-        .map(|at| inside(at % width, at / width))
+    let whole = over_squares(mask, width, by, |a, b| a && b);
+    let whole = whole.into_iter().enumerate();
+    whole
+        .map(|(at, whole)| whole && inside(at % width, at / width))
         .collect()
 }
 

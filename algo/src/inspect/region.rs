@@ -1,5 +1,6 @@
 //! A polygon in camera pixels, as the pixels inside it.
 
+use crate::math::hull;
 use alloc::vec::Vec;
 use core::ops::Range;
 
@@ -117,6 +118,13 @@ impl Region {
     /// The rows and columns of the region's spans.
     pub fn spans(&self) -> &[(usize, Range<usize>)] {
         &self.spans.all
+    }
+
+    /// The columns and rows of the box around it.
+    pub(super) fn bounds(&self) -> (Range<usize>, Range<usize>) {
+        let columns = self.spans().iter().map(|(_, columns)| columns.clone());
+        let rows = self.spans().iter().map(|(row, _)| *row..row + 1);
+        (columns.fold(0..0, hull), rows.fold(0..0, hull))
     }
 
     /// The spans of row `v`.

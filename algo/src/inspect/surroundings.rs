@@ -267,16 +267,10 @@ impl Front<'_> {
 
     /// How far the lowest steps stand out from the plane; `None` if what lies in front of it rises out of it.
     fn step(&self) -> Option<f64> {
-        let [width, rows] = self.size;
         let (mut edges, mut steps) = (0, Vec::new());
         for at in (0..self.above.len()).filter(|at| !self.is_apart(*at)) {
-            let (u, v) = ((at % width) as isize, (at / width) as isize);
-            for (right, down) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-                let beyond = |by: isize| {
-                    let (u, v) = (u + right * by, v + down * by);
-                    let inside = u >= 0 && v >= 0 && u < width as isize && v < rows as isize;
-                    inside.then(|| v as usize * width + u as usize)
-                };
+            for way in BESIDE {
+                let beyond = |by: isize| beyond(at, way.map(|way| way * by), self.size);
                 let places = [1, NEAR, 2 * NEAR].map(beyond);
                 let [Some(next), Some(near), Some(far)] = places else {
                     continue;
@@ -303,25 +297,19 @@ impl Plane {
         point.z - (a + b * point.x + c * point.y)
     }
 
-    fn through(points: &[Vector]) -> Option<Self> {
-        let rows = points
-            .iter()
-            .map(|point| ([1.0, point.x, point.y], point.z));
+    fn through(points: impl Iterator<Item = Vector>) -> Option<Self> {
+        let rows = points.map(|point| ([1.0, point.x, point.y], point.z));
         Normal::of(rows).solve().map(Self)
     }
 
     /// Through the nearer half of these points, found again and again.
     fn trimmed(known: &[Vector]) -> Option<Self> {
-        let mut plane = Self::through(known)?;
+        let mut plane = Self::through(known.iter().copied())?;
         for _ in 0..ROUNDS {
             let off = |point: &Vector| plane.above(*point).abs();
             let limit = quantile(&mut known.iter().map(off).collect::<Vec<_>>(), KEPT);
-            let near: Vec<Vector> = known
-                .iter()
-                .filter(|point| off(point) <= limit)
-                .copied()
-                .collect();
-            plane = Self::through(&near)?;
+            let near = known.iter().copied().filter(|point| off(point) <= limit);
+            plane = Self::through(near)?;
         }
         Some(plane)
     }
@@ -371,22 +359,17 @@ fn flat(
     let most = BEND_MM.max(BEND_SIGMAS * noise);
     let height = |at| point(at).map_or(f64::NAN, |point: Vector| point.z);
     let heights: Vec<f64> = (0..pixels).map(height).collect();
-    let along = |at: usize, [right, down]: [isize; 2]| {
-        let (u, v) = ((at % width) as isize + right, (at / width) as isize + down);
-        let inside = (0..width as isize).contains(&u) && (0..rows as isize).contains(&v);
-        let height = if inside {
-            heights[v as usize * width + u as usize]
-        } else {
-            f64::NAN
-        };
+    let size = [width, rows];
+    let along = |at: usize, way: [isize; 2]| {
+        let height = beyond(at, way, size).map_or(f64::NAN, |beyond| heights[beyond]);
         height - heights[at]
     };
     let continues = |at: usize| {
-        [[1, 0], [0, 1]].into_iter().all(|[right, down]| {
-            let far = [BENT_PX * right, BENT_PX * down];
-            let bend = along(at, far) + along(at, far.map(|way| -way));
+        [[1, 0], [0, 1]].into_iter().all(|way: [isize; 2]| {
+            let far = |by: isize| along(at, way.map(|way| way * by));
+            let bend = far(BENT_PX) + far(-BENT_PX);
             // Not a number where a height is missing.
-            !(along(at, [right, down]).abs() > JUMP_MM || bend.abs() > most)
+            !(far(1).abs() > JUMP_MM || bend.abs() > most)
         })
     };
     let continues = |at: usize| heights[at].is_finite() && continues(at);
@@ -394,7 +377,7 @@ fn flat(
     let mut pieces = components(&continues, width, false);
     pieces.retain(|piece| {
         let is_large = piece.len() as f64 >= LEAST_FLAT * pixels as f64;
-        is_large && piece.iter().any(|at| is_border(*at, [width, rows]))
+        is_large && piece.iter().any(|at| is_border(*at, size))
     });
     pieces.sort_by_key(|piece| core::cmp::Reverse(piece.len()));
     pieces.into_iter().find_map(|piece| {
@@ -408,26 +391,25 @@ fn flat(
             return None;
         }
         // Pieces that the part keeps apart are of one plane.
-        let near: Vec<Vector> = all
-            .filter(|point| plane.above(*point).abs() <= reach)
-            .collect();
-        Plane::through(&near)
+        Plane::through(all.filter(|point| plane.above(*point).abs() <= reach))
     })
 }
 
+/// The ways to the pixels that share an edge with a pixel.
+const BESIDE: [[isize; 2]; 4] = [[1, 0], [-1, 0], [0, 1], [0, -1]];
+
+/// The pixel so many columns and rows away from another one; `None` outside of the picture.
+fn beyond(at: usize, [right, down]: [isize; 2], [width, rows]: [usize; 2]) -> Option<usize> {
+    let u = (at % width).checked_add_signed(right);
+    let v = (at / width).checked_add_signed(down);
+    Some(v.filter(|v| *v < rows)? * width + u.filter(|u| *u < width)?)
+}
+
 /// The pixels that share an edge with a pixel.
-fn beside(at: usize, [width, rows]: [usize; 2]) -> impl Iterator<Item = usize> {
-    let (u, v) = (at % width, at / width);
-    let inside = [u > 0, u + 1 < width, v > 0, v + 1 < rows];
-    let next = [
-        at.wrapping_sub(1),
-        at + 1,
-        at.wrapping_sub(width),
-        at + width,
-    ];
-    next.into_iter()
-        .zip(inside)
-        .filter_map(|(next, inside)| inside.then_some(next))
+fn beside(at: usize, size: [usize; 2]) -> impl Iterator<Item = usize> {
+    BESIDE
+        .into_iter()
+        .filter_map(move |way| beyond(at, way, size))
 }
 
 fn is_border(at: usize, [width, rows]: [usize; 2]) -> bool {

@@ -1,4 +1,5 @@
-//! Numeric pieces that several rooms need: ranges of columns and roots in a bracket here; complex
+//! Numeric pieces that several rooms need: ranges of columns, the normal density and
+//! roots in a bracket here; complex
 //! numbers, rounding to whole numbers, least squares, and the propagation of uncertainty in files of
 //! their own.
 
@@ -29,6 +30,11 @@ pub(crate) fn hull(a: Range<usize>, b: Range<usize>) -> Range<usize> {
         (_, true) => a,
         _ => a.start.min(b.start)..a.end.max(b.end),
     }
+}
+
+/// φ, the density of the standard normal distribution.
+pub(crate) fn normal_density(x: f64) -> f64 {
+    libm::exp(-x * x / 2.0) / libm::sqrt(2.0 * core::f64::consts::PI)
 }
 
 /// A root of `f` between `a` and `b`, where f(a) = `fa` and f(b) = `fb` have opposite signs (or one

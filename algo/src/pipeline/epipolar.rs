@@ -103,20 +103,23 @@ fn off(
 ) -> Option<f64> {
     let (centre, ray) = (camera.centre(), camera.ray(u, v)?);
     let seen = |far: f64| projector.project(centre + ray * far);
+    // The way of a step along the line, and that from the line's point to the measured one.
+    let ways = |far: f64| {
+        let ((xi, eta), (next_xi, next_eta)) = (seen(far)?, seen(far + SHARE * far)?);
+        Some((
+            (next_xi - xi, next_eta - eta),
+            (lit_by.0 - xi, lit_by.1 - eta),
+        ))
+    };
     // From the plane z = 0, or from as far away if the ray does not meet it.
     let mut far = centre.z / Vector::new(0.0, 0.0, -1.0).dot(ray).max(1e-3);
     for _ in 0..STEPS {
-        let step = SHARE * far;
-        let ((xi, eta), (next_xi, next_eta)) = (seen(far)?, seen(far + step)?);
-        let along = (next_xi - xi, next_eta - eta);
+        let (along, short) = ways(far)?;
         let squares = along.0 * along.0 + along.1 * along.1;
-        let short = (lit_by.0 - xi, lit_by.1 - eta);
-        far += step * (short.0 * along.0 + short.1 * along.1) / squares;
+        far += SHARE * far * (short.0 * along.0 + short.1 * along.1) / squares;
     }
-    let step = SHARE * far;
-    let ((xi, eta), (next_xi, next_eta)) = (seen(far)?, seen(far + step)?);
-    let along = (next_xi - xi, next_eta - eta);
-    let across = (lit_by.1 - eta) * along.0 - (lit_by.0 - xi) * along.1;
+    let (along, short) = ways(far)?;
+    let across = short.1 * along.0 - short.0 * along.1;
     let off = across / libm::hypot(along.0, along.1);
     off.is_finite().then_some(off)
 }

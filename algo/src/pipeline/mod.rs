@@ -24,6 +24,7 @@ pub use noise::{off_sine, sample_noise};
 pub use plate::{Plate, PlateError};
 pub use signal::{mean_signal, signal, signal_by_modulation};
 
+use crate::math::around;
 use alloc::vec::Vec;
 use core::sync::atomic::{AtomicUsize, Ordering};
 #[cfg(feature = "parallel")]
@@ -111,6 +112,34 @@ pub(crate) fn for_each<T: Send>(rows: Vec<T>, each: impl Fn(usize, T) + Sync + S
     for (v, row) in rows.into_iter().enumerate() {
         each(v, row);
     }
+}
+
+/// The values within `reach` pixels of each pixel along both axes, joined to one: along the rows
+/// first, then along the columns. `join` is that of a lattice: in any order, and as often as wanted.
+pub(crate) fn over_squares<T: Copy + Send + Sync>(
+    values: &[T],
+    width: usize,
+    reach: usize,
+    join: impl Fn(T, T) -> T + Send + Sync,
+) -> Vec<T> {
+    let rows = values.len() / width.max(1);
+    let mut across = values.to_vec();
+    for_each_row(&mut across, width, |row, out| {
+        let line = &values[row * width..][..width];
+        for (column, out) in out.iter_mut().enumerate() {
+            let near = &line[around(column, reach, width)];
+            *out = near.iter().fold(*out, |joined, here| join(joined, *here));
+        }
+    });
+    let mut all = across.clone();
+    for_each_row(&mut all, width, |row, out| {
+        for other in around(row, reach, rows) {
+            for (out, here) in out.iter_mut().zip(&across[other * width..]) {
+                *out = join(*out, *here);
+            }
+        }
+    });
+    all
 }
 
 /// One value per row, in the order of the rows.

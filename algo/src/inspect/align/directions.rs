@@ -63,7 +63,7 @@ pub struct Directions {
     /// Eigenvalue and unit vector of each that is determined.
     kept: heapless::Vec<(f64, [f64; 6]), 6>,
     /// Unit vectors of the others.
-    free: heapless::Vec<[f64; 6], 6>,
+    pub free: heapless::Vec<[f64; 6], 6>,
     /// Components that the shape does not determine.
     pub left_out: [bool; 6],
 }
@@ -109,11 +109,6 @@ impl Directions {
             free,
             left_out,
         }
-    }
-
-    /// Unit vectors of the directions that are not determined.
-    pub fn free(&self) -> &heapless::Vec<[f64; 6], 6> {
-        &self.free
     }
 
     /// The x with A x = b along the directions that are determined, 0 along the others.

@@ -1,13 +1,41 @@
-//! The equations of the points in the linear problem, and their weighted sums.
+//! The equations of the points in the linear problem, their robust weights, and their weighted sums.
 //!
 //! # Shapes and units
 //! Lengths in mm. A sum is that of four sums over every fourth point, which do not wait for each
 //! other.
 
 use super::directions::Matrix6;
-use super::weight::WeightFunction;
 use crate::geometry::Vector;
 use alloc::vec::Vec;
+
+/// Residual from which Huber's weights fall, in σ.
+const HUBER: f64 = 1.345;
+/// Residual from which Tukey's weights are 0, in σ.
+pub(super) const TUKEY: f64 = 4.685;
+
+/// The function that gives the weight of a point by its residual.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum WeightFunction {
+    Huber,
+    Tukey,
+}
+
+impl WeightFunction {
+    /// The weight of a residual in σ.
+    #[inline(always)]
+    fn weight(self, residual: f64) -> f64 {
+        let size = residual.abs();
+        match self {
+            Self::Huber if size <= HUBER => 1.0,
+            Self::Huber => HUBER / size,
+            Self::Tukey if size >= TUKEY => 0.0,
+            Self::Tukey => {
+                let rest = 1.0 - (size / TUKEY) * (size / TUKEY);
+                rest * rest
+            }
+        }
+    }
+}
 
 /// The equation of a point in the linear problem.
 #[derive(Clone, Copy, Debug)]
@@ -39,7 +67,7 @@ impl Equation {
 
 /// The equations of all points; buffers that the next problem uses again.
 #[derive(Debug, Default)]
-pub(super) struct Equations {
+pub struct Equations {
     all: Vec<Equation>,
     /// Residuals after a further motion.
     after: Vec<f64>,
@@ -51,33 +79,38 @@ pub(super) struct Equations {
 const MEDIAN_TO_SIGMA: f64 = 1.4826;
 
 impl Equations {
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.all.clear();
     }
 
-    pub fn push(&mut self, equation: Equation) {
+    pub(super) fn push(&mut self, equation: Equation) {
         self.all.push(equation);
     }
 
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.all.len()
     }
 
     /// How many residuals are smaller than a size.
-    pub fn agreeing(&self, limit: f64) -> usize {
+    pub(super) fn agreeing(&self, limit: f64) -> usize {
         let residuals = self.all.iter().map(|of| of.residual);
         residuals.filter(|residual| residual.abs() < limit).count()
     }
 
     /// The error of a residual that the points' errors predict, RMS.
-    pub fn predicted(&self) -> f64 {
+    pub(super) fn predicted(&self) -> f64 {
         let both: f64 = self.all.iter().map(|of| of.both).sum();
         libm::sqrt(both / self.len() as f64)
     }
 
     /// Weighs the points by their residuals after a further motion. Returns σ of the residuals:
     /// that which follows from their median, at least `least`.
-    pub fn weigh(&mut self, function: WeightFunction, further: &[f64; 6], least: f64) -> f64 {
+    pub(super) fn weigh(
+        &mut self,
+        function: WeightFunction,
+        further: &[f64; 6],
+        least: f64,
+    ) -> f64 {
         self.find_residuals(further);
         self.sizes.clear();
         self.sizes.extend(self.after.iter().map(|r| r.abs()));
@@ -100,17 +133,13 @@ impl Equations {
     }
 
     fn find_weights(&mut self, function: WeightFunction, scale: f64) {
-        let weight = match function {
-            WeightFunction::Huber => WeightFunction::huber,
-            WeightFunction::Tukey => WeightFunction::tukey,
-        };
+        let weight = |residual: &f64| function.weight(residual / scale);
         self.weights.clear();
-        self.weights
-            .extend(self.after.iter().map(|residual| weight(residual / scale)));
+        self.weights.extend(self.after.iter().map(weight));
     }
 
     /// The sums with the weights found last.
-    pub fn sums(&self) -> Sums {
+    pub(super) fn sums(&self) -> Sums {
         let mut sums = [[0.0; 4]; SUMS];
         for (at, (of, weight)) in self.all.iter().zip(&self.weights).enumerate() {
             let mut place = 0;
@@ -140,13 +169,13 @@ impl Equations {
     }
 
     /// Points with a weight above 0.
-    pub fn inside(&self) -> usize {
+    pub(super) fn inside(&self) -> usize {
         self.weights.iter().filter(|weight| **weight > 0.0).count()
     }
 
     /// Covariance of the right-hand side, mm², with Tukey's weights after a further motion; `scale`
     /// is σ of the residuals.
-    pub fn covariance(&mut self, further: &[f64; 6], scale: f64) -> Matrix6 {
+    pub(super) fn covariance(&mut self, further: &[f64; 6], scale: f64) -> Matrix6 {
         self.find_residuals(further);
         self.find_weights(WeightFunction::Tukey, scale);
         for (weight, of) in self.weights.iter_mut().zip(&self.all) {
@@ -253,10 +282,7 @@ mod tests {
             let (mut squares, mut right, mut noise) = (0.0, 0.0, 0.0);
             let (mut sizes, mut inside) = (Vec::new(), 0);
             for e in (0..POINTS).map(equation) {
-                let weight = match function {
-                    WeightFunction::Huber => WeightFunction::huber(after(&e) / scale),
-                    WeightFunction::Tukey => WeightFunction::tukey(after(&e) / scale),
-                };
+                let weight = function.weight(after(&e) / scale);
                 let dot = |r: &[f64; 6]| r.iter().zip(probe).map(|(r, p)| r * p).sum::<f64>();
                 let Vector { x, y, z } = e.lever;
                 let (by_x, by_y) = ([1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x]);

@@ -23,11 +23,9 @@
 //! `a_dent_over_a_tenth_of_the_part_does_not_pull_it`.
 
 use super::directions::{Directions, Matrix6, form};
-use super::equations::{Equation, Equations};
+use super::equations::{Equation, Equations, TUKEY, WeightFunction};
 use super::motion::Motion;
-use super::spots::Alignment;
-use super::surface::{Facet, GoldenSurface};
-use super::weight::{TUKEY, WeightFunction};
+use super::surface::{Alignment, Facet, GoldenSurface};
 use crate::geometry::Vector;
 
 /// A measured point.
@@ -101,11 +99,6 @@ const CORNERS: usize = 8;
 const HALVINGS: usize = 10;
 /// With a larger share of outliers a bent part may have been taken for a moved one.
 const SUSPICIOUS: f64 = 0.05;
-/// Buffers of a fit, which the next fit uses again.
-#[derive(Debug, Default)]
-pub struct FitBuffers {
-    equations: Equations,
-}
 
 /// The fit of measured points to a part.
 #[derive(Clone, Copy, Debug)]
@@ -114,9 +107,6 @@ pub struct Fitting<'a> {
     pub golden: GoldenSurface<'a>,
     /// At which spots the surface is measured, and the point that motions turn about.
     pub plan: &'a Alignment,
-    /// The motion to begin with; along directions that the shape does not determine it is kept.
-    /// `None` begins without a motion.
-    pub from: Option<Motion>,
 }
 
 /// Where a descent ended.
@@ -137,23 +127,29 @@ struct SolvedMotion {
 }
 
 impl Fitting<'_> {
-    /// How the part lies; none if too few points lie on the surface.
+    /// How the part lies; none if too few points lie on the surface. The fit begins with the motion
+    /// `from`, without one if `None`; along directions that the shape does not determine it is kept.
     ///
     /// Where many points disagree, a bent part may have been taken for a moved one: a second
     /// descent with Tukey's weights alone stays near the part as taught, and the motion with which
     /// more points agree is taken.
-    pub fn fit(&self, samples: &[HeightSample], buffers: &mut FitBuffers) -> Option<Placed> {
-        let moved = self.descend(WeightFunction::Huber, samples, buffers)?;
+    pub fn fit(
+        &self,
+        from: Option<Motion>,
+        samples: &[HeightSample],
+        equations: &mut Equations,
+    ) -> Option<Placed> {
+        let moved = self.descend(WeightFunction::Huber, from, samples, equations)?;
         if moved.placed.outliers <= SUSPICIOUS {
             return Some(moved.placed);
         }
-        let Some(bent) = self.descend(WeightFunction::Tukey, samples, buffers) else {
+        let Some(bent) = self.descend(WeightFunction::Tukey, from, samples, equations) else {
             return Some(moved.placed);
         };
         let limit = moved.limit.min(bent.limit);
         let mut agreeing = |motion: &Motion| {
-            self.linearise(samples, motion, false, &mut buffers.equations);
-            buffers.equations.agreeing(limit)
+            self.linearise(samples, motion, false, equations);
+            equations.agreeing(limit)
         };
         let found = match agreeing(&bent.placed.motion) > agreeing(&moved.placed.motion) {
             true => bent,
@@ -162,22 +158,18 @@ impl Fitting<'_> {
         Some(found.placed)
     }
 
-    /// The motion that is found from the motion to begin with, beginning with these weights.
+    /// The motion that is found from the motion `from`, beginning with these weights.
     fn descend(
         &self,
         mut weights: WeightFunction,
+        from: Option<Motion>,
         samples: &[HeightSample],
-        buffers: &mut FitBuffers,
+        equations: &mut Equations,
     ) -> Option<Descended> {
-        let mut motion = self.from.unwrap_or(Motion::none(self.plan.centre));
+        let mut motion = from.unwrap_or(Motion::none(self.plan.centre));
         for round in 1..=ROUNDS {
-            let equations = &mut buffers.equations;
-            self.linearise(
-                samples,
-                &motion,
-                round == 1 && self.from.is_none(),
-                equations,
-            );
+            let still = round == 1 && from.is_none();
+            self.linearise(samples, &motion, still, equations);
             if equations.len() < LEAST_POINTS {
                 return None;
             }
@@ -210,13 +202,13 @@ impl Fitting<'_> {
     fn placed(&self, motion: Motion, solved: &SolvedMotion, equations: &mut Equations) -> Placed {
         let spread = equations.covariance(&solved.further, solved.scale);
         let covariance = solved.directions.covariance(&spread);
-        let (reach, reach_sigma) = self.reach(&motion, solved.directions.free(), &covariance);
+        let (reach, reach_sigma) = self.reach(&motion, &solved.directions.free, &covariance);
         Placed {
             motion,
             covariance,
             radius: self.plan.radius,
             left_out: solved.directions.left_out,
-            free: solved.directions.free().clone(),
+            free: solved.directions.free.clone(),
             steered: false,
             points: solved.inside,
             outliers: 1.0 - solved.inside as f64 / equations.len() as f64,

@@ -8,17 +8,15 @@ mod fit;
 mod motion;
 mod picture;
 mod plan;
-mod spots;
 mod surface;
-mod weight;
 
 pub use coarse::Coarse;
 pub use directions::{Matrix6, form};
-pub use fit::{FitBuffers, Fitting, HeightSample, Placed};
+pub use equations::Equations;
+pub use fit::{Fitting, HeightSample, Placed};
 pub use motion::Motion;
 pub use picture::{Found, Picture};
-pub use spots::{Alignment, Spot};
-pub use surface::{Facet, GoldenSurface};
+pub use surface::{Alignment, Facet, GoldenSurface, Spot};
 
 #[cfg(test)]
 mod tests;

@@ -189,8 +189,9 @@ impl Picture {
             lever: 0.0,
             rough_px: SMALL_PX,
         };
-        self.descend(triangulator, &search, pictures)
-            .map(|(found, _)| found)
+        let (motion, Correction { likeness, .. }) =
+            self.descend(triangulator, &search, pictures)?;
+        Some(Found { motion, likeness })
     }
 
     /// Where a part that heights have placed lies in the mean of these frames, if it is moved along
@@ -213,8 +214,8 @@ impl Picture {
             lever: placed.radius,
             rough_px: ROUGH_PX,
         };
-        let (Found { motion, likeness }, shown) = self.descend(triangulator, &search, pictures)?;
-        (ALIKE.contains(&likeness) && shown >= SHOWN).then_some(motion)
+        let (motion, last) = self.descend(triangulator, &search, pictures)?;
+        (ALIKE.contains(&last.likeness) && last.shown >= SHOWN).then_some(motion)
     }
 
     /// The mean of frames at all scales, from fine to coarse.
@@ -230,13 +231,13 @@ impl Picture {
         }
     }
 
-    /// What a search finds, and which share of the template the frame shows there.
+    /// The motion that a search finds, and its last correction.
     fn descend(
         &self,
         triangulator: &Triangulator,
         search: &Search<'_>,
         pictures: &[Coarse],
-    ) -> Option<(Found, f64)> {
+    ) -> Option<(Motion, Correction)> {
         let mut motion = search.from;
         let mut last = None;
         for (scale, picture) in self.scales.iter().zip(pictures.iter().rev()) {
@@ -260,10 +261,7 @@ impl Picture {
                 }
             }
         }
-        let Correction {
-            likeness, shown, ..
-        } = last?;
-        Some((Found { motion, likeness }, shown))
+        Some((motion, last?))
     }
 }
 

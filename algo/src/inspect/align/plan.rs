@@ -1,8 +1,8 @@
 //! The plan of an alignment: as many points as the shape needs, and what they determine.
 
-use super::fit::{FitBuffers, Fitting, HeightSample, Placed};
-use super::spots::{Alignment, Spot};
-use super::surface::GoldenSurface;
+use super::equations::Equations;
+use super::fit::{Fitting, HeightSample, Placed};
+use super::surface::{Alignment, GoldenSurface, Spot};
 use crate::geometry::Vector;
 use crate::pipeline::Window;
 use alloc::vec::Vec;
@@ -91,16 +91,12 @@ impl Alignment {
         };
         let samples: Vec<_> = self.spots.iter().enumerate().map(still).collect();
         self.fitting(golden)
-            .fit(&samples, &mut FitBuffers::default())
+            .fit(None, &samples, &mut Equations::default())
     }
 
     /// The fit of points to the surface.
     pub fn fitting<'a>(&'a self, golden: GoldenSurface<'a>) -> Fitting<'a> {
-        Fitting {
-            golden,
-            plan: self,
-            from: None,
-        }
+        Fitting { golden, plan: self }
     }
 }
 

@@ -129,7 +129,7 @@ fn a_motion_of_a_shape_that_determines_it_is_found_in_all_six_components() {
     let motion = motion(&alignment);
     let found = alignment
         .fitting(made.golden())
-        .fit(&made.moved(&motion), &mut FitBuffers::default())
+        .fit(None, &made.moved(&motion), &mut Equations::default())
         .unwrap();
     assert_found(&found, &motion);
     assert!(found.outliers < 0.01, "{found:?}");
@@ -149,7 +149,7 @@ fn a_dent_over_a_tenth_of_the_part_does_not_pull_it() {
     }
     let found = alignment
         .fitting(made.golden())
-        .fit(&samples, &mut FitBuffers::default())
+        .fit(None, &samples, &mut Equations::default())
         .unwrap();
     assert_found(&found, &motion);
     assert!((found.outliers - 0.1).abs() < 0.02, "{}", found.outliers);
@@ -163,8 +163,9 @@ fn directions_that_a_shape_does_not_determine_are_left_out_and_stay_nought() {
     let found = alignment
         .fitting(plate.golden())
         .fit(
+            None,
             &plate.moved(&motion(&alignment)),
-            &mut FitBuffers::default(),
+            &mut Equations::default(),
         )
         .unwrap();
     let values = found.motion.values();
@@ -189,7 +190,7 @@ fn what_is_not_there_has_no_place() {
     assert!(
         alignment
             .fitting(made.golden())
-            .fit(&[], &mut FitBuffers::default())
+            .fit(None, &[], &mut Equations::default())
             .is_none()
     );
     let away = Motion::new(
@@ -201,7 +202,7 @@ fn what_is_not_there_has_no_place() {
     assert!(
         alignment
             .fitting(made.golden())
-            .fit(&samples, &mut FitBuffers::default())
+            .fit(None, &samples, &mut Equations::default())
             .is_none()
     );
 }

@@ -5,6 +5,7 @@ use super::associate::EdgePoint;
 use super::beyond::{Wall, slope};
 use super::find::Contour;
 use super::light::Setup;
+use super::piece::dot;
 use super::shape::{Parameters, Shape};
 use alloc::vec::Vec;
 
@@ -64,7 +65,6 @@ pub fn inputs(shape: &dyn Shape, contour: &Contour, setup: &Setup, rim: f64) -> 
         let along = shape.along(p, point.x, point.y).unwrap_or(0.0);
         shape.foot(p, along).normal
     };
-    let dot = |a: (f64, f64), b: (f64, f64)| a.0 * b.0 + a.1 * b.1;
     let lean = |point: &EdgePoint| slope(setup.camera, point.x, point.y);
     let of = |source, shift: &dyn Fn(&EdgePoint) -> f64| ContourInput {
         source,

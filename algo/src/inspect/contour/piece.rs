@@ -215,7 +215,8 @@ impl Pixel {
     }
 }
 
-fn dot(a: (f64, f64), b: (f64, f64)) -> f64 {
+/// The scalar product.
+pub fn dot(a: (f64, f64), b: (f64, f64)) -> f64 {
     a.0 * b.0 + a.1 * b.1
 }
 

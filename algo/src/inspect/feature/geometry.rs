@@ -2,6 +2,7 @@
 
 use super::kind::FeatureKind;
 use crate::geometry::Vector;
+use alloc::vec::Vec;
 
 /// The geometry of a feature, in the frame as taught or in that of a datum system; lengths in mm,
 /// directions of length 1.
@@ -52,9 +53,14 @@ impl Geometry {
         }
     }
 
-    /// A geometry of a kind, to try what can be made of it: those with other numbers lie elsewhere
-    /// and point elsewhere. `None` of a kind that has none.
-    pub(in crate::inspect) fn example(kind: FeatureKind, number: usize) -> Option<Self> {
+    /// A geometry of each kind, to try what can be made of them: each lies and points elsewhere.
+    /// `None` if one of the kinds has no geometry.
+    pub(in crate::inspect) fn examples(kinds: &[FeatureKind]) -> Option<Vec<Self>> {
+        let kinds = kinds.iter().enumerate();
+        kinds.map(|(at, &kind)| Self::example(kind, at)).collect()
+    }
+
+    fn example(kind: FeatureKind, number: usize) -> Option<Self> {
         let turn = number as f64;
         let plane = Self::plane(
             Vector::new(10.0 * turn, 3.0 * turn * turn, 1.0 + turn),

@@ -153,12 +153,8 @@ impl Grid {
     /// # Errors
     /// If there are too many cells.
     pub fn over(region: &Region, side: usize) -> Result<Self, TooFine> {
-        let spans = region.spans();
-        let left = spans.iter().map(|(_, span)| span.start).min().unwrap_or(0);
-        let right = spans.iter().map(|(_, span)| span.end).max().unwrap_or(0);
-        let top = spans.first().map_or(0, |(row, _)| *row);
-        let bottom = spans.last().map_or(0, |(row, _)| row + 1);
-        let (width, height) = (right - left, bottom - top);
+        let (across, down) = region.bounds();
+        let (width, height) = (across.len(), down.len());
         let side = match side {
             0 => {
                 let side = libm::ceil(libm::sqrt((width * height) as f64 / CELLS as f64));
@@ -172,8 +168,8 @@ impl Grid {
             return Err(TooFine { side, cells });
         }
         Ok(Self {
-            left,
-            top,
+            left: across.start,
+            top: down.start,
             side,
             columns,
             rows,

@@ -12,9 +12,9 @@ kind! {
 impl Kind for Angle {
     fn facts(&self) -> Facts {
         Facts {
-            takes: &[&[Plane, Line], &[Plane, Line]],
+            unit: Unit::Angle,
             never_negative: true,
-            ..Facts::new(Unit::Angle, Basis::Geometry, "")
+            ..Facts::new(Basis::Geometry, &[&[Plane, Line], &[Plane, Line]])
         }
     }
 

@@ -9,6 +9,9 @@ kind! {
 
 impl Kind for Coverage {
     fn facts(&self) -> Facts {
-        Facts::new(Unit::Share, Basis::Pixels, "")
+        Facts {
+            unit: Unit::Share,
+            ..Facts::new(Basis::Pixels, SURFACE)
+        }
     }
 }

@@ -2,7 +2,6 @@
 
 use crate::geometry::Vector;
 use crate::inspect::feature::{FeatureKind, Geometry};
-use alloc::vec::Vec;
 
 /// A frame in space, right-handed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -71,10 +70,7 @@ impl DatumFrame {
 
 /// Whether features of these kinds make a datum system.
 pub fn makes_datum(kinds: &[FeatureKind]) -> bool {
-    let examples = kinds.iter().enumerate();
-    let examples = examples.map(|(at, &kind)| Geometry::example(kind, at));
-    let examples: Option<Vec<Geometry>> = examples.collect();
-    examples.is_some_and(|of| DatumFrame::of(&of).is_some())
+    Geometry::examples(kinds).is_some_and(|of| DatumFrame::of(&of).is_some())
 }
 
 /// The way of length 1; `None` if it has no length.

@@ -16,12 +16,9 @@ kind! {
 impl Kind for Deviation {
     fn facts(&self) -> Facts {
         Facts {
+            words: "over {smoothing_px} px",
             compares: true,
-            ..Facts::new(
-                Unit::Length,
-                Basis::Squares(self.smoothing_px),
-                "over {smoothing_px} px",
-            )
+            ..Facts::new(Basis::Squares(self.smoothing_px), SURFACE)
         }
     }
 }

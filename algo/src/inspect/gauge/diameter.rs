@@ -11,9 +11,8 @@ kind! {
 impl Kind for Diameter {
     fn facts(&self) -> Facts {
         Facts {
-            takes: CIRCLE,
             never_negative: true,
-            ..Facts::new(Unit::Length, Basis::Geometry, "")
+            ..Facts::new(Basis::Geometry, CIRCLE)
         }
     }
 

@@ -14,9 +14,8 @@ kind! {
 impl Kind for Distance {
     fn facts(&self) -> Facts {
         Facts {
-            takes: FEATURES,
             never_negative: true,
-            ..Facts::new(Unit::Length, Basis::Geometry, "")
+            ..Facts::new(Basis::Geometry, FEATURES)
         }
     }
 

@@ -9,7 +9,7 @@ use super::reading::{FoundValue, OfRim};
 use crate::inspect::align::{Placed, form};
 use crate::inspect::feature::{Cell, Rim};
 use alloc::vec::Vec;
-use core::f64::consts::{PI, SQRT_2};
+use core::f64::consts::SQRT_2;
 
 /// Largest less smallest value, one per cell of a grid of so many columns, less what noise alone
 /// adds to both ends: the largest of many noisy values is not the largest true one. Its error is
@@ -88,6 +88,7 @@ pub(super) fn range_of(rim: &Rim) -> Option<OfRim> {
 }
 
 /// What noise does to a range.
+#[derive(Default)]
 struct Noise {
     /// What it adds on average.
     mean: f64,
@@ -111,11 +112,7 @@ impl Noise {
         relative: impl Fn(usize) -> f64,
     ) -> Self {
         if !(sigma > 0.0) {
-            return Self {
-                mean: 0.0,
-                variance: 0.0,
-                unknown: 0.0,
-            };
+            return Self::default();
         }
         let defect = |at: usize| DEFECT * relative(at).max(1.0);
         let alone = largest_of(&[(0.0, values.len() as f64)]).0;
@@ -247,9 +244,4 @@ fn largest_of(below_largest: &[(f64, f64)]) -> (f64, f64) {
 /// Φ, the normal distribution.
 pub(super) fn below(x: f64) -> f64 {
     (0.5 * libm::erfc(-x / SQRT_2)).max(f64::MIN_POSITIVE)
-}
-
-/// φ, its density.
-pub(super) fn density(x: f64) -> f64 {
-    libm::exp(-x * x / 2.0) / libm::sqrt(2.0 * PI)
 }

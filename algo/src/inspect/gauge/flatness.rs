@@ -17,13 +17,9 @@ kind! {
 impl Kind for Flatness {
     fn facts(&self) -> Facts {
         Facts {
-            takes: FACE,
+            words: "over {smoothing_px} px",
             never_negative: true,
-            ..Facts::new(
-                Unit::Length,
-                Basis::Cells(self.smoothing_px),
-                "over {smoothing_px} px",
-            )
+            ..Facts::new(Basis::Cells(self.smoothing_px), FACE)
         }
     }
 

@@ -10,10 +10,7 @@ kind! {
 
 impl Kind for Flush {
     fn facts(&self) -> Facts {
-        Facts {
-            takes: SECTION,
-            ..Facts::new(Unit::Length, Basis::Section, "")
-        }
+        Facts::new(Basis::Section, SECTION)
     }
 
     fn of_section(&self, of: &section::Joint) -> Option<f64> {

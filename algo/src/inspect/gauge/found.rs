@@ -10,17 +10,16 @@ kind! {
 impl Kind for Found {
     fn facts(&self) -> Facts {
         Facts {
-            takes: CONTOUR,
+            unit: Unit::Share,
             never_negative: true,
-            ..Facts::new(Unit::Share, Basis::Rim, "")
+            ..Facts::new(Basis::Rim, CONTOUR)
         }
     }
 
     fn of_rim(&self, rim: &Rim) -> Option<OfRim> {
         Some(OfRim {
             value: rim.found,
-            variance: 0.0,
-            unknown: 0.0,
+            ..OfRim::default()
         })
     }
 

@@ -5,10 +5,8 @@
 //! `out_of_tolerance.rs` for theirs. The systematic part of U is in `strips/readings/uncertainty.rs`, guard
 //! bands in the daemon's `station/gauge.rs`.
 
-use super::component::Component;
 use super::extreme::motion;
 use crate::inspect::align::Placed;
-
 use crate::inspect::section;
 
 pub(super) use super::extreme::range_of;
@@ -23,6 +21,25 @@ pub(super) use alloc::vec::Vec;
 
 /// Most features of a gauge.
 pub const MAX_PLACES: usize = 2;
+
+words! {
+    /// A component of a part's motion, in the order of
+    /// [`Placed::component`](crate::inspect::Placed::component).
+    Component {
+        /// Translation along x, mm.
+        X: "x",
+        /// Translation along y, mm.
+        Y: "y",
+        /// Translation along z, mm.
+        Z: "z",
+        /// Rotation about x, degrees.
+        AboutX: "about_x",
+        /// Rotation about y, degrees.
+        AboutY: "about_y",
+        /// Rotation about z, degrees.
+        AboutZ: "about_z",
+    }
+}
 
 /// What a value is worked out from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -121,13 +138,13 @@ pub struct Facts {
 }
 
 impl Facts {
-    /// The facts of a value of one surface that is made of heights and may be negative.
-    pub(super) fn new(unit: Unit, basis: Basis, words: &'static str) -> Self {
+    /// The facts of a length that is made of heights and may be negative, of a kind without fields.
+    pub(super) fn new(basis: Basis, takes: Takes) -> Self {
         Self {
-            unit,
+            unit: Unit::Length,
             basis,
-            takes: SURFACE,
-            words,
+            takes,
+            words: "",
             datum: false,
             compares: false,
             never_negative: false,

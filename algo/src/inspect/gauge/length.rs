@@ -10,9 +10,8 @@ kind! {
 impl Kind for Length {
     fn facts(&self) -> Facts {
         Facts {
-            takes: SLOT,
             never_negative: true,
-            ..Facts::new(Unit::Length, Basis::Geometry, "")
+            ..Facts::new(Basis::Geometry, SLOT)
         }
     }
 

@@ -10,7 +10,7 @@ kind! {
 
 impl Kind for MeanHeight {
     fn facts(&self) -> Facts {
-        Facts::new(Unit::Length, Basis::Region, "")
+        Facts::new(Basis::Region, SURFACE)
     }
 
     fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {

@@ -5,7 +5,6 @@
 //! the cells of a region, or from the geometry that is fitted to them.
 
 mod angle;
-mod component;
 mod coverage;
 mod datum;
 mod deviation;
@@ -59,7 +58,7 @@ macro_rules! kinds {
     ($($file:ident: $kind:ident { $($field:ident: $value:expr),* },)*) => {
         /// Every kind of gauge, each in its own file.
         pub mod kinds {
-            pub use crate::inspect::gauge::component::Component;
+            pub use crate::inspect::gauge::kind::Component;
             pub use crate::inspect::gauge::radius::Side;
             pub use crate::inspect::gauge::tilt::Axis;
             $(pub use crate::inspect::gauge::$file::$kind;)*
@@ -143,11 +142,8 @@ kinds! {
 impl Measure {
     /// Whether it has a value of features of these kinds, as many as it takes.
     pub fn measures(&self, of: &[FeatureKind]) -> bool {
-        let examples = of.iter().enumerate();
-        let examples = examples.map(|(at, &kind)| Geometry::example(kind, at));
-        let examples: Option<Vec<Geometry>> = examples.collect();
-        self.facts().basis != Basis::Geometry
-            || examples.is_some_and(|of| self.kind().value(&of).is_some())
+        let has_value = |of: Vec<Geometry>| self.kind().value(&of).is_some();
+        self.facts().basis != Basis::Geometry || Geometry::examples(of).is_some_and(has_value)
     }
 
     /// What teaching proposes for the shape of the whole part, over squares of so many pixels.

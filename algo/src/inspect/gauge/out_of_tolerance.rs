@@ -1,7 +1,8 @@
 //! The share of a region that deviates from golden by more than a tolerance.
 
-use super::extreme::{ExtremeOfNoise, below, density, motion};
+use super::extreme::{ExtremeOfNoise, below, motion};
 use super::kind::*;
+use crate::math::normal_density;
 
 /// Cells further than this many σ from the tolerance lie on the same side of it in every
 /// measurement.
@@ -23,13 +24,11 @@ kind! {
 impl Kind for OutOfTolerance {
     fn facts(&self) -> Facts {
         Facts {
+            unit: Unit::Share,
+            words: "of {tolerance_mm} mm over {smoothing_px} px",
             compares: true,
             noise_limit: Some(self.tolerance_mm),
-            ..Facts::new(
-                Unit::Share,
-                Basis::Cells(self.smoothing_px),
-                "of {tolerance_mm} mm over {smoothing_px} px",
-            )
+            ..Facts::new(Basis::Cells(self.smoothing_px), SURFACE)
         }
     }
 
@@ -66,7 +65,7 @@ impl Kind for OutOfTolerance {
             if libm::fabs(upper).min(libm::fabs(lower)) < SURE {
                 let p = below(-upper) + below(-lower);
                 variance += (p * (1.0 - p)).max(0.0);
-                let slope = (density(upper) - density(lower)) / (sigma * count);
+                let slope = (normal_density(upper) - normal_density(lower)) / (sigma * count);
                 lever += libm::fabs(slope);
                 for (g, j) in g.iter_mut().zip(cell.taught.jacobian) {
                     *g += slope * j;

@@ -14,12 +14,9 @@ kind! {
 impl Kind for PeakToValley {
     fn facts(&self) -> Facts {
         Facts {
+            words: "over {smoothing_px} px",
             never_negative: true,
-            ..Facts::new(
-                Unit::Length,
-                Basis::Cells(self.smoothing_px),
-                "over {smoothing_px} px",
-            )
+            ..Facts::new(Basis::Cells(self.smoothing_px), SURFACE)
         }
     }
 

@@ -1,6 +1,5 @@
 //! How the part lies.
 
-use super::component::Component;
 use super::kind::*;
 
 kind! {
@@ -18,8 +17,9 @@ impl Kind for Placement {
             Component::AboutX | Component::AboutY | Component::AboutZ => Unit::Angle,
         };
         Facts {
-            takes: &[],
-            ..Facts::new(unit, Basis::Motion(self.component), "{component}")
+            unit,
+            words: "{component}",
+            ..Facts::new(Basis::Motion(self.component), &[])
         }
     }
 }

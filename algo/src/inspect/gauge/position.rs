@@ -15,10 +15,10 @@ kind! {
 impl Kind for Position {
     fn facts(&self) -> Facts {
         Facts {
-            takes: OPENING,
+            words: "from {nominal}",
             datum: true,
             never_negative: true,
-            ..Facts::new(Unit::Length, Basis::Geometry, "from {nominal}")
+            ..Facts::new(Basis::Geometry, OPENING)
         }
     }
 

@@ -24,9 +24,9 @@ kind! {
 impl Kind for Radius {
     fn facts(&self) -> Facts {
         Facts {
-            takes: SECTION,
+            words: "{side}",
             never_negative: true,
-            ..Facts::new(Unit::Length, Basis::Section, "{side}")
+            ..Facts::new(Basis::Section, SECTION)
         }
     }
 

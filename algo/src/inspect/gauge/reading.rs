@@ -4,7 +4,7 @@
 pub const MIN_SUPPORT: f64 = 0.5;
 
 /// What a gauge found.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// The value in mm or as a share.
     pub value: f64,
@@ -55,7 +55,7 @@ pub struct FoundValue {
 }
 
 /// A value of the points of a contour.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OfRim {
     /// The value.
     pub value: f64,

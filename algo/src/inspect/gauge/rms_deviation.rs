@@ -14,13 +14,10 @@ kind! {
 impl Kind for RmsDeviation {
     fn facts(&self) -> Facts {
         Facts {
+            words: "over {smoothing_px} px",
             compares: true,
             never_negative: true,
-            ..Facts::new(
-                Unit::Length,
-                Basis::Cells(self.smoothing_px),
-                "over {smoothing_px} px",
-            )
+            ..Facts::new(Basis::Cells(self.smoothing_px), SURFACE)
         }
     }
 

@@ -11,9 +11,8 @@ kind! {
 impl Kind for Roundness {
     fn facts(&self) -> Facts {
         Facts {
-            takes: CIRCLE,
             never_negative: true,
-            ..Facts::new(Unit::Length, Basis::Rim, "")
+            ..Facts::new(Basis::Rim, CIRCLE)
         }
     }
 

@@ -10,10 +10,7 @@ kind! {
 
 impl Kind for Step {
     fn facts(&self) -> Facts {
-        Facts {
-            takes: SURFACES,
-            ..Facts::new(Unit::Length, Basis::Region, "")
-        }
+        Facts::new(Basis::Region, SURFACES)
     }
 
     fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {

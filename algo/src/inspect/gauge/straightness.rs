@@ -11,9 +11,8 @@ kind! {
 impl Kind for Straightness {
     fn facts(&self) -> Facts {
         Facts {
-            takes: LINE,
             never_negative: true,
-            ..Facts::new(Unit::Length, Basis::Rim, "")
+            ..Facts::new(Basis::Rim, LINE)
         }
     }
 

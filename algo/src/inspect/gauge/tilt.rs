@@ -24,7 +24,11 @@ kind! {
 
 impl Kind for Tilt {
     fn facts(&self) -> Facts {
-        Facts::new(Unit::Angle, Basis::Region, "about {about}")
+        Facts {
+            unit: Unit::Angle,
+            words: "about {about}",
+            ..Facts::new(Basis::Region, SURFACE)
+        }
     }
 
     fn find(&self, of: Evidence<'_>) -> Option<FoundValue> {

@@ -12,7 +12,11 @@ kind! {
 
 impl Kind for Volume {
     fn facts(&self) -> Facts {
-        Facts::new(Unit::Volume, Basis::Region, "above {above_mm} mm")
+        Facts {
+            unit: Unit::Volume,
+            words: "above {above_mm} mm",
+            ..Facts::new(Basis::Region, SURFACE)
+        }
     }
 
     /// Each cell's area in x and y as taught times its height.

@@ -10,9 +10,8 @@ kind! {
 impl Kind for Y {
     fn facts(&self) -> Facts {
         Facts {
-            takes: OPENING,
             datum: true,
-            ..Facts::new(Unit::Length, Basis::Geometry, "")
+            ..Facts::new(Basis::Geometry, OPENING)
         }
     }
 

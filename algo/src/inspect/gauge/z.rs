@@ -11,9 +11,8 @@ kind! {
 impl Kind for Z {
     fn facts(&self) -> Facts {
         Facts {
-            takes: &[FeatureKind::PLANE_OR_OPENING],
             datum: true,
-            ..Facts::new(Unit::Length, Basis::Geometry, "")
+            ..Facts::new(Basis::Geometry, &[FeatureKind::PLANE_OR_OPENING])
         }
     }
 

@@ -64,13 +64,6 @@ pub struct JointValue {
     pub systematic: f64,
 }
 
-impl JointValue {
-    /// U = 2 √(σ² + systematic²).
-    pub fn uncertainty(&self) -> f64 {
-        2.0 * libm::sqrt(self.sigma * self.sigma + self.systematic * self.systematic)
-    }
-}
-
 impl Section {
     /// The inputs of the uncertainty of its values beside noise.
     pub fn inputs(&self, known: &Knowledge) -> Vec<JointInput> {

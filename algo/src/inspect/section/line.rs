@@ -24,7 +24,7 @@ const REACH: f64 = 0.5;
 const FLAT: f64 = 0.05;
 
 /// Sums over the points of a stretch.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Moments {
     stretch: [f64; 2],
     middle: f64,
@@ -46,15 +46,8 @@ impl Moments {
         Self {
             stretch,
             middle: (stretch[0] + stretch[1]) / 2.0,
-            level: 0.0,
-            count: 0,
             reach: [f64::INFINITY, f64::NEG_INFINITY],
-            w: 0.0,
-            x: 0.0,
-            z: 0.0,
-            xx: 0.0,
-            xz: 0.0,
-            zz: 0.0,
+            ..Self::default()
         }
     }
 

@@ -12,13 +12,13 @@
 //!    weighted, along golden's normal ([`normal_shares`](super::normal_shares));
 //! 4. **accumulate** (`accumulate`): counts, the sums of the gauges' cells
 //!    ([`feature`](super::feature)), and the square with the largest mean deviation along the normal;
-//!    for the squares, the rows before this one are kept (`measure/recent`);
+//!    for the squares, the rows before this one are kept (`RecentRows`);
 //! 5. **gauge** (`readings`): after all strips,
 //!    the planes of features, the contours in them, readings and their errors from these sums.
 //!
 //! Before that, where the part's motion is wanted, some rows go through stages 1 and 2 and a few
 //! points of each are kept: the motion is found from these, in the order of the rows, and where
-//! they leave it open, by the picture without fringes (`production/steer`).
+//! they leave it open, by the picture without fringes (`production/inspection`).
 //!
 //! What a stage has to know beforehand is worked out once, in a plan of its own: [`golden`] (what all
 //! of them count from and compare with), `PhasePlan`, `Alignment`, `Gauges`, `ReadingPlan`. A folder

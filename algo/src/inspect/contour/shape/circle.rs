@@ -2,7 +2,7 @@
 
 use super::outline::{
     ContourKind, Dimensions, Foot, Marks, Outline, Parameters, PlanePlace, Shape, axes_of,
-    axis_marks, padded,
+    axis_marks, mean, padded,
 };
 use crate::geometry::Vector;
 use crate::math::solve::Normal;
@@ -26,11 +26,7 @@ pub const KIND: ContourKind = ContourKind {
 /// 1976: x² + y² = 2ax + 2by + c is linear); `None` if they do not determine one.
 fn through(outline: &[PlanePlace]) -> Option<[f64; 3]> {
     // About their mean, so that nothing cancels.
-    let count = outline.len() as f64;
-    let sum = outline
-        .iter()
-        .fold((0.0, 0.0), |sum, (x, y)| (sum.0 + x, sum.1 + y));
-    let (x0, y0) = (sum.0 / count, sum.1 / count);
+    let (x0, y0) = mean(outline.iter().copied())?;
     let normal = Normal::of(outline.iter().map(|&(x, y)| {
         let (x, y) = (x - x0, y - y0);
         ([2.0 * x, 2.0 * y, 1.0], x * x + y * y)

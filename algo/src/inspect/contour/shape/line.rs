@@ -1,7 +1,7 @@
 //! A straight edge.
 
 use super::outline::{
-    ContourKind, Dimensions, Foot, Marks, Outline, Parameters, PlanePlace, Shape, Trace,
+    ContourKind, Dimensions, Foot, Marks, Outline, Parameters, PlanePlace, Shape, Trace, mean,
 };
 use crate::geometry::Vector;
 use alloc::vec::Vec;
@@ -73,11 +73,7 @@ fn beside(trace: &Trace) -> Option<Line> {
 
 /// The line through places that is nearest to them: a point and its direction.
 fn straight(places: &[PlanePlace]) -> Option<(f64, f64, f64, f64)> {
-    let count = places.len() as f64;
-    let sum = places
-        .iter()
-        .fold((0.0, 0.0), |sum, at| (sum.0 + at.0, sum.1 + at.1));
-    let middle = (sum.0 / count, sum.1 / count);
+    let middle = mean(places.iter().copied())?;
     let (mut xx, mut xy, mut yy) = (0.0, 0.0, 0.0);
     for at in places {
         let (x, y) = (at.0 - middle.0, at.1 - middle.1);

@@ -8,7 +8,7 @@ pub mod slot;
 
 pub use outline::{
     ContourKind, Covariance, Dimensions, Foot, MAX_PARAMETERS, Marks, Outline, Parameters,
-    PlanePlace, Shape, Trace, padded,
+    PlanePlace, Shape, Trace, mean, padded,
 };
 
 #[cfg(test)]

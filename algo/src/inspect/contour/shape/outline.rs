@@ -171,6 +171,15 @@ impl Trace {
     }
 }
 
+/// The mean of places; `None` where there are none.
+pub fn mean(places: impl Iterator<Item = PlanePlace>) -> Option<PlanePlace> {
+    let (mut x, mut y, mut count) = (0.0, 0.0, 0.0);
+    for at in places {
+        (x, y, count) = (x + at.0, y + at.1, count + 1.0);
+    }
+    (count > 0.0).then(|| (x / count, y / count))
+}
+
 /// The four points of a shape on its axes, half as long and half as wide as it, mm.
 pub fn axis_marks((x, y): PlanePlace, [long, short]: [f64; 2], angle: f64) -> Marks<PlanePlace> {
     let (sin, cos) = (libm::sin(angle), libm::cos(angle));

@@ -62,7 +62,9 @@ fn errors(pixel: f64, floor: Option<(f64, f64)>, stated: bool) -> ([Vec<f64>; 4]
         for i in 0..4 {
             let off = values[i].value - is[i];
             all[i].push(off * 1e3);
-            inside[i] += f64::from(u8::from(off.abs() <= values[i].uncertainty()));
+            inside[i] += f64::from(u8::from(
+                off.abs() <= 2.0 * values[i].sigma.hypot(values[i].systematic),
+            ));
         }
     }
     let count = all[0].len() as f64;

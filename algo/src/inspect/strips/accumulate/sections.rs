@@ -78,7 +78,7 @@ impl Sections {
 }
 
 fn expected(cut: &Cut, golden: &Golden) -> Option<ExpectedSection> {
-    let (from, to) = (seen(golden, cut.from)?, seen(golden, cut.to)?);
+    let (from, to) = (golden.nearest(cut.from).1?, golden.nearest(cut.to).1?);
     let way = Vector::new(to.x - from.x, to.y - from.y, 0.0);
     let along = way * (1.0 / way.length());
     let across = Vector::new(-along.y, along.x, 0.0);
@@ -115,15 +115,6 @@ fn expected(cut: &Cut, golden: &Golden) -> Option<ExpectedSection> {
     })
 }
 
-/// What golden's pixel nearest to (u, v) sees.
-fn seen(golden: &Golden, [u, v]: [f64; 2]) -> Option<Vector> {
-    let (width, rows) = golden.size();
-    // Casts keep to the range of their type.
-    let near = |at: f64, end: usize| (libm::rint(at.max(0.0)) as usize).min(end.saturating_sub(1));
-    let (u, v) = (near(u, width), near(v, rows));
-    golden.seen(u, v, golden.height_mm(v * width + u))
-}
-
 /// The lines of sight about a section.
 #[derive(Clone, Debug, Default)]
 pub struct SectionSight {
@@ -145,11 +136,7 @@ impl SectionSight {
     ) {
         self.at_mm = golden.levels.0;
         let (low, high) = (self.at_mm, self.at_mm + 1.0);
-        let spans = region.spans();
-        let left = spans.iter().map(|(_, span)| span.start).min().unwrap_or(0);
-        let right = spans.iter().map(|(_, span)| span.end).max().unwrap_or(0);
-        let top = spans.first().map_or(0, |(row, _)| *row);
-        let bottom = spans.last().map_or(0, |(row, _)| *row);
+        let (columns, rows) = region.bounds();
         let place = |u: usize, v: usize| (u as f64, v as f64);
         let seen = |u: f64, v: f64| {
             let camera = golden.triangulator.camera();
@@ -163,7 +150,8 @@ impl SectionSight {
             let [ds, dw, dz] = core::array::from_fn(|i| higher[i] - here[i]);
             (ray.z < 0.0).then_some([s, w, z, ds, dw, dz])
         };
-        self.near = Near::new(place(left, top), place(right, bottom), seen);
+        let (first, last) = (rows.start, rows.end.saturating_sub(1));
+        self.near = Near::new(place(columns.start, first), place(columns.end, last), seen);
     }
 
     /// The lines of sight of row `v` of pixels.

@@ -8,8 +8,7 @@ use super::displaced::{
 use super::pose::{PoseField, blocks_of_row};
 use crate::inspect::feature::{Grid, Sum};
 use crate::inspect::strips::golden::part::Golden;
-use crate::inspect::strips::measure::height::HeightRow;
-use crate::inspect::strips::measure::recent::RecentRows;
+use crate::inspect::strips::measure::height::{HeightRow, RecentRows};
 use crate::inspect::weight::Factor;
 use crate::math::common;
 use crate::math::nearest::whole;

@@ -196,12 +196,10 @@ pub fn displacement(
 
 /// Where the point of the part that was seen at (u, v) when it was taught is seen now.
 fn moved(golden: &Golden, motion: &Motion, (u, v): (f64, f64)) -> (f64, f64) {
-    let (width, height) = golden.size();
-    let column = libm::rint(u.clamp(0.0, (width - 1) as f64));
-    let row = libm::rint(v.clamp(0.0, (height - 1) as f64));
-    let (u0, v0) = (column as usize, row as usize);
-    let to = golden
-        .seen(u0, v0, golden.height_mm(v0 * width + u0))
-        .and_then(|point| golden.triangulator.camera().project(motion.apply(point)));
-    to.map_or((u, v), |to| (u + to.0 - column, v + to.1 - row))
+    let ((column, row), seen) = golden.nearest([u, v]);
+    let camera = golden.triangulator.camera();
+    let to = seen.and_then(|point| camera.project(motion.apply(point)));
+    to.map_or((u, v), |to| {
+        (u + to.0 - column as f64, v + to.1 - row as f64)
+    })
 }

@@ -91,6 +91,17 @@ impl Golden {
         self.triangulator.point(u, v, Height::from_mm(z))
     }
 
+    /// The pixel nearest to a place, and the point of golden that it sees.
+    pub fn nearest(&self, place: [f64; 2]) -> ((usize, usize), Option<Vector>) {
+        let (width, rows) = self.size();
+        // Casts keep to the range of their type.
+        let near =
+            |at: f64, end: usize| (libm::rint(at.max(0.0)) as usize).min(end.saturating_sub(1));
+        let (u, v) = (near(place[0], width), near(place[1], rows));
+        let seen = self.seen(u, v, self.height_mm(v * width + u));
+        ((u, v), seen)
+    }
+
     /// Its height at a place, mm; the middle one where that is not known.
     pub fn height_mm(&self, place: usize) -> f64 {
         let height = self.cubics.surface().height[place];

@@ -12,13 +12,12 @@
 //!
 //! Neighbouring phases share pixels. Their σ is therefore that of the two samples of the pixel
 //! alone, which is right for means over areas that are large against the window; means over smaller
-//! squares are less noisy (`noise`).
+//! squares are less noisy (`sums`).
 
 pub mod expected;
-pub mod noise;
 mod phases;
 mod solve;
-mod sums;
+pub mod sums;
 mod window;
 
 pub use phases::PairBuffers;

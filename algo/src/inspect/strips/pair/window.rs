@@ -17,7 +17,7 @@
 //!
 //! # Noise
 //! Fisher's information of a window of n pixels is n B² / σ_I², so σ_δ = σ_I / (2π B √n): that of n
-//! independent pixels of two shifts each. Neighbouring results share pixels (`shared.rs`).
+//! independent pixels of two shifts each. Neighbouring results share pixels (`sums.rs`).
 //!
 //! # Shapes and units
 //! Sums are exact: samples as 12 bits, sines as Q15, products as 24 bits, the 49 of a window in 32. So

@@ -113,9 +113,7 @@ pub fn place_by_openings(
         let further: Shares = core::array::from_fn(along);
         let covariance = solution.over(&placed.free);
         let motion = fitting.then(&placed.motion, &further);
-        let mut again = fitting;
-        again.from = Some(motion);
-        let fitted = again.fit(&strips.samples, &mut strips.fitting)?;
+        let fitted = fitting.fit(Some(motion), &strips.samples, &mut strips.fitting)?;
         if fitted.free.len() != placed.free.len() {
             return None;
         }

@@ -59,12 +59,7 @@ impl<'a> Drawing<'a> {
     /// was not looked for.
     pub fn of(&self, feature: usize) -> Option<Drawn> {
         let strips = self.strips;
-        if let Some(section) = strips
-            .features
-            .joints
-            .iter()
-            .find(|of| of.is_of(&[feature]))
-        {
+        if let Some(section) = strips.features.joints.iter().find(|of| of.is_of(feature)) {
             let points = section.points();
             let every = points.len().div_ceil(POINTS).max(1);
             let points = points.iter().step_by(every);
@@ -82,7 +77,7 @@ impl<'a> Drawing<'a> {
             .features
             .contours
             .iter()
-            .find(|of| of.is_of(&[feature]))?;
+            .find(|of| of.is_of(feature))?;
         let pieces = contour.pieces.as_ref()?;
         let ends = pieces.outline().next().zip(pieces.outline().last());
         let seen = |(point, outcome)| Some((self.place(point)?, outcome));
@@ -109,13 +104,7 @@ impl<'a> Drawing<'a> {
     /// Where the camera sees on this part what it saw at a place of golden's frame; the same place
     /// where that is not known.
     pub fn moved(&self, at: Place) -> Place {
-        let golden = &self.production.golden;
-        let (width, rows) = golden.size();
-        // Casts keep to the range of their type.
-        let near =
-            |at: f64, end: usize| (libm::rint(at.max(0.0)) as usize).min(end.saturating_sub(1));
-        let (u, v) = (near(at[0], width), near(at[1], rows));
-        let seen = golden.seen(u, v, golden.height_mm(v * width + u));
+        let ((u, v), seen) = self.production.golden.nearest(at);
         let moved = seen.and_then(|point| self.place(point));
         // By as much as the pixel that it lies in.
         moved.map_or(at, |[column, row]| {

@@ -1,12 +1,18 @@
 //! The stages of an inspection in their order, for all strips.
+//!
+//! # Parts whose shape leaves their motion open, such as plates
+//! Heights come first and keep what they determine. The picture without fringes moves a part along
+//! the other directions only ([`Picture::steer`](crate::inspect::Picture::steer)), and from there the
+//! heights are fitted again, which hardly changes anything on a plate. Regions follow; the picture
+//! measures nothing: what depends on these directions has no value unless contours determine them
+//! (`by_openings`, [`Placed::component`]).
 
 use super::by_openings::place_by_openings;
 use super::plan::Production;
 use super::rendered::Rendering;
-use super::steer::steer;
 use super::strip::{Maps, Strip, Strips};
 use crate::frame::FrameView;
-use crate::inspect::align::{Alignment, FitBuffers, Found, Motion, Placed};
+use crate::inspect::align::{Alignment, Equations, Found, Motion, Placed};
 use crate::inspect::strips::accumulate::sections::SectionSight;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
 use crate::inspect::strips::accumulate::sums::StripSums;
@@ -48,7 +54,7 @@ impl Production {
             rows,
             pose: PoseField::new(&self.golden, &self.gauges.regions, self.alignment.is_some()),
             samples: Vec::new(),
-            fitting: FitBuffers::default(),
+            fitting: Equations::default(),
             pictures: Vec::new(),
             anchors: vec![ContourFit::default(); self.anchors.len()],
             sights: vec![SectionSight::default(); sections.all.len()],
@@ -106,8 +112,24 @@ impl Production {
     ) -> Result<Option<Placed>, DecodeError> {
         let placed = self.place_from(input, strips, None)?;
         let steered = placed.as_ref();
-        let steered = steered.and_then(|placed| steer(self, input, placed, strips));
+        let steered = steered.and_then(|placed| self.steer(input, placed, strips));
         Ok(steered.or(placed))
+    }
+
+    /// How a part lies that was placed by its heights, whose points the strips still have; none
+    /// where heights leave nothing free, or the picture is not like golden's.
+    fn steer(&self, input: Input<'_>, placed: &Placed, strips: &mut Strips) -> Option<Placed> {
+        let picture = self.picture.as_ref().filter(|_| !placed.free.is_empty())?;
+        let Input::Finest(_, frames) = input else {
+            return None;
+        };
+        let frames = (self.phase.decoder.backend(), frames);
+        let triangulator = &self.golden.triangulator;
+        let motion = picture.steer(triangulator, frames, placed, &mut strips.pictures)?;
+        let fitting = self.alignment.as_ref()?.fitting(self.golden.surface());
+        let placed = fitting.fit(Some(motion), &strips.samples, &mut strips.fitting)?;
+        let steered = true;
+        Some(Placed { steered, ..placed })
     }
 
     /// As [`Self::place`], from a motion that is nearly right.
@@ -128,9 +150,8 @@ impl Production {
         for strip in &strips.strips {
             strips.samples.extend(&strip.samples);
         }
-        let mut fitting = alignment.fitting(self.golden.surface());
-        fitting.from = from;
-        Ok(fitting.fit(&strips.samples, &mut strips.fitting))
+        let fitting = alignment.fitting(self.golden.surface());
+        Ok(fitting.fit(from, &strips.samples, &mut strips.fitting))
     }
 
     /// As [`Self::place`], of phases that were worked out of a part after this motion

@@ -7,7 +7,6 @@ pub mod drawn;
 pub mod inspection;
 pub mod plan;
 pub mod rendered;
-pub mod steer;
 pub mod strip;
 
 #[cfg(test)]

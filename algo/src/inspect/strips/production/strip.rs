@@ -2,15 +2,14 @@
 //! the maps that people ask for.
 
 use super::plan::Production;
-use crate::inspect::align::{Alignment, Coarse, FitBuffers, HeightSample};
+use crate::inspect::align::{Alignment, Coarse, Equations, HeightSample};
 use crate::inspect::strips::accumulate::sections::SectionSight;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
 use crate::inspect::strips::accumulate::sums::StripSums;
 use crate::inspect::strips::align::coordinates::{Comparison, TaughtCoordinates};
 use crate::inspect::strips::align::pose::PoseField;
 use crate::inspect::strips::measure::decode::Input;
-use crate::inspect::strips::measure::height::HeightRow;
-use crate::inspect::strips::measure::recent::RecentRows;
+use crate::inspect::strips::measure::height::{HeightRow, RecentRows};
 use crate::inspect::strips::readings::contours::ContourFit;
 use crate::inspect::strips::readings::deviation::SquareNoise;
 use crate::inspect::strips::readings::evaluation::PartFeatures;
@@ -31,7 +30,7 @@ pub struct Strips {
     pub(super) pose: PoseField,
     /// Points of all strips that the part's motion is found from.
     pub(super) samples: Vec<HeightSample>,
-    pub(super) fitting: FitBuffers,
+    pub(super) fitting: Equations,
     /// The picture without fringes, from fine to coarse.
     pub(super) pictures: Vec<Coarse>,
     /// One per contour that the part is placed by.

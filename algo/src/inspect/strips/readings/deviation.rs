@@ -25,7 +25,7 @@ use crate::inspect::strips::accumulate::squares::extreme::Extreme;
 const SAMPLES: usize = 4;
 
 /// Sums over the pixels of a square, from which the error of its mean follows.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct SquareNoise {
     /// Every so many columns and rows a pixel's Jacobian is taken.
     stride: usize,
@@ -43,10 +43,7 @@ impl SquareNoise {
     pub fn new(side: usize) -> Self {
         Self {
             stride: (side / SAMPLES).max(1),
-            variance: 0.0,
-            factors: 0.0,
-            jacobian: [0.0; 6],
-            sampled: 0.0,
+            ..Self::default()
         }
     }
 

@@ -200,7 +200,7 @@ impl Evaluation<'_> {
 
     /// The planes and contours that gauges need.
     fn features(&self, found: &PartFeatures) -> heapless::Vec<FoundFeature, MAX_FEATURES> {
-        let own = |fit: &&PlaneFit| !found.contours.iter().any(|of| of.is_of(&[fit.feature]));
+        let own = |fit: &&PlaneFit| !found.contours.iter().any(|of| of.is_of(fit.feature));
         let planes = found.fits.iter().filter(own).map(|fit| {
             let geometry = fit.geometry();
             FoundFeature {

@@ -18,10 +18,9 @@ pub struct SectionFit {
 }
 
 impl SectionFit {
-    /// Whether it is of the first of these features.
-    pub fn is_of(&self, features: &[usize]) -> bool {
-        let own = self.of.as_ref().map(|of| of.feature);
-        own.is_some() && own == features.first().copied()
+    /// Whether it is of this feature.
+    pub fn is_of(&self, feature: usize) -> bool {
+        self.of.as_ref().is_some_and(|of| of.feature == feature)
     }
 
     /// Finds it in the points of all strips, in their order.
@@ -79,11 +78,9 @@ impl SectionFit {
         Some(Reading {
             value: value.value,
             sigma: Some(value.sigma),
-            expected: None,
             systematic: value.systematic,
             compared: value.sigma * libm::sqrt(golden),
-            rims: 0.0,
-            square: None,
+            ..Reading::default()
         })
     }
 }

@@ -4,7 +4,6 @@ use super::contours::{ContourFit, FoundFeature};
 use super::evaluation::{CellBuffers, Evaluation, NoiseOf, PartFeatures};
 use super::findings::Missing;
 use super::planes::PlaneFit;
-use super::uncertainty::Made;
 use crate::inspect::contour::State;
 use crate::inspect::contour::shape::Outline;
 use crate::inspect::feature::{Geometry, cells};
@@ -47,11 +46,7 @@ impl Evaluation<'_> {
                 (pixels > 0).then(|| Reading {
                     value: covered as f64 / pixels as f64,
                     sigma: Some(coverage::sigma(variance, pixels)),
-                    expected: None,
-                    systematic: 0.0,
-                    compared: 0.0,
-                    rims: 0.0,
-                    square: None,
+                    ..Reading::default()
                 })
             }
             Basis::Squares(_) => {
@@ -85,12 +80,10 @@ impl Evaluation<'_> {
                 Some(Reading {
                     value,
                     sigma: Some(sigma),
-                    expected: None,
                     systematic,
                     // A motion is what the part differs by from golden.
                     compared: systematic,
-                    rims: 0.0,
-                    square: None,
+                    ..Reading::default()
                 })
             }
             Basis::Cells(_) | Basis::Region => self.of_cells(gauge, noisier, pose, sums, cells),
@@ -98,7 +91,8 @@ impl Evaluation<'_> {
             Basis::Rim => self.of_rim(gauge, contours),
             Basis::Section => {
                 let Gauge { of, measure, .. } = &self.gauges.list[gauge];
-                let found = joints.iter().find(|joint| joint.is_of(of))?;
+                let feature = *of.first()?;
+                let found = joints.iter().find(|joint| joint.is_of(feature))?;
                 found.reading(measure.kind(), self.plan.budget.golden_variance(noisier))
             }
         }
@@ -153,18 +147,18 @@ impl Evaluation<'_> {
             placed,
             room: weights,
         })?;
-        let made = match compares {
-            true => {
-                found.pixels *= self.plan.budget.cells_together(side);
-                Made::OfDeviations
-            }
-            false => Made::OfHeights,
-        };
-        Some(
-            self.plan
-                .budget
-                .reading_of(found, made, (noisier, smoothed), placed),
-        )
+        let budget = &self.plan.budget;
+        if compares {
+            found.pixels *= budget.cells_together(side);
+        }
+        let reading = budget.reading_of(found, (noisier, smoothed), placed);
+        Some(match compares {
+            true => Reading {
+                systematic: reading.compared,
+                ..reading
+            },
+            false => reading,
+        })
     }
 
     /// The reading of a gauge of the geometry of features; `noisier` is the ratio of σ_z to that as
@@ -177,59 +171,50 @@ impl Evaluation<'_> {
         (fits, contours): (&[PlaneFit], &[ContourFit]),
     ) -> Option<Reading> {
         let budget = &self.plan.budget;
-        let Gauge { of, datum, measure } = &self.gauges.list[gauge];
-        let of: heapless::Vec<_, MAX_PLACES> = sensitive(of, fits, contours)?;
-        let datum: heapless::Vec<_, MAX_DATUMS> = sensitive(datum, fits, contours)?;
-        let Gauge {
-            of: places,
-            datum: system,
-            ..
-        } = &self.gauges.list[gauge];
-        let taught: heapless::Vec<_, MAX_PLACES> = self.taught(places).unwrap_or_default();
-        let before: heapless::Vec<_, MAX_DATUMS> = self.taught(system).unwrap_or_default();
+        let gauge = &self.gauges.list[gauge];
+        let of: heapless::Vec<_, MAX_PLACES> = sensitive(&gauge.of, fits, contours)?;
+        let datum: heapless::Vec<_, MAX_DATUMS> = sensitive(&gauge.datum, fits, contours)?;
+        let taught: heapless::Vec<_, MAX_PLACES> = self.taught(&gauge.of).unwrap_or_default();
+        let before: heapless::Vec<_, MAX_DATUMS> = self.taught(&gauge.datum).unwrap_or_default();
         let value = Characteristic {
-            kind: measure.kind(),
+            kind: gauge.measure.kind(),
             of: &of,
             datum: &datum,
             taught: [&taught, &before],
         };
         let placed = pose.placed.as_ref();
-        let propagated = value.propagate(placed, budget.calibration.length)?;
-        let Propagated {
-            found,
-            shared,
-            own,
-            rims,
-        } = propagated;
-        let of = budget.reading_of(found, Made::OfHeights, (noisier, 1.0), placed);
+        let propagated = |value: Characteristic<'_>| {
+            let propagated = value.propagate(placed, budget.calibration.length)?;
+            let reading = budget.reading_of(propagated.found, (noisier, 1.0), placed);
+            Some((propagated, reading))
+        };
+        let (
+            Propagated {
+                found,
+                shared,
+                own,
+                rims,
+            },
+            of,
+        ) = propagated(value)?;
         // Where golden says where a plane's point lies, golden's error is in the value: as much as it would be
         // if the point were found from this part.
         let has_plane = value.of.iter().any(|of| matches!(of, Sensitive::Plane(_)));
-        let golden = match has_plane {
-            false => 0.0,
-            true => {
-                let alone = Characteristic {
-                    taught: [&[]; 2],
-                    ..value
-                };
-                let alone = alone.propagate(placed, budget.calibration.length)?.found;
-                let error = budget.reading_of(alone, Made::OfDeviations, (noisier, 1.0), placed);
-                if alone.pixels == found.pixels {
-                    0.0
-                } else {
-                    error.compared
-                }
+        let mut golden = 0.0;
+        if has_plane {
+            let taught = [&[][..]; 2];
+            let (alone, reading) = propagated(Characteristic { taught, ..value })?;
+            if alone.found.pixels != found.pixels {
+                golden = reading.compared;
             }
+        }
+        let with = |error: f64, inputs: f64| {
+            let error = libm::hypot(error, golden);
+            libm::sqrt(error * error + inputs)
         };
-        let of = Reading {
-            systematic: libm::hypot(of.systematic, golden),
-            compared: libm::hypot(of.compared, golden),
-            ..of
-        };
-        // Where golden was measured its own inputs were others, too.
-        let with = |error: f64, inputs: f64| libm::sqrt(error * error + inputs);
         Some(Reading {
             systematic: with(of.systematic, shared + own),
+            // Where golden was measured its own inputs were others, too.
             compared: with(of.compared, 2.0 * own),
             rims: libm::sqrt(rims),
             ..of
@@ -263,25 +248,22 @@ impl Evaluation<'_> {
     /// The reading of a gauge of the points of a contour.
     fn of_rim(&self, gauge: usize, contours: &[ContourFit]) -> Option<Reading> {
         let Gauge { of, measure, .. } = &self.gauges.list[gauge];
-        let found = contours.iter().find(|contour| contour.is_of(of))?;
+        let feature = *of.first()?;
+        let found = contours.iter().find(|contour| contour.is_of(feature))?;
         let kind = measure.kind();
         let of = match (&found.rim, found.is_absent()) {
             (Some(rim), _) => kind.of_rim(rim)?,
             (None, true) => OfRim {
                 value: kind.of_absent()?,
-                variance: 0.0,
-                unknown: 0.0,
+                ..OfRim::default()
             },
             (None, false) => return None,
         };
         Some(Reading {
             value: of.value,
             sigma: Some(libm::sqrt(of.variance)),
-            expected: None,
             systematic: of.unknown,
-            compared: 0.0,
-            rims: 0.0,
-            square: None,
+            ..Reading::default()
         })
     }
 
@@ -335,7 +317,7 @@ fn sensitive<'a, const N: usize>(
     contours: &'a [ContourFit],
 ) -> Option<heapless::Vec<Sensitive<'a>, N>> {
     let sensitive = |at: &usize| {
-        if let Some(contour) = contours.iter().find(|contour| contour.is_of(&[*at])) {
+        if let Some(contour) = contours.iter().find(|contour| contour.is_of(*at)) {
             return contour.sensitive(fits);
         }
         let fit = fits.iter().find(|fit| fit.feature == *at)?;

@@ -19,7 +19,7 @@
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{FoundValue, Reading};
 use crate::inspect::largest::Largest;
-use crate::inspect::strips::pair::noise::{correlated, smoothed};
+use crate::inspect::strips::pair::sums::{correlated, smoothed};
 use alloc::vec::Vec;
 
 /// σ by the error of the calibration; 0 where it is not known.
@@ -33,15 +33,6 @@ pub struct CalibrationUncertainty {
 
 /// A part whose noise is less than this share of that as taught was not measured at all.
 const LEAST_NOISE: f64 = 0.01;
-
-/// What a value is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Made {
-    /// Heights.
-    OfHeights,
-    /// Deviations from golden.
-    OfDeviations,
-}
 
 /// What the errors of readings are made of, besides the noise of the part that is measured.
 #[derive(Debug)]
@@ -64,12 +55,12 @@ pub struct ErrorBudget {
 }
 
 impl ErrorBudget {
-    /// A reading; σ_z is `noisier` times the taught σ, and the variances of pixels were multiplied
-    /// by `smoothed`.
+    /// The reading of a value that is made of heights; of one that is made of deviations from golden
+    /// `compared` is the systematic error as well. σ_z is `noisier` times the taught σ, and the
+    /// variances of pixels were multiplied by `smoothed`.
     pub fn reading_of(
         &self,
         found: FoundValue,
-        made: Made,
         (noisier, smoothed): (f64, f64),
         placed: Option<&Placed>,
     ) -> Reading {
@@ -91,14 +82,9 @@ impl ErrorBudget {
         Reading {
             value,
             sigma: Some(libm::sqrt(pixels + motion)),
-            expected: None,
-            systematic: match made {
-                Made::OfHeights => systematic(moved, self.calibration.height),
-                Made::OfDeviations => compared,
-            },
+            systematic: systematic(moved, self.calibration.height),
             compared,
-            rims: 0.0,
-            square: None,
+            ..Reading::default()
         }
     }
 

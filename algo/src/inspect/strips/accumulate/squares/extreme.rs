@@ -25,6 +25,13 @@ impl Extreme {
     pub fn reaches(&self, other: &Self) -> bool {
         self.sum.abs() * other.count >= other.sum.abs() * self.count
     }
+
+    /// Becomes the largest if it reaches that: of equal ones the last counts.
+    pub fn raise(self, largest: &mut Option<Self>) {
+        if largest.is_none_or(|largest| self.reaches(&largest)) {
+            *largest = Some(self);
+        }
+    }
 }
 
 /// Whether packed sums hold squares of `side` pixels with deviations of up to `span_nm`.
@@ -59,30 +66,21 @@ impl SquareRow<'_> {
         let least = least_support(self.side);
         let mut floor = floor_of(*largest, least);
         let mut most = strength(*strongest) + 1;
-        let mut column = None;
+        let mut found: Option<Extreme> = None;
         for square in self.squares(span) {
             let sum = square.sum.abs();
-            if sum >= floor.min(most) && self.is_compared(&square) {
-                Self::raise(largest, square, least);
+            if sum >= floor.min(most) && self.centres[square.column] != NO_OFFSET {
+                if square.count >= least {
+                    square.raise(largest);
+                }
                 floor = floor_of(*largest, least);
                 if sum >= most {
                     most = sum;
-                    column = Some(square.column);
+                    found = Some(square);
                 }
             }
         }
-        column
-            .iter()
-            .for_each(|column| self.strengthen(strongest, *column));
-    }
-
-    /// Takes the square around a column as the strongest, if it has enough deviations.
-    fn strengthen(&self, strongest: &mut Option<Extreme>, column: usize) {
-        let columns = &self.sums[column..=column + self.side / 2 * 2];
-        let square = self.unpack(columns.iter().sum(), column);
-        if square.count >= least_support(self.side) {
-            *strongest = Some(square);
-        }
+        *strongest = found.filter(|found| found.count >= least).or(*strongest);
     }
 
     /// The squares around the pixels of a span.
@@ -99,17 +97,6 @@ impl SquareRow<'_> {
             packed += enters - leaves;
             square
         })
-    }
-
-    fn is_compared(&self, square: &Extreme) -> bool {
-        self.centres[square.column] != NO_OFFSET
-    }
-
-    /// Takes a square as the largest if it is, and has enough deviations.
-    fn raise(largest: &mut Option<Extreme>, square: Extreme, least: i64) {
-        if square.count >= least && largest.is_none_or(|largest| square.reaches(&largest)) {
-            *largest = Some(square);
-        }
     }
 
     fn unpack(&self, packed: i64, column: usize) -> Extreme {

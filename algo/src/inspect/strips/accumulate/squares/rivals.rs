@@ -89,7 +89,7 @@ pub fn rivals<'a>(
     let mut rivals = heapless::Vec::<Extreme, RIVALS>::new();
     let mut next = None;
     let largest = strips.clone().filter_map(|strip| strip.largest);
-    largest.for_each(|found| raise(&mut next, found));
+    largest.for_each(|found| found.raise(&mut next));
     let least = next.map(half);
     while let Some(rival) = next {
         if rivals.push(rival).is_err() {
@@ -104,7 +104,7 @@ pub fn rivals<'a>(
             tiles
                 .filter(|tile| least.is_none_or(|least| tile.reaches(&least)))
                 .filter(|tile| rivals.iter().all(|rival| apart(rival, tile)))
-                .for_each(|tile| raise(&mut next, *tile));
+                .for_each(|tile| tile.raise(&mut next));
         }
     }
     rivals
@@ -114,13 +114,6 @@ pub fn rivals<'a>(
 fn half(whole: Extreme) -> Extreme {
     let sum = whole.sum / 2;
     Extreme { sum, ..whole }
-}
-
-/// Of equal ones the last counts.
-fn raise(largest: &mut Option<Extreme>, found: Extreme) {
-    if largest.is_none_or(|largest| found.reaches(&largest)) {
-        *largest = Some(found);
-    }
 }
 
 #[cfg(test)]
@@ -146,7 +139,7 @@ mod tests {
                 strip.update(row, &(3..190), |[largest, strongest], span| {
                     let here = |found: &&Extreme| found.row == row && span.contains(&found.column);
                     for found in squares.iter().filter(here) {
-                        raise(largest, *found);
+                        found.raise(largest);
                         if strength(Some(*found)) > strength(*strongest) {
                             *strongest = Some(*found);
                         }

@@ -2,6 +2,7 @@
 //! compared with, and a pixel's deviation.
 
 use super::linear::{BLOCK, BlockNumbers, Linear, Whole, floor, is_near};
+use crate::inspect::strips::golden::part::base_nm;
 use crate::inspect::weight::Factor;
 use crate::math::nearest::{BELOW, whole};
 use crate::pipeline::{NO_OFFSET, SQUARE};
@@ -78,8 +79,7 @@ pub struct OffsetRow<'a> {
 /// The height that an offset leads to, nm.
 #[inline(always)]
 pub fn height(base: Height, offset: i32) -> i32 {
-    let base = if base.is_known() { base.nm() } else { 0 };
-    base.wrapping_add(offset)
+    base_nm(base).wrapping_add(offset)
 }
 
 /// How far a pixel at height `z` that moves up by `rise` lies above golden, nm. It lies between

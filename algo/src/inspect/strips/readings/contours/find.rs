@@ -112,10 +112,9 @@ impl FoundPieces {
 }
 
 impl ContourFit {
-    /// Whether it is of the first of these features.
-    pub fn is_of(&self, features: &[usize]) -> bool {
-        let own = self.of.as_ref().map(|of| of.feature);
-        own.is_some() && own == features.first().copied()
+    /// Whether it is of this feature.
+    pub fn is_of(&self, feature: usize) -> bool {
+        self.of.as_ref().is_some_and(|of| of.feature == feature)
     }
 
     /// The opening that was found.

@@ -7,8 +7,9 @@
 use super::face::Face;
 use crate::geometry::Vector;
 use crate::inspect::contour::PlaneView;
-use crate::inspect::contour::shape::{Outline, PlanePlace, Trace};
+use crate::inspect::contour::shape::{Outline, PlanePlace, Trace, mean};
 use crate::inspect::feature::{FeatureKind, PlaneFrame};
+use crate::inspect::mask::components;
 use crate::inspect::region::Region;
 use crate::inspect::strips::golden::part::Golden;
 use alloc::vec;
@@ -108,20 +109,16 @@ pub fn ground_below(golden: &Golden, frame: &PlaneFrame) -> Option<f64> {
 
 impl RegionPixels {
     fn of(region: &Region, golden: &Golden, face: &Face<'_>) -> Self {
-        let spans = region.spans();
-        let left = spans.iter().map(|(_, span)| span.start).min().unwrap_or(0);
-        let right = spans.iter().map(|(_, span)| span.end).max().unwrap_or(0);
-        let top = spans.first().map_or(0, |(row, _)| *row);
-        let bottom = spans.last().map_or(0, |(row, _)| row + 1);
-        let width = right - left;
+        let (columns, rows) = region.bounds();
+        let (left, top, width) = (columns.start, rows.start, columns.len());
         let mut pixels = Self {
             left,
             top,
             width,
-            above: vec![None; width * (bottom - top)],
+            above: vec![None; width * rows.len()],
         };
         let (normal, origin) = (face.frame.normal(), face.frame.origin);
-        for (row, span) in spans {
+        for (row, span) in region.spans() {
             for u in span.clone() {
                 let place = row * golden.size().0 + u;
                 let point = golden
@@ -160,32 +157,13 @@ impl RegionPixels {
 
     /// The largest opening that does not touch the border of the region.
     fn opening(&self) -> Option<Vec<usize>> {
-        let mut seen = vec![false; self.above.len()];
-        let mut largest: Option<Vec<usize>> = None;
-        for first in 0..self.above.len() {
-            if seen[first] || !self.is_open(first) {
-                continue;
-            }
-            seen[first] = true;
-            let (mut all, mut next, mut is_inside) = (vec![first], 0, true);
-            while let Some(&at) = all.get(next) {
-                next += 1;
-                for beside in self.beside(at) {
-                    match beside.filter(|&beside| self.above[beside].is_some()) {
-                        None => is_inside = false,
-                        Some(beside) if !seen[beside] && self.is_open(beside) => {
-                            seen[beside] = true;
-                            all.push(beside);
-                        }
-                        Some(_) => {}
-                    }
-                }
-            }
-            if is_inside && largest.as_ref().is_none_or(|of| of.len() < all.len()) {
-                largest = Some(all);
-            }
-        }
-        largest
+        let open: Vec<bool> = (0..self.above.len()).map(|at| self.is_open(at)).collect();
+        let in_region = |beside: &Option<usize>| beside.is_some_and(|at| self.above[at].is_some());
+        let is_inside = |at: &usize| self.beside(*at).iter().all(in_region);
+        let mut openings = components(&open, self.width, false);
+        openings.retain(|opening| opening.iter().all(is_inside));
+        // Of equal ones the first.
+        openings.into_iter().rev().max_by_key(Vec::len)
     }
 
     /// Whether a pixel of the face lies beside what is none.
@@ -193,14 +171,6 @@ impl RegionPixels {
         let open = |beside: &Option<usize>| beside.is_some_and(|beside| self.is_open(beside));
         self.beside(at).iter().any(open)
     }
-}
-
-fn mean(places: impl Iterator<Item = PlanePlace>) -> Option<PlanePlace> {
-    let (mut x, mut y, mut count) = (0.0, 0.0, 0.0);
-    for at in places {
-        (x, y, count) = (x + at.0, y + at.1, count + 1.0);
-    }
-    (count > 0.0).then(|| (x / count, y / count))
 }
 
 /// The convex hull of points, counterclockwise (A. M. Andrew, Inf. Process. Lett. 9, 1979).
