@@ -276,7 +276,7 @@ impl Plan {
         let inspection = self.judged((sequence, frames), found, &mut laps);
         let seen = self.runs.get(sequence).map(|run| {
             let drawing = Drawing::new(&run.production, &strips);
-            self.outline.features(&inspection, &drawing)
+            self.demands.seen(&inspection, &drawing)
         });
         let seen = seen.unwrap_or_default();
         drop(strips);

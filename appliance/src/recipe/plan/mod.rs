@@ -18,7 +18,7 @@ use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use crate::head::rasters::Illumination;
 use crate::recipe::file::refusal::refused;
-use crate::recipe::{Conditions, Demands, Labels, Recipe, RecipeId, Refusal};
+use crate::recipe::{Conditions, Demands, Recipe, RecipeId, Refusal};
 use crate::system::headway::Headway;
 use algo::geometry::HeightRange;
 use algo::inspect::{Production, Strips, normal_shares};
@@ -37,8 +37,6 @@ pub struct Plan {
     conditions: Conditions,
     /// What it demands of a part.
     demands: Demands,
-    /// What its gauges and features are called.
-    outline: Labels,
     /// The light of its patterns.
     illumination: Illumination,
     /// What the rasters show, each once; those of the first run come first.
@@ -142,7 +140,6 @@ impl Plan {
             id,
             conditions,
             demands,
-            outline,
             function,
             sequences,
             mut features,
@@ -217,7 +214,7 @@ impl Plan {
             noise_counts,
             golden,
             picture: (modulation, away as f64),
-            names: &demands.features,
+            labels: &demands.features,
             signal,
         };
         let wanted = |(at, _): &(usize, _)| of_golden.is_none_or(|of| of.sequence == *at);
@@ -237,7 +234,6 @@ impl Plan {
             id,
             conditions,
             demands,
-            outline,
             illumination,
             shots,
             runs,

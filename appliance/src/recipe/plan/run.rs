@@ -2,6 +2,7 @@
 
 use super::taught;
 use crate::recipe::file::archive::Arrays;
+use crate::recipe::file::demands::LabelledFeature;
 use crate::recipe::file::refusal::refused;
 use crate::recipe::{Conditions, Element, Part, RecipeSequence, Refusal, SequenceKind};
 use algo::frame::SampleNoise;
@@ -52,8 +53,8 @@ pub(super) struct Shared<'a> {
     /// Golden's modulation in counts, empty where parts are not aligned, and how far the image of a
     /// part may be displaced, pixels.
     pub picture: (Arc<[f32]>, f64),
-    /// The names of the features, in their order.
-    pub names: &'a [String],
+    /// What the features are called, in their order.
+    pub labels: &'a [LabelledFeature],
     /// What contours need; `None` if no gauge is of one.
     pub signal: Option<GoldenSignal>,
 }
@@ -293,7 +294,7 @@ fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> Refusal {
         .features
         .get(feature)
         .map_or("contour", |of| of.kind.name());
-    let name = shared.names.get(feature).map_or("", String::as_str);
+    let name = shared.labels.get(feature).map_or("", |label| &label.name);
     let of = Some(Element::new(Part::Feature, feature, name));
     let name = clipped(name);
     let is_section = matches!(error, Unmeasurable::NoSection { .. });

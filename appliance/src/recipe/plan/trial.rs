@@ -102,7 +102,7 @@ impl Golden {
         let inspection = plan.judged((0, &[]), found, &mut laps);
         let strips = plan.strips();
         let drawing = Drawing::new(plan.production(), &strips);
-        let seen = plan.outline.features(&inspection, &drawing);
+        let seen = plan.demands.seen(&inspection, &drawing);
         drop(strips);
         (inspection, seen)
     }
