@@ -30,6 +30,10 @@ impl Laps {
         Self { stages, since }
     }
 
+    pub fn now() -> Self {
+        Self::since(Instant::now())
+    }
+
     pub fn end(&mut self, stage: Stage) {
         let now = Instant::now();
         let us = (now - self.since).as_micros();
@@ -269,7 +273,7 @@ impl Plan {
     /// Judges a part as [`Self::inspect`] does, and says what became of the features that gauges
     /// need.
     pub fn look(&self, sequence: usize, frames: &[Frame]) -> (Inspection, Vec<FeatureView<'_>>) {
-        let mut laps = Laps::since(Instant::now());
+        let mut laps = Laps::now();
         let mut strips = self.strips();
         let of = (self.arriving(sequence), frames);
         let found = self.run(&mut strips, of, Maps::default(), &mut laps);

@@ -15,7 +15,6 @@ use algo::pipeline;
 use algo::units::{Height, Modulation};
 use hal::frame::Frame;
 use std::sync::{Arc, PoisonError};
-use std::time::Instant;
 
 /// Maps of one part, row-major.
 #[derive(Clone, Debug)]
@@ -136,13 +135,8 @@ impl Plan {
             deviation: Some(&mut deviation_mm),
         };
         let mut strips = self.strips();
-        let mut laps = Laps::since(Instant::now());
-        let found = self.run(
-            &mut strips,
-            (self.arriving(sequence), frames),
-            maps,
-            &mut laps,
-        );
+        let of = (self.arriving(sequence), frames);
+        let found = self.run(&mut strips, of, maps, &mut Laps::now());
         let shown = self.shown(&found.ok()?.0);
         let production = &self.runs.get(sequence)?.production;
         let deviation_mm =
@@ -169,9 +163,8 @@ impl Plan {
             heights: Some(&mut height_mm),
             deviation: None,
         };
-        let mut laps = Laps::since(Instant::now());
         let of = (self.arriving(sequence), frames);
-        let found = self.run(&mut self.strips(), of, maps, &mut laps);
+        let found = self.run(&mut self.strips(), of, maps, &mut Laps::now());
         found.ok().map(|_| height_mm)
     }
 

@@ -127,8 +127,7 @@ pub(crate) fn as_it_lies(
     plan.load(head, calibration)?;
     let mut judged = Vec::new();
     while judged.len() < STILL {
-        let mut sequence = 0;
-        loop {
+        for sequence in 0..plan.sequence_count() {
             if !headway.tell(judged.len() as f64 / STILL as f64) {
                 return Err(TeachError::Ended);
             }
@@ -142,8 +141,7 @@ pub(crate) fn as_it_lies(
             };
             head.acquire(indices, timeout, &mut keep)?;
             let inspection = plan.inspect(sequence, &frames, Instant::now());
-            sequence += 1;
-            if inspection.step_up.is_none() || sequence == plan.sequence_count() {
+            if inspection.step_up.is_none() {
                 judged.push(inspection);
                 break;
             }

@@ -204,11 +204,7 @@ impl RecipeFile {
         headway: Headway<'_>,
     ) -> Result<Golden, Refusal> {
         let recipe = Recipe::fit(self, arrays.clone())?;
-        let measure = match lenient {
-            true => Plan::golden_leniently,
-            false => Plan::golden,
-        };
-        Ok(measure(recipe, head, headway)?)
+        Ok(Plan::golden(recipe, head, lenient, headway)?)
     }
 
     /// Takes over what is found of golden.
