@@ -280,11 +280,10 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, Refusal> {
             .last()
             .is_none_or(|before| before.kind < sequence.kind)
         {
-            let levels = Sequence::from_frames(&sequence.frames);
             chain.push(RecipeSequence {
                 kind: sequence.kind,
                 shots: sequence.frames.clone(),
-                levels: levels.map_err(|error| error.to_string())?,
+                levels: Sequence::from_frames(&sequence.frames)?,
                 offset: (at < last).then_some(at),
                 ripple_mm: sequence.ripple_mm.unwrap_or(0.0),
             });

@@ -71,10 +71,7 @@ impl GoldenView {
     pub fn new(recipe: &Recipe, head: &Calibration) -> Result<Self, Refusal> {
         let [low, high] = recipe.conditions.range_mm;
         let range = Some(HeightRange { low, high });
-        let triangulator = head.triangulator(recipe.function.clone(), range);
-        triangulator
-            .map(Self)
-            .map_err(|error| error.to_string().into())
+        Ok(Self(head.triangulator(recipe.function.clone(), range)?))
     }
 
     /// x, y and z in mm of every `stride`-th pixel of its heights, NaN where not known.

@@ -158,8 +158,7 @@ impl Plan {
         let [low, high] = conditions.range_mm;
         // Planning asks for the rays of all pixels several times.
         let quick = calibration.clone().with_rays();
-        let triangulator = quick.triangulator(function, Some(HeightRange { low, high }));
-        let triangulator = triangulator.map_err(|error| error.to_string())?;
+        let triangulator = quick.triangulator(function, Some(HeightRange { low, high }))?;
         headway.done(0.1);
         taught::of_sections((&mut features, &demands.features), size, &triangulator)?;
         let (window, away) =

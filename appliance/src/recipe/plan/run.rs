@@ -140,8 +140,7 @@ impl Prepared {
         } = sequence;
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
         let offsets = (taught::offset(arrays, offset), taught::offset(arrays, base));
-        let decoder = Decoder::new(&levels, range, conditions.camera.2);
-        let decoder = decoder.map_err(|error| error.to_string())?;
+        let decoder = Decoder::new(&levels, range, conditions.camera.2)?;
         let decoder = decoder.with_least_modulation(conditions.least_modulation);
         let indices = shots.into_iter().map(|shot| {
             let shown = rasters.iter().position(|known| *known == shot);

@@ -6,7 +6,7 @@
 use super::inspect::Laps;
 use super::{Plan, PlanError};
 use crate::head::calibration::Calibration;
-use crate::recipe::{Demands, FeatureView, Recipe};
+use crate::recipe::{Demands, FeatureView, Recipe, Refusal};
 use crate::station::Inspection;
 use crate::system::headway::Headway;
 use algo::geometry::Vector;
@@ -118,10 +118,7 @@ fn golden(
     headway: Headway<'_>,
 ) -> Result<Golden, PlanError> {
     let number = recipe.id.number;
-    let unfit = |reason: String| PlanError::Unfit {
-        number,
-        reason: reason.into(),
-    };
+    let unfit = |reason: Refusal| PlanError::Unfit { number, reason };
     // Two frames compare pictures, and golden's is by the sequence behind them.
     let planned = recipe.sequences.iter().position(|of| !of.is_pair());
     let sequence = planned.ok_or_else(|| unfit("it has no sequence".into()))?;
@@ -154,7 +151,7 @@ fn golden(
             let input = (input, Signal::Golden);
             production.inspect_placed(input, &mut strips, placed, Maps::default())
         })
-        .map_err(|error| unfit(error.to_string()))?;
+        .map_err(|error| unfit(error.into()))?;
     drop(strips);
     Ok(Golden {
         plan,
@@ -189,7 +186,7 @@ impl Plan {
             });
             drop(strips);
             let findings = findings.map(|findings| (findings, None));
-            let found = findings.map_err(|error| error.to_string().into());
+            let found = findings.map_err(Refusal::from);
             let inspection = self.judged((sequence, &[]), found, &mut laps);
             if inspection.step_up.is_none() {
                 return Some(inspection);

@@ -100,11 +100,10 @@ impl Captured {
             let taken = |share: f64| taking.tell(0.8 * share);
             let means = mean_frames(head, shots.len(), *timeout, &taken)?;
             let means = means.ok_or(TeachError::Ended)?;
-            let (by_modulation, offset, phases) =
-                decode(full, &means, expected).map_err(TeachError::rig)?;
+            let (by_modulation, offset, phases) = decode(full, &means, expected)?;
             taking.done(0.85);
             (noise, offset_counts) = (by_modulation, offset);
-            let seen = scan(function, (&shots, full), &means).map_err(TeachError::rig)?;
+            let seen = scan(function, (&shots, full), &means)?;
             let most = seen.decoder.full_scale();
             signals.push(pipeline::signal(full, &seen.frames, most));
             let offsets = (1..).zip(short).map(|(known, shown)| {
@@ -113,7 +112,7 @@ impl Captured {
                 Ok(by.offsets_from(&phases))
             });
             let offsets: Result<_, Refusal> = offsets.collect();
-            all.push((phases, offsets.map_err(TeachError::rig)?));
+            all.push((phases, offsets?));
         }
         let sequence = Sequence::from_frames(full).map_err(TeachError::rig)?;
         let (_, _, bit_depth) = calibration.frames();

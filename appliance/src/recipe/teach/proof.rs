@@ -60,8 +60,7 @@ impl Proof {
         let recipe = Recipe::check(manifest, arrays.clone())?;
         let sequences = 0..recipe.sequences.len();
         let light = sequences.map(|sequence| recipe.light(sequence)).collect();
-        let plan = Plan::telling(recipe, calibration, false, headway);
-        let plan = plan.map_err(|error| error.to_string())?;
+        let plan = Plan::telling(recipe, calibration, false, headway)?;
         let places = placements(plan.corners(), REACH * manifest.placement_tolerance_mm);
         Ok(Self {
             plan,
