@@ -75,17 +75,14 @@ pub fn edit(
         return Err(ChangeError::Outdated(number));
     }
     if let Some(part_number) = &edit.part_number {
-        let shared = store.refuse_shared(number, part_number);
-        shared.map_err(ChangeError::Unfit)?;
+        store.refuse_shared(number, part_number)?;
     }
     let fingerprint = edit.fingerprint.clone();
     edit.apply(&mut file);
-    file.set_gauges_of(&before).map_err(ChangeError::Unfit)?;
+    file.set_gauges_of(&before)?;
     // Tighter limits may need a longer sequence, wider ones a shorter one.
-    let changed = UnsealedRecipe::of(file, recipe.arrays, Headway::silent())
-        .and_then(UnsealedRecipe::seal)
-        .map_err(ChangeError::Unfit)?;
-    fits(changed.recipe).map_err(ChangeError::Unfit)?;
+    let changed = UnsealedRecipe::of(file, recipe.arrays, Headway::silent())?.seal()?;
+    fits(changed.recipe)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
     match store.replace(number, &fingerprint, &changed.bytes) {
         Ok(true) => Ok(Edited {
