@@ -203,8 +203,7 @@ impl Plan {
         let triangulator = triangulator.seen_by(calibration.camera.clone());
         let shared = Shared {
             conditions: &conditions,
-            aligned: demands.aligned,
-            tolerance_mm: demands.tolerance_mm,
+            demands: &demands,
             triangulator: Arc::new(triangulator),
             cubics: Arc::new(cubics),
             features,
@@ -213,7 +212,6 @@ impl Plan {
             noise_counts,
             golden,
             picture: (modulation, away as f64),
-            labels: &demands.features,
             signal,
         };
         let wanted = |(at, _): &(usize, _)| of_golden.is_none_or(|of| of.sequence == *at);
