@@ -69,7 +69,7 @@ impl Line {
     fn heights(&mut self) -> Vec<f32> {
         let last = self.plan.sequence_count() - 1;
         let frames = frames(&mut self.bed, &self.plan, last);
-        self.plan.heights(last, &frames).unwrap()
+        self.plan.layers(last, &frames).unwrap().height_mm
     }
 
     /// A cycle as the station runs it.

@@ -48,7 +48,7 @@ fn periodic(bed: &mut Bed, taught: &TaughtRecipe, arrays: &Arrays, sequence: usi
     let mut bins = [(0.0, 0.0); BINS];
     for _ in 0..CAPTURES {
         let frames = frames(bed, &plan, sequence);
-        let heights = plan.heights(sequence, &frames).unwrap();
+        let heights = plan.layers(sequence, &frames).unwrap().height_mm;
         let golden = &plan.production().cubics().surface().height;
         for (at, &height) in heights.iter().enumerate() {
             if arrays.valid[at] != 0 && height.is_finite() {

@@ -275,7 +275,7 @@ fn cycle(bed: &mut Bed, file: &RecipeFile, arrays: &Arrays) -> (Vec<f32>, f64) {
     let mut keep = |_, frame| frames.push(frame);
     bed.head.acquire(&indices, TIMEOUT, &mut keep).unwrap();
     let inspection = plan.inspect(0, &frames, Instant::now());
-    let heights = plan.heights(0, &frames).unwrap();
+    let heights = plan.layers(0, &frames).unwrap().height_mm;
     (heights, inspection.gauges[0].value.unwrap())
 }
 

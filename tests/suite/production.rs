@@ -158,7 +158,7 @@ pub(crate) fn compare(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame]
         .collect();
     let mut strips = production.strips(37);
     let found = production.inspect(&views, &mut strips, None).unwrap();
-    let heights = plan.heights(0, frames).unwrap();
+    let heights = plan.layers(0, frames).unwrap().height_mm;
     let even = even_noise(recipe);
     let (decoder, window) = (production.decoder(), Some(production.window()));
     let map = decoder.unwrapping().needs_map().then(|| production.map());

@@ -256,7 +256,7 @@ fn good_parts_that_shine_get_no_wrong_verdict_and_hardly_a_wrong_pixel() {
                 let mut keep = |_, frame| frames.push(frame);
                 let indices = line.plan.indices(full);
                 line.bed.head.acquire(indices, TIMEOUT, &mut keep).unwrap();
-                let heights = line.plan.heights(full, &frames).unwrap();
+                let heights = line.plan.layers(full, &frames).unwrap().height_mm;
                 let truth = line.bed.stage.truth();
                 let known = truth.height.iter().zip(&truth.class);
                 for (mm, (height, class)) in heights.iter().zip(known) {

@@ -69,7 +69,7 @@ fn compare_displaced(name: &str, plan: &Plan, recipe: &Recipe, frames: &[Frame])
     let mut strips = production.strips(37);
     let found = production.inspect(&views, &mut strips, None).unwrap();
     let motion = found.placed.unwrap().motion;
-    let heights = plan.heights(0, frames).unwrap();
+    let heights = plan.layers(0, frames).unwrap().height_mm;
     let width = recipe.conditions.camera.0 as usize;
     let triangulator = production.triangulator();
     let arrays = &recipe.arrays;

@@ -284,7 +284,7 @@ impl Gauges {
             ..
         } = gauging.set(&before, arrays).map_err(unfit)?;
         let head = manifest.head().map_err(unfit)?;
-        let golden = Plan::golden(recipe, &head, Headway::silent());
+        let golden = Plan::golden(recipe, &head, false, Headway::silent());
         let mut golden = golden.map_err(|error| unfit(error.into()))?;
         let (golden, features) = golden.judged((&manifest).into());
         let changed = manifest.differences(&before);

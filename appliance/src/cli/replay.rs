@@ -7,7 +7,7 @@ use crate::error::{Exit, Failure, Result};
 use crate::history::kept::{self, Kept, missing};
 use crate::history::{Entry, GaugeEntry, Reader, difference, seq_of};
 use crate::recipe::plan::PlanError;
-use crate::recipe::{Labels, Recipe, Store};
+use crate::recipe::{Demands, Recipe, Store};
 use crate::station::result::flag::SIMULATED;
 use crate::station::{Inspection, ResultRecord, Square};
 use crate::storage::archive::Unpacked;
@@ -57,7 +57,7 @@ impl Replay {
             original,
         } = chosen;
         let (number, fingerprint) = (recipe.id.number, recipe.id.fingerprint.clone());
-        let outline = recipe.outline.clone();
+        let demands = recipe.demands.clone();
         let before = result_of(&state, unpacked.name(), &kept)?;
         let flags = before.as_ref().map_or(0, |entry| entry.flags);
         let configured = options.files.configuration()?.threads;
@@ -80,7 +80,7 @@ impl Replay {
         })?;
         let replayed = entry(inspection, number, &fingerprint);
         let document = serde_json::json!({
-            "replayed": detailed(&replayed, &outline, features)?, "stored": before,
+            "replayed": detailed(&replayed, &demands, features)?, "stored": before,
             "recipe": { "from": from, "number": number, "fingerprint": fingerprint, "same": original },
         });
         let text = || table(&replayed, &from);
@@ -210,11 +210,11 @@ fn entry(inspection: Inspection, recipe: u16, fingerprint: &str) -> Entry {
 }
 
 /// An entry with the kind of each gauge, and the features.
-fn detailed(entry: &Entry, outline: &Labels, features: Value) -> Result<Value> {
+fn detailed(entry: &Entry, demands: &Demands, features: Value) -> Result<Value> {
     let shown = serde_json::to_value(entry);
     let mut shown = shown.map_err(Exit::Software.because("write the result"))?;
     for (gauge, value) in entry.gauges.iter().enumerate() {
-        shown["gauges"][gauge]["kind"] = outline.kind(value.slot).into();
+        shown["gauges"][gauge]["kind"] = demands.kind(value.slot).into();
     }
     shown["features"] = features;
     Ok(shown)

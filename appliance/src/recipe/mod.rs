@@ -20,7 +20,7 @@ pub mod store;
 pub mod teach;
 
 pub use file::archive::short;
-pub use file::demands::{Demands, Labels};
+pub use file::demands::Demands;
 pub use file::feature::{DatumFile, FeatureFile};
 pub use file::gauge::GaugeFile;
 pub use file::recipe::{Conditions, Recipe, RecipeId, RecipeSequence};

@@ -1,7 +1,8 @@
 //! What is said and drawn of the features of a part, as data (docs/api.md): what became of each, why
 //! one was not found and what to do, its fit, the pieces of a contour, the profile of a section.
 
-use crate::recipe::file::demands::{LabelledFeature, Labels};
+use crate::recipe::Demands;
+use crate::recipe::file::demands::LabelledFeature;
 use crate::station::{GaugeValue, Inspection};
 use algo::geometry::Vector;
 use algo::inspect::contour::Outcome;
@@ -78,21 +79,28 @@ impl FeatureView<'_> {
     }
 }
 
-impl Labels {
-    /// The kind of the gauge in a slot.
-    pub fn kind(&self, slot: u16) -> Option<&'static str> {
-        let mut gauges = self.gauges.iter();
-        let found = gauges.find(|(own, _)| *own == slot);
-        found.map(|(_, kind)| *kind)
-    }
-
+impl Demands {
     /// What became of each feature that a gauge needs: of those with a geometry as it was found, of
     /// others from what became of the gauges that are of it. Of several, one that has a value
     /// decides.
-    pub fn features(&self, of: &Inspection, drawing: &Drawing<'_>) -> Vec<FeatureView<'_>> {
+    pub(super) fn seen(
+        &self,
+        inspection: &Inspection,
+        drawing: &Drawing<'_>,
+    ) -> Vec<FeatureView<'_>> {
         let all = self.features.iter().enumerate();
-        all.filter_map(|(at, feature)| feature.seen(at, of, drawing))
-            .collect()
+        all.filter_map(|(at, feature)| {
+            let gauges = self.limits.iter().zip(&inspection.gauges);
+            let own = gauges.filter(|(limits, _)| limits.of.contains(&feature.name));
+            let rank = |gauge: &&GaugeValue| match state(gauge) {
+                State::Found => 0,
+                State::Absent => 1,
+                State::Unseen => 2,
+            };
+            let gauge = own.map(|(_, gauge)| gauge).min_by_key(rank);
+            feature.seen(at, inspection, gauge, drawing)
+        })
+        .collect()
     }
 }
 
@@ -101,24 +109,17 @@ fn list(of: Vector) -> [f64; 3] {
 }
 
 impl LabelledFeature {
-    /// What became of it in a part; `None` if no gauge needs it.
+    /// What became of it in a part, by its geometry or else by the gauge of it that decides; `None`
+    /// if no gauge needs it.
     fn seen<'a>(
         &'a self,
         at: usize,
-        of: &Inspection,
+        inspection: &Inspection,
+        gauge: Option<&GaugeValue>,
         drawing: &Drawing<'_>,
     ) -> Option<FeatureView<'a>> {
-        let found = of.features.iter().find(|found| found.feature == at);
-        let by_gauges = || {
-            let own = of.gauges.iter();
-            let own = own.filter(|gauge| self.slots.contains(&gauge.slot));
-            let rank = |gauge: &&GaugeValue| match state(gauge) {
-                State::Found => 0,
-                State::Absent => 1,
-                State::Unseen => 2,
-            };
-            own.min_by_key(rank)
-        };
+        let mut found = inspection.features.iter();
+        let found = found.find(|found| found.feature == at);
         let (state, reason, remedy) = match found {
             Some(found) if found.state == State::Found => (State::Found, None, None),
             Some(found) => {
@@ -126,7 +127,7 @@ impl LabelledFeature {
                 (found.state, Some(reason), Some(remedy))
             }
             None => {
-                let gauge = by_gauges()?;
+                let gauge = gauge?;
                 let reason = gauge.reason.as_deref().map(String::from);
                 let remedy = reason.is_some().then_some(SURFACE);
                 (state(gauge), reason, remedy)

@@ -85,7 +85,7 @@ impl Bed {
             let count = plan.indices(sequence).len();
             let frames: Vec<Frame> = self.frames.iter().cloned().cycle().take(count).collect();
             drop(plan.inspect(sequence, &frames, Instant::now()));
-            drop(plan.heights(sequence, &frames));
+            drop(plan.layers(sequence, &frames));
         }
         Ok(())
     }

@@ -209,8 +209,11 @@ impl io::Write for ToClient {
 pub(super) async fn cloud(site: Site) -> Answered<Response> {
     send(&site, "application/octet-stream", |site| {
         let asked = site.last_cycle.ask(|cycle| {
-            let cloud = cycle.plan.cloud(cycle.sequence, &cycle.frames)?;
-            Some((format!("{}.ply", cycle.record.seq), Download::Bytes(cloud)))
+            let layers = cycle.plan.layers(cycle.sequence, &cycle.frames)?;
+            Some((
+                format!("{}.ply", cycle.record.seq),
+                Download::Bytes(layers.cloud()),
+            ))
         });
         asked.flatten().ok_or_else(|| Problem::missing(GONE))
     })

@@ -75,17 +75,14 @@ pub fn edit(
         return Err(ChangeError::Outdated(number));
     }
     if let Some(part_number) = &edit.part_number {
-        let shared = store.refuse_shared(number, part_number);
-        shared.map_err(ChangeError::Unfit)?;
+        store.refuse_shared(number, part_number)?;
     }
     let fingerprint = edit.fingerprint.clone();
     edit.apply(&mut file);
-    file.set_gauges_of(&before).map_err(ChangeError::Unfit)?;
+    file.set_gauges_of(&before)?;
     // Tighter limits may need a longer sequence, wider ones a shorter one.
-    let changed = UnsealedRecipe::of(file, recipe.arrays, Headway::silent())
-        .and_then(UnsealedRecipe::seal)
-        .map_err(ChangeError::Unfit)?;
-    fits(changed.recipe).map_err(ChangeError::Unfit)?;
+    let changed = UnsealedRecipe::of(file, recipe.arrays, Headway::silent())?.seal()?;
+    fits(changed.recipe)?;
     // The recipe was read without the lock: another change may have been stored meanwhile.
     match store.replace(number, &fingerprint, &changed.bytes) {
         Ok(true) => Ok(Edited {
@@ -181,11 +178,17 @@ impl RecipeFile {
             (true, false) => words.push("judges again".into()),
             _ => {}
         }
-        words.extend(gauges(&before.gauges, &self.gauges));
+        words.extend(lists(
+            ("gauge", &before.gauges, &self.gauges),
+            |gauge| &gauge.name,
+            |new, gone| new.slot == gone.slot,
+            gauge,
+        ));
         words.extend(self.other_slots(before));
         words.extend(lists(
             ("feature", &before.features, &self.features),
             |feature| &feature.name,
+            |_, _| false,
             |before, after| match before.kind == after.kind {
                 true => (before.region != after.region).then(|| "moved".into()),
                 false => Some(format!("is a {} now", after.kind.name())),
@@ -194,6 +197,7 @@ impl RecipeFile {
         words.extend(lists(
             ("datum", &before.datums, &self.datums),
             |datum| &datum.name,
+            |_, _| false,
             |before, after| (before.of != after.of).then(|| "is of other features".into()),
         ));
         match words.is_empty() {
@@ -206,7 +210,8 @@ impl RecipeFile {
     /// gauges by their slots.
     pub fn other_slots(&self, before: &Self) -> Option<String> {
         let moved = self.gauges.iter().filter_map(|gauge| {
-            let then = called(&before.gauges, &gauge.name)?.slot;
+            let mut gauges = before.gauges.iter();
+            let then = gauges.find(|before| before.name == gauge.name)?.slot;
             let name = clipped(&gauge.name);
             (then != gauge.slot).then(|| format!("{name:?} from {then} to {}", gauge.slot))
         });
@@ -215,54 +220,31 @@ impl RecipeFile {
     }
 }
 
-/// What differs in two lists whose elements have names.
+/// What differs in two lists whose elements have names. One whose name is gone may have another
+/// name now: that of a new one that `replaces` it.
 fn lists<'a, T>(
     (what, before, after): (&str, &'a [T], &'a [T]),
     name: impl Fn(&'a T) -> &'a String,
+    replaces: impl Fn(&T, &T) -> bool,
     difference: impl Fn(&'a T, &'a T) -> Option<String>,
 ) -> Vec<String> {
     let find = |list: &'a [T], wanted: &str| list.iter().find(|element| name(element) == wanted);
-    let gone = before
+    let is_gone = |element: &&'a T| find(after, name(element)).is_none();
+    let gone: Vec<&'a T> = before.iter().filter(is_gone).collect();
+    let is_new = |element: &&'a T| find(before, name(element)).is_none();
+    let new: Vec<&'a T> = after.iter().filter(is_new).collect();
+    let removed = gone
         .iter()
-        .filter(|element| find(after, name(element)).is_none())
-        .map(|element| format!("{what} {:?} removed", clipped(name(element))));
+        .copied()
+        .filter(|gone| !new.iter().any(|new| replaces(new, gone)))
+        .map(|gone| format!("{what} {:?} removed", clipped(name(gone))));
     let others = after.iter().filter_map(|element| {
-        let called = name(element);
-        let found = match find(before, called) {
-            None => Some("added".into()),
-            Some(before) => difference(before, element),
+        let replaced = || gone.iter().copied().find(|gone| replaces(element, gone));
+        let words = match find(before, name(element)).or_else(replaced) {
+            None => "added".into(),
+            Some(before) => difference(before, element)?,
         };
-        found.map(|words| format!("{what} {:?} {words}", clipped(called)))
-    });
-    gone.chain(others).collect()
-}
-
-/// The gauge of this name.
-fn called<'a>(gauges: &'a [GaugeFile], name: &str) -> Option<&'a GaugeFile> {
-    gauges.iter().find(|gauge| gauge.name == name)
-}
-
-/// What differs in two lists of gauges. One whose name is gone and whose slot is not has another
-/// name.
-fn gauges(before: &[GaugeFile], after: &[GaugeFile]) -> Vec<String> {
-    let renamed = |gauge: &&GaugeFile| called(before, &gauge.name).is_none();
-    let kept = |gauge: &&GaugeFile| called(after, &gauge.name).is_some();
-    let earlier = |gauge: &GaugeFile| {
-        let mut gone = before.iter().filter(|gauge| !kept(gauge));
-        gone.find(|gone| gone.slot == gauge.slot)
-    };
-    let new: Vec<_> = after.iter().filter(renamed).collect();
-    let removed = before
-        .iter()
-        .filter(|gone| !kept(gone) && !new.iter().any(|gauge| gauge.slot == gone.slot));
-    let removed = removed.map(|gone| format!("gauge {:?} removed", clipped(&gone.name)));
-    let others = after.iter().filter_map(|after| {
-        let same = called(before, &after.name);
-        let words = match same.or_else(|| earlier(after)) {
-            None => "added".to_owned(),
-            Some(before) => gauge(before, after)?,
-        };
-        Some(format!("gauge {:?} {words}", clipped(&after.name)))
+        Some(format!("{what} {:?} {words}", clipped(name(element))))
     });
     removed.chain(others).collect()
 }

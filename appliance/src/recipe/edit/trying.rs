@@ -14,7 +14,7 @@ use crate::recipe::file::rules;
 use crate::recipe::plan::{Golden, Plan};
 use crate::recipe::store::LoadedRecipe;
 use crate::recipe::{
-    Element, FeatureFile, FeatureView, GaugeFile, Labels, Part, Recipe, RecipeFile, Refusal,
+    Demands, Element, FeatureFile, FeatureView, GaugeFile, Part, Recipe, RecipeFile, Refusal,
 };
 use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, MAX_GAUGES};
 use crate::system::headway::Headway;
@@ -52,7 +52,7 @@ pub struct Over;
 pub struct Tried {
     /// The recipe with the valid part of the list.
     file: RecipeFile,
-    outline: Labels,
+    demands: Demands,
     /// All that is wrong with the list, as the API has it.
     pub problems: Vec<Value>,
     /// What golden has of each feature.
@@ -97,12 +97,12 @@ impl EditedRecipe {
             missed: Vec::new(),
         };
         let (file, golden) = trial.settled()?;
-        let outline = Labels::from(&file);
+        let demands = Demands::from(&file);
         let mut gauges = Vec::new();
         if let Some(mut golden) = golden {
-            let (judged, seen) = golden.judged((&file).into());
+            let (judged, seen) = golden.judged(demands.clone());
             trial.warn(&file, &judged, &seen);
-            gauges = self::gauges(&judged, &outline);
+            gauges = self::gauges(&judged, &demands);
             trial.take(&seen);
             let readings = golden.findings.readings.iter();
             for (gauge, reading) in gauges.iter_mut().zip(readings) {
@@ -121,7 +121,7 @@ impl EditedRecipe {
             problems: trial.problems.iter().map(Problem::json).collect(),
             features: features.collect(),
             gauges,
-            outline,
+            demands,
             file,
         })
     }
@@ -153,7 +153,7 @@ impl Tried {
         let (judged, seen) = plan.look(sequence, frames);
         json!({
             "verdict": judged.verdict().word(), "reason": judged.reason.as_deref(),
-            "gauges": gauges(&judged, &self.outline), "features": seen,
+            "gauges": gauges(&judged, &self.demands), "features": seen,
         })
     }
 }
@@ -396,12 +396,12 @@ fn probing<'a>(file: &RecipeFile, of: impl Iterator<Item = &'a FeatureFile>) -> 
 }
 
 /// The gauges of a part, with their kinds (docs/api.md, `gauges`).
-fn gauges(judged: &Inspection, outline: &Labels) -> Vec<Value> {
+fn gauges(judged: &Inspection, demands: &Demands) -> Vec<Value> {
     let gauge = |gauge: &GaugeValue| {
         let apart = gauge.low.zip(gauge.high).map(|(low, high)| high - low);
         let fine = apart.zip(gauge.uncertainty);
         json!({
-            "slot": gauge.slot, "name": &*gauge.name, "kind": outline.kind(gauge.slot),
+            "slot": gauge.slot, "name": &*gauge.name, "kind": demands.kind(gauge.slot),
             "unit": gauge.unit.symbol(), "value": gauge.value, "sigma": gauge.sigma,
             "u": gauge.uncertainty, "low": gauge.low, "high": gauge.high,
             "decision": gauge.decision.bits(), "reason": gauge.reason.as_deref(),

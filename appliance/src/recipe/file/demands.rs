@@ -12,8 +12,8 @@ use std::sync::Arc;
 pub struct Demands {
     /// In the order of the recipe's gauges.
     pub(crate) limits: Vec<GaugeDemands>,
-    /// The names of the recipe's features, in their order.
-    pub(crate) features: Vec<String>,
+    /// The recipe's features, in their order.
+    pub(crate) features: Vec<LabelledFeature>,
     /// Least share of the golden pixels that must be resolved.
     pub(crate) min_coverage: f64,
     /// How far the part may lie from where it was taught, mm.
@@ -26,11 +26,12 @@ pub struct Demands {
     pub(crate) aligned: bool,
 }
 
-/// The limits of a gauge, with the name that every result shares.
+/// The limits of a gauge, with its kind and the name that every result shares.
 #[derive(Clone, Debug)]
 pub(crate) struct GaugeDemands {
     pub slot: u16,
     pub name: Arc<str>,
+    pub kind: &'static str,
     /// The names of its features.
     pub of: Vec<String>,
     pub unit: Unit,
@@ -40,11 +41,29 @@ pub(crate) struct GaugeDemands {
     pub master: Option<Substitution>,
 }
 
+/// What a feature is called, and where golden has it.
+#[derive(Clone, Debug)]
+pub(crate) struct LabelledFeature {
+    pub name: String,
+    pub kind: FeatureKind,
+    /// Of a contour, the name of its plane.
+    pub plane: Option<String>,
+    /// Corners of its region, or the ends of a section, in golden's frame.
+    pub places: Vec<Place>,
+}
+
 impl Demands {
     /// Slot, name and unit of each gauge.
     pub fn slots(&self) -> impl Iterator<Item = (u16, &str, Unit)> {
         let limits = self.limits.iter();
         limits.map(|limits| (limits.slot, &*limits.name, limits.unit))
+    }
+
+    /// The kind of the gauge in a slot.
+    pub fn kind(&self, slot: u16) -> Option<&'static str> {
+        let mut limits = self.limits.iter();
+        let found = limits.find(|limits| limits.slot == slot);
+        found.map(|limits| limits.kind)
     }
 }
 
@@ -53,60 +72,16 @@ impl From<&RecipeFile> for Demands {
         let limits = file.gauges.iter().map(|gauge| GaugeDemands {
             slot: gauge.slot,
             name: Arc::from(&*gauge.name),
+            kind: gauge.measures.name(),
             of: gauge.of.clone(),
             unit: gauge.measures.facts().unit,
             low: gauge.low,
             high: gauge.high,
             master: gauge.substitution(),
         });
-        Self {
-            limits: limits.collect(),
-            features: file
-                .features
-                .iter()
-                .map(|feature| feature.name.clone())
-                .collect(),
-            min_coverage: file.min_coverage,
-            tolerance_mm: file.placement_tolerance_mm,
-            guard_k: file.guard_k,
-            judges_nothing: file.judges_nothing,
-            aligned: file.alignment == AlignmentKind::Rigid,
-        }
-    }
-}
-
-/// The kinds of a recipe's gauges, and its features with the gauges that are of them.
-#[derive(Clone, Debug)]
-pub struct Labels {
-    /// Slot and kind of each gauge.
-    pub(crate) gauges: Vec<(u16, &'static str)>,
-    pub(crate) features: Vec<LabelledFeature>,
-}
-
-/// A feature, with the gauges that are of it.
-#[derive(Clone, Debug)]
-pub(crate) struct LabelledFeature {
-    pub name: String,
-    pub kind: FeatureKind,
-    /// Slots of the gauges that are of it.
-    pub slots: Vec<u16>,
-    /// Of a contour, the name of its plane.
-    pub plane: Option<String>,
-    /// Corners of its region, or the ends of a section, in golden's frame.
-    pub places: Vec<Place>,
-}
-
-impl From<&RecipeFile> for Labels {
-    fn from(file: &RecipeFile) -> Self {
-        let gauges = file.gauges.iter();
-        let of = |name: &String| {
-            let gauges = file.gauges.iter().filter(|gauge| gauge.of.contains(name));
-            gauges.map(|gauge| gauge.slot).collect()
-        };
         let features = file.features.iter().map(|feature| LabelledFeature {
             name: feature.name.clone(),
             kind: feature.kind,
-            slots: of(&feature.name),
             plane: feature.plane.clone(),
             places: match feature.from.zip(feature.to) {
                 Some((from, to)) => vec![from, to],
@@ -114,10 +89,13 @@ impl From<&RecipeFile> for Labels {
             },
         });
         Self {
-            gauges: gauges
-                .map(|gauge| (gauge.slot, gauge.measures.name()))
-                .collect(),
+            limits: limits.collect(),
             features: features.collect(),
+            min_coverage: file.min_coverage,
+            tolerance_mm: file.placement_tolerance_mm,
+            guard_k: file.guard_k,
+            judges_nothing: file.judges_nothing,
+            aligned: file.alignment == AlignmentKind::Rigid,
         }
     }
 }

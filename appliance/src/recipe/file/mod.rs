@@ -23,7 +23,7 @@ pub use taught::{ComparisonFile, GoodPartsFile, ModelsFile, TriedFile};
 
 pub use feature::LONGEST_NAME;
 
-use crate::head::calibration::{Calibration, CalibrationSigma};
+use crate::head::calibration::{Calibration, CalibrationSigma, HeightsBy};
 use crate::head::exposing::Exposing;
 use crate::recipe::{DatumFile, FeatureFile, GaugeFile, Refusal};
 use crate::station::control::MAX_RECIPE;
@@ -222,8 +222,23 @@ impl RecipeFile {
         } = self.camera;
         let raster = (self.projector.width, self.projector.height);
         let frames = (width, height, bit_depth);
-        let (noise, sigma) = (self.noise_counts, self.calibration_sigma);
-        self.models.head(frames, raster, noise, sigma)
+        let ModelsFile {
+            camera,
+            projector,
+            plane,
+        } = &self.models;
+        let models = (camera, projector);
+        let by_models = Calibration::new(frames, raster, models, self.noise_counts)
+            .map_err(|error| format!("models: {error}"))?;
+        Ok(Calibration {
+            plane: plane.clone(),
+            heights_by: match plane {
+                Some(_) => HeightsBy::Measured,
+                None => HeightsBy::Models,
+            },
+            sigma: self.calibration_sigma,
+            ..by_models
+        })
     }
 
     /// A feature by its name.

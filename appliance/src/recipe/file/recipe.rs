@@ -5,7 +5,7 @@ use super::archive::{Arrays, short, unpack};
 use super::refusal::refused;
 use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
-use crate::recipe::{Demands, GaugeFile, Labels, PatternFile, RecipeFile, Refusal, SequenceKind};
+use crate::recipe::{Demands, GaugeFile, PatternFile, RecipeFile, Refusal, SequenceKind};
 use algo::calibration::LENGTH;
 use algo::frame::SampleNoise;
 use algo::inspect::{CalibrationUncertainty, Feature, Gauge};
@@ -27,8 +27,6 @@ pub struct Recipe {
     pub conditions: Conditions,
     /// What it demands of a part.
     pub demands: Demands,
-    /// What its gauges and features are called.
-    pub outline: Labels,
     /// Φ_P.
     pub function: PhaseFunction,
     /// The sequences that a part is measured with in turn, until one is good enough: the one for
@@ -254,7 +252,6 @@ impl Recipe {
             id: file.into(),
             conditions: file.into(),
             demands: file.into(),
-            outline: file.into(),
             function,
             arrays,
         })
@@ -283,11 +280,10 @@ fn sequences(file: &RecipeFile) -> Result<Vec<RecipeSequence>, Refusal> {
             .last()
             .is_none_or(|before| before.kind < sequence.kind)
         {
-            let levels = Sequence::from_frames(&sequence.frames);
             chain.push(RecipeSequence {
                 kind: sequence.kind,
                 shots: sequence.frames.clone(),
-                levels: levels.map_err(|error| error.to_string())?,
+                levels: Sequence::from_frames(&sequence.frames)?,
                 offset: (at < last).then_some(at),
                 ripple_mm: sequence.ripple_mm.unwrap_or(0.0),
             });

@@ -1,6 +1,10 @@
 //! Why a recipe is refused: a sentence, and the element of its lists that is why.
 
 use crate::head::scan::PhasesError;
+use algo::frame::FrameError;
+use algo::geometry::RigError;
+use algo::pattern::{PhaseFunctionError, SequenceError};
+use algo::phase::DecodeError;
 use hal::bounds::OutOfBounds;
 
 /// The refusal in these words, formatted.
@@ -56,16 +60,26 @@ impl From<String> for Refusal {
     }
 }
 
-impl From<OutOfBounds> for Refusal {
-    fn from(wrong: OutOfBounds) -> Self {
-        wrong.to_string().into()
-    }
+/// A recipe is refused in the words of these errors.
+macro_rules! refuses {
+    ($($error:ty,)*) => {
+        $(impl From<$error> for Refusal {
+            fn from(error: $error) -> Self {
+                error.to_string().into()
+            }
+        })*
+    };
 }
 
-impl From<PhasesError> for Refusal {
-    fn from(error: PhasesError) -> Self {
-        error.to_string().into()
-    }
+refuses! {
+    OutOfBounds,
+    PhasesError,
+    DecodeError,
+    FrameError,
+    PhaseFunctionError,
+    RigError,
+    SequenceError,
+    std::io::Error,
 }
 
 impl From<&str> for Refusal {

@@ -89,7 +89,6 @@ impl Visit<'_> {
         let names: Vec<_> = file.features.iter().map(|feature| &feature.name).collect();
         for (place, feature) in file.features.iter().enumerate() {
             let bounds = feature.check_bounds();
-            let bounds = bounds.map_err(|error| format!("features[{place}].{error}"));
             if let Some(element) = self.element(Part::Feature, &names[..=place], bounds)? {
                 if is_edit {
                     self.add(Some(&element), feature.pixels(size).map(drop))?;
@@ -100,7 +99,6 @@ impl Visit<'_> {
         let names: Vec<_> = file.datums.iter().map(|datum| &datum.name).collect();
         for (place, datum) in file.datums.iter().enumerate() {
             let bounds = datum.check_bounds();
-            let bounds = bounds.map_err(|error| format!("datums[{place}].{error}"));
             if let Some(element) = self.element(Part::Datum, &names[..=place], bounds)? {
                 self.add(Some(&element), check_frame(file, datum))?;
             }
@@ -109,7 +107,6 @@ impl Visit<'_> {
         let longest = file.camera.width.max(file.camera.height) as usize;
         for (place, gauge) in file.gauges.iter().enumerate() {
             let bounds = check_gauge(gauge, longest);
-            let bounds = bounds.map_err(|error| format!("gauges[{place}]: {error}"));
             let Some(element) = self.element(Part::Gauge, &names[..=place], bounds)? else {
                 continue;
             };
@@ -150,12 +147,13 @@ impl Visit<'_> {
         &mut self,
         part: Part,
         names: &[&String],
-        bounds: Result<(), String>,
+        bounds: Checked,
     ) -> ControlFlow<Refusal, Option<Element>> {
         let [before @ .., name] = names else {
             return ControlFlow::Continue(None);
         };
-        let element = Element::new(part, before.len(), name);
+        let place = before.len();
+        let element = Element::new(part, place, name);
         let of = Some(&element);
         let word = part.word();
         let is_named = self.0 < Rules::Edit || self.add(of, check_name(word, name))?;
@@ -163,6 +161,8 @@ impl Visit<'_> {
             let twice = format!("two of them are called {name:?}: give each {word} its own name");
             self.add(of, Err(twice))?;
         }
+        let end = if part == Part::Gauge { ": " } else { "." };
+        let bounds = bounds.map_err(|error| format!("{word}s[{place}]{end}{error}"));
         let is_bounded = self.add(of, bounds)?;
         ControlFlow::Continue(is_bounded.then_some(element))
     }

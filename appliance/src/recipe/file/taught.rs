@@ -1,9 +1,8 @@
 //! What a recipe's file says of how it was taught: the models of the head, the fixed against the
 //! adaptive pattern, good parts as predicted, and gauges as they were tried.
 
-use crate::head::calibration::{Calibration, CalibrationSigma, HeightsBy};
+use crate::head::calibration::Calibration;
 use crate::head::seam;
-use crate::recipe::Refusal;
 use crate::station::Unit;
 use algo::pattern::MAX_FRAMES;
 use algo::phase::Trust;
@@ -35,32 +34,6 @@ impl ModelsFile {
             projector: seam::device_model(&calibration.projector),
             plane: calibration.plane_by().cloned(),
         }
-    }
-
-    /// The head as far as it is needed to measure golden: without its grey response. Frames are of
-    /// `(columns, rows, bits)`, the raster of `(columns, rows)`.
-    ///
-    /// # Errors
-    /// In words: a model is absurd, and why.
-    pub fn head(
-        &self,
-        frames: (u32, u32, u8),
-        raster: (u32, u32),
-        noise_counts: f64,
-        sigma: Option<CalibrationSigma>,
-    ) -> Result<Calibration, Refusal> {
-        let models = (&self.camera, &self.projector);
-        let by_models = Calibration::new(frames, raster, models, noise_counts)
-            .map_err(|error| format!("models: {error}"))?;
-        Ok(Calibration {
-            plane: self.plane.clone(),
-            heights_by: match self.plane {
-                Some(_) => HeightsBy::Measured,
-                None => HeightsBy::Models,
-            },
-            sigma,
-            ..by_models
-        })
     }
 }
 

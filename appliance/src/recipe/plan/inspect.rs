@@ -30,6 +30,10 @@ impl Laps {
         Self { stages, since }
     }
 
+    pub fn now() -> Self {
+        Self::since(Instant::now())
+    }
+
     pub fn end(&mut self, stage: Stage) {
         let now = Instant::now();
         let us = (now - self.since).as_micros();
@@ -232,7 +236,7 @@ impl Plan {
         // On the stack: a trigger allocates nothing.
         let mut views: heapless::Vec<FrameView<'_>, MAX_FRAMES> = heapless::Vec::new();
         for frame in frames {
-            let view = seam::view(frame).map_err(|error| error.to_string())?;
+            let view = seam::view(frame)?;
             let full = |_| format!("{} frames are more than any sequence has", frames.len());
             views.push(view).map_err(full)?;
         }
@@ -247,18 +251,16 @@ impl Plan {
                 Ok((findings, Some(found.map_or(0.0, |found| found.likeness))))
             });
             laps.end(Stage::Strips);
-            return findings.map_err(|error| error.to_string().into());
+            return Ok(findings?);
         }
-        let (arrived, finest) = run.complete(arriving, &views).map_err(|e| e.to_string())?;
+        let (arrived, finest) = run.complete(arriving, &views)?;
         let input = Input::Finest(&arrived, &finest);
         let placed = production.place(input, strips);
         laps.end(Stage::Alignment);
-        let findings = placed
-            .and_then(|placed| {
-                let input = (input, Signal::Frames(&views));
-                production.inspect_placed(input, strips, placed, maps)
-            })
-            .map_err(|error| error.to_string());
+        let findings = placed.and_then(|placed| {
+            let input = (input, Signal::Frames(&views));
+            production.inspect_placed(input, strips, placed, maps)
+        });
         laps.end(Stage::Strips);
         run.keep(arrived);
         Ok((findings?, None))
@@ -269,14 +271,14 @@ impl Plan {
     /// Judges a part as [`Self::inspect`] does, and says what became of the features that gauges
     /// need.
     pub fn look(&self, sequence: usize, frames: &[Frame]) -> (Inspection, Vec<FeatureView<'_>>) {
-        let mut laps = Laps::since(Instant::now());
+        let mut laps = Laps::now();
         let mut strips = self.strips();
         let of = (self.arriving(sequence), frames);
         let found = self.run(&mut strips, of, Maps::default(), &mut laps);
         let inspection = self.judged((sequence, frames), found, &mut laps);
         let seen = self.runs.get(sequence).map(|run| {
             let drawing = Drawing::new(&run.production, &strips);
-            self.outline.features(&inspection, &drawing)
+            self.demands.seen(&inspection, &drawing)
         });
         let seen = seen.unwrap_or_default();
         drop(strips);

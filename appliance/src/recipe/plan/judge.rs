@@ -77,7 +77,7 @@ impl Demands {
     /// Whether a feature that was not found is absent, and why it was not found.
     fn lost(&self, found: &FoundFeature) -> (bool, String) {
         let name = self.features.get(found.feature);
-        let name = clipped(name.map_or("", |name| name));
+        let name = clipped(name.map_or("", |feature| &feature.name));
         let (reason, _) = why_lost(found);
         let absent = found.state == State::Absent;
         (absent, format!("feature {name:?}: {reason}"))
@@ -226,7 +226,7 @@ impl Demands {
         let names: Vec<String> = unseen
             .filter(|found| found.state == State::Unseen)
             .filter_map(|found| self.features.get(found.feature))
-            .map(|name| clipped(name))
+            .map(|feature| clipped(&feature.name))
             .collect();
         match names.len() {
             0 => String::new(),

@@ -15,7 +15,6 @@ use algo::pipeline;
 use algo::units::{Height, Modulation};
 use hal::frame::Frame;
 use std::sync::{Arc, PoisonError};
-use std::time::Instant;
 
 /// Maps of one part, row-major.
 #[derive(Clone, Debug)]
@@ -30,6 +29,8 @@ pub struct Layers {
     pub shown: ShownDeviation,
     /// Modulation of the finest level in counts.
     pub modulation: Vec<f32>,
+    /// Counts of a full sample.
+    full_scale: u16,
     triangulator: Arc<Triangulator>,
 }
 
@@ -37,6 +38,18 @@ impl Layers {
     /// x, y and z in mm of every `stride`-th pixel, NaN where not resolved.
     pub fn points(&self, stride: usize) -> [Vec<f32>; 3] {
         points(&self.triangulator, (&self.height_mm, self.width), stride)
+    }
+
+    /// The point cloud of the part as binary PLY, with its modulation as intensity.
+    pub fn cloud(&self) -> Vec<u8> {
+        // NaN becomes an unknown height.
+        let heights = self.height_mm.iter();
+        let heights = heights.map(|&mm| Height::from_mm(f64::from(mm)));
+        let shade = |at: usize| {
+            let intensity = self.modulation[at] * 2.0 / f32::from(self.full_scale) * 255.0;
+            (intensity as u8, f32::NAN)
+        };
+        ply(&self.triangulator, Axes::World, self.width, heights, shade)
     }
 }
 
@@ -72,10 +85,7 @@ impl GoldenView {
     pub fn new(recipe: &Recipe, head: &Calibration) -> Result<Self, Refusal> {
         let [low, high] = recipe.conditions.range_mm;
         let range = Some(HeightRange { low, high });
-        let triangulator = head.triangulator(recipe.function.clone(), range);
-        triangulator
-            .map(Self)
-            .map_err(|error| error.to_string().into())
+        Ok(Self(head.triangulator(recipe.function.clone(), range)?))
     }
 
     /// x, y and z in mm of every `stride`-th pixel of its heights, NaN where not known.
@@ -130,19 +140,16 @@ impl ShownGauge {
 impl Plan {
     /// The maps of a part from the frames of a sequence; `None` if the frames do not fit.
     pub fn layers(&self, sequence: usize, frames: &[Frame]) -> Option<Layers> {
-        let [mut height_mm, mut deviation_mm] = [(); 2].map(|()| self.unknown());
+        let (columns, rows, _) = self.conditions.camera;
+        let unknown = vec![f32::NAN; columns as usize * rows as usize];
+        let (mut height_mm, mut deviation_mm) = (unknown.clone(), unknown);
         let maps = Maps {
             heights: Some(&mut height_mm),
             deviation: Some(&mut deviation_mm),
         };
         let mut strips = self.strips();
-        let mut laps = Laps::since(Instant::now());
-        let found = self.run(
-            &mut strips,
-            (self.arriving(sequence), frames),
-            maps,
-            &mut laps,
-        );
+        let of = (self.arriving(sequence), frames);
+        let found = self.run(&mut strips, of, maps, &mut Laps::now());
         let shown = self.shown(&found.ok()?.0);
         let production = &self.runs.get(sequence)?.production;
         let deviation_mm =
@@ -158,27 +165,8 @@ impl Plan {
             shown,
             triangulator: production.shared_triangulator(),
             modulation: counts.map(|b| b.counts(full_scale) as f32).collect(),
+            full_scale,
         })
-    }
-
-    /// z in mm of each pixel from the frames of a sequence, NaN where not resolved; `None` if the
-    /// frames do not fit.
-    pub fn heights(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<f32>> {
-        let mut height_mm = self.unknown();
-        let maps = Maps {
-            heights: Some(&mut height_mm),
-            deviation: None,
-        };
-        let mut laps = Laps::since(Instant::now());
-        let of = (self.arriving(sequence), frames);
-        let found = self.run(&mut self.strips(), of, maps, &mut laps);
-        found.ok().map(|_| height_mm)
-    }
-
-    /// A map of a frame without values.
-    pub(super) fn unknown(&self) -> Vec<f32> {
-        let (columns, rows, _) = self.conditions.camera;
-        vec![f32::NAN; columns as usize * rows as usize]
     }
 
     /// Which deviation a map of the part shows.
@@ -219,30 +207,5 @@ impl Plan {
         let (decoder, map) = (production.decoder(), Some(production.map()));
         let phases = pipeline::decode(decoder, &views.ok()?, map, None).ok()?;
         Some(phases.modulation)
-    }
-
-    /// The point cloud of a part as binary PLY, with its modulation as intensity; `None` as for
-    /// [`Self::layers`].
-    pub fn cloud(&self, sequence: usize, frames: &[Frame]) -> Option<Vec<u8>> {
-        let height_mm = self.heights(sequence, frames)?;
-        let modulation = self.modulation(sequence, frames)?;
-        let production = &self.runs.get(sequence)?.production;
-        let full_scale = production.decoder().full_scale();
-        // NaN becomes an unknown height.
-        let heights = height_mm.iter();
-        let heights = heights.map(|&mm| Height::from_mm(f64::from(mm)));
-        let shade = |at: usize| {
-            let counts = modulation[at].counts(full_scale) as f32;
-            let intensity = counts * 2.0 / f32::from(full_scale) * 255.0;
-            (intensity as u8, f32::NAN)
-        };
-        let triangulator = production.triangulator();
-        Some(ply(
-            triangulator,
-            Axes::World,
-            production.cubics().surface().width,
-            heights,
-            shade,
-        ))
     }
 }

@@ -18,7 +18,7 @@ use crate::head::calibration::Calibration;
 use crate::head::exposing::Exposing;
 use crate::head::rasters::Illumination;
 use crate::recipe::file::refusal::refused;
-use crate::recipe::{Conditions, Demands, Labels, Recipe, RecipeId, Refusal};
+use crate::recipe::{Conditions, Demands, Recipe, RecipeId, Refusal};
 use crate::system::headway::Headway;
 use algo::geometry::HeightRange;
 use algo::inspect::{Production, Strips, normal_shares};
@@ -37,8 +37,6 @@ pub struct Plan {
     conditions: Conditions,
     /// What it demands of a part.
     demands: Demands,
-    /// What its gauges and features are called.
-    outline: Labels,
     /// The light of its patterns.
     illumination: Illumination,
     /// What the rasters show, each once; those of the first run come first.
@@ -142,7 +140,6 @@ impl Plan {
             id,
             conditions,
             demands,
-            outline,
             function,
             sequences,
             mut features,
@@ -161,8 +158,7 @@ impl Plan {
         let [low, high] = conditions.range_mm;
         // Planning asks for the rays of all pixels several times.
         let quick = calibration.clone().with_rays();
-        let triangulator = quick.triangulator(function, Some(HeightRange { low, high }));
-        let triangulator = triangulator.map_err(|error| error.to_string())?;
+        let triangulator = quick.triangulator(function, Some(HeightRange { low, high }))?;
         headway.done(0.1);
         taught::of_sections((&mut features, &demands.features), size, &triangulator)?;
         let (window, away) =
@@ -207,8 +203,7 @@ impl Plan {
         let triangulator = triangulator.seen_by(calibration.camera.clone());
         let shared = Shared {
             conditions: &conditions,
-            aligned: demands.aligned,
-            tolerance_mm: demands.tolerance_mm,
+            demands: &demands,
             triangulator: Arc::new(triangulator),
             cubics: Arc::new(cubics),
             features,
@@ -217,7 +212,6 @@ impl Plan {
             noise_counts,
             golden,
             picture: (modulation, away as f64),
-            names: &demands.features,
             signal,
         };
         let wanted = |(at, _): &(usize, _)| of_golden.is_none_or(|of| of.sequence == *at);
@@ -237,7 +231,6 @@ impl Plan {
             id,
             conditions,
             demands,
-            outline,
             illumination,
             shots,
             runs,

@@ -130,8 +130,7 @@ impl Recipe {
         let mut others = Vec::new();
         for (pattern, spec) in recording.patterns.iter().enumerate() {
             let (columns, rows) = (projector.width as usize, projector.height as usize);
-            let function = seam::phase_function(spec, columns, rows);
-            let function = function.map_err(|error| error.to_string())?;
+            let function = seam::phase_function(spec, columns, rows)?;
             let apart = difference(&function, &self.function);
             if apart.is_some_and(|turns| turns <= SAME) {
                 return Ok(pattern);

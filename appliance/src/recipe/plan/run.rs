@@ -3,7 +3,7 @@
 use super::taught;
 use crate::recipe::file::archive::Arrays;
 use crate::recipe::file::refusal::refused;
-use crate::recipe::{Conditions, Element, Part, RecipeSequence, Refusal, SequenceKind};
+use crate::recipe::{Conditions, Demands, Element, Part, RecipeSequence, Refusal, SequenceKind};
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
@@ -39,9 +39,7 @@ pub(super) struct Run {
 /// What all runs of a recipe share.
 pub(super) struct Shared<'a> {
     pub conditions: &'a Conditions,
-    pub aligned: bool,
-    /// The placement tolerance, mm.
-    pub tolerance_mm: f64,
+    pub demands: &'a Demands,
     pub triangulator: Arc<Triangulator>,
     pub cubics: Arc<HeightCubics>,
     pub features: Vec<Feature>,
@@ -52,8 +50,6 @@ pub(super) struct Shared<'a> {
     /// Golden's modulation in counts, empty where parts are not aligned, and how far the image of a
     /// part may be displaced, pixels.
     pub picture: (Arc<[f32]>, f64),
-    /// The names of the features, in their order.
-    pub names: &'a [String],
     /// What contours need; `None` if no gauge is of one.
     pub signal: Option<GoldenSignal>,
 }
@@ -139,8 +135,7 @@ impl Prepared {
         } = sequence;
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
         let offsets = (taught::offset(arrays, offset), taught::offset(arrays, base));
-        let decoder = Decoder::new(&levels, range, conditions.camera.2);
-        let decoder = decoder.map_err(|error| error.to_string())?;
+        let decoder = Decoder::new(&levels, range, conditions.camera.2)?;
         let decoder = decoder.with_least_modulation(conditions.least_modulation);
         let indices = shots.into_iter().map(|shot| {
             let shown = rasters.iter().position(|known| *known == shot);
@@ -257,8 +252,8 @@ impl Prepared {
             window: shared.window.clone(),
             noise: shared.conditions.noise.by([0.0, 1.0 / brighter]),
             noise_counts: shared.noise_counts,
-            aligned: shared.aligned,
-            tolerance_mm: shared.tolerance_mm,
+            aligned: shared.demands.aligned,
+            tolerance_mm: shared.demands.tolerance_mm,
             golden_noise,
             largest: largest.map(|largest| largest.times(over_full)).collect(),
             displaced: shared.gauges.iter().map(displaced).collect(),
@@ -293,7 +288,8 @@ fn refusal(error: Unmeasurable, shared: &Shared<'_>) -> Refusal {
         .features
         .get(feature)
         .map_or("contour", |of| of.kind.name());
-    let name = shared.names.get(feature).map_or("", String::as_str);
+    let label = shared.demands.features.get(feature);
+    let name = label.map_or("", |label| &label.name);
     let of = Some(Element::new(Part::Feature, feature, name));
     let name = clipped(name);
     let is_section = matches!(error, Unmeasurable::NoSection { .. });

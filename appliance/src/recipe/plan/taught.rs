@@ -2,6 +2,7 @@
 //! the part of the frame that the gauges need.
 
 use crate::recipe::file::archive::Arrays;
+use crate::recipe::file::demands::LabelledFeature;
 use crate::recipe::{Demands, Element, Part, RecipeSequence, Refusal, SequenceKind, safe};
 use algo::adaptive::Field;
 use algo::frame::SampleNoise;
@@ -193,12 +194,12 @@ pub(super) fn window(
 /// # Errors
 /// In words: one lies outside of the frame.
 pub(super) fn of_sections(
-    (features, names): (&mut [Feature], &[String]),
+    (features, labels): (&mut [Feature], &[LabelledFeature]),
     (width, height): (usize, usize),
     triangulator: &Triangulator,
 ) -> Result<(), Refusal> {
     let pitch = pitch(triangulator).ok_or("the camera sees no plane in its middle")?;
-    for ((place, feature), name) in features.iter_mut().enumerate().zip(names) {
+    for ((place, feature), label) in features.iter_mut().enumerate().zip(labels) {
         let Some(Cut {
             from: [u0, v0],
             to: [u1, v1],
@@ -220,7 +221,7 @@ pub(super) fn of_sections(
         ];
         let refused = |error: RegionError| Refusal {
             words: error.to_string(),
-            of: Some(Element::new(Part::Feature, place, name)),
+            of: Some(Element::new(Part::Feature, place, &label.name)),
         };
         feature.region = Region::polygon(&corners, width, height).map_err(refused)?;
     }

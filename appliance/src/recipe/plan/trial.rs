@@ -6,7 +6,7 @@
 use super::inspect::Laps;
 use super::{Plan, PlanError};
 use crate::head::calibration::Calibration;
-use crate::recipe::{Demands, FeatureView, Recipe};
+use crate::recipe::{Demands, FeatureView, Recipe, Refusal};
 use crate::station::Inspection;
 use crate::system::headway::Headway;
 use algo::geometry::Vector;
@@ -15,7 +15,6 @@ use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use algo::units::Modulation;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
 
 /// One recipe is tried at a time: planning takes up to 31 bytes per pixel beside the recipe itself.
 static ONE: Mutex<()> = Mutex::new(());
@@ -34,28 +33,18 @@ impl Plan {
 
     /// What the recipe measures of golden, that is, of a part that lies as taught and is seen
     /// without noise by the first of its sequences; σ is that of one measurement. `head` has the
-    /// models that it was taught with. On threads as [`Plan::try_out`].
+    /// models that it was taught with. A `lenient` plan also has contours of which golden shows too
+    /// little. On threads as [`Plan::try_out`].
     ///
     /// # Errors
     /// As [`Plan::again`].
     pub fn golden(
         recipe: Recipe,
         head: &Calibration,
+        lenient: bool,
         headway: Headway<'_>,
     ) -> Result<Golden, PlanError> {
-        alone(recipe, |recipe| golden(recipe, head, false, headway))
-    }
-
-    /// As [`Plan::golden`], also where golden shows too little of a contour.
-    ///
-    /// # Errors
-    /// As [`Plan::again`].
-    pub fn golden_leniently(
-        recipe: Recipe,
-        head: &Calibration,
-        headway: Headway<'_>,
-    ) -> Result<Golden, PlanError> {
-        alone(recipe, |recipe| golden(recipe, head, true, headway))
+        alone(recipe, |recipe| golden(recipe, head, lenient, headway))
     }
 
     /// Whether production can be planned with a recipe, by every one of its sequences. `head` has the models that it
@@ -97,12 +86,11 @@ impl Golden {
     pub fn judged(&mut self, demands: Demands) -> (Inspection, Vec<FeatureView<'_>>) {
         self.plan.demands = demands;
         let plan = &self.plan;
-        let mut laps = Laps::since(Instant::now());
         let found = Ok((self.findings.clone(), None));
-        let inspection = plan.judged((0, &[]), found, &mut laps);
+        let inspection = plan.judged((0, &[]), found, &mut Laps::now());
         let strips = plan.strips();
         let drawing = Drawing::new(plan.production(), &strips);
-        let seen = plan.outline.features(&inspection, &drawing);
+        let seen = plan.demands.seen(&inspection, &drawing);
         drop(strips);
         (inspection, seen)
     }
@@ -130,10 +118,7 @@ fn golden(
     headway: Headway<'_>,
 ) -> Result<Golden, PlanError> {
     let number = recipe.id.number;
-    let unfit = |reason: String| PlanError::Unfit {
-        number,
-        reason: reason.into(),
-    };
+    let unfit = |reason: Refusal| PlanError::Unfit { number, reason };
     // Two frames compare pictures, and golden's is by the sequence behind them.
     let planned = recipe.sequences.iter().position(|of| !of.is_pair());
     let sequence = planned.ok_or_else(|| unfit("it has no sequence".into()))?;
@@ -166,7 +151,7 @@ fn golden(
             let input = (input, Signal::Golden);
             production.inspect_placed(input, &mut strips, placed, Maps::default())
         })
-        .map_err(|error| unfit(error.to_string()))?;
+        .map_err(|error| unfit(error.into()))?;
     drop(strips);
     Ok(Golden {
         plan,
@@ -184,13 +169,14 @@ impl Plan {
         light: &[Vec<Modulation>],
         seed: u64,
     ) -> Option<Inspection> {
-        let mut sequence = 0;
-        loop {
-            let run = self.runs.get(sequence).filter(|run| run.pair.is_none())?;
+        for (sequence, run) in self.runs.iter().enumerate() {
+            if run.pair.is_some() {
+                return None;
+            }
             let phases = run
                 .production
                 .rendered(motion, &light[sequence], Some(seed));
-            let mut laps = Laps::since(Instant::now());
+            let mut laps = Laps::now();
             let mut strips = self.strips();
             let input = (Input::Phases(&phases), Signal::None);
             let placed = run.production.place_rendered(&phases, &mut strips, motion);
@@ -200,13 +186,13 @@ impl Plan {
             });
             drop(strips);
             let findings = findings.map(|findings| (findings, None));
-            let found = findings.map_err(|error| error.to_string().into());
+            let found = findings.map_err(Refusal::from);
             let inspection = self.judged((sequence, &[]), found, &mut laps);
-            sequence += 1;
-            if inspection.step_up.is_none() || sequence == self.runs.len() {
+            if inspection.step_up.is_none() {
                 return Some(inspection);
             }
         }
+        None
     }
 
     /// Corners of the box around the part as taught; none if parts are not aligned.

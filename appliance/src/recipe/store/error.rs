@@ -65,8 +65,8 @@ pub enum ChangeError {
     )]
     Outdated(u16),
     /// The recipe that is edited, imported or restored cannot be used: why, with the remedy.
-    #[error("{0}")]
-    Unfit(Refusal),
+    #[error(transparent)]
+    Unfit(#[from] Refusal),
     /// The edited recipe cannot be stored.
     #[error("store recipe: {0}: free space")]
     Store(io::Error),

@@ -158,9 +158,8 @@ impl Store {
         replace: &str,
         fits: impl FnOnce(Recipe) -> Result<(), Refusal>,
     ) -> Result<Imported, ChangeError> {
-        let refused = |reason: Refusal| {
-            ChangeError::Unfit(format!("import {}: {reason}", source.display()).into())
-        };
+        let refused =
+            |reason: Refusal| Refusal::from(format!("import {}: {reason}", source.display()));
         let missing = |error| ChangeError::Missing {
             path: source.to_path_buf(),
             source: error,
@@ -223,19 +222,18 @@ impl Store {
         }
         if number == id.number {
             let shared = self.refuse_shared(number, &id.part_number);
-            shared.map_err(|words| ChangeError::Unfit(format!("import: {words}").into()))?;
+            shared.map_err(|words| Refusal::from(format!("import: {words}")))?;
             self.put_received(incoming, number).map_err(write(&path))?;
             return Ok(whole(id, replaced));
         }
         // A copy of a recipe does not take its part number from it.
         let other = self.other_holder(number, &id.part_number);
-        let (mut file, recipe) = incoming.read().map_err(ChangeError::Unfit)?;
+        let (mut file, recipe) = incoming.read()?;
         file.number = number;
         if other.is_some() {
             file.part_number.clear();
         }
-        let packed = archive::pack(&file, &recipe.arrays);
-        let (bytes, fingerprint) = packed.map_err(ChangeError::Unfit)?;
+        let (bytes, fingerprint) = archive::pack(&file, &recipe.arrays)?;
         self.put(number, &bytes).map_err(write(&path))?;
         (id.number, id.part_number, id.fingerprint) = (number, file.part_number, fingerprint);
         Ok(Imported {

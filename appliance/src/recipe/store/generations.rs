@@ -79,7 +79,7 @@ impl Store {
         let before = self.before(number).ok_or(ChangeError::Nothing(number))?;
         let unfit = |reason: Refusal| {
             let words = format!("undo recipe {number}: its previous generation {reason}");
-            ChangeError::Unfit(words.into())
+            Refusal::from(words)
         };
         let restored = read(&before, number).map_err(unfit)?;
         let (path, previous, kept) = (self.path(number), self.previous(number), self.kept(number));
@@ -87,11 +87,10 @@ impl Store {
             |file: &RecipeFile| calibration.is_none_or(|head| file.calibration == head);
         if !is_of_head(&restored) && manifest_at(&path).is_some_and(|newest| is_of_head(&newest)) {
             let reason = "was made for another head or calibration: teach it again";
-            return Err(unfit(reason.into()));
+            return Err(unfit(reason.into()).into());
         }
         let shared = self.refuse_shared(number, &restored.part_number);
-        shared
-            .map_err(|words| ChangeError::Unfit(format!("undo recipe {number}: {words}").into()))?;
+        shared.map_err(|words| Refusal::from(format!("undo recipe {number}: {words}")))?;
         let rename = |from: &Path, to: &Path| rename_whole(from, to).map_err(write(to));
         if !path.exists() {
             rename(&before, &path)?;

@@ -88,14 +88,12 @@ impl Incoming {
     /// # Errors
     /// In words: why it is not a usable recipe.
     pub fn recipe(&self) -> Result<Recipe, Refusal> {
-        let file = File::open(&self.path).map_err(|error| error.to_string())?;
-        Recipe::read(BufReader::new(file), self.bytes)
+        Recipe::read(BufReader::new(File::open(&self.path)?), self.bytes)
     }
 
     /// The recipe with its manifest, once it was checked.
     pub(crate) fn read(&self) -> Result<(RecipeFile, Recipe), Refusal> {
-        let file = File::open(&self.path).map_err(|error| error.to_string())?;
-        Recipe::read_to_edit(BufReader::new(file), self.bytes)
+        Recipe::read_to_edit(BufReader::new(File::open(&self.path)?), self.bytes)
     }
 
     /// Checks that `more` bytes leave as much free storage as the station needs.

@@ -223,7 +223,7 @@ impl Store {
         let opened = fs::File::open(path).and_then(|file| Ok((file.metadata()?.len(), file)));
         let (size, file) = match opened {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return None,
-            Err(error) => return Some(Err(error.to_string().into())),
+            Err(error) => return Some(Err(error.into())),
             Ok(opened) => opened,
         };
         Some(match Recipe::read_to_edit(io::BufReader::new(file), size) {

@@ -82,15 +82,6 @@ impl Captured {
         let shots = distinct(sequences);
         let least = calibration.least_modulation();
         let full_scale = f64::from((1_u32 << calibration.bit_depth) - 1);
-        let decode = |shown: &[Shot], means: &[Frame], map: &[AbsolutePhase]| {
-            let scan = scan(function, (&shots, shown), means)?.trusting(least);
-            let phases = scan.phases(scan.needs_map().then_some(map))?;
-            let counts = light::offset_counts(&scan.frames, &phases);
-            // Means of frames have more bits than the camera's samples.
-            let unit = full_scale / f64::from(scan.decoder.full_scale());
-            let offset = counts.map(|counts| counts * unit);
-            Ok::<_, Refusal>((scan.noise(calibration, &phases), offset, phases))
-        };
         illumination.load(head, function, &shots, calibration)?;
         let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
         let (mut noise, mut offset_counts) = (calibration.noise, None);
@@ -100,20 +91,27 @@ impl Captured {
             let taken = |share: f64| taking.tell(0.8 * share);
             let means = mean_frames(head, shots.len(), *timeout, &taken)?;
             let means = means.ok_or(TeachError::Ended)?;
-            let (by_modulation, offset, phases) =
-                decode(full, &means, expected).map_err(TeachError::rig)?;
+            let decode = |shown: &[Shot], map: &[AbsolutePhase]| {
+                let scan = scan(function, (&shots, shown), &means)?.trusting(least);
+                let phases = scan.phases(scan.needs_map().then_some(map))?;
+                Ok::<_, Refusal>((scan, phases))
+            };
+            let (seen, phases) = decode(full, expected)?;
             taking.done(0.85);
-            (noise, offset_counts) = (by_modulation, offset);
-            let seen = scan(function, (&shots, full), &means).map_err(TeachError::rig)?;
+            // Means of frames have more bits than the camera's samples.
             let most = seen.decoder.full_scale();
+            let unit = full_scale / f64::from(most);
+            let counts = light::offset_counts(&seen.frames, &phases);
+            offset_counts = counts.map(|counts| counts * unit);
+            noise = seen.noise(calibration, &phases);
             signals.push(pipeline::signal(full, &seen.frames, most));
             let offsets = (1..).zip(short).map(|(known, shown)| {
-                let (.., by) = decode(shown, &means, &phases.phase)?;
+                let (_, by) = decode(shown, &phases.phase)?;
                 taking.done(0.85 + 0.15 * known as f64 / short.len() as f64);
                 Ok(by.offsets_from(&phases))
             });
             let offsets: Result<_, Refusal> = offsets.collect();
-            all.push((phases, offsets.map_err(TeachError::rig)?));
+            all.push((phases, offsets?));
         }
         let sequence = Sequence::from_frames(full).map_err(TeachError::rig)?;
         let (_, _, bit_depth) = calibration.frames();

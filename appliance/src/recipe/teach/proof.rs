@@ -60,8 +60,7 @@ impl Proof {
         let recipe = Recipe::check(manifest, arrays.clone())?;
         let sequences = 0..recipe.sequences.len();
         let light = sequences.map(|sequence| recipe.light(sequence)).collect();
-        let plan = Plan::telling(recipe, calibration, false, headway);
-        let plan = plan.map_err(|error| error.to_string())?;
+        let plan = Plan::telling(recipe, calibration, false, headway)?;
         let places = placements(plan.corners(), REACH * manifest.placement_tolerance_mm);
         Ok(Self {
             plan,
@@ -127,8 +126,7 @@ pub(crate) fn as_it_lies(
     plan.load(head, calibration)?;
     let mut judged = Vec::new();
     while judged.len() < STILL {
-        let mut sequence = 0;
-        loop {
+        for sequence in 0..plan.sequence_count() {
             if !headway.tell(judged.len() as f64 / STILL as f64) {
                 return Err(TeachError::Ended);
             }
@@ -142,8 +140,7 @@ pub(crate) fn as_it_lies(
             };
             head.acquire(indices, timeout, &mut keep)?;
             let inspection = plan.inspect(sequence, &frames, Instant::now());
-            sequence += 1;
-            if inspection.step_up.is_none() || sequence == plan.sequence_count() {
+            if inspection.step_up.is_none() {
                 judged.push(inspection);
                 break;
             }

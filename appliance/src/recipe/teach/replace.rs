@@ -37,31 +37,33 @@ pub const PLACEMENT_TOLERANCE_MM: f64 = 1.0;
 /// is taught under a number: those of the recipe that it replaces, if any. With `keep_gauges` the limit is the
 /// widest of its deviations'.
 pub fn naming(number: u16, replaced: Option<&RecipeFile>, keep_gauges: bool) -> Naming {
-    let kept = replaced.cloned();
-    let exposures = replaced.map_or(1, |file| file.exposures);
-    let (part_number, name, placement_tolerance_mm) = match kept {
-        Some(file) => (file.part_number, file.name, file.placement_tolerance_mm),
-        None => (
-            format!("PART-{number:04}"),
-            format!("Part {number}"),
-            PLACEMENT_TOLERANCE_MM,
-        ),
+    let new = Naming {
+        number,
+        part_number: format!("PART-{number:04}"),
+        name: format!("Part {number}"),
+        taught_at_unix_s: crate::system::clock::utc_or_told_s().unwrap_or(0),
+        placement_tolerance_mm: PLACEMENT_TOLERANCE_MM,
+        exposures: 1,
+        everything: false,
+        marking: Marking::default(),
+        empty: None,
+        limit_mm: Some(DEVIATION_MM),
+    };
+    let Some(file) = replaced.cloned() else {
+        return new;
     };
     Naming {
-        number,
-        part_number,
-        name,
-        taught_at_unix_s: crate::system::clock::utc_or_told_s().unwrap_or(0),
-        placement_tolerance_mm,
-        exposures,
-        everything: replaced.is_some_and(|file| file.everything),
-        marking: replaced.map_or_else(Marking::default, |file| file.marking.clone()),
-        empty: None,
-        limit_mm: match replaced {
-            Some(file) if keep_gauges => kept_limit(file),
-            Some(file) => Some(file.good_parts.map_or(DEVIATION_MM, |of| of.tolerance_mm)),
-            None => Some(DEVIATION_MM),
+        limit_mm: match keep_gauges {
+            true => kept_limit(&file),
+            false => Some(file.good_parts.map_or(DEVIATION_MM, |of| of.tolerance_mm)),
         },
+        part_number: file.part_number,
+        name: file.name,
+        placement_tolerance_mm: file.placement_tolerance_mm,
+        exposures: file.exposures,
+        everything: file.everything,
+        marking: file.marking,
+        ..new
     }
 }
 
@@ -204,11 +206,7 @@ impl RecipeFile {
         headway: Headway<'_>,
     ) -> Result<Golden, Refusal> {
         let recipe = Recipe::fit(self, arrays.clone())?;
-        let measure = match lenient {
-            true => Plan::golden_leniently,
-            false => Plan::golden,
-        };
-        Ok(measure(recipe, head, headway)?)
+        Ok(Plan::golden(recipe, head, lenient, headway)?)
     }
 
     /// Takes over what is found of golden.

@@ -6,7 +6,7 @@ use super::planner;
 use super::planner::Choice;
 use crate::head::calibration::Calibration;
 use crate::recipe::file::archive::Arrays;
-use crate::recipe::plan::{Plan, PlanError};
+use crate::recipe::plan::Plan;
 use crate::recipe::{FeatureFile, GaugeFile, Recipe, RecipeFile, Refusal};
 use crate::system::headway::Headway;
 use algo::inspect::kinds::{Found, Roundness};
@@ -250,22 +250,17 @@ fn found(
     let mut left: Vec<usize> = (0..rims.len()).collect();
     while !left.is_empty() {
         let looked = left.iter().map(|&at| rims[at].clone()).collect();
-        let recipe = Recipe::fit(&of_rims(manifest, looked), arrays.clone());
-        let Ok(recipe) = recipe else { break };
         let looking = headway.part(0.0, 0.5);
         headway = headway.part(0.5, 1.0);
-        match Plan::golden_leniently(recipe, head, looking) {
+        match of_rims(manifest, looked).golden((arrays, head), true, looking) {
             Ok(golden) => {
                 for (at, is_found) in left.into_iter().zip(are_found(&golden.findings)) {
                     found[at] = is_found;
                 }
                 break;
             }
-            Err(PlanError::Unfit {
-                reason: Refusal {
-                    of: Some(unseen), ..
-                },
-                ..
+            Err(Refusal {
+                of: Some(unseen), ..
             }) if unseen.place < left.len() => drop(left.remove(unseen.place)),
             Err(_) => break,
         }
