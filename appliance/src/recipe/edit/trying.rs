@@ -28,7 +28,7 @@ const FINE: f64 = 4.0;
 
 /// Something that is wrong with an edit.
 #[derive(Debug)]
-struct Problem {
+struct EditProblem {
     refusal: Refusal,
     /// Whether the list cannot be stored because of it.
     refused: bool,
@@ -85,7 +85,7 @@ impl EditedRecipe {
         let problems = rules::problems(&sent).into_iter();
         let mut trial = Trial {
             problems: problems
-                .map(|refusal| Problem {
+                .map(|refusal| EditProblem {
                     refusal,
                     refused: true,
                 })
@@ -118,7 +118,7 @@ impl EditedRecipe {
         trial.features.sort_by_key(|(at, _)| *at);
         let features = trial.features.into_iter().map(|(_, seen)| seen);
         Ok(Tried {
-            problems: trial.problems.iter().map(Problem::json).collect(),
+            problems: trial.problems.iter().map(EditProblem::json).collect(),
             features: features.collect(),
             gauges,
             demands,
@@ -135,7 +135,7 @@ impl EditedRecipe {
     }
 }
 
-impl Problem {
+impl EditProblem {
     /// As the API has it (docs/api.md, `problems`).
     fn json(&self) -> Value {
         let mut all = json!({ "words": self.refusal.words, "refused": self.refused });
@@ -165,7 +165,7 @@ struct Trial<'a> {
     /// The recipe's arrays and models.
     of: (&'a Arrays, &'a Calibration),
     is_over: &'a dyn Fn() -> bool,
-    problems: Vec<Problem>,
+    problems: Vec<EditProblem>,
     /// What golden has of features, with their places in the list.
     features: Vec<(usize, Value)>,
     /// The places of features that golden does not have.
@@ -267,7 +267,7 @@ impl Trial<'_> {
             .any(|problem| problem.refusal.words == words);
         if is_new {
             let refusal = Refusal { words, of };
-            self.problems.push(Problem { refusal, refused });
+            self.problems.push(EditProblem { refusal, refused });
         }
         is_new && is_known
     }

@@ -47,7 +47,7 @@ enum Holds {
 }
 
 /// A key of a feature beside its name, kind and region.
-struct Key {
+struct FeatureKey {
     name: &'static str,
     about: &'static str,
     holds: Holds,
@@ -76,7 +76,7 @@ macro_rules! keys {
             }
         }
 
-        const KEYS: &[Key] = &[$(Key {
+        const KEYS: &[FeatureKey] = &[$(FeatureKey {
             name: stringify!($key),
             about: $about,
             holds: $holds,
@@ -123,7 +123,7 @@ keys! {
 }
 
 /// A kind of feature.
-pub(crate) struct Kind {
+pub(crate) struct KindRow {
     pub kind: FeatureKind,
     about: &'static str,
     /// How a form draws it; one that is drawn as a section has no region.
@@ -140,7 +140,7 @@ pub(crate) struct Kind {
 const SECTION: &[&str] = &["section"];
 
 /// A kind that is measured in an area and has no keys; other rows say in what they differ.
-const AREA: Kind = Kind {
+const AREA: KindRow = KindRow {
     kind: FeatureKind::Surface,
     about: "Heights, and deviations from golden, of a region.",
     shapes: &["rectangle", "polygon", "circle"],
@@ -151,16 +151,16 @@ const AREA: Kind = Kind {
 };
 
 /// The table of all kinds of features.
-pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
+pub(crate) const KINDS: [KindRow; FeatureKind::ALL.len()] = [
     AREA,
-    Kind {
+    KindRow {
         kind: FeatureKind::Plane,
         about: "The plane that fits the heights of a region best, by least squares.",
         probe: || Z {}.into(),
         may: &["thickness_mm", "rim_mm"],
         ..AREA
     },
-    Kind {
+    KindRow {
         kind: FeatureKind::Line,
         about: "A straight edge of a face, where the face ends.",
         shapes: &["points", "rectangle", "polygon"],
@@ -168,7 +168,7 @@ pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
         may: &["plane", "rim_mm"],
         ..AREA
     },
-    Kind {
+    KindRow {
         kind: FeatureKind::Circle,
         about: "A round hole in a face: where the face ends, by least squares.",
         shapes: &["circle", "rectangle", "polygon"],
@@ -177,7 +177,7 @@ pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
         may: &["plane", "rim_mm"],
         ..AREA
     },
-    Kind {
+    KindRow {
         kind: FeatureKind::Slot,
         about: "A slot with round ends in a face: where the face ends, by least squares.",
         shapes: &["rectangle", "polygon"],
@@ -185,7 +185,7 @@ pub(crate) const KINDS: [Kind; FeatureKind::ALL.len()] = [
         may: &["plane", "rim_mm"],
         ..AREA
     },
-    Kind {
+    KindRow {
         kind: FeatureKind::Section,
         about: "A cut across a joint of two sheets with rounded edges.",
         shapes: SECTION,
@@ -243,7 +243,7 @@ fn listed(names: &[&str], last: &str) -> String {
     }
 }
 
-impl Kind {
+impl KindRow {
     fn has(&self, key: &str) -> bool {
         self.needs.contains(&key) || self.may.contains(&key)
     }
@@ -266,7 +266,7 @@ impl Kind {
     }
 
     /// What a form needs of a key.
-    fn parameter(&self, key: &Key) -> Value {
+    fn parameter(&self, key: &FeatureKey) -> Value {
         let most = key.holds.most();
         let mut all = match key.holds {
             Holds::Plane => json!({ "features": [FeatureKind::Plane.name()] }),
@@ -320,7 +320,7 @@ impl FeatureFile {
         let name = self.kind.name();
         let kind = KINDS.iter().find(|row| row.kind == self.kind);
         let present = self.present();
-        let is_section = |row: &Kind| row.shapes == SECTION;
+        let is_section = |row: &KindRow| row.shapes == SECTION;
         let refused =
             |key: &str, whose: String| refused!("{key} of a {name}: {whose} has it, leave it out");
         if !self.region.is_empty() && kind.is_some_and(is_section) {
