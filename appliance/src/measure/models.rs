@@ -2,7 +2,7 @@
 
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::file::CalibrationFile;
-use crate::head::seam::{self, AbsurdModel};
+use crate::head::seam;
 use hal::replay::Recording;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -52,7 +52,7 @@ pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>> {
     ]
     .into_iter()
     .map(|(device, model, size)| Ok(seam::pinhole(device, model, size)?.centre().z))
-    .collect::<Result<Vec<f64>, AbsurdModel>>()
+    .collect::<Result<Vec<f64>>>()
     .map_err(Exit::Content.because(&place))?
     .into_iter()
     .fold(f64::INFINITY, f64::min);
