@@ -110,7 +110,7 @@ pub(super) async fn attempt(
         let words = format!("try an edit on {} parts: at most {MAX_PARTS}", seqs.len());
         return Err(Problem::unfit(words));
     }
-    let mut turn = site.tries.begin(token(&headers).unwrap_or_default());
+    let turn = site.tries.begin(token(&headers).unwrap_or_default());
     let watched = turn.watched();
     let worked = async {
         // Waiting here takes no thread from other requests.
