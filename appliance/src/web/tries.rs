@@ -22,7 +22,7 @@ use tokio::sync::Mutex;
 use tokio::time::{Instant, sleep};
 
 use super::gate::{signed_in, token};
-use super::history::{broken, kept_frames};
+use super::history::kept_frames;
 use super::problem::{Answered, Problem};
 use super::request;
 use super::request::Path;
@@ -260,7 +260,7 @@ fn last(site: &Site, (open, tried): (&EditedRecipe, &Tried)) -> (Option<u32>, An
 fn kept(site: &Site, (open, tried): (&EditedRecipe, &Tried), seq: u32) -> Answered<TriedPart> {
     let (entry, folder) = kept_frames(site, seq)?;
     let recipe = open.recipe(tried).map_err(Problem::unfit)?;
-    let kept = Kept::judged_by(&folder, &recipe).map_err(broken)?;
+    let kept = Kept::judged_by(&folder, &recipe)?;
     let plan = kept.plan(recipe, entry.flags & SIMULATED != 0);
     let plan = plan.map_err(Problem::unfit)?;
     let sequence = kept.sequence(&plan);
