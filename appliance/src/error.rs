@@ -87,6 +87,12 @@ impl Failure {
     }
 }
 
+impl From<Failure> for String {
+    fn from(failure: Failure) -> Self {
+        failure.to_string()
+    }
+}
+
 /// What a command comes to, unless another error is named.
 pub type Result<T, E = Failure> = std::result::Result<T, E>;
 

@@ -2,7 +2,7 @@
 
 use super::options::{Json, Output};
 use crate::config::{Backend, Config, keys, table};
-use crate::error::{Exit, Result};
+use crate::error::Result;
 use crate::head::calibration::place::CalibrationPlace;
 use crate::production::backend;
 use hal::replay::Recording;
@@ -60,9 +60,8 @@ impl ConfigCommand {
 fn check_named_files(config: &Config) -> Result<()> {
     backend::built_for(config)?;
     if let Some(calibration) = &config.head.calibration {
-        let wrong = Exit::Content.failure();
         // The file need not exist yet.
-        CalibrationPlace::at(calibration).load().map_err(wrong)?;
+        CalibrationPlace::at(calibration).load()?;
     }
     match config.head.backend {
         Backend::Sim => drop(backend::scenario(config.head.scenario.as_deref())?),

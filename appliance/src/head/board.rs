@@ -1,9 +1,9 @@
 //! The checkerboard: its name (`checker:9x13:10` has 9 × 13 inner corners and squares of 10 mm), how the
 //! scale that it gives the models is checked, and which pose of it is z = 0.
 
-use super::calibration::UnusableCalibration;
 use super::calibration::file::CalibrationFile;
 use super::calibration::geometry::{GeometryFile, MAX_CORNERS, MAX_SQUARE_MM};
+use crate::error::{Exit, Result};
 use algo::calibration::{Board, Standing};
 use algo::geometry::{Pinhole, Vector};
 use serde::{Deserialize, Serialize};
@@ -16,27 +16,11 @@ pub const MAX_LENGTH_MM: f64 = 1e5;
 /// share.
 const MOST_SCALE: f64 = 0.01;
 
-/// Why a text is no name of a board.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum BoardNameError {
-    /// It has another form, or a number is out of its bounds.
-    #[error(
-        "write checker:9x13:10 for 9 × 13 inner corners (3 to {}) and squares of 10 mm",
-        MAX_CORNERS
-    )]
-    Form,
-    /// x and y cannot be told apart.
-    #[error(
-        "take a board with different numbers of columns and rows: with equal numbers, x and y could be confused"
-    )]
-    Square,
-}
-
 /// A board from its name.
 ///
 /// # Errors
 /// What a name must be like.
-pub fn parse(text: &str) -> Result<Board, BoardNameError> {
+pub fn parse(text: &str) -> Result<Board> {
     let parsed = || {
         let (counts, square) = text.strip_prefix("checker:")?.split_once(':')?;
         let (columns, rows) = counts.split_once('x')?;
@@ -52,9 +36,13 @@ pub fn parse(text: &str) -> Result<Board, BoardNameError> {
             && counts.contains(&board.rows)
             && (1e-3..=MAX_SQUARE_MM).contains(&board.square)
     };
-    let board = parsed().filter(inside).ok_or(BoardNameError::Form)?;
+    let Some(board) = parsed().filter(inside) else {
+        return Exit::Content.fail(format!(
+            "write checker:9x13:10 for 9 × 13 inner corners (3 to {MAX_CORNERS}) and squares of 10 mm"
+        ));
+    };
     if board.columns == board.rows {
-        return Err(BoardNameError::Square);
+        return Exit::Content.fail("take a board with different numbers of columns and rows: with equal numbers, x and y could be confused");
     }
     Ok(board)
 }
@@ -76,35 +64,6 @@ impl GeometryFile {
     }
 }
 
-/// Why the scale of the models must be wrong.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ScaleError {
-    /// The board's length is not that of its name, mm.
-    #[error(
-        "the board is {length} mm from the first to the last inner corner, and {nominal} mm by its name (--board): state the size of its squares as it is"
-    )]
-    Length {
-        /// As stated.
-        length: f64,
-        /// By its name.
-        nominal: f64,
-    },
-    /// The baseline is not that of the calibration before, mm.
-    #[error(
-        "camera and projector are {now:.2} mm apart, and {then:.2} mm in the calibration before: correct the size of the squares in the board's \
-         name (--board), or measure the board and state its length (--check-length) if the head was changed"
-    )]
-    Baseline {
-        /// By the models.
-        now: f64,
-        /// In the calibration before.
-        then: f64,
-    },
-    /// The calibration before cannot be compared with.
-    #[error(transparent)]
-    Before(#[from] UnusableCalibration),
-}
-
 /// How the scale of the models was checked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -123,11 +82,13 @@ impl Scale {
     ///
     /// # Errors
     /// They differ by more than 1 %.
-    pub fn check_length(board: &Board, length: Option<f64>) -> Result<(), ScaleError> {
+    pub fn check_length(board: &Board, length: Option<f64>) -> Result<()> {
         let nominal = (board.columns.max(board.rows) - 1) as f64 * board.square;
         match length {
             Some(length) if (length / nominal - 1.0).abs() > MOST_SCALE => {
-                Err(ScaleError::Length { length, nominal })
+                Exit::Content.fail(format!(
+                    "the board is {length} mm from the first to the last inner corner, and {nominal} mm by its name (--board): state the size of its squares as it is"
+                ))
             }
             _ => Ok(()),
         }
@@ -142,7 +103,7 @@ impl Scale {
         length: Option<f64>,
         before: Option<&CalibrationFile>,
         now: &GeometryFile,
-    ) -> Result<Self, ScaleError> {
+    ) -> Result<Self> {
         if length.is_some() {
             return Ok(Self::Length);
         }
@@ -152,14 +113,17 @@ impl Scale {
         let then = baseline(before)?;
         if !((now.baseline_mm / then - 1.0).abs() <= MOST_SCALE) {
             let now = now.baseline_mm;
-            return Err(ScaleError::Baseline { now, then });
+            return Exit::Content.fail(format!(
+                "camera and projector are {now:.2} mm apart, and {then:.2} mm in the calibration before: correct the size of the squares in the board's \
+                 name (--board), or measure the board and state its length (--check-length) if the head was changed"
+            ));
         }
         Ok(Self::Baseline)
     }
 }
 
 /// Distance between the centres of camera and projector of a calibration, mm.
-fn baseline(file: &CalibrationFile) -> Result<f64, UnusableCalibration> {
+fn baseline(file: &CalibrationFile) -> Result<f64> {
     let calibration = file.calibration()?;
     let (camera, projector) = (&calibration.camera, &calibration.projector);
     Ok((projector.centre() - camera.centre()).length())

@@ -176,37 +176,36 @@ impl<'a> Channel<'a> {
     /// # Errors
     /// Frames and map, or frames and code, do not fit each other.
     pub fn decode(&self, unwrapping: &Unwrapping) -> Result<Phases, PhasesError> {
-        if let Unwrapping::Chain(chain) = unwrapping {
-            let (mut maps, seen) = (self.wrapped_levels()?, self.seen()?);
-            let chain = match (&self.code, &seen, maps.last()) {
-                (Some(code), Some(seen), Some(finest)) => {
-                    let edges = Edges::of(finest, seen, &code.cells, self.finest());
-                    chain.clone().aligned(&edges)
-                }
-                _ => chain.clone(),
-            };
-            let absolute = chain.unwrap(&maps, seen.as_deref());
-            let wrapped = maps.swap_remove(maps.len() - 1);
-            return Ok(Phases { absolute, wrapped });
-        }
-        if let Unwrapping::About(chain, (_, map)) = unwrapping {
-            let mut maps = self.wrapped_levels()?;
-            let absolute = chain.unwrap_about(&maps, map);
-            let wrapped = maps.swap_remove(maps.len() - 1);
-            return Ok(Phases { absolute, wrapped });
-        }
         let levels = self.scan.sequence.levels();
-        let wrapped = self.wrapped(&levels[levels.len() - 1])?;
+        let mut maps = match unwrapping {
+            Unwrapping::Chain(_) | Unwrapping::About(..) => self.wrapped_levels()?,
+            // The production kernels read the other levels themselves.
+            _ => vec![self.wrapped(&levels[levels.len() - 1])?],
+        };
+        let finest = &maps[maps.len() - 1];
         let absolute = match unwrapping {
+            Unwrapping::Chain(chain) => {
+                let seen = self.seen()?;
+                let chain = match (&self.code, &seen) {
+                    (Some(code), Some(seen)) => {
+                        let edges = Edges::of(finest, seen, &code.cells, self.finest());
+                        chain.clone().aligned(&edges)
+                    }
+                    _ => chain.clone(),
+                };
+                chain.unwrap(&maps, seen.as_deref())
+            }
+            Unwrapping::About(chain, (_, map)) => chain.unwrap_about(&maps, map),
             Unwrapping::Planned(map) => {
                 let map = map.as_ref().map(|(_, map)| &map[..]);
                 self.scan.phases(map)?
             }
-            _ => PhaseMap {
-                phase: vec![AbsolutePhase::UNKNOWN; wrapped.phase.len()],
-                ..wrapped.clone()
+            Unwrapping::Missing(_) => PhaseMap {
+                phase: vec![AbsolutePhase::UNKNOWN; finest.phase.len()],
+                ..finest.clone()
             },
         };
+        let wrapped = maps.swap_remove(maps.len() - 1);
         Ok(Phases { absolute, wrapped })
     }
 

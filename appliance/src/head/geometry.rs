@@ -4,7 +4,7 @@ use super::board::Ground;
 use super::calibration::geometry::{BoardFile, GeometryFile, PoseFile};
 use super::channel::Channel;
 use super::code::CodeAlone;
-use super::seam::AbsurdModel;
+use super::seam;
 use crate::error::{Exit, Failure, Result};
 use algo::calibration::{
     Adjusted, Arrow, Board, BoardView, CalibrationError, FoundBoard, FringeMaps, GreyPicture,
@@ -100,16 +100,15 @@ fn decoded(
     pattern: usize,
     levels: &mut Vec<GreyPicture>,
 ) -> Result<PhaseMap> {
-    let content = Exit::Content.failure();
-    if let Some(code) = CodeAlone::of(recording, pattern).map_err(content)? {
+    if let Some(code) = CodeAlone::of(recording, pattern)? {
         levels.push(GreyPicture::mean(&code.even()));
-        return code.phases(LeastModulation::default()).map_err(content);
+        return Ok(code.phases(LeastModulation::default())?);
     }
     // Not the least of the camera's noise: in black squares the light of bright ones around them
     // would have a phase, which is not the place's.
-    let channel = Channel::new(recording, pattern, LeastModulation::default()).map_err(content)?;
+    let channel = Channel::new(recording, pattern, LeastModulation::default())?;
     let none = Err("the models are to be made".into());
-    let unwrapping = channel.unwrapping(None, &none).map_err(content)?;
+    let unwrapping = channel.unwrapping(None, &none)?;
     if unwrapping.missing().is_some() {
         return Exit::Content.fail(format!(
             "levels of ratios {:?} have no absolute phase by themselves: take geometric ones, the coarsest of at most one fringe, \
@@ -122,8 +121,7 @@ fn decoded(
         let frames = level.frames.iter().map(|&at| scan.frames[usize::from(at)]);
         levels.push(GreyPicture::mean(&frames.collect::<Vec<_>>()));
     }
-    let decoded = channel.decode(&unwrapping).map_err(content)?;
-    Ok(decoded.absolute)
+    Ok(channel.decode(&unwrapping)?.absolute)
 }
 
 /// Checks that a board of such squares can lie in front of a head.
@@ -148,51 +146,6 @@ fn sized(board: &Board, found: &FoundBoard, columns: u32) -> Result<()> {
             square * factor
         ),
     ))
-}
-
-/// Why poses give no models.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum GeometryError {
-    /// A pose is of another head.
-    #[error(
-        "{pose}: its frames or its projector's raster have another size than those of {first}: calibrate with recordings of one head"
-    )]
-    OtherHead {
-        /// The pose to blame.
-        pose: String,
-        /// The first pose.
-        first: String,
-    },
-    /// The board did not move.
-    #[error(
-        "{pose}: {}: leave it out, or take it again with the board elsewhere and tilted",
-        same_place(before)
-    )]
-    SamePlace {
-        /// The pose to blame.
-        pose: String,
-        /// The pose in which it lies in the same place.
-        before: String,
-    },
-    /// A pose does not fit the others.
-    #[error("{pose}: {error}")]
-    Pose {
-        /// The pose to blame.
-        pose: String,
-        /// What is wrong with it.
-        error: CalibrationError,
-    },
-    /// The poses do not determine the models.
-    #[error(transparent)]
-    Poses(#[from] CalibrationError),
-    /// A model that was found is absurd.
-    #[error(transparent)]
-    Model(#[from] AbsurdModel),
-    /// No place is seen by both devices.
-    #[error(
-        "camera and projector see no part of the volume of all poses together: place the board where both see it"
-    )]
-    NothingInCommon,
 }
 
 /// Models of camera and projector from poses of a board.
@@ -225,48 +178,48 @@ impl Geometry {
     /// # Errors
     /// The poses are of different heads, do not determine
     /// the models, or do not fit each other.
-    pub fn of(board: &Board, sigma_ppm: f64, poses: &[SeenPose]) -> Result<Self, GeometryError> {
+    pub fn of(board: &Board, sigma_ppm: f64, poses: &[SeenPose]) -> Result<Self> {
         let Some(first) = poses.first() else {
-            return Err(CalibrationError::Few { given: 0 }.into());
+            return Exit::Content.fail(CalibrationError::Few { given: 0 });
         };
         let other = |pose: &&SeenPose| pose.head != first.head;
         if let Some(other) = poses.iter().find(other) {
-            return Err(GeometryError::OtherHead {
-                pose: other.recording.clone(),
-                first: first.recording.clone(),
-            });
+            return Exit::Content.fail(format!(
+                "{}: its frames or its projector's raster have another size than those of {}: calibrate with recordings of one head",
+                other.recording, first.recording
+            ));
         }
         let places = poses.iter().enumerate();
         let again = places.filter_map(|(at, pose)| Some((pose.again_in(&poses[..at])?, pose)));
         if let Some((before, pose)) = again.into_iter().next() {
-            return Err(GeometryError::SamePlace {
-                pose: pose.recording.clone(),
-                before: before.recording.clone(),
-            });
+            return Exit::Content.fail(format!(
+                "{}: {}: leave it out, or take it again with the board elsewhere and tilted",
+                pose.recording,
+                same_place(&before.recording)
+            ));
         }
         let [width, height, _, columns, rows] = first.head.map(|size| size as usize);
         let (frame, raster) = ((width, height), (columns, rows));
         let views: Vec<BoardView> = poses.iter().map(|pose| pose.view.clone()).collect();
         let blame = |error: CalibrationError| match error.pose() {
-            Some(pose) => GeometryError::Pose {
-                pose: poses[pose].recording.clone(),
-                error,
-            },
-            None => error.into(),
+            Some(pose) => {
+                Failure::new(Exit::Content, format!("{}: {error}", poses[pose].recording))
+            }
+            None => Failure::new(Exit::Content, error),
         };
         let adjusted = calibrate(board, frame, &views).map_err(blame)?;
         let last = poses.len() - 1;
         let (camera, projector) = adjusted.rig.models(last);
         let checked = |device, model, (columns, rows)| {
             let checked = Pinhole::new(model, columns, rows);
-            checked.map_err(|error| AbsurdModel { device, error })
+            checked.map_err(|error| seam::absurd(device, &error))
         };
         let camera = checked("camera", camera, frame)?;
         let projector = checked("projector", projector, raster)?;
         let baseline = (projector.centre() - camera.centre()).length();
-        let prediction = adjusted
-            .prediction(frame, raster, sigma_ppm * 1e-6)
-            .ok_or(GeometryError::NothingInCommon)?;
+        let Some(prediction) = adjusted.prediction(frame, raster, sigma_ppm * 1e-6) else {
+            return Exit::Content.fail("camera and projector see no part of the volume of all poses together: place the board where both see it");
+        };
         let file = file(board, sigma_ppm, poses, &adjusted, &prediction, baseline);
         Ok(Self {
             ground: Ground {

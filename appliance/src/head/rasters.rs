@@ -1,9 +1,10 @@
 //! What the projector shows: the grey rasters of a phase function, corrected by the inverse of the
 //! measured grey response, and the pictures that are taken without models.
 
+use crate::error::{Exit, Failure};
 use crate::head::calibration::Calibration;
 use crate::head::seam;
-use algo::pattern::{Encoder, GreyRaster, PhaseFunction, PhaseFunctionError, Sequence, Shot};
+use algo::pattern::{Encoder, GreyRaster, PhaseFunction, Sequence, Shot};
 use hal::error::Error;
 use hal::frame::Frame;
 use hal::head::Head;
@@ -124,16 +125,6 @@ pub fn rasters(
     Illumination::default().rasters(function, shots, calibration)
 }
 
-/// A pattern that a projector cannot show.
-#[derive(Debug, thiserror::Error)]
-#[error(transparent)]
-pub enum UnshowablePattern {
-    /// It is too small for the fringes.
-    Function(#[from] PhaseFunctionError),
-    /// It shows no such raster.
-    Raster(#[from] Error),
-}
-
 /// What is shown: fringes first, then white and black.
 #[derive(Default)]
 pub struct ShownPictures {
@@ -156,7 +147,7 @@ impl ShownPictures {
     ///
     /// # Errors
     /// The projector is too small for them.
-    pub fn pose(calibration: &Calibration) -> Result<Self, UnshowablePattern> {
+    pub fn pose(calibration: &Calibration) -> Result<Self, Failure> {
         let mut shown = Self {
             white: true,
             ..Self::default()
@@ -179,7 +170,7 @@ impl ShownPictures {
         fringes: Option<f64>,
         levels: usize,
         steps: usize,
-    ) -> Result<(), UnshowablePattern> {
+    ) -> Result<(), Failure> {
         let (columns, rows) = calibration.raster();
         let length = if vertical { columns } else { rows };
         let fringes = fringes.unwrap_or(f64::from(length) / DEFAULT_PITCH_PX);
@@ -187,7 +178,8 @@ impl ShownPictures {
             true => PatternSpec::Vertical { fringes },
             false => PatternSpec::Horizontal { fringes },
         };
-        let function = seam::phase_function(&spec, columns as usize, rows as usize)?;
+        let function = seam::phase_function(&spec, columns as usize, rows as usize)
+            .map_err(Exit::Content.failure())?;
         let shots = Sequence::geometric(function.range(), levels, steps);
         let rasters = rasters(&function, &shots, calibration)?;
         self.fringes.push(FringePattern {

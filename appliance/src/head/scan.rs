@@ -5,6 +5,7 @@
 use super::calibration::Calibration;
 use super::rasters::rasters;
 use super::seam;
+use crate::error::{Exit, Failure};
 use algo::chain::{ChainError, CodeError};
 use algo::frame::{FrameError, FrameView, SampleNoise};
 use algo::geometry::Triangulator;
@@ -86,9 +87,9 @@ pub enum PhasesError {
     NothingToCompare,
 }
 
-impl From<PhasesError> for String {
+impl From<PhasesError> for Failure {
     fn from(error: PhasesError) -> Self {
-        error.to_string()
+        Self::new(Exit::Content, error)
     }
 }
 

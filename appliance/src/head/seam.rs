@@ -1,6 +1,7 @@
 //! Converts between devices and computation: `hal`'s frames, models and patterns, and the types of
 //! `algo`.
 
+use crate::error::{Exit, Failure};
 use algo::frame::{FrameError, FrameView, Samples};
 use algo::geometry::{FittedMap, ModelError, Pinhole, PinholeModel, Reference};
 use algo::pattern::{PhaseFunction, PhaseFunctionError, Shot, Waveform};
@@ -27,22 +28,6 @@ pub fn view(frame: &Frame) -> Result<FrameView<'_>, FrameError> {
     )
 }
 
-/// A device whose model has an absurd number.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("the {device}'s model: {error}")]
-pub struct AbsurdModel {
-    /// Camera or projector.
-    pub device: &'static str,
-    /// What is absurd.
-    pub error: ModelError,
-}
-
-impl From<AbsurdModel> for String {
-    fn from(error: AbsurdModel) -> Self {
-        error.to_string()
-    }
-}
-
 /// A device with frames or rasters of `(columns, rows)`, its model checked: each pixel has one ray.
 ///
 /// # Errors
@@ -51,9 +36,14 @@ pub fn pinhole(
     device: &'static str,
     model: &DeviceModel,
     (columns, rows): (u32, u32),
-) -> Result<Pinhole, AbsurdModel> {
+) -> Result<Pinhole, Failure> {
     Pinhole::new(pinhole_model(model), columns as usize, rows as usize)
-        .map_err(|error| AbsurdModel { device, error })
+        .map_err(|error| absurd(device, &error))
+}
+
+/// The failure of a device, camera or projector, whose model has an absurd number.
+pub fn absurd(device: &str, error: &ModelError) -> Failure {
+    Failure::new(Exit::Content, format!("the {device}'s model: {error}"))
 }
 
 /// A device model as geometry takes it.

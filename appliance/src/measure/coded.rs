@@ -1,12 +1,12 @@
 //! Measures a recording of Gray codes without fringes.
 
 use super::{
-    Manner, MeasuredRecording, MeasurementReport, RecordedRig, StageTimes, Truth,
-    UnmeasurableRecording, least_modulation, primary_of,
+    Manner, MeasuredRecording, MeasurementReport, NO_PATTERN, RecordedRig, StageTimes, Truth,
+    least_modulation, primary_of,
 };
+use crate::error::{Exit, Failure, Result};
 use crate::head::code::CodeAlone;
 use crate::head::direction::Sensitivity;
-use crate::head::scan::PhasesError;
 use crate::head::seam;
 use crate::output::cloud::Surface;
 use algo::chain::{CodePhases, SIGMA_CELLS};
@@ -18,17 +18,20 @@ use hal::replay::Recording;
 ///
 /// # Errors
 /// A code cannot be decoded, or a model is absurd.
-pub(super) fn measure(recording: &Recording) -> Result<MeasuredRecording, UnmeasurableRecording> {
+pub(super) fn measure(recording: &Recording) -> Result<MeasuredRecording> {
     let least = least_modulation(recording);
     let mut stages = StageTimes::default();
     let mut codes = Vec::new();
     let read = stages.time("phase", || {
         for pattern in 0..recording.patterns.len() {
-            let code = CodeAlone::of(recording, pattern)?;
-            codes.push(code.ok_or(UnmeasurableRecording::NothingShown)?);
+            let Some(code) = CodeAlone::of(recording, pattern)? else {
+                return Exit::Content
+                    .fail("it has neither fringes nor a Gray code: record one of both");
+            };
+            codes.push(code);
         }
         let phases = codes.iter().map(|code| code.read(least));
-        Ok::<_, UnmeasurableRecording>(phases.collect::<Result<Vec<_>, _>>()?)
+        Ok::<_, Failure>(phases.collect::<Result<Vec<_>, _>>()?)
     })?;
     let (mut phases, missing): (Vec<PhaseMap>, Vec<Vec<u8>>) = read
         .into_iter()
@@ -38,8 +41,10 @@ pub(super) fn measure(recording: &Recording) -> Result<MeasuredRecording, Unmeas
     let raster = &recording.projector;
     let (columns, rows) = (raster.width as usize, raster.height as usize);
     let geometries = recording.patterns.iter().map(|spec| {
-        let function = seam::phase_function(spec, columns, rows).map_err(PhasesError::from)?;
-        Ok::<_, UnmeasurableRecording>(devices.triangulator(&function)?)
+        let function =
+            seam::phase_function(spec, columns, rows).map_err(Exit::Content.failure())?;
+        let geometry = devices.triangulator(&function);
+        geometry.map_err(Exit::Content.failure())
     });
     let mut geometries: Vec<_> = geometries.collect::<Result<_, _>>()?;
     let sensitivities: Vec<_> = geometries
@@ -47,7 +52,9 @@ pub(super) fn measure(recording: &Recording) -> Result<MeasuredRecording, Unmeas
         .map(|geometry| Sensitivity::of(geometry.as_ref().ok()?))
         .collect();
     let primary = primary_of(recording, &sensitivities);
-    let code = codes.get(primary).ok_or(UnmeasurableRecording::NoPattern)?;
+    let Some(code) = codes.get(primary) else {
+        return Exit::Content.fail(NO_PATTERN);
+    };
     let geometry = geometries.swap_remove(primary);
     let sigma = SIGMA_CELLS * code.cells.width;
     let heights = stages.time("height", || {

@@ -1,9 +1,8 @@
 //! The phase that is expected in a recording: a recipe's golden map, the prediction from a
 //! preliminary measurement, or a map from a file.
 
-use super::UnmeasurableRecording;
+use crate::error::{Exit, Result};
 use crate::head::channel::Expected;
-use crate::head::scan::PhasesError;
 use crate::head::seam;
 use crate::recipe::{Recipe, SequenceKind, safe};
 use algo::adaptive::ProjectorMap;
@@ -57,23 +56,20 @@ impl Known {
     ///
     /// # Errors
     /// If the preliminary measurement has frames of another size.
-    pub fn expected(
-        preliminary: &ProjectorMap,
-        recording: &Recording,
-    ) -> Result<Self, UnmeasurableRecording> {
+    pub fn expected(preliminary: &ProjectorMap, recording: &Recording) -> Result<Self> {
         let (width, height) = (recording.width as usize, recording.height as usize);
         let given = (preliminary.width, preliminary.height());
         if given != (width, height) {
-            return Err(UnmeasurableRecording::OtherCamera {
-                preliminary: given,
-                frames: (width, height),
-            });
+            return Exit::Content.fail(format!(
+                "the preliminary recording has frames of {}x{}, this one of {width}x{height}: both must come from one camera",
+                given.0, given.1
+            ));
         }
         let pattern = super::vertical_of(recording);
         let projector = &recording.projector;
         let (columns, rows) = (projector.width as usize, projector.height as usize);
         let function = seam::phase_function(&recording.patterns[pattern], columns, rows)
-            .map_err(PhasesError::from)?;
+            .map_err(Exit::Content.failure())?;
         Ok(Self {
             name: "preliminary",
             pattern,
@@ -86,13 +82,13 @@ impl Known {
     ///
     /// # Errors
     /// If it has not the size of the frames.
-    pub fn given(map: &Array<f64>, recording: &Recording) -> Result<Self, UnmeasurableRecording> {
+    pub fn given(map: &Array<f64>, recording: &Recording) -> Result<Self> {
         let (width, height) = (recording.width as usize, recording.height as usize);
         if (map.columns, map.rows) != (width, height) {
-            return Err(UnmeasurableRecording::OtherMap {
-                map: (map.columns, map.rows),
-                frames: (width, height),
-            });
+            return Exit::Content.fail(format!(
+                "the expected phase has {}x{} pixels, the recording {width}x{height}: name the expected phase that was made with this camera",
+                map.columns, map.rows
+            ));
         }
         let turns = map.elements.iter();
         Ok(Self {
@@ -109,10 +105,10 @@ impl Known {
     ///
     /// # Errors
     /// If the frames are of another size, or no pattern is the recipe's; both are named.
-    pub fn of(recipe: &Recipe, recording: &Recording) -> Result<Self, UnmeasurableRecording> {
+    pub fn of(recipe: &Recipe, recording: &Recording) -> Result<Self> {
         let pattern = recipe
             .pattern_in(recording)
-            .map_err(UnmeasurableRecording::Recipe)?;
+            .map_err(Exit::Content.failure())?;
         let golden = recipe.arrays.golden_phase.iter();
         let golden = golden.map(|&turns| AbsolutePhase::from_turns(turns));
         Ok(Self {

@@ -10,11 +10,10 @@ pub use report::{GROSS_MM, Manner, MeasurementReport, Score, Truth};
 use crate::error::{Exit, Failure, Result};
 use crate::head::channel::{Channel, Expected, NoHeights, Unwrapping};
 use crate::head::direction::Sensitivity;
-use crate::head::scan::{PhasesError, Scan};
-use crate::head::seam::{self, AbsurdModel};
+use crate::head::scan::Scan;
+use crate::head::seam;
 use crate::output::cloud::Surface;
 use crate::recipe::Recipe;
-use crate::recipe::Refusal;
 use algo::adaptive::ProjectorMap;
 use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, Reference, RigError, Triangulator};
@@ -30,55 +29,8 @@ use std::fmt::Display;
 use std::path::Path;
 use std::time::Instant;
 
-/// Why a recording cannot be measured.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub(crate) enum UnmeasurableRecording {
-    /// A pattern has no phases.
-    #[error(transparent)]
-    Phases(#[from] PhasesError),
-    /// A model is absurd.
-    #[error(transparent)]
-    Model(#[from] AbsurdModel),
-    /// Camera and projector do not look down at the plane.
-    #[error(transparent)]
-    Rig(#[from] RigError),
-    /// The recipe is of another pattern, or of frames of another size.
-    #[error("{0}")]
-    Recipe(Refusal),
-    /// There is nothing to be decoded.
-    #[error("it has neither fringes nor a Gray code: record one of both")]
-    NothingShown,
-    /// There is no pattern.
-    #[error("the recording has no pattern")]
-    NoPattern,
-    /// A code is absolute by itself.
-    #[error(
-        "it has a Gray code without fringes, which needs no expected phase: measure without one"
-    )]
-    NoMapNeeded,
-    /// The preliminary recording has frames of another size.
-    #[error(
-        "the preliminary recording has frames of {}x{}, this one of {}x{}: both must come from one camera",
-        preliminary.0, preliminary.1, frames.0, frames.1
-    )]
-    OtherCamera {
-        /// Columns and rows of the preliminary recording.
-        preliminary: (usize, usize),
-        /// Columns and rows of this one.
-        frames: (usize, usize),
-    },
-    /// The expected phase is of frames of another size.
-    #[error(
-        "the expected phase has {}x{} pixels, the recording {}x{}: name the expected phase that was made with this camera",
-        map.0, map.1, frames.0, frames.1
-    )]
-    OtherMap {
-        /// Columns and rows of the map.
-        map: (usize, usize),
-        /// Columns and rows of the recording.
-        frames: (usize, usize),
-    },
-}
+/// What is wrong with a recording without patterns.
+const NO_PATTERN: &str = "the recording has no pattern";
 
 /// A measured recording.
 #[derive(Debug)]
@@ -178,7 +130,7 @@ fn measure_about(
     let measured = match (recording.frames.is_empty(), &known) {
         (false, _) => of_fringes(recording, recipe, known.as_ref()),
         (true, None) => coded::measure(recording),
-        (true, Some(_)) => Err(UnmeasurableRecording::NoMapNeeded),
+        (true, Some(_)) => Exit::Content.fail("it has a Gray code without fringes, which needs no expected phase: measure without one"),
     };
     measured.map_err(wrong(folder))
 }
@@ -206,12 +158,9 @@ struct Pattern<'a> {
 }
 
 impl<'a> Pattern<'a> {
-    fn new(
-        channel: Channel<'a>,
-        devices: &RecordedRig,
-        known: Option<&Known>,
-    ) -> Result<Self, UnmeasurableRecording> {
-        let geometry = devices.triangulator(&channel.function)?;
+    fn new(channel: Channel<'a>, devices: &RecordedRig, known: Option<&Known>) -> Result<Self> {
+        let geometry = devices.triangulator(&channel.function);
+        let geometry = geometry.map_err(Exit::Content.failure())?;
         let known = known.map(|known| known as &dyn Expected);
         let unwrapping = channel.unwrapping(known, &geometry)?;
         Ok(Self {
@@ -256,7 +205,7 @@ fn of_fringes(
     recording: &Recording,
     recipe: Option<&Recipe>,
     known: Option<&Known>,
-) -> Result<MeasuredRecording, UnmeasurableRecording> {
+) -> Result<MeasuredRecording> {
     let devices = RecordedRig::of(recording, recipe)?;
     let mut stages = StageTimes::default();
     let least = recipe.map(|recipe| recipe.conditions.least_modulation);
@@ -279,7 +228,7 @@ fn of_fringes(
         None => primary_of(recording, &sensitivities),
     };
     if patterns.len() <= primary {
-        return Err(UnmeasurableRecording::NoPattern);
+        return Exit::Content.fail(NO_PATTERN);
     }
     let pattern = patterns.swap_remove(primary);
     let map = &mut phases[primary];
@@ -375,7 +324,7 @@ impl RecordedRig {
     ///
     /// # Errors
     /// A model is absurd.
-    pub fn of(recording: &Recording, recipe: Option<&Recipe>) -> Result<Self, AbsurdModel> {
+    pub fn of(recording: &Recording, recipe: Option<&Recipe>) -> Result<Self> {
         let projector = &recording.projector;
         let frames = (recording.width, recording.height);
         let raster = (projector.width, projector.height);

@@ -2,7 +2,6 @@
 
 use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::file::CalibrationFile;
-use crate::head::seam::{self, AbsurdModel};
 use hal::replay::Recording;
 use std::io::ErrorKind;
 use std::path::Path;
@@ -46,18 +45,10 @@ pub fn replace(recording: &mut Recording, path: &Path) -> Result<Option<f64>> {
             return Err(Failure::because(Exit::Content, &place, words));
         }
     }
-    let lowest = [
-        ("camera", &camera.model, frames[0]),
-        ("projector", &projector.model, rasters[0]),
-    ]
-    .into_iter()
-    .map(|(device, model, size)| Ok(seam::pinhole(device, model, size)?.centre().z))
-    .collect::<Result<Vec<f64>, AbsurdModel>>()
-    .map_err(Exit::Content.because(&place))?
-    .into_iter()
-    .fold(f64::INFINITY, f64::min);
     let calibration = file.calibration();
     let calibration = calibration.map_err(Exit::Content.because(&place))?;
+    let [camera, projector] = [&calibration.camera, &calibration.projector];
+    let lowest = camera.centre().z.min(projector.centre().z);
     recording.range_mm = Some([-REACH * lowest, REACH * lowest]);
     recording.camera_model = Some(file.camera.model);
     recording.projector.model = Some(file.projector.model);

@@ -4,6 +4,7 @@
 //! 8.3.2.3); `re` and `f` fill a rectangle (8.5.2, 8.5.3), `Tj` shows a text (9.4.3) in one of the
 //! 14 standard fonts, which need not be embedded (9.6.2.2).
 
+use crate::error::{Exit, Result};
 use algo::calibration::Board;
 use std::fmt::Write as _;
 
@@ -31,24 +32,11 @@ pub struct Sheet {
     pub pdf: Vec<u8>,
 }
 
-/// A board whose squares and margin are larger than every paper.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "the squares cover {width} × {height} mm, with a margin of {} mm more than A0: take smaller or fewer squares",
-    MARGIN
-)]
-pub struct NoPaper {
-    /// Width of all squares, mm.
-    pub width: f64,
-    /// Height of all squares, mm.
-    pub height: f64,
-}
-
 /// Draws a board on the smallest paper that holds it, upright or lying.
 ///
 /// # Errors
 /// No paper holds it.
-pub fn sheet(board: &Board) -> Result<Sheet, NoPaper> {
+pub fn sheet(board: &Board) -> Result<Sheet> {
     let side = |corners: usize| (corners + 1) as f64 * board.square;
     let (width, height) = (side(board.columns), side(board.rows));
     let fits =
@@ -57,7 +45,11 @@ pub fn sheet(board: &Board) -> Result<Sheet, NoPaper> {
         let sizes = [(short, long), (long, short)];
         Some((paper, sizes.into_iter().find(|&size| fits(size))?))
     });
-    let (paper, (wide, high)) = sized.ok_or(NoPaper { width, height })?;
+    let Some((paper, (wide, high))) = sized else {
+        return Exit::Usage.fail(format!(
+            "the squares cover {width} × {height} mm, with a margin of {MARGIN} mm more than A0: take smaller or fewer squares"
+        ));
+    };
     let (left, bottom) = ((wide - width) / 2.0, (high - height) / 2.0);
     let mut drawing = String::from("0 g\n");
     for row in 0..=board.rows {

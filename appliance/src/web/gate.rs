@@ -39,32 +39,6 @@ pub struct ChangeName(pub &'static str);
 #[derive(Clone, Debug)]
 pub struct Changed(pub String);
 
-/// How a change ended, for the record.
-enum ChangeOutcome {
-    /// It was done; what was changed, in words, where that is known.
-    Done(Option<String>),
-    /// Why it was refused, in words.
-    Refused(String),
-}
-
-impl ChangeOutcome {
-    /// The words for the record: `"done"`, or why it was refused.
-    fn words(&self) -> &str {
-        match self {
-            Self::Done(_) => "done",
-            Self::Refused(words) => words,
-        }
-    }
-
-    /// What was changed.
-    fn changed(&self) -> Option<&str> {
-        match self {
-            Self::Done(changed) => changed.as_deref(),
-            Self::Refused(_) => None,
-        }
-    }
-}
-
 /// The body of a sign-in.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -194,23 +168,21 @@ pub async fn signed_in_only(
         Ok(()) => next.run(request).await,
         Err(problem) => problem.into_response(),
     };
-    let refused = response.extensions().get::<ProblemWords>();
-    let changed = response.extensions().get::<Changed>();
-    let outcome = match refused {
-        Some(ProblemWords(words)) => ChangeOutcome::Refused(words.clone()),
-        None => ChangeOutcome::Done(changed.map(|Changed(words)| words.clone())),
-    };
-    record(&site, from, action, subject, outcome).await;
+    let refused = response.extensions().get::<ProblemWords>().cloned();
+    let changed = response.extensions().get::<Changed>().cloned();
+    record(&site, from, action, subject, refused, changed).await;
     response
 }
 
-/// Adds a line to the record of changes; if that fails, the log says so.
+/// Adds a line to the record of changes: why the change was `refused`, else that it was done and what
+/// was `changed`, where that is known. If that fails, the log says so.
 async fn record(
     site: &Site,
     from: IpAddr,
     action: &'static str,
     subject: String,
-    outcome: ChangeOutcome,
+    refused: Option<ProblemWords>,
+    changed: Option<Changed>,
 ) {
     let written = site
         .change(move |site| {
@@ -222,8 +194,8 @@ async fn record(
                 from,
                 action,
                 subject: &subject,
-                outcome: outcome.words(),
-                changed: outcome.changed(),
+                outcome: refused.as_ref().map_or("done", |ProblemWords(words)| words),
+                changed: changed.as_ref().map(|Changed(words)| words.as_str()),
             };
             let stored = site.access.changes().add(&change);
             stored.map_err(Problem::broken)
@@ -254,11 +226,9 @@ pub(super) async fn begin_session(
     let token = guess.await?;
     // A guess that has to wait is not recorded, so that guessing cannot fill the record.
     if !matches!(token, Err(Refused::Wait(_))) {
-        let outcome = match &token {
-            Ok(_) => ChangeOutcome::Done(None),
-            Err(refused) => ChangeOutcome::Refused(refused.to_string()),
-        };
-        record(&site, from, "sign in", "session".into(), outcome).await;
+        let refused = token.as_ref().err();
+        let refused = refused.map(|refused| ProblemWords(refused.to_string()));
+        record(&site, from, "sign in", "session".into(), refused, None).await;
     }
     match token {
         Ok(token) => {

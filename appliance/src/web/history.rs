@@ -31,6 +31,15 @@ const MAX_PAGE: usize = 1000;
 /// Values of a trend.
 const TREND: usize = 100;
 
+impl From<Failure> for Problem {
+    fn from(failure: Failure) -> Self {
+        match failure.exit {
+            Exit::Missing => Self::missing(failure),
+            _ => Self::broken(failure),
+        }
+    }
+}
+
 impl From<HistoryError> for Problem {
     fn from(error: HistoryError) -> Self {
         Self::broken(error)
@@ -209,19 +218,12 @@ fn judged<T: Send>(
         .build()
         .map_err(|error| Problem::broken(format!("start a thread: {error}: free memory")))?;
     pool.install(|| {
-        let kept = Kept::open(&folder).map_err(broken)?;
-        let (recipe, _) = kept.recipe(&site.recipes).map_err(broken)?;
+        let kept = Kept::open(&folder)?;
+        let (recipe, _) = kept.recipe(&site.recipes)?;
         let plan = kept.plan(recipe, false);
         let plan = plan.map_err(Problem::broken)?;
         let sequence = plan.sequence_of(&kept.shots());
         let sequence = sequence.ok_or_else(|| Problem::broken(OTHER_FRAMES))?;
         Ok(work(&entry, &plan, sequence, &kept))
     })
-}
-
-pub(super) fn broken(failure: Failure) -> Problem {
-    match failure.exit {
-        Exit::Missing => Problem::missing(failure.to_string()),
-        _ => Problem::broken(failure.to_string()),
-    }
 }

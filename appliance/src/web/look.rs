@@ -197,7 +197,10 @@ pub(super) fn map_of(layers: &Layers, at: usize, seq: u32, level: Level) -> Answ
     ];
     map.description["words"] = words[at].clone().into();
     if LAYERS[at] == "deviation" {
-        map.description["shown"] = described(&layers.shown);
+        let shown = &layers.shown;
+        map.description["shown"] = json!({
+            "side": shown.side, "motion_taken_back": shown.placed, "gauge": shown.gauge,
+        });
     }
     Ok(map)
 }
@@ -222,22 +225,6 @@ fn words(shown: &ShownDeviation) -> String {
         None => "no gauge of this recipe measures it".into(),
     };
     format!("deviation from golden {DIRECTION}, {motion}, {mean}; {colours}")
-}
-
-/// What a map of deviations shows, for programs.
-fn described(shown: &ShownDeviation) -> Value {
-    let ShownDeviation {
-        side,
-        placed,
-        ref gauge,
-        ..
-    } = *shown;
-    let gauge = gauge.as_ref().map(|gauge| {
-        json!({
-            "name": &*gauge.name, "value": gauge.value, "square": gauge.square, "low": gauge.low, "high": gauge.high,
-        })
-    });
-    json!({ "side": side, "motion_taken_back": placed, "gauge": gauge })
 }
 
 pub(super) async fn registers(site: Site) -> Json<Value> {

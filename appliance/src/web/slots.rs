@@ -142,83 +142,55 @@ impl Drop for Slot {
     }
 }
 
-/// The tries that are being answered, by session.
+/// The newest try of each session, by the hash of its token.
 #[derive(Clone, Default)]
-pub(super) struct Tries(Arc<Mutex<RunningTries>>);
-
-#[derive(Default)]
-struct RunningTries {
-    number: u64,
-    running: HashMap<u64, (u64, watch::Sender<()>)>,
-}
+pub(super) struct Tries(Arc<Mutex<HashMap<u64, Watched>>>);
 
 /// A try that is being answered; dropped, it is over.
-pub(super) struct Turn {
-    tries: Tries,
-    session: u64,
-    number: u64,
-    watched: Watched,
-}
+pub(super) struct Turn(Watched);
 
-/// The view of a try that the thread working on it has.
+/// The view of a try that the thread working on it has: whether it is over.
 #[derive(Clone)]
-pub(super) struct Watched {
-    /// Closed when the try is over.
-    open: watch::Receiver<()>,
-}
+pub(super) struct Watched(Arc<watch::Sender<bool>>);
 
 impl Watched {
     /// Whether the answer is no longer waited for.
     pub(super) fn is_over(&self) -> bool {
-        self.open.has_changed().is_err()
+        *self.0.borrow()
     }
 }
 
 impl Turn {
     /// The view for the thread that works on it.
     pub(super) fn watched(&self) -> Watched {
-        self.watched.clone()
+        self.0.clone()
     }
 
     /// Waits until it is over.
-    pub(super) async fn over(&mut self) {
-        // Nothing is ever sent: it ends when the sender is gone.
-        let _ = self.watched.open.changed().await;
+    pub(super) async fn over(&self) {
+        // The sender is not dropped meanwhile.
+        let _ = self.0.0.subscribe().wait_for(|over| *over).await;
     }
 }
 
 impl Tries {
-    fn inside(&self) -> MutexGuard<'_, RunningTries> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Begins a try of a session, which has this token; the one before is over.
     pub(super) fn begin(&self, token: &str) -> Turn {
         let mut hash = DefaultHasher::new();
         token.hash(&mut hash);
-        let session = hash.finish();
-        let (sender, open) = watch::channel(());
-        let mut inside = self.inside();
-        inside.number += 1;
-        let number = inside.number;
-        inside.running.insert(session, (number, sender));
-        drop(inside);
-        Turn {
-            tries: self.clone(),
-            session,
-            number,
-            watched: Watched { open },
+        let begun = Watched(Arc::new(watch::Sender::new(false)));
+        let mut newest = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        newest.retain(|_, watched| !watched.is_over());
+        if let Some(before) = newest.insert(hash.finish(), begun.clone()) {
+            before.0.send_replace(true);
         }
+        Turn(begun)
     }
 }
 
 impl Drop for Turn {
     fn drop(&mut self) {
-        let mut inside = self.tries.inside();
-        let own = inside.running.get(&self.session);
-        if own.is_some_and(|(number, _)| *number == self.number) {
-            inside.running.remove(&self.session);
-        }
+        self.0.0.send_replace(true);
     }
 }
 
@@ -293,7 +265,7 @@ mod tests {
     #[test]
     fn of_one_session_the_newest_try_is_open_and_other_sessions_do_not_matter() {
         let tries = Tries::default();
-        let is_over = |turn: &Turn| turn.watched.is_over();
+        let is_over = |turn: &Turn| turn.watched().is_over();
         let (first, other) = (tries.begin("a"), tries.begin("b"));
         assert!(!is_over(&first) && !is_over(&other));
         let second = tries.begin("a");
@@ -302,6 +274,7 @@ mod tests {
         drop(first);
         assert!(!is_over(&second));
         drop((second, other));
-        assert!(tries.inside().running.is_empty());
+        let _last = tries.begin("c");
+        assert_eq!(tries.0.lock().unwrap().len(), 1);
     }
 }

@@ -22,16 +22,16 @@ use tokio::sync::Mutex;
 use tokio::time::{Instant, sleep};
 
 use super::gate::{signed_in, token};
-use super::history::{broken, kept_frames};
+use super::history::kept_frames;
 use super::problem::{Answered, Problem};
 use super::request;
 use super::request::Path;
 use super::site::{LastOpened, Site, alone};
 use crate::history::kept::Kept;
+use crate::recipe::ChangeError;
 use crate::recipe::edit::Edit;
 use crate::recipe::edit::trying::{EditedRecipe, Over, Tried};
-use crate::recipe::plan::{Plan, PlanError};
-use crate::recipe::{ChangeError, Recipe};
+use crate::recipe::plan::Plan;
 use crate::station::result::flag::SIMULATED;
 use crate::system::computing;
 
@@ -110,7 +110,7 @@ pub(super) async fn attempt(
         let words = format!("try an edit on {} parts: at most {MAX_PARTS}", seqs.len());
         return Err(Problem::unfit(words));
     }
-    let mut turn = site.tries.begin(token(&headers).unwrap_or_default());
+    let turn = site.tries.begin(token(&headers).unwrap_or_default());
     let watched = turn.watched();
     let worked = async {
         // Waiting here takes no thread from other requests.
@@ -190,38 +190,8 @@ struct TriedPart {
     before: Value,
 }
 
-/// Why a tried list measures nothing of a part.
-#[derive(Debug, thiserror::Error)]
-enum UntriedPart {
-    /// Nothing was measured, or its frames are gone.
-    #[error("the frames are gone, or nothing was measured yet: trigger a measurement")]
-    NoFrames,
-    /// The part was measured by this recipe.
-    #[error("it was measured by recipe {0}")]
-    OtherRecipe(u16),
-    /// The frames are of no sequence of the recipe.
-    #[error("the recipe has no sequence with its frames")]
-    OtherFrames,
-    /// The recipe cannot be made.
-    #[error("{0}")]
-    Unsealed(String),
-    /// The recipe cannot be planned for the part's head.
-    #[error(transparent)]
-    Unplanned(#[from] PlanError),
-    /// What was kept of the part cannot be read.
-    #[error("{}", .0.words)]
-    Unread(Problem),
-}
-
-impl From<Problem> for UntriedPart {
-    fn from(problem: Problem) -> Self {
-        Self::Unread(problem)
-    }
-}
-
-fn recipe_of(open: &EditedRecipe, tried: &Tried) -> Result<Recipe, UntriedPart> {
-    let recipe = open.recipe(tried);
-    recipe.map_err(|error| UntriedPart::Unsealed(error.to_string()))
+fn other_frames() -> Problem {
+    Problem::unfit("the recipe has no sequence with its frames")
 }
 
 /// What a tried list measures of parts.
@@ -231,14 +201,14 @@ fn parts(
     on: &On,
     is_over: &dyn Fn() -> bool,
 ) -> Answered<Vec<Value>> {
-    let part = |seq: Option<u32>, measured: Result<TriedPart, UntriedPart>| {
+    let part = |seq: Option<u32>, measured: Answered<TriedPart>| {
         let mut part = match measured {
             Ok(TriedPart { mut part, before }) => {
                 part["before"] = before;
                 part["error"] = Value::Null;
                 part
             }
-            Err(error) => json!({ "error": error.to_string() }),
+            Err(problem) => json!({ "error": problem.words }),
         };
         part["seq"] = seq.into();
         part
@@ -260,27 +230,23 @@ fn parts(
 }
 
 /// What it measures of the last part, and the verdict that this had.
-fn last(
-    site: &Site,
-    (open, tried): (&EditedRecipe, &Tried),
-) -> (Option<u32>, Result<TriedPart, UntriedPart>) {
+fn last(site: &Site, (open, tried): (&EditedRecipe, &Tried)) -> (Option<u32>, Answered<TriedPart>) {
     let Some(part) = site.last_cycle.ask(|part| part.clone()) else {
-        return (None, Err(UntriedPart::NoFrames));
+        let words = "the frames are gone, or nothing was measured yet: trigger a measurement";
+        return (None, Err(Problem::missing(words)));
     };
     let measured = || {
         let number = part.record.recipe;
         if number != open.id().0 {
-            return Err(UntriedPart::OtherRecipe(number));
+            let words = format!("it was measured by recipe {number}");
+            return Err(Problem::unfit(words));
         }
-        let recipe = recipe_of(open, tried)?;
+        let recipe = open.recipe(tried).map_err(Problem::unfit)?;
         let shots: Vec<_> = part.plan.shots(part.sequence).map(Some).collect();
-        let plan = Plan::new(
-            recipe,
-            &part.calibration,
-            part.record.flags() & SIMULATED != 0,
-        )?;
+        let simulated = part.record.flags() & SIMULATED != 0;
+        let plan = Plan::new(recipe, &part.calibration, simulated).map_err(Problem::unfit)?;
         let sequence = plan.sequence_among(&shots);
-        let (sequence, places) = sequence.ok_or(UntriedPart::OtherFrames)?;
+        let (sequence, places) = sequence.ok_or_else(other_frames)?;
         let frames: Vec<_> = places.iter().map(|&k| part.frames[k].clone()).collect();
         Ok(TriedPart {
             part: tried.part(&plan, sequence, &frames),
@@ -291,17 +257,14 @@ fn last(
 }
 
 /// What it measures of a kept part, and the verdict that this had.
-fn kept(
-    site: &Site,
-    (open, tried): (&EditedRecipe, &Tried),
-    seq: u32,
-) -> Result<TriedPart, UntriedPart> {
+fn kept(site: &Site, (open, tried): (&EditedRecipe, &Tried), seq: u32) -> Answered<TriedPart> {
     let (entry, folder) = kept_frames(site, seq)?;
-    let recipe = recipe_of(open, tried)?;
-    let kept = Kept::judged_by(&folder, &recipe).map_err(broken)?;
-    let plan = kept.plan(recipe, entry.flags & SIMULATED != 0)?;
+    let recipe = open.recipe(tried).map_err(Problem::unfit)?;
+    let kept = Kept::judged_by(&folder, &recipe)?;
+    let plan = kept.plan(recipe, entry.flags & SIMULATED != 0);
+    let plan = plan.map_err(Problem::unfit)?;
     let sequence = kept.sequence(&plan);
-    let (sequence, frames) = sequence.ok_or(UntriedPart::OtherFrames)?;
+    let (sequence, frames) = sequence.ok_or_else(other_frames)?;
     Ok(TriedPart {
         part: tried.part(&plan, sequence, &frames),
         before: entry.verdict.word().into(),

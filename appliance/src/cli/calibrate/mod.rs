@@ -8,7 +8,7 @@ pub use poses::Print;
 use super::numbers::number;
 use super::options::Measuring;
 use crate::config::HeadConfig;
-use crate::error::{Exit, Failure, Result};
+use crate::error::{Exit, Result};
 use crate::head::calibration::file::{COLDEST_C, CalibrationFile, HOTTEST_C};
 use crate::head::calibration::opencv::{self, Declared, Sizes, Unit};
 use crate::head::calibration::place::CalibrationPlace;
@@ -24,7 +24,7 @@ use hal::bounds::MAX_RANGE_MM;
 use poses::BoardOptions;
 use serde_json::{Value, json};
 use sim::{Part, Stage};
-use std::fmt::{Display, Write as _};
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 /// What to do if the calibration cannot be written.
@@ -214,11 +214,9 @@ impl Calibrate {
             from,
             geometry: None,
         };
-        let failed = |error: &dyn Display| {
-            Failure::new(Exit::Content, format!("import {}: {error}", models.from))
-        };
         let calibration = models.calibration(head);
-        look_down(&calibration.map_err(|error| failed(&error))?, &failed)?;
+        let checked = calibration.and_then(|calibration| look_down(&calibration));
+        checked.map_err(Exit::Content.because(format!("import {}", models.from)))?;
         Ok(Some(models))
     }
 }
@@ -249,17 +247,17 @@ pub fn model_files<'a>(named: impl IntoIterator<Item = &'a PathBuf>) -> Result<(
 /// Checks that camera and projector look down at the plane z = 0 from two different places.
 ///
 /// # Errors
-/// With this beginning: they do not.
-fn look_down(calibration: &Calibration, failed: &dyn Fn(&dyn Display) -> Failure) -> Result<()> {
+/// They do not.
+fn look_down(calibration: &Calibration) -> Result<()> {
     let (columns, rows) = calibration.raster();
     let function = PhaseFunction::vertical(columns as usize, rows as usize, 1.0);
-    let function = function.map_err(|error| failed(&error))?;
+    let function = function.map_err(Exit::Content.failure())?;
     match calibration.triangulator(function, None) {
         Ok(_) => Ok(()),
-        Err(error @ RigError::NotAbove(_)) => Err(failed(&format_args!(
+        Err(error @ RigError::NotAbove(_)) => Exit::Content.fail(format!(
             "{error}; OpenCV's boards have their z pointing away from the camera: then add --z-away"
-        ))),
-        Err(error) => Err(failed(&error)),
+        )),
+        Err(error) => Exit::Content.fail(error),
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::CalibrationSigma;
 use super::geometry::{GeometryFile, ReferenceFile};
-use super::{Calibration, HeightsBy, UnusableCalibration, inverted, size};
+use super::{Calibration, HeightsBy, inverted, size};
+use crate::error::{Exit, Failure, Result};
 use crate::head::exposing::Exposing;
 use crate::head::seam;
 use crate::storage::hex;
@@ -258,32 +259,41 @@ impl CalibrationFile {
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn read(bytes: &[u8]) -> Result<Self, UnusableCalibration> {
+    pub fn read(bytes: &[u8]) -> Result<Self> {
         #[derive(Deserialize)]
         struct FormatVersion {
             format: String,
             version: u32,
         }
-        let damaged =
-            |error: serde_json::Error| UnusableCalibration::Damaged(shortened(&error.to_string()));
+        let wrong = |what: String| Failure::new(Exit::Content, format!("{what}: calibrate anew"));
+        let damaged = |error: serde_json::Error| {
+            wrong(format!("it is damaged: {}", shortened(&error.to_string())))
+        };
         let named: FormatVersion = serde_json::from_slice(bytes).map_err(damaged)?;
         if named.format != FORMAT {
             let found = clipped(&named.format).to_string();
-            return Err(UnusableCalibration::Format { found });
+            return Exit::Content.fail(format!("its format is {found:?}, expected {FORMAT:?}"));
         }
         if named.version != VERSION {
-            let found = named.version;
-            return Err(UnusableCalibration::Version { found });
+            return Err(wrong(format!(
+                "it has version {}, this program reads {VERSION}",
+                named.version
+            )));
         }
         let file: Self = serde_json::from_slice(bytes).map_err(damaged)?;
         if file.checksum != file.checksummed() {
-            return Err(UnusableCalibration::Checksum);
+            return Exit::Content.fail(
+                "it does not agree with its checksum: it is damaged, or was edited; calibrate anew",
+            );
         }
         if file.heights_by == HeightsBy::Measured && file.reference.is_none() {
-            return Err(UnusableCalibration::NoReference);
+            return Exit::Content.fail(
+                "heights_by is \"measured\", and reference is missing: calibrate anew with a plate",
+            );
         }
         if file.calibration()?.fingerprint() != file.fingerprint {
-            return Err(UnusableCalibration::Fingerprint);
+            return Exit::Content
+                .fail("its fingerprint is not that of its content: calibrate anew");
         }
         Ok(file)
     }
@@ -323,8 +333,9 @@ impl CalibrationFile {
     ///
     /// # Errors
     /// If a value is out of its bounds, a model is absurd, or the response cannot be inverted.
-    pub fn calibration(&self) -> Result<Calibration, UnusableCalibration> {
-        self.check_bounds().map_err(UnusableCalibration::Bounds)?;
+    pub fn calibration(&self) -> Result<Calibration> {
+        self.check_bounds()
+            .map_err(|error| Failure::new(Exit::Content, format!("{error}: calibrate anew")))?;
         let (camera, projector) = (&self.camera, &self.projector);
         let nominal = SampleNoise::constant(NOMINAL_NOISE);
         Ok(Calibration {
@@ -374,13 +385,12 @@ impl CalibrationFile {
     ///
     /// # Errors
     /// If a number in it is not finite or the response cannot be inverted.
-    pub fn sealed(mut self) -> Result<(Self, Vec<u8>), UnusableCalibration> {
+    pub fn sealed(mut self) -> Result<(Self, Vec<u8>)> {
         // The bounds ask for a fingerprint's form before there is one.
         self.fingerprint = NO_CHECKSUM.into();
         self.fingerprint = self.calibration()?.fingerprint();
         self.checksum = self.checksummed();
-        let mut bytes = serde_json::to_vec_pretty(&self)
-            .map_err(|error| UnusableCalibration::Unwritable(error.to_string()))?;
+        let mut bytes = serde_json::to_vec_pretty(&self).map_err(Exit::Content.failure())?;
         bytes.push(b'\n');
         // A file that could not be read again is never written.
         let again = Self::read(&bytes)?;

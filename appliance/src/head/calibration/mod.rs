@@ -6,12 +6,13 @@ pub mod geometry;
 pub mod opencv;
 pub mod place;
 
+use crate::error::{Exit, Result};
 use crate::head::exposing::Exposing;
-use crate::head::seam::{self, AbsurdModel};
+use crate::head::seam;
 use crate::storage::hex;
 use algo::frame::SampleNoise;
 use algo::geometry::{HeightRange, Pinhole, RigError, Triangulator};
-use algo::pattern::{GreyResponse, PhaseFunction, ResponseError, Waveform, Waveforms};
+use algo::pattern::{GreyResponse, PhaseFunction, Waveform, Waveforms};
 use algo::phase::LeastModulation;
 use file::ContrastFile;
 use hal::bounded;
@@ -24,84 +25,6 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use sim::Scenario;
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Why a calibration cannot be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum UnusableCalibration {
-    /// The file cannot be read.
-    #[error("{0}: make it readable, or calibrate anew")]
-    Unreadable(String),
-    /// It is no JSON of this form.
-    #[error("it is damaged: {0}: calibrate anew")]
-    Damaged(String),
-    /// It is another kind of file.
-    #[error("its format is {found:?}, expected {:?}", file::FORMAT)]
-    Format {
-        /// The format that it names.
-        found: String,
-    },
-    /// It is of another version.
-    #[error(
-        "it has version {found}, this program reads {}: calibrate anew",
-        file::VERSION
-    )]
-    Version {
-        /// Its version.
-        found: u32,
-    },
-    /// It was changed.
-    #[error("it does not agree with its checksum: it is damaged, or was edited; calibrate anew")]
-    Checksum,
-    /// Heights go by a plane that was not measured.
-    #[error("heights_by is \"measured\", and reference is missing: calibrate anew with a plate")]
-    NoReference,
-    /// It was made by a program with another fingerprint.
-    #[error("its fingerprint is not that of its content: calibrate anew")]
-    Fingerprint,
-    /// A value is out of its bounds.
-    #[error("{0}: calibrate anew")]
-    Bounds(String),
-    /// A model is absurd.
-    #[error(transparent)]
-    Model(#[from] AbsurdModel),
-    /// The response cannot be inverted.
-    #[error(transparent)]
-    Response(#[from] UnusableResponse),
-    /// A number is not finite.
-    #[error("{0}")]
-    Unwritable(String),
-}
-
-impl From<UnusableCalibration> for String {
-    fn from(error: UnusableCalibration) -> Self {
-        error.to_string()
-    }
-}
-
-/// Why a grey response cannot be inverted.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum UnusableResponse {
-    /// It has not one light for each grey level.
-    #[error("response has {0} levels, expected 256")]
-    Levels(usize),
-    /// It falls, or does not rise.
-    #[error(transparent)]
-    Falls(#[from] ResponseError),
-}
-
-/// What a recording lacks for a calibration, as a predicate.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RecordedModelError {
-    /// The camera's model.
-    #[error("has no camera model")]
-    NoCamera,
-    /// The projector's model.
-    #[error("has no projector model")]
-    NoProjector,
-    /// A model that can be used.
-    #[error("has an absurd model: {0}")]
-    Absurd(#[from] AbsurdModel),
-}
 
 /// What heights go by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -166,7 +89,7 @@ impl Calibration {
         raster: (u32, u32),
         (camera, projector): (&DeviceModel, &DeviceModel),
         noise_counts: f64,
-    ) -> Result<Self, AbsurdModel> {
+    ) -> Result<Self> {
         Ok(Self {
             camera: seam::pinhole("camera", camera, (width, height))?,
             bit_depth,
@@ -187,7 +110,7 @@ impl Calibration {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn of_scenario(scenario: &Scenario) -> Result<Self, AbsurdModel> {
+    pub fn of_scenario(scenario: &Scenario) -> Result<Self> {
         let ((width, height), projector) = (scenario.frame_size(), &scenario.rig.projector);
         let head = Self::new(
             (width, height, scenario.bit_depth),
@@ -232,21 +155,19 @@ impl Calibration {
     ///
     /// # Errors
     /// What is wrong with the recording, as a predicate: "has no camera model".
-    pub fn of(recording: &Recording, noise_counts: f64) -> Result<Self, RecordedModelError> {
+    pub fn of(recording: &Recording, noise_counts: f64) -> Result<Self> {
         let projector = &recording.projector;
-        let camera = recording.camera_model.as_ref();
-        let models = (
-            camera.ok_or(RecordedModelError::NoCamera)?,
-            projector
-                .model
-                .as_ref()
-                .ok_or(RecordedModelError::NoProjector)?,
-        );
+        let Some(camera) = &recording.camera_model else {
+            return Exit::Content.fail("has no camera model");
+        };
+        let Some(model) = &projector.model else {
+            return Exit::Content.fail("has no projector model");
+        };
         let frames = (recording.width, recording.height);
         let by_models = Self::new(
             (frames.0, frames.1, recording.bit_depth),
             (projector.width, projector.height),
-            models,
+            (camera, model),
             noise_counts,
         );
         Ok(Self {
@@ -255,7 +176,7 @@ impl Calibration {
                 Some(_) => HeightsBy::Measured,
                 None => HeightsBy::Models,
             },
-            ..by_models?
+            ..by_models.map_err(Exit::Content.because("has an absurd model"))?
         })
     }
 
@@ -402,11 +323,12 @@ impl Current {
 ///
 /// # Errors
 /// If it has not 256 levels, or falls.
-pub fn inverted(response: &[f64]) -> Result<Option<GreyResponse>, UnusableResponse> {
-    let levels: &[f64; 256] = response
-        .try_into()
-        .map_err(|_| UnusableResponse::Levels(response.len()))?;
-    let inverse = GreyResponse::new(levels)?;
+pub fn inverted(response: &[f64]) -> Result<Option<GreyResponse>> {
+    let Ok(levels) = <&[f64; 256]>::try_from(response) else {
+        let levels = response.len();
+        return Exit::Content.fail(format!("response has {levels} levels, expected 256"));
+    };
+    let inverse = GreyResponse::new(levels).map_err(Exit::Content.failure())?;
     let linear = (0..=u8::MAX).all(|level| inverse.level_for(level) == level);
     Ok((!linear).then_some(inverse))
 }

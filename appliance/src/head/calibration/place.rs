@@ -1,7 +1,6 @@
 //! The files of a calibration: `calibration.json`, its previous generation, and the phase maps
 //! beside them.
 
-use super::UnusableCalibration;
 use super::file::CalibrationFile;
 use crate::error::{Exit, Result};
 use crate::storage::folder::{name_also, read_whole, sync_folder_of, write_whole};
@@ -31,22 +30,6 @@ pub struct Loaded {
     pub file: CalibrationFile,
     /// Why it is the previous generation, where it is.
     pub fallback: Option<String>,
-}
-
-/// A `calibration.json` without a generation that can be used.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("calibration {}: {reason}", path.display())]
-pub struct UnusablePlace {
-    /// The file.
-    pub path: PathBuf,
-    /// What is wrong with the newest generation.
-    pub reason: UnusableCalibration,
-}
-
-impl From<UnusablePlace> for String {
-    fn from(error: UnusablePlace) -> Self {
-        error.to_string()
-    }
 }
 
 /// A reference phase map with the name of its file.
@@ -92,7 +75,7 @@ impl CalibrationPlace {
     ///
     /// # Errors
     /// No generation can be used.
-    pub fn load(&self) -> Result<Option<Loaded>, UnusablePlace> {
+    pub fn load(&self) -> Result<Option<Loaded>> {
         let newest = read(&self.path);
         if let Some(Ok(file)) = newest {
             return Ok(Some(Loaded {
@@ -110,10 +93,7 @@ impl CalibrationPlace {
                     reason.map_or("it is missing".into(), |reason| reason.to_string())
                 )),
             })),
-            (_, Some(reason)) => Err(UnusablePlace {
-                path: self.path.clone(),
-                reason,
-            }),
+            (_, Some(reason)) => Exit::Content.fail(format!("calibration {place}: {reason}")),
             (_, None) => Ok(None),
         }
     }
@@ -184,10 +164,12 @@ impl CalibrationPlace {
 }
 
 /// Reads the calibration in a file, if there is one.
-fn read(path: &Path) -> Option<Result<CalibrationFile, UnusableCalibration>> {
+fn read(path: &Path) -> Option<Result<CalibrationFile>> {
     match read_whole(path, MAX_BYTES) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => None,
-        Err(error) => Some(Err(UnusableCalibration::Unreadable(error.to_string()))),
+        Err(error) => {
+            Some(Exit::Content.fail(format!("{error}: make it readable, or calibrate anew")))
+        }
         Ok(bytes) => Some(CalibrationFile::read(&bytes)),
     }
 }

@@ -11,7 +11,7 @@ use crate::head::calibration::place::{CalibrationPlace, NamedMap};
 use crate::head::calibration::{Calibration, HeightsBy};
 use crate::head::direction::Sensitivity;
 use crate::head::examine::{PLATE_PITCH, ReferencePlane, plate};
-use crate::head::seam::{self, AbsurdModel};
+use crate::head::seam;
 use algo::geometry::{FittedMap, Vector};
 use algo::pattern::PhaseFunction;
 use hal::model::{DeviceModel, PlaneModel};
@@ -45,7 +45,7 @@ impl HeadModels {
     ///
     /// # Errors
     /// One of them is absurd.
-    pub fn calibration(&self, head: &Calibration) -> Result<Calibration, AbsurdModel> {
+    pub fn calibration(&self, head: &Calibration) -> Result<Calibration> {
         let models = (&self.camera, &self.projector);
         Calibration::new(head.frames(), head.raster(), models, head.noise_counts)
     }
@@ -114,9 +114,7 @@ pub(super) fn measure(
         missing("the models of camera and projector are not known: do the step geometry first")
     })?;
     let mut calibration = models.calibration(subject.calibration).map_err(missing)?;
-    measured
-        .adopt(&mut calibration)
-        .map_err(Exit::Content.failure())?;
+    measured.adopt(&mut calibration)?;
     let head = &mut *subject.head;
     head.set_timing(measured.timing.over(head.timing()));
     let (progress, choices) = (subject.progress, &subject.choices);

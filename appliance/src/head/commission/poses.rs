@@ -9,7 +9,7 @@ use crate::head::board::{Ground, MAX_LENGTH_MM, MIN_LENGTH_MM, Scale};
 use crate::head::calibration::file::CalibrationFile;
 use crate::head::calibration::geometry::MAX_SIGMA_PPM;
 use crate::head::geometry::{Geometry, SeenPose, same_place};
-use crate::head::rasters::{ShownPictures, UnshowablePattern};
+use crate::head::rasters::ShownPictures;
 use crate::head::scan::take_loaded;
 use crate::head::{board, seam};
 use algo::calibration::{Board, BoardView, GreyPicture, estimate};
@@ -108,7 +108,7 @@ impl Commissioning {
                 "do the step timing first",
             ));
         }
-        let unfit = |error: UnshowablePattern| {
+        let unfit = |error: Failure| {
             Error::unsupported(error.to_string(), "use a projector of more pixels")
         };
         let shown = ShownPictures::pose(subject.calibration).map_err(unfit)?;
@@ -195,13 +195,12 @@ impl Commissioning {
         let Some(name) = &self.board else {
             return Exit::Content.fail("no pose was taken: take at least 3, better 10");
         };
-        let board = board::parse(name).map_err(Exit::Content.failure())?;
+        let board = board::parse(name)?;
         let length = solving.check_length_mm;
-        Scale::check_length(&board, length).map_err(Exit::Content.failure())?;
+        Scale::check_length(&board, length)?;
         let poses: Vec<SeenPose> = self.usable(None).take(MAX_POSES).collect();
-        let geometry = Geometry::of(&board, solving.board_sigma_ppm, &poses)
-            .map_err(Exit::Content.failure())?;
-        let scale = Scale::of(length, before, &geometry.file).map_err(Exit::Content.failure())?;
+        let geometry = Geometry::of(&board, solving.board_sigma_ppm, &poses)?;
+        let scale = Scale::of(length, before, &geometry.file)?;
         Ok(PoseModels {
             camera: seam::device_model(&geometry.camera),
             projector: seam::device_model(&geometry.projector),

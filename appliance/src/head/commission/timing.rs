@@ -6,7 +6,7 @@ use crate::error::{Exit, Failure, Result};
 use crate::head::calibration::file::{
     CalibrationFile, ContrastFile, LevelFile, NoiseFile, TimingFile,
 };
-use crate::head::calibration::{Calibration, UnusableResponse, inverted};
+use crate::head::calibration::{Calibration, inverted};
 use crate::head::doctor::light::{alike, exposed, lit_enough};
 use crate::head::doctor::{Check, CheckVerdict};
 use crate::head::examine::{
@@ -58,7 +58,7 @@ impl Characteristics {
     ///
     /// # Errors
     /// The response cannot be inverted.
-    pub fn adopt(&self, calibration: &mut Calibration) -> Result<(), UnusableResponse> {
+    pub fn adopt(&self, calibration: &mut Calibration) -> Result<()> {
         calibration.response = inverted(&self.response)?;
         calibration.noise_counts = self.noise.counts;
         calibration.noise = self.noise.by_signal();

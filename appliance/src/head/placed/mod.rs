@@ -1,10 +1,11 @@
 //! The part in front of a simulated head: its kind, its defects and its pose, checked.
 
+use crate::error::{Exit, Failure, Result};
 use hal::bounds::clipped;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
 use sim::parts::{Across, Board, Defect, Joint, Plate};
-use sim::{Ground, Material, Part, Placement, Scenario, Unfit};
+use sim::{Ground, Material, Part, Placement, Scenario};
 
 /// The most defects of a part: each ray is traced against all of them.
 const MAX_DEFECTS: usize = 16;
@@ -41,68 +42,6 @@ pub struct Placed {
     /// What it lies on and among, or that it lies on nothing; `None` leaves that as it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub floor: Option<Option<Ground>>,
-}
-
-/// A part that cannot be put in front of a head.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum PlacedError {
-    /// It is written wrongly.
-    #[error("part: {0}")]
-    Part(String),
-    /// There are two placements.
-    #[error("placement and pose: write one of them")]
-    PlacementAndPose,
-    /// There is no such part.
-    #[error("there is no part {kind}: name one of {known}")]
-    NoPart {
-        /// The name.
-        kind: String,
-        /// The names that there are.
-        known: String,
-    },
-    /// Only a board has poses.
-    #[error("pose {pose}: only a board has poses with numbers; write the placement of a {kind}")]
-    NoBoard {
-        /// The pose.
-        pose: u8,
-        /// The part.
-        kind: String,
-    },
-    /// A board has no such pose.
-    #[error("there is no pose {0}: write 1 to {most}", most = Board::POSES.len())]
-    NoPose(u8),
-    /// There is no such defect.
-    #[error("there is no defect {kind:?}: write one of {forms}")]
-    NoDefect {
-        /// The name.
-        kind: String,
-        /// The forms of all defects.
-        forms: String,
-    },
-    /// A defect is written wrongly.
-    #[error("{text:?} is not a defect: write {form}")]
-    DefectForm {
-        /// The defect.
-        text: String,
-        /// The form of such a defect.
-        form: String,
-    },
-    /// The part has no defects of this kind.
-    #[error("a {part} has no {defect}: {reason}")]
-    Unfit {
-        /// The part.
-        part: String,
-        /// The kind of the defect.
-        defect: String,
-        /// Why not.
-        reason: String,
-    },
-    /// There are too many defects.
-    #[error("{0} defects: at most {most} are simulated on a part", most = MAX_DEFECTS)]
-    Defects(usize),
-    /// A number is out of its range.
-    #[error("{0}")]
-    Range(#[from] Unfit),
 }
 
 /// Every part that can be put in front of a head, good and as designed.
@@ -142,20 +81,21 @@ fn given<'a, T: Deserialize<'a>, D: Deserializer<'a>>(from: D) -> Result<Option<
 }
 
 impl TryFrom<PlacedFile> for Placed {
-    type Error = PlacedError;
+    type Error = Failure;
 
-    fn try_from(file: PlacedFile) -> Result<Self, PlacedError> {
+    fn try_from(file: PlacedFile) -> Result<Self> {
         let mut placed = match file.part {
             Value::String(kind) => Self::stock(&kind)?,
             part => Self {
-                part: serde_json::from_value(part)
-                    .map_err(|error| PlacedError::Part(error.to_string()))?,
+                part: serde_json::from_value(part).map_err(Exit::Content.because("part"))?,
                 ..Self::default()
             },
         };
         (placed.material, placed.floor) = (file.material, file.floor);
         match (file.placement, file.pose) {
-            (Some(_), Some(_)) => return Err(PlacedError::PlacementAndPose),
+            (Some(_), Some(_)) => {
+                return Exit::Content.fail("placement and pose: write one of them");
+            }
             (Some(placement), None) => placed.placement = placement,
             (None, Some(pose)) => placed.pose(pose)?,
             (None, None) => (),
@@ -169,15 +109,12 @@ impl Placed {
     ///
     /// # Errors
     /// If there is no such kind, naming those that there are.
-    pub fn stock(kind: &str) -> Result<Self, PlacedError> {
-        let found = stock().find(|part| self::kind(part) == kind);
-        let part = found.ok_or_else(|| {
+    pub fn stock(kind: &str) -> Result<Self> {
+        let Some(part) = stock().find(|part| self::kind(part) == kind) else {
             let kinds: Vec<String> = stock().map(|part| self::kind(&part)).collect();
-            PlacedError::NoPart {
-                kind: kind.to_owned(),
-                known: kinds.join(", "),
-            }
-        })?;
+            let known = kinds.join(", ");
+            return Exit::Content.fail(format!("there is no part {kind}: name one of {known}"));
+        };
         Ok(Self {
             part,
             ..Self::default()
@@ -188,17 +125,19 @@ impl Placed {
     ///
     /// # Errors
     /// If the part is no board, or there is no such pose.
-    pub fn pose(&mut self, number: u8) -> Result<(), PlacedError> {
+    pub fn pose(&mut self, number: u8) -> Result<()> {
         if !matches!(self.part, Part::Board(_)) {
-            return Err(PlacedError::NoBoard {
-                pose: number,
-                kind: kind(&self.part),
-            });
+            return Exit::Content.fail(format!(
+                "pose {number}: only a board has poses with numbers; write the placement of a {}",
+                kind(&self.part)
+            ));
         }
-        let pose = number
-            .checked_sub(1)
-            .and_then(|index| Board::POSES.get(usize::from(index)));
-        self.placement = *pose.ok_or(PlacedError::NoPose(number))?;
+        let index = usize::from(number).checked_sub(1);
+        let Some(pose) = index.and_then(|index| Board::POSES.get(index)) else {
+            let most = Board::POSES.len();
+            return Exit::Content.fail(format!("there is no pose {number}: write 1 to {most}"));
+        };
+        self.placement = *pose;
         Ok(())
     }
 
@@ -228,7 +167,7 @@ impl Placed {
     ///
     /// # Errors
     /// If the text is not a defect, or the part has none of this kind.
-    pub fn add_defect(&mut self, text: &str) -> Result<(), PlacedError> {
+    pub fn add_defect(&mut self, text: &str) -> Result<()> {
         let form = |(kind, keys): &(&str, &[(&str, f64)])| {
             let names: Vec<&str> = keys.iter().map(|(name, _)| *name).collect();
             format!("{kind}:{}", names.join(","))
@@ -237,10 +176,11 @@ impl Placed {
         let known = DEFECTS.iter().find(|(name, _)| *name == kind);
         let Some(known) = known else {
             let forms: Vec<String> = DEFECTS.iter().map(form).collect();
-            return Err(PlacedError::NoDefect {
-                kind: clipped(kind),
-                forms: forms.join(" "),
-            });
+            return Exit::Content.fail(format!(
+                "there is no defect {:?}: write one of {}",
+                clipped(kind),
+                forms.join(" ")
+            ));
         };
         let numbers: Vec<f64> = numbers
             .split(',')
@@ -253,27 +193,27 @@ impl Placed {
             || numbers.len() != text.split(',').count()
             || !named.all(|((name, _), &n)| *name != "index" || is_place(n))
         {
-            return Err(PlacedError::DefectForm {
-                text: clipped(text),
-                form: form(known),
-            });
+            return Exit::Content.fail(format!(
+                "{:?} is not a defect: write {}",
+                clipped(text),
+                form(known)
+            ));
         }
         let named = known.1.iter().zip(numbers).map(|((name, _), n)| (*name, n));
-        add(&mut self.part, defect(kind, named)).map_err(|reason| PlacedError::Unfit {
-            part: self::kind(&self.part),
-            defect: kind.to_owned(),
-            reason,
-        })
+        let what = format!("a {} has no {kind}", self::kind(&self.part));
+        add(&mut self.part, defect(kind, named)).map_err(Exit::Content.because(what))
     }
 
     /// Checks every number.
     ///
     /// # Errors
     /// Naming the one that is out of its range.
-    pub fn check(&self) -> Result<(), PlacedError> {
+    pub fn check(&self) -> Result<()> {
         let defects = self.part.defects().len();
         if defects > MAX_DEFECTS {
-            return Err(PlacedError::Defects(defects));
+            return Exit::Content.fail(format!(
+                "{defects} defects: at most {MAX_DEFECTS} are simulated on a part"
+            ));
         }
         let scenario = Scenario {
             part: self.part.clone(),
@@ -281,7 +221,7 @@ impl Placed {
             floor: self.floor.clone().flatten(),
             ..Scenario::default()
         };
-        Ok(scenario.check()?)
+        scenario.check().map_err(Exit::Content.failure())
     }
 }
 
@@ -307,9 +247,9 @@ fn defect<'a>(kind: &str, numbers: impl Iterator<Item = (&'a str, f64)>) -> Valu
 }
 
 /// Adds a defect, if the part can have one of this kind.
-fn add(part: &mut Part, defect: Value) -> Result<(), String> {
-    let defect: Defect = serde_json::from_value(defect).map_err(|error| error.to_string())?;
-    part.can_have(&defect)?;
+fn add(part: &mut Part, defect: Value) -> Result<()> {
+    let defect: Defect = serde_json::from_value(defect).map_err(Exit::Content.failure())?;
+    part.can_have(&defect).map_err(Exit::Content.failure())?;
     if let Some(defects) = part.defects_mut() {
         defects.push(defect);
     }

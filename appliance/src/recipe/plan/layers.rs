@@ -14,6 +14,7 @@ use algo::inspect::{Drawing, Findings, Maps};
 use algo::pipeline;
 use algo::units::{Height, Modulation};
 use hal::frame::Frame;
+use serde::Serialize;
 use std::sync::{Arc, PoisonError};
 
 /// Maps of one part, row-major.
@@ -114,7 +115,7 @@ pub struct ShownDeviation {
 }
 
 /// The gauge that a map of deviations is of: of several, the one that uses most of its limits.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShownGauge {
     /// The gauge's name in the recipe.
     pub name: Arc<str>,

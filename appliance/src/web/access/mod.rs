@@ -67,9 +67,7 @@ impl Access {
     pub fn open(folder: &Path, given: Option<&Path>) -> Result<(Self, Option<NewSecret>)> {
         let what = format!("open {}", folder.display());
         std::fs::create_dir_all(folder).map_err(Exit::CannotCreate.because(&what))?;
-        let given = given.map_or(Ok(None), secret::given);
-        let given = given.map_err(Exit::Configuration.failure())?;
-        let (hash, shown) = match given {
+        let (hash, shown) = match given.map_or(Ok(None), secret::given)? {
             Some(hash) => (hash, None),
             None => {
                 secret::open(&folder.join("secret")).map_err(Exit::CannotCreate.because(&what))?

@@ -1,5 +1,6 @@
 //! The device's secret: configured, or made at the first start and stored as an argon2id hash.
 
+use crate::error::{Exit, Result};
 use crate::storage::folder::{read_whole, write_whole};
 use argon2::Argon2;
 use argon2::password_hash::phc::{self, PasswordHash};
@@ -20,61 +21,32 @@ const MOST: u64 = 4096;
 /// Letters and digits of the shortest secret that may be given: 60 bits where they are random.
 const SHORTEST: usize = 12;
 
-/// Why a secret cannot be used, read or made.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum SecretError {
-    /// The file of the configured secret cannot be read.
-    #[error("read the secret that was given: {0}")]
-    Given(io::Error),
-    /// The configured secret begins as a hash does.
-    #[error("the secret that was given begins with $ but is not a hash ({0}): give a new one")]
-    GivenHash(phc::Error),
-    /// The configured secret is too short or too long.
-    #[error(
-        "the secret that was given must have {SHORTEST} letters and digits at least and {LONGEST} characters at most: give a new one"
-    )]
-    GivenLength,
-    /// The stored hash cannot be read.
-    #[error("{0}")]
-    Read(io::Error),
-    /// The stored hash is not text.
-    #[error("it is not text")]
-    NoText,
-    /// The stored hash is damaged.
-    #[error("it is damaged ({0})")]
-    Damaged(phc::Error),
-    /// The system gives no random bits.
-    #[error("{0}")]
-    Random(#[from] getrandom::Error),
-    /// The secret cannot be hashed.
-    #[error("{0}")]
-    Hash(#[from] password_hash::Error),
-    /// The hash cannot be stored.
-    #[error("write secret: {0}: free space")]
-    Write(io::Error),
-}
-
 /// The hash of the secret in this file, which holds it in plain text or as an argon2id hash; none
 /// if there is no such file.
 ///
 /// # Errors
-/// It cannot be read or used.
-pub(super) fn given(file: &Path) -> Result<Option<String>, SecretError> {
+/// It cannot be read or used (78).
+pub(super) fn given(file: &Path) -> Result<Option<String>> {
+    let wrong = Exit::Configuration;
     let text = match std::fs::read_to_string(file) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        read => read.map_err(SecretError::Given)?,
+        read => read.map_err(wrong.because("read the secret that was given"))?,
     };
     let text = text.trim();
     if text.starts_with('$') {
         return match PasswordHash::new(text) {
             Ok(_) => Ok(Some(text.to_owned())),
-            Err(error) => Err(SecretError::GivenHash(error)),
+            Err(error) => wrong.fail(format!(
+                "the secret that was given begins with $ but is not a hash ({error}): give a new one"
+            )),
         };
     }
     if plain(text).len() < SHORTEST || text.len() > LONGEST {
-        return Err(SecretError::GivenLength);
+        return wrong.fail(format!(
+            "the secret that was given must have {SHORTEST} letters and digits at least and {LONGEST} characters at most: give a new one"
+        ));
     }
-    Ok(Some(hash(text)?))
+    hash(text).map(Some).map_err(wrong.failure())
 }
 
 /// A secret that was made, and is to be shown.
@@ -89,8 +61,8 @@ pub struct NewSecret {
 /// The stored hash; without one that can be used, a new secret with its hash.
 ///
 /// # Errors
-/// None can be made or stored.
-pub(super) fn open(file: &Path) -> Result<(String, Option<NewSecret>), SecretError> {
+/// None can be made or stored (73).
+pub(super) fn open(file: &Path) -> Result<(String, Option<NewSecret>)> {
     let complaint = match read(file) {
         Ok(Some(hash)) => return Ok((hash, None)),
         Ok(None) => None,
@@ -103,24 +75,29 @@ pub(super) fn open(file: &Path) -> Result<(String, Option<NewSecret>), SecretErr
             ))
         }
     };
-    let secret = make()?;
-    let hash = hash(&secret)?;
+    let unmade = Exit::CannotCreate;
+    let secret = make().map_err(unmade.failure())?;
+    let hash = hash(&secret).map_err(unmade.failure())?;
     write_whole(file, format!("{hash}\n").as_bytes())
         .and_then(|()| close_to_others(file))
-        .map_err(SecretError::Write)?;
+        .map_err(unmade.advising("write secret", "free space"))?;
     Ok((hash, Some(NewSecret { secret, complaint })))
 }
 
 /// The stored hash, if there is one.
-fn read(file: &Path) -> Result<Option<String>, SecretError> {
+fn read(file: &Path) -> Result<Option<String>> {
     let bytes = match read_whole(file, MOST) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        read => read.map_err(SecretError::Read)?,
+        read => read.map_err(Exit::Content.failure())?,
     };
-    let text = String::from_utf8(bytes).map_err(|_| SecretError::NoText)?;
+    let Ok(text) = String::from_utf8(bytes) else {
+        return Exit::Content.fail("it is not text");
+    };
     let hash = text.trim();
-    PasswordHash::new(hash).map_err(SecretError::Damaged)?;
-    Ok(Some(hash.to_owned()))
+    match PasswordHash::new(hash) {
+        Ok(_) => Ok(Some(hash.to_owned())),
+        Err(error) => Exit::Content.fail(format!("it is damaged ({error})")),
+    }
 }
 
 /// Whether a text is the secret; dashes, spaces and the case of letters do not matter.
