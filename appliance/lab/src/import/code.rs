@@ -2,6 +2,7 @@
 //! and alone it numbers the picture from one side to the other; else an option is named with which
 //! it does.
 
+use super::direction::rising_and_falling;
 use crate::Failed;
 use crate::description::{BitOrder, Description, Direction, Gray, of_direction, usual};
 use algo::chain::{Cells, CodeWord, Coding, EXPECTED_TURNS, Edges};
@@ -387,21 +388,9 @@ fn problem(map: &PhaseMap) -> Option<String> {
 /// The excess of pairs whose phase changes in one way, along rows and along columns.
 fn one_way(map: &PhaseMap) -> [f64; 2] {
     let width = map.width.max(1);
-    let height = map.phase.len() / width;
-    [(width, 1), (height, width)].map(|(length, step)| {
+    [(true, width), (false, map.phase.len() / width)].map(|(along_rows, length)| {
         let apart = (length / FRAME_PARTS).max(1);
-        let (mut rising, mut falling) = (0_usize, 0_usize);
-        for (at, here) in map.phase.iter().enumerate() {
-            if (at / step) % length + apart >= length {
-                continue;
-            }
-            let next = map.phase[at + apart * step];
-            if here.is_known() && next.is_known() {
-                let turns = (next - *here).turns();
-                rising += usize::from(turns > 0.0);
-                falling += usize::from(turns < 0.0);
-            }
-        }
+        let [rising, falling] = rising_and_falling(map, along_rows, apart);
         rising.abs_diff(falling) as f64 / (rising + falling).max(1) as f64
     })
 }
