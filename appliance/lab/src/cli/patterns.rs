@@ -1,8 +1,9 @@
 //! `fringed-lab patterns DIR`: the pictures to project, and the manifest of the recording that
 //! their frames will make.
 
-use super::described::{Described, Size, size};
+use crate::description::Description;
 use crate::layout::{Layout, Shown};
+use crate::lists::{Size, size};
 use algo::chain::GrayCode;
 use algo::pattern::{Encoder, PhaseFunction, Shot};
 use appliance::cli::numbers::number;
@@ -25,7 +26,7 @@ pub struct Patterns {
     #[arg(value_parser = names::folder())]
     folder: PathBuf,
     #[command(flatten)]
-    described: Described,
+    described: Description,
     /// Phase function of an adaptive pattern, as adapt writes it: then only the ratios of --fringes
     /// count.
     #[arg(long, value_name = "FILE")]
@@ -56,7 +57,7 @@ impl Patterns {
             |error: &dyn std::fmt::Display| Failure::because(Exit::Usage, "patterns", error);
         let projector = self.described.projector();
         let function = self.pattern.as_deref().map(|path| turns(path, projector));
-        let description = self.described.description(function.transpose()?)?;
+        let description = self.described.complete(function.transpose()?)?;
         let layout = Layout::of(&description).map_err(|error| usage(&error))?;
         let (columns, rows) = (projector.0 as usize, projector.1 as usize);
         let functions: Vec<PhaseFunction> = layout

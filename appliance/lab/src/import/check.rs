@@ -4,7 +4,8 @@
 use super::code;
 use super::direction::rising_and_falling;
 use crate::Failed;
-use crate::description::{Convention, Description, Shifts};
+use crate::description::Description;
+use crate::shifts::{Convention, Shifts};
 use algo::chain::{Chain, CodeWord};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
