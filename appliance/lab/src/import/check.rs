@@ -316,16 +316,14 @@ fn conventions(
     let mut best: Option<(Agreement, Shifts)> = None;
     for half in [0.0, 0.5] {
         for convention in [Convention::Sin, Convention::Cos] {
-            for reversed in [false, true] {
+            for sign in [stated.sign, stated.sign.reversed()] {
                 let first = stated.first + half;
                 let other = Shifts {
                     convention,
-                    sign: match reversed {
-                        false => stated.sign,
-                        true => stated.sign.reversed(),
-                    },
+                    sign,
                     first: first - if first > 0.5 { 1.0 } else { 0.0 },
                 };
+                let reversed = sign != stated.sign;
                 if other == stated {
                     continue;
                 }
