@@ -19,9 +19,9 @@ struct Limits {
 const fn limits(part: &'static str, [twelve, nine, six, four]: [f64; 4]) -> Limits {
     let ratios = [
         (BetterSequence::TWELVE, twelve),
-        (BetterSequence::NINE, nine),
-        (BetterSequence::SIX, six),
-        (BetterSequence::FOUR, four),
+        (BetterSequence::new(9), nine),
+        (BetterSequence::new(6), six),
+        (BetterSequence::new(4), four),
     ];
     Limits { part, ratios }
 }
@@ -68,7 +68,7 @@ fn the_better_pattern_beats_the_papers_own_in_the_middle_of_cone_and_spline() {
     check(
         &CONE,
         MIDDLE,
-        &[BetterSequence::TWELVE, BetterSequence::FOUR],
+        &[BetterSequence::TWELVE, BetterSequence::new(4)],
     );
     check(&SPLINE, MIDDLE, &[BetterSequence::TWELVE]);
 }
@@ -79,9 +79,9 @@ fn the_better_pattern_beats_the_papers_own_on_every_part() {
     for limits in [&CONE, &SAWTOOTH, &SPHERE, &SPLINE] {
         let all = [
             BetterSequence::TWELVE,
-            BetterSequence::NINE,
-            BetterSequence::SIX,
-            BetterSequence::FOUR,
+            BetterSequence::new(9),
+            BetterSequence::new(6),
+            BetterSequence::new(4),
         ];
         check(limits, WHOLE, &all);
     }

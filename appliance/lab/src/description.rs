@@ -1,32 +1,15 @@
-//! What the user says about projected pictures: levels of fringes and their shifts, Gray codes, and
-//! the order of projection.
+//! Options that describe projected pictures, for `import` and `patterns`: levels of fringes and their
+//! shifts, Gray codes, and the order of projection.
 
+use crate::lists::{PerDirection, Series, Size, directions, of_direction, series, size};
+use crate::shifts::Shifts;
 use algo::chain::{Coding, GrayCode, MAX_CODE_BITS};
+use appliance::error::{Exit, Result};
+use hal::bounds::{MAX_FRINGES, MAX_SIDE};
 use thiserror::Error;
 
-/// First shifts differ by quarters or thirds of a turn: the parts of a turn, and how near a measured
-/// difference must be to a multiple of one, turns.
-const USUAL: [(f64, f64); 2] = [(4.0, 0.0625), (3.0, 0.04)];
-
-/// How the sine of a level is written down.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Convention {
-    /// I = A + B sin 2π(Φ + shift).
-    Sin,
-    /// I = A + B cos 2π(Φ + shift).
-    Cos,
-}
-
-/// Whether the shift rises or falls from frame to frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum ShiftSign {
-    /// Frame k of N has the shift + k/N turn.
-    #[value(name = "+")]
-    Rising,
-    /// Frame k of N has the shift − k/N turn.
-    #[value(name = "-")]
-    Falling,
-}
+/// Most levels of a recording that can be decoded.
+const MAX_LEVELS: usize = 8;
 
 /// The fringes of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -54,17 +37,6 @@ pub enum Section {
     Black,
 }
 
-/// The convention of shifts.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shifts {
-    /// Sine or cosine.
-    pub convention: Convention,
-    /// Rising or falling.
-    pub sign: ShiftSign,
-    /// Shift of each level's first frame, in turns.
-    pub first: f64,
-}
-
 /// The order in which the bits of a Gray code are projected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum BitOrder {
@@ -74,61 +46,73 @@ pub enum BitOrder {
     Lsb,
 }
 
-/// Gray codes. Lists have one element for both codes, or one for the vertical and one for the
-/// horizontal one.
-#[derive(Clone, Debug, PartialEq)]
+/// Gray codes, if there are any.
+#[derive(Clone, Debug, clap::Args)]
 pub struct Gray {
-    /// Numbers of bits.
-    pub bits: Vec<u8>,
-    /// Widths of cells in projector pixels; empty where a cell is a fringe of the finest level, or
-    /// of a code alone a pixel.
-    pub cell_px: Vec<f64>,
-    /// How far before the raster's edge the first cell begins, projector pixels; empty where it
-    /// begins there.
-    pub offset_px: Vec<f64>,
-    /// The order of the bits.
+    /// Bits of a Gray code beside the fringes; two numbers for the vertical and the horizontal one.
+    #[arg(id = "gray", long = "gray", value_name = "BITS", value_parser = series(1u8, 13, 2))]
+    bits: Option<Series<u8>>,
+    /// Width of the Gray code's cells, projector pixels; without it one cell per fringe of the
+    /// finest level, or per pixel without fringes. Two numbers for the vertical and the horizontal
+    /// code.
+    #[arg(id = "gray_cell", long = "gray-cell", value_name = "PX", value_parser = series(1.0, f64::from(MAX_SIDE), 2))]
+    pub cell_px: Option<Series<f64>>,
+    /// How far before the raster's edge the first cell begins, projector pixels: half a cell where
+    /// edges lie in the middle of fringes.
+    #[arg(id = "gray_offset", long = "gray-offset", value_name = "PX", value_parser = series(0.0, f64::from(MAX_SIDE), 2))]
+    pub offset_px: Option<Series<f64>>,
+    /// Order of the Gray code's bits: most or least significant first.
+    #[arg(
+        id = "gray_order",
+        long = "gray-order",
+        value_name = "GRAY_ORDER",
+        default_value = "msb"
+    )]
     pub order: BitOrder,
-    /// How the numbers of cells are written in the bits.
-    pub coding: Coding,
-    /// Whether each picture is followed by its inverse.
+    /// The cells are numbered in plain binary instead of a Gray code.
+    #[arg(id = "gray_binary", long = "gray-binary")]
+    binary: bool,
+    /// Bits that are set are dark.
+    #[arg(id = "gray_invert", long = "gray-invert")]
+    inverted: bool,
+    /// Each picture of the Gray code is followed by its inverse.
+    #[arg(id = "gray_inverse", long = "gray-inverse")]
     pub inverse: bool,
 }
 
-/// A list for vertical fringes and one for horizontal ones, or one for both.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PerDirection<T>(pub Vec<Vec<T>>);
-
-/// The fringes of each level, in the order of projection.
-#[derive(Clone, Debug, PartialEq)]
-pub enum Fringes {
-    /// Numbers of fringes over the projector.
-    Count(PerDirection<f64>),
-    /// Projector pixels per fringe.
-    Pitch(PerDirection<f64>),
-    /// No fringes: a Gray code alone.
-    None,
-}
-
-/// What the user says about the projected pictures.
-#[derive(Clone, Debug, PartialEq)]
+/// What was or will be projected.
+#[derive(Clone, Debug, clap::Args)]
 pub struct Description {
     /// Columns and rows of the projector.
-    pub projector: (u32, u32),
-    /// The fringes of each level.
-    pub fringes: Fringes,
-    /// Shifts of each level, or of all.
-    pub steps: PerDirection<u8>,
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    projector: Size,
+    /// Fringes over the projector of each level, in the order of projection; need not be whole
+    /// numbers. 1,8,32/1,8,16: vertical ones, then horizontal ones. Without fringes there is a Gray
+    /// code alone.
+    #[arg(long, value_name = "F,...", conflicts_with = "pitch", value_parser = directions(1e-3, MAX_FRINGES, MAX_LEVELS))]
+    fringes: Option<PerDirection<f64>>,
+    /// Projector pixels per fringe of each level, instead of --fringes.
+    #[arg(long, value_name = "PX,...", value_parser = directions(2.0, 1e6, MAX_LEVELS))]
+    pitch: Option<PerDirection<f64>>,
+    /// Shifts of all levels, or of each.
+    #[arg(long, value_name = "N,...", default_value = "4", value_parser = directions(3u8, 64, MAX_LEVELS))]
+    steps: PerDirection<u8>,
     /// The convention of shifts.
+    #[command(flatten)]
     pub shifts: Shifts,
-    /// The direction of fringes.
+    /// Direction of the fringes; both: all vertical ones, then all horizontal ones;
+    /// horizontal-first: the other way round.
+    #[arg(long, default_value = "vertical")]
     pub direction: Direction,
-    /// The Gray codes, if there are any.
-    pub gray: Option<Gray>,
-    /// The order of projection. Fringes and codes that are named once for each direction are
-    /// projected direction by direction.
+    /// The Gray codes.
+    #[command(flatten)]
+    pub gray: Gray,
+    /// Order of projection; without it sine, then gray if there is one.
+    #[arg(long, value_name = "PART,...", value_delimiter = ',')]
     pub order: Vec<Section>,
     /// A phase function instead of straight fringes, row-major, in turns: then only the ratios of
     /// `fringes` count.
+    #[arg(skip)]
     pub function: Option<Vec<f64>>,
 }
 
@@ -187,98 +171,6 @@ pub enum DescriptionError {
     },
 }
 
-impl Convention {
-    /// The shift of this function against the sine, in turns.
-    pub fn turns(self) -> f64 {
-        match self {
-            Self::Sin => 0.0,
-            Self::Cos => 0.25,
-        }
-    }
-}
-
-impl ShiftSign {
-    /// The other one.
-    pub fn reversed(self) -> Self {
-        match self {
-            Self::Rising => Self::Falling,
-            Self::Falling => Self::Rising,
-        }
-    }
-}
-
-impl Shifts {
-    /// The shift of the sine of frame `k` of `steps`, in turns.
-    fn of(self, k: u8, steps: u8) -> f64 {
-        let share = f64::from(k) / f64::from(steps);
-        let along = match self.sign {
-            ShiftSign::Rising => share,
-            ShiftSign::Falling => -share,
-        };
-        along + self.first + self.convention.turns()
-    }
-
-    /// The shift of the sine in the first frame, turns.
-    pub fn total(self) -> f64 {
-        self.first + self.convention.turns()
-    }
-
-    /// These shifts with `total` as the shift of the sine in the first frame; in the convention that
-    /// states it most plainly: with a first shift of 0, as stated, or of half a turn.
-    pub fn with_total(self, sign: ShiftSign, total: f64) -> Self {
-        let total = match usual(total - self.total()) {
-            Some(turns) => self.total() + turns,
-            None => (100.0 * total).round() / 100.0,
-        };
-        let other = match self.convention {
-            Convention::Sin => Convention::Cos,
-            Convention::Cos => Convention::Sin,
-        };
-        let [own, other] = [self.convention, other].map(|convention| {
-            let first = total - convention.turns();
-            let first = first - first.round();
-            Self {
-                convention,
-                sign,
-                first: if first == -0.5 { 0.5 } else { first },
-            }
-        });
-        let plain = [0.0, self.first, 0.5].into_iter().find_map(|first| {
-            let is_it = |shifts: &Self| (shifts.first - first).abs() < 1e-9;
-            let found = [own, other].into_iter().find(is_it);
-            found.map(|shifts| Self { first, ..shifts })
-        });
-        plain.unwrap_or(own)
-    }
-
-    /// The options of these shifts where others were stated.
-    pub fn options(self, stated: Self) -> String {
-        let convention = match self.convention {
-            Convention::Sin => "sin",
-            Convention::Cos => "cos",
-        };
-        let sign = match self.sign {
-            ShiftSign::Rising => "+",
-            ShiftSign::Falling => "-",
-        };
-        let first = match (self.first, stated.first) {
-            (0.0, 0.0) => String::new(),
-            (first, _) => format!(" --first-shift {first}"),
-        };
-        format!("--convention {convention} --shift {sign}{first}")
-    }
-}
-
-/// The whole number of quarters or thirds of a turn that `turns` is near enough to stand for.
-pub fn usual(turns: f64) -> Option<f64> {
-    let parts = USUAL.into_iter().map(|(parts, near)| {
-        let usual = (turns * parts).round() / parts;
-        (usual, near)
-    });
-    let mut near = parts.filter(|(usual, near)| (usual - turns).abs() < *near);
-    near.next().map(|(usual, _)| usual)
-}
-
 impl Direction {
     /// Which fringes are vertical, in the order of projection.
     pub fn vertical(self) -> &'static [bool] {
@@ -291,29 +183,64 @@ impl Direction {
     }
 }
 
-impl<T> PerDirection<T> {
-    /// The list of this direction.
-    fn of(&self, vertical: bool) -> &[T] {
-        let own = self.0.get(usize::from(!vertical)).or(self.0.last());
-        own.map_or(&[], Vec::as_slice)
+impl Description {
+    /// The projector's columns and rows.
+    pub fn projector(&self) -> (u32, u32) {
+        let Size(width, height) = self.projector;
+        (width, height)
     }
-}
 
-impl Fringes {
-    /// Numbers of vertical or horizontal fringes over `length` projector pixels.
-    pub fn over(&self, vertical: bool, length: u32) -> Vec<f64> {
-        match self {
-            Self::Count(count) => count.of(vertical).to_vec(),
-            Self::Pitch(pitch) => {
+    /// The description with the usual order of projection where none is stated, and with a phase
+    /// function instead of straight fringes if one is given.
+    ///
+    /// # Errors
+    /// If neither fringes, pitches nor a Gray code are given, or a Gray code is described that
+    /// there is not (64).
+    pub fn complete(&self, function: Option<Vec<f64>>) -> Result<Self> {
+        let gray = &self.gray;
+        if !self.has_fringes() && (gray.bits.is_none() || function.is_some()) {
+            let words = "give --fringes or --pitch, or the bits of a Gray code alone with --gray";
+            return Exit::Usage.fail(words);
+        }
+        let described = gray.cell_px.is_some()
+            || gray.offset_px.is_some()
+            || gray.order != BitOrder::Msb
+            || gray.binary
+            || gray.inverted
+            || gray.inverse;
+        if gray.bits.is_none() && described {
+            let words =
+                "options that begin with --gray- describe a Gray code: give its bits with --gray";
+            return Exit::Usage.fail(words);
+        }
+        let mut complete = Self {
+            function,
+            ..self.clone()
+        };
+        if complete.order.is_empty() {
+            let sine = self.has_fringes().then_some(Section::Sine);
+            let gray = gray.bits.is_some().then_some(Section::Gray);
+            complete.order = sine.into_iter().chain(gray).collect();
+        }
+        Ok(complete)
+    }
+
+    fn has_fringes(&self) -> bool {
+        self.fringes.is_some() || self.pitch.is_some()
+    }
+
+    /// Numbers of vertical or horizontal fringes over `length` projector pixels, level by level.
+    pub fn fringes_over(&self, vertical: bool, length: u32) -> Vec<f64> {
+        match (&self.fringes, &self.pitch) {
+            (Some(fringes), _) => fringes.of(vertical).to_vec(),
+            (None, Some(pitch)) => {
                 let pitch = pitch.of(vertical).iter();
                 pitch.map(|pitch| f64::from(length) / pitch).collect()
             }
-            Self::None => Vec::new(),
+            (None, None) => Vec::new(),
         }
     }
-}
 
-impl Description {
     /// How often a section is named in the order of projection.
     pub fn projected(&self, section: Section) -> usize {
         count(&self.order, section)
@@ -322,19 +249,19 @@ impl Description {
     /// Checks that each section is projected as often as it must be, and that a code alone has
     /// something to be compared with.
     pub fn check_order(&self, directions: usize) -> Result<(), DescriptionError> {
-        let sine = self.fringes != Fringes::None;
+        let sine = self.has_fringes();
         let fits = |section, there: bool| match there {
             true => [1, directions].contains(&self.projected(section)),
             false => self.projected(section) == 0,
         };
         let [white, black] = [Section::White, Section::Black].map(|one| self.projected(one));
         if !fits(Section::Sine, sine)
-            || !fits(Section::Gray, self.gray.is_some())
+            || !fits(Section::Gray, self.gray.bits.is_some())
             || white.max(black) > 1
         {
             return Err(DescriptionError::Order);
         }
-        let against = self.gray.as_ref().is_some_and(|gray| gray.inverse) || white + black == 2;
+        let against = self.gray.inverse || white + black == 2;
         if !sine && !against {
             return Err(DescriptionError::NothingToCompare);
         }
@@ -371,20 +298,30 @@ impl Description {
 }
 
 impl Gray {
-    /// The code beside `finest` fringes, or alone beside 0, over `length` projector pixels.
+    /// How the numbers of cells are written in the bits.
+    pub fn coding(&self) -> Coding {
+        let &Self {
+            binary, inverted, ..
+        } = self;
+        Coding { binary, inverted }
+    }
+
+    /// The code beside `finest` fringes, or alone beside 0, over `length` projector pixels, if there
+    /// is one.
     pub fn code(
         &self,
         vertical: bool,
         finest: f64,
         length: u32,
         curved: bool,
-    ) -> Result<GrayCode, DescriptionError> {
+    ) -> Result<Option<GrayCode>, DescriptionError> {
+        let Some(bits) = of_direction(&self.bits, vertical) else {
+            return Ok(None);
+        };
         if curved {
             return Err(DescriptionError::Curved);
         }
-        let bits = of_direction(&self.bits, vertical)
-            .unwrap_or(1)
-            .min(MAX_CODE_BITS);
+        let bits = bits.min(MAX_CODE_BITS);
         let length = f64::from(length);
         let cell = match of_direction(&self.cell_px, vertical) {
             Some(cell) => cell,
@@ -398,17 +335,17 @@ impl Gray {
             }
         };
         let offset = of_direction(&self.offset_px, vertical).unwrap_or(0.0);
-        let coding = self.coding;
+        let coding = self.coding();
         let cells = ((length + offset) / cell - 1e-9).ceil();
         // A Gray code of one more cell shows the last two alike, and those alone are lost.
         let doubled = u32::from(offset > 0.0 && !coding.binary);
         match cells <= f64::from((1_u32 << bits) + doubled) {
-            true => Ok(GrayCode {
+            true => Ok(Some(GrayCode {
                 bits,
                 cell,
                 offset,
                 coding,
-            }),
+            })),
             false => Err(DescriptionError::FewBits {
                 bits,
                 cells,
@@ -421,62 +358,4 @@ impl Gray {
 /// How often a section is among these.
 pub fn count(sections: &[Section], section: Section) -> usize {
     sections.iter().filter(|other| **other == section).count()
-}
-
-/// The element for vertical or horizontal fringes of a list that has one for both, or one for each.
-pub fn of_direction<T: Copy>(list: &[T], vertical: bool) -> Option<T> {
-    list.get(usize::from(!vertical)).or(list.last()).copied()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn shifts_are_named_in_the_plainest_way() {
-        let stated = |convention, first| Shifts {
-            convention,
-            sign: ShiftSign::Rising,
-            first,
-        };
-        let third = -1.0 / 3.0;
-        for (convention, first, total, expected) in [
-            (Convention::Sin, 0.0, 0.25, "--convention cos --shift +"),
-            (Convention::Cos, 0.0, 0.01, "--convention sin --shift +"),
-            (
-                Convention::Cos,
-                0.0,
-                0.74,
-                "--convention cos --shift + --first-shift 0.5",
-            ),
-            (
-                Convention::Sin,
-                0.0,
-                -0.25,
-                "--convention cos --shift + --first-shift 0.5",
-            ),
-            (
-                Convention::Sin,
-                0.5,
-                0.0,
-                "--convention sin --shift + --first-shift 0",
-            ),
-            (
-                Convention::Sin,
-                0.0,
-                0.1,
-                "--convention sin --shift + --first-shift 0.1",
-            ),
-            (
-                Convention::Sin,
-                third,
-                third + 0.25,
-                "--convention cos --shift + --first-shift -0.3333333333333333",
-            ),
-        ] {
-            let stated = stated(convention, first);
-            let named = stated.with_total(ShiftSign::Rising, total);
-            assert_eq!(named.options(stated), expected);
-        }
-    }
 }

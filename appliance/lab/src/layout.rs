@@ -52,7 +52,7 @@ impl Layout {
     /// # Errors
     /// Numbers of steps, bits or cells that do not fit the levels.
     pub fn of(description: &Description) -> Result<Self, DescriptionError> {
-        let (columns, rows) = description.projector;
+        let (columns, rows) = description.projector();
         let directions: &[bool] = match &description.function {
             Some(_) => &[true],
             None => description.direction.vertical(),
@@ -64,13 +64,10 @@ impl Layout {
         let mut bits = sines.clone();
         for (pattern, &vertical) in directions.iter().enumerate() {
             let length = if vertical { columns } else { rows };
-            let fringes = description.fringes.over(vertical, length);
+            let fringes = description.fringes_over(vertical, length);
             let mut finest = fringes.iter().copied().fold(0.0, f64::max);
-            let code = description.gray.as_ref().map(|gray| {
-                let curved = description.function.is_some();
-                gray.code(vertical, finest, length, curved)
-            });
-            let code = code.transpose()?;
+            let (gray, curved) = (&description.gray, description.function.is_some());
+            let code = gray.code(vertical, finest, length, curved)?;
             if let (true, Some(code)) = (fringes.is_empty(), &code) {
                 // A turn of a code alone is a cell, or two or four of very many.
                 finest = f64::from(length) / code.cell;
@@ -94,7 +91,7 @@ impl Layout {
                     shift,
                 });
             }
-            if let (Some(gray), Some(code)) = (&description.gray, code) {
+            if let Some(code) = code {
                 for at in 0..code.bits {
                     let bit = match gray.order {
                         BitOrder::Msb => at,

@@ -8,6 +8,8 @@ pub mod description;
 pub mod experiment;
 pub mod import;
 pub mod layout;
+pub mod lists;
+pub mod shifts;
 
 /// Why a benchmark failed: an error of what it times. Only a person reads it.
 pub type Failed = Box<dyn std::error::Error + Send + Sync>;

@@ -72,57 +72,29 @@ impl Point {
     }
 }
 
-/// A sequence that is compared, by its number of frames.
-#[derive(Clone, Copy)]
-enum Compared {
-    /// 100 fringes, three geometric levels of sines.
-    Fixed(usize),
-    /// A pattern made for the part, with a sequence of the experiments.
-    Better(usize),
-}
-
 /// The noise of all measurements.
 const SEED: u64 = 1;
 
-const SEQUENCES: [Compared; 10] = [
-    Compared::Fixed(9),
-    Compared::Fixed(12),
-    Compared::Fixed(24),
-    Compared::Better(24),
-    Compared::Better(12),
-    Compared::Better(9),
-    Compared::Better(6),
-    Compared::Better(5),
-    Compared::Better(4),
-    Compared::Better(3),
+/// 100 fringes, three geometric levels of sines.
+const FIXED: Method = Method::Fixed { fringes: 100 };
+
+/// The methods that are compared, and the frames of each.
+const SEQUENCES: [(Method, usize); 10] = [
+    (FIXED, 9),
+    (FIXED, 12),
+    (FIXED, 24),
+    better(24),
+    better(12),
+    better(9),
+    better(6),
+    better(5),
+    better(4),
+    better(3),
 ];
 
-impl Compared {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Fixed(_) => "fixed",
-            Self::Better(_) => "better",
-        }
-    }
-
-    fn frames(self) -> usize {
-        let (Self::Fixed(frames) | Self::Better(frames)) = self;
-        frames
-    }
-
-    fn method(self) -> Method {
-        match self {
-            Self::Fixed(_) => Method::Fixed { fringes: 100 },
-            Self::Better(frames) => Method::Better(BetterSequence::new(frames)),
-        }
-    }
-
-    fn shots(self, range: PhaseRange) -> Result<Vec<Shot>, Failed> {
-        match self {
-            Self::Fixed(frames) => Ok(Sequence::geometric(range, 3, frames / 3)),
-            Self::Better(frames) => Ok(BetterSequence::new(frames).shots()?),
-        }
-    }
+/// A pattern made for the part, with a sequence of the experiments.
+const fn better(frames: usize) -> (Method, usize) {
+    (Method::Better(BetterSequence::new(frames)), frames)
 }
 
 impl Study {
@@ -170,20 +142,11 @@ impl Study {
                     ..scene
                 };
                 let mut runner = Runner::new(&scene, OpticsKind::Sharp)?;
-                for compared in SEQUENCES {
-                    let words = format!(
-                        "{part}, {bit_depth} bit, {}-{}",
-                        compared.name(),
-                        compared.frames()
-                    );
+                for (method, frames) in SEQUENCES {
+                    let words = format!("{part}, {bit_depth} bit, {}-{frames}", word(method));
                     progress(done / total, &words);
-                    points.extend(self.compare(
-                        &mut runner,
-                        compared,
-                        part,
-                        bit_depth,
-                        &mut floor,
-                    )?);
+                    let compared = self.compare(&mut runner, (method, frames), &scene, &mut floor);
+                    points.extend(compared?);
                     done += 1.0;
                 }
             }
@@ -194,15 +157,19 @@ impl Study {
     fn compare(
         &self,
         runner: &mut Runner,
-        compared: Compared,
-        part: &'static str,
-        bits: u8,
+        (method, frames): (Method, usize),
+        scene: &Scene,
         floor: &mut Floor,
     ) -> Result<Vec<Point>, Failed> {
-        let shots = |range| compared.shots(range).unwrap_or_default();
-        let (measured, map) = runner.measure_with(compared.method(), shots, SEED)?;
+        let shots = |range| match method {
+            Method::Better(sequence) => sequence.shots(),
+            _ => Ok(Sequence::geometric(range, 3, frames / 3)),
+        };
+        let known = |range| shots(range).unwrap_or_default();
+        let (measured, map) = runner.measure_with(method, known, SEED)?;
+        let bits = scene.bit_depth;
         let range = measured.triangulator.function().range();
-        let shots = compared.shots(range)?;
+        let shots = shots(range)?;
         let sequence = Sequence::from_frames(&shots)?;
         let set = FrameSet::new(measured.frames.clone(), map);
         let truth = runner.truth();
@@ -211,11 +178,11 @@ impl Study {
         let taken = timed(|| turns = textbook(&set, &shots, range, bits).unwrap_or_default());
         let textbook_ns = taken.as_secs_f64() * 1e9 / pixels.max(1) as f64;
         let mut variants = Vec::new();
-        let mut kernels: Vec<Box<dyn Kernel>> = Vec::new();
+        let mut kernels = Vec::new();
         for (name, decoder) in decoders(&sequence, range, bits)? {
             for window in [None, Some(rows_seen(truth, width))] {
                 variants.push((name, window.is_some()));
-                kernels.push(Box::new(Decoding::new(decoder.clone(), window)));
+                kernels.push(Decoding::new(decoder.clone(), window));
             }
         }
         let mut sets = FrameSets::of(set, self.effort.bytes);
@@ -225,10 +192,10 @@ impl Study {
             let score = score(&measured, truth, turns);
             let figure = |figure: &dyn Fn(&Score) -> f64| score.as_ref().map_or(f64::NAN, figure);
             Point {
-                part,
+                part: scene.name,
                 implementation,
-                sequence: compared.name(),
-                frames: compared.frames(),
+                sequence: word(method),
+                frames,
                 shifts: sequence.levels().last().map_or(0, Level::shifts),
                 bits,
                 skipping,
@@ -251,6 +218,14 @@ impl Study {
             points.push(point(variant, &set.turns(), ns_per_px, x_floor));
         }
         Ok(points)
+    }
+}
+
+/// The sequence of a point.
+fn word(method: Method) -> &'static str {
+    match method {
+        Method::Better(_) => "better",
+        _ => "fixed",
     }
 }
 

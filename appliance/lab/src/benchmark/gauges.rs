@@ -1,8 +1,8 @@
 //! The gauges of a cycle that is timed: those of the recipe, or many of one kind.
 
 use algo::geometry::Vector;
-use algo::inspect::kinds::Diameter;
-use algo::inspect::{Basis, FeatureKind, Measure};
+use algo::inspect::kinds::{Diameter, Distance, MeanHeight, Z};
+use algo::inspect::{FeatureKind, Measure};
 use appliance::recipe::{FeatureFile, GaugeFile, RecipeFile};
 
 /// Where the regions lie, as shares of the frame: on the plate of the default part.
@@ -58,13 +58,13 @@ impl Gauges {
 
     /// Gives them to a recipe for frames of (width, height).
     pub fn replace(self, file: &mut RecipeFile, (width, height): (u32, u32)) {
-        let surface = FeatureKind::Surface;
-        let (count, kind, kinds) = match self {
+        let (z, plane) = (Z {}.into(), FeatureKind::Plane);
+        let (count, kind, kinds): (_, _, Vec<Measure>) = match self {
             Self::Taught => return,
             Self::Holes(count) => return holes(file, count),
-            Self::Means(count) => (count, surface, kinds(Basis::Region, surface, &[1])),
-            Self::Planes(count) => (count, FeatureKind::Plane, planes(&[1])),
-            Self::Distances(count) => (count, FeatureKind::Plane, planes(&[1, 2])),
+            Self::Means(count) => (count, FeatureKind::Surface, vec![MeanHeight {}.into()]),
+            Self::Planes(count) => (count, plane, vec![z]),
+            Self::Distances(count) => (count, plane, vec![z, Distance {}.into()]),
         };
         let name = |at: usize| format!("region {}", at % count);
         let rows = count.div_ceil(COLUMNS);
@@ -128,25 +128,4 @@ fn holes(file: &mut RecipeFile, count: usize) {
             .push(GaugeFile::new(slot, &gauge, Diameter {}, &[&name]));
     }
     file.judges_nothing = true;
-}
-
-/// For each number of planes, the first geometric kind that takes as many.
-fn planes(features: &[usize]) -> Vec<Measure> {
-    kinds(Basis::Geometry, FeatureKind::Plane, features)
-}
-
-/// For each number of features, the first kind in the table on this basis that takes as many
-/// features of this kind.
-fn kinds(basis: Basis, kind: FeatureKind, features: &[usize]) -> Vec<Measure> {
-    let first = |&count: &usize| {
-        let mut all = Measure::examples().into_iter();
-        all.find(|measure| {
-            let facts = measure.facts();
-            let takes = facts.takes;
-            facts.basis == basis
-                && takes.len() == count
-                && takes.iter().all(|at| at.contains(&kind))
-        })
-    };
-    features.iter().filter_map(first).collect()
 }

@@ -251,38 +251,31 @@ pub fn decoders(
         .collect())
 }
 
-/// An implementation by its name.
-type Named = (String, Box<dyn Kernel>);
-
 /// The decoders of a workload, by implementation and workload: `avx2_geometric_12`, and where a
 /// quiet head is timed as well the fastest with its least modulation, `avx2_geometric_12_quiet`.
 /// Where the clock starts after the coarser levels were decoded, these are kept for `copies` frame
 /// sets in turn.
-fn variants(workload: &Workload, copies: usize) -> Result<Vec<Named>, Failed> {
+fn variants(workload: &Workload, copies: usize) -> Result<Vec<(String, Decoding)>, Failed> {
     let sequence = Sequence::from_frames(&workload.frames)?;
-    let mut named: Vec<(&str, Decoder, &str)> = Vec::new();
-    for (name, decoder) in decoders(&sequence, RANGE, workload.bit_depth)? {
-        named.push((name, decoder, ""));
-    }
+    let mut decoders: Vec<_> = decoders(&sequence, RANGE, workload.bit_depth)?
+        .into_iter()
+        .map(|(name, decoder)| (name, decoder, ""))
+        .collect();
     if workload.has_quiet {
         let decoder = Decoder::new(&sequence, RANGE, workload.bit_depth)?;
         let least =
             LeastModulation::new(QUIET_COUNTS).ok_or("no least modulation of a quiet head")?;
         let decoder = decoder.with_least_modulation(least);
-        named.push((decoder.backend().name(), decoder, "_quiet"));
+        decoders.push((decoder.backend().name(), decoder, "_quiet"));
     }
-    let mut variants: Vec<Named> = Vec::new();
-    for (name, decoder, suffix) in named {
-        let sequence = &workload.name;
+    let mut variants = Vec::new();
+    for (name, decoder, suffix) in decoders {
+        let sequence = format!("{}{suffix}", workload.name);
         if workload.has_last {
             let last = Decoding::after_the_last(decoder.clone(), copies);
-            variants.push((
-                format!("{name}_last_frames_of_{sequence}{suffix}"),
-                Box::new(last),
-            ));
+            variants.push((format!("{name}_last_frames_of_{sequence}"), last));
         }
-        let whole = Decoding::new(decoder, None);
-        variants.push((format!("{name}_{sequence}{suffix}"), Box::new(whole)));
+        variants.push((format!("{name}_{sequence}"), Decoding::new(decoder, None)));
     }
     Ok(variants)
 }

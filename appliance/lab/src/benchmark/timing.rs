@@ -241,8 +241,8 @@ pub fn alone() -> Result<ThreadPool, Failed> {
 ///
 /// # Errors
 /// As [`alone`].
-pub fn interleaved(
-    kernels: &mut [Box<dyn Kernel>],
+pub fn interleaved<K: Kernel>(
+    kernels: &mut [K],
     sets: &mut FrameSets,
     floor: &mut Floor,
     effort: &Effort,
@@ -253,7 +253,7 @@ pub fn interleaved(
         for _ in 0..effort.rounds {
             let floor = floor.time();
             for (kernel, rounds) in kernels.iter_mut().zip(&mut rounds) {
-                let kernel = ns_per_px(&mut **kernel, sets, effort.patience);
+                let kernel = ns_per_px(kernel, sets, effort.patience);
                 rounds.push(Round { kernel, floor });
             }
         }

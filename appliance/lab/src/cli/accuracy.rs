@@ -28,7 +28,7 @@ pub struct Accuracy {
     output: Output,
 }
 
-#[derive(Serialize)]
+#[derive(Default, Serialize)]
 struct Answer {
     errors: Vec<Share>,
     dents: Vec<Resolution>,
@@ -48,7 +48,7 @@ impl Accuracy {
         let folder = OutputFolder::create(&self.out)?;
         let pool = self.threads.pool(0)?;
         let failed = Exit::Software.because("measure the simulated parts");
-        let (mut errors, mut dents) = (Vec::new(), Vec::new());
+        let mut answer = Answer::default();
         for optics in OPTICS {
             for part in PARTS {
                 self.output.progress().tell(0.0, part);
@@ -61,28 +61,24 @@ impl Accuracy {
                 let [width, height] = found.size;
                 let name = format!("bias-{part}-{}.png", optics.word());
                 folder.write(&name, &height_png(width, height, &found.bias_mm))?;
-                errors.push(found.share);
+                answer.errors.push(found.share);
             }
             if let Some(scene) = Scene::named(PARTS[0]) {
-                dents.extend(
-                    pool.install(|| resolution(&scene, optics))
-                        .map_err(&failed)?,
-                );
+                let dents = pool.install(|| resolution(&scene, optics));
+                answer.dents.extend(dents.map_err(&failed)?);
             }
         }
         self.output.progress().clear();
-        let text = || tables(&errors, &dents);
-        let (errors, dents) = (errors.clone(), dents.clone());
-        self.output.answer(&Answer { errors, dents }, text)
+        self.output.answer(&answer, || tables(&answer))
     }
 }
 
 /// Both tables as Markdown.
-fn tables(errors: &[Share], dents: &[Resolution]) -> String {
+fn tables(answer: &Answer) -> String {
     let mut text = String::from(
         "| part | optics | RMS, µm | noise | without noise | 99 % of it | stated σ |\n|---|---|---:|---:|---:|---:|---:|\n",
     );
-    for row in errors {
+    for row in &answer.errors {
         let Share { part, optics, .. } = row;
         let um = [
             row.total_mm,
@@ -98,7 +94,7 @@ fn tables(errors: &[Share], dents: &[Resolution]) -> String {
         );
     }
     text.push_str("\n| dent, mm | optics | depth of a pixel, % | of a mean of 9 × 9, % |\n|---:|---|---:|---:|\n");
-    for row in dents {
+    for row in &answer.dents {
         let _ = writeln!(
             text,
             "| {} | {} | {:.0} | {:.0} |",
@@ -120,7 +116,7 @@ fn measure(scene: &Scene, optics: OpticsKind, seed: u64) -> Result<(Runner, Run)
 }
 
 /// The error of one part with one setting of the optics, mm.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Debug, Serialize)]
 struct Share {
     /// The part.
     part: &'static str,
@@ -153,7 +149,7 @@ struct Divided {
 /// If the part cannot be simulated or measured.
 fn divided(scene: &Scene, optics: OpticsKind, seed: u64) -> Result<Divided, MeasureError> {
     let (noisy, run) = measure(scene, optics, seed)?;
-    let with_noise = errors(&Truth::from(noisy.truth()), noisy.truth(), &run);
+    let with_noise = errors(noisy.truth(), &run);
     let sigmas = run.measured.heights.sigma.iter().zip(&with_noise);
     let sigmas = sigmas.filter(|(_, error)| !error.is_nan());
     let stated = rms(sigmas.map(|(&sigma, _)| f64::from(sigma)));
@@ -162,7 +158,7 @@ fn divided(scene: &Scene, optics: OpticsKind, seed: u64) -> Result<Divided, Meas
         ..scene.clone()
     };
     let (runner, run) = measure(&quiet, optics, seed)?;
-    let bias_mm = errors(&Truth::from(runner.truth()), runner.truth(), &run);
+    let bias_mm = errors(runner.truth(), &run);
     let known = |errors: &[f32]| -> Vec<f64> {
         let known = errors.iter().filter(|error| !error.is_nan());
         known.map(|&error| f64::from(error)).collect()
@@ -189,10 +185,10 @@ fn divided(scene: &Scene, optics: OpticsKind, seed: u64) -> Result<Divided, Meas
 }
 
 /// The errors of the resolved, wholly lit pixels but the gross ones, mm; NaN elsewhere.
-fn errors(known: &Truth<'_>, truth: &sim::Truth, run: &Run) -> Vec<f32> {
+fn errors(truth: &sim::Truth, run: &Run) -> Vec<f32> {
     let (heights, trust) = (&run.measured.heights.height, &run.measured.phases.trust);
     let mut errors = vec![f32::NAN; heights.len()];
-    for at in known.whole_pixels() {
+    for at in Truth::from(truth).whole_pixels() {
         let error = heights[at].mm() - f64::from(truth.height[at]);
         if trust[at] == Trust::Resolved && error.abs() <= GROSS_MM {
             errors[at] = error as f32;
@@ -211,7 +207,7 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// What is left of a dent's depth in the middle of the dent, without noise.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Debug, Serialize)]
 struct Resolution {
     /// The optics.
     optics: &'static str,

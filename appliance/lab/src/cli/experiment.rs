@@ -12,7 +12,6 @@ use appliance::error::{Exit, Failure, Result};
 use appliance::head::calibrated::MeasureError;
 use appliance::output::grey_png;
 use appliance::storage::folder::OutputFolder;
-use hal::frame::Samples;
 use hal::npy;
 use std::path::PathBuf;
 
@@ -41,29 +40,33 @@ pub struct Experiment {
     output: Output,
 }
 
+/// The results of all runs.
+#[derive(Debug, Default)]
+struct Results {
+    /// One row per run.
+    rows: Vec<RunRow>,
+    /// File names and contents of what some methods showed, saw and measured.
+    shown: Vec<(String, Vec<u8>)>,
+}
+
 impl Experiment {
     /// Runs the experiments, writes their results and prints the means.
     ///
     /// # Errors
     /// If a part is not known, a run fails or the results cannot be written.
     pub fn run(&self) -> Result<()> {
-        let campaign = Campaign {
-            scenes: self.scenes()?,
-            optics: self.optics,
-            seeds: self.seeds,
-            sines: self.waveform == Form::Sine,
-        };
+        let scenes = self.scenes()?;
         let folder = OutputFolder::create(&self.out)?;
         let pool = self.threads.pool(0)?;
         let progress = self.output.progress();
         let on_progress = |share: f64, words: &str| progress.tell(share, words);
-        let results = pool.install(|| campaign.run(&on_progress));
+        let results = pool.install(|| self.measure(&scenes, &on_progress));
         progress.clear();
         let results = results.map_err(Exit::Software.because("run the experiments"))?;
         let means = means(&results.rows);
         write(&folder, &results)?;
         let text = || {
-            let tables = tables(&campaign, &means);
+            let tables = self.tables(&scenes, &means);
             format!("{}\nwritten to {}", tables.trim_end(), self.out.display())
         };
         self.output.answer(&means, text)
@@ -89,44 +92,25 @@ impl Experiment {
         }
         Ok(scenes)
     }
-}
 
-/// What is to be run.
-#[derive(Clone, Debug)]
-struct Campaign {
-    /// The parts.
-    scenes: Vec<Scene>,
-    /// The optics that are asked for; a part's figure may show others as well.
-    optics: OpticsKind,
-    /// Noise seeds 1…seeds.
-    seeds: u64,
-    /// Whether the better sequences show sines instead of the brightest waveforms.
-    sines: bool,
-}
-
-/// The results of all runs.
-#[derive(Debug, Default)]
-struct Results {
-    /// One row per run.
-    rows: Vec<RunRow>,
-    /// File names and contents of what some methods showed, saw and measured.
-    shown: Vec<(String, Vec<u8>)>,
-}
-
-impl Campaign {
-    /// Runs everything. `progress` is called with the share done, 0…1, and with the run that
-    /// begins.
+    /// Runs each method of each scene with each seed. `progress` is called with the share done, 0…1,
+    /// and with the run that begins.
     ///
     /// # Errors
     /// If the simulated head or a pattern fails.
-    fn run(&self, progress: &dyn Fn(f64, &str)) -> Result<Results, MeasureError> {
+    fn measure(
+        &self,
+        scenes: &[Scene],
+        progress: &dyn Fn(f64, &str),
+    ) -> Result<Results, MeasureError> {
         let mut results = Results::default();
-        let settings = self.scenes.iter().flat_map(|scene| {
+        let sines = self.waveform == Form::Sine;
+        let settings = scenes.iter().flat_map(|scene| {
             let kinds = scene.optics(self.optics);
             kinds.into_iter().map(move |optics| (scene, optics))
         });
         let settings: Vec<_> = settings.collect();
-        let count = |(scene, _): &(&Scene, _)| scene.methods(self.sines).len() as u64 * self.seeds;
+        let count = |(scene, _): &(&Scene, _)| scene.methods(sines).len() as u64 * self.seeds;
         let total = settings.iter().map(count).sum::<u64>().max(1) as f64;
         for (scene, optics) in settings {
             let about = format!("{}, {} optics", scene.name, optics.word());
@@ -134,7 +118,7 @@ impl Campaign {
             progress(done / total, &format!("{about}: light of the scene"));
             let mut runner = Runner::new(scene, optics)?;
             for seed in 1..=self.seeds {
-                for method in scene.methods(self.sines) {
+                for method in scene.methods(sines) {
                     let done = results.rows.len() as f64;
                     let words = format!("{about}, seed {seed}: {}", method.name());
                     progress(done / total, &words);
@@ -151,6 +135,19 @@ impl Campaign {
         set_ratios(&mut results.rows);
         Ok(results)
     }
+
+    /// A table for each part and each of its optics.
+    fn tables(&self, scenes: &[Scene], means: &[RunRow]) -> String {
+        let mut tables = Vec::new();
+        for scene in scenes {
+            for optics in scene.optics(self.optics) {
+                let same = |row: &&RunRow| row.part == scene.name && row.optics == optics.word();
+                let rows: Vec<&RunRow> = means.iter().filter(same).collect();
+                tables.push(table(scene, &rows));
+            }
+        }
+        tables.join("\n")
+    }
 }
 
 /// The finest pattern and its frame as pictures, and the measured heights in mm as an array of the
@@ -159,18 +156,9 @@ fn shown(name: &str, run: &Run) -> [(String, Vec<u8>); 3] {
     let raster = Encoder::new(None, &[]).raster(&run.function, Shot::sine(1.0, 0.0));
     let frame = &run.measured.frames[run.finest];
     let format = frame.format();
-    let bytes: Vec<u8> = match frame.samples() {
-        Samples::Eight(samples) => samples.to_vec(),
-        Samples::Sixteen(samples) => {
-            let shift = format.bit_depth.saturating_sub(8);
-            samples.iter().map(|s| (s >> shift) as u8).collect()
-        }
-    };
-    let rows = bytes.chunks(format.stride);
-    let seen: Vec<u8> = rows
-        .flat_map(|row| &row[..format.width as usize])
-        .copied()
-        .collect();
+    let shift = format.bit_depth - 8;
+    let counts = frame.counts().into_iter();
+    let seen: Vec<u8> = counts.map(|count| (count as u16 >> shift) as u8).collect();
     let measured = &run.measured;
     let heights = measured.heights.height.iter().zip(&measured.phases.trust);
     let heights: Vec<f32> = heights
@@ -201,17 +189,4 @@ fn write(folder: &OutputFolder, results: &Results) -> Result<()> {
         folder.write(name, content)?;
     }
     Ok(())
-}
-
-/// A table for each part and each of its optics.
-fn tables(campaign: &Campaign, means: &[RunRow]) -> String {
-    let mut tables = Vec::new();
-    for scene in &campaign.scenes {
-        for optics in scene.optics(campaign.optics) {
-            let same = |row: &&RunRow| row.part == scene.name && row.optics == optics.word();
-            let rows: Vec<&RunRow> = means.iter().filter(same).collect();
-            tables.push(table(scene, &rows));
-        }
-    }
-    tables.join("\n")
 }

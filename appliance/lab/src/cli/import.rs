@@ -1,7 +1,8 @@
 //! `fringed-lab import DIR --out RECORDING`: a recording of other people's pictures.
 
-use super::described::{Described, range};
+use crate::description::Description;
 use crate::import::{Channel, Taken, import};
+use crate::lists::range;
 use appliance::cli::numbers::number;
 use appliance::cli::{Output, Threads, model_files, names};
 use appliance::error::{Exit, Result};
@@ -22,7 +23,7 @@ pub struct Import {
     #[arg(long, value_name = "DIR", value_parser = names::folder())]
     out: PathBuf,
     #[command(flatten)]
-    described: Described,
+    described: Description,
     /// Take only pictures whose names begin with this, or fit a pattern of * and ?, such as *-left.
     #[arg(
         long,
@@ -94,7 +95,7 @@ impl Import {
     /// (64, 65), or the recording cannot be written (73).
     pub fn run(&self) -> Result<()> {
         let taken = Taken {
-            description: self.described.description(None)?,
+            description: self.described.complete(None)?,
             channel: self.channel,
             bit_depth: self.bit_depth,
             name: self.name.clone(),

@@ -4,7 +4,6 @@ mod accuracy;
 mod adapt;
 mod bench;
 mod capture;
-mod described;
 mod experiment;
 mod import;
 mod patterns;

@@ -1,9 +1,9 @@
 //! `fringed-lab patterns DIR`: the pictures to project, and the manifest of the recording that
 //! their frames will make.
 
-use super::described::{Described, Size, size};
+use crate::description::Description;
 use crate::layout::{Layout, Shown};
-use algo::chain::GrayCode;
+use crate::lists::{Size, size};
 use algo::pattern::{Encoder, PhaseFunction, Shot};
 use appliance::cli::numbers::number;
 use appliance::cli::{Quiet, Threads, names};
@@ -25,7 +25,7 @@ pub struct Patterns {
     #[arg(value_parser = names::folder())]
     folder: PathBuf,
     #[command(flatten)]
-    described: Described,
+    described: Description,
     /// Phase function of an adaptive pattern, as adapt writes it: then only the ratios of --fringes
     /// count.
     #[arg(long, value_name = "FILE")]
@@ -56,7 +56,7 @@ impl Patterns {
             |error: &dyn std::fmt::Display| Failure::because(Exit::Usage, "patterns", error);
         let projector = self.described.projector();
         let function = self.pattern.as_deref().map(|path| turns(path, projector));
-        let description = self.described.description(function.transpose()?)?;
+        let description = self.described.complete(function.transpose()?)?;
         let layout = Layout::of(&description).map_err(|error| usage(&error))?;
         let (columns, rows) = (projector.0 as usize, projector.1 as usize);
         let functions: Vec<PhaseFunction> = layout
@@ -75,20 +75,12 @@ impl Patterns {
         let pictures: Vec<_> = pool.install(|| shown.map(picture).collect());
         let Size(width, height) = self.camera;
         let format = FrameFormat::packed(width, height, self.bit_depth);
-        // Frames that are yet to be taken: only their places are written.
-        let frame = |at: usize| {
-            let pixel = FrameFormat::packed(1, 1, 8);
-            Frame::new(
-                pixel,
-                Arc::new(Pixels::zeroed(&pixel)),
-                Timestamp(0),
-                at as u64,
-            )
-        };
-        let frames: Vec<Frame> = (0..layout.shown.len())
-            .map(frame)
-            .collect::<Result<_, _>>()
+        // Frames that are yet to be taken: only their places are written, by their counts.
+        let pixel = FrameFormat::packed(1, 1, 8);
+        let pixels = Arc::new(Pixels::zeroed(&pixel));
+        let frame = Frame::new(pixel, pixels, Timestamp(0), 0)
             .map_err(Exit::Software.because("patterns"))?;
+        let frames = (0..).map(|at| frame.restamped(Timestamp(0), at));
         let mut outline = layout.recording(projector, format, frames);
         outline.description = "to be filled with the frames of show/".into();
         recorder::write_outline(&outline, &self.folder, &pictures).map_err(|error| {
@@ -157,35 +149,15 @@ fn raster(
             pattern,
             bit,
             inverse,
-        } => bits(
-            &layout.codes[pattern],
-            bit,
-            inverse,
-            layout.is_vertical(pattern),
-            (columns, rows),
-        ),
+        } => {
+            let (code, vertical) = (&layout.codes[pattern], layout.is_vertical(pattern));
+            let places = (0..rows).flat_map(|row| {
+                (0..columns).map(move |column| if vertical { column } else { row })
+            });
+            let lit = places.map(|place| code.lights(bit, place) != inverse);
+            lit.map(|lit| if lit { u8::MAX } else { 0 }).collect()
+        }
         Shown::White => vec![u8::MAX; all],
         Shown::Black => vec![0; all],
     }
-}
-
-/// The grey levels of a picture of a Gray code.
-fn bits(
-    code: &GrayCode,
-    bit: u8,
-    inverse: bool,
-    vertical: bool,
-    (columns, rows): (u32, u32),
-) -> Vec<u8> {
-    let grey = |at: u32| {
-        if code.lights(bit, at) == inverse {
-            0
-        } else {
-            u8::MAX
-        }
-    };
-    let pixels = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-    pixels
-        .map(|(column, row)| grey(if vertical { column } else { row }))
-        .collect()
 }

@@ -260,12 +260,6 @@ impl Method {
 impl BetterSequence {
     /// 12 frames.
     pub const TWELVE: Self = Self::new(12);
-    /// 9 frames.
-    pub const NINE: Self = Self::new(9);
-    /// 6 frames.
-    pub const SIX: Self = Self::new(6);
-    /// 4 frames.
-    pub const FOUR: Self = Self::new(4);
 
     /// The sequence of `frames` frames, with the brightest waveforms.
     pub const fn new(frames: usize) -> Self {

@@ -2,8 +2,10 @@
 //! other conventions, and the frames of each level are compared with a sine.
 
 use super::code;
+use super::direction::rising_and_falling;
 use crate::Failed;
-use crate::description::{Convention, Description, Shifts};
+use crate::description::Description;
+use crate::shifts::{Convention, Shifts};
 use algo::chain::{Chain, CodeWord};
 use algo::phase::Trust;
 use algo::pipeline::{self, PhaseMap};
@@ -91,7 +93,12 @@ pub(super) fn notes(
                     }
                 };
                 let may_fall = named || recording.camera_model.is_some();
-                if !may_fall && rows.falls(&rows.unwrap(&chain), along_rows) {
+                if !may_fall
+                    && falls(
+                        &chain.unwrap(&rows.levels, rows.code.as_deref()),
+                        along_rows,
+                    )
+                {
                     let along = if along_rows {
                         "from left to right"
                     } else {
@@ -229,10 +236,6 @@ impl Rows {
         }
     }
 
-    fn unwrap(&self, chain: &Chain) -> PhaseMap {
-        chain.unwrap(&self.levels, self.code.as_deref())
-    }
-
     /// The rows as they would be decoded under another convention: each phase φ becomes ± φ +
     /// `offset`.
     fn under(&self, reversed: bool, offset: f64) -> Self {
@@ -272,26 +275,15 @@ impl Rows {
         Agreement {
             share: resolved as f64 / modulated.max(1) as f64,
             jumps: jumps.count() as f64 / rows.max(1) as f64,
-            falls: self.falls(&map, along_rows),
+            falls: falls(&map, along_rows),
         }
     }
+}
 
-    /// Whether the phase falls along the rows, or from row to row.
-    fn falls(&self, map: &PhaseMap, along_rows: bool) -> bool {
-        let (width, pixels) = (map.width.max(1), map.phase.len());
-        let step = if along_rows { 1 } else { width };
-        let (mut falling, mut rising) = (0_usize, 0_usize);
-        for at in (0..pixels.saturating_sub(step)).filter(|at| !along_rows || (at + 1) % width != 0)
-        {
-            let (here, next) = (map.phase[at], map.phase[at + step]);
-            if here.is_known() && next.is_known() {
-                let turns = (next - here).turns();
-                falling += usize::from(turns < 0.0);
-                rising += usize::from(turns > 0.0);
-            }
-        }
-        falling as f64 > FALLING * (falling + rising) as f64
-    }
+/// Whether the phase falls along the rows, or from row to row.
+fn falls(map: &PhaseMap, along_rows: bool) -> bool {
+    let [rising, falling] = rising_and_falling(map, along_rows, 1);
+    falling as f64 > FALLING * (falling + rising) as f64
 }
 
 /// Compares the stated convention of shifts with the others, of a sine or a cosine, rising or
@@ -324,16 +316,14 @@ fn conventions(
     let mut best: Option<(Agreement, Shifts)> = None;
     for half in [0.0, 0.5] {
         for convention in [Convention::Sin, Convention::Cos] {
-            for reversed in [false, true] {
+            for sign in [stated.sign, stated.sign.reversed()] {
                 let first = stated.first + half;
                 let other = Shifts {
                     convention,
-                    sign: match reversed {
-                        false => stated.sign,
-                        true => stated.sign.reversed(),
-                    },
+                    sign,
                     first: first - if first > 0.5 { 1.0 } else { 0.0 },
                 };
+                let reversed = sign != stated.sign;
                 if other == stated {
                     continue;
                 }

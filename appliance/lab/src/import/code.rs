@@ -2,8 +2,11 @@
 //! and alone it numbers the picture from one side to the other; else an option is named with which
 //! it does.
 
+use super::direction::rising_and_falling;
 use crate::Failed;
-use crate::description::{BitOrder, Description, Direction, Gray, of_direction, usual};
+use crate::description::{BitOrder, Description, Direction, Gray};
+use crate::lists::{Series, of_direction};
+use crate::shifts::usual;
 use algo::chain::{Cells, CodeWord, Coding, EXPECTED_TURNS, Edges};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
@@ -53,9 +56,7 @@ pub(super) fn notes_beside(
     description: &Description,
 ) -> Result<Option<Vec<String>>, Failed> {
     let code = recording.codes.iter().find(|code| code.pattern == pattern);
-    let (Some(code), Some(cells), Some(seen), Some(gray)) =
-        (code, channel.cells(), channel.seen()?, &description.gray)
-    else {
+    let (Some(code), Some(cells), Some(seen)) = (code, channel.cells(), channel.seen()?) else {
         return Ok(None);
     };
     let ratio = channel.finest();
@@ -64,7 +65,7 @@ pub(super) fn notes_beside(
     if edges.smoothness() < DOUBTFUL
         && let Some(better) = coding(finest, &seen, cells, ratio, &edges)
     {
-        let options = options(better.reversed, better.coding, gray);
+        let options = options(better.reversed, better.coding, &description.gray);
         notes.push(format!(
             "cells of the Gray code that are neighbours follow each other in {:.0} %, with {} in {:.0} %: give {}",
             100.0 * edges.smoothness(),
@@ -90,7 +91,6 @@ pub(super) fn notes_beside(
             false => projector.height,
         }),
         description,
-        gray,
         vertical,
     };
     notes.extend(beside.width());
@@ -126,13 +126,13 @@ fn options(reversed: bool, coding: Coding, gray: &Gray) -> String {
             BitOrder::Lsb => "--gray-order msb",
         });
     }
-    if coding.binary != gray.coding.binary {
+    if coding.binary != gray.coding().binary {
         options.push(match coding.binary {
             true => "--gray-binary",
             false => "no --gray-binary",
         });
     }
-    if coding.inverted != gray.coding.inverted {
+    if coding.inverted != gray.coding().inverted {
         options.push(match coding.inverted {
             true => "--gray-invert",
             false => "no --gray-invert",
@@ -187,7 +187,6 @@ struct Beside<'a> {
     /// Projector pixels across the fringes.
     length: f64,
     description: &'a Description,
-    gray: &'a Gray,
     /// Whether it numbers columns.
     vertical: bool,
 }
@@ -240,7 +239,10 @@ impl Beside<'_> {
         };
         let ((whole_cell, cell), (whole_fringes, fringes)) =
             (rounded(cell, 2.0), rounded(fringes, 1.0));
-        let by_cell = format!("--gray-cell {}", self.of_both(&self.gray.cell_px, cell));
+        let by_cell = format!(
+            "--gray-cell {}",
+            self.of_both(&self.description.gray.cell_px, cell)
+        );
         let by_fringes = format!("--fringes {fringes} for the finest level");
         // Cells of this width would lie beside the raster.
         let beside = self.edges.last() * cell > self.length + cell;
@@ -297,7 +299,7 @@ impl Beside<'_> {
     /// The offset with which cells and fringes begin together, if it is not one of whole cells.
     fn by_offset(&self, off: f64, turns: f64) -> Option<String> {
         let cell = turns * self.pitch();
-        let stated = of_direction(&self.gray.offset_px, self.vertical).unwrap_or(0.0);
+        let stated = of_direction(&self.description.gray.offset_px, self.vertical).unwrap_or(0.0);
         let offset = (stated - off * self.pitch()).rem_euclid(cell);
         let share = offset / cell;
         let quarters = (4.0 * share).round() / 4.0;
@@ -308,14 +310,14 @@ impl Beside<'_> {
         WITHIN_CELL.contains(&share).then(|| {
             format!(
                 "--gray-offset {} if the code and not the fringes begin elsewhere",
-                self.of_both(&self.gray.offset_px, offset)
+                self.of_both(&self.description.gray.offset_px, offset)
             )
         })
     }
 
     /// A number for this code, beside that of the other one if there is another: that of the
     /// columns first.
-    fn of_both(&self, stated: &[f64], own: f64) -> String {
+    fn of_both(&self, stated: &Option<Series<f64>>, own: f64) -> String {
         let both = matches!(
             self.description.direction,
             Direction::Both | Direction::HorizontalFirst
@@ -340,8 +342,7 @@ pub(super) fn notes_alone(
     let mut notes = Vec::new();
     let least = least_modulation(recording);
     for pattern in 0..recording.patterns.len() {
-        let (Some(code), Some(gray)) = (CodeAlone::of(recording, pattern)?, &description.gray)
-        else {
+        let Some(code) = CodeAlone::of(recording, pattern)? else {
             continue;
         };
         let Some(words) = problem(&code.phases(least)?) else {
@@ -353,7 +354,9 @@ pub(super) fn notes_alone(
             read.is_ok_and(|map| problem(&map).is_none())
         });
         let remedy = match fits {
-            Some((reversed, coding)) => format!("give {}", options(reversed, coding, gray)),
+            Some((reversed, coding)) => {
+                format!("give {}", options(reversed, coding, &description.gray))
+            }
             None => REMEDY.to_owned(),
         };
         notes.push(format!("Gray code of {number}: {words}{remedy}"));
@@ -387,21 +390,9 @@ fn problem(map: &PhaseMap) -> Option<String> {
 /// The excess of pairs whose phase changes in one way, along rows and along columns.
 fn one_way(map: &PhaseMap) -> [f64; 2] {
     let width = map.width.max(1);
-    let height = map.phase.len() / width;
-    [(width, 1), (height, width)].map(|(length, step)| {
+    [(true, width), (false, map.phase.len() / width)].map(|(along_rows, length)| {
         let apart = (length / FRAME_PARTS).max(1);
-        let (mut rising, mut falling) = (0_usize, 0_usize);
-        for (at, here) in map.phase.iter().enumerate() {
-            if (at / step) % length + apart >= length {
-                continue;
-            }
-            let next = map.phase[at + apart * step];
-            if here.is_known() && next.is_known() {
-                let turns = (next - *here).turns();
-                rising += usize::from(turns > 0.0);
-                falling += usize::from(turns < 0.0);
-            }
-        }
+        let [rising, falling] = rising_and_falling(map, along_rows, apart);
         rising.abs_diff(falling) as f64 / (rising + falling).max(1) as f64
     })
 }

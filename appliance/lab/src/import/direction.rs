@@ -75,21 +75,42 @@ fn coarsest(recording: &Recording, pattern: usize) -> Result<PhaseMap, Failed> {
 /// Mean change of the phase from column to column and from row to row, in turns, without its sign;
 /// the phase `wraps` at whole turns, or does not.
 fn slopes(map: &PhaseMap, wraps: bool) -> [f64; 2] {
-    let width = map.width.max(1);
-    [1, width].map(|step| {
+    [true, false].map(|along_rows| {
         let (mut sum, mut count) = (0.0, 0_usize);
-        for at in 0..map.phase.len().saturating_sub(step) {
-            if step == 1 && (at + 1) % width == 0 {
-                continue;
-            }
-            let pair = [at, at + step];
-            if pair.iter().all(|&at| map.trust[at].has_phase()) {
-                let [here, next] = pair.map(|at| map.phase[at].turns());
-                let rise = next - here;
-                sum += if wraps { rise - rise.round() } else { rise };
-                count += 1;
-            }
+        for rise in changes(map, along_rows, 1, |pixel| map.trust[pixel].has_phase()) {
+            sum += if wraps { rise - rise.round() } else { rise };
+            count += 1;
         }
         (sum / count.max(1) as f64).abs()
     })
+}
+
+/// The changes of the phase, in turns, between pixels that lie `apart` in a row or in a column, both
+/// of which are `known`.
+fn changes(
+    map: &PhaseMap,
+    along_rows: bool,
+    apart: usize,
+    known: impl Fn(usize) -> bool,
+) -> impl Iterator<Item = f64> {
+    let width = map.width.max(1);
+    let (length, step) = match along_rows {
+        true => (width, 1),
+        false => (map.phase.len() / width, width),
+    };
+    let first = (0..map.phase.len()).filter(move |pixel| pixel / step % length + apart < length);
+    let pairs = first.map(move |pixel| (pixel, pixel + apart * step));
+    let pairs = pairs.filter(move |&(here, next)| known(here) && known(next));
+    pairs.map(|(here, next)| (map.phase[next] - map.phase[here]).turns())
+}
+
+/// Between how many of these pixels the phase rises, and between how many it falls.
+pub(super) fn rising_and_falling(map: &PhaseMap, along_rows: bool, apart: usize) -> [usize; 2] {
+    let known = |pixel: usize| map.phase[pixel].is_known();
+    let (mut rising, mut falling) = (0, 0);
+    for turns in changes(map, along_rows, apart, known) {
+        rising += usize::from(turns > 0.0);
+        falling += usize::from(turns < 0.0);
+    }
+    [rising, falling]
 }

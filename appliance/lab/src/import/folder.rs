@@ -196,12 +196,17 @@ fn common(names: &[&[&str]]) -> String {
 fn words(mut text: &str) -> Vec<&str> {
     let mut words = Vec::new();
     while !text.is_empty() {
-        let (letters, digits) = (until_digit(text), digits(text));
-        let word = if letters.is_empty() { digits } else { letters };
+        let is_number = begins_with_digit(text);
+        let end = text.find(|letter: char| letter.is_ascii_digit() != is_number);
+        let (word, rest) = text.split_at(end.unwrap_or(text.len()));
         words.push(word);
-        text = &text[word.len()..];
+        text = rest;
     }
     words
+}
+
+fn begins_with_digit(text: &str) -> bool {
+    text.starts_with(|letter: char| letter.is_ascii_digit())
 }
 
 fn stem(name: &str) -> String {
@@ -210,36 +215,16 @@ fn stem(name: &str) -> String {
 
 /// Compares names so that pat2 comes before pat10.
 fn by_numbers(a: &str, b: &str) -> Ordering {
-    let (mut a, mut b) = (a, b);
-    loop {
-        let (text_a, text_b) = (until_digit(a), until_digit(b));
-        let order = text_a.cmp(text_b);
-        (a, b) = (&a[text_a.len()..], &b[text_b.len()..]);
-        if order != Ordering::Equal || a.is_empty() || b.is_empty() {
-            return order.then(a.len().cmp(&b.len()));
-        }
-        let (number_a, number_b) = (digits(a), digits(b));
-        let plain = |number: &str| number.trim_start_matches('0').to_owned();
-        let (plain_a, plain_b) = (plain(number_a), plain(number_b));
-        let order = plain_a
-            .len()
-            .cmp(&plain_b.len())
-            .then(plain_a.cmp(&plain_b));
-        (a, b) = (&a[number_a.len()..], &b[number_b.len()..]);
-        if order != Ordering::Equal {
-            return order;
+    /// A number's place is that of its value, before any text.
+    fn place(word: &str) -> (bool, usize, &str) {
+        let number = word.trim_start_matches('0');
+        match begins_with_digit(word) {
+            true => (false, number.len(), number),
+            false => (true, 0, word),
         }
     }
-}
-
-fn until_digit(text: &str) -> &str {
-    let end = text.find(|letter: char| letter.is_ascii_digit());
-    &text[..end.unwrap_or(text.len())]
-}
-
-fn digits(text: &str) -> &str {
-    let end = text.find(|letter: char| !letter.is_ascii_digit());
-    &text[..end.unwrap_or(text.len())]
+    let places = |name| words(name).into_iter().map(place);
+    places(a).cmp(places(b))
 }
 
 #[cfg(test)]

@@ -125,7 +125,7 @@ pub fn import(
         .map(frame)
         .collect::<Result<_, _>>()?;
     let models = models((format.width, format.height))?;
-    let mut recording = layout.recording(taken.description.projector, format, frames);
+    let mut recording = layout.recording(taken.description.projector(), format, frames);
     recording.description = format!("imported from {}", name(folder));
     recording.noise_counts = taken.noise_counts;
     recording.range_mm = taken.range_mm;

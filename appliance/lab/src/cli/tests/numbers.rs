@@ -1,9 +1,8 @@
 //! Boundary values in every number of the command line: each is refused with its option and bounds,
 //! or lies within them.
 
-use super::super::described::{Series as Numbers, Size};
 use super::Arguments;
-use crate::description::PerDirection;
+use crate::lists::{PerDirection, Series as Numbers, Size};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgMatches, CommandFactory as _};
 use std::any::TypeId;
