@@ -45,13 +45,13 @@ mod pair;
 mod production;
 mod readings;
 
-pub use accumulate::gauges::{Gauge, MAX_FEATURES, MAX_GAUGES, Unmeasurable};
-pub use measure::decode::Input;
+pub use accumulate::{Gauge, MAX_FEATURES, MAX_GAUGES, Unmeasurable};
+pub use measure::Input;
 pub use pair::PairBuffers;
 pub use production::drawn::{Drawing, Drawn, Place, Profile};
 pub use production::inspection::PairPlaced;
 pub use production::plan::{Parts, Production};
 pub use production::strip::{Maps, Strips};
-pub use readings::contours::{FoundFeature, GoldenSignal, Levels, Lost, SeenRim, Signal};
-pub use readings::findings::{Findings, Missing, Skipped};
-pub use readings::uncertainty::CalibrationUncertainty;
+pub use readings::CalibrationUncertainty;
+pub use readings::{Findings, Missing, Skipped};
+pub use readings::{FoundFeature, GoldenSignal, Levels, Lost, SeenRim, Signal};

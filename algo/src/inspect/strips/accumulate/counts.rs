@@ -4,8 +4,8 @@
 use super::coverage::{add_variances, count_known};
 use super::gauges::Gauges;
 use crate::inspect::feature::Sum;
-use crate::inspect::strips::align::coordinates::{Comparison, TaughtCoordinates};
-use crate::inspect::strips::measure::height::HeightRow;
+use crate::inspect::strips::align::{Comparison, TaughtCoordinates};
+use crate::inspect::strips::measure::HeightRow;
 use crate::math::common;
 use crate::phase::Trust;
 use crate::pipeline::{HeightTally, PhaseMap};

@@ -9,7 +9,7 @@ use crate::inspect::feature::{
 };
 use crate::inspect::gauge::{Basis, Measure, makes_datum};
 use crate::inspect::region::Region;
-use crate::inspect::strips::align::pose::PoseField;
+use crate::inspect::strips::align::PoseField;
 use crate::math::hull;
 use alloc::vec::Vec;
 use core::ops::Range;

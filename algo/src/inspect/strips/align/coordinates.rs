@@ -7,8 +7,8 @@ use super::displaced::{
 };
 use super::pose::{PoseField, blocks_of_row};
 use crate::inspect::feature::{Grid, Sum};
-use crate::inspect::strips::golden::part::Golden;
-use crate::inspect::strips::measure::height::{HeightRow, RecentRows};
+use crate::inspect::strips::golden::Golden;
+use crate::inspect::strips::measure::{HeightRow, RecentRows};
 use crate::inspect::weight::Factor;
 use crate::math::common;
 use crate::math::nearest::whole;

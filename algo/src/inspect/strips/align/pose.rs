@@ -9,7 +9,7 @@ use super::displaced::{BLOCK, BlockNumbers, Node, between, interpolate};
 use crate::geometry::Vector;
 use crate::inspect::align::{Motion, Placed};
 use crate::inspect::region::{CrossedEdge, Region};
-use crate::inspect::strips::golden::part::Golden;
+use crate::inspect::strips::golden::Golden;
 use crate::pipeline::for_each_row;
 use crate::simd::Backend;
 use alloc::vec;

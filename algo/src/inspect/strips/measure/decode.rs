@@ -1,7 +1,7 @@
 //! Stage 1, decode: a row of all frames → absolute phase, modulation and trust of its pixels.
 
 use crate::frame::{FrameView, SampleNoise};
-use crate::inspect::strips::golden::part::Golden;
+use crate::inspect::strips::golden::Golden;
 use crate::phase::{Arrived, DecodeError, Decoder, PhaseRow};
 use crate::pipeline::PhaseMap;
 use crate::units::{AbsolutePhase, Modulation};

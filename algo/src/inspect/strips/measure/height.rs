@@ -6,8 +6,7 @@
 
 use super::decode::PhasePlan;
 use crate::frame::SampleNoise;
-use crate::inspect::strips::golden::near::NodeRow;
-use crate::inspect::strips::golden::part::{Golden, base_nm};
+use crate::inspect::strips::golden::{Golden, NodeRow, base_nm};
 use crate::phase::Trust;
 use crate::pipeline::{
     CubicInput, CubicOutput, HeightTally, NO_OFFSET, PhaseMap, VARIANCE_UNIT_NM, offset_row,

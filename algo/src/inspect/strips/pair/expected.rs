@@ -13,11 +13,10 @@
 //! `expected_phases_are_those_of_double_precision`.
 
 use super::window::ExpectedRow;
-use crate::inspect::strips::align::displaced::{
-    BLOCK, BlockNumbers, Linear, Whole, floor, is_near,
+use crate::inspect::strips::align::{
+    BLOCK, BlockNumbers, Linear, PoseField, Whole, floor, is_near,
 };
-use crate::inspect::strips::align::pose::PoseField;
-use crate::inspect::strips::golden::part::Golden;
+use crate::inspect::strips::golden::Golden;
 use crate::math::nearest::whole;
 use crate::pipeline::{COMPARED, CubicRow};
 use crate::simd::{Backend, Lanes, back_end_entry};

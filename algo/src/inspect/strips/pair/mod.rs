@@ -22,5 +22,8 @@ mod window;
 
 pub use phases::PairBuffers;
 
+pub use expected::Expectation;
+pub use sums::{correlated, smoothed};
+
 #[cfg(test)]
 mod tests;

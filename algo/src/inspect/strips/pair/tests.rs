@@ -1,7 +1,6 @@
 //! Fits of made-up pairs against theory.
 
-use super::sums::SIDE;
-use super::sums::{correlated, smoothed};
+use super::sums::{SIDE, correlated, smoothed};
 use super::window::{Band, Windows};
 use crate::frame::{FrameView, Samples};
 use crate::phase::{LeastModulation, Trust};

@@ -1,9 +1,8 @@
 //! Which contours a part is placed by whose heights leave its motion open.
 
 use crate::geometry::Vector;
-use crate::inspect::strips::accumulate::gauges::Gauge;
-use crate::inspect::strips::readings::contours::{Contours, ExpectedContour};
-use crate::inspect::strips::readings::planes::PlaneFit;
+use crate::inspect::strips::accumulate::Gauge;
+use crate::inspect::strips::readings::{Contours, ExpectedContour, PlaneFit};
 use alloc::vec::Vec;
 
 /// Contours that a part is placed by at most.

@@ -26,9 +26,7 @@ use super::strip::Strips;
 use crate::geometry::Vector;
 use crate::inspect::align::{Fitting, Matrix6, Placed};
 use crate::inspect::feature::PlaneFrame;
-use crate::inspect::strips::readings::contours::{
-    ContourFit, ExpectedContour, REACH_MM, Signal, moved,
-};
+use crate::inspect::strips::readings::{ContourFit, ExpectedContour, REACH_MM, Signal, moved};
 use crate::math::solve::solve_symmetric;
 use crate::pipeline::for_each;
 use alloc::vec::Vec;

@@ -6,17 +6,14 @@ use crate::geometry::{Triangulator, Vector};
 use crate::inspect::align::{Alignment, Picture};
 use crate::inspect::feature::Feature;
 use crate::inspect::largest::Largest;
-use crate::inspect::strips::accumulate::coverage::Threshold;
-use crate::inspect::strips::accumulate::gauges::{Gauge, Gauges, Unmeasurable};
-use crate::inspect::strips::accumulate::sections::Sections;
-use crate::inspect::strips::align::coordinates::Comparison;
-use crate::inspect::strips::align::pose::PoseField;
-use crate::inspect::strips::golden::part::Golden;
-use crate::inspect::strips::measure::decode::PhasePlan;
-use crate::inspect::strips::readings::contours::{Contours, GoldenSignal, Known, Levels};
-use crate::inspect::strips::readings::evaluation::{Evaluation, ReadingPlan};
-use crate::inspect::strips::readings::planes::PlaneFit;
-use crate::inspect::strips::readings::uncertainty::{CalibrationUncertainty, ErrorBudget};
+use crate::inspect::strips::accumulate::{Gauge, Gauges, Sections, Threshold, Unmeasurable};
+use crate::inspect::strips::align::{Comparison, PoseField};
+use crate::inspect::strips::golden::Golden;
+use crate::inspect::strips::measure::PhasePlan;
+use crate::inspect::strips::readings::{
+    CalibrationUncertainty, Contours, ErrorBudget, Evaluation, GoldenSignal, Known, Levels,
+    PlaneFit, ReadingPlan,
+};
 use crate::inspect::taught::Taught;
 use crate::phase::Decoder;
 use crate::pipeline::{HeightCubics, VARIANCE_UNIT_NM};

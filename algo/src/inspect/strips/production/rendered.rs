@@ -24,8 +24,8 @@
 
 use crate::geometry::Vector;
 use crate::inspect::align::Motion;
-use crate::inspect::strips::golden::part::Golden;
-use crate::inspect::strips::measure::decode::PhasePlan;
+use crate::inspect::strips::golden::Golden;
+use crate::inspect::strips::measure::PhasePlan;
 use crate::phase::Trust;
 use crate::pipeline::{PhaseMap, for_each};
 use crate::units::{AbsolutePhase, Modulation};

@@ -3,16 +3,11 @@
 
 use super::plan::Production;
 use crate::inspect::align::{Alignment, Coarse, Equations, HeightSample};
-use crate::inspect::strips::accumulate::sections::SectionSight;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
-use crate::inspect::strips::accumulate::sums::StripSums;
-use crate::inspect::strips::align::coordinates::{Comparison, TaughtCoordinates};
-use crate::inspect::strips::align::pose::PoseField;
-use crate::inspect::strips::measure::decode::Input;
-use crate::inspect::strips::measure::height::{HeightRow, RecentRows};
-use crate::inspect::strips::readings::contours::ContourFit;
-use crate::inspect::strips::readings::deviation::SquareNoise;
-use crate::inspect::strips::readings::evaluation::PartFeatures;
+use crate::inspect::strips::accumulate::{SectionSight, StripSums};
+use crate::inspect::strips::align::{Comparison, PoseField, TaughtCoordinates};
+use crate::inspect::strips::measure::{HeightRow, Input, RecentRows};
+use crate::inspect::strips::readings::{ContourFit, PartFeatures, SquareNoise};
 use crate::math::common;
 use crate::pipeline::{NO_OFFSET, PhaseMap};
 use alloc::vec::Vec;

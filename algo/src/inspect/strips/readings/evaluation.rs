@@ -10,13 +10,12 @@ use crate::inspect::align::Placed;
 use crate::inspect::contour::State;
 use crate::inspect::feature::{Cell, Sum};
 use crate::inspect::gauge::Reading;
-use crate::inspect::strips::accumulate::counts::TRUSTS;
-use crate::inspect::strips::accumulate::gauges::{Gauges, MAX_FEATURES, MAX_GAUGES};
-use crate::inspect::strips::accumulate::sections::Sections;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
-use crate::inspect::strips::accumulate::sums::{StripSums, add_up};
-use crate::inspect::strips::align::pose::PoseField;
-use crate::inspect::strips::golden::part::Golden;
+use crate::inspect::strips::accumulate::{
+    Gauges, MAX_FEATURES, MAX_GAUGES, Sections, StripSums, TRUSTS, add_up,
+};
+use crate::inspect::strips::align::PoseField;
+use crate::inspect::strips::golden::Golden;
 use crate::phase::Trust;
 use crate::pipeline::{HeightTally, VARIANCE_UNIT_NM, for_each, for_each_item};
 use alloc::vec;

@@ -3,7 +3,7 @@
 use super::contours::FoundFeature;
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{MAX_PLACES, Reading};
-use crate::inspect::strips::accumulate::gauges::{MAX_FEATURES, MAX_GAUGES};
+use crate::inspect::strips::accumulate::{MAX_FEATURES, MAX_GAUGES};
 
 /// Everything that is known of a part after one cycle.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use super::uncertainty::ErrorBudget;
 use crate::inspect::contour::State;
 use crate::inspect::gauge::{Kind, Reading};
 use crate::inspect::section::{Joint, JointInput, Knowledge, Section, SectionPoint};
-use crate::inspect::strips::accumulate::sections::ExpectedSection;
+use crate::inspect::strips::accumulate::ExpectedSection;
 use alloc::vec::Vec;
 
 /// What was found of a section.

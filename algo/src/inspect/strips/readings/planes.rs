@@ -24,9 +24,9 @@ use crate::geometry::Vector;
 use crate::inspect::align::Motion;
 use crate::inspect::feature::{Cell, FittedPlane, Geometry, Middle, Sum, cells};
 use crate::inspect::gauge::SensitivePlane;
-use crate::inspect::strips::accumulate::gauges::Patch;
-use crate::inspect::strips::align::pose::{SPACING, displacement};
-use crate::inspect::strips::golden::part::Golden;
+use crate::inspect::strips::accumulate::Patch;
+use crate::inspect::strips::align::{SPACING, displacement};
+use crate::inspect::strips::golden::Golden;
 use alloc::vec::Vec;
 
 /// The fit of a plane, with its buffers.

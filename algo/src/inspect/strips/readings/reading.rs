@@ -11,12 +11,10 @@ use crate::inspect::gauge::{
     Basis, Characteristic, Evidence, Facts, MAX_DATUMS, MAX_PLACES, OfRim, Propagated, Reading,
     Sensitive,
 };
-use crate::inspect::strips::accumulate::coverage;
-use crate::inspect::strips::accumulate::gauges::Gauge;
 use crate::inspect::strips::accumulate::squares::extreme::Extreme;
 use crate::inspect::strips::accumulate::squares::rivals::rivals;
-use crate::inspect::strips::accumulate::sums::{StripSums, add_up};
-use crate::inspect::strips::align::pose::PoseField;
+use crate::inspect::strips::accumulate::{Gauge, StripSums, add_up, coverage};
+use crate::inspect::strips::align::PoseField;
 
 impl Evaluation<'_> {
     /// The reading of a gauge; `noisier` is the ratio of σ_z to that as taught.

@@ -19,7 +19,7 @@
 use crate::inspect::align::Placed;
 use crate::inspect::gauge::{FoundValue, Reading};
 use crate::inspect::largest::Largest;
-use crate::inspect::strips::pair::sums::{correlated, smoothed};
+use crate::inspect::strips::pair::{correlated, smoothed};
 use alloc::vec::Vec;
 
 /// σ by the error of the calibration; 0 where it is not known.

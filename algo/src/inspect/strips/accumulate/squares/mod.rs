@@ -8,8 +8,8 @@ pub mod extreme;
 pub mod rivals;
 
 use crate::inspect::strips::accumulate::gauges::Gauges;
-use crate::inspect::strips::align::coordinates::Comparison;
-use crate::inspect::strips::measure::height::RecentRows;
+use crate::inspect::strips::align::Comparison;
+use crate::inspect::strips::measure::RecentRows;
 use crate::math::{common, hull};
 use crate::pipeline::NO_OFFSET;
 use crate::simd::{Lanes, back_end_entry};

@@ -2,7 +2,7 @@
 //! compared with, and a pixel's deviation.
 
 use super::linear::{BLOCK, BlockNumbers, Linear, Whole, floor, is_near};
-use crate::inspect::strips::golden::part::base_nm;
+use crate::inspect::strips::golden::base_nm;
 use crate::inspect::weight::Factor;
 use crate::math::nearest::{BELOW, whole};
 use crate::pipeline::{NO_OFFSET, SQUARE};

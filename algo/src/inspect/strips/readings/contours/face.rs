@@ -4,7 +4,7 @@ use super::light::{GoldenSignal, Levels, Signal};
 use crate::geometry::{Triangulator, Vector};
 use crate::inspect::contour::{PlaneSpot, PlaneView};
 use crate::inspect::feature::PlaneFrame;
-use crate::inspect::strips::golden::near::{Near, NodeRow};
+use crate::inspect::strips::golden::{Near, NodeRow};
 use crate::math::complex::Complex;
 
 /// The plane of a face as it lies now.

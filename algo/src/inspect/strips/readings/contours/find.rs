@@ -10,8 +10,7 @@ use crate::inspect::contour::{Contour, EdgePoint, Outcome, PIECE_PX, Setup, Stat
 use crate::inspect::feature::{Geometry, PlaneFrame, Rim};
 use crate::inspect::gauge::Sensitive;
 use crate::inspect::section::Unseen;
-use crate::inspect::strips::golden::near::Near;
-use crate::inspect::strips::golden::part::Golden;
+use crate::inspect::strips::golden::{Golden, Near};
 use crate::inspect::strips::readings::planes::PlaneFit;
 use alloc::vec::Vec;
 

@@ -11,7 +11,7 @@ use crate::inspect::contour::shape::{Outline, PlanePlace, Trace, mean};
 use crate::inspect::feature::{FeatureKind, PlaneFrame};
 use crate::inspect::mask::components;
 use crate::inspect::region::Region;
-use crate::inspect::strips::golden::part::Golden;
+use crate::inspect::strips::golden::Golden;
 use alloc::vec;
 use alloc::vec::Vec;
 
