@@ -9,7 +9,7 @@
 use super::Edit;
 use crate::head::calibration::Calibration;
 use crate::recipe::file::archive::Arrays;
-use crate::recipe::file::feature::KINDS;
+use crate::recipe::file::feature::KindRow;
 use crate::recipe::file::rules;
 use crate::recipe::plan::{Golden, Plan};
 use crate::recipe::store::LoadedRecipe;
@@ -381,11 +381,10 @@ impl Trial<'_> {
 
 /// A recipe with a gauge of each of these features and no other.
 fn probing<'a>(file: &RecipeFile, of: impl Iterator<Item = &'a FeatureFile>) -> RecipeFile {
-    let gauges = of.enumerate().filter_map(|(at, feature)| {
-        let kind = KINDS.iter().find(|row| row.kind == feature.kind)?;
+    let gauges = of.enumerate().map(|(at, feature)| {
         let of = [feature.name.as_str()];
-        let measure = (kind.probe)();
-        Some(GaugeFile::new(at as u16 + 1, &feature.name, measure, &of))
+        let measure = (KindRow::of(feature.kind).probe)();
+        GaugeFile::new(at as u16 + 1, &feature.name, measure, &of)
     });
     RecipeFile {
         gauges: gauges.collect(),

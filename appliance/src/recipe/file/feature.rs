@@ -1,6 +1,7 @@
 //! The features of a recipe in its file, and datum systems of them.
 //!
-//! A feature kind is a row of `KINDS`, a key of features a row of `keys!`: reading, writing,
+//! A kind of feature is an arm of `KindRow::of`, and of contours their own file in `algo`; a key of
+//! features is a row of `keys!`: reading, writing,
 //! bounds, forms and the checked feature follow from these. The file form has the keys of all
 //! kinds, so that a key of another kind is refused by its name.
 
@@ -139,63 +140,6 @@ pub(crate) struct KindRow {
 
 const SECTION: &[&str] = &["section"];
 
-/// A kind that is measured in an area and has no keys; other rows say in what they differ.
-const AREA: KindRow = KindRow {
-    kind: FeatureKind::Surface,
-    about: "Heights, and deviations from golden, of a region.",
-    shapes: &["rectangle", "polygon", "circle"],
-    size: None,
-    probe: || MeanHeight {}.into(),
-    needs: &[],
-    may: &[],
-};
-
-/// The table of all kinds of features.
-pub(crate) const KINDS: [KindRow; FeatureKind::ALL.len()] = [
-    AREA,
-    KindRow {
-        kind: FeatureKind::Plane,
-        about: "The plane that fits the heights of a region best, by least squares.",
-        probe: || Z {}.into(),
-        may: &["thickness_mm", "rim_mm"],
-        ..AREA
-    },
-    KindRow {
-        kind: FeatureKind::Line,
-        about: "A straight edge of a face, where the face ends.",
-        shapes: &["points", "rectangle", "polygon"],
-        probe: || Found {}.into(),
-        may: &["plane", "rim_mm"],
-        ..AREA
-    },
-    KindRow {
-        kind: FeatureKind::Circle,
-        about: "A round hole in a face: where the face ends, by least squares.",
-        shapes: &["circle", "rectangle", "polygon"],
-        size: Some("diameter"),
-        probe: || Found {}.into(),
-        may: &["plane", "rim_mm"],
-        ..AREA
-    },
-    KindRow {
-        kind: FeatureKind::Slot,
-        about: "A slot with round ends in a face: where the face ends, by least squares.",
-        shapes: &["rectangle", "polygon"],
-        probe: || Found {}.into(),
-        may: &["plane", "rim_mm"],
-        ..AREA
-    },
-    KindRow {
-        kind: FeatureKind::Section,
-        about: "A cut across a joint of two sheets with rounded edges.",
-        shapes: SECTION,
-        needs: &["from", "to", "width_mm", "left", "right"],
-        probe: || Gap {}.into(),
-        may: &["edge_mm", "edge_tolerance_mm"],
-        ..AREA
-    },
-];
-
 bounded! {
     /// A datum system (ISO 5459).
     pub struct DatumFile {
@@ -244,6 +188,45 @@ fn listed(names: &[&str], last: &str) -> String {
 }
 
 impl KindRow {
+    /// That of a kind; a contour's follows from what its own file says of it.
+    pub(crate) fn of(kind: FeatureKind) -> Self {
+        let area = |about| Self {
+            kind,
+            about,
+            shapes: &["rectangle", "polygon", "circle"],
+            size: None,
+            probe: || MeanHeight {}.into(),
+            needs: &[],
+            may: &[],
+        };
+        match (kind, kind.contour()) {
+            (_, Some(contour)) => Self {
+                shapes: match (kind.is_opening(), contour.sizes) {
+                    (false, _) => &["points", "rectangle", "polygon"],
+                    (true, 1) => &["circle", "rectangle", "polygon"],
+                    (true, _) => &["rectangle", "polygon"],
+                },
+                size: (contour.sizes == 1).then_some("diameter"),
+                probe: || Found {}.into(),
+                may: &["plane", "rim_mm"],
+                ..area(contour.about)
+            },
+            (FeatureKind::Plane, _) => Self {
+                probe: || Z {}.into(),
+                may: &["thickness_mm", "rim_mm"],
+                ..area("The plane that fits the heights of a region best, by least squares.")
+            },
+            (FeatureKind::Section, _) => Self {
+                shapes: SECTION,
+                needs: &["from", "to", "width_mm", "left", "right"],
+                probe: || Gap {}.into(),
+                may: &["edge_mm", "edge_tolerance_mm"],
+                ..area("A cut across a joint of two sheets with rounded edges.")
+            },
+            _ => area("Heights, and deviations from golden, of a region."),
+        }
+    }
+
     fn has(&self, key: &str) -> bool {
         self.needs.contains(&key) || self.may.contains(&key)
     }
@@ -318,25 +301,25 @@ impl FeatureFile {
     /// Refuses keys that its kind does not have, and lacks of those that it must have.
     fn check_keys(&self) -> Result<(), Refusal> {
         let name = self.kind.name();
-        let kind = KINDS.iter().find(|row| row.kind == self.kind);
+        let kind = KindRow::of(self.kind);
         let present = self.present();
-        let is_section = |row: &KindRow| row.shapes == SECTION;
         let refused =
             |key: &str, whose: String| refused!("{key} of a {name}: {whose} has it, leave it out");
-        if !self.region.is_empty() && kind.is_some_and(is_section) {
+        if !self.region.is_empty() && kind.shapes == SECTION {
             return refused("region", "any other kind".into());
         }
         for key in KEYS.iter().filter(|key| present.contains(&key.name)) {
             let complete = key.with.is_none_or(|with| present.contains(&with));
-            if !(complete && kind.is_some_and(|row| row.has(key.name))) {
-                let owners = KINDS.iter().filter(|row| row.has(key.name));
+            if !(complete && kind.has(key.name)) {
+                let owners = FeatureKind::ALL.map(KindRow::of).into_iter();
+                let owners = owners.filter(|row| row.has(key.name));
                 let owners: Vec<_> = owners.map(|row| row.kind.name()).collect();
                 let with = key.with.map(|with| format!(" with an {with}"));
                 let owners = listed(&owners, "or");
                 return refused(key.name, format!("a {owners}{}", with.unwrap_or_default()));
             }
         }
-        let needs = kind.map_or(&[][..], |row| row.needs);
+        let needs = kind.needs;
         match needs.iter().all(|key| present.contains(key)) {
             true => Ok(()),
             false => refused!(
@@ -456,12 +439,12 @@ mod tests {
 
     #[test]
     fn a_feature_with_the_keys_of_its_form_is_one_and_with_another_it_is_none() {
-        for kind in KINDS.map(|kind| kind.json()) {
+        for kind in FeatureKind::ALL.map(|kind| KindRow::of(kind).json()) {
             for all in [false, true] {
                 let feature = made(&kind, all);
                 assert_eq!(feature.check_bounds(), Ok(()), "{kind}");
                 let keys = serde_json::to_value(&feature).unwrap();
-                for other in KINDS.map(|kind| kind.json()) {
+                for other in FeatureKind::ALL.map(|kind| KindRow::of(kind).json()) {
                     for parameter in other["parameters"].as_array().unwrap() {
                         let name = parameter["name"].as_str().unwrap();
                         let own = kind["parameters"].as_array().unwrap();
@@ -481,7 +464,7 @@ mod tests {
 
     #[test]
     fn gauges_of_a_kind_of_feature_are_those_that_take_it() {
-        let all = KINDS.map(|kind| kind.json());
+        let all = FeatureKind::ALL.map(|kind| KindRow::of(kind).json());
         let of = |kind: &str| {
             let found = all.iter().find(|of| of["kind"] == kind).unwrap();
             found["gauges"].as_array().unwrap().clone()

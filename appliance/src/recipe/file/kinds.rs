@@ -20,7 +20,7 @@ pub fn json() -> Value {
     });
     json!({
         "kinds": kinds, "units": units, "limits": limits(), "datums": datums(),
-        "features": feature::KINDS.map(|kind| kind.json()),
+        "features": FeatureKind::ALL.map(|kind| feature::KindRow::of(kind).json()),
         "bounds": {
             "features": MAX_FEATURES, "gauges": MAX_GAUGES, "corners": MAX_CORNERS,
             "characters": LONGEST_NAME,

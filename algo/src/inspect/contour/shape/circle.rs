@@ -14,6 +14,7 @@ pub struct Circle;
 
 /// Its row among the kinds of features.
 pub const KIND: ContourKind = ContourKind {
+    about: "A round hole in a face: where the face ends, by least squares.",
     has_direction: false,
     sizes: 1,
     begin: |trace| {

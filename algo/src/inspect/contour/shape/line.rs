@@ -21,6 +21,7 @@ pub struct Line {
 
 /// Its row among the kinds of features.
 pub const KIND: ContourKind = ContourKind {
+    about: "A straight edge of a face, where the face ends.",
     has_direction: true,
     sizes: 0,
     begin: |trace| Some(Outline::new(beside(trace)?, &[])),

@@ -124,6 +124,8 @@ pub struct Trace {
 /// What is known of a kind of contour.
 #[derive(Debug)]
 pub struct ContourKind {
+    /// What it is, in a sentence for people.
+    pub about: &'static str,
     /// Whether it has a direction in its plane.
     pub has_direction: bool,
     /// How many sizes it has.

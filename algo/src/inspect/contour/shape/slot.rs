@@ -14,6 +14,7 @@ pub struct Slot;
 
 /// Its row among the kinds of features.
 pub const KIND: ContourKind = ContourKind {
+    about: "A slot with round ends in a face: where the face ends, by least squares.",
     has_direction: true,
     sizes: 2,
     begin: |trace| {
