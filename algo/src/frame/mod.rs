@@ -1,8 +1,8 @@
 //! Camera frames as borrowed samples, their mean, and a camera's noise.
 //!
 //! `FrameView::row` is where a frame's stride is dropped: everything that decodes gets slices of
-//! whole rows without padding. What reads samples without it (`head/examine/pictures.rs`,
-//! `head/means.rs`, `head/live/picture.rs`, the recorder) leaves the padding out by itself.
+//! whole rows without padding. What reads samples without it (the doctor, means of frames, the live
+//! picture, the recorder) leaves the padding out by itself.
 
 mod noise;
 
