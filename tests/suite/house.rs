@@ -252,6 +252,20 @@ fn the_stages_of_an_inspection_import_only_what_lies_before_them() {
     only_backwards(rule, "algo/src/inspect/strips", strips, &order);
 }
 
+#[test]
+fn the_folders_of_a_recipe_import_only_what_lies_before_them() {
+    let rule = "appliance/src/recipe, in this order: file ← shown ← plan ← store ← teach ← edit.";
+    let order = [
+        &["file"][..],
+        &["shown"],
+        &["plan"],
+        &["store"],
+        &["teach"],
+        &["edit"],
+    ];
+    only_backwards(rule, "appliance/src/recipe", "crate::recipe", &order);
+}
+
 /// Fails where a module below `folder`, whose path in the code is `path`, names one of a later line.
 fn only_backwards(rule: &str, folder: &str, path: &str, order: &[&[&str]]) {
     for (at, here) in order.iter().enumerate() {
