@@ -20,7 +20,7 @@ use crate::inspect::strips::measure::Input;
 use crate::inspect::strips::pair::{Expectation, PairBuffers};
 use crate::inspect::strips::readings::{ContourFit, Findings, PartFeatures, Signal, SquareNoise};
 use crate::phase::DecodeError;
-use crate::pipeline::{PhaseMap, arrive_rest, for_each, for_each_item};
+use crate::pipeline::{PhaseMap, arrive_rest, for_each, for_each_item, for_each_row_of_two};
 use crate::units::Modulation;
 use alloc::vec;
 use alloc::vec::Vec;
@@ -280,17 +280,16 @@ impl Production {
             sight.set(expected, &self.golden, region, motion);
         });
         let part = (pose, &sights[..]);
-        let work = all.iter_mut().zip(&mut *sums);
         if maps.is_empty() {
-            for_each(
-                work.collect(),
-                |_, (strip, sums): (&mut Strip, &mut StripSums)| {
+            for_each_row_of_two((&mut *all, 1), (&mut *sums, 1), |_, strips, sums| {
+                for (strip, sums) in strips.iter_mut().zip(sums) {
                     strip.inspect(self, part, input, sums, Maps::default());
-                },
-            );
+                }
+            });
         } else {
             let maps = maps.split((*rows * self.golden.size().0).max(1));
-            for_each(work.zip(maps).collect(), |_, ((strip, sums), maps)| {
+            let work = all.iter_mut().zip(&mut *sums).zip(maps);
+            for_each(work.collect(), |_, ((strip, sums), maps)| {
                 strip.inspect(self, part, input, sums, maps);
             });
         }
