@@ -71,6 +71,23 @@ pub struct Placed {
 }
 
 impl Placed {
+    /// A part that lies as taught and turns about this point, 50 mm large.
+    #[cfg(test)]
+    pub fn lying(centre: Vector, covariance: Matrix6) -> Self {
+        Self {
+            motion: Motion::none(centre),
+            covariance,
+            radius: 50.0,
+            left_out: [false; 6],
+            free: heapless::Vec::new(),
+            steered: false,
+            points: 100,
+            outliers: 0.0,
+            reach: 0.0,
+            reach_sigma: 0.0,
+        }
+    }
+
     /// Component 0 to 5 of the motion and its error (1 σ): shifts in mm, turns in degrees; none if
     /// the part's shape does not determine it.
     pub fn component(&self, component: usize) -> Option<(f64, f64)> {

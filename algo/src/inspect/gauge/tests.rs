@@ -231,18 +231,7 @@ fn plane((x, y): (f64, f64), slopes: [f64; 2], pixel: f64) -> (FittedPlane, Vec<
 
 /// A part whose motion has this covariance.
 fn lying(covariance: [[f64; 6]; 6]) -> Placed {
-    Placed {
-        motion: Motion::none(Vector::new(1.0, -2.0, 4.0)),
-        covariance,
-        radius: 50.0,
-        left_out: [false; 6],
-        free: heapless::Vec::new(),
-        steered: false,
-        points: 100,
-        outliers: 0.0,
-        reach: 0.0,
-        reach_sigma: 0.0,
-    }
+    Placed::lying(Vector::new(1.0, -2.0, 4.0), covariance)
 }
 
 /// Planes as values depend on them.

@@ -153,24 +153,12 @@ fn magnitude(square: &Extreme) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::Vector;
-    use crate::inspect::align::Motion;
 
     #[test]
     fn noise_falls_with_the_pixels_of_a_square_and_the_error_of_the_motion_does_not() {
         let mut covariance = [[0.0; 6]; 6];
         covariance[2][2] = 0.02 * 0.02;
-        let placed = Placed {
-            motion: Motion::none(Vector::default()),
-            covariance,
-            radius: 50.0,
-            left_out: [false; 6],
-            free: heapless::Vec::new(),
-            steered: false,
-            points: 100,
-            outliers: 0.0,
-            reach: 0.0,
-            reach_sigma: 0.0,
-        };
+        let placed = Placed::lying(Vector::default(), covariance);
         let mut noise = SquareNoise::new(8);
         for at in 0..64 {
             // On a slope a shift along z by 1 mm lifts what a pixel sees by 2 mm.
