@@ -11,6 +11,7 @@ pub mod material;
 pub mod optics;
 pub mod parts;
 pub mod placement;
+mod random;
 pub mod scenario;
 mod scene;
 mod sensor;
@@ -19,6 +20,7 @@ pub mod timing;
 mod trace;
 pub mod transport;
 mod unfit;
+mod unsteady;
 
 pub use hal::virtual_head::Faults;
 pub use material::Material;
@@ -30,6 +32,7 @@ pub use stage::{Stage, head, head_with_progress};
 pub use timing::Timing;
 pub use transport::Truth;
 pub use unfit::Unfit;
+pub use unsteady::Unsteady;
 
 #[cfg(test)]
 mod tests;

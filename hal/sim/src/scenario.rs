@@ -14,6 +14,7 @@ use super::parts::Part;
 use super::placement::{Ground, Placement};
 use super::timing::Timing;
 use super::unfit::{MAX_RAYS, Unfit};
+use super::unsteady::Unsteady;
 use hal::bounded;
 use hal::bounds::{Bound, Fields, shortened};
 use hal::model::DeviceModel;
@@ -44,6 +45,8 @@ bounded! {
         pub rig: Rig = Fields,
         /// Ambient light, and how much light the part reflects.
         pub light: Lighting = Fields,
+        /// How the light changes in time.
+        pub unsteady: Unsteady = Fields,
         /// Noise of the camera.
         pub noise: Noise = Fields,
         /// Blur, response and exposure.

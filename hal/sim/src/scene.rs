@@ -14,6 +14,7 @@ use super::placement::{Ground, Placement};
 use super::scenario::Scenario;
 use super::sensor::Sensor;
 use super::transport::{PADDING, Transport};
+use super::unsteady::Exposed;
 use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Pool};
 use hal::projector::Raster;
@@ -29,8 +30,11 @@ const MAX_PICTURES: usize = 24 << 20;
 /// exposures often see the same two, with other shares.
 const MAX_LIGHTS: usize = 3;
 
-/// What was in view during an exposure.
-type View = Vec<InView>;
+/// What was in view during an exposure, and at which place of the part.
+type View = (usize, Vec<InView>);
+
+/// The place of the part, and the pattern that is shown, or none.
+type Shown = (usize, Option<usize>);
 
 /// A placed part with its light transport, ready to be put in place.
 #[derive(Clone, Debug)]
@@ -39,7 +43,10 @@ pub struct Staged {
     pub(super) material: Option<Material>,
     pub(super) placement: Placement,
     pub(super) floor: Option<Ground>,
+    /// As it lies.
     pub(super) transport: Arc<Transport>,
+    /// At each of the places between which it shakes.
+    shaken: Vec<Arc<Transport>>,
 }
 
 impl Staged {
@@ -50,13 +57,29 @@ impl Staged {
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Self {
-        let transport = Transport::build(scenario, part, material, placement, progress);
+        let places = scenario.unsteady.places();
+        let shaken = places.iter().enumerate().map(|(at, share)| {
+            let mut placement = *placement;
+            for (mm, shake) in placement
+                .shift_mm
+                .iter_mut()
+                .zip(scenario.unsteady.shake_mm)
+            {
+                *mm += share * shake;
+            }
+            let told = |done: f64| progress((at as f64 + done) / places.len() as f64);
+            Arc::new(Transport::build(
+                scenario, part, material, &placement, &told,
+            ))
+        });
+        let shaken: Vec<_> = shaken.collect();
         Self {
             part: part.clone(),
             material,
             placement: *placement,
             floor: scenario.floor.clone(),
-            transport: Arc::new(transport),
+            transport: Arc::clone(&shaken[shaken.len() / 2]),
+            shaken,
         }
     }
 }
@@ -71,7 +94,7 @@ pub(crate) struct SimScene {
     pictures: VecDeque<(View, Vec<f32>)>,
     /// The light of patterns that were seen with others in one exposure, before the camera's blur; the
     /// latest last.
-    lights: VecDeque<(Option<usize>, Vec<f32>)>,
+    lights: VecDeque<(Shown, Vec<f32>)>,
     /// Pixels of the sensor.
     sensor_size: usize,
     pool: Pool,
@@ -121,13 +144,14 @@ impl SimScene {
         self.sensor.reseed(seed);
     }
 
-    /// The number of the picture of what is in view, which is computed unless it is kept: frames of
-    /// one pattern differ by their noise alone.
-    fn picture(&mut self, seen: &[InView]) -> usize {
-        if let Some(known) = self.pictures.iter().position(|(view, _)| view == seen) {
+    /// The number of the picture of what is in view, with the part at one of its places, which is
+    /// computed unless it is kept: frames of one pattern differ by their noise alone.
+    fn picture(&mut self, place: usize, seen: &[InView]) -> usize {
+        let mut known = self.pictures.iter();
+        if let Some(known) = known.position(|((at, view), _)| *at == place && view == seen) {
             return known;
         }
-        if self.pictures.len() > self.rasters.len() {
+        if self.pictures.len() > self.rasters.len() * self.placed.shaken.len() {
             self.pictures.pop_front();
         }
         let mut picture = vec![0.0; self.sensor_size];
@@ -135,34 +159,67 @@ impl SimScene {
             [InView { pattern, share }] => {
                 self.lights.clear();
                 let raster = self.lit(*pattern);
-                self.placed.transport.light(raster.as_deref(), &mut picture);
+                self.placed.shaken[place].light(raster.as_deref(), &mut picture);
                 picture.iter_mut().for_each(|light| *light *= share);
             }
             several => {
                 for InView { pattern, share } in several {
-                    let parts = picture.iter_mut().zip(self.light(*pattern));
+                    let parts = picture.iter_mut().zip(self.light((place, *pattern)));
                     parts.for_each(|(sum, light)| *sum += share * light);
                 }
             }
         }
         let width = self.scenario.rig.camera.width as usize;
         gaussian(&mut picture, width, self.placed.transport.blur_px);
-        self.pictures.push_back((seen.to_vec(), picture));
+        self.pictures.push_back(((place, seen.to_vec()), picture));
         self.pictures.len() - 1
     }
 
-    /// The light on the camera while this pattern is shown, or none.
-    fn light(&mut self, shown: Option<usize>) -> &[f32] {
-        let known = self
-            .lights
-            .iter()
-            .position(|(pattern, _)| *pattern == shown);
+    /// The picture of what is in view where something changes; none where nothing does.
+    fn changed(&mut self, seen: &[InView], timestamp: Timestamp, count: u64) -> Option<Vec<f32>> {
+        let scenario = Arc::clone(&self.scenario);
+        let unsteady = &scenario.unsteady;
+        let shakes = unsteady.places().len() > 1;
+        if unsteady.is_steady() && !shakes {
+            return None;
+        }
+        let share = seen.iter().map(|view| view.share).sum();
+        let planned = scenario.mechanics().exposure.as_secs_f64();
+        let exposed = Exposed {
+            start: timestamp.0 as f64 * 1e-9,
+            length: planned * self.exposing[0] * f64::from(share),
+            count,
+        };
+        let refresh = scenario.refresh().as_secs_f64();
+        let light = unsteady.light(scenario.light.ambient, exposed, refresh);
+        let [other, shown] = light.map(|factor| factor as f32);
+        let dark = [InView {
+            pattern: None,
+            share,
+        }];
+        let mut picture = vec![0.0; self.sensor_size];
+        for (place, stay) in unsteady.stays(exposed).into_iter().enumerate() {
+            for (seen, share) in [(seen, shown), (&dark, other - shown)] {
+                let share = share * stay as f32;
+                if share != 0.0 {
+                    let at = self.picture(place, seen);
+                    let parts = picture.iter_mut().zip(&self.pictures[at].1);
+                    parts.for_each(|(sum, light)| *sum += share * light);
+                }
+            }
+        }
+        Some(picture)
+    }
+
+    /// The light on the camera while the part is at this place and this pattern is shown, or none.
+    fn light(&mut self, shown: Shown) -> &[f32] {
+        let known = self.lights.iter().position(|(known, _)| *known == shown);
         let oldest = || (self.lights.len() >= MAX_LIGHTS).then_some(0);
         let kept = known.or_else(oldest).and_then(|at| self.lights.remove(at));
         let mut light = kept.map_or_else(|| vec![0.0; self.sensor_size], |(_, light)| light);
         if known.is_none() {
-            let raster = self.lit(shown);
-            self.placed.transport.light(raster.as_deref(), &mut light);
+            let raster = self.lit(shown.1);
+            self.placed.shaken[shown.0].light(raster.as_deref(), &mut light);
         }
         self.lights.push_back((shown, light));
         self.lights.back().map_or(&[], |(_, light)| light)
@@ -170,7 +227,8 @@ impl SimScene {
 
     /// Whether there is memory for the pictures of all patterns and of none.
     fn keeps_pictures(&self) -> bool {
-        (self.rasters.len() + 1) * self.sensor_size * size_of::<f32>() <= MAX_PICTURES
+        (self.rasters.len() + 1) * self.placed.shaken.len() * self.sensor_size * size_of::<f32>()
+            <= MAX_PICTURES
     }
 
     /// The light of a loaded raster, 1 = white, row by row, with [`PADDING`]; `None` where none is
@@ -219,8 +277,8 @@ impl Scene for SimScene {
     fn load(&mut self, kept: usize, rasters: Vec<Raster>) -> Result<(), Error> {
         let stays = |shown: &Option<usize>| shown.is_none_or(|index| index < kept);
         self.pictures
-            .retain(|(view, _)| view.iter().all(|seen| stays(&seen.pattern)));
-        self.lights.retain(|(shown, _)| stays(shown));
+            .retain(|((_, view), _)| view.iter().all(|seen| stays(&seen.pattern)));
+        self.lights.retain(|((_, shown), _)| stays(shown));
         // Teaching holds more frames at a time than a cycle.
         self.pool.release();
         self.rasters.truncate(kept);
@@ -238,9 +296,11 @@ impl Scene for SimScene {
         timestamp: Timestamp,
         count: u64,
     ) -> Result<Frame, Error> {
-        let at = self.picture(seen);
+        let changed = self.changed(seen, timestamp, count);
+        let middle = self.placed.shaken.len() / 2;
+        let at = self.picture(middle, seen);
         let (random, exposing) = (self.sensor.next_frame(), self.exposing);
-        let (_, whole) = &self.pictures[at];
+        let whole = changed.as_ref().unwrap_or(&self.pictures[at].1);
         let plane = self.scenario.colour.then(|| self.scenario.in_frame(whole));
         let picture = plane.as_ref().unwrap_or(whole);
         let sensor = &self.sensor;

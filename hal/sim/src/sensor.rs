@@ -11,6 +11,7 @@
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 
+use super::random::normal;
 use super::scenario::{Noise, Scenario};
 
 /// Separates the random numbers of the pixels' responses from those of frames.
@@ -107,12 +108,4 @@ impl Sensor {
             }
         }
     }
-}
-
-/// The sum of the four quarters of a random word, of mean 0 and variance 1. All sums are exact.
-fn normal(word: u64) -> f32 {
-    let quarter = |at: u32| f32::from((word >> (16 * at)) as u16);
-    let sum = quarter(0) + quarter(1) + quarter(2) + quarter(3);
-    // Each quarter is uniform in 0…65535, of variance (2³² − 1) / 12; √3 / 2¹⁶ = 2.6429e-5.
-    (sum - 131_070.0) * 2.642_899_8e-5
 }

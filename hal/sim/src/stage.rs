@@ -108,7 +108,7 @@ impl Stage {
             None => self.work_out(part, material, placement, progress)?,
         };
         let mut remembered = self.remembered();
-        if remembered.len() == MAX_REMEMBERED {
+        if remembered.len() >= MAX_REMEMBERED / self.scenario.unsteady.places().len() {
             remembered.remove(0);
         }
         remembered.push(staged.clone());
