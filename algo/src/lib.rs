@@ -16,6 +16,7 @@ extern crate std;
 pub mod adaptive;
 pub mod calibration;
 pub mod chain;
+pub mod flicker;
 pub mod frame;
 pub mod geometry;
 pub mod inspect;

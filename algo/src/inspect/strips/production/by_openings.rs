@@ -68,7 +68,7 @@ pub fn place_by_openings(
         production.alignment.as_ref()?,
     );
     let is_open = !placed.free.is_empty() && !production.anchors.is_empty();
-    if !is_open || !matches!(light, Signal::Frames(_)) {
+    if !is_open || !matches!(light, Signal::Frames(..)) {
         return None;
     }
     let fitting = alignment.fitting(production.golden.surface());

@@ -92,7 +92,7 @@ impl Production {
             heights,
             deviation: None,
         };
-        self.inspect_placed((input, Signal::Frames(frames)), strips, placed, maps)
+        self.inspect_placed((input, Signal::Frames(frames, 0.0)), strips, placed, maps)
     }
 
     /// The first half: how the part lies, from a few rows of each strip, and by the picture where

@@ -15,7 +15,7 @@
 //! ([`Facet::jacobian`](crate::inspect::align::Facet::jacobian)); it changes little over a square,
 //! so its mean over some pixels is taken.
 
-use super::uncertainty::ErrorBudget;
+use super::uncertainty::{ErrorBudget, Taken};
 use crate::inspect::align::{Placed, form};
 use crate::inspect::gauge::{Reading, Square};
 use crate::inspect::largest::Largest;
@@ -81,14 +81,13 @@ impl SquareNoise {
 
 impl ErrorBudget {
     /// The reading of the first of the squares of `side` pixels that were found, in falling order;
-    /// none if there is none. σ_z is `noisier` times the taught σ. The noise of the squares is
-    /// asked for here, for these few alone.
+    /// none if there is none. The noise of the squares is asked for here, for these few alone.
     pub fn deviation(
         &self,
         (found, side): (&[Extreme], usize),
         mut noise_of: impl FnMut(&Extreme) -> SquareNoise,
         placed: Option<&Placed>,
-        (gauge, noisier): (usize, f64),
+        (gauge, taken): (usize, Taken),
     ) -> Option<Reading> {
         let best = found.first()?;
         let smoothed = self.square_variance(side);
@@ -101,7 +100,7 @@ impl ErrorBudget {
         let others =
             others.map(|(square, (pixels, motion, _))| [magnitude(square), pixels + motion]);
         // What good parts read: golden's noise and that of this measurement.
-        let golden = self.golden_variance(noisier) / smoothed;
+        let golden = self.golden_variance(taken.noisier) / smoothed;
         let largest = self.largest.get(gauge).copied().unwrap_or_default();
         let largest = largest.times(libm::sqrt(1.0 + 1.0 / golden));
         let largest = self.of_displaced(largest, gauge, placed);
@@ -111,7 +110,7 @@ impl ErrorBudget {
         let golden = libm::sqrt(
             golden * (extreme.defect * pixels + motion * smoothed / self.spot_variance()),
         );
-        let wrong = libm::hypot(self.displaced(placed), self.rippled() * lever);
+        let wrong = libm::hypot(self.displaced(placed), self.rippled(taken) * lever);
         let systematic = libm::hypot(golden, wrong);
         Some(Reading {
             value: best.sum as f64 / best.count as f64 / 1e6,

@@ -5,7 +5,7 @@ use super::deviation::SquareNoise;
 use super::findings::{Findings, Skipped};
 use super::joints::SectionFit;
 use super::planes::PlaneFit;
-use super::uncertainty::ErrorBudget;
+use super::uncertainty::{ErrorBudget, Taken};
 use crate::inspect::align::Placed;
 use crate::inspect::contour::State;
 use crate::inspect::feature::{Cell, Sum};
@@ -116,16 +116,18 @@ impl Evaluation<'_> {
             rms_mm(tally.variance, tally.summed),
             rms_mm(tally.taught_variance, tally.taught),
         );
-        // The ratio of σ_z to that as taught.
-        let noisier = height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE);
+        let taken = Taken {
+            noisier: height_noise_mm / taught_noise_mm.max(f64::MIN_POSITIVE),
+            unsteady: height_noise_mm * light.unsteady(),
+        };
         // From the noise of independent pixels to that of the map.
         let windows = libm::sqrt(self.plan.budget.square_variance(1));
-        self.fit(sums, pose, noisier, &mut found.fits);
+        self.fit(sums, pose, taken.noisier, &mut found.fits);
         self.find_contours(pose, light, found);
         self.find_joints(sums, found);
         let features = self.features(found);
         let readings: heapless::Vec<Option<Reading>, MAX_GAUGES> = (0..self.gauges.list.len())
-            .map(|gauge| self.reading(gauge, noisier, pose, sums, noise_of, found))
+            .map(|gauge| self.reading(gauge, taken, pose, sums, noise_of, found))
             .collect();
         let missing = |(gauge, reading): (usize, &Option<Reading>)| match reading {
             Some(_) => None,

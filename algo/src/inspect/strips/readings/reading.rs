@@ -4,6 +4,7 @@ use super::contours::{ContourFit, FoundFeature};
 use super::evaluation::{CellBuffers, Evaluation, NoiseOf, PartFeatures};
 use super::findings::Missing;
 use super::planes::PlaneFit;
+use super::uncertainty::Taken;
 use crate::inspect::contour::State;
 use crate::inspect::contour::shape::Outline;
 use crate::inspect::feature::{Geometry, cells};
@@ -17,11 +18,11 @@ use crate::inspect::strips::accumulate::{Gauge, StripSums, add_up, coverage};
 use crate::inspect::strips::align::PoseField;
 
 impl Evaluation<'_> {
-    /// The reading of a gauge; `noisier` is the ratio of σ_z to that as taught.
+    /// The reading of a gauge of a part that was measured so.
     pub fn reading(
         &self,
         gauge: usize,
-        noisier: f64,
+        taken: Taken,
         pose: &PoseField,
         sums: &mut [StripSums],
         noise_of: NoiseOf<'_>,
@@ -59,7 +60,7 @@ impl Evaluation<'_> {
                     let found = rivals(sums.iter().map(|strip| &strip.squares.extremes[at]));
                     let found = (&found[..], squares.side);
                     let noise_of = |square: &Extreme| noise_of(square, squares.side);
-                    let (placed, gauge) = (pose.placed.as_ref(), (gauge, noisier));
+                    let (placed, gauge) = (pose.placed.as_ref(), (gauge, taken));
                     let next = self.plan.budget.deviation(found, noise_of, placed, gauge);
                     let less = |next: &Reading| {
                         largest.is_some_and(|of| libm::fabs(next.value) < libm::fabs(of.value))
@@ -72,7 +73,10 @@ impl Evaluation<'_> {
                 let (value, sigma) = pose.placed.as_ref()?.component(component as usize)?;
                 let budget = &self.plan.budget;
                 let systematic = libm::hypot(
-                    sigma * libm::sqrt(budget.golden_variance(noisier) / budget.spot_variance()),
+                    sigma
+                        * libm::sqrt(
+                            budget.golden_variance(taken.noisier) / budget.spot_variance(),
+                        ),
                     value * budget.calibration.length,
                 );
                 Some(Reading {
@@ -84,14 +88,17 @@ impl Evaluation<'_> {
                     ..Reading::default()
                 })
             }
-            Basis::Cells(_) | Basis::Region => self.of_cells(gauge, noisier, pose, sums, cells),
-            Basis::Geometry => self.of_geometry(gauge, noisier, pose, (fits, contours)),
+            Basis::Cells(_) | Basis::Region => self.of_cells(gauge, taken, pose, sums, cells),
+            Basis::Geometry => self.of_geometry(gauge, taken, pose, (fits, contours)),
             Basis::Rim => self.of_rim(gauge, contours),
             Basis::Section => {
                 let Gauge { of, measure, .. } = &self.gauges.list[gauge];
                 let feature = *of.first()?;
                 let found = joints.iter().find(|joint| joint.is_of(feature))?;
-                found.reading(measure.kind(), self.plan.budget.golden_variance(noisier))
+                found.reading(
+                    measure.kind(),
+                    self.plan.budget.golden_variance(taken.noisier),
+                )
             }
         }
     }
@@ -100,7 +107,7 @@ impl Evaluation<'_> {
     fn of_cells(
         &self,
         gauge: usize,
-        noisier: f64,
+        taken: Taken,
         pose: &PoseField,
         sums: &[StripSums],
         buffers: &mut CellBuffers,
@@ -133,7 +140,7 @@ impl Evaluation<'_> {
             0 => patch.pixels().isqrt() as usize,
             side => side,
         });
-        let noise = noisier * noisier * smoothed;
+        let noise = taken.noisier * taken.noisier * smoothed;
         let [pixel, from] = [patch, other].map(|of| of.pixel_variance(compares) * noise);
         let placed = pose.placed.as_ref();
         let mut found = measure.kind().find(Evidence {
@@ -149,7 +156,7 @@ impl Evaluation<'_> {
         if compares {
             found.pixels *= budget.cells_together(side);
         }
-        let reading = budget.reading_of(found, (noisier, smoothed), placed);
+        let reading = budget.reading_of(found, (taken, smoothed), placed);
         Some(match compares {
             true => Reading {
                 systematic: reading.compared,
@@ -159,12 +166,11 @@ impl Evaluation<'_> {
         })
     }
 
-    /// The reading of a gauge of the geometry of features; `noisier` is the ratio of σ_z to that as
-    /// taught.
+    /// The reading of a gauge of the geometry of features.
     fn of_geometry(
         &self,
         gauge: usize,
-        noisier: f64,
+        taken: Taken,
         pose: &PoseField,
         (fits, contours): (&[PlaneFit], &[ContourFit]),
     ) -> Option<Reading> {
@@ -183,7 +189,7 @@ impl Evaluation<'_> {
         let placed = pose.placed.as_ref();
         let propagated = |value: Characteristic<'_>| {
             let propagated = value.propagate(placed, budget.calibration.length)?;
-            let reading = budget.reading_of(propagated.found, (noisier, 1.0), placed);
+            let reading = budget.reading_of(propagated.found, (taken, 1.0), placed);
             Some((propagated, reading))
         };
         let (

@@ -13,7 +13,7 @@
 //! - the periodic error of phases by an imperfect response, of RMS ρ
 //!   ([`ripple`](crate::inspect::ripple)): a part that is displaced has it at other places of the
 //!   fringes than golden, so its deviation has √2 ρ, and 2 u is the largest by which two sines
-//!   differ. ρ is that of the place where it is largest, and taken to have the sign that does most
+//!   differ. What is left of light that changed ([`flicker`](crate::flicker)) is such an error, too. ρ is that of the place where it is largest, and taken to have the sign that does most
 //!   everywhere.
 
 use crate::inspect::align::Placed;
@@ -54,14 +54,23 @@ pub struct ErrorBudget {
     pub pixels_per_spot: f64,
 }
 
+/// How a part was measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Taken {
+    /// σ_z over that as taught.
+    pub noisier: f64,
+    /// RMS of the periodic error of heights that changes of light left, mm.
+    pub unsteady: f64,
+}
+
 impl ErrorBudget {
     /// The reading of a value that is made of heights; of one that is made of deviations from golden
-    /// `compared` is the systematic error as well. σ_z is `noisier` times the taught σ, and the
-    /// variances of pixels were multiplied by `smoothed`.
+    /// `compared` is the systematic error as well. The variances of pixels were multiplied by
+    /// `smoothed`.
     pub fn reading_of(
         &self,
         found: FoundValue,
-        (noisier, smoothed): (f64, f64),
+        (taken, smoothed): (Taken, f64),
         placed: Option<&Placed>,
     ) -> Reading {
         let FoundValue {
@@ -74,8 +83,8 @@ impl ErrorBudget {
         // Golden's pixels are independent of each other.
         let moved = motion / self.spot_variance();
         let systematic = |golden: f64, wrong: f64| {
-            let golden = golden * self.golden_variance(noisier);
-            let wrong = libm::hypot(wrong, self.rippled());
+            let golden = golden * self.golden_variance(taken.noisier);
+            let wrong = libm::hypot(wrong, self.rippled(taken));
             libm::sqrt(golden + wrong * wrong * lever * lever + unknown * unknown)
         };
         let compared = systematic(pixels / smoothed + moved, self.displaced(placed));
@@ -119,9 +128,10 @@ impl ErrorBudget {
         self.square_variance(1).max(1.0 / apart).min(1.0)
     }
 
-    /// What the periodic errors of golden and of a displaced part make of a deviation, mm.
-    pub fn rippled(&self) -> f64 {
-        core::f64::consts::SQRT_2 * self.ripple
+    /// What the periodic errors of golden and of a displaced part make of a deviation, with what
+    /// changes of light left in the part's, mm.
+    pub fn rippled(&self, taken: Taken) -> f64 {
+        libm::hypot(core::f64::consts::SQRT_2 * self.ripple, taken.unsteady)
     }
 
     /// By how much a length as long as the part's displacement is wrong, mm.

@@ -99,7 +99,7 @@ impl PlaneView for Face<'_> {
 
     fn signals(&self, (u, v): (usize, usize), level: usize, row: &mut [Complex]) {
         match self.light {
-            Signal::Frames(frames) => self.levels.signals(frames, level, (u, v), row),
+            Signal::Frames(frames, _) => self.levels.signals(frames, level, (u, v), row),
             Signal::Golden => {
                 let first = v * self.size.0 + u;
                 for (signal, place) in row.iter_mut().zip(first..) {

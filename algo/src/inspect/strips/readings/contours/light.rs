@@ -15,12 +15,23 @@ const EIGHT_BIT: f64 = 255.0;
 /// What the light of a part is known from.
 #[derive(Clone, Copy, Debug)]
 pub enum Signal<'a> {
-    /// All frames of its sequence.
-    Frames(&'a [FrameView<'a>]),
+    /// All frames of its sequence, and σ of what changes of light left in a sample, over that of
+    /// noise.
+    Frames(&'a [FrameView<'a>], f64),
     /// Golden's signal: the part is golden.
     Golden,
     /// Not known: contours are not seen.
     None,
+}
+
+impl Signal<'_> {
+    /// σ of what changes of light left in a sample, over that of noise.
+    pub fn unsteady(self) -> f64 {
+        match self {
+            Self::Frames(_, unsteady) => unsteady,
+            Self::Golden | Self::None => 0.0,
+        }
+    }
 }
 
 /// Golden's signal: Z = B e^{2πiφ} of each pixel of the finest level of the full sequence.

@@ -1,0 +1,196 @@
+//! The frames of a level, a run of its pixels, and what the light of a frame does to them.
+
+use crate::pattern::Level;
+use alloc::vec::Vec;
+use core::f64::consts::TAU;
+
+/// Neighbouring pixels of a row that are looked at together: some three fringes.
+pub(super) const RUN: usize = 24;
+/// The mean of a run's sines is at most this: else the run is less than a fringe.
+const ONE_SIDED: f64 = 0.5;
+
+/// Rounds of finding the signal of a pixel whose fringes moved.
+const SHIFTED: usize = 3;
+
+/// The frames of a level.
+#[derive(Clone, Debug)]
+pub(super) struct LevelShifts {
+    /// Their places in the sequence.
+    pub frames: Vec<usize>,
+    /// cos and sin of 2πs_k.
+    pub shifts: Vec<[f64; 2]>,
+    /// What no sine explains: N − 3 orthonormal vectors with a number per frame.
+    pub others: Vec<Vec<f64>>,
+}
+
+/// The change of a frame's light against the mean of its level.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameLight {
+    /// a and b of its offset.
+    pub offset: [f64; 2],
+    /// g, its gain less 1.
+    pub gain: f64,
+    /// ε, how much farther its fringes lie than its shift says, turns: the part moved.
+    pub shift: f64,
+}
+
+/// The samples of a run in each frame of a level.
+pub(super) type Run = Vec<[f64; RUN]>;
+
+/// A run of a level's pixels: A, B, and sin and cos of 2πφ.
+#[derive(Clone, Debug)]
+pub(super) struct SeenRun {
+    pub offset: [f64; RUN],
+    pub modulation: [f64; RUN],
+    pub phase: [[f64; 2]; RUN],
+    /// B/A of all pixels together.
+    pub contrast: f64,
+}
+
+impl LevelShifts {
+    /// None of a level of two shifts, which tells nothing of its light.
+    pub fn of(level: &Level) -> Option<Self> {
+        let count = level.shifts();
+        if count < 3 {
+            return None;
+        }
+        let shifts = (0..count).map(|k| {
+            let (sin, cos) = libm::sincos(TAU * (level.start + k as f64 / count as f64));
+            [cos, sin]
+        });
+        let wave = |harmonic: usize, of: fn(f64) -> f64| {
+            let norm = if 2 * harmonic == count { 1.0 } else { 2.0 };
+            let scale = libm::sqrt(norm / count as f64);
+            let angle = move |k: usize| TAU * (harmonic * k) as f64 / count as f64;
+            (0..count).map(|k| scale * of(angle(k))).collect()
+        };
+        let waves = |harmonic: usize| {
+            let sine = (2 * harmonic < count).then(|| wave(harmonic, libm::sin));
+            [Some(wave(harmonic, libm::cos)), sine]
+                .into_iter()
+                .flatten()
+        };
+        Some(Self {
+            frames: level.frames.iter().map(|&at| usize::from(at)).collect(),
+            shifts: shifts.collect(),
+            others: (2..=count / 2).flat_map(waves).collect(),
+        })
+    }
+
+    /// N.
+    pub fn count(&self) -> f64 {
+        self.frames.len() as f64
+    }
+}
+
+impl FrameLight {
+    /// What its shift adds to a sample of the signal B e^{2πiφ}, whose frame has this shift.
+    fn shifted(&self, [re, im]: [f64; 2], [cos, sin]: [f64; 2]) -> f64 {
+        // B sin 2π(φ + s) and B cos 2π(φ + s).
+        let (wave, slope) = (im * cos + re * sin, re * cos - im * sin);
+        let angle = TAU * self.shift;
+        slope * angle - wave * angle * angle / 2.0
+    }
+
+    /// What a sample lacks of A where the contrast is B/A, as a share of A.
+    fn less(&self, contrast: f64) -> f64 {
+        self.gain - self.offset[0] - self.offset[1] * contrast
+    }
+}
+
+/// A pixel's samples in the light that the frames of its level have together, whose mean A is
+/// (1/N) Σ (I_k + A (g_k − a_k − b_k B/A)) / (1 + g_k), and with its fringes where the shifts say.
+#[inline]
+pub(super) fn steady(
+    level: &LevelShifts,
+    samples: &mut [f64],
+    light: &[FrameLight],
+    contrast: f64,
+) {
+    let (mut sum, mut share) = (0.0, level.count());
+    for (sample, light) in samples.iter().zip(light) {
+        let gain = 1.0 / (1.0 + light.gain);
+        sum += sample * gain;
+        share -= light.less(contrast) * gain;
+    }
+    let mean = sum / share;
+    for (sample, light) in samples.iter_mut().zip(light) {
+        *sample = (*sample + mean * light.less(contrast)) / (1.0 + light.gain);
+    }
+    if light.iter().all(|light| light.shift == 0.0) {
+        return;
+    }
+    // B e^{2πiφ} is as far off as shifts are: its square counts.
+    let mut lies = signal(level, samples);
+    for _ in 1..SHIFTED {
+        let mut next = [0.0; 2];
+        let pixels = samples.iter().zip(light).zip(&level.shifts);
+        for ((sample, light), shift) in pixels {
+            let sample = sample - light.shifted(lies, *shift);
+            next[0] += sample * shift[1];
+            next[1] += sample * shift[0];
+        }
+        lies = next.map(|part| 2.0 / level.count() * part);
+    }
+    for ((sample, light), shift) in samples.iter_mut().zip(light).zip(&level.shifts) {
+        *sample -= light.shifted(lies, *shift);
+    }
+}
+
+/// The real and the imaginary part of B e^{2πiφ}.
+fn signal(level: &LevelShifts, samples: &[f64]) -> [f64; 2] {
+    let mut parts = [0.0; 2];
+    for (sample, [cos, sin]) in samples.iter().zip(&level.shifts) {
+        parts[0] += sample * sin;
+        parts[1] += sample * cos;
+    }
+    parts.map(|part| 2.0 / level.count() * part)
+}
+
+impl SeenRun {
+    /// Of pixels whose sample in frame k is `sample(k, pixel)`.
+    pub fn of(level: &LevelShifts, sample: impl Fn(usize, usize) -> f64) -> Self {
+        let [mut offset, mut re, mut im] = [[0.0; RUN]; 3];
+        for (k, [cos, sin]) in level.shifts.iter().enumerate() {
+            for at in 0..RUN {
+                let sample = sample(k, at);
+                offset[at] += sample;
+                re[at] += sin * sample;
+                im[at] += cos * sample;
+            }
+        }
+        let count = level.count();
+        let (mut modulation, mut phase) = ([0.0; RUN], [[0.0; 2]; RUN]);
+        for at in 0..RUN {
+            let length = libm::sqrt(re[at] * re[at] + im[at] * im[at]);
+            modulation[at] = 2.0 / count * length;
+            phase[at] = [im[at] / length, re[at] / length];
+            offset[at] /= count;
+        }
+        Self {
+            contrast: modulation.iter().sum::<f64>() / offset.iter().sum::<f64>(),
+            offset,
+            modulation,
+            phase,
+        }
+    }
+
+    /// Whether all pixels have more modulation than `least`.
+    pub fn is_lit(&self, least: f64) -> bool {
+        self.modulation.iter().all(|modulation| *modulation > least)
+    }
+
+    /// Whether its phases lie on one side of the circle: they are of less than a fringe, or wrong.
+    pub fn is_one_sided(&self) -> bool {
+        let sum = |part: usize| self.phase.iter().map(|phase| phase[part]).sum::<f64>();
+        [0, 1]
+            .iter()
+            .any(|&part| sum(part).abs() > ONE_SIDED * RUN as f64)
+    }
+
+    /// B/A of each pixel over that of all, less 1.
+    pub fn ripple(&self) -> [f64; RUN] {
+        let ratio = |at: usize| self.modulation[at] / (self.offset[at] * self.contrast);
+        core::array::from_fn(|at| ratio(at) - 1.0)
+    }
+}
