@@ -24,6 +24,7 @@ mod experiment;
 mod exposing;
 mod exposures;
 mod faint;
+mod flicker;
 mod foreign;
 mod form;
 mod formats;

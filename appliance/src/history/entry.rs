@@ -3,7 +3,7 @@
 use crate::station::result::flag;
 use crate::station::{
     Decision, GaugeValue, Inspection, MAX_GAUGES, Placement, ResultRecord, Square, Stages, Unit,
-    Verdict,
+    UnsteadyLight, Verdict,
 };
 use rusqlite::types::{FromSql, FromSqlError, FromSqlResult, ToSql, ToSqlOutput, ValueRef};
 
@@ -83,7 +83,7 @@ macro_rules! as_json {
 }
 
 as_json! {
-    Placement Square => |error| Err(FromSqlError::Other(error.into()));
+    Placement Square UnsteadyLight => |error| Err(FromSqlError::Other(error.into()));
     // Times are only shown: what cannot be read is left out.
     Stages => |_| Ok(Stages::default());
 }
@@ -136,6 +136,8 @@ columns! {
         stages: Stages = record.stages(), "TEXT NOT NULL";
         /// How the part lay; `None` where it was not aligned.
         placement: Option<Placement> = record.inspection.placement.filter(is_finite), "TEXT";
+        /// How the light changed within the cycle; `None` where it did not beyond noise.
+        light: Option<UnsteadyLight> = record.inspection.light.as_deref().cloned(), "TEXT";
         /// The folder in `recordings/` that holds the frames, if they were kept.
         recording: Option<String> = None, "TEXT";
         /// Why the frames of a part that did not pass were not kept, as far as known; see
@@ -216,6 +218,7 @@ impl Entry {
             flags: self.flags,
             stages: self.stages.clone(),
             placement: self.placement,
+            light: self.light.clone().map(Into::into),
             ..Inspection::default()
         };
         ResultRecord {
@@ -302,6 +305,7 @@ pub fn difference(stored: &Entry, replayed: &Entry) -> Option<String> {
         fitness_permille: replayed.fitness_permille,
         gauges: replayed.gauges.clone(),
         placement: replayed.placement,
+        light: replayed.light.clone(),
         ..stored.clone()
     };
     if same == *stored {

@@ -69,7 +69,7 @@ pub(super) fn open(path: &Path) -> HistoryResult<Connection> {
     let mut connection = Connection::open(path).map_err(failed)?;
     settle(&connection).map_err(failed)?;
     match version(&connection).map_err(failed)? {
-        (APPLICATION, VERSION) => {}
+        (APPLICATION, VERSION) => complete(&connection).map_err(failed)?,
         (0, 0) if is_empty(&connection).map_err(failed)? => {
             create(&mut connection).map_err(failed)?;
         }
@@ -155,6 +155,14 @@ fn create(connection: &mut Connection) -> rusqlite::Result<()> {
     transaction.pragma_update(None, "application_id", APPLICATION)?;
     transaction.pragma_update(None, "user_version", VERSION)?;
     transaction.commit()
+}
+
+/// Adds the column that a history of this version lacks which was begun before there was flicker.
+fn complete(connection: &Connection) -> rusqlite::Result<()> {
+    match connection.prepare("SELECT light FROM result") {
+        Ok(_) => Ok(()),
+        Err(_) => connection.execute_batch("ALTER TABLE result ADD COLUMN light TEXT"),
+    }
 }
 
 fn strange(path: &Path, (application, version): (i64, i64)) -> HistoryError {

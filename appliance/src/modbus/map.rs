@@ -150,7 +150,7 @@ registers! {
         100 STATUS Bits x 1 = now.status, "0 ONLINE, 1 READY, 2 BUSY, 3 PROCESSING, 4 EXPOSURE_DONE, 5 RESULT_VALID, 6 RESULT_TOGGLE, 7 TRIGGER_ACK, 8 RECIPE_LOADING, 9 RECIPE_OK, 10 WARNING, 11 ERROR, 12 MISSED_TRIGGER, 13 BUFFER_OVERFLOW, 14 WARMING_UP, 15 CALIBRATION_VALID";
         101 HEARTBEAT U16 x 1 = now.heartbeat, "+1 every 100 ms as long as the measuring task meets its deadlines";
         102 ERROR_CODE U16 x 1 = now.error_code, "0 none, 1xx camera, 2xx projector, 3xx sync, 4xx recipe, 5xx calibration, 6xx storage, 7xx thermal, 8xx internal";
-        103 WARNING Bits x 1 = now.warnings, "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip, 8 power, 9 geometry";
+        103 WARNING Bits x 1 = now.warnings, "0 temperature, 1 storage, 2 plc_lost, 3 clock_unsynced, 4 low_light, 5 saturation, 6 pattern_unfit, 7 frame_slip, 8 power, 9 geometry, 10 unsteady_light";
         104 STATE U16 x 1 = now.state, "0 boot, 1 ready, 2 acquiring, 3 processing, 4 loading, 5 teaching, 6 offline, 7 fault, 8 stopping, 9 commissioning";
         105 ACTIVE_RECIPE U16 x 1 = now.active().unwrap_or(0), "number of the active recipe, 0 none";
         106 RECIPE_CRC32 U32 x 1 = now.recipe.as_ref().map_or(0, |recipe| recipe.crc), "first 32 bits of the active recipe's fingerprint";

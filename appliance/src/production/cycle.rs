@@ -16,6 +16,9 @@ use hal::head::Exposure;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// So often a sequence is taken again whose light changed too much.
+const RETAKES: u32 = 2;
+
 /// The sequence that a part was judged by.
 #[derive(Default)]
 pub struct JudgedBy {
@@ -38,7 +41,7 @@ impl Worker {
         };
         let plan = &plan;
         let (mut sequence, mut flags, mut cpu) = (0, 0, Duration::ZERO);
-        let mut stages = Stages::default();
+        let (mut stages, mut retakes) = (Stages::default(), 0);
         let waited = self.station.now().since(job.accepted);
         stages.add(Stage::Waiting, waited.to_u32());
         loop {
@@ -52,6 +55,16 @@ impl Worker {
             stages.add(Stage::Exposure, us(began.elapsed()));
             if exposure.retaken > 0 {
                 flags |= RETRIED;
+            }
+            let (broken, spent) =
+                timed_on(&self.pool, || plan.is_light_broken(&mut arriving, &frames));
+            cpu += spent;
+            if broken && retakes < RETAKES {
+                self.progress
+                    .log("measuring again: the light changed within the sequence");
+                flags |= RETRIED;
+                retakes += 1;
+                continue;
             }
             let last = sequence + 1 >= plan.sequence_count();
             // Not before the judgement if another sequence may follow: the part must stay in place
@@ -76,6 +89,9 @@ impl Worker {
             inspection.flags |= flags;
             if exposure.retaken > 0 {
                 inspection.warnings |= warning::FRAME_SLIP;
+            }
+            if retakes > 0 {
+                inspection.warnings |= warning::UNSTEADY_LIGHT;
             }
             if self.warm_up.is_under_way() {
                 inspection.flags |= WARM_UP;

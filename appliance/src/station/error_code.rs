@@ -55,6 +55,8 @@ pub const BLURRED: u16 = 906;
 pub const GUARD_BAND: u16 = 907;
 /// A gauge found nothing to measure.
 pub const NOT_MEASURED: u16 = 908;
+/// The light changed within a cycle by more than can be corrected.
+pub const UNSTEADY_LIGHT: u16 = 909;
 
 /// Whether a code says why a part could not be judged, not that the station failed.
 pub fn is_of_part(code: u16) -> bool {

@@ -113,7 +113,9 @@ pub use health::{
 };
 pub use machine::{Identity, Limits, Settings, Station};
 pub use recipes::{ActiveRecipe, RecipeKey, RecipeResult};
-pub use result::{Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, Verdict};
+pub use result::{
+    Inspection, MAX_GAUGES, Placement, ResultRecord, Skipped, UnsteadyLight, Verdict,
+};
 pub use results::{Buffered, Counts, MAX_BUFFERED};
 pub use snapshot::Snapshot;
 pub use stages::{Stage, StageTime, Stages};

@@ -109,6 +109,20 @@ impl Placement {
     }
 }
 
+/// Light that changed within a cycle, frame by frame against the mean of the frame's level; values
+/// were corrected for it.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct UnsteadyLight {
+    /// Other light, counts where the part is.
+    pub other_counts: Vec<f64>,
+    /// The projector's light, as a share.
+    pub gain: Vec<f64>,
+    /// By how much fringes were moved, turns: the part shook.
+    pub shift_turns: Vec<f64>,
+    /// The frequency of lamps that other light changes with, Hz, where the frames tell it.
+    pub hz: Option<u32>,
+}
+
 /// The worker's report of one cycle; what the page shows of it as it is, under the fields' names.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Inspection {
@@ -121,7 +135,7 @@ pub struct Inspection {
     #[serde(skip)]
     pub error_code: u16,
     /// What the part's frames show of the head: WARNING bits `LOW_LIGHT`, `SATURATION`,
-    /// `PATTERN_UNFIT`, `FRAME_SLIP`.
+    /// `PATTERN_UNFIT`, `FRAME_SLIP`, `UNSTEADY_LIGHT`.
     #[serde(skip)]
     pub warnings: u16,
     /// The recipe's gauges, by ascending slots.
@@ -149,6 +163,8 @@ pub struct Inspection {
     pub cpu_us: u32,
     /// The part's pose, if it was aligned.
     pub placement: Option<Placement>,
+    /// How the light changed from frame to frame, if it did beyond noise.
+    pub light: Option<Arc<UnsteadyLight>>,
     /// Its planes and contours.
     #[serde(skip)]
     pub features: heapless::Vec<FoundFeature, MAX_FEATURES>,

@@ -73,10 +73,12 @@ pub mod warning {
         POWER = 8, "power";
         /// Camera and projector no longer stand to each other as they were calibrated.
         GEOMETRY = 9, "geometry";
+        /// Light changes from frame to frame.
+        UNSTEADY_LIGHT = 10, "unsteady light";
     }
 
     /// The warnings that the frames of a part show.
-    pub const OF_A_PART: u16 = LOW_LIGHT | SATURATION | PATTERN_UNFIT | FRAME_SLIP;
+    pub const OF_A_PART: u16 = LOW_LIGHT | SATURATION | PATTERN_UNFIT | FRAME_SLIP | UNSTEADY_LIGHT;
 }
 
 /// REJECT_REASON, register 120: why the last rejected request was rejected.

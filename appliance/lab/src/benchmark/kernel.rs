@@ -145,7 +145,7 @@ impl<'a> Inspecting<'a> {
         let last = arrive_rest(self.production.decoder(), &frames, &mut self.arrived)?;
         let input = Input::Finest(&self.arrived, &last);
         let placed = self.production.place(input, &mut self.strips)?;
-        let input = (input, Signal::Frames(&frames));
+        let input = (input, Signal::Frames(&frames, 0.0));
         let maps = Maps::default();
         let found = self
             .production

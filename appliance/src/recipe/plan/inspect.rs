@@ -9,6 +9,7 @@ use crate::recipe::{Demands, FeatureView, Refusal};
 use crate::station::error_code::WRONG_FRAMES;
 use crate::station::result::flag::{JUDGES_NOTHING, SIMULATED};
 use crate::station::{Inspection, Stage, Stages, Verdict};
+use algo::flicker::Steadiness;
 use algo::frame::FrameView;
 use algo::inspect::{Drawing, Findings, Input, Maps, PairPlaced, Signal, Strips};
 use algo::pattern::{MAX_FRAMES, MAX_SHIFTS};
@@ -49,6 +50,27 @@ pub struct Arriving {
     sequence: usize,
     /// `None` if the recipe has no such sequence, or its frames do not fit it.
     arrived: Option<Arrived>,
+    /// What all frames tell of their light, once that was asked.
+    light: Option<Steadiness>,
+}
+
+/// What was found in the frames of a sequence.
+pub(super) struct Found {
+    pub findings: Findings,
+    /// Of two frames how much the picture is like golden's.
+    pub likeness: Option<f64>,
+    pub light: Steadiness,
+}
+
+impl From<Findings> for Found {
+    /// In steady light.
+    fn from(findings: Findings) -> Self {
+        Self {
+            findings,
+            likeness: None,
+            light: Steadiness::Steady,
+        }
+    }
 }
 
 impl Arriving {
@@ -64,7 +86,20 @@ impl Plan {
         Arriving {
             sequence,
             arrived: self.runs.get(sequence).map(Run::room),
+            light: None,
         }
+    }
+
+    /// Whether the light of the frames, which are all, changed so much that they must be taken again.
+    pub fn is_light_broken(&self, arriving: &mut Arriving, frames: &[Frame]) -> bool {
+        let places: heapless::Vec<usize, MAX_FRAMES> = (0..frames.len().min(MAX_FRAMES)).collect();
+        if let (Some(run), Some(views)) = (
+            self.runs.get(arriving.sequence),
+            views::<MAX_FRAMES>(&places, frames),
+        ) {
+            arriving.light = run.light(&views).ok();
+        }
+        matches!(arriving.light, Some(Steadiness::Broken(_)))
     }
 
     /// Whether the frames so far complete a level that can be decoded now.
@@ -85,7 +120,7 @@ impl Plan {
         };
         let decoder = run.production.decoder();
         let places = run.coarser().nth(arrived.levels()).unwrap_or(&[]);
-        let views = views(places, frames);
+        let views: Option<heapless::Vec<_, MAX_SHIFTS>> = views(places, frames);
         // Frames that do not fit are reported when all of them are inspected.
         if views.is_none_or(|views| arrive(decoder, &views, arrived).is_err()) {
             arriving.arrived = None;
@@ -114,6 +149,12 @@ impl Run {
         Ok((arrived, finest))
     }
 
+    /// What the frames of the sequence tell of their light.
+    fn light(&self, frames: &[FrameView<'_>]) -> Result<Steadiness, DecodeError> {
+        self.production.check(frames)?;
+        Ok(self.watch.look(frames))
+    }
+
     /// Keeps the memory of decoded levels for the next measurement.
     pub(super) fn keep(&self, arrived: Arrived) {
         *self.arrived.lock().unwrap_or_else(PoisonError::into_inner) = Some(arrived);
@@ -135,10 +176,10 @@ impl Run {
 }
 
 /// Views of some of the frames; `None` if a frame is missing or inconsistent.
-fn views<'a>(
+fn views<'a, const MOST: usize>(
     places: &[usize],
     frames: &'a [Frame],
-) -> Option<heapless::Vec<FrameView<'a>, MAX_SHIFTS>> {
+) -> Option<heapless::Vec<FrameView<'a>, MOST>> {
     let view = |&at: &usize| seam::view(frames.get(at)?).ok();
     places.iter().map(view).collect()
 }
@@ -168,7 +209,7 @@ impl Plan {
     pub(super) fn judged(
         &self,
         (sequence, frames): (usize, &[Frame]),
-        found: Result<(Findings, Option<f64>), Refusal>,
+        found: Result<Found, Refusal>,
         laps: &mut Laps,
     ) -> Inspection {
         let simulated = if self.simulated { SIMULATED } else { 0 };
@@ -182,7 +223,11 @@ impl Plan {
             ..Inspection::default()
         };
         match found {
-            Ok((findings, likeness)) => {
+            Ok(Found {
+                findings,
+                likeness,
+                light,
+            }) => {
                 self.demands.judge(&findings, &mut inspection);
                 if sequence + 1 < self.runs.len() {
                     let unlike = likeness.is_some_and(|likeness| likeness < judge::ALIKE);
@@ -195,6 +240,7 @@ impl Plan {
                     let light = self.light(sequence, frames);
                     self.demands.explain(light, &mut inspection);
                 }
+                self.tell_changes(light, frames, &mut inspection);
             }
             Err(reason) => {
                 inspection.judged = Verdict::Invalid;
@@ -221,15 +267,14 @@ impl Plan {
         self.strips.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The findings from the frames of a sequence, and of two frames how much the picture is like
-    /// golden's.
+    /// What is found in the frames of a sequence. Where their light changes, it is taken out of them.
     pub(super) fn run(
         &self,
         strips: &mut Strips,
-        (arriving, frames): (Arriving, &[Frame]),
+        (mut arriving, frames): (Arriving, &[Frame]),
         maps: Maps<'_>,
         laps: &mut Laps,
-    ) -> Result<(Findings, Option<f64>), Refusal> {
+    ) -> Result<Found, Refusal> {
         let sequence = arriving.sequence();
         let run = self.runs.get(sequence);
         let run = run.ok_or_else(|| format!("the recipe has no sequence {sequence}"))?;
@@ -248,22 +293,44 @@ impl Plan {
             let findings = placed.and_then(|PairPlaced { found, placed }| {
                 let input = (Input::Phases(buffers.phases()), Signal::None);
                 let findings = production.inspect_placed(input, strips, placed, maps)?;
-                Ok((findings, Some(found.map_or(0.0, |found| found.likeness))))
+                let likeness = Some(found.map_or(0.0, |found| found.likeness));
+                Ok(Found {
+                    likeness,
+                    ..findings.into()
+                })
             });
             laps.end(Stage::Strips);
             return Ok(findings?);
+        }
+        let light = arriving.light.take();
+        let light = light.map_or_else(|| run.light(&views), Ok)?;
+        let (steady, unsteady) = match &light {
+            Steadiness::Flickers(flicker) => {
+                (Some(run.watch.steady(&views, flicker)), flicker.left)
+            }
+            _ => (None, 0.0),
+        };
+        let mut views = views;
+        if let Some(steady) = &steady {
+            views = steady.views().collect();
+            if let Some(arrived) = &mut arriving.arrived {
+                arrived.restart();
+            }
         }
         let (arrived, finest) = run.complete(arriving, &views)?;
         let input = Input::Finest(&arrived, &finest);
         let placed = production.place(input, strips);
         laps.end(Stage::Alignment);
         let findings = placed.and_then(|placed| {
-            let input = (input, Signal::Frames(&views));
+            let input = (input, Signal::Frames(&views, unsteady));
             production.inspect_placed(input, strips, placed, maps)
         });
         laps.end(Stage::Strips);
         run.keep(arrived);
-        Ok((findings?, None))
+        Ok(Found {
+            light,
+            ..findings?.into()
+        })
     }
 }
 

@@ -151,7 +151,7 @@ impl Plan {
         let mut strips = self.strips();
         let of = (self.arriving(sequence), frames);
         let found = self.run(&mut strips, of, maps, &mut Laps::now());
-        let shown = self.shown(&found.ok()?.0);
+        let shown = self.shown(&found.ok()?.findings);
         let production = &self.runs.get(sequence)?.production;
         let deviation_mm =
             Drawing::new(production, &strips).square_means(&deviation_mm, shown.side);

@@ -7,6 +7,7 @@ mod layers;
 pub(super) mod light;
 mod patterns;
 mod run;
+mod steadiness;
 pub(super) mod taught;
 mod trial;
 

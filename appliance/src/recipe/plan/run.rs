@@ -4,6 +4,7 @@ use super::taught;
 use crate::recipe::file::archive::Arrays;
 use crate::recipe::file::refusal::refused;
 use crate::recipe::{Conditions, Demands, Element, Part, RecipeSequence, Refusal, SequenceKind};
+use algo::flicker::Watch;
 use algo::frame::SampleNoise;
 use algo::geometry::Triangulator;
 use algo::inspect::{
@@ -21,6 +22,9 @@ use std::sync::{Arc, Mutex};
 /// Most bytes of a recipe's patterns: 64 of a projector of 1920 × 1080 pixels take half of it.
 const MAX_PATTERN_BYTES: usize = 256 << 20;
 
+/// The light is compared where golden's modulation is so many times the noise of a sample.
+const LIT: f64 = 8.0;
+
 /// A sequence that the part can be measured with.
 #[derive(Debug)]
 pub(super) struct Run {
@@ -28,6 +32,8 @@ pub(super) struct Run {
     /// Which of the plan's rasters its frames show.
     pub indices: Vec<usize>,
     pub production: Production,
+    /// What tells whether the light changes from frame to frame.
+    pub watch: Watch,
     /// The buffers of two frames.
     pub pair: Option<Mutex<PairBuffers>>,
     /// Memory for the levels that are decoded on arrival, allocated by the first cycle.
@@ -73,6 +79,7 @@ pub(super) struct Prepared {
     indices: Vec<usize>,
     decoder: Decoder,
     levels: Levels,
+    watch: Watch,
     taught: Taught,
     map: Option<Vec<AbsolutePhase>>,
     /// Its modulation over that of golden.
@@ -144,7 +151,15 @@ impl Prepared {
                 rasters.len() - 1
             })
         });
+        let noise = taught::even_noise(conditions.noise, arrays);
+        let lit = |at: usize| {
+            let seen = brighter * f64::from(arrays.modulation[at]);
+            arrays.valid[at] != 0 && seen > LIT * noise
+        };
+        let lit: Vec<bool> = (0..arrays.valid.len()).map(lit).collect();
+        let light = (decoder.full_scale(), noise);
         Ok(Self {
+            watch: Watch::new(&levels, light, conditions.camera.0 as usize, &lit),
             kind,
             indices: indices.collect(),
             taught: taught::taught((conditions.noise, brighter), arrays, shares, &decoder),
@@ -228,6 +243,7 @@ impl Prepared {
             indices,
             decoder,
             levels,
+            watch,
             taught,
             map,
             brighter,
@@ -273,6 +289,7 @@ impl Prepared {
             indices,
             bytes,
             production,
+            watch,
             pair: pair.map(Mutex::new),
             arrived: Mutex::new(None),
         })

@@ -3,7 +3,7 @@
 //!
 //! Golden is also judged as a displaced part would be, as production would.
 
-use super::inspect::Laps;
+use super::inspect::{Found, Laps};
 use super::{Plan, PlanError};
 use crate::head::calibration::Calibration;
 use crate::recipe::{Demands, FeatureView, Recipe, Refusal};
@@ -86,7 +86,7 @@ impl Golden {
     pub fn judged(&mut self, demands: Demands) -> (Inspection, Vec<FeatureView<'_>>) {
         self.plan.demands = demands;
         let plan = &self.plan;
-        let found = Ok((self.findings.clone(), None));
+        let found = Ok(self.findings.clone().into());
         let inspection = plan.judged((0, &[]), found, &mut Laps::now());
         let strips = plan.strips();
         let drawing = Drawing::new(plan.production(), &strips);
@@ -185,8 +185,7 @@ impl Plan {
                     .inspect_placed(input, &mut strips, placed, Maps::default())
             });
             drop(strips);
-            let findings = findings.map(|findings| (findings, None));
-            let found = findings.map_err(Refusal::from);
+            let found = findings.map(Found::from).map_err(Refusal::from);
             let inspection = self.judged((sequence, &[]), found, &mut laps);
             if inspection.step_up.is_none() {
                 return Some(inspection);

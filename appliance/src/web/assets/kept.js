@@ -3,7 +3,7 @@ import { $, fill, make, show, text } from "./element.js";
 import { ask, map } from "./api.js";
 import { paint } from "./colour.js";
 import { marks } from "./found.js";
-import { about, limits, measures, milliseconds, moment, quantity, signed } from "./number.js";
+import { about, changes, limits, measures, milliseconds, moment, quantity, signed } from "./number.js";
 import { over, rings } from "./ring.js";
 import { drawScale } from "./scale.js";
 import { nameOf } from "./times.js";
@@ -48,6 +48,7 @@ function facts({ result, flags }, boot) {
     ["Pattern fitness", fitness],
     ["Stages", result.stages.map((stage) => `${nameOf(stage)} ${milliseconds(stage.us)}`).join(" · ") || "–"],
     ["Placement", result.placement ? placement(result.placement) : "not known"],
+    ["Light", result.light ? changes(result.light) : "steady"],
     ["How it was measured", flags.length ? flags.join(", ") : "–"],
   ];
   return pairs.map(([name, value]) => make("div", typeof value === "string" && value.length > 24 ? "wide" : "", make("dt", "", name), typeof value === "string" ? make("dd", "", value) : value));

@@ -16,7 +16,7 @@ import { start as startQuestion } from "./question.js";
 import { showSimulation, start as startSimulation } from "./simulation.js";
 import { change, start as startSession } from "./session.js";
 import { ask } from "./api.js";
-import { count, duration, measures } from "./number.js";
+import { changes, count, duration, measures } from "./number.js";
 
 const VIEWS = ["live", "history", "recipes", "registers", "head", "device"];
 const STATES = {
@@ -36,6 +36,7 @@ function showCounters(now) {
   const measured = measures(now.result);
   for (const name of ["points", "coverage", "noise", "fitness"]) text(name, measured[name]);
   const notes = now.warnings.map((warning) => `warning: ${warning}`);
+  if (now.result && now.result.light && now.warnings.includes("unsteady light")) notes.push(changes(now.result.light));
   if (now.buffer_overflow) notes.push("a result was not queued: the PLC does not acknowledge");
   if (now.warming_up) notes.push("warming up");
   if (now.error && !now.fault) notes.push(`error ${now.error.code}: ${now.error.words}`);

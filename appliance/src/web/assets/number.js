@@ -51,6 +51,15 @@ export function measures(result) {
   };
 }
 
+// How the light changed from frame to frame within a cycle.
+export function changes({ other_counts, gain, shift_turns, hz }) {
+  const half = (Math.max(...other_counts) - Math.min(...other_counts)) / 2;
+  const most = Math.max(...gain.map(Math.abs));
+  const moved = Math.max(...shift_turns.map(Math.abs));
+  const shook = moved > 0.005 ? `, fringes moved by ± ${moved.toFixed(3)} turns: does the part shake?` : "";
+  return `other light changed by ± ${half.toFixed(1)} counts between frames${hz ? `: a lamp of ${hz} Hz?` : ""}, the projector's by ± ${(100 * most).toFixed(1)} %${shook}; corrected`;
+}
+
 export function clock(utc_us) {
   return utc_us ? new Date(utc_us / 1000).toLocaleTimeString("en-GB") : "";
 }

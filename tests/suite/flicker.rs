@@ -1,0 +1,351 @@
+//! Light that changes within a cycle: lamps on the mains, a projector that is not constant, a flash, a
+//! shadow. A part in it reads as in steady light, or is INVALID with that reason.
+
+use crate::placement::{Bed, TIMEOUT, bed, taught_within};
+use appliance::recipe::plan::Plan;
+use appliance::station::error_code::UNSTEADY_LIGHT;
+use appliance::station::snapshot::warning;
+use appliance::station::{Inspection, Verdict};
+use hal::frame::{Frame, Pixels, Samples};
+use sim::parts::{Defect, Flowerpot, SheetMetal, Sphere};
+use sim::scenario::Optics;
+use sim::{Part, Placement, Scenario, Unsteady};
+use std::sync::Arc;
+use std::time::Instant;
+use tests::random::Random;
+
+/// Other light of 40 counts, and a projector that leaves room for it.
+fn scenario(part: &Part, unsteady: Unsteady, exposure_refreshes: f64) -> Scenario {
+    let mut scenario = Scenario {
+        part: part.clone(),
+        sub_rays: 2,
+        unsteady,
+        optics: Optics {
+            projector_blur_px: 1.0,
+            camera_blur_px: 0.5,
+            ..Optics::default()
+        },
+        ..Scenario::default()
+    };
+    (scenario.light.ambient, scenario.light.diffuse) = (40.0 / 255.0, 0.7);
+    scenario.timing.exposure_refreshes = exposure_refreshes;
+    scenario
+}
+
+/// A lamp whose light changes by ± `counts` of 40 where exposures are short against its period.
+fn lamp(hz: f64, counts: f64) -> Unsteady {
+    Unsteady {
+        lamp_hz: hz,
+        lamp_depth: counts / 40.0,
+        lamp_phase: 0.13,
+        ..Unsteady::default()
+    }
+}
+
+/// A projector whose light changes by 3 % from refresh to refresh.
+fn noisy() -> Unsteady {
+    Unsteady {
+        projector_noise: 0.03,
+        ..Unsteady::default()
+    }
+}
+
+/// A part that was taught in steady light, and heads that see it in steady and in changing light.
+struct Taught {
+    plan: Plan,
+    heads: [Bed; 2],
+    part: Part,
+}
+
+impl Taught {
+    fn new(part: Part, tolerance_mm: f64, unsteady: Unsteady, exposure_refreshes: f64) -> Self {
+        let steady = scenario(&part, Unsteady::default(), exposure_refreshes);
+        let mut quiet = bed(&steady);
+        let taught = taught_within(&mut quiet, tolerance_mm).unwrap();
+        let plan = Plan::new(taught.recipe, &quiet.calibration, true).unwrap();
+        let mut heads = [quiet, bed(&scenario(&part, unsteady, exposure_refreshes))];
+        let rasters = plan.rasters(&heads[0].calibration).unwrap();
+        for head in &mut heads {
+            head.head.load(rasters.clone()).unwrap();
+        }
+        Self { plan, heads, part }
+    }
+
+    fn place(&self, part: &Part, placement: &Placement) {
+        for head in &self.heads {
+            head.stage.place(part, placement).unwrap();
+        }
+    }
+
+    /// The frames of a sequence in steady light, or in the other one.
+    fn frames(&mut self, sequence: usize, changing: bool) -> Vec<Frame> {
+        let mut frames = Vec::new();
+        let mut keep = |_, frame| frames.push(frame);
+        let head = &mut self.heads[usize::from(changing)].head;
+        head.acquire(self.plan.indices(sequence), TIMEOUT, &mut keep)
+            .unwrap();
+        frames
+    }
+
+    fn inspect(&self, sequence: usize, frames: &[Frame]) -> Inspection {
+        self.plan.inspect(sequence, frames, Instant::now())
+    }
+}
+
+fn near(random: &mut Random) -> Placement {
+    let mut within = |most: f64| most * (2.0 * random.share() - 1.0);
+    Placement {
+        shift_mm: [within(0.3), within(0.3), within(0.2)],
+        tilt_deg: [within(0.1), within(0.1)],
+        rotation_deg: within(0.2),
+    }
+}
+
+/// What changing light makes of the values of parts, per sequence.
+#[derive(Default)]
+struct Tally {
+    parts: usize,
+    passed: [usize; 2],
+    failed: usize,
+    invalid: usize,
+    steady_invalid: usize,
+    /// Differences of deviations from those in steady light, mm, and over U of the steady one.
+    off: Vec<[f64; 2]>,
+}
+
+fn tally(taught: &mut Taught, count: u64, what: &str) -> Vec<Tally> {
+    let mut all: Vec<Tally> = (0..taught.plan.sequence_count())
+        .map(|_| Tally::default())
+        .collect();
+    for seed in 0..count {
+        let part = taught.part.clone();
+        taught.place(&part, &near(&mut Random::new(seed)));
+        for (sequence, tally) in all.iter_mut().enumerate() {
+            let frames = [false, true].map(|changing| taught.frames(sequence, changing));
+            let [steady, found] = frames.map(|frames| taught.inspect(sequence, &frames));
+            tally.parts += 1;
+            tally.passed[0] += usize::from(steady.verdict() == Verdict::Pass);
+            tally.passed[1] += usize::from(found.verdict() == Verdict::Pass);
+            tally.failed += usize::from(found.verdict() == Verdict::Fail);
+            tally.invalid += usize::from(found.verdict() == Verdict::Invalid);
+            tally.steady_invalid += usize::from(steady.verdict() == Verdict::Invalid);
+            for (steady, found) in steady.gauges.iter().zip(&found.gauges) {
+                let Some((steady_value, value)) = steady.value.zip(found.value) else {
+                    continue;
+                };
+                let off = value.abs() - steady_value.abs();
+                if &*steady.name == "deviation" {
+                    let u = steady.uncertainty.unwrap().max(found.uncertainty.unwrap());
+                    tally.off.push([off, off / u]);
+                }
+            }
+        }
+    }
+    for (sequence, tally) in all.iter().enumerate() {
+        let most = |at: usize| {
+            tally
+                .off
+                .iter()
+                .map(|off| off[at].abs())
+                .fold(0.0, f64::max)
+        };
+        let rms = (tally.off.iter().map(|off| off[0] * off[0]).sum::<f64>()
+            / tally.off.len().max(1) as f64)
+            .sqrt();
+        println!(
+            "{what}, {} frames: {} parts, PASS {:?}, FAIL {}, INVALID {}; deviation off by {:.4} RMS, {:.4} mm or {:.2} U at most",
+            taught.plan.indices(sequence).len(),
+            tally.parts,
+            tally.passed,
+            tally.failed,
+            tally.invalid,
+            rms,
+            most(0),
+            most(1),
+        );
+    }
+    all
+}
+
+/// Lamps on both mains with exposures of one and two refreshes, a lamp that is slow against an
+/// exposure, so that frames see all of its change, and a projector whose light is not constant.
+fn kinds() -> Vec<(&'static str, Unsteady, f64)> {
+    vec![
+        ("lamp of 100 Hz, 16.7 ms", lamp(100.0, 15.0), 1.0),
+        ("lamp of 100 Hz, 33 ms", lamp(100.0, 15.0), 2.0),
+        ("light of 13.7 Hz, 16.7 ms", lamp(13.7, 15.0), 1.0),
+        ("projector 3 %, 16.7 ms", noisy(), 1.0),
+    ]
+}
+
+/// Good parts pass as in steady light, with values as in steady light.
+fn are_as_in_steady_light(part: &Part, tolerance_mm: f64, placements: u64) {
+    for (what, unsteady, refreshes) in kinds() {
+        let mut taught = Taught::new(part.clone(), tolerance_mm, unsteady, refreshes);
+        for tally in tally(&mut taught, placements, what) {
+            assert_eq!(
+                [tally.failed, tally.invalid],
+                [0, tally.steady_invalid],
+                "{what}"
+            );
+            let within = |off: &&[f64; 2]| off[0].abs() <= 0.01 && off[1].abs() <= 1.0;
+            let held = tally.off.iter().filter(within).count();
+            assert!(
+                held * 20 >= tally.off.len() * 19,
+                "{what}: {held} of {}",
+                tally.off.len()
+            );
+        }
+    }
+}
+
+#[test]
+fn a_part_in_changing_light_reads_as_in_steady_light() {
+    are_as_in_steady_light(&Part::default(), 1.0, 3);
+}
+
+#[test]
+#[ignore = "takes half an hour: `.ci/run full`"]
+fn fifty_placements_of_parts_in_changing_light_read_as_in_steady_light() {
+    for part in [
+        Part::default(),
+        Part::Sphere(Sphere::default()),
+        Part::Flowerpot(Flowerpot::default()),
+    ] {
+        for tolerance_mm in [1.0, 0.3] {
+            are_as_in_steady_light(&part, tolerance_mm, 50);
+        }
+    }
+}
+
+#[test]
+fn a_dent_fails_in_changing_light() {
+    let dented = Part::SheetMetal(SheetMetal {
+        defects: vec![Defect::Dent {
+            x: 10.0,
+            y: -20.0,
+            depth_mm: 0.3,
+            diameter_mm: 8.0,
+        }],
+        ..SheetMetal::default()
+    });
+    for (what, unsteady, refreshes) in kinds() {
+        let mut taught = Taught::new(Part::default(), 1.0, unsteady, refreshes);
+        taught.place(&dented, &near(&mut Random::new(3)));
+        let frames = taught.frames(0, true);
+        let found = taught.inspect(0, &frames);
+        assert_eq!(found.verdict(), Verdict::Fail, "{what}: {:?}", found.reason);
+        let light = found.light.unwrap();
+        assert!(
+            light.other_counts.iter().any(|other| other.abs() > 0.2)
+                || light.gain.iter().any(|gain| gain.abs() > 0.01)
+        );
+    }
+}
+
+/// A frame whose samples are changed, by their places.
+fn changed(frame: &Frame, change: impl Fn(usize, f64) -> f64) -> Frame {
+    let Samples::Eight(samples) = frame.samples() else {
+        unreachable!("the head has 8 bits");
+    };
+    let samples = samples.iter().enumerate();
+    let samples =
+        samples.map(|(at, sample)| change(at, f64::from(*sample)).round().clamp(0.0, 255.0) as u8);
+    let pixels = Arc::new(Pixels::Eight(samples.collect()));
+    Frame::new(frame.format(), pixels, frame.timestamp(), frame.count()).unwrap()
+}
+
+#[test]
+fn a_flash_or_a_shadow_in_any_one_frame_is_named_and_no_good_part_fails() {
+    let mut taught = Taught::new(Part::default(), 1.0, Unsteady::default(), 1.0);
+    let width = taught.heads[0].stage.scenario().frame_size().0 as usize;
+    let steady = taught.frames(0, false);
+    let found = taught.inspect(0, &steady);
+    assert_eq!(found.verdict(), Verdict::Pass);
+    assert_eq!((found.light, found.warnings), (None, 0));
+    for at in 0..steady.len() {
+        let flash = changed(&steady[at], |_, sample| sample + 200.0);
+        let shadow = changed(&steady[at], |at, sample| {
+            if at % width < width / 2 {
+                0.2 * sample
+            } else {
+                sample
+            }
+        });
+        for (what, frame) in [("a flash", flash), ("a shadow", shadow)] {
+            let mut frames = steady.clone();
+            frames[at] = frame;
+            let found = taught.inspect(0, &frames);
+            let named = (found.verdict(), found.error_code);
+            assert_eq!(
+                named,
+                (Verdict::Invalid, UNSTEADY_LIGHT),
+                "{what} in {at}: {:?}",
+                found.reason
+            );
+            assert!(found.warnings & warning::UNSTEADY_LIGHT != 0);
+            let frame = format!("frame {} of {}", at + 1, frames.len());
+            assert!(
+                found.reason.clone().unwrap().contains(&frame),
+                "{what} in {at}: {:?}",
+                found.reason
+            );
+        }
+    }
+}
+
+#[test]
+fn the_frequency_of_a_lamp_is_named_where_the_times_of_frames_tell_it() {
+    // Refreshes of 1/60 s see a lamp of 120 Hz always in the same phase.
+    for (hz, refreshes, told) in [
+        (100.0, 1.0, Some(100)),
+        (100.0, 2.0, Some(100)),
+        (120.0, 1.0, None),
+    ] {
+        let mut taught = Taught::new(Part::default(), 1.0, lamp(hz, 15.0), refreshes);
+        let frames = taught.frames(0, true);
+        let found = taught.inspect(0, &frames);
+        assert_eq!(
+            found.light.and_then(|light| light.hz),
+            told,
+            "{hz} Hz, {refreshes} refreshes"
+        );
+    }
+}
+
+/// A part that shakes by so many mm along x and z.
+fn shaking(shake_mm: [f64; 3], shake_hz: f64) -> Unsteady {
+    Unsteady {
+        shake_mm,
+        shake_hz,
+        ..Unsteady::default()
+    }
+}
+
+/// Shakes a part along one axis: in steady light it reads as one that rests.
+fn shakes(mm: &[f64], hz: &[f64], placements: u64) {
+    for &mm in mm {
+        for along in [[mm, 0.0, 0.0], [0.0, 0.0, mm]] {
+            for &hz in hz {
+                let what = format!("shaken by {along:?} mm, {hz} Hz");
+                let mut taught = Taught::new(Part::default(), 1.0, shaking(along, hz), 1.0);
+                for tally in tally(&mut taught, placements, &what) {
+                    assert_eq!(tally.failed, 0, "{what}");
+                    let held = tally.off.iter().filter(|off| off[1].abs() <= 1.0).count();
+                    assert!(held * 20 >= tally.off.len() * 19, "{what}: {held}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_part_that_shakes_reads_as_one_that_rests() {
+    shakes(&[0.05], &[17.0, 33.0], 2);
+}
+
+#[test]
+#[ignore = "takes a quarter of an hour: `.ci/run full`"]
+fn a_part_that_shakes_slowly_or_fast_reads_as_one_that_rests() {
+    shakes(&[0.02, 0.05, 0.2], &[15.0, 17.0, 33.0, 47.0, 59.0], 10);
+}
