@@ -221,7 +221,7 @@ fn the_stations_decisions_are_pure() {
 #[test]
 fn imports_inside_algo_only_go_backwards_along_the_flow() {
     let rule = "Imports only go backwards along the flow: units, trust, math ← simd ← frame ← pattern, \
-                phase ← geometry ← pipeline ← calibration, chain, inspect ← adaptive.";
+                phase ← geometry ← pipeline ← calibration, chain, flicker, inspect ← adaptive.";
     let order = [
         &["units", "trust", "math"][..],
         &["simd"],
@@ -229,7 +229,7 @@ fn imports_inside_algo_only_go_backwards_along_the_flow() {
         &["pattern", "phase"],
         &["geometry"],
         &["pipeline"],
-        &["calibration", "chain", "inspect"],
+        &["calibration", "chain", "flicker", "inspect"],
         &["adaptive"],
     ];
     only_backwards(rule, "algo/src", "crate", &order);

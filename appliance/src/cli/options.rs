@@ -13,7 +13,7 @@ use clap::{Arg, Args, Command};
 use hal::bounds::{Bound, Fields, MAX_PLACEMENT_MM, MAX_ROTATION_DEG, MAX_TILT_DEG, clipped};
 use serde::Serialize;
 use sim::parts::Board;
-use sim::{Ground, Material};
+use sim::{Ground, Material, Scenario, Unsteady};
 use std::ffi::OsString;
 use std::fmt::Display;
 use std::net::SocketAddr;
@@ -303,6 +303,10 @@ pub struct SimulatedPart {
     /// black space. If it is left out, the floor is the scenario's.
     #[arg(long, value_name = "ALBEDO,DEPTH", value_parser = floor)]
     floor: Option<Lies>,
+    /// Let light and part change while frames are taken: keys of the scenario's `[unsteady]`, as in
+    /// lamp_depth=0.4,shake_mm=[0,0,0.1]. If it is left out, they do as the scenario says.
+    #[arg(long, value_name = "KEY=VALUE,…", value_parser = unsteady)]
+    unsteady: Option<Unsteady>,
     /// Place the simulated board in this one of the ten poses that are recommended for a
     /// calibration; 10 lies in z = 0.
     #[arg(long, value_name = "NUMBER", value_parser = number(1, Board::POSES.len() as u8), conflicts_with_all = ["shift", "tilt", "rotate"])]
@@ -332,7 +336,7 @@ impl SimulatedPart {
         };
         if head.backend != Backend::Sim {
             return Err(usage(
-                &"the configured head is not simulated: leave out --part, --defect, --material, --floor, --pose, --shift, --tilt and --rotate",
+                &"the configured head is not simulated: leave out --part, --defect, --material, --floor, --unsteady, --pose, --shift, --tilt and --rotate",
             ));
         }
         let scenario = backend::scenario(head.scenario.as_deref())?;
@@ -343,10 +347,12 @@ impl SimulatedPart {
                 material: scenario.material,
                 placement: scenario.placement,
                 floor: None,
+                unsteady: None,
             },
         };
         placed.material = self.material.or(placed.material);
         placed.floor = self.floor.clone().map(|lies| lies.0);
+        placed.unsteady = self.unsteady;
         for defect in &self.defect {
             let added = placed.add_defect(defect).and_then(|()| placed.check());
             added.map_err(|words| usage(&format_args!("--defect {}: {words}", clipped(defect))))?;
@@ -383,6 +389,12 @@ fn floor(given: &str) -> Result<Lies, String> {
     };
     Fields.check("floor", &ground)?;
     Ok(Lies(Some(ground)))
+}
+
+fn unsteady(given: &str) -> Result<Unsteady, String> {
+    let table = format!("unsteady = {{ {given} }}");
+    let scenario = Scenario::from_toml(&table, "--unsteady").map_err(|error| error.problem)?;
+    Ok(scenario.unsteady)
 }
 
 /// A material by its name.

@@ -95,6 +95,7 @@ impl Simulation {
                     "placement": placement,
                     "floor": stage.floor(),
                     "floors": floors(),
+                    "unsteady": stage.unsteady(),
                     "kinds": kinds(),
                     "materials": materials,
                 })
@@ -126,6 +127,9 @@ impl Simulation {
         let unlaid = |error: hal::error::Error| PutError::Unfit(error.to_string());
         if let Some(floor) = &placed.floor {
             stage.surround(floor.clone()).map_err(unlaid)?;
+        }
+        if let Some(unsteady) = placed.unsteady {
+            stage.unsettle(unsteady).map_err(unlaid)?;
         }
         let staged = stage
             .work_out(&placed.part, placed.material, &placed.placement, &|_| ())

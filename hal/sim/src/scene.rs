@@ -14,7 +14,7 @@ use super::placement::{Ground, Placement};
 use super::scenario::Scenario;
 use super::sensor::Sensor;
 use super::transport::{PADDING, Transport};
-use super::unsteady::Exposed;
+use super::unsteady::{Exposed, Unsteady};
 use hal::error::Error;
 use hal::frame::{Frame, FrameFormat, Pixels, Pool};
 use hal::projector::Raster;
@@ -43,6 +43,7 @@ pub struct Staged {
     pub(super) material: Option<Material>,
     pub(super) placement: Placement,
     pub(super) floor: Option<Ground>,
+    pub(super) unsteady: Unsteady,
     /// As it lies.
     pub(super) transport: Arc<Transport>,
     /// At each of the places between which it shakes.
@@ -78,6 +79,7 @@ impl Staged {
             material,
             placement: *placement,
             floor: scenario.floor.clone(),
+            unsteady: scenario.unsteady,
             transport: Arc::clone(&shaken[shaken.len() / 2]),
             shaken,
         }
@@ -178,7 +180,7 @@ impl SimScene {
     /// The picture of what is in view where something changes; none where nothing does.
     fn changed(&mut self, seen: &[InView], timestamp: Timestamp, count: u64) -> Option<Vec<f32>> {
         let scenario = Arc::clone(&self.scenario);
-        let unsteady = &scenario.unsteady;
+        let unsteady = self.placed.unsteady;
         let shakes = unsteady.places().len() > 1;
         if unsteady.is_steady() && !shakes {
             return None;

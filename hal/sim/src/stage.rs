@@ -9,6 +9,7 @@ use super::placement::{Ground, Placement};
 use super::scenario::Scenario;
 use super::scene::{SimScene, Staged};
 use super::transport::Truth;
+use super::unsteady::Unsteady;
 use hal::bounds::{Bound, Fields, within};
 use hal::error::{DeviceKind, Error};
 use hal::head::Head;
@@ -28,6 +29,8 @@ pub struct Stage {
     gain: Arc<Mutex<f64>>,
     /// What the next part lies on and among.
     floor: Arc<Mutex<Option<Ground>>>,
+    /// How light and part change in time once the next part is placed.
+    unsteady: Arc<Mutex<Unsteady>>,
 }
 
 /// A simulated head in front of the scenario's part, and the stage to place others on.
@@ -64,6 +67,7 @@ pub fn head_with_progress(
         control,
         gain: Arc::new(Mutex::new(scenario.optics.gain)),
         floor: Arc::new(Mutex::new(scenario.floor.clone())),
+        unsteady: Arc::new(Mutex::new(scenario.unsteady)),
         scenario,
         remembered: Arc::new(Mutex::new(vec![staged])),
     };
@@ -93,9 +97,10 @@ impl Stage {
         placement: &Placement,
         progress: &(dyn Fn(f64) + Sync),
     ) -> Result<(), Error> {
-        let floor = self.floor();
+        let (floor, unsteady) = (self.floor(), self.unsteady());
         let known = |staged: &Staged| {
-            let same = staged.part == *part && staged.floor == floor;
+            let world = staged.floor == floor && staged.unsteady == unsteady;
+            let same = staged.part == *part && world;
             same && staged.material == material && staged.placement == *placement
         };
         let recalled = {
@@ -108,7 +113,7 @@ impl Stage {
             None => self.work_out(part, material, placement, progress)?,
         };
         let mut remembered = self.remembered();
-        if remembered.len() >= MAX_REMEMBERED / self.scenario.unsteady.places().len() {
+        if remembered.len() >= MAX_REMEMBERED / unsteady.places().len() {
             remembered.remove(0);
         }
         remembered.push(staged.clone());
@@ -134,6 +139,7 @@ impl Stage {
             .map_err(|problem| Error::unsupported("placing this part", problem))?;
         let scenario = Scenario {
             floor: self.floor(),
+            unsteady: self.unsteady(),
             ..Scenario::clone(&self.scenario)
         };
         Ok(Staged::new(&scenario, part, material, placement, progress))
@@ -150,6 +156,23 @@ impl Stage {
         checked.map_err(|problem| Error::unsupported("laying this floor", problem))?;
         *self.floor.lock().unwrap_or_else(PoisonError::into_inner) = floor;
         Ok(())
+    }
+
+    /// Lets light and parts that are placed from now on change so in time.
+    ///
+    /// # Errors
+    /// `Unsupported` if a value is out of its range.
+    pub fn unsettle(&self, unsteady: Unsteady) -> Result<(), Error> {
+        let checked = Fields.check("unsteady", &unsteady);
+        checked.map_err(|problem| Error::unsupported("changing the light", problem))?;
+        *self.unsteady.lock().unwrap_or_else(PoisonError::into_inner) = unsteady;
+        Ok(())
+    }
+
+    /// How light and parts that are placed change in time.
+    #[must_use]
+    pub fn unsteady(&self) -> Unsteady {
+        *self.unsteady.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// What parts that are placed lie on and among.

@@ -15,6 +15,14 @@ const SHARP_PITCH: u32 = 12;
 /// Least contrast at that pitch, relative to the coarsest. A blur of σ pixels leaves exp(−2 (π σ /
 /// pitch)²): 0.5 is σ = 2.2 px.
 const LEAST_CONTRAST: f64 = 0.5;
+/// Most that other light may change, ± share of full scale.
+const MOST_FLICKER: f64 = 0.01;
+/// Frequencies of mains, Hz, and how long a period of their lamps' light is, s.
+const LAMPS: [(u32, f64); 2] = [(50, 0.01), (60, 1.0 / 120.0)];
+/// An exposure is of whole periods to this part of one.
+const WHOLE: f64 = 0.02;
+/// No longer exposure is proposed.
+const MOST_REFRESHES: u32 = 32;
 /// Largest deviation of light from proportionality to grey, share of white. A gamma of 1.1 deviates
 /// by 0.035.
 const MOST_NONLINEAR: f64 = 0.03;
@@ -128,6 +136,35 @@ pub fn alike(off: f64) -> Check {
         (off.abs() > MOST_BY_CONTENT).then_some(ADAPTS),
         json!({ "by_content_percent": off * 100.0 }),
     )
+}
+
+pub(super) fn flicker(examination: &mut Examination<'_>) -> CheckResult {
+    let (head, lit) = examination.lit()?;
+    // A multiple of three refreshes of 60 Hz is one of whole periods of 100 Hz.
+    let counts = examine::flicker(head, SETTLE + 1, lit)?;
+    let refresh = head.refresh().as_secs_f64();
+    let whole = LAMPS.map(|(mains, period)| {
+        let least = head.camera_timing().exposure.as_secs_f64() / refresh;
+        let mut refreshes = least.round().max(1.0) as u32..MOST_REFRESHES;
+        let found = refreshes.find(|count| {
+            let periods = f64::from(*count) * refresh / period;
+            (periods - periods.round()).abs() < WHOLE
+        });
+        found.map(|count| {
+            let us = f64::from(count) * refresh * 1e6;
+            format!("{us:.0} µs with mains of {mains} Hz")
+        })
+    });
+    let whole: Vec<String> = whole.into_iter().flatten().collect();
+    let remedy = format!(
+        "keep the light of lamps away from the part, or expose for whole periods of theirs: {}",
+        whole.join(", ")
+    );
+    Ok(Check::new(
+        format!("other light than the projector's changes by ± {counts:.1} counts"),
+        (counts > MOST_FLICKER * lit.full_scale()).then_some(&*remedy),
+        json!({ "flicker_counts": counts }),
+    ))
 }
 
 pub(super) fn response(examination: &mut Examination<'_>) -> CheckResult {

@@ -126,7 +126,7 @@ type Row = (
 const LIT: &[&str] = &["devices", "trigger", "light", "exposure"];
 
 /// The checks in their order.
-const CHECKS: [Row; 15] = [
+const CHECKS: [Row; 16] = [
     ("devices", &[], time::devices),
     ("format", &["devices"], time::format),
     ("mode", &["devices"], time::mode),
@@ -140,12 +140,15 @@ const CHECKS: [Row; 15] = [
         &["devices", "trigger", "light"],
         light::exposure,
     ),
+    ("flicker", LIT, light::flicker),
     ("delay", LIT, time::delay),
     ("contrast", LIT, light::contrast),
     ("content", LIT, light::content),
     (
         "response",
-        &["devices", "trigger", "light", "exposure", "content"],
+        &[
+            "devices", "trigger", "light", "exposure", "content", "flicker",
+        ],
         light::response,
     ),
     (

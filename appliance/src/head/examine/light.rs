@@ -24,6 +24,8 @@ use serde_json::{Map, Value};
 const MOST_FALL: f64 = 0.02;
 /// Grey levels; two pictures are taken of each.
 const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
+/// Pictures in the dark that tell whether other light changes.
+const DARK_PICTURES: usize = 12;
 /// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are
 /// relative to it.
 pub const PITCHES: [u32; 6] = [64, 32, 24, 16, 12, 8];
@@ -111,6 +113,21 @@ fn isotonic(values: &[f64]) -> Vec<f64> {
     }
     let spread = |(mean, count)| std::iter::repeat_n(mean, count);
     pools.into_iter().flat_map(spread).collect()
+}
+
+/// By how much other light than the projector's changes, ± counts over the lit pixels: half the span
+/// of pictures in the dark.
+///
+/// # Errors
+/// The error of a device.
+pub fn flicker(head: &mut Head, settle: u32, lit: &Lit) -> Result<f64, Error> {
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    let dark = greys(head.projector_size(), [0; DARK_PICTURES]);
+    pictures(head, settle, dark, &mut |counts| {
+        let mean = lit.mean(&counts);
+        (least, most) = (least.min(mean), most.max(mean));
+    })?;
+    Ok((most - least) / 2.0)
 }
 
 /// The camera's noise from two pictures of each of eight greys, with its σ at half the light of

@@ -5,7 +5,7 @@ use hal::bounds::clipped;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value, json};
 use sim::parts::{Across, Board, Defect, Joint, Plate};
-use sim::{Ground, Material, Part, Placement, Scenario};
+use sim::{Ground, Material, Part, Placement, Scenario, Unsteady};
 
 /// The most defects of a part: each ray is traced against all of them.
 const MAX_DEFECTS: usize = 16;
@@ -42,6 +42,9 @@ pub struct Placed {
     /// What it lies on and among, or that it lies on nothing; `None` leaves that as it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub floor: Option<Option<Ground>>,
+    /// How light and part change in time; `None` leaves that as it is.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub unsteady: Option<Unsteady>,
 }
 
 /// Every part that can be put in front of a head, good and as designed.
@@ -73,6 +76,7 @@ struct PlacedFile {
     pose: Option<u8>,
     #[serde(default, deserialize_with = "given")]
     floor: Option<Option<Ground>>,
+    unsteady: Option<Unsteady>,
 }
 
 /// A value whose key is given, also if it is `null`.
@@ -92,6 +96,7 @@ impl TryFrom<PlacedFile> for Placed {
             },
         };
         (placed.material, placed.floor) = (file.material, file.floor);
+        placed.unsteady = file.unsteady;
         match (file.placement, file.pose) {
             (Some(_), Some(_)) => {
                 return Exit::Content.fail("placement and pose: write one of them");

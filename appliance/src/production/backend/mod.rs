@@ -381,6 +381,7 @@ fn simulated(config: &HeadConfig, progress: &(dyn Fn(f64) + Sync)) -> Result<Ope
         (scenario.part, scenario.placement) = (placed.part.clone(), placed.placement);
         scenario.material = placed.material;
         scenario.floor = placed.floor.clone().unwrap_or(scenario.floor);
+        scenario.unsteady = placed.unsteady.unwrap_or(scenario.unsteady);
     }
     let (mut head, stage) =
         sim::head_with_progress(&scenario, progress).map_err(Exit::Unavailable.failure())?;

@@ -10,6 +10,9 @@ let part = null;
 let asked = "";
 // What the part lies over, and an example of all that can stand there.
 let floor = null, floors = {};
+// How light and part change in time.
+let unsteady = null;
+const CHANGING = ["lamp_depth", "flash", "projector_noise"];
 const STANDING = ["pins", "clamps", "next_mm"];
 let placing = false;
 
@@ -54,6 +57,24 @@ function showFloor() {
   for (const name of STANDING) $(`floor-${name}`).checked = Boolean(floor && floor[name] && (name === "next_mm" || floor[name].length));
 }
 
+function showUnsteady() {
+  const { shake_mm } = unsteady, changes = CHANGING.some((name) => unsteady[name] > 0) || shake_mm.some((mm) => mm > 0);
+  $("unsteady").checked = changes;
+  show("unsteady-fields", changes);
+  if (!changes) return;
+  for (const name of ["lamp_hz", "shake_hz", ...CHANGING]) $(`unsteady-${name}`).value = String(unsteady[name]);
+  for (const at of [0, 2]) $(`unsteady-shake-${at}`).value = String(shake_mm[at]);
+}
+
+// What changes in time as the form says.
+function changing() {
+  const ticked = $("unsteady").checked, number = (id) => Number($(`unsteady-${id}`).value);
+  const made = { ...unsteady, lamp_hz: number("lamp_hz"), shake_hz: number("shake_hz") };
+  for (const name of CHANGING) made[name] = ticked ? number(name) : 0;
+  made.shake_mm = unsteady.shake_mm.map((mm, at) => (!ticked ? 0 : at === 1 ? mm : number(`shake-${at}`)));
+  return made;
+}
+
 // The floor as the form says; what stands on it stays as it is where it is ticked, or is the example.
 function laid() {
   if (!$("floor").checked) return null;
@@ -69,13 +90,14 @@ function laid() {
 function showPart(answer) {
   show("simulation", answer.simulated);
   if (!answer.simulated) return;
-  ({ kinds, part, floor, floors } = answer);
+  ({ kinds, part, floor, floors, unsteady } = answer);
   fill($("part-material"), new Option("as the scenario's light", ""), ...answer.materials.map((name) => new Option(words(name), name)));
   $("part-material").value = answer.material || "";
   fill($("part-kind"), ...kinds.map((one) => new Option(words(one.part.kind), one.part.kind)));
   $("part-kind").value = part.kind;
   showPlacement(answer.placement);
   showFloor();
+  showUnsteady();
   showDefects();
 }
 
@@ -103,7 +125,7 @@ async function put() {
   const placement = { shift_mm: [0, 1, 2].map(number), tilt_deg: [3, 4].map(number), rotation_deg: number(5) };
   text("simulation-words", "the light of the part is being computed…");
   const material = $("part-material").value || null;
-  await place({ part, material, placement, floor: laid() }, "the part is in place: the next cycle sees it");
+  await place({ part, material, placement, floor: laid(), unsteady: changing() }, "the part is in place: the next cycle sees it");
   text("simulation-words", "");
 }
 
@@ -120,6 +142,7 @@ export function start() {
     part = copy(kinds.find((one) => one.part.kind === $("part-kind").value).part);
     showDefects();
   });
+  $("unsteady").addEventListener("change", () => show("unsteady-fields", $("unsteady").checked));
   $("floor").addEventListener("change", () => show("floor-fields", $("floor").checked));
   $("pose").addEventListener("change", () => {
     const { poses } = kinds.find((one) => one.part.kind === part.kind);
