@@ -393,7 +393,10 @@ fn floor(given: &str) -> Result<Lies, String> {
 
 fn unsteady(given: &str) -> Result<Unsteady, String> {
     let table = format!("unsteady = {{ {given} }}");
-    let scenario = Scenario::from_toml(&table, "--unsteady").map_err(|error| error.problem)?;
+    let scenario = Scenario::from_toml(&table, "--unsteady").map_err(|error| {
+        let problem = error.problem;
+        format!("write keys of [unsteady] with their values, as in lamp_depth=0.4: {problem}")
+    })?;
     Ok(scenario.unsteady)
 }
 

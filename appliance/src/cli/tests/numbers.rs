@@ -29,12 +29,14 @@ enum Takes {
     Defect,
     /// A floor below a simulated part.
     Floor,
+    /// What changes in time.
+    Unsteady,
     /// A checkerboard.
     Checker,
     /// Text, which has no numeric bounds.
     Words,
 }
-use Takes::{Address, Checker, Date, Defect, Floor, List, Number, Words};
+use Takes::{Address, Checker, Date, Defect, Floor, List, Number, Unsteady, Words};
 
 /// Every option and positional argument that takes neither a path nor one word of a list; `*` is
 /// every other command.
@@ -47,6 +49,7 @@ const TABLE: &[(&str, &str, Takes)] = &[
     ("*", "part", Words),
     ("*", "defect", Defect),
     ("*", "floor", Floor),
+    ("*", "unsteady", Unsteady),
     ("*", "shift", List(3, 1000.0)),
     ("*", "tilt", List(2, 80.0)),
     ("*", "pose", Number(1.0, 10.0)),
@@ -114,6 +117,9 @@ impl Takes {
                 let others = ["missing_hole", "bent_flange"].map(|kind| format!("{kind}:{value}"));
                 dents.chain(others).collect()
             }
+            Unsteady => ["lamp_depth={}", "lamp_hz=50,shake_mm=[0,0,{}]"]
+                .map(|form| form.replace("{}", value))
+                .into(),
             Floor => beside(&["0.35", "20"]),
             Checker => ["{}x13:10", "9x{}:10", "9x13:{}"]
                 .map(|form| format!("checker:{}", form.replace("{}", value)))
@@ -129,7 +135,7 @@ impl Takes {
             List(_, most) => vec![format!("from -{most} to {most}")],
             Address => vec!["0 to 65535".into()],
             Date => vec!["write a date".into()],
-            Defect | Floor => vec!["write ".into()],
+            Defect | Floor | Unsteady => vec!["write ".into()],
             Checker => vec!["write checker:".into()],
             Words => Vec::new(),
         }
@@ -194,7 +200,7 @@ fn a_boundary_value_of_an_option_is_refused_with_its_bounds_or_lies_within_them(
     }
     println!("{cases} boundary values of options, {taken} of them can be used");
     assert_eq!(known.len(), TABLE.len(), "an option is gone");
-    assert_eq!(cases, 1428);
+    assert_eq!(cases, 1530);
 }
 
 /// Checks the outcome of a case; returns whether its value was accepted.
@@ -236,7 +242,7 @@ fn check(
             assert!(numbers.iter().all(|number| number.abs() <= most), "{case}");
         }
         Address => assert!(matches.get_one::<SocketAddr>(id).is_some(), "{case}"),
-        Defect | Floor => {
+        Defect | Floor | Unsteady => {
             let part = SimulatedPart::from_arg_matches(&matches).unwrap();
             if let Err(refused) = part.placed(&HeadConfig::default()) {
                 assert_eq!(refused.exit, Exit::Usage, "{case}");
