@@ -1,7 +1,9 @@
 //! Light that changes within a cycle: lamps on the mains, a projector that is not constant, a flash, a
 //! shadow. A part in it reads as in steady light, or is INVALID with that reason.
 
+use crate::history::reader;
 use crate::placement::{Bed, TIMEOUT, bed, taught_within};
+use crate::station_plc::{Daemon, Place, Plc, long};
 use appliance::recipe::plan::Plan;
 use appliance::station::error_code::UNSTEADY_LIGHT;
 use appliance::station::snapshot::warning;
@@ -10,9 +12,11 @@ use hal::frame::{Frame, Pixels, Samples};
 use sim::parts::{Defect, Flowerpot, SheetMetal, Sphere};
 use sim::scenario::Optics;
 use sim::{Part, Placement, Scenario, Unsteady};
+use std::fs;
 use std::sync::Arc;
 use std::time::Instant;
 use tests::random::Random;
+use tests::until::{PATIENCE, until};
 
 /// Other light of 40 counts, and a projector that leaves room for it.
 fn scenario(part: &Part, unsteady: Unsteady, exposure_refreshes: f64) -> Scenario {
@@ -355,4 +359,52 @@ fn a_part_that_shakes_slowly_or_fast_reads_as_one_that_rests() {
         &[15.0, 17.0, 33.0, 47.0, 59.0],
         10,
     );
+}
+
+#[test]
+fn teaching_says_that_light_changed() {
+    let part = Part::default();
+    for (unsteady, told) in [(Unsteady::default(), false), (lamp(13.7, 15.0), true)] {
+        let taught = taught_within(&mut bed(&scenario(&part, unsteady, 1.0)), 1.0).unwrap();
+        let mut reasons = taught.choice.reasons.iter();
+        assert_eq!(reasons.any(|words| words.contains("light changed")), told);
+    }
+}
+
+#[test]
+fn a_station_takes_a_sequence_with_a_flash_again_and_keeps_what_changed() {
+    let place = Place::taught();
+    let scenario = fs::read_to_string(place.path("small.toml")).unwrap();
+    let changing = "[unsteady]\nflash = 0.06\nlamp_hz = 13.7\nlamp_depth = 0.4\n";
+    fs::write(place.path("small.toml"), format!("{scenario}\n{changing}")).unwrap();
+    let daemon = Daemon::start(&place);
+    let mut plc = Plc::connect(&daemon);
+    let mut retried = 0;
+    let mut last = 0;
+    for token in 1..=6 {
+        let words = plc.measure(token);
+        last = long(&words, 0);
+        let (verdict, error_code, flags) = (words[8], words[9], words[31]);
+        println!("verdict {verdict}, error {error_code}, flags {flags:b}");
+        assert!(
+            verdict == 1 || error_code == UNSTEADY_LIGHT,
+            "{verdict}, {error_code}"
+        );
+        retried += flags & 1;
+    }
+    assert!(retried > 0);
+    // The history has the changes of the lamp of each part that was judged.
+    let entries = until("the last result", PATIENCE, || {
+        let found: Vec<_> = (1..=last)
+            .filter_map(|seq| reader(&place).result(seq).unwrap())
+            .collect();
+        if found.len() == last as usize {
+            Ok(found)
+        } else {
+            Err(found.len())
+        }
+    });
+    let judged = entries.iter().filter(|entry| entry.error_code == 0);
+    let kept = judged.clone().filter(|entry| entry.light.is_some());
+    assert!(kept.count() > 0, "of {} judged", judged.count());
 }

@@ -190,6 +190,9 @@ impl Worker {
             if let Some(floor) = &placed.floor {
                 stage.surround(floor.clone())?;
             }
+            if let Some(unsteady) = placed.unsteady {
+                stage.unsettle(unsteady)?;
+            }
             stage.place_with_progress(part, placed.material, lies, &progress)
         };
         let shown = self.computing.on(|| self.pool.install(place));

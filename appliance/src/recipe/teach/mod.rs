@@ -191,6 +191,7 @@ pub fn teach_showing(
     if asked && let Some(exceeded) = limits::exceeded(&manifest, &judged) {
         return Err(exceeded.refusal(""));
     }
+    choice.reasons.extend(proof::unsteady(&judged));
     let mut words = proof::leave_out_covered(&mut manifest, &mut judged);
     words.extend(proof::hold(&mut manifest, &judged));
     let moved = !words.is_empty();

@@ -13,6 +13,7 @@ use crate::recipe::file::archive::Arrays;
 use crate::recipe::plan::Plan;
 use crate::recipe::plan::light::median;
 use crate::recipe::{GaugeFile, Recipe, RecipeFile, Refusal};
+use crate::station::snapshot::warning;
 use crate::station::{COVERAGE_FACTOR, GaugeValue, Inspection, Unit, Verdict};
 use crate::system::headway::Headway;
 use algo::geometry::Vector;
@@ -293,6 +294,15 @@ pub(crate) fn not_judged(judged: &[Inspection]) -> Option<String> {
         reasons.len(),
         judged.len()
     ))
+}
+
+/// What is to be said if light changed while the part was measured: golden is a mean of several
+/// captures, of which less is taken out than of a cycle.
+pub(crate) fn unsteady(judged: &[Inspection]) -> Option<String> {
+    let mut warnings = judged.iter().map(|inspection| inspection.warnings);
+    warnings.any(|all| all & warning::UNSTEADY_LIGHT != 0).then(|| {
+        "light changed while the part was taught, and its heights are off by some of that: teach it in steady light".into()
+    })
 }
 
 /// What a gauge's values are in magnitude: middle and spread.
