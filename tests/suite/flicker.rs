@@ -391,6 +391,8 @@ fn a_station_takes_a_sequence_with_a_flash_again_and_keeps_what_changed() {
             "{verdict}, {error_code}"
         );
         retried += flags & 1;
+        let warnings = plc.read(103, 1).unwrap()[0];
+        assert!(warnings & warning::UNSTEADY_LIGHT != 0, "{warnings:b}");
     }
     assert!(retried > 0);
     // The history has the changes of the lamp of each part that was judged.

@@ -251,7 +251,7 @@ impl Station {
     /// WARNING: the worker's bits, except those that the station decides.
     fn warnings(&self) -> u16 {
         let own = warning::PLC_LOST | warning::CLOCK_UNSYNCED;
-        let of_worker = self.condition.warnings & !own & 0x00FF;
+        let of_worker = self.condition.warnings & !own & (0x00FF | warning::UNSTEADY_LIGHT);
         let now = self.clock.now();
         let storage = self.results.unstored || self.history_fails || self.health.storage_is_low();
         of_worker
