@@ -63,7 +63,7 @@ fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
     // One thread and many give the same result.
     replay(&folder, &["--threads", "1"]).succeeded();
 
-    // One frame of the finest level is replaced by another, as if the light or the part had changed.
+    // One frame of the finest level is replaced by another.
     fs::copy(folder.join("frames/008.png"), folder.join("frames/011.png")).unwrap();
     let run = replay(&folder, &[]);
     assert_eq!(run.code, 70, "{}", run.stderr);
@@ -80,7 +80,7 @@ fn a_failed_part_is_kept_and_replays_bit_by_bit_and_a_difference_is_said() {
     let run = replay(&elsewhere, &["--state", state.to_str().unwrap()]);
     assert_eq!(run.code, 66, "{}", run.stderr);
     assert!(
-        run.stdout.contains("INVALID") && run.stderr.contains("compared with nothing"),
+        run.stdout.contains("FAIL") && run.stderr.contains("compared with nothing"),
         "{}",
         run.stderr
     );

@@ -63,6 +63,8 @@ const SURE: f64 = 8.0;
 const MOST_MISFIT: f64 = 2.0;
 /// Or with a larger share of the runs that do not fit.
 const MOST_STRAYS: f64 = 0.05;
+/// A frame has other light than its level if its mean differs by more than this share.
+const UNLIKE: f64 = 0.04;
 /// A frame is overexposed alone if it has so much more of its pixels at full scale than another one.
 const ALONE: f64 = 0.5;
 /// Other light is told apart from the projector's to this share of itself, and of the projector's
@@ -190,8 +192,9 @@ impl Watch {
         })
     }
 
-    /// The frame whose light differs most from the mean of its level.
-    fn strangest(&self, frames: &[FrameView<'_>]) -> usize {
+    /// The frame whose light differs most from the mean of its level, if it does by more than chance:
+    /// else something else than light is strange about the part.
+    fn broken(&self, frames: &[FrameView<'_>]) -> Steadiness {
         let light = |frame: usize| {
             let runs = self.looked().map(|(u, v)| {
                 let row = frames[frame].row(v);
@@ -206,7 +209,10 @@ impl Watch {
             off.zip(&level.frames)
         });
         let most = far.max_by(|a, b| a.0.total_cmp(&b.0));
-        most.map_or(0, |(_, frame)| *frame)
+        match most.filter(|(off, _)| *off > UNLIKE) {
+            Some((_, frame)) => Steadiness::Broken(*frame),
+            None => Steadiness::Steady,
+        }
     }
 
     /// The least modulation of a pixel that is looked at, counts.
@@ -287,7 +293,7 @@ impl Watch {
             }
         }
         if strays[0] as f64 > MOST_STRAYS * strays[1] as f64 {
-            return Steadiness::Broken(self.strangest(frames));
+            return self.broken(frames);
         }
         if gained < unknowns + SURE * libm::sqrt(2.0 * unknowns) {
             return Steadiness::Steady;
@@ -296,7 +302,7 @@ impl Watch {
         found.left = libm::hypot(found.left, libm::sqrt((found.misfit - 1.0).max(0.0)));
         match found.misfit <= MOST_MISFIT {
             true => Steadiness::Flickers(found),
-            false => Steadiness::Broken(self.strangest(frames)),
+            false => self.broken(frames),
         }
     }
 }
