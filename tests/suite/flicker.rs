@@ -419,3 +419,29 @@ fn a_station_takes_a_sequence_with_a_flash_again_and_keeps_what_changed() {
     let kept = judged.clone().filter(|entry| entry.light.is_some());
     assert!(kept.count() > 0, "of {} judged", judged.count());
 }
+
+#[test]
+fn steady_light_is_never_taken_for_changing_light_by_a_small_camera_either() {
+    let part = Part::default();
+    let mut steady = Scenario {
+        part,
+        sub_rays: 2,
+        ..Scenario::default()
+    };
+    (steady.rig.camera.width, steady.rig.camera.height) = (160, 160);
+    let mut bed = bed(&steady);
+    let taught = taught_within(&mut bed, 1.0).unwrap();
+    let plan = Plan::new(taught.recipe, &bed.calibration, true).unwrap();
+    let rasters = plan.rasters(&bed.calibration).unwrap();
+    bed.head.load(rasters).unwrap();
+    for seed in 0..400 {
+        bed.stage.reseed(seed);
+        let mut frames = Vec::new();
+        let mut keep = |_, frame| frames.push(frame);
+        bed.head
+            .acquire(plan.indices(0), TIMEOUT, &mut keep)
+            .unwrap();
+        let found = plan.inspect(0, &frames, Instant::now());
+        assert_eq!((found.light, found.error_code), (None, 0), "seed {seed}");
+    }
+}
