@@ -21,7 +21,6 @@ const ROUNDS: usize = 3;
 const PRIOR: [f64; PARTS] = [0.5, 0.5, 0.2, 0.05];
 /// Runs whose ripple varies by so many times the median variance are of an edge or a shadow.
 const STRAY: f64 = 4.0;
-
 /// A run does not fit whose ripple varies by so many times the variance of noise.
 const FAR: f64 = 9.0;
 

@@ -113,13 +113,8 @@ impl LevelRow<'_> {
                 true => pixel.copy_from_slice(&self.samples[u * count..][..count]),
                 false => self.steady(u, &mut pixel),
             }
-            let [mut offset, mut re, mut im] = [0.0; 3];
-            for (sample, [cos, sin]) in pixel.iter().zip(&self.level.shifts) {
-                offset += sample;
-                re += sin * sample;
-                im += cos * sample;
-            }
-            let modulation = 2.0 * libm::sqrt(re * re + im * im);
+            let [offset, re, im] = self.level.demodulate(pixel.iter().copied());
+            let modulation = libm::sqrt(re * re + im * im);
             sums[u + 1] = [sums[u][0] + offset, sums[u][1] + modulation];
         }
         let contrast = |u: usize| {

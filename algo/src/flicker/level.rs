@@ -7,8 +7,7 @@ use core::f64::consts::TAU;
 /// Neighbouring pixels of a row that are looked at together: some three fringes.
 pub(super) const RUN: usize = 24;
 /// The mean of a run's sines is at most this: else the run is less than a fringe.
-const ONE_SIDED: f64 = 0.5;
-
+const OFF_CENTRE: f64 = 0.5;
 /// Rounds of finding the signal of a pixel whose fringes moved.
 const SHIFTED: usize = 3;
 
@@ -77,6 +76,19 @@ impl LevelShifts {
         })
     }
 
+    /// A and the real and the imaginary part of B e^{2πiφ} of a pixel.
+    #[inline]
+    pub fn demodulate(&self, samples: impl Iterator<Item = f64>) -> [f64; 3] {
+        let mut sums = [0.0; 3];
+        for (sample, [cos, sin]) in samples.zip(&self.shifts) {
+            sums[0] += sample;
+            sums[1] += sample * sin;
+            sums[2] += sample * cos;
+        }
+        let [sum, re, im] = sums.map(|sum| sum / self.count());
+        [sum, 2.0 * re, 2.0 * im]
+    }
+
     /// N.
     pub fn count(&self) -> f64 {
         self.frames.len() as f64
@@ -120,52 +132,29 @@ pub(super) fn steady(
     if light.iter().all(|light| light.shift == 0.0) {
         return;
     }
-    // B e^{2πiφ} is as far off as shifts are: its square counts.
-    let mut lies = signal(level, samples);
-    for _ in 1..SHIFTED {
-        let mut next = [0.0; 2];
-        let pixels = samples.iter().zip(light).zip(&level.shifts);
-        for ((sample, light), shift) in pixels {
-            let sample = sample - light.shifted(lies, *shift);
-            next[0] += sample * shift[1];
-            next[1] += sample * shift[0];
-        }
-        lies = next.map(|part| 2.0 / level.count() * part);
+    // B e^{2πiφ} is as far off as shifts are, in the next round as far as their squares.
+    let mut signal = [0.0; 2];
+    for _ in 0..SHIFTED {
+        let pixel = samples.iter().zip(light).zip(&level.shifts);
+        let moved = pixel.map(|((sample, light), shift)| sample - light.shifted(signal, *shift));
+        [_, signal[0], signal[1]] = level.demodulate(moved);
     }
     for ((sample, light), shift) in samples.iter_mut().zip(light).zip(&level.shifts) {
-        *sample -= light.shifted(lies, *shift);
+        *sample -= light.shifted(signal, *shift);
     }
-}
-
-/// The real and the imaginary part of B e^{2πiφ}.
-fn signal(level: &LevelShifts, samples: &[f64]) -> [f64; 2] {
-    let mut parts = [0.0; 2];
-    for (sample, [cos, sin]) in samples.iter().zip(&level.shifts) {
-        parts[0] += sample * sin;
-        parts[1] += sample * cos;
-    }
-    parts.map(|part| 2.0 / level.count() * part)
 }
 
 impl SeenRun {
     /// Of pixels whose sample in frame k is `sample(k, pixel)`.
     pub fn of(level: &LevelShifts, sample: impl Fn(usize, usize) -> f64) -> Self {
-        let [mut offset, mut re, mut im] = [[0.0; RUN]; 3];
-        for (k, [cos, sin]) in level.shifts.iter().enumerate() {
-            for at in 0..RUN {
-                let sample = sample(k, at);
-                offset[at] += sample;
-                re[at] += sin * sample;
-                im[at] += cos * sample;
-            }
-        }
-        let count = level.count();
-        let (mut modulation, mut phase) = ([0.0; RUN], [[0.0; 2]; RUN]);
+        let [mut offset, mut modulation] = [[0.0; RUN]; 2];
+        let mut phase = [[0.0; 2]; RUN];
         for at in 0..RUN {
-            let length = libm::sqrt(re[at] * re[at] + im[at] * im[at]);
-            modulation[at] = 2.0 / count * length;
-            phase[at] = [im[at] / length, re[at] / length];
-            offset[at] /= count;
+            let pixel = (0..level.frames.len()).map(|k| sample(k, at));
+            let [mean, re, im] = level.demodulate(pixel);
+            let length = libm::sqrt(re * re + im * im);
+            (offset[at], modulation[at]) = (mean, length);
+            phase[at] = [im / length, re / length];
         }
         Self {
             contrast: modulation.iter().sum::<f64>() / offset.iter().sum::<f64>(),
@@ -185,7 +174,7 @@ impl SeenRun {
         let sum = |part: usize| self.phase.iter().map(|phase| phase[part]).sum::<f64>();
         [0, 1]
             .iter()
-            .any(|&part| sum(part).abs() > ONE_SIDED * RUN as f64)
+            .any(|&part| sum(part).abs() > OFF_CENTRE * RUN as f64)
     }
 
     /// B/A of each pixel over that of all, less 1.

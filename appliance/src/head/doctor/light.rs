@@ -4,7 +4,8 @@
 use super::{Check, CheckResult, CheckVerdict, Examination};
 use crate::head::examine::{self, SETTLE};
 use crate::head::examine::{
-    LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, Lit, MOST_BY_CONTENT, MOST_SATURATED, by_content,
+    LAMPS_HZ, LEAST_BRIGHT, LEAST_LIT, LONGEST_DARK, Lit, MOST_BY_CONTENT, MOST_SATURATED,
+    by_content,
 };
 use serde_json::json;
 
@@ -17,8 +18,6 @@ const SHARP_PITCH: u32 = 12;
 const LEAST_CONTRAST: f64 = 0.5;
 /// Most that other light may change, ± share of full scale.
 const MOST_FLICKER: f64 = 0.01;
-/// Frequencies of mains, Hz, and how long a period of their lamps' light is, s.
-const LAMPS: [(u32, f64); 2] = [(50, 0.01), (60, 1.0 / 120.0)];
 /// An exposure is of whole periods to this part of one.
 const WHOLE: f64 = 0.02;
 /// No longer exposure is proposed.
@@ -143,16 +142,16 @@ pub(super) fn flicker(examination: &mut Examination<'_>) -> CheckResult {
     // A multiple of three refreshes of 60 Hz is one of whole periods of 100 Hz.
     let counts = examine::flicker(head, SETTLE + 1, lit)?;
     let refresh = head.refresh().as_secs_f64();
-    let whole = LAMPS.map(|(mains, period)| {
+    let whole = LAMPS_HZ.map(|hz| {
         let least = head.camera_timing().exposure.as_secs_f64() / refresh;
         let mut refreshes = least.round().max(1.0) as u32..MOST_REFRESHES;
         let found = refreshes.find(|count| {
-            let periods = f64::from(*count) * refresh / period;
+            let periods = f64::from(*count) * refresh * f64::from(hz);
             (periods - periods.round()).abs() < WHOLE
         });
         found.map(|count| {
             let us = f64::from(count) * refresh * 1e6;
-            format!("{us:.0} µs with mains of {mains} Hz")
+            format!("{us:.0} µs with mains of {} Hz", hz / 2)
         })
     });
     let whole: Vec<String> = whole.into_iter().flatten().collect();

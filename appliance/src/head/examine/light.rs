@@ -24,6 +24,8 @@ use serde_json::{Map, Value};
 const MOST_FALL: f64 = 0.02;
 /// Grey levels; two pictures are taken of each.
 const GREYS: [u8; 8] = [16, 48, 80, 112, 144, 176, 208, 240];
+/// How often lamps on mains of 50 and 60 Hz get brighter, Hz.
+pub const LAMPS_HZ: [u32; 2] = [100, 120];
 /// Pictures in the dark that tell whether other light changes.
 const DARK_PICTURES: usize = 12;
 /// Pitches whose contrast is measured, projector pixels. The first is the coarsest: contrasts are

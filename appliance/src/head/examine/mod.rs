@@ -16,7 +16,8 @@ pub use crossed::{
 };
 pub use delay::Delay;
 pub use light::{
-    MOST_BY_CONTENT, PITCHES, by_content, by_pitch, contrast, flicker, lights, noise, response,
+    LAMPS_HZ, MOST_BY_CONTENT, PITCHES, by_content, by_pitch, contrast, flicker, lights, noise,
+    response,
 };
 
 use hal::camera::Starts;

@@ -1,6 +1,7 @@
 //! What is said of light that changes from frame to frame.
 
 use super::Plan;
+use crate::head::examine::LAMPS_HZ;
 use crate::station::error_code::UNSTEADY_LIGHT;
 use crate::station::snapshot::warning;
 use crate::station::{Inspection, UnsteadyLight, Verdict};
@@ -12,8 +13,6 @@ use std::sync::Arc;
 
 /// Smaller changes are corrected and not told: share of full scale, of the projector's light, turns.
 const TOLD: [f64; 3] = [0.008, 0.02, 0.005];
-/// Frequencies of lamps on the mains, Hz.
-const LAMPS_HZ: [u32; 2] = [100, 120];
 /// A frequency is named that explains so much of the changes, and if no other one explains as much as
 /// the second share.
 const EXPLAINED: [f64; 2] = [0.9, 0.7];
@@ -30,7 +29,7 @@ impl Plan {
             Steadiness::Steady => {}
             Steadiness::Broken(frame) => {
                 let words = format!(
-                    "the light changed too much while frame {} of {} was taken (a flash, a shadow, or the part moved): keep other light away from the part and measure again",
+                    "the light changed too much while frame {} of {} was taken (a flash or a shadow): keep other light away from the part and measure again",
                     frame + 1,
                     frames.len()
                 );
