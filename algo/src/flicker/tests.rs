@@ -1,6 +1,6 @@
 //! Frames whose light is known, frame by frame.
 
-use super::{Steadiness, Watch};
+use super::{Flicker, Steadiness, Watch};
 use crate::frame::{FrameView, Samples};
 use crate::pattern::{Sequence, Shot};
 use alloc::vec::Vec;
@@ -98,6 +98,17 @@ fn error(shots: &[Shot], views: &[FrameView<'_>]) -> f64 {
     libm::sqrt(squares / cells.len() as f64)
 }
 
+/// What is found in frames that change, and the errors of their phases before and after.
+fn corrected(shots: &[Shot], watch: &Watch, views: &[FrameView<'_>]) -> (Flicker, [f64; 2]) {
+    let Steadiness::Flickers(found) = watch.look(views) else {
+        panic!("{:?}", watch.look(views));
+    };
+    let steady = watch.steady(views, &found);
+    let steady: Vec<_> = steady.views().collect();
+    let errors = [error(shots, views), error(shots, &steady)];
+    (found, errors)
+}
+
 /// The sequences of production: three levels of four shifts, two of three, one of four or three.
 fn sequences() -> Vec<Vec<Shot>> {
     [
@@ -156,12 +167,7 @@ fn a_lamp_and_an_unsteady_projector_are_found_and_taken_out() {
         for (alpha, gamma) in [(&lamp[..], &none[..]), (&none, gains), (&lamp, gains)] {
             let frames = frames(&shots, (40.0, alpha, gamma), 1);
             let views = views(&frames);
-            let Steadiness::Flickers(found) = watch.look(&views) else {
-                panic!("{:?}", watch.look(&views));
-            };
-            let corrected = watch.steady(&views, &found);
-            let corrected: Vec<_> = corrected.views().collect();
-            let (before, after) = (error(&shots, &views), error(&shots, &corrected));
+            let (found, [before, after]) = corrected(&shots, &watch, &views);
             let off = |found: &[f64], truth: &[f64]| {
                 let mut most: f64 = 0.0;
                 for (k, shot) in shots.iter().enumerate() {
@@ -217,12 +223,7 @@ fn fringes_that_move_from_frame_to_frame_are_found_and_moved_back() {
         let moved: Vec<f64> = moved.collect();
         let frames = moved_frames(&shots, (40.0, &none, &none), &moved, 1);
         let views = views(&frames);
-        let Steadiness::Flickers(found) = watch.look(&views) else {
-            panic!("{:?}", watch.look(&views));
-        };
-        let corrected = watch.steady(&views, &found);
-        let corrected: Vec<_> = corrected.views().collect();
-        let (before, after) = (error(&shots, &views), error(&shots, &corrected));
+        let (found, [before, after]) = corrected(&shots, &watch, &views);
         let shifts = found.frames.iter().zip(&moved);
         let off = shifts
             .map(|(found, moved)| (found.shift - moved).abs())

@@ -682,6 +682,24 @@ fn a_storage_that_refuses_is_a_warning_and_what_waited_is_stored_when_it_takes_i
 }
 
 #[test]
+fn a_history_that_was_begun_before_light_was_kept_gets_the_column_and_stays_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(DATABASE);
+    open_writer(folder.path()).store(some(2).iter()).unwrap();
+    let other = rusqlite::Connection::open(&path).unwrap();
+    other
+        .execute_batch("ALTER TABLE result DROP COLUMN light")
+        .unwrap();
+    drop(other);
+    let (mut writer, complaint) = Writer::open(&path, ENOUGH).unwrap();
+    assert_eq!(complaint, None);
+    let reader = Reader::of(folder.path());
+    assert_eq!(seqs(&reader, &Filter::default()).len(), 2);
+    writer.store(some(3).iter().skip(2)).unwrap();
+    assert_eq!(seqs(&reader, &Filter::default()).len(), 3);
+}
+
+#[test]
 fn a_history_of_another_version_is_set_aside_whole_and_a_new_one_with_an_id_of_its_own_begins() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join(DATABASE);
