@@ -1,7 +1,7 @@
 //! How the light of a level's frames changes, by least squares.
 //!
 //! Unknown are a, b, g and ε of N frames. A run gives equations per pixel: for its ripple and for its
-//! brightness A, both without mean and slope, and N − 3 for what no sine explains. (The brightness
+//! brightness A, both without mean, slope and bend, and N − 3 for what no sine explains. (The brightness
 //! tells shifts from gains; what the part's own shades do to it counts as noise.) They are linear about
 //! the frames as corrected so far; three rounds do for changes of a third of the light. What the frames
 //! have in common, and the two numbers of an offset where all runs have the same contrast, are left
@@ -150,7 +150,7 @@ fn kept(level: &LevelShifts, runs: &[(Run, SeenRun)], noise: f64) -> Vec<bool> {
 
 /// Variance of a run's ripple over that by noise.
 fn ripples(level: &LevelShifts, run: &SeenRun, noise: f64) -> f64 {
-    let squares = without_line(&run.ripple()).map(|value| value * value);
+    let squares = bare(&run.ripple()).map(|value| value * value);
     squares.iter().sum::<f64>() / (RUN as f64 * variance(level, run, noise))
 }
 
@@ -161,18 +161,29 @@ fn variance(level: &LevelShifts, run: &SeenRun, noise: f64) -> f64 {
     noise * noise * (2.0 * b * b + a * a) / level.count()
 }
 
-/// Values without their mean and slope.
-fn without_line(values: &[f64; RUN]) -> [f64; RUN] {
+/// Values without their mean, slope and bend, which are of the part.
+fn bare(values: &[f64; RUN]) -> [f64; RUN] {
     let middle = (RUN - 1) as f64 / 2.0;
-    let (mut mean, mut slope, mut squares) = (0.0, 0.0, 0.0);
-    for (at, value) in values.iter().enumerate() {
-        let place = at as f64 - middle;
-        mean += value / RUN as f64;
-        slope += value * place;
-        squares += place * place;
+    let spread = ((RUN * RUN - 1) as f64) / 12.0;
+    // Polynomials that are orthogonal on the run.
+    let polynomials: [fn(f64, f64) -> f64; 3] = [
+        |_, _| 1.0,
+        |place, _| place,
+        |place, spread| place * place - spread,
+    ];
+    let mut left = *values;
+    for polynomial in polynomials {
+        let of = |at: usize| polynomial(at as f64 - middle, spread);
+        let (mut product, mut square) = (0.0, 0.0);
+        for (at, value) in values.iter().enumerate() {
+            product += value * of(at);
+            square += of(at) * of(at);
+        }
+        for (at, left) in left.iter_mut().enumerate() {
+            *left -= product / square * of(at);
+        }
     }
-    let slope = slope / squares;
-    core::array::from_fn(|at| values[at] - mean - slope * (at as f64 - middle))
+    left
 }
 
 impl LightEquations {
@@ -201,17 +212,13 @@ impl LightEquations {
         let (n, contrast) = (level.count(), run.contrast);
         // δB/B − δA/A, δA/A and, in counts, what no sine explains, of an offset of B.
         self.set(level, run, |_, _, wave| (2.0 * wave - contrast) / n);
-        self.rows
-            .iter_mut()
-            .for_each(|row| *row = without_line(row));
-        let ripple = without_line(&run.ripple());
+        self.rows.iter_mut().for_each(|row| *row = bare(row));
+        let ripple = bare(&run.ripple());
         let mut squares = self.join(&ripple, variance(level, run, noise));
         self.set(level, run, |_, _, _| contrast / n);
-        self.rows
-            .iter_mut()
-            .for_each(|row| *row = without_line(row));
+        self.rows.iter_mut().for_each(|row| *row = bare(row));
         let mean = run.offset.iter().sum::<f64>() / RUN as f64;
-        let bright = without_line(&run.offset.map(|offset| offset / mean));
+        let bright = bare(&run.offset.map(|offset| offset / mean));
         let shades = bright.iter().map(|value| value * value).sum::<f64>() / RUN as f64;
         self.join(&bright, shades.max(noise * noise / (n * mean * mean)));
         for other in &level.others {

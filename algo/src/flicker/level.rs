@@ -1,6 +1,6 @@
 //! The frames of a level, a run of its pixels, and what the light of a frame does to them.
 
-use crate::pattern::Level;
+use crate::pattern::{Level, Waveform};
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
 
@@ -18,6 +18,9 @@ pub(super) struct LevelShifts {
     pub frames: Vec<usize>,
     /// cos and sin of 2πs_k.
     pub shifts: Vec<[f64; 2]>,
+    /// N, if its fringes are no sines: of their harmonics the N-th is the same in all frames, and looks
+    /// like a brightness that ripples along the fringes.
+    pub harmonic: Option<usize>,
     /// What no sine explains: N − 3 orthonormal vectors with a number per frame.
     pub others: Vec<Vec<f64>>,
 }
@@ -72,6 +75,7 @@ impl LevelShifts {
         Some(Self {
             frames: level.frames.iter().map(|&at| usize::from(at)).collect(),
             shifts: shifts.collect(),
+            harmonic: (level.waveform != Waveform::SINE).then_some(count),
             others: (2..=count / 2).flat_map(waves).collect(),
         })
     }
@@ -144,6 +148,25 @@ pub(super) fn steady(
     }
 }
 
+/// Takes a harmonic of the fringes out of the brightness of a run.
+fn flatten(offset: &mut [f64; RUN], phase: &[[f64; 2]; RUN], harmonic: usize) {
+    let mean = offset.iter().sum::<f64>() / RUN as f64;
+    let waves = phase.map(|[sin, cos]| {
+        let turned = |[s, c]: [f64; 2]| [s * cos + c * sin, c * cos - s * sin];
+        (0..harmonic).fold([0.0, 1.0], |wave, _| turned(wave))
+    });
+    for part in [0, 1] {
+        let (mut product, mut square) = (0.0, f64::MIN_POSITIVE);
+        for (offset, wave) in offset.iter().zip(&waves) {
+            product += (offset - mean) * wave[part];
+            square += wave[part] * wave[part];
+        }
+        for (offset, wave) in offset.iter_mut().zip(&waves) {
+            *offset -= product / square * wave[part];
+        }
+    }
+}
+
 impl SeenRun {
     /// Of pixels whose sample in frame k is `sample(k, pixel)`.
     pub fn of(level: &LevelShifts, sample: impl Fn(usize, usize) -> f64) -> Self {
@@ -155,6 +178,9 @@ impl SeenRun {
             let length = libm::sqrt(re * re + im * im);
             (offset[at], modulation[at]) = (mean, length);
             phase[at] = [im / length, re / length];
+        }
+        if let Some(harmonic) = level.harmonic {
+            flatten(&mut offset, &phase, harmonic);
         }
         Self {
             contrast: modulation.iter().sum::<f64>() / offset.iter().sum::<f64>(),

@@ -4,8 +4,8 @@
 //! # Idea
 //! Of a pixel, the N frames of a level show I_k = A + B sin 2π(φ + s_k). Another offset or gain in
 //! some of them makes the modulation of pixels wrong once or twice per fringe, while that of the part
-//! hardly changes along a few fringes. So B/A, without its mean and slope along a short run of
-//! pixels, tells the changes; from four frames on, what no sine explains tells them, too. (Shifts that
+//! hardly changes along a few fringes. So B/A, without its mean, slope and bend along a short
+//! run of pixels, tells the changes; from four frames on, what no sine explains tells them, too. (Shifts that
 //! are not known are found alike: Z. Wang, B. Han, Optics Letters 29, 2004, pp. 1671–1673. Here shifts
 //! are known and the light is not.) What is found is taken out of the samples, so that phases,
 //! contours and sections follow from frames of one light.
