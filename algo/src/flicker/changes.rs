@@ -17,6 +17,8 @@ use core::f64::consts::TAU;
 const PARTS: usize = 4;
 /// Rounds of correcting and solving.
 const ROUNDS: usize = 3;
+/// Rounds of finding the contrast of a run: changing light makes it seem larger than it is.
+const CONTRASTS: usize = 2;
 /// σ of the prior of a, b, g and ε.
 const PRIOR: [f64; PARTS] = [0.5, 0.5, 0.2, 0.05];
 /// Runs whose ripple varies by so many times the median variance are of an edge or a shadow.
@@ -117,22 +119,22 @@ impl Changes {
 impl LevelShifts {
     /// A run in the light that its frames have together, and what is seen there.
     fn seen(&self, run: &Run, light: &[FrameLight]) -> (Run, SeenRun) {
-        let before = SeenRun::of(self, |k, at| run[k][at]);
+        let mut seen = SeenRun::of(self, |k, at| run[k][at]);
         let mut samples = run.clone();
         let mut pixel = vec![0.0; run.len()];
-        for at in 0..RUN {
-            pixel
-                .iter_mut()
-                .zip(run)
-                .for_each(|(sample, all)| *sample = all[at]);
-            steady(self, &mut pixel, light, before.contrast);
-            samples
-                .iter_mut()
-                .zip(&pixel)
-                .for_each(|(all, sample)| all[at] = *sample);
+        for _ in 0..CONTRASTS {
+            for at in 0..RUN {
+                for (sample, all) in pixel.iter_mut().zip(run) {
+                    *sample = all[at];
+                }
+                steady(self, &mut pixel, light, seen.contrast);
+                for (all, sample) in samples.iter_mut().zip(&pixel) {
+                    all[at] = *sample;
+                }
+            }
+            seen = SeenRun::of(self, |k, at| samples[k][at]);
         }
-        let after = SeenRun::of(self, |k, at| samples[k][at]);
-        (samples, after)
+        (samples, seen)
     }
 }
 

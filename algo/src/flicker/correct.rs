@@ -19,6 +19,7 @@ pub struct SteadyFrames {
     count: usize,
 }
 
+/// Samples as the decoder wants them.
 #[derive(Debug)]
 enum Buffer {
     Eight(Vec<u8>),
@@ -33,37 +34,26 @@ impl SteadyFrames {
         frames: &[FrameView<'_>],
         full_scale: u16,
     ) -> Self {
-        let size = frames
-            .first()
-            .map_or((0, 0), |frame| (frame.width(), frame.height()));
         let count = frames.len();
-        let length = count * size.0 * size.1;
-        let eight = matches!(
-            frames.first().map(|frame| frame.row(0)),
-            Some(Samples::Eight(_))
-        );
-        let row = |v: usize| move |frame: usize, u: usize| frames[frame].row(v).at(u);
-        let samples = match eight {
-            true => {
-                let mut all = vec![0_u8; length];
-                for_each_row(&mut all, count * size.0, |v, out| {
-                    correct(levels, (row(v), count, full_scale), out, |sample| {
-                        sample as u8
-                    });
-                });
-                Buffer::Eight(all)
+        let width = frames.first().map_or(0, FrameView::width);
+        let mut samples = vec![0; frames.iter().map(|frame| width * frame.height()).sum()];
+        for_each_row(&mut samples, count * width, |v, out| {
+            for (row, frame) in out.chunks_mut(width).zip(frames) {
+                for (u, sample) in row.iter_mut().enumerate() {
+                    *sample = frame.row(v).at(u);
+                }
             }
-            false => {
-                let mut all = vec![0_u16; length];
-                for_each_row(&mut all, count * size.0, |v, out| {
-                    correct(levels, (row(v), count, full_scale), out, |sample| sample);
-                });
-                Buffer::Sixteen(all)
+            for (level, light) in levels {
+                correct(level, light, (out, width), full_scale);
             }
-        };
+        });
+        let eight = |frame: &FrameView<'_>| matches!(frame.row(0), Samples::Eight(_));
         Self {
-            samples,
-            size,
+            samples: match frames.first().is_some_and(eight) {
+                true => Buffer::Eight(samples.iter().map(|&sample| sample as u8).collect()),
+                false => Buffer::Sixteen(samples),
+            },
+            size: (width, frames.first().map_or(0, FrameView::height)),
             count,
         }
     }
@@ -126,39 +116,28 @@ impl LevelRow<'_> {
     }
 }
 
-/// Writes a row of all `count` frames, one after the other; `sample(frame, column)` is what was
-/// taken.
-fn correct<T>(
-    levels: &[(&LevelShifts, Vec<FrameLight>)],
-    (sample, count, full_scale): (impl Fn(usize, usize) -> u16, usize, u16),
-    out: &mut [T],
-    to: impl Fn(u16) -> T,
+/// Corrects the samples of a level in a row of all frames, one frame after the other.
+fn correct(
+    level: &LevelShifts,
+    light: &[FrameLight],
+    (row, width): (&mut [u16], usize),
+    full_scale: u16,
 ) {
-    let width = out.len() / count.max(1);
-    for frame in 0..count {
-        for u in 0..width {
-            out[frame * width + u] = to(sample(frame, u));
-        }
-    }
-    let most = f64::from(full_scale) - 1.0;
-    for (level, light) in levels {
-        let places = (0..width).flat_map(|u| level.frames.iter().map(move |&frame| (frame, u)));
-        let mut row = LevelRow {
-            level,
-            light,
-            samples: places
-                .map(|(frame, u)| f64::from(sample(frame, u)))
-                .collect(),
-            contrasts: Vec::new(),
-        };
-        NEIGHBOURS.iter().for_each(|&reach| row.look(reach));
-        let mut pixel = vec![0.0; level.frames.len()];
-        for u in 0..width {
-            row.steady(u, &mut pixel);
-            for (corrected, &frame) in pixel.iter().zip(&level.frames) {
-                if sample(frame, u) < full_scale {
-                    out[frame * width + u] = to(libm::rint(corrected.clamp(0.0, most)) as u16);
-                }
+    let places = (0..width).flat_map(|u| level.frames.iter().map(move |frame| frame * width + u));
+    let mut seen = LevelRow {
+        level,
+        light,
+        samples: places.map(|at| f64::from(row[at])).collect(),
+        contrasts: Vec::new(),
+    };
+    NEIGHBOURS.iter().for_each(|&reach| seen.look(reach));
+    let mut pixel = vec![0.0; level.frames.len()];
+    for u in 0..width {
+        seen.steady(u, &mut pixel);
+        for (corrected, frame) in pixel.iter().zip(&level.frames) {
+            let sample = &mut row[frame * width + u];
+            if *sample < full_scale {
+                *sample = libm::rint(corrected.clamp(0.0, f64::from(full_scale) - 1.0)) as u16;
             }
         }
     }

@@ -62,14 +62,14 @@ const SURE: f64 = 8.0;
 /// With a larger misfit, variance over that of noise, changes are not of this kind.
 const MOST_MISFIT: f64 = 2.0;
 /// Nor if a larger share of the runs does not fit.
-const MOST_STRAYS: f64 = 0.05;
+const MOST_STRAYS: f64 = 0.08;
 /// A frame has other light than its level if its mean differs by more than this share.
 const UNLIKE: f64 = 0.04;
 /// A frame is overexposed alone if it has so much more of its pixels at full scale than another one.
 const ALONE: f64 = 0.5;
-/// Other light is told apart from the projector's to this share of itself, and of the projector's
-/// change.
-const APART: [f64; 2] = [0.04, 0.1];
+/// Where fringes are blurred more than elsewhere, other light is told apart from the projector's to
+/// this share of itself.
+const BLURRED: f64 = 0.05;
 /// The contrast of a pattern alone, where the frames do not tell: at least half, at most 1.
 const PATTERN: [f64; 2] = [0.5, 1.0];
 
@@ -91,8 +91,6 @@ pub struct Flicker {
     pub frames: Vec<FrameLight>,
     /// Per frame, the other light against the mean of its level, counts where the part is.
     pub other: Vec<f64>,
-    /// σ of that, and of gains.
-    pub sigma: [f64; 2],
     /// Variance of what the corrected frames differ by from sines, over that of noise.
     pub misfit: f64,
     /// σ of what is left in a sample after the correction, over that of noise.
@@ -265,7 +263,6 @@ impl Watch {
         let mut found = Flicker {
             frames: vec![FrameLight::default(); frames.len()],
             other: vec![0.0; frames.len()],
-            sigma: [0.0; 2],
             misfit: 0.0,
             left: 0.0,
         };
@@ -281,15 +278,11 @@ impl Watch {
             gained += fit.gained;
             unknowns += 4.0 * level.count();
             let [offset, gain] = fit.sigma;
-            let unsure = libm::hypot(offset, gain * fit.seen[1]) / self.noise;
-            found.left = found.left.max(unsure);
+            found.left = found.left.max(libm::hypot(offset, gain * fit.seen[1]));
             let others = fit.other();
             for ((light, other), &frame) in fit.light.iter().zip(others).zip(&level.frames) {
                 found.frames[frame] = *light;
                 found.other[frame] = other;
-                let shares = [APART[0] * other, APART[1] * light.gain * fit.seen[1]];
-                let unsure = libm::hypot(offset, libm::hypot(shares[0], shares[1]));
-                found.sigma = [found.sigma[0].max(unsure), found.sigma[1].max(gain)];
             }
         }
         if strays[0] as f64 > MOST_STRAYS * strays[1] as f64 {
@@ -299,7 +292,8 @@ impl Watch {
             return Steadiness::Steady;
         }
         found.misfit = left[0] / left[1];
-        found.left = libm::hypot(found.left, libm::sqrt((found.misfit - 1.0).max(0.0)));
+        let unsure = libm::hypot(found.left, BLURRED * found.other_counts()) / self.noise;
+        found.left = libm::hypot(unsure, libm::sqrt((found.misfit - 1.0).max(0.0)));
         match found.misfit <= MOST_MISFIT {
             true => Steadiness::Flickers(found),
             false => self.broken(frames),

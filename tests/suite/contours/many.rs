@@ -4,15 +4,15 @@
 use super::line::{Judged, Line};
 use super::plates::{Setting, Z_MM, plate};
 use super::{
-    all_together, bright, closed_holes_are_absent, defects_fail, judge,
-    rims_that_nobody_states_are_within_the_uncertainty, thick,
+    all_together, bright, closed_holes_are_absent, defects_fail, judge, lamp,
+    rims_that_nobody_states_are_within_the_uncertainty, sizes_are_true, thick,
 };
 use crate::placement::{bed, taught_within};
 use crate::surroundings::everywhere;
 use algo::geometry::Vector;
 use appliance::station::Verdict;
-use sim::Part;
 use sim::parts::{Floor, Plate};
+use sim::{Part, Unsteady};
 use std::time::Instant;
 use tests::random::Random;
 
@@ -131,6 +131,24 @@ fn a_floor_a_whole_number_of_fringes_lower_is_never_taken_for_the_sheet() {
         }
     }
     assert!(wrong.is_empty(), "{wrong:?}");
+}
+
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn sizes_in_changing_light_are_as_true_in_fifty_placements() {
+    let noisy = Unsteady {
+        projector_noise: 0.03,
+        ..Unsteady::default()
+    };
+    for (name, unsteady) in [
+        ("steady", Unsteady::default()),
+        ("100 Hz", lamp(100.0)),
+        ("120 Hz", lamp(120.0)),
+        ("13.7 Hz", lamp(13.7)),
+        ("projector 3 %", noisy),
+    ] {
+        sizes_are_true(name, unsteady, 50);
+    }
 }
 
 #[test]

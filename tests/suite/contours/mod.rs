@@ -11,8 +11,8 @@ use crate::gauges::frames;
 use appliance::station::Verdict;
 use line::{Judged, Line};
 use plates::{Setting, plate};
-use sim::Part;
 use sim::parts::{Defect, Floor, Plate};
+use sim::{Part, Unsteady};
 use std::time::Instant;
 use tests::random::Random;
 
@@ -135,6 +135,36 @@ fn holes_slots_and_edges_are_true_and_as_uncertain_as_they_say() {
 #[ignore = "minutes"]
 fn contours_are_true_with_thick_sheets_bright_floors_real_optics_and_tilts() {
     judge(settings());
+}
+
+#[test]
+fn sizes_in_light_that_changes_slowly_are_as_true() {
+    sizes_are_true("13.7 Hz", lamp(13.7), FEW_PLACEMENTS);
+}
+
+/// Other light of 40 ± 15 counts where exposures are short against its period.
+fn lamp(lamp_hz: f64) -> Unsteady {
+    Unsteady {
+        lamp_hz,
+        lamp_depth: 15.0 / 40.0,
+        ..Unsteady::default()
+    }
+}
+
+/// Of a plate that was taught in steady light.
+fn sizes_are_true(name: &str, unsteady: Unsteady, placements: usize) {
+    let mut line = Line::new(&Setting {
+        ambient: 40.0 / 255.0,
+        ..Setting::default()
+    });
+    line.bed.stage.unsettle(unsteady).unwrap();
+    let mut judged = Judged::default();
+    line.judge(name, placements, &mut judged);
+    let [scatter, within, _] = judged.figures();
+    assert_eq!(judged.missing, 0, "{name}");
+    assert!(judged.bias <= 3.0, "{name}: {}", judged.bias);
+    assert!((0.8..1.25).contains(&scatter), "{name}: {scatter}");
+    assert!(within >= 0.95, "{name}: {within}");
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 use super::{PATIENT, counts, frames, small};
 use crate::optics::normalised;
-use crate::parts::Plane;
+use crate::parts::{Plane, SheetMetal};
 use crate::scenario::Noise;
-use crate::{Part, Scenario, head};
+use crate::{Part, Placement, Scenario, Unsteady, head};
+use hal::frame::Frame;
 use hal::head::{Head, Showing};
 use hal::projector::Raster;
 use std::f64::consts::TAU;
@@ -298,4 +299,59 @@ fn fringes_through_a_lens_keep_no_replica_of_the_projectors_pixels() {
     // A sharp lens lets replicas of 0.0077 through. Their error with that of the raster is 9.2e-4
     // by direct summation.
     assert!((found[0] - 9.2e-4).abs() < 1e-4, "{found:?}");
+}
+
+#[test]
+fn a_part_that_shakes_is_seen_in_all_places_that_it_goes_through_in_an_exposure() {
+    let mut scenario = small(Part::SheetMetal(SheetMetal::default()));
+    scenario.noise.noise_counts = Some(0.0);
+    scenario.bit_depth = 12;
+    for (amplitude, shake_hz) in [([0.05, 0.0, 0.0], 17.0), ([0.0, 0.1, 0.2], 40.0)] {
+        let (mut head, stage) = head(&scenario).unwrap();
+        let (width, height) = head.projector_size();
+        let stripes = (0..width * height).map(|at| if at % width % 20 < 10 { 230 } else { 30 });
+        let stripes = Raster::new(width, height, stripes.collect()).unwrap();
+        head.load(vec![stripes]).unwrap();
+        let mut take = || {
+            let mut taken = None;
+            let mut keep = |_, frame: Frame| taken = Some((counts(&frame), frame.timestamp()));
+            head.acquire(&[0], PATIENT, &mut keep).unwrap();
+            taken.unwrap()
+        };
+        stage
+            .unsettle(Unsteady {
+                shake_mm: amplitude,
+                shake_hz,
+                ..Unsteady::default()
+            })
+            .unwrap();
+        stage.place(&scenario.part, &Placement::default()).unwrap();
+        let (shaken, start) = take();
+        stage.unsettle(Unsteady::default()).unwrap();
+        let length = stage.exposing().0.as_secs_f64();
+        let mut sums = vec![0.0; shaken.len()];
+        const MOMENTS: u32 = 32;
+        for moment in 0..MOMENTS {
+            let share = (f64::from(moment) + 0.5) / f64::from(MOMENTS);
+            let time = start.0 as f64 * 1e-9 + length * share;
+            let way = (TAU * shake_hz * time).sin();
+            let lies = Placement {
+                shift_mm: amplitude.map(|mm| mm * way),
+                ..Placement::default()
+            };
+            stage.place(&scenario.part, &lies).unwrap();
+            let (rests, _) = take();
+            let all = sums.iter_mut().zip(rests);
+            all.for_each(|(sum, sample)| *sum += sample / f64::from(MOMENTS));
+        }
+        stage.place(&scenario.part, &Placement::default()).unwrap();
+        let (rests, _) = take();
+        let off = |a: &[f64], b: &[f64]| {
+            let squares = a.iter().zip(b).map(|(a, b)| (a - b).powi(2));
+            (squares.sum::<f64>() / a.len() as f64).sqrt()
+        };
+        let (left, moved) = (off(&shaken, &sums), off(&rests, &sums));
+        // Of 4095 counts: between the places that are drawn, light is taken to change evenly.
+        assert!(left < 0.3 * moved && left < 8.0, "{left} of {moved}");
+    }
 }
