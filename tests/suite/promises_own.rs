@@ -104,7 +104,7 @@ fn every_spoilt_patch_is_rejected_for_its_own_reason() {
         .flat_map(|v| (78..90).map(move |u| (u, v)))
         .filter(|&(u, v)| at(u, v) == "saturated")
         .count();
-    // A sine that leaves the range at its top is caught where one of 12 samples is in the cut part.
+    // A sine that leaves the range at its top is caught where two of a level's four samples do.
     assert!(bright > 40, "{bright}");
     assert_eq!(at(48, 48), "resolved");
 }

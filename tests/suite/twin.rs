@@ -94,7 +94,9 @@ fn check_heights(name: &str, measured: &Measured, twin: &PhaseTwin) -> Vec<Reaso
                 let (z, slope) = solve(pixel, found.phase[pixel].turns())
                     .unwrap_or_else(|| panic!("{name}: the twin has no height at {pixel}"));
                 let height = surface.map.height[pixel].mm() - z;
-                let sigma = noise.filter(|_| reason == Reason::Resolved).map(|noise| {
+                // More modulation than words hold, of clipped samples, is stated as less.
+                let held = reason == Reason::Resolved && twin.modulation[pixel] < 0.49;
+                let sigma = noise.filter(|_| held).map(|noise| {
                     let sigma = sigma_z(noise, slope, twin.information[pixel]);
                     f64::from(surface.map.sigma[pixel]) / sigma - 1.0
                 });

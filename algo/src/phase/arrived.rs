@@ -269,6 +269,19 @@ impl WrappedRowMut<'_> {
         Some((coarsest, level))
     }
 
+    /// Borrowed to be written.
+    pub fn again(&mut self) -> WrappedRowMut<'_> {
+        Wrapped {
+            phase: self.phase,
+            flags: self.flags,
+        }
+    }
+
+    /// Whether one of these pixels is rejected for a sample at full scale alone.
+    pub fn has_saturated(&self, columns: Range<usize>) -> bool {
+        self.flags[columns].contains(&SATURATED)
+    }
+
     /// Writes the block at `at`.
     #[inline(always)]
     pub fn store<V: Lanes>(&mut self, v: V, at: usize, block: &Demodulated<V>) {

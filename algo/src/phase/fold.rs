@@ -94,7 +94,7 @@ pub(super) struct Folded<V: Lanes> {
     pub strong: V::B,
     /// Whether `strong` is set nowhere.
     pub dark: bool,
-    /// 255 where a sample is at full scale and the level does not tolerate that.
+    /// 255 where a sample is at full scale, as long as the phase is not found without it.
     pub brightest: V::B,
 }
 

@@ -210,6 +210,8 @@ impl<V: Lanes> GeometricLanes<V> {
             ],
         ];
         let modulation = doubled_where(v, resolved, modulation);
-        out.store_turns(v, at, phases, modulation, trust(v, reason));
+        let trust = trust(v, reason);
+        out.reject(v, trust);
+        out.store_turns(v, at, phases, modulation, trust);
     }
 }

@@ -7,16 +7,12 @@
 //! Modulations come out as shares of full scale in units of full scale / 32767.5, that is half of a
 //! [`crate::units::Modulation`]; the stores double them.
 
-use crate::pattern::{self, Waveform};
+use super::clipped::Clipped;
+use crate::pattern;
 use crate::simd::Lanes;
 use crate::trust::LeastModulation;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
-
-/// Sines of at least this many shifts are trusted even with samples at full scale: the periodic
-/// error of a slight saturation falls from 3e-3 turn (4 shifts) to 7e-4 turn. The flat tops of
-/// other waveforms keep it at 3e-3 turn.
-pub const FULL_TRUST_SHIFTS: usize = 8;
 
 /// What rounding may take off √(S² + C²) at the threshold, in units of S and C, so that a
 /// modulation of exactly the minimum is trusted.
@@ -67,8 +63,8 @@ pub(crate) struct LevelPlan {
     /// Whether the product of these coefficients and a length is half of the modulation, because
     /// they would not fit Q15 else.
     doubled: bool,
-    /// Whether a sample at full scale rejects its pixel.
-    pub saturates: bool,
+    /// How a pixel with samples at full scale is demodulated; they reject it if it is not.
+    pub(super) clipped: Option<Clipped>,
 }
 
 /// The least modulation of four shifts of 8 bits, with S and C in counts.
@@ -104,7 +100,7 @@ pub(crate) struct Demodulated<V: Lanes> {
     pub phase: [V::W; 2],
     /// Mask: the modulation is at least the trusted minimum.
     pub strong: V::B,
-    /// 255 where a sample is at full scale and the level does not tolerate that.
+    /// 255 where a sample is at full scale and the phase was not found without it.
     pub brightest: V::B,
 }
 
@@ -157,6 +153,11 @@ impl LevelPlan {
         if doubled {
             factor /= 2.0;
         }
+        let per_count = shifts as f64 / 2.0 * unit;
+        let first = match demodulation {
+            Demodulation::Weighted => level.start,
+            _ => 0.0,
+        };
         let mut planned = Self {
             frames,
             demodulation,
@@ -166,14 +167,14 @@ impl LevelPlan {
             down,
             to_16_bits,
             below_full_scale: (((1_u32 << bit_depth) - 2) as u16).cast_signed(),
-            per_count: shifts as f64 / 2.0 * unit,
+            per_count,
             below_least_power: 0,
             long_enough: 0,
             faint: false,
             four: LeastOfFour::default(),
             hypotenuse: LENGTH.map(|c| libm::rint(c * factor * 32_768.0) as i16),
             doubled,
-            saturates: shifts < FULL_TRUST_SHIFTS || level.waveform != Waveform::SINE,
+            clipped: Clipped::new(level, first, per_count, full_scale),
         };
         planned.trust_from(LeastModulation::default(), full_scale as u16);
         planned
@@ -183,6 +184,10 @@ impl LevelPlan {
     pub fn trust_from(&mut self, least: LeastModulation, full_scale: u16) {
         let length = self.per_count * least.counts(full_scale) - TIE;
         self.below_least_power = libm::ceil(length * length) as i32 - 1;
+        if let Some(clipped) = &mut self.clipped {
+            clipped.least = length;
+            clipped.below_least_power = self.below_least_power;
+        }
         // The longer of two components is at least 1/√2 of the length.
         self.faint = length < f64::from(FAINT) * core::f64::consts::SQRT_2;
         let enough = libm::ceil(length) as i16;
@@ -212,8 +217,6 @@ pub(super) struct LevelLanes<'a, V: Lanes> {
     pub half_lift: V::Count,
     pub to_16_bits: V::Count,
     pub long_enough: V::W,
-    /// Full scale, all bits of a sample.
-    pub full_scale: V::W,
     /// Full scale less one count, with its sign bit inverted.
     pub below_full_scale: V::W,
     pub hypotenuse: [V::W; 3],
@@ -243,7 +246,6 @@ impl<'a, V: Lanes> LevelLanes<'a, V> {
             half_lift: v.left(plan.lift.saturating_sub(1)),
             to_16_bits: v.left(plan.to_16_bits),
             long_enough: v.splat16(plan.long_enough),
-            full_scale: v.splat16(plan.below_full_scale | 1),
             below_full_scale: v.xor(v.splat16(plan.below_full_scale), v.splat16(i16::MIN)),
             hypotenuse: [
                 v.splat16(plan.hypotenuse[0]),

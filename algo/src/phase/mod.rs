@@ -21,6 +21,7 @@
 
 mod about;
 mod arrived;
+mod clipped;
 mod decode;
 mod fold;
 mod geometric;
@@ -35,7 +36,6 @@ mod unwrap_step;
 pub use crate::trust::{LeastModulation, NOISE_OVER_LEAST, Trust};
 pub use arrived::Arrived;
 pub use decode::{DecodeError, Decoder, PhaseRow};
-pub use level::FULL_TRUST_SHIFTS;
 
 #[cfg(test)]
 mod tests;

@@ -16,7 +16,7 @@ const MAX_RESIDUAL_BITS: i16 = (MAX_RESIDUAL * 65_536.0) as i16;
 pub(super) struct Quality<V: Lanes> {
     /// Mask: every level has at least the trusted modulation.
     pub strong: V::B,
-    /// 255 where a sample is at full scale and its level does not tolerate that.
+    /// 255 where a sample is at full scale and the phase was not found without it.
     pub brightest: V::B,
     /// The largest residual, unsigned, 1/65536 turn.
     pub residual: [V::W; 2],

@@ -140,7 +140,14 @@ impl Decoder {
         out: PhaseRow<'_>,
     ) {
         let (backend, levels) = (self.backend, &self.levels[..]);
-        let out = results(out, &columns);
+        let mut saturated = false;
+        let out = Results::new(
+            out.phase,
+            out.modulation,
+            out.trust,
+            &mut saturated,
+            columns.end,
+        );
         let arrived_columns = start..start + columns.end;
         match (&self.unwrapper, arrived, levels) {
             (Unwrapper::Geometric(plan), _, [level]) => {
@@ -169,11 +176,6 @@ impl Decoder {
             _ => {}
         }
     }
-}
-
-/// Where the kernels write.
-fn results<'a>(out: PhaseRow<'a>, columns: &Range<usize>) -> Results<'a> {
-    Results::new(out.phase, out.modulation, out.trust, columns.end)
 }
 
 /// The rows of a level's frames.

@@ -14,10 +14,6 @@ pub(crate) trait BlockSample: Sample {
     fn bytes<'r, 'a, const N: usize>(rows: &'r [&'a [Self]; N]) -> Option<&'r [&'a [u8]; N]>;
     /// The block of `row` that starts at `at`.
     fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> Self::Block<V>;
-    /// The bits of the depth: samples above full scale, which levels of many shifts tolerate, must
-    /// not overflow sums.
-    fn of_depth<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>)
-    -> Self::Block<V>;
     /// As words, moved up to 16 bits and counted from the middle of their range.
     fn centred<V: Lanes>(v: V, level: &LevelLanes<'_, V>, block: Self::Block<V>) -> [V::W; 2];
     /// Samples of 16 bits as words, counted from the middle of their range.
@@ -46,10 +42,6 @@ impl BlockSample for u8 {
     #[inline(always)]
     fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> V::B {
         v.load8(row, at)
-    }
-    #[inline(always)]
-    fn of_depth<V: Lanes>(_v: V, _level: &LevelLanes<'_, V>, block: V::B) -> V::B {
-        block
     }
     #[inline(always)]
     fn centred<V: Lanes>(v: V, _level: &LevelLanes<'_, V>, block: V::B) -> [V::W; 2] {
@@ -96,10 +88,6 @@ impl BlockSample for u16 {
     #[inline(always)]
     fn load<V: Lanes>(v: V, row: &[Self], at: usize) -> [V::W; 2] {
         v.load16(row, at)
-    }
-    #[inline(always)]
-    fn of_depth<V: Lanes>(v: V, level: &LevelLanes<'_, V>, [low, high]: [V::W; 2]) -> [V::W; 2] {
-        [v.and(low, level.full_scale), v.and(high, level.full_scale)]
     }
     #[inline(always)]
     fn centred<V: Lanes>(v: V, level: &LevelLanes<'_, V>, [low, high]: [V::W; 2]) -> [V::W; 2] {

@@ -33,15 +33,16 @@
 //! `every_number_of_shifts_is_within_the_bounds` and
 //! `any_number_of_steps_at_any_depth_agrees_with_the_definition`.
 
-use super::level::{Demodulation, FULL_TRUST_SHIFTS, LevelLanes};
+use super::clipped::Pixels;
+use super::level::{Demodulation, LevelLanes};
 use super::samples::BlockSample;
-use crate::simd::{Lanes, Rows};
+use crate::simd::{Lanes, MAX_PIXELS, Rows};
 
 /// The pointers of a block.
 pub(super) struct Pointers<V: Lanes> {
     pub s: [V::W; 2],
     pub c: [V::W; 2],
-    /// 255 where a sample is at full scale and the level does not tolerate that.
+    /// 255 where a sample is at full scale, as long as the phase is not found without it.
     pub brightest: V::B,
 }
 
@@ -92,28 +93,20 @@ pub(super) fn of_shifts<V: Lanes, T: BlockSample, const N: usize>(
     level: &LevelLanes<'_, V>,
     blocks: &[T::Block<V>; N],
 ) -> Pointers<V> {
-    let mut blocks = *blocks;
     let mut brightest = blocks[0];
     let mut k = 1;
     while k < N {
         brightest = T::brighter(v, brightest, blocks[k]);
         k += 1;
     }
-    if N >= FULL_TRUST_SHIFTS {
-        let mut k = 0;
-        while k < N {
-            blocks[k] = T::of_depth(v, level, blocks[k]);
-            k += 1;
-        }
-    }
     let [s, c] = match N {
-        3 | 6 => thirds::<V, T, N>(v, level, &blocks),
+        3 | 6 => thirds::<V, T, N>(v, level, blocks),
         4 => [
             four::<V, T>(v, level, blocks[0], blocks[N / 2]),
             four::<V, T>(v, level, blocks[1], blocks[N - 1]),
         ],
         _ => {
-            let [along, across] = terms::<V, T, N>(v, &blocks);
+            let [along, across] = terms::<V, T, N>(v, blocks);
             let four = N == 7 || N == 9;
             [
                 products::<V, T>(v, level, &along, level.terms[0], four),
@@ -124,11 +117,39 @@ pub(super) fn of_shifts<V: Lanes, T: BlockSample, const N: usize>(
     Pointers {
         s,
         c,
-        brightest: if N < FULL_TRUST_SHIFTS || level.plan.saturates {
-            T::saturated(v, level, brightest)
-        } else {
-            v.splat8(0)
-        },
+        brightest: T::saturated(v, level, brightest),
+    }
+}
+
+impl<V: Lanes> Pointers<V> {
+    /// With those of pixels that have clipped samples found from the others, where there are such
+    /// pixels. `row(k)` are the samples of shift k.
+    #[inline(always)]
+    pub fn mended<'a, T: BlockSample + 'a>(
+        self,
+        v: V,
+        level: &LevelLanes<'_, V>,
+        row: impl Fn(usize) -> &'a [T],
+        at: usize,
+    ) -> Self {
+        let clipped = v.eq8(self.brightest, v.splat8(u8::MAX));
+        let (false, Some(plan)) = (v.none8(clipped), &level.plan.clipped) else {
+            return self;
+        };
+        let mut pixels = Pixels {
+            s: [0; MAX_PIXELS],
+            c: [0; MAX_PIXELS],
+            brightest: [0; MAX_PIXELS],
+        };
+        v.store16(&mut pixels.s, 0, self.s);
+        v.store16(&mut pixels.c, 0, self.c);
+        v.store8(&mut pixels.brightest, 0, self.brightest);
+        plan.mend(row, at, &mut pixels, V::PIXELS);
+        Self {
+            s: v.load16(&pixels.s, 0),
+            c: v.load16(&pixels.c, 0),
+            brightest: v.load8(&pixels.brightest, 0),
+        }
     }
 }
 
@@ -263,9 +284,7 @@ fn weighted<V: Lanes, T: BlockSample>(
         v.fetch(first, at, V::AHEAD);
         v.fetch(second, at, V::AHEAD);
         let (first, second) = (T::load(v, first, at), T::load(v, second, at));
-        if level.plan.saturates {
-            brightest = T::brighter(v, brightest, T::brighter(v, first, second));
-        }
+        brightest = T::brighter(v, brightest, T::brighter(v, first, second));
         let [first, second] = if level.plan.to_16_bits == 0 {
             [T::centred_16(v, first), T::centred_16(v, second)]
         } else {
@@ -282,11 +301,7 @@ fn weighted<V: Lanes, T: BlockSample>(
     Pointers {
         s: rounded_sums(v, s),
         c: rounded_sums(v, c),
-        brightest: if level.plan.saturates {
-            T::saturated(v, level, brightest)
-        } else {
-            v.splat8(0)
-        },
+        brightest: T::saturated(v, level, brightest),
     }
 }
 

@@ -22,7 +22,7 @@ pub use measure::{
 };
 pub use noise::{off_sine, sample_noise};
 pub use plate::{Plate, PlateError};
-pub use signal::{mean_signal, signal, signal_by_modulation};
+pub use signal::{CLIPPED, mean_signal, signal, signal_by_modulation};
 
 use crate::math::around;
 use alloc::vec::Vec;

@@ -14,7 +14,7 @@ use core::f64::consts::TAU;
 /// A level of N shifts has N − 3 degrees of freedom beside offset, modulation and phase: the places
 /// 2 to N − 2 of the level's discrete Fourier transform X_p = Σ I_k e^(−2πi kp/N), of which p and
 /// N − p are one another's mirror images. Noise has the expectation N σ_I² of |X_p|² there.
-/// Averaged over all resolved pixels and all such levels.
+/// Averaged over all resolved pixels without clipped samples and all such levels.
 ///
 /// **Harmonics.** A response that is not linear makes harmonics of the fringes, which N shifts
 /// cancel in the phase, but not in these places: harmonic h, of r_h times the modulation, adds
@@ -29,15 +29,25 @@ use core::f64::consts::TAU;
 ///
 /// **Accuracy.** A response of gamma 2, N = 4 to 12: within 6 %
 /// (`harmonics_of_a_response_are_not_taken_for_noise`).
-pub fn sample_noise(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) -> Option<f64> {
-    let left = residuals(sequence, frames, trust)?;
+pub fn sample_noise(
+    sequence: &Sequence,
+    frames: &[FrameView<'_>],
+    full_scale: u16,
+    trust: &[Trust],
+) -> Option<f64> {
+    let left = residuals(sequence, frames, full_scale, trust)?;
     (left.freedom > 0.0).then(|| libm::sqrt(left.noise / left.freedom))
 }
 
 /// By how much the samples of levels with 4 or more shifts are off the sine that fits them best,
 /// RMS in counts: noise and harmonics. `None` as for [`sample_noise`].
-pub fn off_sine(sequence: &Sequence, frames: &[FrameView<'_>], trust: &[Trust]) -> Option<f64> {
-    let left = residuals(sequence, frames, trust)?;
+pub fn off_sine(
+    sequence: &Sequence,
+    frames: &[FrameView<'_>],
+    full_scale: u16,
+    trust: &[Trust],
+) -> Option<f64> {
+    let left = residuals(sequence, frames, full_scale, trust)?;
     (left.samples > 0.0).then(|| libm::sqrt(left.all / left.samples))
 }
 
@@ -76,6 +86,7 @@ impl core::ops::Add for SineResiduals {
 fn residuals(
     sequence: &Sequence,
     frames: &[FrameView<'_>],
+    full_scale: u16,
     trust: &[Trust],
 ) -> Option<SineResiduals> {
     let levels: Vec<Transform> = sequence
@@ -89,7 +100,8 @@ fn residuals(
         let mut sum = SineResiduals::default();
         for from in (0..width).step_by(RUN) {
             let run = from..width.min(from + RUN);
-            let resolved = run.filter(|u| trust[v * width + u] == Trust::Resolved);
+            let is_whole = |u: usize| rows.iter().all(|row| row.at(u) < full_scale);
+            let resolved = run.filter(|&u| trust[v * width + u] == Trust::Resolved && is_whole(u));
             let resolved: Vec<usize> = resolved.collect();
             for level in levels.iter().filter(|_| !resolved.is_empty()) {
                 sum = sum + level.residuals(&rows, &resolved);
@@ -312,7 +324,7 @@ pub(super) mod tests {
             });
             let views = views(SIDE, &frames);
             let trust = [Trust::Resolved; SIDE * SIDE];
-            let found = sample_noise(&sequence, &views, &trust);
+            let found = sample_noise(&sequence, &views, u16::MAX, &trust);
             assert_eq!(found.is_some(), freedom > 0, "{shifts} shifts");
             // 6/√3, and rounding to whole counts.
             let expected = libm::sqrt(12.0 + 1.0 / 12.0);
@@ -343,14 +355,14 @@ pub(super) mod tests {
                 });
                 let views = views(SIDE, &frames);
                 let trust = [Trust::Resolved; SIDE * SIDE];
-                let found = sample_noise(&sequence, &views, &trust).unwrap();
+                let found = sample_noise(&sequence, &views, u16::MAX, &trust).unwrap();
                 let expected = libm::sqrt(12.0 + 1.0 / 12.0);
                 assert!(
                     (0.96..1.06).contains(&(found / expected)),
                     "{shifts} shifts, {ratio}: {found} for {expected}"
                 );
                 // The harmonic's amplitude is 22.5 counts; noise adds its share of the places.
-                let off = off_sine(&sequence, &views, &trust).unwrap();
+                let off = off_sine(&sequence, &views, u16::MAX, &trust).unwrap();
                 let share = (shifts as f64 - 3.0) / shifts as f64;
                 // Of an amplitude a the mean square is a²/2; the only place of 4 shifts has a².
                 let harmonic = 22.5 * 22.5 / 2.0;

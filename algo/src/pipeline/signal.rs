@@ -6,7 +6,7 @@
 //! linear in the light: where an edge cuts a pixel, Z is the mean of both sides.
 //!
 //! **Shape and unit.** Per pixel the real and the imaginary part behind each other, in 1/64 count
-//! of an 8-bit sample, whatever the camera's.
+//! of an 8-bit sample, whatever the camera's; [`CLIPPED`] where a sample is at full scale.
 
 use super::{PhaseMap, for_each_row, map_rows};
 use crate::frame::{FrameView, Samples};
@@ -20,6 +20,9 @@ use core::f64::consts::TAU;
 const STEPS: f64 = 64.0;
 /// Counts of an 8-bit sample at full scale.
 const EIGHT_BIT: f64 = 255.0;
+
+/// In both parts of a pixel whose signal is not known, because a sample is at full scale.
+pub const CLIPPED: i16 = i16::MIN;
 
 /// The signal of the frames of `shots`, whose samples are `full_scale` at most.
 pub fn signal(shots: &[Shot], frames: &[FrameView<'_>], full_scale: u16) -> Vec<i16> {
@@ -45,9 +48,14 @@ pub fn signal(shots: &[Shot], frames: &[FrameView<'_>], full_scale: u16) -> Vec<
                 Samples::Sixteen(samples) => add(&mut sums, samples, weights),
             }
         }
-        for (pixel, sum) in row.iter_mut().zip(sums) {
+        let levels: Vec<_> = level.iter().map(|(_, frame)| frame.row(v)).collect();
+        for (u, (pixel, sum)) in row.iter_mut().zip(sums).enumerate() {
+            let clipped = levels.iter().any(|row| row.at(u) >= full_scale);
             // Casts keep to the range of their type.
-            *pixel = sum.map(|part| libm::round(part) as i16);
+            *pixel = match clipped {
+                true => [CLIPPED; 2],
+                false => sum.map(|part| libm::round(part) as i16),
+            };
         }
     });
     signal.into_flattened()
@@ -61,7 +69,7 @@ fn add<T: Copy + Into<f64>>(sums: &mut [[f64; 2]], samples: &[T], [sin, cos]: [f
     }
 }
 
-/// The mean signal of a resolved pixel by its modulation, both of the finest level: offset in
+/// The mean signal of a resolved pixel without clipped samples by its modulation, both of the finest level: offset in
 /// counts, and counts per count, neither below 0. It is the least-squares line, because not all
 /// light is modulated: light from elsewhere is not, nor what blur takes. Samples have `full_scale`
 /// counts at most.
@@ -83,6 +91,9 @@ pub fn signal_by_modulation(
         let mut sums = [0_u64; 5];
         for u in (0..width).filter(|u| phases.trust[v * width + u] == Trust::Resolved) {
             let x = u64::from(phases.modulation[v * width + u].to_bits());
+            if rows.iter().any(|row| row.at(u) >= full_scale) {
+                continue;
+            }
             let y: u64 = rows.iter().map(|row| u64::from(row.at(u))).sum();
             for (sum, term) in sums.iter_mut().zip([1, x, y, x * x, x * y]) {
                 *sum += term;
@@ -112,8 +123,11 @@ pub fn signal_by_modulation(
 
 /// The mean of two signals.
 pub fn mean_signal(first: &[i16], second: &[i16]) -> Vec<i16> {
-    let pairs = first.iter().zip(second);
-    pairs.map(|(a, b)| a.midpoint(*b)).collect()
+    let mean = |(a, b): (&i16, &i16)| match [*a, *b].contains(&CLIPPED) {
+        true => CLIPPED,
+        false => a.midpoint(*b),
+    };
+    first.iter().zip(second).map(mean).collect()
 }
 
 #[cfg(test)]

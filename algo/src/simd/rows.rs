@@ -4,6 +4,7 @@
 use super::Lanes;
 use crate::trust::Trust;
 use crate::units::{AbsolutePhase, Modulation};
+use core::ops::Range;
 
 /// Phases as their bits.
 pub(crate) fn phase_bits(phases: &[AbsolutePhase]) -> &[i32] {
@@ -116,9 +117,23 @@ pub(crate) struct Results<'a> {
     pub phase: &'a mut [i32],
     modulation: &'a mut [u16],
     trust: &'a mut [Trust],
+    /// Whether a pixel is rejected for a sample at full scale.
+    saturated: &'a mut bool,
 }
 
 impl<'a> Results<'a> {
+    /// Whether one of these pixels is rejected for a sample at full scale.
+    pub fn has_saturated(&self, columns: Range<usize>) -> bool {
+        *self.saturated && self.trust[columns].contains(&Trust::Saturated)
+    }
+
+    /// Looks for pixels that are rejected for a sample at full scale.
+    #[inline(always)]
+    pub fn reject<V: Lanes>(&mut self, v: V, trust: V::B) {
+        let saturated = v.eq8(trust, v.splat8(Trust::Saturated as u8));
+        *self.saturated |= !v.none8(saturated);
+    }
+
     /// The first `length` of a row.
     ///
     /// # Panics
@@ -127,12 +142,14 @@ impl<'a> Results<'a> {
         phase: &'a mut [AbsolutePhase],
         modulation: &'a mut [Modulation],
         trust: &'a mut [Trust],
+        saturated: &'a mut bool,
         length: usize,
     ) -> Self {
         Self {
             phase: &mut phase_bits_mut(phase)[..length],
             modulation: &mut modulation_bits_mut(modulation)[..length],
             trust: &mut trust[..length],
+            saturated,
         }
     }
 
@@ -143,6 +160,7 @@ impl<'a> Results<'a> {
             phase: &mut self.phase[..length],
             modulation: &mut self.modulation[..length],
             trust: &mut self.trust[..length],
+            saturated: self.saturated,
         }
     }
 

@@ -189,9 +189,12 @@ impl<'a> Pattern<'a> {
         let stated = stated.or_else(|| recipe.map(|recipe| recipe.conditions.noise_counts));
         let noise = stated.or_else(|| {
             let Scan {
-                sequence, frames, ..
+                sequence,
+                frames,
+                decoder,
+                ..
             } = &self.channel.scan;
-            pipeline::sample_noise(sequence, frames, &phases.trust)
+            pipeline::sample_noise(sequence, frames, decoder.full_scale(), &phases.trust)
         });
         let by_light = match (recording.noise_counts, recipe) {
             (None, Some(recipe)) => Some(recipe.conditions.noise),

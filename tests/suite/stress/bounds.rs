@@ -225,6 +225,12 @@ fn error(found: AbsolutePhase, truth: f64) -> f64 {
 /// The modulation of the finest level.
 fn check_modulation(found: Modulation, twin: &PixelTwin, full_scale: u16) {
     let truth = twin.levels[twin.levels.len() - 1].modulation;
-    let off = found.counts(full_scale) / truth - 1.0;
+    let found_counts = found.counts(full_scale);
+    let off = found_counts / truth - 1.0;
+    // Of a pixel with clipped samples it is no more than words hold, half of full scale or more.
+    let most = 0.49 * f64::from(full_scale);
+    if truth > most && (most..truth).contains(&found_counts) {
+        return;
+    }
     assert!(off.abs() <= MODULATION, "{found:?} where B is {truth}");
 }

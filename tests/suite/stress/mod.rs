@@ -9,6 +9,7 @@ mod arctangent;
 mod bounds;
 mod calibrations;
 mod extremes;
+mod highlights;
 mod limits;
 mod place;
 mod random;

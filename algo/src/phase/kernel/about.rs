@@ -20,7 +20,7 @@
 //! **Accuracy.** As [`crate::phase::about`]; the same bits on every back-end
 //! (`every_back_end_gives_the_same_bits`).
 
-use super::{Frames, next_block, of_bytes};
+use super::{Frames, Mended, next_block, next_clipped, of_bytes};
 use crate::phase::about::{About, BlockLevels, DenseLanes, SingleLanes, Unwrapped};
 use crate::phase::arrived::{WrappedRow, WrappedRowMut};
 use crate::phase::fold::AngleLanes;
@@ -48,6 +48,7 @@ pub(crate) fn finest_row<T: BlockSample>(
 ) {
     let (all, out) = (Rows::new(rows, columns.end), &mut out);
     let (three, four) = (of_bytes::<T, 3>(level, rows), of_bytes::<T, 4>(level, rows));
+    let again = columns.clone();
     match (before, three, four) {
         ([], Some(&frames), _) => single(backend, plan, level, frames, map, columns, out),
         ([], _, Some(&frames)) => single(backend, plan, level, frames, map, columns, out),
@@ -59,6 +60,17 @@ pub(crate) fn finest_row<T: BlockSample>(
         (&[a, b], ..) => dense(backend, plan, level, [a, b], all, map, columns, out),
         // There are at most three dense levels.
         _ => {}
+    }
+    let mut from = again.start;
+    while let Some(block) = next_clipped(level, &mut from, &again, |block| out.has_saturated(block))
+    {
+        let all = Mended(all);
+        match before {
+            [] => single(backend, plan, level, all, map, block, out),
+            &[a] => dense(backend, plan, level, [a], all, map, block, out),
+            &[a, b] => dense(backend, plan, level, [a, b], all, map, block, out),
+            _ => {}
+        }
     }
 }
 
@@ -97,8 +109,31 @@ pub(crate) fn demodulate_row<T: BlockSample>(
     columns: Range<usize>,
     out: WrappedRowMut<'_>,
 ) {
-    let rows = Rows::new(rows, columns.end);
-    demodulate(backend, level, rows, coarsest, columns, out);
+    let (rows, mut out) = (Rows::new(rows, columns.end), out);
+    let again = columns.clone();
+    let mut saturated = false;
+    demodulate(
+        backend,
+        level,
+        rows,
+        coarsest,
+        columns,
+        out.again(),
+        &mut saturated,
+    );
+    let mut from = if saturated { again.start } else { again.end };
+    while let Some(block) = next_clipped(level, &mut from, &again, |block| out.has_saturated(block))
+    {
+        demodulate(
+            backend,
+            level,
+            Mended(rows),
+            coarsest,
+            block,
+            out.again(),
+            &mut saturated,
+        );
+    }
 }
 
 back_end_entry! {
@@ -108,6 +143,7 @@ back_end_entry! {
         coarsest: Option<WrappedRow<'_>>,
         columns: Range<usize>,
         out: WrappedRowMut<'_>,
+        saturated: &mut bool,
     )
 }
 
@@ -219,9 +255,11 @@ fn demodulate_columns<V: Lanes, S: Frames>(
     coarsest: Option<WrappedRow<'_>>,
     columns: Range<usize>,
     mut out: WrappedRowMut<'_>,
+    saturated: &mut bool,
 ) {
     let level = LevelLanes::new(v, level);
     let angle = AngleLanes::new(v);
+    let mut brightest = v.splat8(0);
     let mut start = columns.start;
     while let Some(at) = next_block::<V>(start, &columns) {
         start += V::PIXELS;
@@ -233,8 +271,10 @@ fn demodulate_columns<V: Lanes, S: Frames>(
         }
         let folded = frames.fold(v, &level, at);
         let (block, _) = level.fine(v, &angle, &folded, S::DOUBLED);
+        brightest = v.max8(brightest, block.brightest);
         out.store(v, at, &block);
     }
+    *saturated = !v.none8(v.eq8(brightest, v.splat8(u8::MAX)));
 }
 
 /// A block of the known map.
@@ -316,5 +356,7 @@ fn store<V: Lanes>(
         ],
     ];
     let modulation = doubled_where(v, resolved, modulation);
-    out.store(v, at, phase, modulation, trust(v, reason));
+    let trust = trust(v, reason);
+    out.reject(v, trust);
+    out.store(v, at, phase, modulation, trust);
 }

@@ -37,7 +37,7 @@
 //! `no_fringe_order_slips_at_any_wrap_of_a_hundred_fringes`; the same bits on every back-end:
 //! `every_back_end_gives_the_same_bits`.
 
-use super::{Frames, next_block, of_bytes};
+use super::{Frames, Mended, next_block, next_clipped, of_bytes};
 use crate::phase::arrived::{NO_REASON, PredictedRow, PredictedRowMut};
 use crate::phase::geometric::{Geometric, GeometricLanes};
 use crate::phase::level::{LevelLanes, LevelPlan};
@@ -58,7 +58,7 @@ pub(crate) fn level_row<T: BlockSample>(
     columns: Range<usize>,
     out: PredictedRowMut<'_>,
 ) {
-    let rows = Rows::new(rows, columns.end);
+    let rows = Mended(Rows::new(rows, columns.end));
     match (&plan.steps[..at], &plan.steps[at..]) {
         ([], [next, ..]) => coarsest(backend, plan, next, level, rows, columns, out),
         ([.., step], [next, ..]) => between(backend, plan, [step, next], level, rows, columns, out),
@@ -77,13 +77,15 @@ pub(crate) fn finest_row<T: BlockSample>(
     columns: Range<usize>,
     mut out: Results<'_>,
 ) {
-    let (part, end, out) = (columns.clone(), columns.end, &mut out);
+    let (part, all, out) = (columns.clone(), Rows::new(rows, columns.end), &mut out);
     match of_bytes::<T, 4>(level, rows) {
         Some(&frames) => finest(backend, plan, level, frames, before, columns, out),
-        None => {
-            let frames = Rows::new(rows, end);
-            finest(backend, plan, level, frames, before, columns, out);
-        }
+        None => finest(backend, plan, level, all, before, columns, out),
+    }
+    let mut from = part.start;
+    while let Some(block) = next_clipped(level, &mut from, &part, |block| out.has_saturated(block))
+    {
+        finest(backend, plan, level, Mended(all), before, block, out);
     }
     plan.finish(&mut out.phase[part]);
 }
@@ -98,8 +100,13 @@ pub(crate) fn single_row<T: BlockSample>(
     mut out: Results<'_>,
 ) {
     let part = columns.clone();
-    let frames = Rows::new(rows, columns.end);
-    single(backend, plan, level, frames, columns, &mut out);
+    let all = Rows::new(rows, columns.end);
+    single(backend, plan, level, all, columns, &mut out);
+    let mut from = part.start;
+    while let Some(block) = next_clipped(level, &mut from, &part, |block| out.has_saturated(block))
+    {
+        single(backend, plan, level, Mended(all), block, &mut out);
+    }
     plan.finish(&mut out.phase[part]);
 }
 

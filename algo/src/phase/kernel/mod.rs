@@ -17,7 +17,7 @@ use super::fold::{Folded, fold, fold_four};
 use super::level::{Demodulation, LevelLanes, LevelPlan};
 use super::samples::BlockSample;
 use super::terms::{blocks, of_shifts, pointers};
-use crate::simd::{Lanes, Rows};
+use crate::simd::{Lanes, MAX_PIXELS, Rows};
 use core::ops::Range;
 
 /// The rows of a level's frames, in the order of their shifts.
@@ -68,6 +68,47 @@ impl<T: BlockSample> Frames for Rows<'_, T> {
     fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Folded<V> {
         fold(v, level, pointers(v, level, self, at))
     }
+}
+
+/// The rows of a level whose pixels with clipped samples are demodulated from the others.
+#[derive(Clone, Copy)]
+struct Mended<'a, T>(Rows<'a, T>);
+
+impl<T: BlockSample> Frames for Mended<'_, T> {
+    const DOUBLED: bool = true;
+
+    #[inline(always)]
+    fn first(self, columns: usize) -> Self {
+        Self(self.0.part(columns))
+    }
+
+    #[inline(always)]
+    fn fold<V: Lanes>(&self, v: V, level: &LevelLanes<'_, V>, at: usize) -> Folded<V> {
+        let rows = &self.0;
+        let found = pointers(v, level, rows, at);
+        fold(v, level, found.mended(v, level, |k| rows.row(k), at))
+    }
+}
+
+/// The next block of `columns`, from column `from` on, that has a pixel with clipped samples: decoded
+/// again, as [`Mended`]. They are too few for the loop over all blocks to look for them. None where
+/// the level takes all samples.
+fn next_clipped(
+    level: &LevelPlan,
+    from: &mut usize,
+    columns: &Range<usize>,
+    has_clipped: impl Fn(Range<usize>) -> bool,
+) -> Option<Range<usize>> {
+    level.clipped.as_ref()?;
+    while *from < columns.end {
+        let start = (*from).min(columns.end - MAX_PIXELS);
+        *from += MAX_PIXELS;
+        let block = start..start + MAX_PIXELS;
+        if has_clipped(block.clone()) {
+            return Some(block);
+        }
+    }
+    None
 }
 
 /// The rows of a level of N shifts of 8 bits that start at 0.

@@ -1,6 +1,7 @@
 //! Tests of the phase kernels on single rows.
 
 mod backends;
+mod clipped;
 mod eight_bit;
 mod shifts;
 mod textbook;

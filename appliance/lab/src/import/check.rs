@@ -149,11 +149,19 @@ fn unused_bits(recording: &Recording, notes: &mut Vec<String>) {
 fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(String)) {
     let finest = &levels[levels.len() - 1];
     let pixels = finest.trust.len() as f64;
-    let (resolved, saturated) = (
-        finest.count(Trust::Resolved),
-        finest.count(Trust::Saturated),
-    );
-    let lit = (resolved + saturated) as f64;
+    let scan = &channel.scan;
+    let full_scale = scan.decoder.full_scale();
+    let clipped = |at: &usize| {
+        let (u, v) = (at % finest.width, at / finest.width);
+        scan.frames
+            .iter()
+            .any(|frame| frame.row(v).at(u) >= full_scale)
+    };
+    let resolved = finest.count(Trust::Resolved);
+    let is_lit = |trust: Trust| matches!(trust, Trust::Resolved | Trust::Saturated);
+    let modulated = (0..finest.trust.len()).filter(|&at| is_lit(finest.trust[at]));
+    let lit = modulated.clone().count() as f64;
+    let saturated = modulated.filter(clipped).count() as f64;
     if lit < LIT * pixels {
         note(format!(
             "only {:.1} % of the pixels are modulated at the finest level by {:.0} of 255 counts or more: if the pictures are only \
@@ -163,15 +171,13 @@ fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(Strin
         ));
         return;
     }
-    if saturated as f64 > SATURATED * lit {
+    if saturated > SATURATED * lit {
         note(format!(
             "{:.0} % of the modulated pixels are at full scale: expose for a shorter time",
-            100.0 * saturated as f64 / lit
+            100.0 * saturated / lit
         ));
     }
-    let scan = &channel.scan;
-    let off = pipeline::off_sine(&scan.sequence, &scan.frames, &finest.trust);
-    let full_scale = scan.decoder.full_scale();
+    let off = pipeline::off_sine(&scan.sequence, &scan.frames, full_scale, &finest.trust);
     let counts = finest.modulation.iter();
     let sum: f64 = counts.map(|modulation| modulation.counts(full_scale)).sum();
     let mean = sum / resolved.max(1) as f64;

@@ -17,6 +17,8 @@ pub struct PhaseTwin {
     /// Σ N r² · B², B of the finest level, counts²: the weight of the levels that the phase was
     /// computed from.
     pub information: Vec<f64>,
+    /// B of the finest level, as a share of full scale.
+    pub modulation: Vec<f64>,
     /// Resolved or why not, before heights are computed.
     pub reason: Vec<Reason>,
     /// Whether a level's modulation is exactly at the threshold, to rounding.
@@ -54,6 +56,7 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
         form,
         phase: pixels.iter().map(|pixel| pixel.phase).collect(),
         information: pixels.iter().map(|pixel| pixel.information).collect(),
+        modulation: pixels.iter().map(PixelTwin::modulation).collect(),
         reason: pixels.iter().map(|pixel| pixel.reason).collect(),
         tie: pixels.iter().map(PixelTwin::is_tie).collect(),
     }
@@ -62,13 +65,21 @@ pub fn decode(recording: &Recording, at: usize) -> PhaseTwin {
 /// σ of one sample in counts: the recording's, else estimated from the residuals of N ≥ 4 shifts
 /// after fitting offset, modulation and phase of each pixel (N − 3 degrees of freedom), and in each
 /// run of pixels the harmonics 2 to N − 2 that a response adds to all of them alike, over all pixels
-/// that are resolved by `reason`.
+/// that are resolved by `reason` and have no clipped sample.
 pub fn sample_noise(recording: &Recording, at: usize, reason: &[Reason]) -> Option<f64> {
     if recording.noise_counts.is_some() {
         return recording.noise_counts;
     }
     let (mut squares, mut freedom) = (0.0, 0.0);
-    for level in levels_of(recording, at) {
+    let full = Scale::of(recording.bit_depth, None).full;
+    let levels = levels_of(recording, at);
+    let is_whole = |pixel: usize| {
+        let mut all = levels
+            .iter()
+            .flat_map(|level| samples(recording, level, pixel));
+        all.all(|sample| sample < full)
+    };
+    for level in &levels {
         let shifts = level.shifts.len() as f64;
         if shifts < 4.0 {
             continue;
@@ -80,9 +91,9 @@ pub fn sample_noise(recording: &Recording, at: usize, reason: &[Reason]) -> Opti
                 .step_by(RUN)
                 .map(move |from| from..(from + RUN).min((row + 1) * width))
         }) {
-            let resolved = run.filter(|&pixel| reason[pixel] == Reason::Resolved);
+            let resolved = run.filter(|&at| reason[at] == Reason::Resolved && is_whole(at));
             let resolved: Vec<_> = resolved
-                .map(|pixel| samples(recording, &level, pixel))
+                .map(|pixel| samples(recording, level, pixel))
                 .collect();
             let left = left_of_run(&resolved, &level.shifts);
             squares += left.0;

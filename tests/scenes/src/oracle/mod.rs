@@ -17,7 +17,7 @@ pub mod reason;
 pub mod unwrap;
 
 pub use decode::{PhaseTwin, decode, sample_noise, samples};
-pub use demodulate::demodulate;
+pub use demodulate::{demodulate, demodulate_whole};
 pub use device::Device;
 pub use height::Rig;
 pub use levels::{Level, levels_from, levels_of};

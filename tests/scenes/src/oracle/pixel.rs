@@ -1,6 +1,6 @@
 //! Decoding one pixel: its samples → its absolute phase, or the reason why it has none.
 
-use super::demodulate::{Demodulated, demodulate};
+use super::demodulate::{Demodulated, demodulate, demodulate_whole};
 use super::unwrap::{Doubt, Form, Wrapped, unwrap_with_doubt};
 use super::{Level, Reason};
 
@@ -61,7 +61,16 @@ impl PixelTwin {
         let seen: Vec<Demodulated> = levels
             .iter()
             .zip(samples)
-            .map(|(level, samples)| demodulate(samples, &level.shifts))
+            .map(|(level, samples)| {
+                let plain = demodulate(samples, &level.shifts);
+                let clipped = plain.brightest >= scale.full && samples.len() > 3;
+                let whole = clipped.then(|| demodulate_whole(samples, &level.shifts, scale.full));
+                let strong = |seen: &Demodulated| seen.modulation >= scale.least - TIE;
+                let whole = whole
+                    .flatten()
+                    .filter(|whole| strong(whole) && strong(&plain));
+                whole.unwrap_or(plain)
+            })
             .collect();
         let mut twin = Self {
             phase: f64::NAN,
@@ -79,7 +88,7 @@ impl PixelTwin {
             twin.reason = Reason::Unexpected;
             return twin;
         }
-        if let Some(reason) = distrust(levels, &twin.levels, scale) {
+        if let Some(reason) = distrust(&twin.levels, scale) {
             twin.reason = reason;
             return twin;
         }
@@ -102,6 +111,12 @@ impl PixelTwin {
         twin
     }
 
+    /// B of the finest level, as a share of full scale.
+    pub fn modulation(&self) -> f64 {
+        let finest = self.levels.last();
+        finest.map_or(0.0, |seen| seen.modulation / self.scale.full)
+    }
+
     /// Whether a level's modulation is within `counts` of the threshold.
     pub fn on_the_threshold(&self, counts: f64) -> bool {
         let near = |seen: &Demodulated| (seen.modulation - self.scale.least).abs() < counts;
@@ -114,13 +129,10 @@ impl PixelTwin {
     }
 }
 
-/// The first reason in the samples for which a pixel is rejected; `levels` go from coarse to fine.
-fn distrust(levels: &[Level], seen: &[Demodulated], scale: Scale) -> Option<Reason> {
+/// The first reason in the samples for which a pixel is rejected, from coarse to fine.
+fn distrust(seen: &[Demodulated], scale: Scale) -> Option<Reason> {
     let weak = |seen: &Demodulated| seen.modulation < scale.least - TIE;
-    let saturated = levels
-        .iter()
-        .zip(seen)
-        .any(|(level, seen)| level.shifts.len() < 8 && seen.brightest >= scale.full);
+    let saturated = seen.iter().any(|seen| seen.brightest >= scale.full);
     if weak(&seen[0]) {
         Some(Reason::Dark)
     } else if seen.iter().any(weak) {

@@ -3,6 +3,7 @@
 use crate::frame::{FrameView, Samples};
 use crate::math::complex::Complex;
 use crate::pattern::Sequence;
+use crate::pipeline::CLIPPED;
 use alloc::sync::Arc;
 use alloc::vec::Vec;
 use core::f64::consts::TAU;
@@ -51,11 +52,14 @@ pub struct GoldenSignal {
 }
 
 impl GoldenSignal {
-    /// Z of a pixel, in counts of samples that are `full_scale` at most.
+    /// Z of a pixel, in counts of samples that are `full_scale` at most; none where it is not known.
     pub fn at(&self, place: usize, full_scale: f64) -> Option<Complex> {
         let &[re, im] = self.values.get(2 * place..2 * place + 2)? else {
             return None;
         };
+        if re == CLIPPED {
+            return None;
+        }
         let unit = full_scale / EIGHT_BIT / STEPS;
         Some(Complex::new(f64::from(re) * unit, f64::from(im) * unit))
     }
