@@ -370,8 +370,6 @@ fn a_part_that_shakes_reads_as_one_that_rests() {
 fn a_part_that_shakes_slowly_or_fast_reads_as_one_that_rests() {
     let hz = [15.0, 17.0, 33.0, 47.0, 59.0];
     shakes(&[0, 2], &[0.02, 0.05], &hz, 10);
-    // Along its surface a part must not shake by as much: flanges seem to bend.
-    shakes(&[2], &[0.2], &hz, 10);
 }
 
 #[test]

@@ -197,7 +197,7 @@ fn a_matte_part_has_the_light_that_a_part_without_a_material_has_by_default() {
 }
 
 #[test]
-fn a_highlight_is_not_taught_as_an_opening_of_the_part() {
+fn a_highlight_is_not_taught_as_an_opening_and_hides_none() {
     let openings = |material| {
         let mut bed = bed(&Scenario {
             sub_rays: 2,
@@ -211,10 +211,19 @@ fn a_highlight_is_not_taught_as_an_opening_of_the_part() {
         let openings = features.filter(|feature| feature.name.starts_with("opening"));
         openings.map(|feature| feature.region).collect::<Vec<_>>()
     };
-    let (shining, matte) = (openings(Material::RolledSteel), openings(Material::Matte));
-    // The bracket has three round holes and a slot; beside one of them rolled steel shines.
-    assert_eq!((shining.len(), matte.len()), (3, 4));
-    assert!(shining.iter().all(|opening| matte.contains(opening)));
+    // Three round holes and a slot, also beside the highlight.
+    let matte = openings(Material::Matte);
+    assert_eq!(matte.len(), 4);
+    for material in [Material::RolledSteel, Material::Oiled] {
+        let shining = openings(material);
+        assert_eq!(shining.len(), matte.len(), "{material:?}: {shining:?}");
+        // Some pixels of a rim may shine, and so change which of two is the larger one.
+        let far = |a: &[f64; 2], b: &[f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) > 1.0;
+        for opening in &matte {
+            let same = |other: &Vec<_>| !other.iter().zip(opening).any(|(a, b)| far(a, b));
+            assert!(shining.iter().any(same), "{material:?}: {shining:?}");
+        }
+    }
 }
 
 /// Parts of a material that shines, taught and measured wherever they lie: no verdict is wrong, and

@@ -125,6 +125,7 @@ pub fn teach_showing(
     let adapted = |share| adapting.done(share);
     let AdaptivePattern { function, expected } =
         computing.on(|| preliminary.adapt(&first, calibration, &adapted))?;
+    let clipped = part::clipped(&first.frames);
     // Their memory is free for the captures.
     first.frames = Vec::new();
     let full = Sequence::dense(DENSE_N, SHIFTS);
@@ -141,6 +142,7 @@ pub fn teach_showing(
     if let Some(found) = &found {
         part::leave_out(found, &mut golden.phases, &mut golden.heights);
     }
+    part::name_highlights(&clipped, &mut golden.phases);
     refuse_empty(&golden.phases)?;
     let adaptive = (full.len(), &golden.phases, &golden.heights);
     let fixed = (preliminary.shots.len(), &first.phases, &first.heights);

@@ -11,6 +11,7 @@ use algo::inspect::{Marking, Surroundings};
 use algo::phase::Trust;
 use algo::pipeline::{HeightMap, PhaseMap};
 use algo::units::{AbsolutePhase, Height, Modulation};
+use hal::frame::Frame;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// What is known of a part's surroundings before it is measured.
@@ -67,6 +68,34 @@ pub fn leave_out(surroundings: &Surroundings, phases: &mut PhaseMap, heights: &m
         }
         (phases.phase[at], phases.modulation[at]) = (AbsolutePhase::UNKNOWN, Modulation::default());
         (heights.height[at], heights.sigma[at]) = (Height::UNKNOWN, f32::NAN);
+    }
+}
+
+/// Which pixels have a sample at full scale in any of the frames.
+pub fn clipped(frames: &[Frame]) -> Vec<bool> {
+    let mut clipped = Vec::new();
+    for frame in frames {
+        let (full_scale, counts) = (f32::from(frame.format().full_scale()), frame.counts());
+        clipped.resize(counts.len(), false);
+        for (clipped, sample) in clipped.iter_mut().zip(counts) {
+            *clipped |= sample >= full_scale;
+        }
+    }
+    clipped
+}
+
+/// Calls unresolved pixels saturated that are clipped where the pattern was measured by which the part's
+/// own one was made: there was no phase of them, which that one needs.
+pub fn name_highlights(clipped: &[bool], phases: &mut PhaseMap) {
+    for (trust, _) in phases
+        .trust
+        .iter_mut()
+        .zip(clipped)
+        .filter(|(_, clipped)| **clipped)
+    {
+        if !matches!(trust, Trust::Resolved | Trust::OutOfRange) {
+            *trust = Trust::Saturated;
+        }
     }
 }
 
