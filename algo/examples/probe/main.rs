@@ -167,11 +167,10 @@ mod tests {
             triangulate(&rig, &decoder, None, &mut map, &|_| ());
             for reason in Trust::REASONS {
                 // A single level is the coarsest and has no unwrapping step, so no residual; only
-                // maps have unknown pixels; 8 shifts tolerate saturation; a phase within a few
-                // turns of the map is within the working range.
+                // maps have unknown pixels; a phase within a few turns of the map is within the
+                // working range.
                 let expected = match reason {
                     Trust::LowModulation => case.levels.len() > 1,
-                    Trust::Saturated => case.levels[0].1 < 8,
                     Trust::Unexpected => case.needs_map(),
                     Trust::Residual => case.levels.len() > 1,
                     Trust::OutOfRange => !case.needs_map() || case.levels.len() > 2,
