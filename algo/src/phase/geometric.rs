@@ -211,7 +211,7 @@ impl<V: Lanes> GeometricLanes<V> {
         ];
         let modulation = doubled_where(v, resolved, modulation);
         let trust = trust(v, reason);
-        out.reject(v, trust);
+        out.note_saturated(v, trust);
         out.store_turns(v, at, phases, modulation, trust);
     }
 }

@@ -24,7 +24,7 @@ const WORD_FORM_BITS: u8 = 12;
 /// The largest S or C where its unit is chosen to fill a word, with room for roundings. With this
 /// value the rounded weights of N = 5, 7, 8 and 9 turn the pointer by at most 2.4e-7 turn; with
 /// other values by up to 3e-6.
-const LARGEST: f64 = 32_694.0;
+pub(super) const LARGEST: f64 = 32_694.0;
 /// √(1 + t²) on 0 ≤ t ≤ 1, coefficients of 1, t² and t⁴: relative error 6.5e-4.
 const LENGTH: [f64; 3] = [1.000_644, 0.484_927, -0.072_269];
 
@@ -186,7 +186,6 @@ impl LevelPlan {
         self.below_least_power = libm::ceil(length * length) as i32 - 1;
         if let Some(clipped) = &mut self.clipped {
             clipped.least = length;
-            clipped.below_least_power = self.below_least_power;
         }
         // The longer of two components is at least 1/√2 of the length.
         self.faint = length < f64::from(FAINT) * core::f64::consts::SQRT_2;

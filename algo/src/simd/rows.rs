@@ -127,9 +127,9 @@ impl<'a> Results<'a> {
         *self.saturated && self.trust[columns].contains(&Trust::Saturated)
     }
 
-    /// Looks for pixels that are rejected for a sample at full scale.
+    /// Notes whether a pixel of a block is rejected for a sample at full scale.
     #[inline(always)]
-    pub fn reject<V: Lanes>(&mut self, v: V, trust: V::B) {
+    pub fn note_saturated<V: Lanes>(&mut self, v: V, trust: V::B) {
         let saturated = v.eq8(trust, v.splat8(Trust::Saturated as u8));
         *self.saturated |= !v.none8(saturated);
     }

@@ -357,6 +357,6 @@ fn store<V: Lanes>(
     ];
     let modulation = doubled_where(v, resolved, modulation);
     let trust = trust(v, reason);
-    out.reject(v, trust);
+    out.note_saturated(v, trust);
     out.store(v, at, phase, modulation, trust);
 }
