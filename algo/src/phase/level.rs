@@ -7,7 +7,7 @@
 //! Modulations come out as shares of full scale in units of full scale / 32767.5, that is half of a
 //! [`crate::units::Modulation`]; the stores double them.
 
-use super::clipped::Clipped;
+use super::clipped::{Clipped, LARGEST};
 use crate::pattern;
 use crate::simd::Lanes;
 use crate::trust::LeastModulation;
@@ -21,10 +21,6 @@ const TIE: f64 = 0.75;
 pub(super) const FAINT: i16 = 1 << 10;
 /// Largest bit depth of the forms that subtract samples: four of them must fit a word.
 const WORD_FORM_BITS: u8 = 12;
-/// The largest S or C where its unit is chosen to fill a word, with room for roundings. With this
-/// value the rounded weights of N = 5, 7, 8 and 9 turn the pointer by at most 2.4e-7 turn; with
-/// other values by up to 3e-6.
-pub(super) const LARGEST: f64 = 32_694.0;
 /// √(1 + t²) on 0 ≤ t ≤ 1, coefficients of 1, t² and t⁴: relative error 6.5e-4.
 const LENGTH: [f64; 3] = [1.000_644, 0.484_927, -0.072_269];
 
