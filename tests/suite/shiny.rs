@@ -6,11 +6,11 @@ use crate::placement::{bed, taught_within};
 use appliance::station::Verdict;
 use hal::frame::Samples;
 use hal::projector::Raster;
-use sim::parts::{Sphere, Tube};
+use sim::parts::{Sawtooth, Sphere, Tube};
 use sim::{Material, Part, Placement, Scenario, head};
 use std::time::Duration;
 use tests::oracle::Device;
-use tests::oracle::light::{Body, Phong};
+use tests::oracle::light::{Body, Face, Phong};
 use tests::random::Random;
 
 const TIMEOUT: Duration = Duration::from_secs(2);
@@ -194,6 +194,95 @@ fn a_matte_part_has_the_light_that_a_part_without_a_material_has_by_default() {
     assert_eq!(samples(&other), samples(&matte));
     other.light.ambient = 0.1;
     assert_ne!(samples(&other), samples(&matte));
+}
+
+/// The flank of a valley that faces right, and the one that faces left.
+fn flanks(part: &Sawtooth, valley: f64) -> [Face; 2] {
+    let (rise, fall) = (part.rise * part.period, (1.0 - part.rise) * part.period);
+    let height = part.hi - part.lo;
+    let (corner, along) = (
+        [valley, -part.half_size, part.lo],
+        [0.0, 2.0 * part.half_size, 0.0],
+    );
+    [
+        Face {
+            corner,
+            sides: [along, [-fall, 0.0, height]],
+        },
+        Face {
+            corner,
+            sides: [[rise, 0.0, height], along],
+        },
+    ]
+}
+
+#[test]
+fn light_by_way_of_another_face_is_what_the_integral_over_that_face_says() {
+    let part = Sawtooth::default();
+    for (material, [diffuse, specular, shininess]) in [
+        (Material::Matte, [0.86, 0.0, 1.0]),
+        (Material::RolledSteel, [0.35, 0.8, 30.0]),
+        (Material::Oiled, [0.25, 2.0, 80.0]),
+    ] {
+        let mut scenario = scenario(&Part::Sawtooth(part.clone()), &Placement::default());
+        (scenario.material, scenario.sub_rays) = (Some(material), 1);
+        scenario.optics.projector_blur_px = 0.0;
+        let direct = samples(&scenario);
+        scenario.bounces = 1;
+        let both = samples(&scenario);
+        // A pattern of no light has none by any way.
+        assert_eq!(direct[0], both[0]);
+        let phong = Phong {
+            ambient: 0.04,
+            diffuse,
+            specular,
+            shininess,
+        };
+        let camera = Device::new(&scenario.rig.camera.model());
+        let lamp = Device::new(&scenario.rig.projector.model());
+        let (mut compared, mut most) = (0, 0.0_f64);
+        for at in (0..SIZE * SIZE).step_by(29) {
+            let (u, v) = (f64::from(at % SIZE), f64::from(at / SIZE));
+            let (eye, ray) = (camera.centre(), camera.ray(u, v));
+            // Where the ray crosses a flank of one of the valleys, first of all.
+            let mut seen: Option<(f64, [f64; 3], [f64; 3], Face)> = None;
+            for valley in [-60.0, -20.0, 20.0] {
+                let [right, left] = flanks(&part, valley);
+                for (own, other) in [(right, left), (left, right)] {
+                    let Some((t, place, normal)) = own.crossed(eye, ray) else {
+                        continue;
+                    };
+                    if seen.is_none_or(|(before, ..)| t < before) {
+                        seen = Some((t, place, normal, other));
+                    }
+                }
+            }
+            let Some((_, place, normal, other)) = seen else {
+                continue;
+            };
+            // Away from the ends of the flanks, where the light of other valleys is seen.
+            let height = (place[2] - part.lo) / (part.hi - part.lo);
+            if !(0.1..0.9).contains(&height) || place[1].abs() > 60.0 {
+                continue;
+            }
+            let expected = phong.by_way_of((place, normal), (eye, lamp.centre()), &other, 400);
+            let found = (both[2][at as usize] - direct[2][at as usize]) / FULL_SCALE / GAIN;
+            if both[2][at as usize] < FULL_SCALE {
+                let off = (found - expected) * 255.0;
+                assert!(
+                    off.abs() < 1.0,
+                    "{material:?} ({u}, {v}): {found:.4}, not {expected:.4}"
+                );
+                compared += 1;
+                most = most.max(expected);
+            }
+        }
+        println!(
+            "{material:?}: {compared} pixels, up to {:.1} counts by another way",
+            most * 255.0
+        );
+        assert!(compared > 50 && most * 255.0 > 5.0);
+    }
 }
 
 #[test]

@@ -100,7 +100,7 @@ fn a_trigger_after_the_answer_sees_the_part_that_was_put_there_over_the_page() {
     assert_eq!(before["material"], Value::Null);
     assert_eq!(
         before["materials"],
-        json!(["matte", "rolled_steel", "oiled"])
+        json!(["matte", "rolled_steel", "oiled", "black_plastic"])
     );
     for material in ["oiled", "matte"] {
         let mut body = good([0.0; 3]);

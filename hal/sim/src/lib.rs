@@ -5,6 +5,7 @@
 //! the rasters that the projector shows.
 
 mod blur;
+mod bounce;
 pub mod controller;
 mod footprint;
 pub mod material;
@@ -23,7 +24,7 @@ mod unfit;
 mod unsteady;
 
 pub use hal::virtual_head::Faults;
-pub use material::Material;
+pub use material::{Material, Print};
 pub use parts::Part;
 pub use placement::{Clamp, Ground, Pin, Placement};
 pub use scenario::Scenario;

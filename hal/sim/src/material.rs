@@ -22,6 +22,28 @@ bounded! {
         /// How narrow the highlight is: the exponent of its cosine, 1…500.
         pub shininess: f64 = 1.0..=500.0 => 1.0,
     }
+
+    /// Matte squares that are printed on a part, in rows along its own x and y; one lies about its origin.
+    #[derive(Copy)]
+    pub struct Print: Default {
+        /// Share of the projector's light that they reflect, as `diffuse` of the light.
+        pub diffuse: f64 = 0.0..=1.0 => 0.8,
+        /// Their side, mm.
+        pub side_mm: f64 = 0.1..=1000.0 => 10.0,
+        /// From one to the next, mm.
+        pub pitch_mm: f64 = 0.1..=1000.0 => 40.0,
+    }
+}
+
+impl Print {
+    /// Whether it covers this point of the part.
+    fn covers(&self, [x, y, _]: Vector) -> bool {
+        let within = |along: f64| {
+            let pitches = (along + self.side_mm / 2.0) / self.pitch_mm;
+            pitches.rem_euclid(1.0) * self.pitch_mm < self.side_mm
+        };
+        within(x) && within(y)
+    }
 }
 
 /// A material by name, instead of the `diffuse`, `specular` and `shininess` of a scenario's
@@ -35,14 +57,17 @@ pub enum Material {
     RolledSteel,
     /// Metal under oil: a narrow highlight beyond full scale.
     Oiled,
+    /// Black plastic with a weak sheen.
+    BlackPlastic,
 }
 
 impl Material {
     /// Every material with its name.
-    pub const ALL: [(Self, &str); 3] = [
+    pub const ALL: [(Self, &str); 4] = [
         (Self::Matte, "matte"),
         (Self::RolledSteel, "rolled_steel"),
         (Self::Oiled, "oiled"),
+        (Self::BlackPlastic, "black_plastic"),
     ];
 
     /// The lighting of a part of this material: only the ambient light is that of `light`.
@@ -52,6 +77,7 @@ impl Material {
             Self::Matte => [0.86, 0.0, 1.0],
             Self::RolledSteel => [0.35, 0.8, 30.0],
             Self::Oiled => [0.25, 2.0, 80.0],
+            Self::BlackPlastic => [0.08, 0.15, 20.0],
         };
         Lighting {
             ambient: light.ambient,
@@ -65,32 +91,55 @@ impl Material {
 /// How a part reflects, in shares of the brightest that it can be, so that no weight is larger than
 /// that of a pixel that arrives completely.
 pub(super) struct Reflection {
-    /// diffuse + specular.
+    /// diffuse + specular, or the print where that is brighter.
     pub brightest: f64,
-    diffuse: f64,
-    specular: f64,
-    shininess: f64,
+    /// Of the part itself, and of what is printed on it.
+    bare: Lighting,
+    printed: Option<(Print, Lighting)>,
 }
 
 impl Reflection {
-    /// The reflection that a light asks for.
-    pub fn new(light: &Lighting) -> Self {
+    /// The reflection that a light and a print ask for.
+    pub fn new(light: &Lighting, print: Option<Print>) -> Self {
         let brightest = light.diffuse + light.specular;
+        let brightest = print.map_or(brightest, |print| brightest.max(print.diffuse));
         // A black part has weights, which are multiplied by 0.
         let [diffuse, specular] = match brightest > 0.0 {
             true => [light.diffuse / brightest, light.specular / brightest],
             false => [1.0, 0.0],
         };
+        let ink = |print: Print| Lighting {
+            diffuse: print.diffuse / brightest,
+            specular: 0.0,
+            ..*light
+        };
         Self {
             brightest,
-            diffuse,
-            specular,
-            shininess: light.shininess,
+            bare: Lighting {
+                diffuse,
+                specular,
+                ..*light
+            },
+            printed: print.map(|print| (print, ink(print))),
         }
     }
 
+    /// Of what is printed at a point of the part, if anything is.
+    pub fn printed(&self, point: Vector) -> Option<&Lighting> {
+        let (print, light) = self.printed.as_ref()?;
+        print.covers(point).then_some(light)
+    }
+
+    /// At a point of the part, or of what is around it, which has no print.
+    pub fn at(&self, point: Vector, of_part: bool) -> &Lighting {
+        let printed = self.printed(point).filter(|_| of_part);
+        printed.unwrap_or(&self.bare)
+    }
+}
+
+impl Lighting {
     /// The share of the light from `towards` that goes to `eye`; none if it comes from behind.
-    pub fn share(&self, normal: Vector, towards: Vector, eye: Vector) -> Option<f64> {
+    pub(super) fn share(&self, normal: Vector, towards: Vector, eye: Vector) -> Option<f64> {
         let cosine = facing(normal, towards)?;
         let mut share = self.diffuse * cosine;
         if self.specular > 0.0 {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Deserializer};
 
-use super::material::{Lighting, Material};
+use super::material::{Lighting, Material, Print};
 use super::optics::{Lens, turn, turned};
 use super::parts::Part;
 use super::placement::{Ground, Placement};
@@ -41,6 +41,11 @@ bounded! {
         /// What the part is made of. If it is not given, `light` says how the part reflects.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub material: Option<Material>,
+        /// What is printed on the part; nothing if it is not given.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub print: Option<Print> = Fields,
+        /// Whether light by way of one other surface of part and surroundings is added, 0 or 1.
+        pub bounces: u32 = 0..=1,
         /// Camera and projector.
         pub rig: Rig = Fields,
         /// Ambient light, and how much light the part reflects.
@@ -140,6 +145,10 @@ bounded! {
         pub gamma: f64 = 0.1..=10.0 => 1.0,
         /// The camera's gain: counts at full scale for 1 / gain of the light, 0…100.
         pub gain: f64 = 0.0..=100.0 => 1.0,
+        /// Share of full scale at which the camera clips, 0.1…1.
+        pub clips_at: f64 = 0.1..=1.0 => 1.0,
+        /// Share of full scale from which it makes a quarter of the counts of the same light, 0.1…1.
+        pub knee_at: f64 = 0.1..=1.0 => 1.0,
         /// By how much more light than its grey asks for a picture gets whose mean light is almost
         /// 0, as a share, −1…10; one of mean 1 gets none, and others in proportion. So do
         /// projectors that adapt their LEDs to the content of a picture.
@@ -342,6 +351,13 @@ impl Scenario {
             None => self.noise.variance(self.optics.gain * full_scale),
         };
         [read + 1.0 / 12.0, shot]
+    }
+
+    /// The sample from which the camera clips or is not linear; `None`: full scale.
+    #[must_use]
+    pub fn clips_from(&self) -> Option<u16> {
+        let share = self.optics.clips_at.min(self.optics.knee_at);
+        (share < 1.0).then(|| (share * self.full_scale()).round() as u16)
     }
 
     /// The largest sample.

@@ -4,7 +4,7 @@
 //! photo-response non-uniformity, the same in all frames. The count is gain · full scale /
 //! `full_well_e` · (e + √(e + read²) · z), clipped and rounded: shot noise, read noise and
 //! quantisation, σ²(count) = read² + shot · count in counts (J. R. Janesick, *Photon Transfer*,
-//! SPIE 2007). z is the sum of four uniform numbers, whose distribution function differs from the
+//! SPIE 2007). With a knee, counts above it are a quarter; a sample may be clipped below full scale. z is the sum of four uniform numbers, whose distribution function differs from the
 //! normal one by at most 0.007, and which is never beyond ± 3.47. The paper's sensor has uniform
 //! noise instead.
 
@@ -20,10 +20,16 @@ const RESPONSES: u64 = 0x5052_4e55;
 /// So many pixels are read out at a time.
 const BLOCK: usize = 64;
 
+/// What a response loses of the counts above its knee.
+const BENT: f32 = 0.75;
+
 /// A sensor, and its random numbers.
 pub(super) struct Sensor {
     noise: Noise,
     full_scale: f64,
+    /// From where the response is flatter, and where it ends, counts.
+    knee: f32,
+    most: f32,
     /// 1 + p of each pixel of a frame.
     responses: Vec<f32>,
     seed: u64,
@@ -38,6 +44,8 @@ impl Sensor {
         let response = |_| 1.0 + noise.prnu as f32 * normal(random.next_u64());
         Self {
             full_scale: scenario.full_scale(),
+            knee: (scenario.optics.knee_at * scenario.full_scale()) as f32,
+            most: (scenario.optics.clips_at * scenario.full_scale()) as f32,
             responses: (0..width * height).map(response).collect(),
             seed: noise.seed,
             exposed: 0,
@@ -70,9 +78,10 @@ impl Sensor {
         samples: &mut [T],
         count: impl Fn(f32) -> T,
     ) {
-        let full_scale = self.full_scale as f32;
+        let (knee, most) = (self.knee, self.most);
         let bright = (longer * gain * self.full_scale) as f32;
-        let rounded = |value: f32| count(value.clamp(0.0, full_scale) + 0.5);
+        let bent = |value: f32| value - (value - knee).max(0.0) * BENT;
+        let rounded = |value: f32| count(bent(value).clamp(0.0, most) + 0.5);
         let [read, shot] = self
             .noise
             .variance(gain * self.full_scale)

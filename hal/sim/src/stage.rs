@@ -62,7 +62,8 @@ pub fn head_with_progress(
         progress,
     );
     let scene = SimScene::new(Arc::clone(&scenario), staged.clone());
-    let (head, control) = virtual_head::head(scene, scenario.mechanics());
+    let (mut head, control) = virtual_head::head(scene, scenario.mechanics());
+    head.set_clipping(scenario.clips_from().filter(|_| scenario.calibrated));
     let stage = Stage {
         control,
         gain: Arc::new(Mutex::new(scenario.optics.gain)),
@@ -219,7 +220,10 @@ impl Stage {
     /// # Errors
     /// `Disconnected` if camera or projector is unplugged.
     pub fn reopen(&self) -> Result<Head, Error> {
-        self.control.reopen()
+        let mut head = self.control.reopen()?;
+        let known = self.scenario.calibrated;
+        head.set_clipping(self.scenario.clips_from().filter(|_| known));
+        Ok(head)
     }
 
     /// The exposure and the gain of the camera.

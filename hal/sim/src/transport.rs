@@ -8,7 +8,8 @@
 //! · (ambient + pattern · (diffuse · max(0, n·l) + specular · max(0, r·v)^shininess)), averaged
 //! over the sub-rays, without fall-off with distance: n is the normal, l the direction to the
 //! projector, v that to the camera, and r = 2 (n·l) n − l. A surface that faces away from the
-//! projector has no highlight. Ambient light reaches shadowed points, too; a sub-ray that meets
+//! projector has no highlight. With `bounces` there is also the light that came by way of one other surface
+//! ([`super::bounce`]), from the projector pixel nearest to where that is lit. Ambient light reaches shadowed points, too; a sub-ray that meets
 //! nothing has I = 0. Beyond the raster the projector is dark.
 //!
 //! The result does not depend on the number of threads: every pixel is computed by itself.
@@ -38,6 +39,8 @@ pub struct Truth {
     pub class: Vec<u8>,
 }
 
+/// Printed faces have numbers from here on: no part has so many.
+const PRINT: u16 = u16::MAX / 8;
 /// Neighbours in a row of the raster whose weights are stored together.
 const LANES: usize = 4;
 /// A raster is followed by so many dark pixels, which the last taps read with weight 0.
@@ -58,6 +61,10 @@ pub(super) struct Transport {
     /// Where each pixel's taps end; they start where those of the pixel before end.
     ends: Vec<u32>,
     taps: Vec<Tap>,
+    /// Where each pixel's light by way of other surfaces ends; empty without.
+    bounce_ends: Vec<u32>,
+    /// Of that the pixel of the raster, and the light that it gives.
+    bounces: Vec<(u32, f32)>,
     /// σ with which the lens blurs the finished picture, camera pixels.
     pub blur_px: f64,
     pub truth: Truth,
@@ -72,9 +79,9 @@ struct Tap {
 }
 
 /// A placed part, and the devices in its coordinates.
-struct Placed {
-    pose: Pose,
-    eye: Vector,
+pub(super) struct Placed {
+    pub pose: Pose,
+    pub eye: Vector,
     lamp: Vector,
 }
 
@@ -121,7 +128,8 @@ impl Transport {
         let solid_of_next = another.and_then(Part::solid);
         let thin_of_next = surface_of_next.as_deref().map(Traced::new);
         let light = &scenario.light;
-        let reflection = Reflection::new(&material.map_or(*light, |made| made.under(light)));
+        let light = material.map_or(*light, |made| made.under(light));
+        let reflection = Reflection::new(&light, scenario.print);
         let mut tracer = Tracer {
             scenario,
             camera: &camera,
@@ -172,6 +180,10 @@ impl Transport {
         for row in rows {
             let before = whole.taps.len() as u32;
             whole.ends.extend(row.ends.iter().map(|end| before + end));
+            let before = whole.bounces.len() as u32;
+            let ends = row.bounce_ends.iter().map(|end| before + end);
+            whole.bounce_ends.extend(ends);
+            whole.bounces.extend(row.bounces);
             whole.ambient.extend(row.ambient);
             whole.taps.extend(row.taps);
             whole.truth.height.extend(row.truth.height);
@@ -186,6 +198,8 @@ impl Transport {
             unit: 0.0,
             ends: Vec::with_capacity(pixels),
             taps: Vec::with_capacity(taps),
+            bounce_ends: Vec::new(),
+            bounces: Vec::new(),
             blur_px: 0.0,
             truth: Truth {
                 height: Vec::with_capacity(pixels),
@@ -215,27 +229,35 @@ impl Transport {
             }
             *pixel = ambient + self.unit * sums.iter().sum::<f32>();
         }
+        let mut start = 0;
+        for (pixel, end) in picture.iter_mut().zip(&self.bounce_ends) {
+            let ways = self.bounces[start..*end as usize].iter();
+            *pixel += ways
+                .map(|(at, share)| share * raster[*at as usize])
+                .sum::<f32>();
+            start = *end as usize;
+        }
     }
 }
 
 /// What the tracing of a row needs.
-struct Tracer<'a> {
-    scenario: &'a Scenario,
+pub(super) struct Tracer<'a> {
+    pub scenario: &'a Scenario,
     camera: &'a Lens,
     projector: &'a Lens,
     spread: Spread,
-    placed: &'a Placed,
-    reflection: &'a Reflection,
-    body: Option<&'a dyn Body>,
-    world: Option<World<'a>>,
+    pub placed: &'a Placed,
+    pub reflection: &'a Reflection,
+    pub body: Option<&'a dyn Body>,
+    pub world: Option<World<'a>>,
     footprint: Footprint,
 }
 
 /// A point of the part that the projector lights: its place on the raster, and the share of the
 /// light that it reflects.
-struct Lit {
-    raster: [f64; 2],
-    share: f64,
+pub(super) struct Lit {
+    pub raster: [f64; 2],
+    pub share: f64,
 }
 
 /// Memory for the weights of one pixel.
@@ -273,14 +295,14 @@ impl Tracer<'_> {
                 whole &= centre
                     .as_ref()
                     .is_some_and(|(at, _)| !depth_edge(at, &hit, direction));
-                match self.lit(&hit) {
+                match self.seen_lit(&hit) {
                     Some(lit) => points.push(lit),
                     None => whole = false,
                 }
             }
             let seen = centre
                 .as_ref()
-                .and_then(|(hit, _)| self.lit(hit).map(|_| hit.point));
+                .and_then(|(hit, _)| self.seen_lit(hit).map(|_| hit.point));
             let class = match seen {
                 None => 0,
                 Some(_) if whole => 2,
@@ -294,6 +316,12 @@ impl Tracer<'_> {
                 .push((self.scenario.light.ambient * bright * share) as f32);
             self.taps(&points, share, &mut weights, &mut row.taps);
             row.ends.push(row.taps.len() as u32);
+            if self.scenario.bounces > 0 {
+                if let Some((hit, _)) = centre.filter(|(hit, _)| !hit.is_of_world()) {
+                    self.bounces(&hit, &mut row.bounces);
+                }
+                row.bounce_ends.push(row.bounces.len() as u32);
+            }
         }
         row
     }
@@ -318,15 +346,22 @@ impl Tracer<'_> {
     fn label(&self, u: u32, v: u32) -> u16 {
         let hit = self.hit(f64::from(u), f64::from(v));
         hit.map_or(0, |(hit, _)| {
-            1 + 2 * hit.face + u16::from(self.lit(&hit).is_some())
+            let is_printed = !hit.is_of_world() && self.reflection.printed(hit.point).is_some();
+            let face = hit.face + u16::from(is_printed) * PRINT;
+            1 + 2 * face + u16::from(self.seen_lit(&hit).is_some())
         })
     }
 
-    /// How the projector lights this point; none if it does not.
-    fn lit(&self, hit: &Hit) -> Option<Lit> {
+    /// How the projector lights this point for the camera; none if it does not.
+    fn seen_lit(&self, hit: &Hit) -> Option<Lit> {
+        self.lit(hit, normalised(minus(self.placed.eye, hit.point)))
+    }
+
+    /// How the projector lights this point for one in direction `eye`; none if it does not.
+    pub fn lit(&self, hit: &Hit, eye: Vector) -> Option<Lit> {
         let towards = normalised(minus(self.placed.lamp, hit.point));
-        let eye = normalised(minus(self.placed.eye, hit.point));
-        let share = self.reflection.share(hit.normal, towards, eye)? * hit.albedo;
+        let light = self.reflection.at(hit.point, !hit.is_of_world());
+        let share = light.share(hit.normal, towards, eye)? * hit.albedo;
         let raster = self
             .projector
             .project(self.placed.pose.to_world(hit.point))?;

@@ -1,4 +1,4 @@
-//! The light of a round body under one lamp, by Phong's model (1975), in plain `f64`: ambient +
+//! The light of a round body, and by way of a flat face, under one lamp, by Phong's model (1975), in plain `f64`: ambient +
 //! pattern · (diffuse · n·l + specular · (r·v)^shininess).
 
 use super::device::{Device, Point};
@@ -48,8 +48,89 @@ fn plus(a: Point, s: f64, b: Point) -> Point {
     [a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]]
 }
 
+fn cross(a: Point, b: Point) -> Point {
+    [
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    ]
+}
+
 fn unit(a: Point) -> Point {
     plus([0.0; 3], 1.0 / dot(a, a).sqrt(), a)
+}
+
+/// A flat face, a parallelogram.
+#[derive(Clone, Copy, Debug)]
+pub struct Face {
+    /// A corner.
+    pub corner: Point,
+    /// The sides that begin there.
+    pub sides: [Point; 2],
+}
+
+impl Face {
+    /// Where a ray crosses it: the distance, the point and the normal on that side of the sides a × b.
+    pub fn crossed(&self, eye: Point, ray: Point) -> Option<(f64, Point, Point)> {
+        let [a, b] = self.sides;
+        let normal = cross(a, b);
+        let t = dot(normal, plus(self.corner, -1.0, eye)) / dot(normal, ray);
+        let off = plus(plus(eye, t, ray), -1.0, self.corner);
+        let share = |side: Point, other: Point| {
+            let across = cross(normal, other);
+            dot(off, across) / dot(side, across)
+        };
+        let inside = |share: f64| (0.0..1.0).contains(&share);
+        let met = t > 0.0 && inside(share(a, b)) && inside(share(b, a));
+        met.then(|| (t, plus(eye, t, ray), unit(normal)))
+    }
+}
+
+impl Phong {
+    /// The light that a point with this normal gets from a lamp in direction `from`, and that goes on in direction
+    /// `to`.
+    fn reflected(&self, normal: Point, from: Point, to: Point) -> f64 {
+        let along = dot(normal, from);
+        if along <= 0.0 {
+            return 0.0;
+        }
+        let mirrored = plus(plus([0.0; 3], 2.0 * along, normal), -1.0, from);
+        self.diffuse * along + self.specular * dot(mirrored, to).max(0.0).powf(self.shininess)
+    }
+
+    /// What a point with this normal that is seen from `eye` gets by way of a face that the lamp lights, as the
+    /// integral over the face of I / π · reflected · cos / r² dA, with so many places along each side.
+    pub fn by_way_of(
+        &self,
+        (at, normal): (Point, Point),
+        (eye, lamp): (Point, Point),
+        face: &Face,
+        places: u32,
+    ) -> f64 {
+        let [a, b] = face.sides;
+        let across = cross(a, b);
+        let area = dot(across, across).sqrt() / f64::from(places * places);
+        let outwards = unit(across);
+        let share = |step: u32| (f64::from(step) + 0.5) / f64::from(places);
+        let to_eye = unit(plus(eye, -1.0, at));
+        let mut sum = 0.0;
+        for step in 0..places * places {
+            let place = plus(face.corner, share(step % places), a);
+            let place = plus(place, share(step / places), b);
+            let way = plus(place, -1.0, at);
+            let from = unit(way);
+            let lit = self.reflected(
+                outwards,
+                unit(plus(lamp, -1.0, place)),
+                plus([0.0; 3], -1.0, from),
+            );
+            // The light of a small source is reflected as if it came perpendicularly: without the cosine here.
+            let on = self.reflected(normal, from, to_eye);
+            let seen = -dot(outwards, from) / dot(way, way);
+            sum += lit * on * seen.max(0.0) * area / std::f64::consts::PI;
+        }
+        sum
+    }
 }
 
 impl Body {
