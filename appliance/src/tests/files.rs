@@ -80,6 +80,7 @@ fn a_boundary_value_in_a_calibration_is_refused_by_its_key_or_the_head_is_known_
             counts: 3.0,
             read_counts: 1.0,
             shot: 0.01,
+            clips_from: None,
             levels: vec![LevelFile {
                 level: 100.0,
                 counts: 3.0,

@@ -19,6 +19,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::Head;
+use super::clipping::Clipping;
 use crate::camera::{Camera, CameraTiming, Encoding, Starts};
 use crate::clock::{Clock, Monotonic};
 use crate::error::{DeviceKind, Error};
@@ -42,6 +43,8 @@ pub(crate) struct Devices {
     pub(super) exposures: u32,
     /// Number of the first patterns that stay loaded; indices of the others count from behind them.
     pub(super) kept: usize,
+    /// Where the camera clips below full scale.
+    pub(super) clipping: Option<Clipping>,
 }
 
 /// A camera that stayed on.

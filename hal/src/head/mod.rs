@@ -2,6 +2,7 @@
 //!
 //! The `sequencer` decides and knows no device; the loop here carries its decisions out.
 
+mod clipping;
 mod devices;
 mod identity;
 mod outcome;
@@ -20,6 +21,7 @@ use crate::projector::ControllerState;
 use crate::projector::Projector;
 use crate::trigger::Trigger;
 use crate::units::Timestamp;
+use clipping::Clipping;
 use devices::Devices;
 pub use devices::GoOn;
 pub use outcome::Exposure;
@@ -59,6 +61,7 @@ impl Head {
                 streaming: Default::default(),
                 exposures: 1,
                 kept: 0,
+                clipping: None,
             },
             timing,
             sequencer: Sequencer::default(),
@@ -89,6 +92,13 @@ impl Head {
     /// Replaces the measured times between flips, light and stamps.
     pub fn set_timing(&mut self, timing: Timing) {
         self.timing = timing;
+    }
+
+    /// Delivers samples from this count on as samples at full scale: the camera clips there, or is not
+    /// linear beyond. `None`: no others are.
+    pub fn set_clipping(&mut self, from: Option<u16>) {
+        let format = self.camera_format();
+        self.devices.clipping = from.and_then(|from| Clipping::new(from, format));
     }
 
     /// Columns and rows of the rasters that [`Head::load`] takes.
@@ -257,6 +267,7 @@ fn carry_out(
         clock,
         streaming,
         kept,
+        clipping,
         ..
     } = devices;
     let refresh = projector.refresh();
@@ -273,6 +284,10 @@ fn carry_out(
                 continue;
             }
             let (start, count) = (start_of(&frame), frame.count());
+            let frame = match clipping {
+                Some(clipping) => clipping.mark(&frame)?,
+                None => frame,
+            };
             sequencer.frame(frame.restamped(start, count));
         }
         // After the frames and before any decision: the pulse of a frame that has arrived has ended

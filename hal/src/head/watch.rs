@@ -150,6 +150,10 @@ impl Head {
                     if !devices.streaming.is_new(&frame) {
                         continue;
                     }
+                    let frame = match &mut devices.clipping {
+                        Some(clipping) => clipping.mark(&frame)?,
+                        None => frame,
+                    };
                     seen.frames.push(WatchedFrame {
                         start: timing.exposure_start(&camera, frame.timestamp()),
                         arrived: devices.clock.now(),

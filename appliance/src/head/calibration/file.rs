@@ -155,6 +155,10 @@ bounded! {
         pub shot: f64 = 0.0..=MAX_NOISE_COUNTS,
         /// The measured levels.
         pub levels: Vec<LevelFile> = Fields,
+        /// The sample from which the camera clips or is not linear, counts; left out where that is full scale,
+        /// or not known.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        pub clips_from: Option<u16> = 1..=u16::MAX,
         /// The exposure and gain at which it was measured; `None` where they are not known.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub exposing: Option<Exposing> = Fields,

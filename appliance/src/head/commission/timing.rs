@@ -10,8 +10,8 @@ use crate::head::calibration::{Calibration, inverted};
 use crate::head::doctor::light::{alike, exposed, lit_enough};
 use crate::head::doctor::{Check, CheckVerdict};
 use crate::head::examine::{
-    Delay, Lit, SETTLE, Spaced, Stamps, by_content, by_pitch, contrast, noise, pace, refreshes,
-    response,
+    Clips, Delay, Lit, SETTLE, Spaced, Stamps, by_content, by_pitch, clipping, contrast, noise,
+    pace, refreshes, response,
 };
 use algo::frame::SampleNoise;
 use hal::head::{Head, Stamp, Timing};
@@ -104,6 +104,20 @@ fn characterise(subject: &mut Subject<'_>, before: Option<Vec<f64>>) -> Result<C
         hold: pace.unwrap_or(head.timing().hold),
         ..head.timing()
     });
+    progress(0.04, "where the camera clips");
+    // Measured on samples as they are.
+    head.set_clipping(None);
+    let clips_from = match clipping(head)? {
+        Clips::From(sample) => Some(sample),
+        Clips::AtFullScale => None,
+        Clips::Unknown(why) => {
+            notes.push(format!(
+                "where the camera clips is not measured, and taken to be full scale: {why}"
+            ));
+            None
+        }
+    };
+    head.set_clipping(clips_from);
     progress(0.05, "light");
     let lit = Lit::take(head, SETTLE)?;
     passed(lit_enough(&lit))?;
@@ -158,6 +172,7 @@ fn characterise(subject: &mut Subject<'_>, before: Option<Vec<f64>>) -> Result<C
             counts: noise.counts,
             read_counts: noise.read_counts,
             shot: noise.shot,
+            clips_from,
             levels: noise
                 .points
                 .iter()
@@ -213,6 +228,7 @@ impl Characteristics {
     /// What was found, each with its name.
     pub fn words(&self) -> Vec<(&'static str, String)> {
         let (timing, noise) = (&self.timing, &self.noise);
+        let noise_file = noise;
         let marks = match timing.stamp {
             Stamp::ExposureStart => "start of the exposure",
             Stamp::ExposureEnd => "end of the exposure",
@@ -238,6 +254,12 @@ impl Characteristics {
             "{:.2} counts at half of white; {:.2} in the dark, and {:.4} counts² per count of light",
             noise.counts, noise.read_counts, noise.shot
         );
+        found.extend(noise_file.clips_from.map(|from| {
+            let words = format!(
+                "the camera clips or bends at {from} counts: samples from there on are left out"
+            );
+            ("clipping", words)
+        }));
         found.extend([
             ("delay", delay),
             ("response", response),

@@ -6,11 +6,13 @@
 //! ([`Delay`]).
 
 mod camera;
+mod clipping;
 mod crossed;
 mod delay;
 mod light;
 
 pub use camera::{MOST_LATE, Spaced, Stamps, pace};
+pub use clipping::{Clips, clipping};
 pub use crossed::{
     CrossedFringes, DRIFT_REMEDY, MOST_DRIFT_PX, PLATE_PITCH, ReferencePlane, plate,
 };
@@ -176,18 +178,20 @@ pub fn pictures(
         if batch.is_empty() {
             return Ok(());
         }
-        take(head, settle, batch, keep)?;
+        take(head, (settle, 1), batch, keep)?;
     }
 }
 
+/// Pictures of patterns, of so many exposures each.
 fn take(
     head: &mut Head,
-    settle: u32,
+    (settle, exposures): (u32, u32),
     patterns: Vec<Raster>,
     keep: &mut dyn FnMut(Vec<f32>),
 ) -> Result<(), Error> {
     let count = patterns.len();
     head.load(patterns)?;
+    head.expose(exposures)?;
     let showings: Vec<Showing> = (0..count).map(|at| showing(head, at, settle)).collect();
     for _ in 0..ATTEMPTS {
         let seen = head.watch(&showings, PATIENCE, &mut |frame| frame.clone())?;

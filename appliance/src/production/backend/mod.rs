@@ -206,6 +206,9 @@ impl OpenedHead {
                 let misfit = misfit(config, &self.calibration, &calibration);
                 if misfit.is_none() {
                     self.head.set_timing(loaded.file.timing(self.head.timing()));
+                    let noise = loaded.file.noise.as_ref();
+                    self.head
+                        .set_clipping(noise.and_then(|noise| noise.clips_from));
                     self.calibration = calibration;
                     self.fallback = loaded.fallback.clone();
                 }
