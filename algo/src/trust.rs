@@ -75,20 +75,23 @@ pub enum Trust {
     OutOfRange = 5,
     /// The map that the levels are unwrapped about has no phase here, so the pixel was not decoded.
     Unexpected = 6,
+    /// Light changes so steeply beside the pixel that its phase may be that of its brighter side.
+    LightEdge = 7,
 }
 
 impl Trust {
     /// Every reason for rejecting a pixel. A pixel has the first that applies.
-    pub const REASONS: [Self; 6] = [
+    pub const REASONS: [Self; 7] = [
         Self::Unexpected,
         Self::Dark,
         Self::LowModulation,
         Self::Saturated,
         Self::Residual,
+        Self::LightEdge,
         Self::OutOfRange,
     ];
 
-    /// The largest number of a variant.
+    /// The largest number of a variant that blocks of pixels get.
     pub(crate) const LAST: u8 = Self::Unexpected as u8;
 
     /// The word for reports.
@@ -101,6 +104,7 @@ impl Trust {
             Self::Residual => "residual",
             Self::OutOfRange => "out_of_range",
             Self::Unexpected => "unexpected",
+            Self::LightEdge => "light_edge",
         }
     }
 

@@ -253,7 +253,7 @@ fn taught_recipe(head: &mut Head, calibration: &Calibration) -> (Vec<u8>, Recipe
         name: "sphere".into(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
-        exposures: 1,
+        exposures: None,
         everything: false,
         marking: Default::default(),
         empty: None,
@@ -314,11 +314,7 @@ fn record(
     recipe: &Recipe,
     shots: &[Shot],
 ) -> Recording {
-    let mut head = CalibratedHead {
-        head,
-        calibration,
-        timeout: TIMEOUT,
-    };
+    let mut head = CalibratedHead::new(head, calibration, TIMEOUT);
     let function = &recipe.function;
     let measured = head
         .measure(function, shots, None, &|_| ())

@@ -106,8 +106,7 @@ impl Line {
 /// A recipe's plan, with its patterns loaded.
 fn planned(bed: &mut Bed, recipe: Recipe) -> Plan {
     let plan = Plan::new(recipe, &bed.calibration, true).unwrap();
-    let rasters = plan.rasters(&bed.calibration).unwrap();
-    bed.head.load(rasters).unwrap();
+    plan.load(&mut bed.head, &bed.calibration).unwrap();
     plan
 }
 

@@ -45,7 +45,7 @@ impl Line {
     fn new(scenario: &Scenario, exposures: u32) -> Self {
         let mut bed = bed(scenario);
         let naming = Naming {
-            exposures,
+            exposures: Some(exposures),
             limit_mm: Some(LIMIT_MM),
             ..naming(TOLERANCE_MM)
         };
@@ -242,7 +242,7 @@ fn a_station_measures_by_a_recipe_that_teach_makes_with_longer_exposures() {
     let (file, arrays) = archive::unpack(std::io::Cursor::new(&bytes), bytes.len() as u64).unwrap();
     assert_eq!(file.exposures, 3);
     // Taught again, it stays so.
-    assert_eq!(replace::naming(1, Some(&file), false).exposures, 3);
+    assert_eq!(replace::naming(1, Some(&file), false).exposures, Some(3));
     refused_without_its_light(&file, &arrays);
     std::fs::create_dir_all(place.recipe().parent().unwrap()).unwrap();
     std::fs::copy(&out, place.recipe()).unwrap();
@@ -280,10 +280,11 @@ fn refused_without_its_light(file: &RecipeFile, arrays: &archive::Arrays) {
     let whole = arrays.amplitude.to_vec();
     check(3, whole.clone()).unwrap();
     check(1, Vec::new()).unwrap();
+    check(1, whole.clone()).unwrap();
     let mut dark = whole.clone();
     dark[7] = 0;
     for (exposures, amplitude) in [
-        (1, whole.clone()),
+        (1, whole[1..].to_vec()),
         (3, Vec::new()),
         (3, whole[1..].to_vec()),
         (3, dark),

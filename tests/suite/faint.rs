@@ -2,7 +2,7 @@
 //! noise and is a property of the recipe.
 
 use super::gauges::{frames, plan};
-use super::placement::{Bed, TIMEOUT, bed, scenario, taught};
+use super::placement::{Bed, TIMEOUT, bed, scenario, taught_exposed};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::head::calibrated::{CalibratedHead, MeasuredPart};
@@ -30,7 +30,7 @@ fn dark() -> (Bed, TaughtRecipe) {
     scenario.noise.noise_counts = Some(HALF_WIDTH);
     scenario.optics.gain *= DARK;
     let mut bed = bed(&scenario);
-    let taught = taught(&mut bed).unwrap();
+    let taught = taught_exposed(&mut bed, 1.0, 1).unwrap();
     (bed, taught)
 }
 
@@ -44,11 +44,7 @@ fn measured(bed: &mut Bed, taught: &TaughtRecipe) -> (MeasuredPart, Vec<Absolute
     let golden: Vec<_> = golden
         .map(|&turns| AbsolutePhase::from_turns(turns))
         .collect();
-    let mut head = CalibratedHead {
-        head: &mut bed.head,
-        calibration: &bed.calibration,
-        timeout: TIMEOUT,
-    };
+    let mut head = CalibratedHead::new(&mut bed.head, &bed.calibration, TIMEOUT);
     let function = &taught.recipe.function;
     let measured = head.measure(function, full(taught), Some(&golden), &|_| ());
     (measured.unwrap(), golden)

@@ -72,13 +72,9 @@ fn a_colour_camera_measures_through_one_green_plane_with_the_geometry_of_that_pl
     let function = PhaseFunction::vertical(columns as usize, rows as usize, fringes).unwrap();
     let shots = Sequence::geometric(function.range(), 3, 4);
     let calibration = &opened.calibration;
-    let measured = CalibratedHead {
-        head: &mut opened.head,
-        calibration,
-        timeout: Duration::from_secs(1),
-    }
-    .measure(&function, &shots, None, &|_| ())
-    .unwrap();
+    let measured = CalibratedHead::new(&mut opened.head, calibration, Duration::from_secs(1))
+        .measure(&function, &shots, None, &|_| ())
+        .unwrap();
     let truth = opened.stage.as_ref().unwrap().truth();
     let frames = shots.iter().zip(measured.frames);
     let played = Measured::new(Recording {

@@ -24,6 +24,7 @@ mod experiment;
 mod exposing;
 mod exposures;
 mod faint;
+mod finish;
 mod flicker;
 mod foreign;
 mod form;

@@ -51,11 +51,7 @@ impl Bench {
     fn preliminary(&mut self) -> Recording {
         let function = PhaseFunction::vertical(512, 384, 25.6).unwrap();
         let shots = Sequence::geometric(function.range(), 3, 4);
-        let mut head = CalibratedHead {
-            head: &mut self.head,
-            calibration: &self.calibration,
-            timeout: TIMEOUT,
-        };
+        let mut head = CalibratedHead::new(&mut self.head, &self.calibration, TIMEOUT);
         let measured = head.measure(&function, &shots, None, &|_| ()).unwrap();
         let frames = shots.iter().zip(measured.frames);
         let frames = frames.map(|(&shot, frame)| seam::recorded(shot, frame));

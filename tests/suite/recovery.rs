@@ -169,7 +169,7 @@ fn a_teach_that_is_ended_does_no_further_step() {
         name: "part".into(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: 1.0,
-        exposures: 1,
+        exposures: None,
         everything: false,
         marking: Default::default(),
         empty: None,

@@ -223,11 +223,7 @@ fn errors(noise: fn(&mut Scenario), placements: usize) {
             let reaches = &taught.recipe.arrays.phase_reach;
             let map = appliance::recipe::safe(&golden, reaches, reach);
             let map = sequence.kind.reach().map(|_| &map[..]);
-            let mut head = CalibratedHead {
-                head: &mut bed.head,
-                calibration: &bed.calibration,
-                timeout: TIMEOUT,
-            };
+            let mut head = CalibratedHead::new(&mut bed.head, &bed.calibration, TIMEOUT);
             let function = &taught.recipe.function;
             let measured = head
                 .measure(function, &sequence.frames, map, &|_| ())

@@ -5,6 +5,7 @@ use super::about::About;
 use super::arrived::Arrived;
 use super::geometric::Geometric;
 use super::level::LevelPlan;
+use super::light_edge::LightEdges;
 use crate::frame::{FrameView, SampleNoise, Samples};
 use crate::pattern::{PhaseRange, Sequence, SequenceError, Unwrapping};
 use crate::simd::Backend;
@@ -26,6 +27,7 @@ pub struct Decoder {
     frame_count: usize,
     pub(super) bit_depth: u8,
     least: LeastModulation,
+    pub(super) light_edges: Option<LightEdges>,
 }
 
 /// How the levels of a pixel become one absolute phase; prepared once per plan.
@@ -174,6 +176,7 @@ impl Decoder {
             frame_count: sequence.frame_count(),
             bit_depth,
             least: LeastModulation::default(),
+            light_edges: None,
         })
     }
 
@@ -184,6 +187,17 @@ impl Decoder {
             level.trust_from(least, full_scale);
         }
         Self { least, ..self }
+    }
+
+    /// The same decoder, which refuses pixels beside which light changes so steeply that their phase is wrong
+    /// by more than this noise of a sample explains ([`Trust::LightEdge`]).
+    pub fn refusing_light_edges(self, noise: SampleNoise) -> Self {
+        let sigma = |modulation| self.phase_noise(modulation, noise);
+        let light_edges = Some(LightEdges::new(sigma));
+        Self {
+            light_edges,
+            ..self
+        }
     }
 
     /// The same decoder on another back-end of this machine; the bits are the same.

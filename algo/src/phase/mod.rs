@@ -27,6 +27,7 @@ mod fold;
 mod geometric;
 mod kernel;
 mod level;
+mod light_edge;
 mod quality;
 mod rows;
 mod samples;

@@ -46,7 +46,7 @@ impl Decoder {
     /// [`Self::check_last`] has passed.
     ///
     /// `map` is the row of the known map for dense and single-level sequences; other sequences do
-    /// not read it.
+    /// not read it. Where edges of light are refused, the columns on either side are decoded, too.
     pub fn row(
         &self,
         arrived: &Arrived,
@@ -56,10 +56,41 @@ impl Decoder {
         columns: Range<usize>,
         out: PhaseRow<'_>,
     ) {
+        let decoded = match &self.light_edges {
+            // They are looked for with the neighbours of each pixel.
+            Some(_) if !columns.is_empty() => {
+                columns.start.saturating_sub(1)..out.phase.len().min(columns.end + 1)
+            }
+            _ => columns.clone(),
+        };
+        let row = arrived.row(v);
+        let PhaseRow {
+            phase,
+            modulation,
+            trust,
+        } = out;
+        let out = PhaseRow {
+            phase: &mut *phase,
+            modulation: &mut *modulation,
+            trust: &mut *trust,
+        };
         if self.bit_depth == 8 {
-            self.typed_row::<u8>(arrived.row(v), last, v, map, columns, out);
+            self.typed_row::<u8>(row, last, v, map, decoded, out);
         } else {
-            self.typed_row::<u16>(arrived.row(v), last, v, map, columns, out);
+            self.typed_row::<u16>(row, last, v, map, decoded, out);
+        }
+        let out = PhaseRow {
+            phase,
+            modulation,
+            trust,
+        };
+        self.refuse_light_edges(out, columns);
+    }
+
+    /// Refuses decoded columns of a row, if edges of light are refused.
+    pub(crate) fn refuse_light_edges(&self, row: PhaseRow<'_>, columns: Range<usize>) {
+        if let Some(edges) = &self.light_edges {
+            edges.refuse(row.phase, row.modulation, row.trust, columns);
         }
     }
 

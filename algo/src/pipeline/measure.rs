@@ -130,6 +130,15 @@ pub fn decode(
     Ok(phases)
 }
 
+/// Refuses the pixels of a decoded map beside which light changes steeply, if the decoder does so
+/// ([`Decoder::refusing_light_edges`]).
+pub fn refuse_light_edges(decoder: &Decoder, phases: &mut PhaseMap) {
+    let columns = 0..phases.width;
+    for_each(phases.rows(), |_, row| {
+        decoder.refuse_light_edges(row, columns.clone());
+    });
+}
+
 /// Decodes the frames of the next level on arrival, while those of finer levels are being exposed.
 /// Levels arrive from coarse to fine, frames are in the order of their shifts.
 ///

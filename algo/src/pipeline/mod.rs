@@ -17,8 +17,8 @@ pub(crate) use cubic::{
 pub use cubic::{HeightCubics, KnownSurface};
 pub use epipolar::Epipolar;
 pub use measure::{
-    HeightMap, PhaseMap, Window, arrive, arrive_rest, decode, triangulate, triangulate_with,
-    wrapped,
+    HeightMap, PhaseMap, Window, arrive, arrive_rest, decode, refuse_light_edges, triangulate,
+    triangulate_with, wrapped,
 };
 pub use noise::{off_sine, sample_noise};
 pub use plate::{Plate, PlateError};

@@ -57,8 +57,8 @@ pub struct Teach {
     #[arg(long, value_name = "MM", value_parser = number(LEAST_LIMIT_MM, MOST_LIMIT_MM))]
     limit: Option<f64>,
     /// Expose each frame so many times as long as the head is set to, with less light where the
-    /// part is bright: dark places have less noise; without it as in the recipe that is replaced,
-    /// or 1.
+    /// part is bright: dark places have less noise; without it as in the recipe that is replaced, if
+    /// that has longer ones, else once unless the part is dark.
     #[arg(long, value_name = "N", conflicts_with = "golden", value_parser = number(1, MAX_EXPOSURES))]
     exposures: Option<u32>,
     /// Take all that is seen for the part, also a flat surface that lies behind it all round: the base of
@@ -233,7 +233,7 @@ impl Teach {
             part_number: self.part_number.clone().unwrap_or(kept.part_number),
             name: self.name.clone().unwrap_or(kept.name),
             placement_tolerance_mm: self.tolerance.unwrap_or(kept.placement_tolerance_mm),
-            exposures: self.exposures.unwrap_or(kept.exposures),
+            exposures: self.exposures.or(kept.exposures),
             everything: self.everything || kept.everything,
             limit_mm: self.limit.or(kept.limit_mm),
             ..kept
@@ -334,6 +334,7 @@ impl Teach {
             pattern: PatternFile::of(&recording.patterns[primary]),
             // Recordings cannot be exposed anew.
             illumination: Illumination::default(),
+            light_edges: false,
             full,
             decoder: decoder.clone(),
             triangulator: surface.triangulator.clone(),

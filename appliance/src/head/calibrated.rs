@@ -8,7 +8,7 @@ use crate::head::scan::{self, Scan};
 use crate::storage::folder::{read_whole, write_whole};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Sequence, Shot};
-use algo::phase::Decoder;
+use algo::phase::{Decoder, LeastModulation};
 use algo::pipeline::{HeightMap, PhaseMap, Progress};
 use algo::units::AbsolutePhase;
 use hal::frame::Frame;
@@ -59,6 +59,8 @@ pub struct CalibratedHead<'a> {
     pub calibration: &'a Calibration,
     /// Longest wait for a device.
     pub timeout: Duration,
+    /// The least modulation that is trusted.
+    pub least: LeastModulation,
 }
 
 /// A measured part.
@@ -94,7 +96,17 @@ impl MeasureError {
     }
 }
 
-impl CalibratedHead<'_> {
+impl<'a> CalibratedHead<'a> {
+    /// That trusts the modulation that the head's calibration says.
+    pub fn new(head: &'a mut Head, calibration: &'a Calibration, timeout: Duration) -> Self {
+        Self {
+            head,
+            calibration,
+            timeout,
+            least: calibration.least_modulation(),
+        }
+    }
+
     /// Projects the shots of a phase function and measures the part in the default working range of
     /// [`Triangulator::new`]. Levels that are unwrapped about a known map take `map` (row-major),
     /// or without one the reference phase map. `progress` gets the share of the measurement that is done.
@@ -132,7 +144,7 @@ impl CalibratedHead<'_> {
             progress(TAKEN * share);
         })?;
         let scan = Scan::new(function.range(), shots, &frames).map_err(MeasureError::impossible)?;
-        let scan = scan.trusting(calibration.least_modulation());
+        let scan = scan.trusting(self.least);
         let reference;
         let map = match map {
             None if scan.needs_map() => {
@@ -179,11 +191,7 @@ impl EmptyStation {
             calibration.projector.height(),
         );
         let (function, shots) = straight_fringes((columns, rows))?;
-        let mut head = CalibratedHead {
-            head,
-            calibration,
-            timeout: TIMEOUT,
-        };
+        let mut head = CalibratedHead::new(head, calibration, TIMEOUT);
         let measured = head.measure(&function, &shots, None, progress)?;
         let heights = measured.heights.height.iter();
         let mm = heights.map(|height| match height.is_known() {

@@ -79,14 +79,17 @@ impl Illumination {
         shots.par_iter().map(raster).collect()
     }
 
-    /// What is exposed for longer, for people; none for one exposure of the whole light.
+    /// What is not one exposure of the whole light, for people.
     pub fn words(&self) -> Option<String> {
-        let least = self.amplitude.iter().min()?;
-        Some(format!(
-            "frames are exposed {} times as long, with {:.0} % of the projector's light where the part is brightest",
-            self.exposures,
-            f64::from(*least) / 2.55
-        ))
+        let least = f64::from(*self.amplitude.iter().min()?) / 2.55;
+        Some(match self.exposures {
+            1 => format!(
+                "the part mirrors: the projector gives {least:.0} % of its light where the part is brightest, and cycles take no longer"
+            ),
+            times => format!(
+                "frames are exposed {times} times as long, with {least:.0} % of the projector's light where the part is brightest"
+            ),
+        })
     }
 
     /// Makes linear light darker, rounded to the nearest level.

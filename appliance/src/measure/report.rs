@@ -112,7 +112,8 @@ impl MeasurementReport {
         let resolved = phases.count(Trust::Resolved);
         let unresolved: BTreeMap<_, _> = Trust::REASONS
             .into_iter()
-            .filter(|&reason| reason != Trust::Unexpected)
+            // Edges of light are refused where a recipe says so.
+            .filter(|reason| !matches!(reason, Trust::Unexpected | Trust::LightEdge))
             .map(|reason| match reason {
                 Trust::Dark => (reason.word(), dark_but_lit),
                 _ => (reason.word(), phases.count(reason)),

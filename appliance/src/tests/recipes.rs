@@ -52,7 +52,7 @@ impl Bed {
             name: "part".into(),
             taught_at_unix_s: 0,
             placement_tolerance_mm: 1.0,
-            exposures: 1,
+            exposures: None,
             everything: false,
             marking: Default::default(),
             empty: None,

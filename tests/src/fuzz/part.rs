@@ -44,7 +44,7 @@ impl Part {
             name: "plane".into(),
             taught_at_unix_s: 0,
             placement_tolerance_mm: 0.5,
-            exposures: 1,
+            exposures: None,
             everything: false,
             marking: Default::default(),
             empty: None,

@@ -124,7 +124,7 @@ pub fn budgets(
         name: "bench".into(),
         taught_at_unix_s: 0,
         placement_tolerance_mm: PLACEMENT_MM,
-        exposures: 1,
+        exposures: None,
         everything: false,
         marking: Default::default(),
         empty: None,

@@ -181,11 +181,7 @@ impl Runner {
         map: Option<&[AbsolutePhase]>,
     ) -> Result<MeasuredPart, MeasureError> {
         self.stage.reseed(self.learnt.seed * STREAMS + noise_stream);
-        let mut head = CalibratedHead {
-            head: &mut self.head,
-            calibration: &self.calibration,
-            timeout: TIMEOUT,
-        };
+        let mut head = CalibratedHead::new(&mut self.head, &self.calibration, TIMEOUT);
         head.measure(function, shots, map, &|_| ())
     }
 

@@ -150,6 +150,14 @@ impl Calibration {
         LeastModulation::of_noise(self.noise_counts, self.bit_depth)
     }
 
+    /// The least modulation that is trusted on a part that is dark, or dark but for where it mirrors: that
+    /// of the noise of samples at an eighth of full scale.
+    pub fn least_modulation_of_dark(&self) -> LeastModulation {
+        let light = f64::from((1_u32 << self.bit_depth) - 1) / 8.0;
+        let noise = self.noise.at(light).min(self.noise_counts);
+        LeastModulation::of_noise(noise, self.bit_depth)
+    }
+
     /// The calibration of the head that took a recording, from its models, with the noise of a
     /// sample in counts.
     ///

@@ -125,6 +125,9 @@ bounded! {
         /// not known.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub calibration_sigma: Option<CalibrationSigma> = Fields,
+        /// Whether pixels are refused beside which light changes steeply: the part mirrors or is printed on.
+        #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+        pub light_edges: bool,
         /// Whether all that was seen was taken for the part, also what lies behind it all round.
         #[serde(default, skip_serializing_if = "std::ops::Not::not")]
         pub everything: bool,

@@ -80,6 +80,8 @@ pub struct Conditions {
     pub golden_offset_counts: Option<f64>,
     /// The least modulation that is trusted.
     pub least_modulation: LeastModulation,
+    /// Whether pixels are refused beside which light changes steeply.
+    pub light_edges: bool,
     /// σ by the uncertainty of the calibration; 0 where it is not known.
     pub calibration: CalibrationUncertainty,
     /// |ΔΦ| in turns up to which the expansion of the height holds.
@@ -211,13 +213,10 @@ impl Recipe {
             file.projector.height as usize,
         );
         let amplitude = &arrays.amplitude;
-        let expected = match file.exposures {
-            1 => 0,
-            _ => columns * rows,
-        };
-        if amplitude.len() != expected || amplitude.contains(&0) {
+        let is_whole = file.exposures == 1 && amplitude.is_empty();
+        if !is_whole && (amplitude.len() != columns * rows || amplitude.contains(&0)) {
             return refused!(
-                "amplitude has {} values, {} of them 0, for a projector of {columns}x{rows} and {} exposures: it has one of 1 to 255 for each pixel where there are several, else none",
+                "amplitude has {} values, {} of them 0, for a projector of {columns}x{rows} and {} exposures: it has one of 1 to 255 for each pixel, or with one exposure none",
                 amplitude.len(),
                 amplitude.iter().filter(|share| **share == 0).count(),
                 file.exposures
@@ -354,6 +353,7 @@ impl From<&RecipeFile> for Conditions {
             golden_captures: file.golden_captures,
             golden_offset_counts: file.golden_offset_counts,
             least_modulation: LeastModulation::new(file.least_modulation).unwrap_or_default(),
+            light_edges: file.light_edges,
             calibration: file.calibration_sigma.map_or_else(
                 CalibrationUncertainty::default,
                 |sigma| CalibrationUncertainty {

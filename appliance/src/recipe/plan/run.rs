@@ -143,7 +143,10 @@ impl Prepared {
         let offset = offset.filter(|_| !arrays.sequence_offset.is_empty());
         let offsets = (taught::offset(arrays, offset), taught::offset(arrays, base));
         let decoder = Decoder::new(&levels, range, conditions.camera.2)?;
-        let decoder = decoder.with_least_modulation(conditions.least_modulation);
+        let mut decoder = decoder.with_least_modulation(conditions.least_modulation);
+        if conditions.light_edges {
+            decoder = decoder.refusing_light_edges(conditions.noise);
+        }
         let indices = shots.into_iter().map(|shot| {
             let shown = rasters.iter().position(|known| *known == shot);
             shown.unwrap_or_else(|| {

@@ -20,10 +20,10 @@ use crate::system::headway::Headway;
 use algo::frame::{FrameError, SampleNoise};
 use algo::geometry::Triangulator;
 use algo::pattern::{PhaseFunction, Sequence, Shot};
-use algo::phase::Decoder;
+use algo::phase::{Decoder, Trust};
 use algo::pipeline;
 use algo::pipeline::{HeightMap, PhaseMap};
-use algo::units::AbsolutePhase;
+use algo::units::{AbsolutePhase, Height};
 use hal::frame::Frame;
 use hal::replay::Recording;
 
@@ -31,6 +31,13 @@ use hal::replay::Recording;
 const MEANS: usize = 2;
 /// All captures.
 pub const CAPTURES: usize = MEANS * hal::frame::FrameSum::CAPTURES;
+
+/// Edges of light on a part's faces that make it one that is printed on, as a share of the picture.
+const PRINTED: f64 = 3e-4;
+/// How far what lies on both sides of a pixel of a face may be apart there, mm, and by how much its slopes may
+/// differ, mm per pixel.
+const FLAT_MM: f64 = 0.15;
+const FLAT_SLOPE_MM: f64 = 0.05;
 
 /// For each mean, the phase of each pixel by a sequence less its phase by the full sequence,
 /// 1/65536 turn; 0 where one of both phases is not resolved.
@@ -69,6 +76,7 @@ impl Captured {
             head,
             calibration,
             timeout,
+            least,
         }: &mut CalibratedHead<'_>,
         illumination: &Illumination,
         function: &PhaseFunction,
@@ -80,7 +88,6 @@ impl Captured {
             return Err(TeachError::Rig("there is no sequence".into()));
         };
         let shots = distinct(sequences);
-        let least = calibration.least_modulation();
         let full_scale = f64::from((1_u32 << calibration.bit_depth) - 1);
         illumination.load(head, function, &shots, calibration)?;
         let mut all: Vec<(PhaseMap, Vec<Vec<i16>>)> = Vec::new();
@@ -92,7 +99,7 @@ impl Captured {
             let means = mean_frames(head, shots.len(), *timeout, &taken)?;
             let means = means.ok_or(TeachError::Ended)?;
             let decode = |shown: &[Shot], map: &[AbsolutePhase]| {
-                let scan = scan(function, (&shots, shown), &means)?.trusting(least);
+                let scan = scan(function, (&shots, shown), &means)?.trusting(*least);
                 let phases = scan.phases(scan.needs_map().then_some(map))?;
                 Ok::<_, Refusal>((scan, phases))
             };
@@ -118,7 +125,7 @@ impl Captured {
         let decoder = Decoder::new(&sequence, function.range(), bit_depth);
         let decoder = decoder
             .map_err(TeachError::rig)?
-            .with_least_modulation(least);
+            .with_least_modulation(*least);
         let triangulator = calibration.triangulator(function.clone(), None);
         let triangulator = triangulator.map_err(TeachError::rig)?;
         let Ok([(mut phases, first), (other, second)]) = <[_; MEANS]>::try_from(all) else {
@@ -149,6 +156,43 @@ impl Captured {
             noise,
             offset_counts,
         })
+    }
+
+    /// Refuses pixels beside which light changes steeply, if the part `shines` or there are such on its
+    /// faces, and returns whether it does so. Along creases and the part's end light changes on any part.
+    pub fn refuse_light_edges(&mut self, shines: bool) -> bool {
+        let decoder = self.decoder.clone().refusing_light_edges(self.noise);
+        let mut phases = self.phases.clone();
+        pipeline::refuse_light_edges(&decoder, &mut phases);
+        let edges = (0..phases.trust.len()).filter(|&at| phases.trust[at] == Trust::LightEdge);
+        let printed = edges.clone().filter(|&at| self.is_flat(at)).count();
+        if !shines && (printed as f64) < PRINTED * phases.trust.len() as f64 {
+            return false;
+        }
+        for at in edges {
+            (self.heights.height[at], self.heights.sigma[at]) = (Height::UNKNOWN, f32::NAN);
+        }
+        self.phases = phases;
+        true
+    }
+
+    /// Whether a face goes on through a pixel: what lies in its row on either side of it has one slope and meets.
+    fn is_flat(&self, at: usize) -> bool {
+        let mm = |off: isize| {
+            let height = self.heights.height.get(at.checked_add_signed(off)?)?;
+            height.is_known().then(|| height.mm())
+        };
+        let row = self.heights.width as isize;
+        let [Some(before), Some(ahead), Some(behind), Some(beyond)] = [-5, -2, 2, 5].map(mm) else {
+            return false;
+        };
+        // Pixels of the part's end are lit in part.
+        if [-2 * row, 2 * row].map(mm).contains(&None) {
+            return false;
+        }
+        let slopes = [ahead - before, beyond - behind].map(|rise| rise / 3.0);
+        let apart = behind - ahead - 2.0 * (slopes[0] + slopes[1]);
+        (slopes[1] - slopes[0]).abs() < FLAT_SLOPE_MM && apart.abs() < FLAT_MM
     }
 }
 

@@ -62,8 +62,8 @@ pub struct Naming {
     pub taught_at_unix_s: u64,
     /// How far any corner of a part may lie from where it was taught, mm.
     pub placement_tolerance_mm: f64,
-    /// Each frame is exposed so many times as long as the head is set to, 1 to 4.
-    pub exposures: u32,
+    /// Each frame is exposed so many times as long as the head is set to, 1 to 4; `None`: as the part needs.
+    pub exposures: Option<u32>,
     /// Whether all that is seen is the part, also what lies behind it.
     pub everything: bool,
     /// What a person has marked in the picture.
@@ -94,6 +94,8 @@ pub struct GoldenPart<'a> {
     pub pattern: PatternFile,
     /// The light with which it was measured.
     pub illumination: Illumination,
+    /// Whether pixels were refused beside which light changes steeply.
+    pub light_edges: bool,
     /// What each frame of the full sequence shows.
     pub full: &'a [Shot],
     /// How these frames were decoded.
@@ -265,6 +267,7 @@ impl GoldenPart<'_> {
             golden_captures: self.captures,
             least_modulation: self.decoder.least_modulation().eight_bit(),
             models: ModelsFile::of(calibration),
+            light_edges: self.light_edges,
             calibration_sigma: calibration.sigma,
             everything: naming.everything,
             marking: naming.marking.clone(),

@@ -4,6 +4,7 @@ pub mod adaptive;
 pub mod captures;
 pub mod golden;
 pub mod good_parts;
+mod illumination;
 mod limits;
 pub mod part;
 pub mod planner;
@@ -93,21 +94,28 @@ pub fn teach_showing(
     let measuring = stage(0.0, 0.15, "measuring the part")?;
     // Every stage asks for the rays of all pixels.
     let calibration = &calibration.clone().with_rays();
-    let mut head = CalibratedHead {
-        head,
-        calibration,
-        timeout,
-    };
+    let mut head = CalibratedHead::new(head, calibration, timeout);
     let raster = &calibration.projector;
     let preliminary = Preliminary::new((raster.width(), raster.height()))?;
     let Preliminary { function, shots } = &preliminary;
     // Checked before the next stage: a sequence is not interrupted.
     let measured = |share| measuring.done(share);
     let mut first = head.measure(function, shots, None, &measured)?;
+    let exposures = computing.on(|| illumination::exposures(&first, naming, &mut head))?;
+    let shines = illumination::shines(&first);
     let mut illumination = Illumination::default();
-    if naming.exposures > 1 {
-        let again = stage(0.15, 0.2, "measuring the part with longer exposures")?;
-        illumination = computing.on(|| preliminary.illumination(&first, calibration, naming));
+    if exposures > 1 || shines {
+        let again = stage(0.15, 0.2, "measuring the part in the light that suits it")?;
+        head.least = calibration.least_modulation_of_dark();
+        let dimmed = if shines {
+            Some(preliminary.dimmed(&mut head)?)
+        } else {
+            None
+        };
+        let asked = (exposures, naming);
+        illumination = computing.on(|| {
+            preliminary.illumination(&first, dimmed.as_ref(), asked, calibration.noise_counts)
+        });
         let measured = |share| again.done(share);
         first = head.measure_lit(&illumination, function, shots, None, &measured)?;
     }
@@ -143,6 +151,7 @@ pub fn teach_showing(
         part::leave_out(found, &mut golden.phases, &mut golden.heights);
     }
     part::name_highlights(&clipped, &mut golden.phases);
+    let light_edges = computing.on(|| golden.refuse_light_edges(shines));
     refuse_empty(&golden.phases)?;
     let adaptive = (full.len(), &golden.phases, &golden.heights);
     let fixed = (preliminary.shots.len(), &first.phases, &first.heights);
@@ -153,6 +162,7 @@ pub fn teach_showing(
         calibration,
         pattern: PatternFile::File,
         illumination,
+        light_edges,
         full: &full,
         decoder: golden.decoder,
         triangulator: golden.triangulator,

@@ -43,7 +43,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>, keep_gauges: bool) -> 
         name: format!("Part {number}"),
         taught_at_unix_s: crate::system::clock::utc_or_told_s().unwrap_or(0),
         placement_tolerance_mm: PLACEMENT_TOLERANCE_MM,
-        exposures: 1,
+        exposures: None,
         everything: false,
         marking: Marking::default(),
         empty: None,
@@ -60,7 +60,7 @@ pub fn naming(number: u16, replaced: Option<&RecipeFile>, keep_gauges: bool) -> 
         part_number: file.part_number,
         name: file.name,
         placement_tolerance_mm: file.placement_tolerance_mm,
-        exposures: file.exposures,
+        exposures: Some(file.exposures).filter(|exposures| *exposures > 1),
         everything: file.everything,
         marking: file.marking,
         ..new

@@ -111,6 +111,7 @@ const ORDER: [Trust; TRUSTS] = [
     Trust::Saturated,
     Trust::Residual,
     Trust::OutOfRange,
+    Trust::LightEdge,
 ];
 /// Pixels whose counts fit into a byte.
 const BLOCK: usize = 255;

@@ -1,0 +1,158 @@
+//! How long frames are exposed, and how much of the projector's light each place of a part gets, by what
+//! straight fringes show of it.
+//!
+//! In the order of what they cost a cycle: one exposure of the whole light; less light where the part
+//! mirrors it, which costs no time; longer exposures, where all of the part is dark, also with less light
+//! where they would be at full scale.
+
+use super::TeachError;
+use super::adaptive::Preliminary;
+use super::golden::Naming;
+use super::part;
+use crate::head::calibrated::{CalibratedHead, MeasuredPart, STRAIGHT_SHIFTS};
+use crate::head::rasters::Illumination;
+use crate::recipe::file::MAX_EXPOSURES;
+use algo::adaptive::ProjectorMap;
+use algo::adaptive::amplitude::{Received, Wanted, amplitude, reach};
+use algo::phase::Trust;
+use hal::error::Error;
+use hal::frame::{Frame, Samples};
+
+/// Samples may reach this share of full scale, less their noise: a part that lies differently
+/// reflects a little more.
+const MOST: f64 = 0.9;
+/// Noise that a sample may have beyond that, in σ.
+const NOISE_SIGMAS: f64 = 4.0;
+/// Fewer pixels at full scale, as a share of the picture, change nothing.
+const FEW: f64 = 1e-3;
+/// The light of the second look at places that are at full scale, in 1/255: a quarter.
+const DIM: u8 = 64;
+/// Below this median of the modulation, as a share of full scale, a part is dark.
+const DARK: f64 = 1.0 / 16.0;
+/// What longer exposures of a dark part are to reach.
+const ENOUGH: f64 = 1.0 / 8.0;
+/// Fewer resolved pixels, as a share of the picture, tell nothing of a part.
+const LEAST_RESOLVED: f64 = super::LEAST_RESOLVED;
+
+/// Whether so many pixels are at full scale, in each level, that they are worth a second look: noise alone
+/// takes a sample there, but not in all.
+pub(super) fn shines(first: &MeasuredPart) -> bool {
+    let levels = first.frames.chunks(STRAIGHT_SHIFTS).map(part::clipped);
+    let both = |a: Vec<bool>, b: Vec<bool>| a.iter().zip(b).map(|(a, b)| *a && b).collect();
+    let clipped = levels.reduce(both).unwrap_or_default();
+    let count = clipped.iter().filter(|clipped| **clipped).count();
+    count as f64 > FEW * clipped.len() as f64
+}
+
+/// How many times as long as the head is set to frames of the part are to be exposed: as told, else once
+/// unless the part is dark and the head can.
+pub(super) fn exposures(
+    first: &MeasuredPart,
+    naming: &Naming,
+    head: &mut CalibratedHead<'_>,
+) -> Result<u32, TeachError> {
+    if let Some(told) = naming.exposures {
+        return Ok(told);
+    }
+    let wanted = wanted_exposures(first, naming);
+    match head.head.expose(wanted) {
+        Ok(()) => Ok(wanted),
+        Err(Error::Unsupported { .. }) => Ok(1),
+        Err(error) => Err(error.into()),
+    }
+}
+
+fn wanted_exposures(first: &MeasuredPart, naming: &Naming) -> u32 {
+    let (phases, decoder) = (&first.phases, &first.decoder);
+    let full_scale = decoder.full_scale();
+    let found = part::of(&first.heights, &first.triangulator, naming.told());
+    let found = found.ok().flatten();
+    let is_part = |at: usize| found.as_ref().is_none_or(|found| found.part[at]);
+    let pixels = phases.trust.len();
+    let resolved = (0..pixels).filter(|&at| phases.trust[at] == Trust::Resolved && is_part(at));
+    let mut counts: Vec<f64> = resolved
+        .map(|at| phases.modulation[at].counts(full_scale))
+        .collect();
+    let are_few = |count: usize| (count as f64) < LEAST_RESOLVED * pixels as f64;
+    if are_few(counts.len()) {
+        // What is seen but not resolved is not too dark.
+        let seen = [Trust::Saturated, Trust::Residual, Trust::OutOfRange];
+        let seen = seen.map(|trust| phases.count(trust)).iter().sum();
+        return if are_few(seen) { MAX_EXPOSURES } else { 1 };
+    }
+    let middle = counts.len() / 2;
+    let median = *counts.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let share = median / f64::from(full_scale);
+    match share < DARK {
+        true => ((ENOUGH / share).ceil() as u32).clamp(2, MAX_EXPOSURES),
+        false => 1,
+    }
+}
+
+impl Preliminary {
+    /// The part in a quarter of the light.
+    ///
+    /// # Errors
+    /// If a device fails.
+    pub(super) fn dimmed(&self, head: &mut CalibratedHead<'_>) -> Result<MeasuredPart, TeachError> {
+        let dim = Illumination {
+            exposures: 1,
+            amplitude: vec![DIM; self.function.columns() * self.function.rows()],
+        };
+        Ok(head.measure_lit(&dim, &self.function, &self.shots, None, &|_| ())?)
+    }
+
+    /// The light for a part that was measured with these fringes in one exposure of their whole light and,
+    /// where that is at full scale, in a quarter of it.
+    pub(super) fn illumination(
+        &self,
+        part: &MeasuredPart,
+        dimmed: Option<&MeasuredPart>,
+        (exposures, naming): (u32, &Naming),
+        noise_counts: f64,
+    ) -> Illumination {
+        let format = part.frames[0].format();
+        let full_scale = f64::from(format.full_scale());
+        let (width, rows) = (format.width as usize, format.height as usize);
+        let received = (0..width * rows).map(|pixel| {
+            let at = pixel / width * format.stride + pixel % width;
+            // The coarsest level, which blur weakens least.
+            let of = |part: &MeasuredPart, share: f64| {
+                let shifts: [f64; STRAIGHT_SHIFTS] =
+                    std::array::from_fn(|shift| sample(&part.frames[shift], at) / full_scale);
+                Received::of(shifts, share)
+            };
+            let whole = of(part, 1.0);
+            let dimmed = dimmed.filter(|_| whole.white.is_infinite());
+            dimmed.map_or(whole, |dimmed| of(dimmed, f64::from(DIM) / 255.0))
+        });
+        let mut heights = part.heights.clone();
+        for (height, dimmed) in heights
+            .height
+            .iter_mut()
+            .zip(dimmed.iter().flat_map(|dimmed| &dimmed.heights.height))
+            .filter(|(height, _)| !height.is_known())
+        {
+            *height = *dimmed;
+        }
+        let (triangulator, tolerance) = (&part.triangulator, naming.placement_tolerance_mm);
+        let most = MOST - NOISE_SIGMAS * noise_counts / full_scale;
+        let wanted: Vec<Wanted> = received
+            .map(|light| light.wanted(exposures, most))
+            .collect();
+        let map = ProjectorMap::from_heights(triangulator, &heights);
+        let (columns, rows) = (self.function.columns(), self.function.rows());
+        let reach = reach(triangulator, &heights, tolerance, dimmed.is_some());
+        Illumination {
+            exposures,
+            amplitude: amplitude(&map, &wanted, columns, rows, reach),
+        }
+    }
+}
+
+fn sample(frame: &Frame, at: usize) -> f64 {
+    match frame.samples() {
+        Samples::Eight(samples) => samples[at].into(),
+        Samples::Sixteen(samples) => samples[at].into(),
+    }
+}
