@@ -94,6 +94,25 @@ fn delay_response_noise_and_plane_are_those_of_the_scenario() {
 }
 
 #[test]
+fn a_camera_that_clips_or_bends_below_full_scale_is_known_by_that() {
+    for (optics, from) in [
+        ("clips_at = 0.9215686", Some(235..=235)),
+        ("knee_at = 0.8\ngain = 0.8", Some(192..=206)),
+        ("gamma = 1.0", None),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let scenario = format!("{HEAD}[optics]\n{optics}\n");
+        let report = calibrated(folder.path(), &scenario, &[]);
+        let found = report["calibration"]["noise"]["clips_from"].as_u64();
+        println!("{optics}: {found:?}");
+        match (found, from) {
+            (Some(found), Some(from)) => assert!(from.contains(&found), "{optics}: {found}"),
+            (found, from) => assert!(found.is_none() && from.is_none(), "{optics}: {found:?}"),
+        }
+    }
+}
+
+#[test]
 #[ignore = "takes a minute: `.ci/run full`"]
 fn delay_response_noise_and_plane_are_those_of_every_scenario() {
     are_measured(&HEADS);

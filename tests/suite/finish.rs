@@ -2,7 +2,11 @@
 //! and measured where they lie elsewhere. A camera that clips below full scale.
 
 use crate::every_part::{Line, stock};
-use crate::placement::{bed, one_click};
+use crate::placement::{bed, one_click, taught_within};
+use algo::pattern::{PhaseFunction, Shot};
+use algo::phase::Trust;
+use algo::units::AbsolutePhase;
+use appliance::head::calibrated::{CalibratedHead, MeasuredPart, straight_fringes};
 use sim::scenario::RigDevice;
 use sim::{Material, Part, Placement, Print, Scenario};
 use std::time::Duration;
@@ -48,13 +52,7 @@ impl Seen {
         line.bed.head.acquire(indices, TIMEOUT, &mut keep).unwrap();
         let heights = line.plan.layers(sequence, &frames).unwrap().height_mm;
         let truth = line.bed.stage.truth();
-        for (at, class) in truth
-            .class
-            .iter()
-            .enumerate()
-            .filter(|(_, class)| **class == 2)
-        {
-            let _ = class;
+        for at in (0..heights.len()).filter(|at| truth.class[*at] == 2) {
             self.lit += 1;
             let error = f64::from(heights[at] - truth.height[at]);
             if error.is_finite() {
@@ -160,4 +158,78 @@ fn a_black_part_with_a_print_is_taught_and_its_edges_are_refused() {
     // A matte part has no edges of light on its faces.
     let matte = one_click(&mut bed(&scenario("cone", Material::Matte))).unwrap();
     assert!(!matte.manifest.light_edges && matte.recipe.arrays.amplitude.is_empty());
+}
+
+/// The part, measured with a pattern, with and without light by way of another face.
+fn with_and_without(
+    scenario: &Scenario,
+    (function, shots, map): (&PhaseFunction, &[Shot], Option<&[AbsolutePhase]>),
+) -> [MeasuredPart; 2] {
+    [0, 1].map(|bounces| {
+        let mut bed = bed(&Scenario {
+            bounces,
+            ..scenario.clone()
+        });
+        let mut head = CalibratedHead::new(&mut bed.head, &bed.calibration, TIMEOUT);
+        head.measure(function, shots, map, &|_| ()).unwrap()
+    })
+}
+
+/// What a bounce does to heights: printed, and asserted of the patterns of production.
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn a_bounce_is_averaged_out_by_dense_levels_and_not_by_geometric_ones() {
+    for (kind, diffuse) in [
+        ("sheet_metal", 0.35),
+        ("sheet_metal", 0.86),
+        ("handset", 0.35),
+        ("handset", 0.86),
+    ] {
+        let mut scenario = Scenario {
+            part: part(kind),
+            sub_rays: 2,
+            ..Scenario::default()
+        };
+        scenario.light.diffuse = diffuse;
+        let taught = taught_within(&mut bed(&scenario), 1.0).unwrap();
+        let raster = &scenario.rig.projector;
+        let straight = straight_fringes((raster.width as usize, raster.height as usize)).unwrap();
+        let full = &taught.manifest.sequences.last().unwrap().frames;
+        let (function, golden) = (&taught.recipe.function, &taught.recipe.arrays.golden_phase);
+        let golden: Vec<AbsolutePhase> = golden
+            .iter()
+            .map(|turns| AbsolutePhase::from_turns(*turns))
+            .collect();
+        for (name, pattern) in [
+            ("geometric", (&straight.0, &straight.1[..], None)),
+            ("dense", (function, &full[..], Some(&golden[..]))),
+        ] {
+            let [direct, both] = with_and_without(&scenario, pattern);
+            let (mut lit, mut far, mut most, mut squares) = (0, 0, 0.0_f64, 0.0);
+            let (dark, bright) = (&direct.frames[0].counts(), &both.frames[0].counts());
+            let mut map = Vec::new();
+            for at in 0..direct.phases.trust.len() {
+                let resolved =
+                    [&direct, &both].map(|part| part.phases.trust[at]) == [Trust::Resolved; 2];
+                let mm = both.heights.height[at].mm() - direct.heights.height[at].mm();
+                map.push(if resolved { mm } else { f64::NAN });
+                if !resolved || bright[at] - dark[at] < 2.0 {
+                    continue;
+                }
+                lit += 1;
+                squares += mm * mm;
+                most = most.max(mm.abs());
+                far += usize::from(mm.abs() > 5.0 * f64::from(both.heights.sigma[at]));
+            }
+            if std::env::var("MAPS").is_ok() {
+                let text: String = map.iter().map(|mm| format!("{mm} ")).collect();
+                std::fs::write(format!("/tmp/bounce-{kind}-{diffuse}-{name}.txt"), text).unwrap();
+            }
+            let rms = 1e3 * (squares / f64::from(lit.max(1))).sqrt();
+            println!(
+                "{kind}, diffuse {diffuse}, {name}: {lit} pixels with a bounce of 2 counts, RMS {rms:.1} um, most {:.0} um, {far} beyond 5 sigma",
+                1e3 * most
+            );
+        }
+    }
 }

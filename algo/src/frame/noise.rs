@@ -153,8 +153,8 @@ impl PhotonTransfer {
 }
 
 /// Read noise (variance) and shot noise (per count), by least squares with weights 1/(2σ⁴/n), the
-/// variance of a variance from n pairs. Without significant shot noise, or where the read noise's
-/// variance would be negative: the mean variance and 0.
+/// variance of a variance from n pairs. Where the read noise's variance would be negative it is 0; without
+/// significant shot noise: the mean variance and 0.
 fn fit(points: &[NoisePoint]) -> Option<(f64, f64)> {
     let (mut w, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for point in points {
@@ -173,10 +173,10 @@ fn fit(points: &[NoisePoint]) -> Option<(f64, f64)> {
     let shot = (xy - x * y / w) / spread;
     let read = mean - shot * x / w;
     let significant = shot * sqrt(spread) > SIGNIFICANT;
-    Some(if significant && read > 0.0 {
-        (read, shot)
-    } else {
-        (mean, 0.0)
+    Some(match (significant, read > 0.0) {
+        (true, true) => (read, shot),
+        (true, false) => (0.0, xy / xx),
+        (false, _) => (mean, 0.0),
     })
 }
 

@@ -295,7 +295,7 @@ pub struct SimulatedPart {
     /// hole_radius:INDEX,RADIUS; more than once for more.
     #[arg(long, value_name = "KIND:NUMBERS")]
     defect: Vec<String>,
-    /// What the simulated part is made of: matte, rolled_steel or oiled. If it is left out, the
+    /// What the simulated part is made of: matte, rolled_steel, oiled or black_plastic. If it is left out, the
     /// scenario's light says how a part reflects.
     #[arg(long, value_name = "NAME", value_parser = material())]
     material: Option<Material>,

@@ -218,8 +218,8 @@ fn mark_clipped(pictures: &mut [Vec<u16>], shown: &[Shown], format: FrameFormat)
         }
     }
     Some(format!(
-        "fringes are clipped at {largest} of {full_scale} counts in {:.1} % of the pixels, which are not resolved: expose for a \
-         shorter time",
+        "fringes are clipped at {largest} of {full_scale} counts in {:.1} % of the pixels, of which these samples are left out: \
+         expose for a shorter time",
         100.0 * pixels as f64 / reached.len().max(1) as f64
     ))
 }

@@ -1,10 +1,10 @@
 //! From which sample on a camera is not linear: where it clips, or where it begins to compress bright light.
 //!
 //! **Idea.** Four exposures at a time show four times the light of one. Where they show less, the camera clips or
-//! bends. A ramp of all greys shows both over all samples, whatever is in front of the head, and neither
+//! bends. Ramps of all greys show both over all samples, whatever is in front of the head, and neither
 //! the projector's response nor other light matters: both are in both pictures.
 //!
-//! **Equation.** With the samples s₁ and s₄ of the ramp and d₁ and d₄ of black, by one exposure and by four,
+//! **Equation.** With the samples s₁ and s₄ of the ramps and d₁ and d₄ of black, by one exposure and by four,
 //!
 //! ```text
 //! q = (s₄ − d₄) / (s₁ − d₁)          the mean of q over the pixels of a bin of s₄, over that of all dark bins
@@ -18,14 +18,16 @@ use hal::error::Error;
 use hal::head::Head;
 use hal::projector::Raster;
 
+/// Columns of a ramp of all greys; others follow: a camera may see a small part of the projector.
+const RAMP: u32 = 64;
 /// Exposures of the brighter pictures: as many as any recipe has.
 const LONG: u32 = 4;
 /// Samples are told apart in so many bins over full scale.
-const BINS: usize = 128;
+const BINS: usize = 64;
 /// Bins of the dark half, in which every camera is linear.
 const DARK: usize = BINS / 2;
 /// Pixels of a bin whose mean tells something.
-const FEWEST: usize = 50;
+const FEWEST: usize = 16;
 /// A pixel tells something if one exposure shows this share of full scale.
 const LEAST: f64 = 1.0 / 64.0;
 /// A mean of q below this is bent.
@@ -50,7 +52,7 @@ pub enum Clips {
 /// The error of a device.
 pub fn clipping(head: &mut Head) -> Result<Clips, Error> {
     let (columns, rows) = head.projector_size();
-    let grey = |at: u32| (at % columns * 255 / columns.saturating_sub(1).max(1)) as u8;
+    let grey = |at: u32| (at % columns % RAMP * 255 / (RAMP - 1)) as u8;
     let ramp = Raster::new(columns, rows, (0..columns * rows).map(grey).collect())?;
     let patterns = vec![Raster::uniform(columns, rows, 0)?, ramp];
     let mut taken = Vec::with_capacity(4);
@@ -108,9 +110,10 @@ fn found(pairs: impl Iterator<Item = (f64, f64, f64)>, full_scale: u16) -> Clips
     let last = bin_of(largest);
     let beside = last.checked_sub(1).map_or(0, |bin| bins[bin].0);
     let is_plateau = often as f64 * width > PLATEAU * beside as f64;
-    let bent = (DARK..BINS)
-        .filter(is_known)
-        .find(|bin| all(&bins[*bin..=*bin]) < BENT * linear);
+    // Noise and the few greys of a ramp bend a bin, but not all from there on.
+    let is_straight = |bin: &usize| all(&bins[*bin..=*bin]) >= BENT * linear;
+    let straight = (DARK..BINS).filter(is_known).rfind(is_straight);
+    let bent = (straight.unwrap_or(DARK) + 1..BINS).find(is_known);
     match bent {
         Some(bin) if bin < last || !is_plateau => {
             // It begins to bend in the bin before.

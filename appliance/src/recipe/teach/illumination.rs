@@ -15,6 +15,7 @@ use crate::recipe::file::MAX_EXPOSURES;
 use algo::adaptive::ProjectorMap;
 use algo::adaptive::amplitude::{Received, Wanted, amplitude, reach};
 use algo::phase::Trust;
+use algo::pipeline::PhaseMap;
 use hal::error::Error;
 use hal::frame::{Frame, Samples};
 
@@ -86,6 +87,18 @@ fn wanted_exposures(first: &MeasuredPart, naming: &Naming) -> u32 {
     match share < DARK {
         true => ((ENOUGH / share).ceil() as u32).clamp(2, MAX_EXPOSURES),
         false => 1,
+    }
+}
+
+/// How much of a part stays at full scale, as the end of a sentence.
+pub(super) fn unseen(phases: &PhaseMap) -> String {
+    let [seen, unseen] = [Trust::Resolved, Trust::Saturated].map(|trust| phases.count(trust));
+    match unseen {
+        0 => String::new(),
+        _ => format!(
+            "; {:.2} % of it stays at full scale and is not measured",
+            100.0 * unseen as f64 / (seen + unseen) as f64
+        ),
     }
 }
 

@@ -177,6 +177,7 @@ pub fn teach_showing(
         comparison: Some(comparison),
     };
     let words = part.illumination.words();
+    let words = words.map(|words| words + &illumination::unseen(&part.phases));
     computing::trim_memory();
     let making = stage(0.55, 0.9, "working out what good parts may read")?;
     let made = computing.on(|| part.recipe(naming, making));
