@@ -2,11 +2,14 @@
 //! and measured where they lie elsewhere. A camera that clips below full scale.
 
 use crate::every_part::{Line, stock};
+use crate::limits::cycle;
 use crate::placement::{bed, one_click, taught_within};
 use algo::pattern::{PhaseFunction, Shot};
 use algo::phase::Trust;
 use algo::units::AbsolutePhase;
 use appliance::head::calibrated::{CalibratedHead, MeasuredPart, straight_fringes};
+use appliance::station::Verdict;
+use sim::parts::Defect;
 use sim::scenario::RigDevice;
 use sim::{Material, Part, Placement, Print, Scenario};
 use std::time::Duration;
@@ -158,6 +161,53 @@ fn a_black_part_with_a_print_is_taught_and_its_edges_are_refused() {
     // A matte part has no edges of light on its faces.
     let matte = one_click(&mut bed(&scenario("cone", Material::Matte))).unwrap();
     assert!(!matte.manifest.light_edges && matte.recipe.arrays.amplitude.is_empty());
+}
+
+/// Good sheets of a material and dented ones, wherever they lie: no verdict is wrong.
+#[test]
+#[ignore = "takes minutes: `.ci/run full`"]
+fn sheets_that_mirror_pass_and_their_dents_fail_also_in_the_highlight() {
+    const GOOD: usize = 500;
+    const DENTS: usize = 50;
+    for material in [Material::RolledSteel, Material::Oiled] {
+        let mut line = Line::new(&scenario("sheet_metal", material));
+        let mut random = Random::new(29);
+        let judged = |line: &mut Line, part: &Part, random: &mut Random| {
+            let placement = line.placement(random);
+            line.bed.stage.place(part, &placement).unwrap();
+            cycle(&mut line.bed, &line.plan).verdict()
+        };
+        let good = part("sheet_metal");
+        let verdicts: Vec<Verdict> = (0..GOOD)
+            .map(|_| judged(&mut line, &good, &mut random))
+            .collect();
+        let mut dented = Vec::new();
+        for at in 0..DENTS {
+            // Left of the holes, or where the face mirrors, between a hole and the crease.
+            let [x, y] = [random.share(), random.share()];
+            let (x, y) = match at % 2 {
+                0 => (-55.0 + 45.0 * x, -12.0 + 24.0 * y),
+                _ => (36.0 + 3.0 * x, -14.0 + 36.0 * y),
+            };
+            let dent = Defect::Dent {
+                x,
+                y,
+                depth_mm: 0.3,
+                diameter_mm: 8.0,
+            };
+            let mut dent_of = good.clone();
+            dent_of.defects_mut().unwrap().push(dent);
+            dented.push(judged(&mut line, &dent_of, &mut random));
+        }
+        let count = |all: &[Verdict], verdict| all.iter().filter(|of| **of == verdict).count();
+        let [pass, fail] = [Verdict::Pass, Verdict::Fail].map(|of| count(&verdicts, of));
+        let [missed, found] = [Verdict::Pass, Verdict::Fail].map(|of| count(&dented, of));
+        println!(
+            "{material:?}: {pass} of {GOOD} good ones PASS, {fail} FAIL; {found} of {DENTS} dents FAIL, {missed} PASS"
+        );
+        assert!(fail == 0 && 100 * pass >= 99 * GOOD);
+        assert!(missed == 0 && 10 * found >= 9 * DENTS);
+    }
 }
 
 /// The part, measured with a pattern, with and without light by way of another face.
