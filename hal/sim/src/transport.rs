@@ -9,7 +9,7 @@
 //! over the sub-rays, without fall-off with distance: n is the normal, l the direction to the
 //! projector, v that to the camera, and r = 2 (n·l) n − l. A surface that faces away from the
 //! projector has no highlight. With `bounces` there is also the light that came by way of one other surface
-//! ([`super::bounce`]), from the projector pixel nearest to where that is lit. Ambient light reaches shadowed points, too; a sub-ray that meets
+//! (`bounce.rs`), from the projector pixel nearest to where that is lit. Ambient light reaches shadowed points, too; a sub-ray that meets
 //! nothing has I = 0. Beyond the raster the projector is dark.
 //!
 //! The result does not depend on the number of threads: every pixel is computed by itself.
