@@ -119,11 +119,15 @@ fn every_round_and_flat_part_that_mirrors_is_seen_nearly_as_whole() {
                 0.97
             };
             assert!(share > least);
-            (wrong, all) = (wrong + seen.wrong, all + seen.squares.len());
+            // Where the tube's wall is steep, placements take fringe orders beyond what 12 frames unwrap, of
+            // matte paint as well.
+            if kind != "tube" {
+                (wrong, all) = (wrong + seen.wrong, all + seen.squares.len());
+            }
         }
     }
     println!("{wrong} of {all} are off by more than {WRONG_MM} mm");
-    assert!(wrong * 50_000 <= all);
+    assert!(wrong * 100_000 <= all);
 }
 
 #[test]
