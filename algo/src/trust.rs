@@ -67,7 +67,7 @@ pub enum Trust {
     Dark = 1,
     /// A finer level's modulation is below the least that is trusted: its fringes are not resolved.
     LowModulation = 2,
-    /// A sample is at full scale in a level of fewer than 8 shifts.
+    /// Samples are at full scale, and the others give no phase that is trusted.
     Saturated = 3,
     /// The residual of an unwrapping step is above 0.40 turn: the fringe order would be a guess.
     Residual = 4,

@@ -1,5 +1,5 @@
 //! Parts that mirror, are black or printed on, against the same part of matte paint: taught with one click,
-//! and measured where they lie elsewhere. A camera that clips below full scale.
+//! and measured where they lie elsewhere. What light by way of another face does to heights.
 
 use crate::every_part::{Line, stock};
 use crate::limits::cycle;
@@ -261,12 +261,10 @@ fn a_bounce_is_averaged_out_by_dense_levels_and_not_by_geometric_ones() {
             let [direct, both] = with_and_without(&scenario, pattern);
             let (mut lit, mut far, mut most, mut squares) = (0, 0, 0.0_f64, 0.0);
             let (dark, bright) = (&direct.frames[0].counts(), &both.frames[0].counts());
-            let mut map = Vec::new();
             for at in 0..direct.phases.trust.len() {
                 let resolved =
                     [&direct, &both].map(|part| part.phases.trust[at]) == [Trust::Resolved; 2];
                 let mm = both.heights.height[at].mm() - direct.heights.height[at].mm();
-                map.push(if resolved { mm } else { f64::NAN });
                 if !resolved || bright[at] - dark[at] < 2.0 {
                     continue;
                 }
@@ -274,10 +272,6 @@ fn a_bounce_is_averaged_out_by_dense_levels_and_not_by_geometric_ones() {
                 squares += mm * mm;
                 most = most.max(mm.abs());
                 far += usize::from(mm.abs() > 5.0 * f64::from(both.heights.sigma[at]));
-            }
-            if std::env::var("MAPS").is_ok() {
-                let text: String = map.iter().map(|mm| format!("{mm} ")).collect();
-                std::fs::write(format!("/tmp/bounce-{kind}-{diffuse}-{name}.txt"), text).unwrap();
             }
             let rms = 1e3 * (squares / f64::from(lit.max(1))).sqrt();
             println!(

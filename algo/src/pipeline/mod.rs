@@ -20,7 +20,7 @@ pub use measure::{
     HeightMap, PhaseMap, Window, arrive, arrive_rest, decode, refuse_light_edges, triangulate,
     triangulate_with, wrapped,
 };
-pub use noise::{off_sine, sample_noise};
+pub use noise::{sample_noise, sine_residuals};
 pub use plate::{Plate, PlateError};
 pub use signal::{CLIPPED, mean_signal, signal, signal_by_modulation};
 

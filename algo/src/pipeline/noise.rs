@@ -35,20 +35,7 @@ pub fn sample_noise(
     full_scale: u16,
     trust: &[Trust],
 ) -> Option<f64> {
-    let left = residuals(sequence, frames, full_scale, trust)?;
-    (left.freedom > 0.0).then(|| libm::sqrt(left.noise / left.freedom))
-}
-
-/// By how much the samples of levels with 4 or more shifts are off the sine that fits them best,
-/// RMS in counts: noise and harmonics. `None` as for [`sample_noise`].
-pub fn off_sine(
-    sequence: &Sequence,
-    frames: &[FrameView<'_>],
-    full_scale: u16,
-    trust: &[Trust],
-) -> Option<f64> {
-    let left = residuals(sequence, frames, full_scale, trust)?;
-    (left.samples > 0.0).then(|| libm::sqrt(left.all / left.samples))
+    sine_residuals(sequence, frames, full_scale, trust)?.noise()
 }
 
 /// Pixels of a row over which the harmonics of a response are the same shares of the modulation.
@@ -60,14 +47,26 @@ const ALIKE: f64 = 1e-6;
 const CLEARLY: f64 = 0.1;
 
 /// Sums of squares of what a sine leaves of the samples, counts².
-#[derive(Clone, Copy, Default)]
-struct SineResiduals {
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SineResiduals {
     /// Without harmonics, and the degrees of freedom in it.
     noise: f64,
     freedom: f64,
     /// With them, and the number of samples.
     all: f64,
     samples: f64,
+}
+
+impl SineResiduals {
+    /// σ_I as [`sample_noise`].
+    fn noise(&self) -> Option<f64> {
+        (self.freedom > 0.0).then(|| libm::sqrt(self.noise / self.freedom))
+    }
+
+    /// RMS of noise and harmonics together, counts.
+    pub fn off_sine(&self) -> Option<f64> {
+        (self.samples > 0.0).then(|| libm::sqrt(self.all / self.samples))
+    }
 }
 
 impl core::ops::Add for SineResiduals {
@@ -83,7 +82,8 @@ impl core::ops::Add for SineResiduals {
     }
 }
 
-fn residuals(
+/// What the sines that fit levels with 4 or more shifts best leave of their samples; `None` without frames.
+pub fn sine_residuals(
     sequence: &Sequence,
     frames: &[FrameView<'_>],
     full_scale: u16,
@@ -362,7 +362,8 @@ pub(super) mod tests {
                     "{shifts} shifts, {ratio}: {found} for {expected}"
                 );
                 // The harmonic's amplitude is 22.5 counts; noise adds its share of the places.
-                let off = off_sine(&sequence, &views, u16::MAX, &trust).unwrap();
+                let left = sine_residuals(&sequence, &views, u16::MAX, &trust).unwrap();
+                let off = left.off_sine().unwrap();
                 let share = (shifts as f64 - 3.0) / shifts as f64;
                 // Of an amplitude a the mean square is a²/2; the only place of 4 shifts has a².
                 let harmonic = 22.5 * 22.5 / 2.0;

@@ -13,8 +13,8 @@
 //! ```
 //!
 //! over the directions above the surface (J. T. Kajiya, *The rendering equation*, SIGGRAPH 1986, with
-//! one reflection between). Directions are those of a Hammersley set, spread as n·ω for the first term
-//! and as (m·ω)^shininess for the second one, where the integral is a mean.
+//! one reflection between). Directions are those of a Fibonacci lattice, spread as n·ω for the first
+//! term and as (m·ω)^shininess for the second one, where the integral is a mean.
 
 use super::material::Lighting;
 use super::optics::{Vector, along, dot, minus, normalised, turned};
@@ -27,6 +27,7 @@ const DIFFUSE: u32 = 768;
 /// Directions of the mirrored one.
 const MIRRORED: u32 = 128;
 
+/// 2 / (1 + √5): turns from each direction to the next.
 const GOLDEN_SECTION: f64 = 0.618_033_988_749_894_9;
 /// Rays from a surface to others start at this distance from it, mm.
 const LIFT_MM: f64 = 0.02;

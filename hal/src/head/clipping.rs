@@ -22,8 +22,15 @@ impl Clipping {
         })
     }
 
-    /// The same frame with full scale from there on.
-    pub fn mark(&mut self, frame: &Frame) -> Result<Frame, Error> {
+    /// The frame as it is, or of a camera that clips with full scale from there on.
+    pub fn marked(of: &mut Option<Self>, frame: Frame) -> Result<Frame, Error> {
+        match of {
+            Some(clipping) => clipping.mark(&frame),
+            None => Ok(frame),
+        }
+    }
+
+    fn mark(&mut self, frame: &Frame) -> Result<Frame, Error> {
         let (from, full_scale) = (self.from, frame.format().full_scale());
         let marked = |sample: u16| if sample < from { sample } else { full_scale };
         let (time, count) = (frame.timestamp(), frame.count());

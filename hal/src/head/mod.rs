@@ -284,10 +284,7 @@ fn carry_out(
                 continue;
             }
             let (start, count) = (start_of(&frame), frame.count());
-            let frame = match clipping {
-                Some(clipping) => clipping.mark(&frame)?,
-                None => frame,
-            };
+            let frame = Clipping::marked(clipping, frame)?;
             sequencer.frame(frame.restamped(start, count));
         }
         // After the frames and before any decision: the pulse of a frame that has arrived has ended

@@ -6,6 +6,7 @@
 
 use std::time::Duration;
 
+use super::clipping::Clipping;
 use super::{Head, wait};
 use crate::camera::Starts;
 use crate::error::Error;
@@ -150,10 +151,7 @@ impl Head {
                     if !devices.streaming.is_new(&frame) {
                         continue;
                     }
-                    let frame = match &mut devices.clipping {
-                        Some(clipping) => clipping.mark(&frame)?,
-                        None => frame,
-                    };
+                    let frame = Clipping::marked(&mut devices.clipping, frame)?;
                     seen.frames.push(WatchedFrame {
                         start: timing.exposure_start(&camera, frame.timestamp()),
                         arrived: devices.clock.now(),

@@ -177,7 +177,8 @@ fn light(channel: &Channel<'_>, levels: &[PhaseMap], note: &mut impl FnMut(Strin
             100.0 * saturated / lit
         ));
     }
-    let off = pipeline::off_sine(&scan.sequence, &scan.frames, full_scale, &finest.trust);
+    let left = pipeline::sine_residuals(&scan.sequence, &scan.frames, full_scale, &finest.trust);
+    let off = left.and_then(|left| left.off_sine());
     let counts = finest.modulation.iter();
     let sum: f64 = counts.map(|modulation| modulation.counts(full_scale)).sum();
     let mean = sum / resolved.max(1) as f64;

@@ -117,6 +117,7 @@ pub(super) fn measure(
     measured.adopt(&mut calibration)?;
     let head = &mut *subject.head;
     head.set_timing(measured.timing.over(head.timing()));
+    head.set_clipping(measured.noise.clips_from);
     let (progress, choices) = (subject.progress, &subject.choices);
     let mut maps = Vec::new();
     let reference = if choices.no_plate {

@@ -228,7 +228,6 @@ impl Characteristics {
     /// What was found, each with its name.
     pub fn words(&self) -> Vec<(&'static str, String)> {
         let (timing, noise) = (&self.timing, &self.noise);
-        let noise_file = noise;
         let marks = match timing.stamp {
             Stamp::ExposureStart => "start of the exposure",
             Stamp::ExposureEnd => "end of the exposure",
@@ -254,7 +253,7 @@ impl Characteristics {
             "{:.2} counts at half of white; {:.2} in the dark, and {:.4} counts² per count of light",
             noise.counts, noise.read_counts, noise.shot
         );
-        found.extend(noise_file.clips_from.map(|from| {
+        found.extend(self.noise.clips_from.map(|from| {
             let words = format!(
                 "the camera clips or bends at {from} counts: samples from there on are left out"
             );

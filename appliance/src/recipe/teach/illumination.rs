@@ -5,10 +5,10 @@
 //! mirrors it, which costs no time; longer exposures, where all of the part is dark, also with less light
 //! where they would be at full scale.
 
-use super::TeachError;
 use super::adaptive::Preliminary;
 use super::golden::Naming;
 use super::part;
+use super::{LEAST_RESOLVED, TeachError};
 use crate::head::calibrated::{CalibratedHead, MeasuredPart, STRAIGHT_SHIFTS};
 use crate::head::rasters::Illumination;
 use crate::recipe::file::MAX_EXPOSURES;
@@ -17,7 +17,6 @@ use algo::adaptive::amplitude::{Received, Wanted, amplitude, reach};
 use algo::phase::Trust;
 use algo::pipeline::PhaseMap;
 use hal::error::Error;
-use hal::frame::{Frame, Samples};
 
 /// Samples may reach this share of full scale, less their noise: a part that lies differently
 /// reflects a little more.
@@ -32,8 +31,6 @@ const DIM: u8 = 64;
 const DARK: f64 = 1.0 / 16.0;
 /// What longer exposures of a dark part are to reach.
 const ENOUGH: f64 = 1.0 / 8.0;
-/// Fewer resolved pixels, as a share of the picture, tell nothing of a part.
-const LEAST_RESOLVED: f64 = super::LEAST_RESOLVED;
 
 /// Whether so many pixels are at full scale, in each level, that they are worth a second look: noise alone
 /// takes a sample there, but not in all.
@@ -45,25 +42,24 @@ pub(super) fn shines(first: &MeasuredPart) -> bool {
     count as f64 > FEW * clipped.len() as f64
 }
 
-/// How many times as long as the head is set to frames of the part are to be exposed: as told, else once
-/// unless the part is dark and the head can.
-pub(super) fn exposures(
-    first: &MeasuredPart,
+/// `wanted` exposures, or one where the head cannot expose for longer and nobody has told so many.
+pub(super) fn possible(
+    wanted: u32,
     naming: &Naming,
     head: &mut CalibratedHead<'_>,
 ) -> Result<u32, TeachError> {
-    if let Some(told) = naming.exposures {
-        return Ok(told);
-    }
-    let wanted = wanted_exposures(first, naming);
     match head.head.expose(wanted) {
-        Ok(()) => Ok(wanted),
-        Err(Error::Unsupported { .. }) => Ok(1),
-        Err(error) => Err(error.into()),
+        Err(Error::Unsupported { .. }) if naming.exposures.is_none() => Ok(1),
+        exposed => Ok(exposed.map(|()| wanted)?),
     }
 }
 
-fn wanted_exposures(first: &MeasuredPart, naming: &Naming) -> u32 {
+/// How many times as long as the head is set to frames of the part are to be exposed: as told, else once
+/// unless the part is dark.
+pub(super) fn wanted(first: &MeasuredPart, naming: &Naming) -> u32 {
+    if let Some(told) = naming.exposures {
+        return told;
+    }
     let (phases, decoder) = (&first.phases, &first.decoder);
     let full_scale = decoder.full_scale();
     let found = part::of(&first.heights, &first.triangulator, naming.told());
@@ -124,20 +120,20 @@ impl Preliminary {
         (exposures, naming): (u32, &Naming),
         noise_counts: f64,
     ) -> Illumination {
-        let format = part.frames[0].format();
-        let full_scale = f64::from(format.full_scale());
-        let (width, rows) = (format.width as usize, format.height as usize);
-        let received = (0..width * rows).map(|pixel| {
-            let at = pixel / width * format.stride + pixel % width;
-            // The coarsest level, which blur weakens least.
-            let of = |part: &MeasuredPart, share: f64| {
-                let shifts: [f64; STRAIGHT_SHIFTS] =
-                    std::array::from_fn(|shift| sample(&part.frames[shift], at) / full_scale);
-                Received::of(shifts, share)
-            };
-            let whole = of(part, 1.0);
-            let dimmed = dimmed.filter(|_| whole.white.is_infinite());
-            dimmed.map_or(whole, |dimmed| of(dimmed, f64::from(DIM) / 255.0))
+        let full_scale = f64::from(part.decoder.full_scale());
+        // The coarsest level, which blur weakens least.
+        let samples = |part: &MeasuredPart| -> [Vec<f32>; STRAIGHT_SHIFTS] {
+            std::array::from_fn(|shift| part.frames[shift].counts())
+        };
+        let (whole, quarter) = (samples(part), dimmed.map(samples));
+        let of = |shifts: &[Vec<f32>; STRAIGHT_SHIFTS], at: usize, share: f64| {
+            let samples = std::array::from_fn(|shift| f64::from(shifts[shift][at]) / full_scale);
+            Received::of(samples, share)
+        };
+        let received = (0..whole[0].len()).map(|at| {
+            let light = of(&whole, at, 1.0);
+            let quarter = quarter.as_ref().filter(|_| light.white.is_infinite());
+            quarter.map_or(light, |quarter| of(quarter, at, f64::from(DIM) / 255.0))
         });
         let mut heights = part.heights.clone();
         for (height, dimmed) in heights
@@ -160,12 +156,5 @@ impl Preliminary {
             exposures,
             amplitude: amplitude(&map, &wanted, columns, rows, reach),
         }
-    }
-}
-
-fn sample(frame: &Frame, at: usize) -> f64 {
-    match frame.samples() {
-        Samples::Eight(samples) => samples[at].into(),
-        Samples::Sixteen(samples) => samples[at].into(),
     }
 }

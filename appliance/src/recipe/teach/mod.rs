@@ -101,8 +101,11 @@ pub fn teach_showing(
     // Checked before the next stage: a sequence is not interrupted.
     let measured = |share| measuring.done(share);
     let mut first = head.measure(function, shots, None, &measured)?;
-    let exposures = computing.on(|| illumination::exposures(&first, naming, &mut head))?;
-    let shines = illumination::shines(&first);
+    let (wanted, shines) = computing.on(|| {
+        let wanted = illumination::wanted(&first, naming);
+        (wanted, illumination::shines(&first))
+    });
+    let exposures = illumination::possible(wanted, naming, &mut head)?;
     let mut illumination = Illumination::default();
     if exposures > 1 || shines {
         let again = stage(0.15, 0.2, "measuring the part in the light that suits it")?;

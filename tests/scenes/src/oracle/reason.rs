@@ -11,7 +11,7 @@ pub enum Reason {
     Dark,
     /// The modulation of another level is below the least that is trusted.
     LowModulation,
-    /// A sample is at full scale in a level of fewer than 8 shifts.
+    /// Samples are at full scale, and the others give no phase that is trusted.
     Saturated,
     /// A residual of the unwrapping is above 0.40 turn.
     Residual,
