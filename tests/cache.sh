@@ -8,6 +8,8 @@
 # begin at pages of 16 KiB, as a camera's buffers do, so that equal pixels of all frames compete for the same sets of these caches.
 # Of the counts, 0.19 is each byte of the frames read once, and 0.16 the 5 bytes per pixel that a level hands to the next one and that are
 # read twice. The rest is competition: a Cortex-A72 keeps two lines of a set, a level has four frames.
+# The results lie on the heap: an allocator that maps large ones by itself lets them begin at pages, too, of one height and not of the
+# other, depending on what was freed before, and they then compete with the frames by chance.
 # As in aarch64/cost.sh, the program decodes frames of two heights, and in the difference everything cancels that does not grow with the
 # height. Ends with 69 (EX_UNAVAILABLE) and the reason if Valgrind is not available, or the processor is another.
 set -euo pipefail
@@ -35,7 +37,7 @@ trap 'rm -f "$log"' EXIT
 # misses BACK-END CACHE ROWS: prints the read misses and the number of pixels.
 misses() {
     local pixels
-    pixels=$(env -i "$valgrind" --tool=cachegrind --cache-sim=yes --D1="$2" --cachegrind-out-file=/dev/null --log-file="$log" \
+    pixels=$(env -i MALLOC_MMAP_THRESHOLD_=16777216 "$valgrind" --tool=cachegrind --cache-sim=yes --D1="$2" --cachegrind-out-file=/dev/null --log-file="$log" \
         ./probe decode "$case@$1" "$3" </dev/null)
     # "==1== D1  misses: ALL ( READ rd + WRITE wr)"
     sed -nE "s/.*D1 +misses:.*\( *([0-9,]+) rd.*/\1 $pixels/p" "$log" | tr -d ,
