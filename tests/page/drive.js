@@ -117,7 +117,7 @@ try {
       await page.waitForFunction(() => document.querySelector("#notice").textContent.includes("part is in place") && !document.querySelector("#part-put").disabled);
       await page.evaluate(() => { document.querySelector("#notice").textContent = ""; });
     };
-    assert.equal(await page.locator("#part-material option").count(), 4);
+    assert.equal(await page.locator("#part-material option").count(), 5);
     await page.selectOption("#part-material", "matte");
     await page.selectOption("#defect-kind", "dent");
     await page.click("#defect-add");
