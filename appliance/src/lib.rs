@@ -17,6 +17,7 @@ pub mod recipe;
 pub mod service;
 pub mod station;
 pub mod storage;
+pub mod study;
 pub mod system;
 pub mod web;
 

@@ -1,6 +1,6 @@
 // Drives the page in a real headless Chromium, as a technician would: node drive.js PROGRAM CHROMIUM [PICTURES]
 //
-// With a third argument it also takes screenshots for the documentation, into that folder.
+// With a third argument it also takes screenshots for the documentation, into that folder. With the word "full" a study has 90 trials.
 import { strict as assert } from "node:assert";
 import { chromium } from "playwright-core";
 import { Daemon, Place } from "./daemon.js";
@@ -9,10 +9,11 @@ import { forms } from "./forms.js";
 import { part } from "./part.js";
 import { pictures } from "./pictures.js";
 import { recipes } from "./recipes.js";
+import { studies } from "./studies.js";
 import { view } from "./view.js";
 import { wizard } from "./wizard.js";
 
-const [program, browserPath, folder] = process.argv.slice(2);
+const [program, browserPath, folder] = process.argv.slice(2).filter((word) => word !== "full");
 // Longest wait for anything that must happen.
 const PATIENCE = 30000;
 // Largest layout shift of the page by Chromium's measure; up to 0.1 is rated good.
@@ -426,6 +427,7 @@ try {
   assert.deepEqual(complaints, [], "the browser complains");
   await editor({ browser, program, step, folder });
   await part({ browser, program, step, folder });
+  await studies({ browser, program, step, folder, full: process.argv.includes("full") });
   await wizard({ browser, program, step, folder });
   if (folder) await step("pictures", () => pictures(browser, program, folder));
   console.log("the page does what it promises");

@@ -26,7 +26,7 @@ const ORDER: [&[&str]; 13] = [
     &["head"],
     &["output"],
     &["storage"],
-    &["system"],
+    &["system", "study"],
     &["error"],
     &["station"],
 ];
@@ -45,6 +45,7 @@ const SEEN: [(&str, &[&str]); 3] = [
             "output",
             "storage",
             "system",
+            "study",
             "error",
             "station",
         ],

@@ -25,6 +25,7 @@ mod record;
 mod registers;
 mod replay;
 mod serve;
+mod study;
 mod teach;
 
 pub use calibrate::model_files;
@@ -100,6 +101,9 @@ commands! {
     Teach(teach::Teach);
     /// Show or export stored results.
     History(history::HistoryOptions);
+    /// Release a station for production: capability of a gauge, Gage R&R, process.
+    #[command(subcommand)]
+    Study(study::StudyCommand);
     /// Judge a part that did not pass again and compare with the history.
     Replay(replay::Replay);
     /// List, export, import or delete recipes, undo that, or change the gauges of one.

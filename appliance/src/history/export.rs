@@ -241,13 +241,13 @@ fn put(line: &mut String, entry: &Entry, gauges: &[(String, String)]) {
     }
 }
 
-fn number(number: Option<f64>) -> String {
+pub(super) fn number(number: Option<f64>) -> String {
     number.map_or_else(String::new, |number| number.to_string())
 }
 
 /// A text, quoted where it must be; what a spreadsheet would take for a formula gets an apostrophe
 /// in front.
-fn quoted(text: &str) -> Cow<'_, str> {
+pub(super) fn quoted(text: &str) -> Cow<'_, str> {
     let formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
     let guard = if formula { "'" } else { "" };
     if formula || text.contains([',', '"', '\r', '\n']) {

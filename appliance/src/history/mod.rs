@@ -18,6 +18,8 @@
 //! lacks: kill -9 costs at most the result in flight, however busy the card was. A loss of power
 //! costs what was not synced yet: what came in the time that the card takes for one sync.
 
+mod course;
+pub mod design;
 pub mod entry;
 pub mod export;
 mod handle;
@@ -27,6 +29,7 @@ mod recordings;
 pub mod schema;
 pub mod seqs;
 mod spool;
+pub mod studies;
 mod task;
 pub mod writer;
 

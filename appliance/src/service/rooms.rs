@@ -7,6 +7,7 @@ use crate::config::Config;
 use crate::error::{Exit, Result};
 use crate::head::calibration::Current;
 use crate::head::placed::Placed;
+use crate::history::studies::Studies;
 use crate::history::{History, Reader, Task};
 use crate::production::backend::{self, Wires};
 use crate::production::commissioning::Commission;
@@ -100,6 +101,7 @@ impl Rooms<'_> {
             commission: self.commission.clone(),
             live: self.live.clone(),
             history: Reader::of(self.path),
+            studies: Studies::of(self.path),
             date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
             log: self.progress.logbook().clone(),
             registers: modbus::live,

@@ -15,6 +15,7 @@ pub mod server;
 pub mod slots;
 pub mod view;
 
+mod desk;
 mod downloads;
 mod gate;
 mod head;
@@ -25,6 +26,7 @@ mod recipes;
 mod request;
 mod results;
 mod site;
+mod studies;
 mod tries;
 
 #[cfg(test)]

@@ -6,7 +6,9 @@ use super::problem::Problem;
 use super::site::Site;
 use super::slots::{Slot, Slots};
 use super::view::{self, Following};
-use super::{assets, downloads, head, history, look, metrics, orders, recipes, results, tries};
+use super::{
+    assets, downloads, head, history, look, metrics, orders, recipes, results, studies, tries,
+};
 use crate::system::clock;
 use axum::extract::Request;
 use axum::handler::Handler;
@@ -163,6 +165,24 @@ pub fn routes() -> Vec<Route> {
             "/api/simulation/part",
             "place simulated part",
             head::put_part,
+        ),
+        look("/api/studies", studies::list),
+        look("/api/studies/{number}", studies::one),
+        look("/api/studies/{number}/report", studies::report),
+        look("/api/studies/{number}/values.csv", studies::values),
+        change(POST, "/api/studies", "begin study", studies::begin),
+        change(POST, "/api/studies/{number}/run", "run study", studies::run),
+        change(
+            POST,
+            "/api/studies/{number}/pause",
+            "pause study",
+            studies::pause,
+        ),
+        change(
+            DELETE,
+            "/api/studies/{number}",
+            "delete study",
+            studies::delete,
         ),
         look("/api/session", gate::session),
         route(POST, "/api/session", None, gate::begin_session),

@@ -13,11 +13,13 @@ use serde_json::Value;
 use tokio::sync::{Mutex, Semaphore, oneshot};
 use tokio::time::Instant;
 
+use super::desk::Desk;
 use super::problem::{Answered, Problem};
 use super::slots::Slots;
 use super::slots::Tries;
 use crate::head::calibration::Current;
 use crate::history::Reader;
+use crate::history::studies::Studies;
 use crate::production::commissioning::Commission;
 use crate::production::commissioning::live::Live;
 use crate::production::latest::LastCycleRequests;
@@ -75,6 +77,8 @@ pub struct Parts {
     pub live: Live,
     /// The stored results.
     pub history: Reader,
+    /// Guided studies.
+    pub studies: Studies,
     /// Stores the time of this start of the daemon, µs since 1970 UTC, by the clock of a signed-in
     /// user's browser; answers whether it is stored.
     pub date: Box<dyn Fn(u64) -> bool + Send + Sync>,
@@ -111,6 +115,8 @@ pub struct Site {
     pub(super) kept: Arc<Mutex<LastKept>>,
     /// The recipe whose edit was tried last; locked while an edit is tried.
     pub(super) opened: Arc<Mutex<LastOpened>>,
+    /// The guided study that runs.
+    pub(super) desk: Desk,
     /// The tries that are being answered.
     pub(super) tries: Tries,
     looking: Arc<Semaphore>,
@@ -145,6 +151,7 @@ impl Site {
             collected_at_s: Arc::default(),
             kept: Arc::default(),
             opened: Arc::default(),
+            desk: Desk::default(),
             tries: Tries::default(),
             looking: Arc::new(Semaphore::new(MAX_ASIDE)),
             changing: Arc::new(Semaphore::new(MAX_CHANGES)),

@@ -9,12 +9,13 @@ mod page;
 mod part;
 mod plant;
 mod recipe;
+mod study;
 
 /// A target; it panics if a promise is not kept.
 pub type Target = fn(&[u8]);
 
 /// All targets with their names, which are also the names of the folders of their inputs.
-pub const TARGETS: [(&str, Target); 13] = [
+pub const TARGETS: [(&str, Target); 14] = [
     ("npy", folder::npy),
     ("png_frame", folder::png_frame),
     ("recording", folder::recording),
@@ -28,6 +29,7 @@ pub const TARGETS: [(&str, Target); 13] = [
     ("config", head::config),
     ("modbus", plant::modbus),
     ("http", page::http),
+    ("study", study::csv),
 ];
 
 /// The target of this name, if there is one.

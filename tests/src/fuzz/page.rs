@@ -3,6 +3,7 @@
 use super::part::PART;
 use super::plant::{runtime, settings};
 use appliance::history::Reader;
+use appliance::history::studies::Studies;
 use appliance::production::commissioning::Commission;
 use appliance::production::commissioning::live::Live;
 use appliance::production::latest::LastCycleRequests;
@@ -71,6 +72,7 @@ impl Page {
             live: Live::new(orders, commission.clone()),
             commission,
             history: Reader::of(folder.path()),
+            studies: Studies::of(folder.path()),
             date: Box::new(|_| false),
             log: Default::default(),
             registers: |_| serde_json::json!({ "registers": [] }),

@@ -86,6 +86,7 @@ assets! {
         "kept.js"
         "scale.js"
         "history.js"
+        "studies.js"
         "simulation.js"
         "head.js"
         "live.js"

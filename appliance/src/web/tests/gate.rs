@@ -2,7 +2,7 @@
 
 use super::*;
 
-const CHANGES: [(&str, &str); 11] = [
+const CHANGES: [(&str, &str); 15] = [
     ("POST", "/api/trigger"),
     ("POST", "/api/reset"),
     ("POST", "/api/recipes"),
@@ -14,6 +14,10 @@ const CHANGES: [(&str, &str); 11] = [
     ("POST", "/api/head/steps/plane"),
     ("DELETE", "/api/head/steps/plane"),
     ("PUT", "/api/simulation/part"),
+    ("POST", "/api/studies"),
+    ("POST", "/api/studies/1/run"),
+    ("POST", "/api/studies/1/pause"),
+    ("DELETE", "/api/studies/1"),
 ];
 
 #[tokio::test]

@@ -19,6 +19,7 @@ use tokio::net::{TcpListener, TcpStream};
 
 use super::*;
 use crate::history::Reader;
+use crate::history::studies::Studies;
 use crate::production::commissioning::Commission;
 use crate::production::commissioning::live::Live;
 use crate::production::simulation::Simulation;
@@ -69,6 +70,7 @@ async fn served() -> Served {
         live: Live::new(orders, commission.clone()),
         commission,
         history: Reader::of(folder.path()),
+        studies: Studies::of(folder.path()),
         date: Box::new(move |utc_us| dates.send(utc_us).is_ok()),
         log: Default::default(),
         registers: |_| serde_json::json!({ "registers": [] }),
