@@ -87,7 +87,7 @@ export async function studies({ browser, program, step, folder, full }) {
       const values = join(place.folder, "values.csv");
       writeFileSync(values, await answer("api/studies/1/values.csv"));
       const printed = execFileSync(program, ["study", "grr", values, "--json"], { encoding: "utf8" });
-      assert.equal(JSON.stringify(JSON.parse(await answer("api/studies/1/report"))), JSON.stringify(JSON.parse(printed)));
+      assert.equal(JSON.stringify(JSON.parse(await answer("api/studies/1/report.json"))), JSON.stringify(JSON.parse(printed)));
       const verdicts = await page.locator("#study-report .tag").allTextContents();
       assert.deepEqual(verdicts, JSON.parse(printed).studies.map(({ judgement }) => judgement.verdict));
     });

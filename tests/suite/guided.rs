@@ -77,7 +77,7 @@ fn a_guided_study_outlives_a_restart_and_ends_in_the_report_of_its_values() {
         (&study["running"], &study["words"]),
         (&false.into(), &"part 2, appraiser B, trial 1".into())
     );
-    let (status, missing) = browser.ask("GET", "/api/studies/1/report", &[]);
+    let (status, missing) = browser.ask("GET", "/api/studies/1/report.json", &[]);
     assert_eq!(status, 422, "{}", String::from_utf8_lossy(&missing));
     assert_eq!(run(&mut browser, json!({})).0, 200);
     for count in 4..=8 {
@@ -112,7 +112,7 @@ fn a_guided_study_outlives_a_restart_and_ends_in_the_report_of_its_values() {
             Ok(())
         }
     });
-    let report = browser.get("/api/studies/1/report");
+    let report = browser.get("/api/studies/1/report.json");
     let (_, csv) = browser.ask("GET", "/api/studies/1/values.csv", &[]);
     let printed = studies(
         &place,
@@ -217,7 +217,7 @@ fn the_repeatability_of_an_honest_station_is_the_predicted_one() {
                 }
             });
         }
-        let report = browser.get(&format!("/api/studies/{number}/report"));
+        let report = browser.get(&format!("/api/studies/{number}/report.json"));
         for study in report["studies"].as_array().unwrap() {
             let name = study["characteristic"].as_str().unwrap().to_owned();
             let (Some(interval), Some(sigma)) = (

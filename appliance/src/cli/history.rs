@@ -66,14 +66,7 @@ impl HistoryOptions {
             before_seq: None,
             limit: self.limit.unwrap_or(usual) as usize,
         };
-        let undated = reader.undated(&filter)?;
-        if undated > 0 {
-            let words = format!(
-                "{undated} results are left out, of which it is not known when they were: the clock was not synchronised; \
-                 leave out --since and --until to see them"
-            );
-            journal::write(Severity::Warning, &words);
-        }
+        let undated = warn_of_undated(&reader, &filter)?;
         if self.csv {
             return self.csv(&reader, &filter);
         }
@@ -126,6 +119,22 @@ impl HistoryOptions {
             None => read.map_err(Failure::from),
         }
     }
+}
+
+/// Says how many results a filter by time leaves out because it is not known when they were, and answers with it.
+///
+/// # Errors
+/// As [`Reader::undated`].
+pub(super) fn warn_of_undated(reader: &Reader, filter: &Filter) -> Result<u64> {
+    let undated = reader.undated(filter)?;
+    if undated > 0 {
+        let words = format!(
+            "{undated} results are left out, of which it is not known when they were: the clock was not synchronised; \
+             leave out --since and --until to see them"
+        );
+        journal::write(Severity::Warning, &words);
+    }
+    Ok(undated)
 }
 
 /// Standard output, and why it first failed.

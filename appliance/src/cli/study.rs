@@ -1,5 +1,6 @@
 //! `fringed study`: what releases a station for production, from a CSV file or from stored results.
 
+use super::history::warn_of_undated;
 use super::numbers::number;
 use super::options::{Files, Json};
 use crate::error::{Exit, Failure, Result, shortened};
@@ -9,14 +10,13 @@ use crate::station::MAX_GAUGES;
 use crate::station::control::MAX_RECIPE;
 use crate::study::{
     CapabilityLimits, Characteristic, Course, Decimal, GaugeCapability, Repeatability, StudyLimits,
-    marks, table,
+    marks, table, write_json,
 };
 use crate::system::computing;
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::fmt::Display;
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, BufWriter, Write as _};
+use std::io::{self, BufRead, BufReader, BufWriter};
 use std::path::PathBuf;
 
 /// Which study.
@@ -237,11 +237,8 @@ impl OneCharacteristic {
 /// Prints reports: as JSON a list of them.
 fn print<T: Serialize + Display>(json: Json, reports: &[T]) -> Result<()> {
     if json.json {
-        // A hundred thousand results with 64 gauges have a gigabyte of figures, so it is written as it is made. JSON
-        // has no characters that command a terminal; a pipe that the reader has closed is not an error.
-        let mut out = BufWriter::new(io::stdout().lock());
-        let all = BTreeMap::from([("studies", reports)]);
-        let _ = serde_json::to_writer_pretty(&mut out, &all).map(|()| writeln!(out));
+        // JSON has no characters that command a terminal; a pipe that the reader has closed is not an error.
+        let _ = write_json(&mut BufWriter::new(io::stdout().lock()), reports);
     } else {
         let texts: Vec<String> = reports.iter().map(T::to_string).collect();
         say!("{}", texts.join("\n").trim_end());
@@ -317,7 +314,7 @@ impl ProcessOptions {
                 .collect(),
             None => {
                 // A running station needs the cores.
-                computing::give_way();
+                computing::stand_back();
                 let state = self.files.state_folder()?;
                 let reader = Reader::of(&state);
                 let filter = Filter {
@@ -327,6 +324,7 @@ impl ProcessOptions {
                     limit: usize::MAX,
                     ..Filter::default()
                 };
+                warn_of_undated(&reader, &filter)?;
                 let of_studies = Studies::of(&state).seqs(&reader.id()?);
                 reader.courses(&filter, self.slot, bounds, &of_studies)?
             }

@@ -4,7 +4,7 @@
 //! when it is complete, where cycles came faster than they can be told apart, and after ten minutes without a cycle, so that
 //! production does not fill a study that was forgotten.
 
-use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
@@ -21,8 +21,8 @@ use super::site::Site;
 use crate::history::Entry;
 use crate::history::design::{StudyDesign, StudyTrial};
 use crate::history::studies::{GuidedStudy, StudyError};
-use crate::station::ResultRecord;
-use crate::study::Repeatability;
+use crate::station::{ResultRecord, Snapshot};
+use crate::study::write_json;
 
 /// A study that takes no cycle for so long is paused.
 const IDLE: Duration = Duration::from_secs(600);
@@ -48,7 +48,7 @@ fn shown(site: &Site, study: &GuidedStudy) -> Value {
     json!({
         "number": study.number, "asked": study.asked, "all": study.all(), "running": again.is_some(),
         "next": next, "words": next.map(|next| study.asked.words(next)), "note": note.map(|(_, words)| words),
-        "taken": study.taken,
+        "taken": study.taken.iter().map(|taken| json!({ "of": taken.of, "seq": taken.seq })).collect::<Vec<_>>(),
     })
 }
 
@@ -99,48 +99,51 @@ struct RunRequest {
     again: Option<StudyTrial>,
 }
 
-pub(super) async fn run(
+/// Runs a study, or pauses it.
+pub(super) async fn order(
     site: Site,
-    Path(number): Path<u32>,
+    Path((number, order)): Path<(u32, String)>,
     request: Request<Body>,
 ) -> Answered<Json<Value>> {
     let RunRequest { again } = request::json_if_any(request.into_body()).await?;
     let study = site
         .aside(move |site| Ok(site.studies.read(number)?))
         .await?;
+    match order.as_str() {
+        "run" => run(&site, &study, again)?,
+        "pause" => {
+            if let Some(turn) = site.desk.turn_of(number) {
+                site.desk.pause(turn, "paused".into());
+            }
+        }
+        _ => return Err(Problem::missing("a study can run or pause")),
+    }
+    Ok(Json(shown(&site, &study)))
+}
+
+fn run(site: &Site, study: &GuidedStudy, again: Option<StudyTrial>) -> Answered<()> {
+    let number = study.number;
     if again.is_some_and(|again| !study.has(again)) {
         return Err(Problem::unfit(format!("study {number} has no such trial")));
     }
     if again.is_none() && study.next().is_none() {
+        let words = "is complete: name a trial that is taken again";
+        return Err(Problem::busy(format!("study {number} {words}")));
+    }
+    let mut running = site.desk.lock();
+    if let Some((other, _)) = running.study.filter(|(other, _)| *other != number) {
         return Err(Problem::busy(format!(
-            "study {number} is complete: name a trial that is taken again"
+            "study {other} is running: pause it before"
         )));
     }
-    let turn = {
-        let mut running = site.desk.lock();
-        if let Some((other, _)) = running.study.filter(|(other, _)| *other != number) {
-            return Err(Problem::busy(format!(
-                "study {other} is running: pause it before"
-            )));
-        }
-        running.turn += 1;
-        (running.study, running.note) = (Some((number, again)), None);
-        running.turn
-    };
-    let last = site.last_seq();
-    let answer = shown(&site, &study);
-    tokio::spawn(follow(site, number, turn, last));
-    Ok(Json(answer))
-}
-
-pub(super) async fn pause(site: Site, Path(number): Path<u32>) -> Answered<Json<Value>> {
-    let study = site
-        .aside(move |site| Ok(site.studies.read(number)?))
-        .await?;
-    if let Some(turn) = site.desk.turn_of(number) {
-        site.desk.pause(turn, "paused".into());
-    }
-    Ok(Json(shown(&site, &study)))
+    running.turn += 1;
+    (running.study, running.note) = (Some((number, again)), None);
+    let now = site.station.snapshot();
+    let last = now.result.as_ref().map(|result| result.seq);
+    // A cycle that was triggered before is not one of the study.
+    let last = last.map(|seq| seq.wrapping_add(u32::from(now.is_working())));
+    tokio::spawn(follow(site.clone(), number, running.turn, last));
+    Ok(())
 }
 
 pub(super) async fn delete(site: Site, Path(number): Path<u32>) -> Answered<Json<Value>> {
@@ -154,33 +157,39 @@ pub(super) async fn delete(site: Site, Path(number): Path<u32>) -> Answered<Json
     Ok(Json(json!({})))
 }
 
-pub(super) async fn values(site: Site, Path(number): Path<u32>) -> Answered<Response> {
-    send(&site, "text/csv; charset=utf-8", move |site| {
-        let csv = site.studies.read(number)?.csv();
-        Ok((
-            format!("study-{number}.csv"),
-            Download::Bytes(csv.into_bytes()),
-        ))
+/// The values as CSV, or what `fringed study grr --json` prints of them, byte by byte.
+pub(super) async fn file(
+    site: Site,
+    Path((number, name)): Path<(u32, String)>,
+) -> Answered<Response> {
+    let kind = match name.as_str() {
+        "values.csv" => "text/csv; charset=utf-8",
+        "report.json" => "application/json",
+        _ => return Err(Problem::missing("a study has values.csv and report.json")),
+    };
+    send(&site, kind, move |site| {
+        let study = site.studies.read(number)?;
+        let mut bytes = Vec::new();
+        match name.as_str() {
+            "values.csv" => bytes = study.csv().into_bytes(),
+            _ => write_json(&mut bytes, &study.report()?).map_err(Problem::broken)?,
+        }
+        Ok((format!("study-{number}-{name}"), Download::Bytes(bytes)))
     })
     .await
 }
 
-/// What `fringed study grr --json` prints of the same values.
-pub(super) async fn report(
-    site: Site,
-    Path(number): Path<u32>,
-) -> Answered<Json<BTreeMap<&'static str, Vec<Repeatability>>>> {
-    let report = site.aside(move |site| Ok(site.studies.read(number)?.report()?));
-    Ok(Json(BTreeMap::from([("studies", report.await?)])))
-}
-
-/// Takes results behind `last` for a study, until it is paused.
-async fn follow(site: Site, number: u32, turn: u64, mut last: u32) {
+/// Takes results behind `last`, or any if there is none so far, for a study, until it is paused.
+async fn follow(site: Site, number: u32, turn: u64, mut last: Option<u32>) {
     let mut snapshots = site.station.subscribe();
     loop {
-        let newer =
-            snapshots.wait_for(|now| now.result.as_ref().is_some_and(|result| result.seq != last));
-        let result = match tokio::time::timeout(IDLE, newer).await {
+        let ahead = |seq: u32| last.map_or(1, |last| seq.wrapping_sub(last).cast_signed());
+        let newer = |now: &Arc<Snapshot>| {
+            now.result
+                .as_ref()
+                .is_some_and(|result| ahead(result.seq) > 0)
+        };
+        let result = match tokio::time::timeout(IDLE, snapshots.wait_for(newer)).await {
             Ok(Ok(now)) => now.result.clone(),
             Ok(Err(_)) => return,
             Err(_) => {
@@ -189,15 +198,14 @@ async fn follow(site: Site, number: u32, turn: u64, mut last: u32) {
             }
         };
         let Some(result) = result else { return };
-        let before = std::mem::replace(&mut last, result.seq);
-        if before != 0 && result.seq != before.wrapping_add(1) {
+        if ahead(result.seq) > 1 {
             let words = format!(
-                "paused: results {} to {} came faster than they can be told apart: look which part was last, and run the study again",
-                before.wrapping_add(1),
+                "paused: results up to {} came faster than they can be told apart: look which part was last, and run the study again",
                 result.seq
             );
             return site.desk.pause(turn, words);
         }
+        last = Some(result.seq);
         let taken = site.change(move |site| take(site, number, turn, &result));
         match taken.await {
             Ok(true) => {}

@@ -138,7 +138,7 @@ function judged(study) {
 
 async function report(number) {
   try {
-    const { studies } = await ask("GET", path(number, "/report"));
+    const { studies } = await ask("GET", path(number, "/report.json"));
     fill($("study-report"), ...studies.map(judged));
   } catch (error) { fill($("study-report"), make("p", "bad", error.message)); }
 }

@@ -2,7 +2,7 @@
 
 use super::*;
 
-const CHANGES: [(&str, &str); 15] = [
+const CHANGES: [(&str, &str); 14] = [
     ("POST", "/api/trigger"),
     ("POST", "/api/reset"),
     ("POST", "/api/recipes"),
@@ -16,7 +16,6 @@ const CHANGES: [(&str, &str); 15] = [
     ("PUT", "/api/simulation/part"),
     ("POST", "/api/studies"),
     ("POST", "/api/studies/1/run"),
-    ("POST", "/api/studies/1/pause"),
     ("DELETE", "/api/studies/1"),
 ];
 
