@@ -4,10 +4,12 @@ use super::history::warn_of_undated;
 use super::numbers::number;
 use super::options::{Files, Json};
 use crate::error::{Exit, Failure, Result, shortened};
+use crate::history::course::Rest;
 use crate::history::studies::Studies;
 use crate::history::{Filter, Reader, export};
 use crate::station::MAX_GAUGES;
 use crate::station::control::MAX_RECIPE;
+use crate::storage::state::StateFolder;
 use crate::study::{
     CapabilityLimits, Characteristic, Course, Decimal, GaugeCapability, Repeatability, StudyLimits,
     marks, table, write_json,
@@ -325,8 +327,13 @@ impl ProcessOptions {
                     ..Filter::default()
                 };
                 warn_of_undated(&reader, &filter)?;
+                let rest = if StateFolder::is_used(&state) {
+                    Rest::OfStation
+                } else {
+                    Rest::None
+                };
                 let of_studies = Studies::of(&state).seqs(&reader.id()?);
-                reader.courses(&filter, self.slot, bounds, &of_studies)?
+                reader.courses(&filter, self.slot, bounds, &of_studies, rest)?
             }
         };
         let courses = self.of.of(courses, |course| &course.name)?;

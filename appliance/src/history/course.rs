@@ -9,6 +9,7 @@ use crate::study::process::LimitPair;
 use crate::study::{Course, Decimal, LeftOut};
 use rusqlite::params_from_iter;
 use std::collections::HashSet;
+use std::time::{Duration, Instant};
 
 impl Reader {
     /// The values of each gauge of the results that pass the filter, but for its limit, oldest first; of INVALID results,
@@ -23,6 +24,7 @@ impl Reader {
         slot: Option<u16>,
         bounds: LimitPair,
         of_studies: &HashSet<u32>,
+        rest: Rest,
     ) -> HistoryResult<Vec<Course>> {
         let (condition, mut values) = condition(filter);
         let of_slot = if slot.is_some() { "AND place = ?" } else { "" };
@@ -32,12 +34,30 @@ impl Reader {
              FROM dated CROSS JOIN gauge ON gauge.result = dated.id WHERE {condition} {of_slot} ORDER BY dated.id, place"
         );
         let given = bounds.0.or(bounds.1).map(|_| bounds);
-        let counts = self.counts(filter)?;
+        let of_invalid = format!(
+            "SELECT count(*) FROM dated WHERE {condition} AND verdict = {}",
+            Verdict::Invalid.number()
+        );
         self.read(|connection| {
+            // Counts and values are of one state of the history.
+            let connection = connection.unchecked_transaction()?;
+            let of_results = values
+                .iter()
+                .take(values.len() - usize::from(slot.is_some()));
+            let invalid =
+                connection
+                    .query_row(&of_invalid, params_from_iter(of_results), |row| row.get(0))?;
+            let mut begun = Instant::now();
             let mut statement = connection.prepare(&query)?;
             let mut rows = statement.query(params_from_iter(values))?;
             let mut courses: Vec<(i64, Course, Limited)> = Vec::new();
+            let mut read = 0_u32;
             while let Some(row) = rows.next()? {
+                read += 1;
+                if rest == Rest::OfStation && read.is_multiple_of(SLICE) {
+                    std::thread::sleep((3 * begun.elapsed()).min(LONGEST));
+                    begun = Instant::now();
+                }
                 let (place, name, unit): (i64, _, _) = (
                     row.get(2)?,
                     row.get_ref(3)?.as_str()?,
@@ -48,7 +68,7 @@ impl Reader {
                 });
                 let at = known.unwrap_or_else(|| {
                     let left_out = LeftOut {
-                        invalid: counts.invalid,
+                        invalid,
                         ..LeftOut::default()
                     };
                     let course = Course::new(name, unit, left_out);
@@ -82,6 +102,21 @@ impl Reader {
         })
     }
 }
+
+/// Whether the reader rests while a station measures on the same processor: a core that works takes memory and clock
+/// from the others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Rest {
+    /// No station uses the history.
+    None,
+    /// For three times as long as it works.
+    OfStation,
+}
+
+/// Rows between two rests.
+const SLICE: u32 = 4096;
+/// The longest rest.
+const LONGEST: Duration = Duration::from_millis(20);
 
 /// The limits of the row before, which most rows share.
 #[derive(Default)]

@@ -18,7 +18,7 @@
 //! lacks: kill -9 costs at most the result in flight, however busy the card was. A loss of power
 //! costs what was not synced yet: what came in the time that the card takes for one sync.
 
-mod course;
+pub mod course;
 pub mod design;
 pub mod entry;
 pub mod export;

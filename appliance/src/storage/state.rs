@@ -81,6 +81,12 @@ impl StateFolder {
         })
     }
 
+    /// Whether a station uses a folder.
+    pub fn is_used(path: &Path) -> bool {
+        let lock = File::open(path.join("lock"));
+        lock.is_ok_and(|lock| matches!(lock.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
+
     /// The folder.
     pub fn path(&self) -> &Path {
         &self.path

@@ -5,7 +5,7 @@ use super::distribution;
 use super::spread::{Spread, defined, more_than_rounding, offsets};
 use super::values::{Characteristic, Reading};
 use crate::error::{Exit, Failure, Result, shortened};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// The values of a balanced study.
 pub struct Balanced<'a> {
@@ -62,69 +62,32 @@ impl<'a> Balanced<'a> {
                 "name them in the column part",
             ));
         }
-        // Every cell of the table must have values, so there are no more cells than those.
-        let cells = parts.len() * appraisers.len();
-        let mut table = vec![
-            Vec::new();
-            if cells > measured.readings.len() {
-                0
-            } else {
-                cells
-            }
-        ];
+        // By part, then appraiser. Of a table with gaps only what is there takes memory.
+        let mut table = BTreeMap::<usize, Vec<&Reading>>::new();
         let mut trials = HashMap::new();
         for (part, appraiser, reading) in placed {
             let cell = part * appraisers.len() + appraiser;
-            let twice = if reading.trial.is_empty() {
-                None
-            } else {
-                trials.insert((cell, &*reading.trial), reading.at)
-            };
-            if let Some(before) = twice {
+            table.entry(cell).or_default().push(reading);
+            if reading.trial.is_empty() {
+                continue;
+            }
+            if let Some(before) = trials.insert((cell, &*reading.trial), reading.at) {
+                let (cell, trial) = (words(parts[part], appraisers[appraiser]), &reading.trial);
                 let what = format!(
-                    "{} trial {} is there twice, at {before} and {}",
-                    words(parts[part], appraisers[appraiser]),
-                    reading.trial,
+                    "{cell} trial {trial} is there twice, at {before} and {}",
                     reading.at
                 );
                 return Err(refused(what, "leave one of them out"));
             }
-            if let Some(values) = table.get_mut(cell) {
-                values.push(reading);
-            }
         }
-        let most = table.iter().map(Vec::len).max().unwrap_or(0);
-        let missing = if table.is_empty() {
-            // More cells than values: one of them has none.
-            let has = |part: &str, appraiser: &str| {
-                measured
-                    .readings
-                    .iter()
-                    .any(|reading| *reading.part == *part && *reading.appraiser == *appraiser)
-            };
-            let each = parts
-                .iter()
-                .flat_map(|part| appraisers.iter().map(move |appraiser| (*part, *appraiser)));
-            each.map(|(part, appraiser)| (part, appraiser, 0))
-                .find(|(part, appraiser, _)| !has(part, appraiser))
-        } else {
-            let short = table.iter().position(|cell| cell.len() < most);
-            short.map(|at| {
-                (
-                    parts[at / appraisers.len()],
-                    appraisers[at % appraisers.len()],
-                    table[at].len(),
-                )
-            })
-        };
-        if let Some((part, appraiser, has)) = missing {
-            let what = format!(
-                "{} has {has} trials, others have {}",
-                words(part, appraiser),
-                most.max(1)
-            );
+        let most = table.values().map(Vec::len).max().unwrap_or(0);
+        let has = |cell: &usize| table.get(cell).map_or(0, Vec::len);
+        let all = parts.len() * appraisers.len();
+        if let Some(short) = (0..all).find(|cell| has(cell) < most) {
+            let (part, appraiser) = (short / appraisers.len(), short % appraisers.len());
+            let (cell, has) = (words(parts[part], appraisers[appraiser]), has(&short));
             return Err(refused(
-                what,
+                format!("{cell} has {has} trials, others have {most}"),
                 "measure what is missing, or leave the part or appraiser out: the analysis needs a balanced table",
             ));
         }
@@ -137,7 +100,7 @@ impl<'a> Balanced<'a> {
         Ok(Self {
             parts,
             appraisers,
-            cells: table,
+            cells: table.into_values().collect(),
         })
     }
 }
