@@ -11,8 +11,9 @@
 use super::decimal::Decimal;
 use super::distribution::{self, Tail};
 use super::spread::{Spread, defined, offsets};
+use super::text::{rounded, short, shown, titled};
 use super::values::Characteristic;
-use super::verdict::{Criterion, Judgement, Prediction, Squares, rounded, short, shown};
+use super::verdict::{Judgement, Prediction, ended};
 use crate::error::{Exit, Failure, Result, shortened};
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
@@ -132,32 +133,16 @@ impl GaugeCapability {
         let cg = scattering.map(|s| limits.share / 100.0 * tolerance / (limits.spread * s));
         let cgk = scattering.map(|s| (limits.share / 200.0 * tolerance - bias.abs()) / half(s));
         let q_ms = u_ms.map(|u| 100.0 * 2.0 * u / tolerance);
-        let least = |figure, value, limit| Criterion {
-            figure,
-            value,
-            unit: "",
-            is_least: true,
-            limit,
-            conditions: limit,
-        };
-        let judgement = Judgement::by(&[
-            least("C_g", cg, limits.cg),
-            least("C_gk", cgk, limits.cgk),
+        let judgement = Judgement::default()
+            .least("C_g", cg, limits.cg)
+            .least("C_gk", cgk, limits.cgk)
             // With no scatter at all it says nothing of the gauge.
-            Criterion {
-                figure: "Q_MS",
-                value: q_ms.filter(|_| scattering.is_some()),
-                unit: " %",
-                is_least: false,
-                limit: limits.q_ms,
-                conditions: limits.q_ms,
-            },
-        ]);
-        let (mut sigmas, mut us) = (Squares::default(), Squares::default());
-        for reading in readings {
-            sigmas.add(reading.sigma);
-            us.add(reading.uncertainty);
-        }
+            .most(
+                "Q_MS",
+                q_ms.filter(|_| scattering.is_some()),
+                limits.q_ms,
+                limits.q_ms,
+            );
         let t = error.map(|error| distribution::t_quantile(Tail::Upper(0.025), df) * error);
         let beyond = error.and_then(|error| defined(bias / error));
         Ok(Self {
@@ -180,7 +165,7 @@ impl GaugeCapability {
             u_bi,
             u_ms,
             q_ms,
-            prediction: Prediction::compared(&sigmas, &us, s, df, false),
+            prediction: Prediction::of(readings, s, df),
             judgement,
         })
     }
@@ -226,30 +211,4 @@ impl Display for GaugeCapability {
         )?;
         ended(f, self.prediction.as_ref(), "s", &self.judgement)
     }
-}
-
-/// A characteristic with its unit.
-pub fn titled(name: &str, unit: &str) -> String {
-    match unit {
-        "" => name.to_owned(),
-        unit => format!("{name} [{unit}]"),
-    }
-}
-
-/// The last lines of a report.
-pub fn ended(
-    f: &mut Formatter<'_>,
-    prediction: Option<&Prediction>,
-    s: &str,
-    judgement: &Judgement,
-) -> fmt::Result {
-    if let Some(prediction) = prediction {
-        writeln!(f, "  {}", prediction.words(s))?;
-    }
-    writeln!(
-        f,
-        "  {}: {}",
-        judgement.verdict,
-        judgement.reasons.join("; ")
-    )
 }

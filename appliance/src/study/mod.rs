@@ -18,6 +18,7 @@ pub mod process;
 pub mod repeatability;
 pub mod spread;
 pub mod table;
+mod text;
 pub mod values;
 pub mod verdict;
 

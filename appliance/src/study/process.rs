@@ -9,13 +9,13 @@
 //! Sources: Montgomery, *Introduction to Statistical Quality Control*; Bissell 1990 for the interval of C_pk. GroupValues are in
 //! the order of their results; where the limits change, a new group begins, and no figure mixes two groups.
 
-use super::capability::titled;
 use super::decimal::Decimal;
 use super::distribution::{self, Tail};
 use super::marks::{self, Mark};
 use super::spread::{Spread, defined};
+use super::text::{rounded, short, shown, titled};
 use super::values::{Characteristic, LeftOut};
-use super::verdict::{Prediction, Squares, rounded, short, shown};
+use super::verdict::{Prediction, Squares, compared};
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
 
@@ -373,7 +373,7 @@ impl Display for Process {
                 shown(group.largest_range)
             )?;
             if let Some(prediction) = &group.prediction {
-                writeln!(f, "    {}", prediction.words("s of the process"))?;
+                writeln!(f, "    {}", compared(prediction, "s of the process"))?;
             }
             for mark in group.marks.iter().take(MOST_PRINTED) {
                 writeln!(

@@ -19,12 +19,13 @@
 //! Sources: AIAG, *Measurement Systems Analysis*, 4th edition, 2010; Q_MP: ISO 22514-7 and VDA 5.
 
 use super::balanced::{Balanced, Sums, ms};
-use super::capability::{ended, expanded, titled};
+use super::capability::expanded;
 use super::decimal::Decimal;
 use super::distribution::{self, Tail};
 use super::spread::defined;
+use super::text::{rounded, short, shown, titled};
 use super::values::Characteristic;
-use super::verdict::{Criterion, Judgement, Prediction, Squares, rounded, short, shown};
+use super::verdict::{Judgement, Prediction, ended};
 use crate::error::{Exit, Failure, Result, shortened};
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
@@ -270,43 +271,16 @@ impl Repeatability {
         // Values that never differ say nothing of a gauge.
         let scatters = grr > 0.0;
         let figure = |value: Option<f64>| value.filter(|_| scatters);
-        let of_what = component("GRR", grr);
-        let (named, of_what) = match tolerance.is_some() || low.or(high).is_some() {
-            true => ("GRR of tolerance", of_what.of_tolerance),
-            false => ("GRR of study", of_what.of_study),
+        let gauge = component("GRR", grr);
+        let (named, share) = match low.or(high) {
+            Some(_) => ("GRR of tolerance", gauge.of_tolerance),
+            None => ("GRR of study", gauge.of_study),
         };
-        let mut criteria = vec![
-            Criterion {
-                figure: named,
-                value: figure(of_what),
-                unit: " %",
-                is_least: false,
-                limit: limits.fit,
-                conditions: limits.conditions,
-            },
-            Criterion {
-                figure: "ndc",
-                value: figure(ndc),
-                unit: "",
-                is_least: true,
-                limit: limits.ndc,
-                conditions: limits.ndc,
-            },
-        ];
+        let mut judgement = Judgement::default()
+            .most(named, figure(share), limits.fit, limits.conditions)
+            .least("ndc", figure(ndc), limits.ndc);
         if both.is_some() {
-            criteria.push(Criterion {
-                figure: "Q_MP",
-                value: figure(q_mp),
-                unit: " %",
-                is_least: false,
-                limit: limits.q_mp,
-                conditions: limits.q_mp,
-            });
-        }
-        let (mut sigmas, mut us) = (Squares::default(), Squares::default());
-        for reading in readings {
-            sigmas.add(reading.sigma);
-            us.add(reading.uncertainty);
+            judgement = judgement.most("Q_MP", figure(q_mp), limits.q_mp, limits.q_mp);
         }
         let df = error[1];
         let bound = |tail| (error[0] / distribution::chi_squared_quantile(tail, df)).sqrt();
@@ -329,9 +303,9 @@ impl Repeatability {
             ndc_unrounded,
             u_mp: Some(u_mp).filter(|_| scatters),
             q_mp,
-            prediction: Prediction::compared(&sigmas, &us, Some(ev.sqrt()), df, false),
+            prediction: Prediction::of(readings, Some(ev.sqrt()), df),
             left_out: measured.left_out,
-            judgement: Judgement::by(&criteria),
+            judgement,
         })
     }
 }

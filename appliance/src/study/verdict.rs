@@ -2,13 +2,16 @@
 
 use super::distribution::{self, Tails};
 use super::spread::defined;
+use super::text::short;
+use super::values::Reading;
 use serde::Serialize;
 use std::fmt::{self, Display, Formatter};
 
 /// A verdict of a study, from the best to the worst.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Fitness {
     /// All figures are within their limits.
+    #[default]
     #[serde(rename = "fit")]
     Fit,
     /// A figure is between the two limits that it has.
@@ -28,8 +31,8 @@ impl Display for Fitness {
     }
 }
 
-/// A verdict and its reasons.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// A verdict and its reasons; by default before any figure was looked at.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Judgement {
     /// The worst that a figure says.
     pub verdict: Fitness,
@@ -37,74 +40,43 @@ pub struct Judgement {
     pub reasons: Vec<String>,
 }
 
-/// A figure with the limits that it goes by.
-pub struct Criterion {
-    /// Its name.
-    pub figure: &'static str,
-    /// None if it is not defined.
-    pub value: Option<f64>,
-    /// `%` or empty.
-    pub unit: &'static str,
-    /// Whether larger is better.
-    pub is_least: bool,
-    /// Up to here it is fit.
-    pub limit: f64,
-    /// Up to here it is fit with conditions.
-    pub conditions: f64,
-}
-
-impl Criterion {
-    fn judged(&self) -> (Fitness, String) {
-        let Self {
-            figure,
-            unit,
-            limit,
-            conditions,
-            ..
-        } = self;
-        let Some(value) = self.value else {
-            return (Fitness::NotDecided, format!("{figure} is not defined"));
-        };
-        let within = |limit: f64| {
-            if self.is_least {
-                value >= limit
-            } else {
-                value <= limit
+impl Judgement {
+    /// And by a figure that must be at least this.
+    pub fn least(self, figure: &str, value: Option<f64>, limit: f64) -> Self {
+        match value {
+            Some(value) if value >= limit => {
+                self.and(Fitness::Fit, format!("{figure} {} ≥ {limit}", short(value)))
             }
-        };
-        let (good, bad) = if self.is_least {
-            ("≥", "<")
-        } else {
-            ("≤", ">")
-        };
-        let shown = short(value);
-        if within(*limit) {
-            (
-                Fitness::Fit,
-                format!("{figure} {shown}{unit} {good} {limit}{unit}"),
-            )
-        } else if within(*conditions) {
-            let words = format!(
-                "{figure} {shown}{unit} {bad} {limit}{unit}, but {good} {conditions}{unit}"
-            );
-            (Fitness::Conditions, words)
-        } else {
-            (
+            Some(value) => self.and(
                 Fitness::NotFit,
-                format!("{figure} {shown}{unit} {bad} {conditions}{unit}"),
-            )
+                format!("{figure} {} < {limit}", short(value)),
+            ),
+            None => self.and(Fitness::NotDecided, format!("{figure} is not defined")),
         }
     }
-}
 
-impl Judgement {
-    /// By these figures.
-    pub fn by(criteria: &[Criterion]) -> Self {
-        let (words, reasons): (Vec<Fitness>, _) = criteria.iter().map(Criterion::judged).unzip();
-        Self {
-            verdict: words.into_iter().max().unwrap_or(Fitness::NotDecided),
-            reasons,
+    /// And by a share in % that must be at most this, with conditions at most the second limit.
+    pub fn most(self, figure: &str, share: Option<f64>, limit: f64, conditions: f64) -> Self {
+        let Some(share) = share else {
+            return self.and(Fitness::NotDecided, format!("{figure} is not defined"));
+        };
+        let words = format!("{figure} {} %", short(share));
+        if share <= limit {
+            self.and(Fitness::Fit, format!("{words} ≤ {limit} %"))
+        } else if share <= conditions {
+            self.and(
+                Fitness::Conditions,
+                format!("{words} > {limit} %, but ≤ {conditions} %"),
+            )
+        } else {
+            self.and(Fitness::NotFit, format!("{words} > {conditions} %"))
         }
+    }
+
+    fn and(mut self, verdict: Fitness, reason: String) -> Self {
+        self.verdict = self.verdict.max(verdict);
+        self.reasons.push(reason);
+        self
     }
 }
 
@@ -156,22 +128,14 @@ impl Prediction {
         })
     }
 
-    /// In words.
-    pub fn words(&self, s: &str) -> String {
-        let u = self
-            .u
-            .map_or(String::new(), |u| format!(", U {}", short(u)));
-        let is = match (self.agrees, self.f > 1.0) {
-            (true, _) => "agrees",
-            (false, true) => "disagrees: the values scatter more",
-            (false, false) => "disagrees: the values scatter less",
-        };
-        format!(
-            "predicted σ {}{u}: {s} {is} (F {}, p {})",
-            short(self.sigma),
-            short(self.f),
-            short(self.p)
-        )
+    /// The same with what was predicted of these values.
+    pub fn of(readings: &[Reading], s: Option<f64>, df: f64) -> Option<Self> {
+        let (mut sigmas, mut us) = (Squares::default(), Squares::default());
+        for reading in readings {
+            sigmas.add(reading.sigma);
+            us.add(reading.uncertainty);
+        }
+        Self::compared(&sigmas, &us, s, df, false)
     }
 }
 
@@ -197,31 +161,38 @@ impl Squares {
     }
 }
 
-/// A number with five digits, as people read it.
-pub fn short(number: f64) -> String {
-    rounded(number, 5)
+/// The last lines of a report.
+pub fn ended(
+    f: &mut Formatter<'_>,
+    prediction: Option<&Prediction>,
+    s: &str,
+    judgement: &Judgement,
+) -> fmt::Result {
+    if let Some(prediction) = prediction {
+        writeln!(f, "  {}", compared(prediction, s))?;
+    }
+    writeln!(
+        f,
+        "  {}: {}",
+        judgement.verdict,
+        judgement.reasons.join("; ")
+    )
 }
 
-/// A number with so many digits.
-pub fn rounded(number: f64, digits: u8) -> String {
-    let size = number.abs();
-    if number != 0.0 && !(1e-4..1e7).contains(&size) {
-        return format!("{number:.3e}");
-    }
-    let before = if number == 0.0 {
-        0
-    } else {
-        size.log10().floor() as i32
+/// A prediction beside the scatter that has this name.
+pub fn compared(prediction: &Prediction, s: &str) -> String {
+    let u = prediction
+        .u
+        .map_or(String::new(), |u| format!(", U {}", short(u)));
+    let is = match (prediction.agrees, prediction.f > 1.0) {
+        (true, _) => "agrees",
+        (false, true) => "disagrees: the values scatter more",
+        (false, false) => "disagrees: the values scatter less",
     };
-    let places = usize::try_from(i32::from(digits) - 1 - before).unwrap_or(0);
-    let text = format!("{number:.places$}");
-    match text.contains('.') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
-    }
-}
-
-/// The same of a figure that may not be defined.
-pub fn shown(figure: Option<f64>) -> String {
-    figure.map_or_else(|| "not defined".into(), short)
+    format!(
+        "predicted σ {}{u}: {s} {is} (F {}, p {})",
+        short(prediction.sigma),
+        short(prediction.f),
+        short(prediction.p)
+    )
 }

@@ -98,6 +98,7 @@ function showStudy(study) {
   const key = JSON.stringify([study.number, study.taken.map(({ of, seq }) => [of, seq]), study.next]);
   if (key === made) return;
   made = key;
+  list().catch(() => {});
   table(study);
   if (study.taken.length === study.all) report(study.number); else fill($("study-report"));
 }
