@@ -92,19 +92,19 @@ pub struct Cg {
     #[command(flatten)]
     known: Uncertainties,
     /// Share of T that the gauge may take, %.
-    #[arg(long, value_name = "PERCENT", default_value = "20", value_parser = number(0.1, 100.0))]
+    #[arg(long, value_name = "PERCENT", default_value_t = CapabilityLimits::USUAL.share, value_parser = number(0.1, 100.0))]
     share: f64,
     /// Widths in s that must fit into it.
-    #[arg(long, value_name = "N", default_value = "6", value_parser = number(1.0, 12.0))]
+    #[arg(long, value_name = "N", default_value_t = CapabilityLimits::USUAL.spread, value_parser = number(1.0, 12.0))]
     spread: f64,
     /// The least C_g of a gauge that is fit.
-    #[arg(long, value_name = "CG", default_value = "1.33", value_parser = number(0.0, 100.0))]
+    #[arg(long, value_name = "CG", default_value_t = CapabilityLimits::USUAL.cg, value_parser = number(0.0, 100.0))]
     least_cg: f64,
     /// The least C_gk.
-    #[arg(long, value_name = "CGK", default_value = "1.33", value_parser = number(0.0, 100.0))]
+    #[arg(long, value_name = "CGK", default_value_t = CapabilityLimits::USUAL.cgk, value_parser = number(0.0, 100.0))]
     least_cgk: f64,
     /// The most Q_MS, %.
-    #[arg(long, value_name = "PERCENT", default_value = "15", value_parser = number(0.0, 1000.0))]
+    #[arg(long, value_name = "PERCENT", default_value_t = CapabilityLimits::USUAL.q_ms, value_parser = number(0.0, 1000.0))]
     most_q: f64,
     #[command(flatten)]
     json: Json,
@@ -118,21 +118,21 @@ pub struct Grr {
     #[command(flatten)]
     bounded: Bounded,
     /// Pool the interaction of parts and appraisers where its p is above this.
-    #[arg(long, value_name = "P", default_value = "0.25", value_parser = number(0.0, 1.0))]
+    #[arg(long, value_name = "P", default_value_t = StudyLimits::USUAL.pool, value_parser = number(0.0, 1.0))]
     pool: f64,
     #[command(flatten)]
     known: Uncertainties,
     /// Fit up to this GRR, % of the tolerance, or of the study's variation where there are no limits.
-    #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = number(0.0, 1000.0))]
+    #[arg(long, value_name = "PERCENT", default_value_t = StudyLimits::USUAL.fit, value_parser = number(0.0, 1000.0))]
     fit: f64,
     /// Fit with conditions up to this GRR, %.
-    #[arg(long, value_name = "PERCENT", default_value = "30", value_parser = number(0.0, 1000.0))]
+    #[arg(long, value_name = "PERCENT", default_value_t = StudyLimits::USUAL.conditions, value_parser = number(0.0, 1000.0))]
     conditions: f64,
     /// The least number of distinct categories.
-    #[arg(long, value_name = "N", default_value = "5", value_parser = number(0.0, 1000.0))]
+    #[arg(long, value_name = "N", default_value_t = StudyLimits::USUAL.ndc, value_parser = number(0.0, 1000.0))]
     least_ndc: f64,
     /// The most Q_MP, %.
-    #[arg(long, value_name = "PERCENT", default_value = "30", value_parser = number(0.0, 1000.0))]
+    #[arg(long, value_name = "PERCENT", default_value_t = StudyLimits::USUAL.q_mp, value_parser = number(0.0, 1000.0))]
     most_q: f64,
     #[command(flatten)]
     json: Json,
@@ -268,8 +268,6 @@ impl Cg {
             ));
         };
         let limits = CapabilityLimits {
-            reference: self.reference,
-            tolerance: self.tolerance,
             resolution: self.known.resolution,
             u_reference: self.known.u_reference,
             u_others: self.known.u_other.clone(),
@@ -279,7 +277,15 @@ impl Cg {
             cgk: self.least_cgk,
             q_ms: self.most_q,
         };
-        print(self.json, &[GaugeCapability::of(measured, &limits)?])
+        print(
+            self.json,
+            &[GaugeCapability::of(
+                measured,
+                self.reference,
+                self.tolerance,
+                &limits,
+            )?],
+        )
     }
 }
 

@@ -194,7 +194,7 @@ impl GuidedStudy {
         let measured = table::read(self.csv().as_bytes(), "the values of the study");
         let all = measured.and_then(|all| {
             all.iter()
-                .map(|one| Repeatability::of(one, &StudyLimits::default()))
+                .map(|one| Repeatability::of(one, &StudyLimits::USUAL))
                 .collect()
         });
         all.map_err(|failure| StudyError::Unfit(failure.to_string()))

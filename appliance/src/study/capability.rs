@@ -21,10 +21,6 @@ use std::fmt::{self, Display, Formatter};
 /// What a study of the capability goes by.
 #[derive(Clone, Debug)]
 pub struct CapabilityLimits {
-    /// The reference part's value.
-    pub reference: Decimal,
-    /// T.
-    pub tolerance: f64,
     /// The step of the values; 0 if it is not known.
     pub resolution: f64,
     /// u_CAL, the standard uncertainty of the reference.
@@ -41,6 +37,20 @@ pub struct CapabilityLimits {
     pub cgk: f64,
     /// The most Q_MS, %.
     pub q_ms: f64,
+}
+
+impl CapabilityLimits {
+    /// Those of ISO 22514-7, of a reference that is known exactly.
+    pub const USUAL: Self = Self {
+        resolution: 0.0,
+        u_reference: 0.0,
+        u_others: Vec::new(),
+        share: 20.0,
+        spread: 6.0,
+        cg: 1.33,
+        cgk: 1.33,
+        q_ms: 15.0,
+    };
 }
 
 /// The capability of a gauge. What cannot be formed is none.
@@ -96,11 +106,16 @@ pub fn expanded(u: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 impl GaugeCapability {
-    /// By the values of one part.
+    /// By the values of one part, which is known to have the value `reference`, for a characteristic of this tolerance T.
     ///
     /// # Errors
     /// There are no values, or those of several parts.
-    pub fn of(measured: &Characteristic, limits: &CapabilityLimits) -> Result<Self> {
+    pub fn of(
+        measured: &Characteristic,
+        reference: Decimal,
+        tolerance: f64,
+        limits: &CapabilityLimits,
+    ) -> Result<Self> {
         let readings = &measured.readings;
         let Some(first) = readings.first() else {
             let words = format!("{} has no values", shortened(&measured.name));
@@ -120,9 +135,8 @@ impl GaugeCapability {
         let (first, offsets) = offsets(readings.iter().map(|reading| reading.value));
         let spread = Spread::of(&offsets);
         let (n, df) = (spread.n as f64, spread.df());
-        let (s, bias) = (spread.s(), first.minus(limits.reference) + spread.mean);
+        let (s, bias) = (spread.s(), first.minus(reference) + spread.mean);
         let error = s.map(|s| s / n.sqrt());
-        let tolerance = limits.tolerance;
         let scattering = s.filter(|s| *s > 0.0);
         let [u_re, u_bi] = [limits.resolution / 12_f64.sqrt(), bias.abs() / 3_f64.sqrt()];
         let u_ms = s.map(|s| {
@@ -149,7 +163,7 @@ impl GaugeCapability {
             characteristic: measured.name.clone(),
             unit: measured.unit.clone(),
             n: spread.n,
-            reference: limits.reference.to_f64(),
+            reference: reference.to_f64(),
             tolerance,
             mean: first.to_f64() + spread.mean,
             bias,

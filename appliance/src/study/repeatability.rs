@@ -53,21 +53,19 @@ pub struct StudyLimits {
     pub q_mp: f64,
 }
 
-impl Default for StudyLimits {
+impl StudyLimits {
     /// Those of the AIAG and of ISO 22514-7.
-    fn default() -> Self {
-        Self {
-            low: None,
-            high: None,
-            pool: 0.25,
-            resolution: 0.0,
-            u_others: Vec::new(),
-            fit: 10.0,
-            conditions: 30.0,
-            ndc: 5.0,
-            q_mp: 30.0,
-        }
-    }
+    pub const USUAL: Self = Self {
+        low: None,
+        high: None,
+        pool: 0.25,
+        resolution: 0.0,
+        u_others: Vec::new(),
+        fit: 10.0,
+        conditions: 30.0,
+        ndc: 5.0,
+        q_mp: 30.0,
+    };
 }
 
 /// A row of the table of the analysis of variance.

@@ -16,25 +16,14 @@ pub(super) fn csv(bytes: &[u8]) {
     let Ok(all) = bounded(most, || table::read(bytes, "values.csv")) else {
         return;
     };
-    let tolerance = Decimal::read("0.2").expect("a number");
-    let limits = CapabilityLimits {
-        reference: Decimal::default(),
-        tolerance: tolerance.to_f64(),
-        resolution: 0.001,
-        u_reference: 0.0,
-        u_others: Vec::new(),
-        share: 20.0,
-        spread: 6.0,
-        cg: 1.33,
-        cgk: 1.33,
-        q_ms: 15.0,
-    };
     for one in &all {
         let process = Course::of(one, (None, None)).figures(&[1, 2, 3, 4, 5, 6, 7, 8]);
         let mut texts = vec![process.to_string()];
-        texts.extend(GaugeCapability::of(one, &limits).map(|study| study.to_string()));
-        texts
-            .extend(Repeatability::of(one, &StudyLimits::default()).map(|study| study.to_string()));
+        texts.extend(
+            GaugeCapability::of(one, Decimal::default(), 0.2, &CapabilityLimits::USUAL)
+                .map(|study| study.to_string()),
+        );
+        texts.extend(Repeatability::of(one, &StudyLimits::USUAL).map(|study| study.to_string()));
         assert!(texts.iter().all(|text| !text.contains("NaN")), "{texts:?}");
     }
 }

@@ -46,7 +46,7 @@ fn sigma(study: &Repeatability, name: &str) -> f64 {
 
 #[test]
 fn the_manuals_example_has_the_manuals_figures() {
-    let study = Repeatability::of(&measured(&manual()), &StudyLimits::default()).unwrap();
+    let study = Repeatability::of(&measured(&manual()), &StudyLimits::USUAL).unwrap();
     let squares: Vec<f64> = study.anova.iter().map(|row| row.ss).collect();
     for (found, published) in squares
         .iter()
@@ -79,7 +79,7 @@ fn the_manuals_example_has_the_manuals_figures() {
     close(study.ndc_unrounded.unwrap(), 4.8605, 1e-5);
     let kept = StudyLimits {
         pool: 1.0,
-        ..StudyLimits::default()
+        ..StudyLimits::USUAL
     };
     close(
         sigma(
@@ -109,7 +109,7 @@ fn one_way(parts: &[Vec<String>], f: f64, between: f64, within: f64) {
             let _ = writeln!(csv, "{part},{value}");
         });
     }
-    let study = Repeatability::of(&measured(&csv), &StudyLimits::default()).unwrap();
+    let study = Repeatability::of(&measured(&csv), &StudyLimits::USUAL).unwrap();
     assert_eq!(study.design, "one-way");
     close(study.anova[0].f.unwrap(), f, 1e-12);
     close(study.anova[0].ms.unwrap(), between, 1e-12);
@@ -155,18 +155,13 @@ fn a_capability_follows_its_formulas() {
     // 0.01 and -0.01 about 10.002: s² = 6e-4/5.
     let values = measured("value\n10.012\n9.992\n10.012\n9.992\n10.012\n9.992\n");
     let limits = CapabilityLimits {
-        reference: Decimal::read("10.000").unwrap(),
-        tolerance: 0.6,
         resolution: 0.001,
         u_reference: 0.002,
         u_others: vec![0.003],
-        share: 20.0,
-        spread: 6.0,
-        cg: 1.33,
-        cgk: 1.33,
-        q_ms: 15.0,
+        ..CapabilityLimits::USUAL
     };
-    let study = GaugeCapability::of(&values, &limits).unwrap();
+    let reference = Decimal::read("10.000").unwrap();
+    let study = GaugeCapability::of(&values, reference, 0.6, &limits).unwrap();
     let s = (6e-4_f64 / 5.0).sqrt();
     close(study.s.unwrap(), s, 1e-12);
     close(study.bias, 0.002, 1e-12);

@@ -6,19 +6,8 @@ use crate::study::verdict::Fitness;
 use crate::study::{CapabilityLimits, Decimal, GaugeCapability, Repeatability, StudyLimits, marks};
 
 fn capability(csv: &str) -> GaugeCapability {
-    let limits = CapabilityLimits {
-        reference: Decimal::read("1").unwrap(),
-        tolerance: 1.0,
-        resolution: 0.0,
-        u_reference: 0.0,
-        u_others: Vec::new(),
-        share: 20.0,
-        spread: 6.0,
-        cg: 1.33,
-        cgk: 1.33,
-        q_ms: 15.0,
-    };
-    GaugeCapability::of(&measured(csv), &limits).unwrap()
+    let reference = Decimal::read("1").unwrap();
+    GaugeCapability::of(&measured(csv), reference, 1.0, &CapabilityLimits::USUAL).unwrap()
 }
 
 #[test]
@@ -40,11 +29,11 @@ fn equal_values_and_a_single_one_have_no_capability() {
 fn parts_that_repeat_exactly_say_nothing_of_the_gauge() {
     let csv =
         "part,appraiser,value\n1,A,.1\n1,A,.1\n2,A,.7\n2,A,.7\n1,B,.1\n1,B,.1\n2,B,.7\n2,B,.7\n";
-    let study = Repeatability::of(&measured(csv), &StudyLimits::default()).unwrap();
+    let study = Repeatability::of(&measured(csv), &StudyLimits::USUAL).unwrap();
     assert_eq!((study.ndc, study.anova[2].f), (None, None));
     assert_eq!(study.judgement.verdict, Fitness::NotDecided);
     let equal = measured("part,value\n1,5\n1,5\n2,5\n2,5\n");
-    let study = Repeatability::of(&equal, &StudyLimits::default()).unwrap();
+    let study = Repeatability::of(&equal, &StudyLimits::USUAL).unwrap();
     assert!(
         study
             .components
@@ -59,7 +48,7 @@ fn a_mean_beyond_the_only_limit_has_no_share_of_a_tolerance() {
     let csv = "part,value\n1,5\n1,5.1\n2,6\n2,6.1\n";
     let limits = StudyLimits {
         high: Decimal::read("5"),
-        ..StudyLimits::default()
+        ..StudyLimits::USUAL
     };
     let study = Repeatability::of(&measured(csv), &limits).unwrap();
     assert_eq!(study.tolerance, None);
@@ -69,7 +58,7 @@ fn a_mean_beyond_the_only_limit_has_no_share_of_a_tolerance() {
 #[test]
 fn a_table_that_is_not_balanced_is_refused_by_the_name_of_what_is_missing() {
     let refused = |csv: &str| {
-        Repeatability::of(&measured(csv), &StudyLimits::default())
+        Repeatability::of(&measured(csv), &StudyLimits::USUAL)
             .unwrap_err()
             .to_string()
     };
