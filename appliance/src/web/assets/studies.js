@@ -127,12 +127,12 @@ function judged(study) {
   const facts = [`ndc ${digits(ndc)} (${digits(ndc_unrounded)})`, model];
   const ev = components.find(({ name }) => name === "EV");
   if (prediction) facts.push(`predicted σ ${quantity(prediction.sigma, unit, 1)}${prediction.u === null ? "" : `, U ${quantity(prediction.u, unit, 1)}`}; EV ${quantity(ev.sigma, unit, 1)} ${prediction.agrees ? "agrees with it" : "disagrees with it"} (p ${digits(prediction.p, 2)})`);
-  const of = (share) => (share === null ? "–" : `${share.toFixed(2)} %`);
+  const of = (share) => (share === null ? "–" : share.toFixed(2));
   const section = make("section", "", make("h3", "", `${characteristic} `, verdict), make("p", "", judgement.reasons.join(" · ")), make("p", "quiet", facts.join(" · ")));
   // Without any scatter there is nothing to divide.
   if (ndc === null) return section;
   const table = rows(`analysis of variance of ${characteristic}`, ["Source", "df", "SS", "MS", "F", "p"], anova.map(({ source, df, ss, ms, f, p }) => [source, String(df), digits(ss), ...[ms, f, p].map((one) => (one === null ? "" : digits(one)))]));
-  section.append(rows(`components of ${characteristic}`, ["Component", "σ", "Of the study", "Of the tolerance"], components.map(({ name, sigma, of_study, of_tolerance }) => [name, quantity(sigma, unit, 1), of(of_study), of(of_tolerance)])),
+  section.append(rows(`components of ${characteristic}`, ["Component", `σ (${unit || "%"})`, "% of study", "% of tolerance"], components.map(({ name, sigma, of_study, of_tolerance }) => [name, quantity(sigma, unit, 1, true), of(of_study), of(of_tolerance)])),
     make("details", "", make("summary", "", "Analysis of variance"), table));
   return section;
 }
