@@ -31,7 +31,10 @@ await page.addInitScript(() => {
   const parse = JSON.parse;
   JSON.parse = (text) => {
     const value = parse(text);
-    if (window.heldStill && value && value.heartbeat !== undefined) value.heartbeat = 7;
+    if (window.heldStill && value && value.heartbeat !== undefined) {
+      value.heartbeat = 7;
+      window.standsStill = true;
+    }
     return value;
   };
   window.jumped = 0;
@@ -395,6 +398,8 @@ try {
 
   await step("a measuring task whose heartbeat stands still makes the verdict STALE", async () => {
     await page.evaluate(() => { window.heldStill = true; });
+    // It stands still from the next event on, which comes within a second.
+    await page.waitForFunction(() => window.standsStill);
     await page.waitForSelector("body.stale", { timeout: STALE_WITHIN });
     assert.match(await page.textContent("#stale-words"), /heartbeat stands still/);
     await page.evaluate(() => { window.heldStill = false; });
