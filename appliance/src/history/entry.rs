@@ -110,6 +110,8 @@ columns! {
         press_stroke: u32 = record.press_stroke, "INTEGER NOT NULL";
         /// The token that triggered, 0 for an edge.
         token: u16 = record.token, "INTEGER NOT NULL";
+        /// The token of a request by the API.
+        request: Option<String> = record.request.as_deref().map(str::to_owned), "TEXT";
         /// PASS, FAIL or INVALID.
         verdict: Verdict = record.verdict, "INTEGER NOT NULL";
         /// 0, or why there is no measurement.
@@ -224,6 +226,7 @@ impl Entry {
         ResultRecord {
             seq: self.seq,
             token: self.token,
+            request: self.request.as_deref().map(Into::into),
             recipe: self.recipe,
             recipe_name: "".into(),
             recipe_crc: hex(&self.fingerprint),

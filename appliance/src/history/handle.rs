@@ -39,6 +39,8 @@ pub(super) enum Message {
         /// Gets a message when it is stored.
         stored: SyncSender<()>,
     },
+    /// Gets a message when everything before is stored.
+    Reached(SyncSender<()>),
     Stop {
         last_seq: u32,
     },
@@ -178,6 +180,8 @@ impl Keeping {
 
 /// Longest wait of a sign-in for its time to be stored.
 const DATING: Duration = Duration::from_secs(2);
+/// Longest wait of a request for its result to be stored.
+const STORING: Duration = Duration::from_secs(10);
 
 /// Access to the history's threads. Cheap to clone.
 #[derive(Clone)]
@@ -263,6 +267,14 @@ impl History {
             stored,
         };
         self.queue.try_send(dated).is_ok() && done.recv_timeout(DATING).is_ok()
+    }
+
+    /// Waits until every result so far is stored, those of the run before as well; answers whether they
+    /// are.
+    pub fn is_stored(&self) -> bool {
+        let (stored, done) = sync_channel(1);
+        let sent = self.queue.try_send(Message::Reached(stored));
+        sent.is_ok() && done.recv_timeout(STORING).is_ok()
     }
 
     /// Results that the history has lost since the start because the card did not keep up.

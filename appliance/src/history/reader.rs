@@ -123,6 +123,17 @@ impl Reader {
         )
     }
 
+    /// The result of a request by the API.
+    ///
+    /// # Errors
+    /// As [`Self::results`].
+    pub fn requested(&self, token: &str) -> HistoryResult<Option<Entry>> {
+        self.first(
+            "SELECT * FROM dated WHERE request = ?1 ORDER BY id DESC LIMIT 1",
+            token,
+        )
+    }
+
     /// The result whose frames are kept under this name.
     ///
     /// # Errors

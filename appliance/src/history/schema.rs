@@ -37,6 +37,7 @@ CREATE INDEX result_seq ON result (seq);
 CREATE INDEX result_recipe ON result (recipe, id);
 CREATE INDEX result_time ON result (time_utc_us);
 CREATE INDEX result_recording ON result (recording) WHERE recording IS NOT NULL;
+{REQUESTED};
 CREATE TABLE gauge (
     result INTEGER NOT NULL REFERENCES result (id) ON DELETE CASCADE,
     place INTEGER NOT NULL,
@@ -157,12 +158,22 @@ fn create(connection: &mut Connection) -> rusqlite::Result<()> {
     transaction.commit()
 }
 
-/// Adds the column that a history of this version lacks which was begun before there was flicker.
+/// Finds results by the token of a request.
+const REQUESTED: &str =
+    "CREATE INDEX IF NOT EXISTS result_request ON result (request) WHERE request IS NOT NULL";
+
+/// Adds the columns that a history of this version lacks which was begun before they were thought of.
 fn complete(connection: &Connection) -> rusqlite::Result<()> {
-    match connection.prepare("SELECT light FROM result") {
-        Ok(_) => Ok(()),
-        Err(_) => connection.execute_batch("ALTER TABLE result ADD COLUMN light TEXT"),
+    for column in ["light", "request"] {
+        if connection
+            .prepare(&format!("SELECT {column} FROM result"))
+            .is_err()
+        {
+            let add = format!("ALTER TABLE result ADD COLUMN {column} TEXT");
+            connection.execute_batch(&add)?;
+        }
     }
+    connection.execute_batch(REQUESTED)
 }
 
 fn strange(path: &Path, (application, version): (i64, i64)) -> HistoryError {

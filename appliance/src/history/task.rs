@@ -16,7 +16,7 @@ use crate::station::{Event, StationHandle};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -41,6 +41,8 @@ pub struct Task {
     waiting: VecDeque<Entry>,
     /// From which length on the log is brought into the database.
     due: u64,
+    /// Who waits until everything before is stored.
+    asking: Vec<SyncSender<()>>,
     /// Lost results that were reported to the station.
     lost_before: u32,
     /// The problem that was reported to the station last.
@@ -62,6 +64,7 @@ impl Task {
             keeping: Some(keeping),
             waiting: waiting.into(),
             due: STRETCH,
+            asking: Vec::new(),
             lost_before: 0,
             problem: None,
         }
@@ -134,6 +137,10 @@ impl Task {
                     let _ = stored.send(());
                 })
             }
+            Message::Reached(stored) => {
+                self.asking.push(stored);
+                Ok(())
+            }
             Message::Stop { .. } | Message::RecordingsEnded => Ok(()),
         };
         done.err().map(|error| error.to_string())
@@ -157,9 +164,16 @@ impl Task {
         let stored = match self.store() {
             Ok(begun) => {
                 self.waiting.clear();
+                // Whoever asked may have given up waiting.
+                for asked in self.asking.drain(..) {
+                    let _ = asked.send(());
+                }
                 begun.or(self.bound_log(paused))
             }
-            Err(error) => Some(format!("{error}: free space")),
+            Err(error) => {
+                self.asking.clear();
+                Some(format!("{error}: free space"))
+            }
         };
         let lost = self.history.lost();
         let more = lost.wrapping_sub(std::mem::replace(&mut self.lost_before, lost));

@@ -90,6 +90,7 @@ impl Rooms<'_> {
     ) -> Room {
         let (config, station) = (self.config.clone(), self.station.clone());
         let (dating, boot_id) = (self.history.clone(), station.snapshot().boot_id);
+        let storing = self.history.clone();
         let site = web::Site::new(web::Parts {
             station: station.clone(),
             access,
@@ -103,6 +104,7 @@ impl Rooms<'_> {
             history: Reader::of(self.path),
             studies: Studies::of(self.path),
             date: Box::new(move |utc_us| dating.date(boot_id, utc_us)),
+            is_stored: Box::new(move || storing.is_stored()),
             log: self.progress.logbook().clone(),
             registers: modbus::live,
             configuration: toml::to_string(&config).unwrap_or_default(),

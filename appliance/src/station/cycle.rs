@@ -9,20 +9,23 @@ use super::machine::{Station, log, push};
 use super::result::{Inspection, ResultRecord, Verdict};
 use super::stages::Stages;
 use super::state::{Cycle, State};
+use super::triggers::Trigger;
 
 impl Station {
     /// Accepts a trigger: latches what belongs to it and orders the measurement. Only while READY.
-    pub(super) fn begin(&mut self, token: u16, effects: &mut Effects) {
+    pub(super) fn begin(&mut self, trigger: &Trigger, effects: &mut Effects) {
         let Some(recipe) = self.recipes.active.clone() else {
             return;
         };
-        self.requests.accept(token);
+        self.requests.accept(trigger.token);
         self.results.begin();
+        let written = &self.plc.registers;
         let order = Job {
             job: self.worker.next_job(),
-            token,
-            part_id: self.plc.registers.part_id,
-            press_stroke: self.plc.registers.press_stroke,
+            token: trigger.token,
+            request: trigger.request.clone(),
+            part_id: trigger.part_id.unwrap_or(written.part_id),
+            press_stroke: trigger.press_stroke.unwrap_or(written.press_stroke),
             recipe,
             accepted: self.clock.now(),
         };
@@ -131,6 +134,7 @@ impl Station {
         let record = Arc::new(ResultRecord {
             seq: self.results.next_seq(),
             token: order.token,
+            request: order.request,
             recipe: order.recipe.number,
             recipe_name: order.recipe.name,
             recipe_crc: order.recipe.crc,

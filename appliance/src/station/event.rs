@@ -7,7 +7,7 @@ use super::control::ControlWrite;
 use super::health::{Drift, Pace, ProjectorHealth, System};
 use super::recipes::{ActiveRecipe, RecipeKey, RecipeResult};
 use super::result::{Inspection, ResultRecord};
-use super::triggers::Client;
+use super::triggers::{Client, Trigger};
 use algo::inspect::Marking;
 
 /// The number of one order to the worker. Each answer carries it, so that a late answer is
@@ -19,6 +19,8 @@ pub struct JobId(pub u64);
 /// page.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Request {
+    /// Measure.
+    Trigger(Trigger),
     /// Load a recipe.
     Load(RecipeKey),
     /// Teach a recipe; allowed also where the PLC must not teach.
@@ -225,6 +227,8 @@ pub struct Job {
     pub job: JobId,
     /// The token that triggered, 0 for an edge.
     pub token: u16,
+    /// The token of a request by the API.
+    pub request: Option<Arc<str>>,
     /// The piece's serial.
     pub part_id: u32,
     /// Stroke or pallet counter.

@@ -121,4 +121,4 @@ pub use snapshot::Snapshot;
 pub use stages::{Stage, StageTime, Stages};
 pub use state::{Cycle, LoadProgress, State, TeachProgress};
 pub use step::step;
-pub use triggers::Client;
+pub use triggers::{Client, Trigger};

@@ -210,6 +210,8 @@ pub struct ResultRecord {
     pub seq: u32,
     /// The token that triggered, 0 for an edge.
     pub token: u16,
+    /// The token of a request by the API.
+    pub request: Option<Arc<str>>,
     /// Recipe number.
     pub recipe: u16,
     /// The recipe's name at the trigger.

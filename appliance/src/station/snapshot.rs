@@ -136,6 +136,8 @@ pub struct Snapshot {
     pub missed: u32,
     /// The last accepted token.
     pub last_token: u16,
+    /// The token of the API's request that is being measured.
+    pub request: Option<Arc<str>>,
     /// Results waiting for RESULT_ACK.
     pub buffered: u16,
     /// REJECT_REASON, see [`reject`].
@@ -233,6 +235,10 @@ impl Station {
             result_seq: self.results.last_seq,
             missed: self.requests.missed,
             last_token: self.requests.last_token,
+            request: self
+                .state
+                .cycle()
+                .and_then(|cycle| cycle.order.request.clone()),
             buffered: u16::try_from(self.results.queue.len()).unwrap_or(u16::MAX),
             reject_reason: self.requests.reject_reason,
             refusal: self.refusal(),

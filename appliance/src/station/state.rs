@@ -148,15 +148,22 @@ impl State {
         }
     }
 
+    /// The trigger being served.
+    pub fn cycle(&self) -> Option<&Cycle> {
+        match self {
+            Self::Acquiring { cycle, .. } | Self::Processing { cycle, .. } => Some(cycle),
+            Self::Stopping { cycle } => cycle.as_ref(),
+            _ => None,
+        }
+    }
+
     /// The job that the worker is doing in this state.
     pub fn job(&self) -> Option<JobId> {
         match self {
-            Self::Acquiring { cycle, .. } | Self::Processing { cycle, .. } => Some(cycle.order.job),
-            Self::Stopping { cycle } => cycle.as_ref().map(|cycle| cycle.order.job),
             Self::Loading { job, .. }
             | Self::Teaching { job, .. }
             | Self::Commissioning { job, .. } => Some(*job),
-            Self::Boot { .. } | Self::Ready | Self::Offline | Self::Fault(_) => None,
+            _ => self.cycle().map(|cycle| cycle.order.job),
         }
     }
 }

@@ -10,7 +10,7 @@ use super::fault::{ClearedBy, Fault};
 use super::machine::{Station, push};
 use super::snapshot::reject;
 use super::state::State;
-use super::triggers::Client;
+use super::triggers::{Client, Trigger};
 
 /// Takes one event. Every state takes every event; an event that makes no sense in a state changes
 /// nothing and is logged.
@@ -34,6 +34,7 @@ impl Station {
                 rising,
                 client,
             } => self.written(&write, rising, client, effects),
+            Event::Request(Request::Trigger(trigger)) => self.triggered(&trigger, effects),
             Event::Request(Request::Load(key)) => {
                 self.load(key, effects);
             }
@@ -158,17 +159,24 @@ impl Station {
         }
         let token = self.requests.new_token(write.token);
         if rose(control::TRIGGER) || token.is_some() {
-            self.triggered(token.unwrap_or(0), client, effects);
+            let trigger = Trigger {
+                client,
+                token: token.unwrap_or(0),
+                ..Trigger::default()
+            };
+            self.triggered(&trigger, effects);
         }
     }
 
     /// Takes a trigger, or counts it as missed.
-    fn triggered(&mut self, token: u16, client: Client, effects: &mut Effects) {
-        let now = self.clock.now();
-        match self.refusal() {
+    fn triggered(&mut self, trigger: &Trigger, effects: &mut Effects) {
+        let (now, client) = (self.clock.now(), trigger.client);
+        let active = self.recipes.active.as_ref().map(|recipe| recipe.number);
+        let other = trigger.recipe.is_some() && trigger.recipe != active;
+        match self.refusal().or(other.then_some(reject::OTHER_RECIPE)) {
             None if self.turns.may(client, now) => {
                 self.turns.granted(client);
-                self.begin(token, effects);
+                self.begin(trigger, effects);
             }
             None => self.requests.miss(reject::NOT_READY),
             Some(reason) => {

@@ -8,6 +8,7 @@
 //! other client.
 
 use super::clock::Micros;
+use std::sync::Arc;
 
 /// Who triggers.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -28,6 +29,23 @@ impl Client {
             _ => false,
         }
     }
+}
+
+/// A trigger: who asks for what.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Trigger {
+    /// Who asks.
+    pub client: Client,
+    /// TRIGGER_TOKEN, 0 for an edge.
+    pub token: u16,
+    /// The token of a request by the API.
+    pub request: Option<Arc<str>>,
+    /// The recipe that must be active; any if it is not said.
+    pub recipe: Option<u16>,
+    /// PART_ID; that of the registers if it is not said.
+    pub part_id: Option<u32>,
+    /// PRESS_STROKE; that of the registers if it is not said.
+    pub press_stroke: Option<u32>,
 }
 
 /// Rejected triggers after which a client waits for its turn: one that asks less often does not

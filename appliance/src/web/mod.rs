@@ -20,6 +20,7 @@ mod downloads;
 mod gate;
 mod head;
 mod history;
+mod maps;
 mod metrics;
 mod orders;
 mod recipes;
@@ -28,6 +29,7 @@ mod results;
 mod site;
 mod studies;
 mod tries;
+mod triggers;
 
 #[cfg(test)]
 mod tests;

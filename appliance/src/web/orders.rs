@@ -1,17 +1,14 @@
-//! Orders to the station: trigger, reset, load and teach.
+//! Orders to the station: reset, load and teach.
 
-use std::hash::{DefaultHasher, Hash as _, Hasher as _};
-use std::sync::Arc;
 use std::time::Duration;
 
 use axum::body::Body;
 use axum::extract::Request as Asked;
-use axum::http::{HeaderMap, StatusCode};
+use axum::http::StatusCode;
 use axum::response::Json;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::gate;
 use super::problem::{Answered, Problem};
 use super::request;
 use super::request::Path;
@@ -19,7 +16,7 @@ use super::site::Site;
 use crate::recipe::file::rules::check_marking;
 use crate::recipe::store;
 use crate::recipe::teach::replace;
-use crate::station::control::{ERROR_RESET, MAX_RECIPE, TRIGGER};
+use crate::station::control::{ERROR_RESET, MAX_RECIPE};
 use crate::station::{
     Client, ControlWrite, Event, Marking, RecipeKey, RecipeResult, Request, Snapshot, Teaching,
 };
@@ -38,35 +35,13 @@ pub(super) fn not_now(what: &str, snapshot: &Snapshot) -> Problem {
     ))
 }
 
-/// Why a trigger was rejected, from the snapshot after it.
-fn rejected(snapshot: &Snapshot) -> Problem {
-    let words = snapshot.refusal_words();
-    let words = words.unwrap_or_else(|| "another client waits for its turn: try again".into());
-    Problem::busy(format!("trigger: {words}"))
-}
-
-/// A rising edge without a write, so the PLC's registers stay as it wrote them.
-fn edge(site: &Site, rising: u16, headers: &HeaderMap) -> Arc<Snapshot> {
-    let mut session = DefaultHasher::new();
-    gate::token(headers).hash(&mut session);
-    site.station.event(Event::Write {
+pub(super) async fn reset(site: Site) -> Answered<Accepted> {
+    // A rising edge without a write, so the PLC's registers stay as it wrote them.
+    let after = site.station.event(Event::Write {
         write: ControlWrite::default(),
-        rising,
-        client: Client::Page(session.finish()),
-    })
-}
-
-pub(super) async fn trigger(site: Site, headers: HeaderMap) -> Answered<Accepted> {
-    let before = site.station.snapshot().triggers;
-    let after = edge(&site, TRIGGER, &headers);
-    if after.triggers == before {
-        return Err(rejected(&after));
-    }
-    Ok(accepted())
-}
-
-pub(super) async fn reset(site: Site, headers: HeaderMap) -> Answered<Accepted> {
-    let after = edge(&site, ERROR_RESET, &headers);
+        rising: ERROR_RESET,
+        client: Client::default(),
+    });
     match &after.fault {
         None => Ok(accepted()),
         Some(fault) => Err(Problem::busy(format!(

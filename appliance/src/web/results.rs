@@ -51,7 +51,7 @@ struct FirstLine<'a> {
 
 /// Any other line. Lengths in mm, angles in °, volumes in mm³, shares 0…1.
 #[derive(Serialize)]
-struct Line<'a> {
+pub(super) struct Line<'a> {
     serial: &'a str,
     history: &'a str,
     seq: u32,
@@ -61,7 +61,9 @@ struct Line<'a> {
     fingerprint: &'a str,
     part_id: u32,
     press_stroke: u32,
+    request: Option<&'a str>,
     verdict: Verdict,
+    reason: Option<&'a str>,
     error_code: u16,
     flags: u16,
     exposure_us: u32,
@@ -144,7 +146,7 @@ fn line(to: &mut ToClient, line: &impl Serialize) -> io::Result<()> {
     to.write_all(b"\n")
 }
 
-fn of<'a>(serial: &'a str, history: &'a str, entry: &'a Entry) -> Line<'a> {
+pub(super) fn of<'a>(serial: &'a str, history: &'a str, entry: &'a Entry) -> Line<'a> {
     let (us, clock) = match (entry.time_utc_us, entry.browser_utc_us) {
         (Some(us), _) => (Some(us), "synchronised"),
         (None, Some(us)) => (Some(us), "browser"),
@@ -160,7 +162,9 @@ fn of<'a>(serial: &'a str, history: &'a str, entry: &'a Entry) -> Line<'a> {
         fingerprint: &entry.fingerprint,
         part_id: entry.part_id,
         press_stroke: entry.press_stroke,
+        request: entry.request.as_deref(),
         verdict: entry.verdict,
+        reason: entry.reason.as_deref(),
         error_code: entry.error_code,
         flags: entry.flags,
         exposure_us: entry.exposure_us,

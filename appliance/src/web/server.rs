@@ -7,7 +7,8 @@ use super::site::Site;
 use super::slots::{Slot, Slots};
 use super::view::{self, Following};
 use super::{
-    assets, downloads, head, history, look, metrics, orders, recipes, results, studies, tries,
+    assets, downloads, head, history, look, maps, metrics, orders, recipes, results, studies,
+    tries, triggers,
 };
 use crate::system::clock;
 use axum::extract::Request;
@@ -97,6 +98,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/log", look::log),
         look("/api/changes", look::changes),
         look("/api/last/cloud.ply", downloads::cloud),
+        look("/api/last/maps.npz", maps::last),
         look("/api/last/recording.zip", downloads::recording),
         look("/api/last/gauges.csv", downloads::gauges),
         look("/api/last/features", look::features),
@@ -105,6 +107,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/history/{seq}", history::one),
         look("/api/history/{seq}/picture/{layer}", history::picture),
         look("/api/history/{seq}/features", history::features),
+        look("/api/history/{seq}/maps.npz", maps::kept),
         look("/api/history/{seq}/recording.zip", history::recording),
         look("/api/results", results::after),
         look("/api/diagnostics.zip", downloads::diagnostics),
@@ -112,6 +115,7 @@ pub fn routes() -> Vec<Route> {
         look("/api/recipes", recipes::list),
         look("/api/recipes/{number}", recipes::one),
         look("/api/recipes/{number}/file", recipes::export),
+        look("/api/recipes/{number}/maps.npz", maps::golden),
         look("/api/recipes/{number}/picture/{layer}", recipes::picture),
         change(POST, "/api/recipes", "import recipe", recipes::import),
         change(PUT, "/api/recipes/{number}", "edit recipe", recipes::edit),
@@ -140,7 +144,7 @@ pub fn routes() -> Vec<Route> {
             "teach recipe",
             orders::teach,
         ),
-        change(POST, "/api/trigger", "trigger", orders::trigger),
+        change(POST, "/api/trigger", "trigger", triggers::trigger),
         change(POST, "/api/reset", "reset errors", orders::reset),
         look("/api/head", head::state),
         look("/api/head/board.pdf", head::board_pdf),

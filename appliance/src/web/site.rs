@@ -82,6 +82,8 @@ pub struct Parts {
     /// Stores the time of this start of the daemon, µs since 1970 UTC, by the clock of a signed-in
     /// user's browser; answers whether it is stored.
     pub date: Box<dyn Fn(u64) -> bool + Send + Sync>,
+    /// Waits until every result so far is stored; answers whether they are.
+    pub is_stored: Box<dyn Fn() -> bool + Send + Sync>,
     /// The log.
     pub log: Logbook,
     /// The registers with their values, as the PLC reads them.
@@ -115,6 +117,8 @@ pub struct Site {
     pub(super) kept: Arc<Mutex<LastKept>>,
     /// The recipe whose edit was tried last; locked while an edit is tried.
     pub(super) opened: Arc<Mutex<LastOpened>>,
+    /// Held from the look-up of a trigger's token until its result is stored.
+    pub(super) asking: Arc<Mutex<()>>,
     /// The guided study that runs.
     pub(super) desk: Desk,
     /// The tries that are being answered.
@@ -151,6 +155,7 @@ impl Site {
             collected_at_s: Arc::default(),
             kept: Arc::default(),
             opened: Arc::default(),
+            asking: Arc::default(),
             desk: Desk::default(),
             tries: Tries::default(),
             looking: Arc::new(Semaphore::new(MAX_ASIDE)),

@@ -62,6 +62,7 @@ impl Page {
         let (orders, _) = mpsc::channel();
         let (commission, _) = Commission::open(folder.path());
         let site = Site::new(Parts {
+            is_stored: Box::new(|| true),
             station,
             access: access.clone(),
             recipes: Store::open(&recipes).expect("a store"),

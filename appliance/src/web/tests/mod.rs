@@ -60,6 +60,7 @@ async fn served() -> Served {
     let (orders, _) = mpsc::channel();
     let (commission, _) = Commission::open(folder.path());
     let site = Site::new(Parts {
+        is_stored: Box::new(|| true),
         station: handle.clone(),
         access,
         recipes: Store::open(&folder.path().join("recipes")).unwrap(),
