@@ -129,9 +129,26 @@ pub fn read<T: Element>(bytes: &[u8]) -> Result<Array<T>, NpyError> {
 /// out.
 pub fn write<T: Element>(columns: usize, elements: &[T]) -> Vec<u8> {
     let rows = elements.len() / columns.max(1);
-    let kind = T::KIND;
-    let mut text =
-        format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    let shape = format!("{rows}, {columns}");
+    let mut bytes = preamble(T::KIND, &shape, size_of_val(elements));
+    for element in &elements[..rows * columns] {
+        element.write(&mut bytes);
+    }
+    bytes
+}
+
+/// The bytes of a version 1.0 file that holds a text, as an array without dimensions.
+pub fn write_text(text: &str) -> Vec<u8> {
+    let length = text.chars().count();
+    let mut bytes = preamble(&format!("<U{length}"), "", 4 * length);
+    let letters = text.chars().map(|letter| u32::from(letter).to_le_bytes());
+    bytes.extend(letters.flatten());
+    bytes
+}
+
+/// What comes before the elements, and room for so many bytes of them.
+fn preamble(kind: &str, shape: &str, room: usize) -> Vec<u8> {
+    let mut text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({shape}), }}");
     let preamble = MAGIC.len() + 4;
     // The header ends with a newline, and is padded with spaces before it.
     let padded = (preamble + text.len() + 1).next_multiple_of(ALIGNMENT) - preamble;
@@ -139,14 +156,11 @@ pub fn write<T: Element>(columns: usize, elements: &[T]) -> Vec<u8> {
         text.push(' ');
     }
     text.push('\n');
-    let mut bytes = Vec::with_capacity(preamble + padded + size_of_val(elements));
+    let mut bytes = Vec::with_capacity(preamble + padded + room);
     bytes.extend_from_slice(MAGIC);
     bytes.extend_from_slice(&[1, 0]);
     bytes.extend_from_slice(&u16::try_from(text.len()).unwrap_or(u16::MAX).to_le_bytes());
     bytes.extend_from_slice(text.as_bytes());
-    for element in &elements[..rows * columns] {
-        element.write(&mut bytes);
-    }
     bytes
 }
 

@@ -5,7 +5,7 @@ use super::options::{Output, Threads};
 use crate::error::{Exit, Result};
 use crate::history::kept;
 use crate::measure::{MeasuredRecording, measure_about_map, measure_with, models};
-use crate::output::cloud::Axes;
+use crate::output::cloud::{Axes, Pixels};
 use crate::output::{grey_png, picture};
 use crate::storage::archive::Unpacked;
 use crate::storage::folder::OutputFolder;
@@ -34,6 +34,9 @@ pub struct Measure {
     /// Frame of the points in cloud.ply.
     #[arg(long, default_value = "world")]
     axes: Axes,
+    /// Pixels of cloud.ply: those with a height, or all, row by row.
+    #[arg(long, default_value = "resolved")]
+    pixels: Pixels,
     #[command(flatten)]
     threads: Threads,
     #[command(flatten)]
@@ -62,7 +65,7 @@ impl Measure {
         let mut measurement = pool.install(measured)?;
         measurement.report.add_models(models);
         let folder = OutputFolder::create(&self.out)?;
-        pool.install(|| write(&folder, &measurement, self.axes))?;
+        pool.install(|| write(&folder, &measurement, (self.axes, self.pixels)))?;
         let json = serde_json::to_string_pretty(&measurement.report)
             .map_err(Exit::Software.because("write the report"))?;
         folder.write("report.json", format!("{json}\n").as_bytes())?;
@@ -99,7 +102,11 @@ const PLACES: [&str; 2] = ["column", "row"];
 /// Files of each pattern, by the beginning of their names.
 const OF_PATTERN: [&str; 4] = ["phase", "wrapped", "modulation", "mask"];
 
-fn write(folder: &OutputFolder, measurement: &MeasuredRecording, axes: Axes) -> Result<()> {
+fn write(
+    folder: &OutputFolder,
+    measurement: &MeasuredRecording,
+    form: (Axes, Pixels),
+) -> Result<()> {
     let array = |name: &str, width, values: &[f32]| folder.write(name, &npy::write(width, values));
     let patterns = measurement.phases.len();
     write_pattern(folder, measurement, measurement.primary, "")?;
@@ -139,7 +146,7 @@ fn write(folder: &OutputFolder, measurement: &MeasuredRecording, axes: Axes) -> 
         let rows = mm.len() / map.width.max(1);
         let png = picture::height_png(map.width as u32, rows as u32, &mm);
         folder.write(picture_of, &png)?;
-        folder.write(points, &surface.ply(axes, &measurement.intensity))?;
+        folder.write(points, &surface.ply(form, &measurement.intensity))?;
     }
     Ok(())
 }

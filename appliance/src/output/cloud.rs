@@ -48,25 +48,45 @@ impl Axes {
     }
 }
 
-/// A binary little-endian PLY: one vertex per known height with float x, y, z in mm, uchar
-/// intensity and float sigma (σ_z in mm, NaN where not known).
+/// Which pixels a cloud has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, clap::ValueEnum)]
+#[serde(rename_all = "lowercase")]
+pub enum Pixels {
+    /// Those with a height.
+    #[default]
+    Resolved,
+    /// All, row by row, NaN where there is no height: an organised cloud.
+    All,
+}
+
+/// A binary little-endian PLY: one vertex per pixel with float x, y, z in mm, uchar intensity and
+/// float sigma (σ_z in mm, NaN where not known).
 ///
 /// `heights` are row-major in rows of `width` pixels; `shade` gives intensity and σ_z of the pixel
 /// of an index.
 pub fn ply(
     triangulator: &Triangulator,
-    axes: Axes,
+    (axes, pixels): (Axes, Pixels),
     width: usize,
-    heights: impl Iterator<Item = Height>,
+    heights: impl ExactSizeIterator<Item = Height>,
     shade: impl Fn(usize) -> (u8, f32),
 ) -> Vec<u8> {
-    let points: Vec<_> = heights
-        .enumerate()
-        .filter_map(|(at, height)| Some((at, triangulator.point(at % width, at / width, height)?)))
-        .collect();
+    // As readers of organised clouds expect it.
+    let grid = match pixels {
+        Pixels::Resolved => String::new(),
+        Pixels::All => {
+            let rows = heights.len() / width.max(1);
+            format!("obj_info num_cols {width}\nobj_info num_rows {rows}\n")
+        }
+    };
+    let found = |(at, height)| {
+        let point = triangulator.point(at % width, at / width, height);
+        (point.is_some() || pixels == Pixels::All).then_some((at, point))
+    };
+    let points: Vec<_> = heights.enumerate().filter_map(found).collect();
     let count = points.len();
     let mut ply = format!(
-        "ply\nformat binary_little_endian 1.0\ncomment {}\n\
+        "ply\nformat binary_little_endian 1.0\ncomment {}\n{grid}\
          element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n\
          property uchar intensity\nproperty float sigma\nend_header\n",
         axes.comment()
@@ -74,7 +94,8 @@ pub fn ply(
     .into_bytes();
     ply.reserve(count * VERTEX_BYTES);
     for (at, point) in points {
-        for coordinate in axes.place(triangulator.camera(), point) {
+        let place = |point| axes.place(triangulator.camera(), point);
+        for coordinate in point.map_or([f64::NAN; 3], place) {
             ply.extend_from_slice(&(coordinate as f32).to_le_bytes());
         }
         let (intensity, sigma) = shade(at);
@@ -86,10 +107,10 @@ pub fn ply(
 
 impl Surface {
     /// The heights as a [`ply`]; `intensity` is one value per pixel, row-major like the heights.
-    pub fn ply(&self, axes: Axes, intensity: &[u8]) -> Vec<u8> {
+    pub fn ply(&self, form: (Axes, Pixels), intensity: &[u8]) -> Vec<u8> {
         let Self { map, triangulator } = self;
         let heights = map.height.iter().copied();
-        ply(triangulator, axes, map.width, heights, |at| {
+        ply(triangulator, form, map.width, heights, |at| {
             (intensity.get(at).copied().unwrap_or(0), map.sigma[at])
         })
     }

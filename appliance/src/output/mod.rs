@@ -3,6 +3,7 @@
 
 pub mod board;
 pub mod cloud;
+pub mod npz;
 pub mod picture;
 
 use embedded_graphics::Drawable;

@@ -18,13 +18,18 @@ use zip::ZipWriter;
 use zip::result::ZipError;
 
 use super::problem::{Answered, Problem};
+use super::request::Query;
 use super::site::Site;
 use super::{metrics, view};
 use crate::history::{Filter, JudgedPart, name_of};
+use crate::output::cloud::Pixels;
+use crate::output::npz::OrganisedMaps;
 use crate::storage::archive::{packed, stored};
 
 /// Bytes of a file that are sent to its client at a time.
 const CHUNK: usize = 64 << 10;
+/// The same of maps, which have tens of megabytes.
+const LARGE_CHUNK: usize = 1 << 20;
 
 /// What is sent.
 pub(super) enum Download {
@@ -34,6 +39,8 @@ pub(super) enum Download {
     Stored(File),
     /// A folder, as a ZIP.
     Folder(Packed),
+    /// Maps, as NPZ.
+    Maps(Box<OrganisedMaps>),
 }
 
 impl Download {
@@ -42,7 +49,7 @@ impl Download {
         Ok(match self {
             Self::Bytes(bytes) => Some(bytes.len() as u64),
             Self::Stored(file) => Some(file.metadata()?.len()),
-            Self::Folder(_) => None,
+            Self::Folder(_) | Self::Maps(_) => None,
         })
     }
 
@@ -53,6 +60,10 @@ impl Download {
                 .try_for_each(|chunk| to.write_all(chunk)),
             Self::Stored(mut file) => io::copy(&mut file, to).map(drop),
             Self::Folder(packed) => packed.write(to).map_err(io::Error::other),
+            Self::Maps(maps) => {
+                to.most = LARGE_CHUNK;
+                maps.write(to).map_err(io::Error::other)
+            }
         }
     }
 }
@@ -139,6 +150,8 @@ impl Packed {
 pub(super) struct ToClient {
     sender: mpsc::Sender<Result<Bytes, io::Error>>,
     chunk: Vec<u8>,
+    /// Bytes of a chunk.
+    most: usize,
     /// Whether all of the answer was sent.
     whole: Arc<AtomicBool>,
     /// Longest wait for the client to take a chunk.
@@ -165,6 +178,7 @@ impl ToClient {
         let to = Self {
             sender,
             chunk: Vec::new(),
+            most: CHUNK,
             whole,
             slow: SLOW,
         };
@@ -182,7 +196,7 @@ impl ToClient {
 impl io::Write for ToClient {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.chunk.extend_from_slice(bytes);
-        if self.chunk.len() >= CHUNK {
+        if self.chunk.len() >= self.most {
             self.flush()?;
         }
         Ok(bytes.len())
@@ -206,13 +220,23 @@ impl io::Write for ToClient {
     }
 }
 
-pub(super) async fn cloud(site: Site) -> Answered<Response> {
-    send(&site, "application/octet-stream", |site| {
-        let asked = site.last_cycle.ask(|cycle| {
+/// Which pixels of the part are sent.
+#[derive(Debug, Default, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub(super) struct CloudQuery {
+    pixels: Pixels,
+}
+
+pub(super) async fn cloud(
+    site: Site,
+    Query(CloudQuery { pixels }): Query<CloudQuery>,
+) -> Answered<Response> {
+    send(&site, "application/octet-stream", move |site| {
+        let asked = site.last_cycle.ask(move |cycle| {
             let layers = cycle.plan.layers(cycle.sequence, &cycle.frames)?;
             Some((
                 format!("{}.ply", cycle.record.seq),
-                Download::Bytes(layers.cloud()),
+                Download::Bytes(layers.cloud(pixels)),
             ))
         });
         asked.flatten().ok_or_else(|| Problem::missing(GONE))
@@ -221,7 +245,7 @@ pub(super) async fn cloud(site: Site) -> Answered<Response> {
 }
 
 /// The answer where the frames of the last result are needed and missing.
-const GONE: &str =
+pub(super) const GONE: &str =
     "the frames of the last result are gone, or the station is busy; trigger a measurement";
 
 pub(super) async fn recording(site: Site) -> Answered<Response> {

@@ -10,11 +10,11 @@ use super::look::{Level, found, map_of, place_of};
 use super::map::Map;
 use super::problem::{Answered, Problem};
 use super::request::{Path, Query};
-use super::site::Site;
+use super::site::{LastKept, Site};
 use crate::error::{Exit, Failure};
 use crate::history::kept::Kept;
 use crate::history::{Entry, Filter, HistoryError, why_no_frames};
-use crate::recipe::plan::Plan;
+use crate::recipe::plan::{Layers, Plan};
 use crate::station::Verdict;
 use crate::station::result::flag;
 use crate::system::computing;
@@ -23,6 +23,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::sync::Arc;
+use tokio::sync::OwnedMutexGuard;
 use tokio::task::{JoinError, spawn_blocking};
 
 /// Results of one answer, unless it asks for fewer.
@@ -148,7 +149,7 @@ pub(super) async fn one(site: Site, Path(seq): Path<u32>) -> Answered<Json<Value
     found.await.map(Json)
 }
 
-fn unknown(seq: u32) -> Problem {
+pub(super) fn unknown(seq: u32) -> Problem {
     Problem::missing(format!("there is no result {seq} in the history"))
 }
 
@@ -159,20 +160,29 @@ pub(super) async fn picture(
 ) -> Answered<Map> {
     let at = place_of(&layer)?;
     // Waiting here takes no thread from other requests.
-    let mut last = site.kept.clone().lock_owned().await;
-    let worked = spawn_blocking(move || {
-        if last.as_ref().is_none_or(|(of, _)| *of != seq) {
-            *last = None;
-            let layers = judged(&site, seq, |_, plan, sequence, kept| {
-                plan.layers(sequence, &kept.frames())
-            })?;
-            let layers = layers.ok_or_else(|| Problem::broken(OTHER_FRAMES))?;
-            *last = Some((seq, Arc::new(layers)));
-        }
-        let (_, layers) = last.as_ref().ok_or_else(|| Problem::broken(OTHER_FRAMES))?;
-        map_of(layers, at, seq, level)
-    });
+    let last = site.kept.clone().lock_owned().await;
+    let worked = spawn_blocking(move || map_of(&*layers(&site, last, seq)?, at, seq, level));
     worked.await.map_err(failed)?
+}
+
+/// The maps of a kept part; those that were worked out `last` are not worked out again.
+pub(super) fn layers(
+    site: &Site,
+    mut last: OwnedMutexGuard<LastKept>,
+    seq: u32,
+) -> Answered<Arc<Layers>> {
+    if let Some((of, layers)) = &*last
+        && *of == seq
+    {
+        return Ok(layers.clone());
+    }
+    *last = None;
+    let layers = judged(site, seq, |_, plan, sequence, kept| {
+        plan.layers(sequence, &kept.frames())
+    })?;
+    let layers = Arc::new(layers.ok_or_else(|| Problem::broken(OTHER_FRAMES))?);
+    *last = Some((seq, layers.clone()));
+    Ok(layers)
 }
 
 /// What was found on a kept part.
@@ -189,7 +199,7 @@ pub(super) async fn features(site: Site, Path(seq): Path<u32>) -> Answered<Json<
     worked.await.map_err(failed)?.map(Json)
 }
 
-fn failed(_: JoinError) -> Problem {
+pub(super) fn failed(_: JoinError) -> Problem {
     Problem::broken("working it out failed; see the log")
 }
 
@@ -204,6 +214,17 @@ pub(super) fn kept_frames(site: &Site, seq: u32) -> Answered<(Entry, PathBuf)> {
     Ok((entry, folder))
 }
 
+/// Works on a thread that gives way to the measuring task.
+pub(super) fn looking_back<T: Send>(work: impl FnOnce() -> Answered<T> + Send) -> Answered<T> {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(1)
+        .thread_name(|_| "looking-back".into())
+        .start_handler(|_| computing::give_way())
+        .build()
+        .map_err(|error| Problem::broken(format!("start a thread: {error}: free memory")))?;
+    pool.install(work)
+}
+
 /// Works on the frames of a kept part and the plan that judged it.
 fn judged<T: Send>(
     site: &Site,
@@ -211,13 +232,7 @@ fn judged<T: Send>(
     work: impl FnOnce(&Entry, &Plan, usize, &Kept) -> T + Send,
 ) -> Answered<T> {
     let (entry, folder) = kept_frames(site, seq)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .thread_name(|_| "looking-back".into())
-        .start_handler(|_| computing::give_way())
-        .build()
-        .map_err(|error| Problem::broken(format!("start a thread: {error}: free memory")))?;
-    pool.install(|| {
+    looking_back(|| {
         let kept = Kept::open(&folder)?;
         let (recipe, _) = kept.recipe(&site.recipes)?;
         let plan = kept.plan(recipe, false);

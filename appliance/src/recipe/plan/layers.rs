@@ -1,12 +1,12 @@
 //! Maps of a measured part for the page (height, deviation from golden, modulation), and its point
 //! cloud.
 
-use super::Plan;
 use super::inspect::Laps;
 use super::taught::pitch;
+use super::{Plan, STRIPS};
 use crate::head::calibration::Calibration;
 use crate::head::seam;
-use crate::output::cloud::{Axes, ply};
+use crate::output::cloud::{Axes, Pixels, ply};
 use crate::recipe::{Recipe, Refusal};
 use crate::station::Square;
 use algo::geometry::{HeightRange, Triangulator};
@@ -24,6 +24,8 @@ pub struct Layers {
     pub width: usize,
     /// z in mm as the part lies, NaN where not resolved.
     pub height_mm: Vec<f32>,
+    /// σ_z in mm: the noise of [`Self::height_mm`].
+    pub sigma_mm: Vec<f32>,
     /// Deviation from golden in mm as [`Self::shown`] says, NaN where the part is not compared.
     pub deviation_mm: Vec<f32>,
     /// Which deviation the map shows.
@@ -42,15 +44,16 @@ impl Layers {
     }
 
     /// The point cloud of the part as binary PLY, with its modulation as intensity.
-    pub fn cloud(&self) -> Vec<u8> {
+    pub fn cloud(&self, pixels: Pixels) -> Vec<u8> {
         // NaN becomes an unknown height.
         let heights = self.height_mm.iter();
         let heights = heights.map(|&mm| Height::from_mm(f64::from(mm)));
         let shade = |at: usize| {
             let intensity = self.modulation[at] * 2.0 / f32::from(self.full_scale) * 255.0;
-            (intensity as u8, f32::NAN)
+            (intensity as u8, self.sigma_mm[at])
         };
-        ply(&self.triangulator, Axes::World, self.width, heights, shade)
+        let form = (Axes::World, pixels);
+        ply(&self.triangulator, form, self.width, heights, shade)
     }
 }
 
@@ -142,17 +145,20 @@ impl Plan {
     /// The maps of a part from the frames of a sequence; `None` if the frames do not fit.
     pub fn layers(&self, sequence: usize, frames: &[Frame]) -> Option<Layers> {
         let (columns, rows, _) = self.conditions.camera;
+        let production = &self.runs.get(sequence)?.production;
         let unknown = vec![f32::NAN; columns as usize * rows as usize];
-        let (mut height_mm, mut deviation_mm) = (unknown.clone(), unknown);
+        let (mut height_mm, mut sigma_mm) = (unknown.clone(), unknown.clone());
+        let mut deviation_mm = unknown;
         let maps = Maps {
             heights: Some(&mut height_mm),
+            sigma: Some(&mut sigma_mm),
             deviation: Some(&mut deviation_mm),
         };
-        let mut strips = self.strips();
+        // Not the plan's: another part may be judged meanwhile.
+        let mut strips = production.strips((rows as usize).div_ceil(STRIPS));
         let of = (self.arriving(sequence), frames);
         let found = self.run(&mut strips, of, maps, &mut Laps::now());
         let shown = self.shown(&found.ok()?.findings);
-        let production = &self.runs.get(sequence)?.production;
         let deviation_mm =
             Drawing::new(production, &strips).square_means(&deviation_mm, shown.side);
         drop(strips);
@@ -162,6 +168,7 @@ impl Plan {
         Some(Layers {
             width: production.cubics().surface().width,
             height_mm,
+            sigma_mm,
             deviation_mm,
             shown,
             triangulator: production.shared_triangulator(),

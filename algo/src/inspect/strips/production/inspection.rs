@@ -90,7 +90,7 @@ impl Production {
         let placed = self.place(input, strips)?;
         let maps = Maps {
             heights,
-            deviation: None,
+            ..Maps::default()
         };
         self.inspect_placed((input, Signal::Frames(frames, 0.0)), strips, placed, maps)
     }

@@ -48,6 +48,8 @@ impl Strips {
 pub struct Maps<'a> {
     /// z in mm of each pixel with a height, as the part lies.
     pub heights: Option<&'a mut [f32]>,
+    /// σ_z in mm of each pixel with a height: its noise, without the uncertainty of models.
+    pub sigma: Option<&'a mut [f32]>,
     /// Deviation from golden along its normal in mm of each pixel that is compared, as the squares
     /// of a gauge get it: the part's motion taken back, times golden's weight.
     pub deviation: Option<&'a mut [f32]>,
@@ -56,16 +58,18 @@ pub struct Maps<'a> {
 impl<'a> Maps<'a> {
     /// Whether nothing is to be written.
     pub(super) fn is_empty(&self) -> bool {
-        self.heights.is_none() && self.deviation.is_none()
+        self.heights.is_none() && self.sigma.is_none() && self.deviation.is_none()
     }
 
     /// Those of one part of the frame after the other, of so many pixels each.
     pub(super) fn split(self, pixels: usize) -> impl Iterator<Item = Self> {
         let parts = |map: Option<&'a mut [f32]>| map.map(|map| map.chunks_mut(pixels));
-        let (mut heights, mut deviation) = (parts(self.heights), parts(self.deviation));
+        let (mut heights, mut sigma) = (parts(self.heights), parts(self.sigma));
+        let mut deviation = parts(self.deviation);
         core::iter::from_fn(move || {
             let maps = Self {
                 heights: heights.as_mut().and_then(Iterator::next),
+                sigma: sigma.as_mut().and_then(Iterator::next),
                 deviation: deviation.as_mut().and_then(Iterator::next),
             };
             (!maps.is_empty()).then_some(maps)
@@ -134,6 +138,10 @@ impl Strip {
                         self.heights
                             .store(golden, v, &mut heights[row..row + width]);
                     }
+                    if let Some(sigma) = &mut maps.sigma {
+                        let row = (v - self.rows.start) * width;
+                        self.store_sigma(plan, v, &mut sigma[row..row + width]);
+                    }
                 }
                 if let Some(deviation) = &mut maps.deviation
                     && self.rows.contains(&v)
@@ -144,6 +152,21 @@ impl Strip {
             }
             let rows = (&self.rows, &written);
             sums.squares.slide(with, gauges, v, &self.recent, rows);
+        }
+    }
+
+    /// Writes σ_z of row `v`, which was measured last, in mm; NaN where there is no height.
+    fn store_sigma(&self, plan: &Production, v: usize, sigma: &mut [f32]) {
+        // From the noise of independent pixels to that of the map.
+        let windows = libm::sqrt(plan.readings.budget.square_variance(1)) * 1e-6;
+        for (u, mm) in sigma.iter_mut().enumerate() {
+            *mm = if self.heights.offset[u] == NO_OFFSET {
+                f32::NAN
+            } else {
+                let slope = plan.golden.slope((u, v), self.decoded.phase[u]);
+                let nm = plan.phase.sigma_nm(self.decoded.modulation[u], slope);
+                (nm * windows) as f32
+            };
         }
     }
 
